@@ -1,0 +1,191 @@
+use std::path::PathBuf;
+
+use clap::{Args, Parser, ValueEnum};
+
+use crate::Error;
+
+/// Everything on the command line of a task.
+#[derive(Debug, Parser)]
+pub(crate) struct CommandLine<A: Args> {
+    /// What to do.
+    #[arg(value_enum, default_value = "solve")]
+    pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) settings: Settings,
+    #[command(flatten)]
+    pub(crate) args: A,
+}
+
+/// What a task binary can be asked to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Command {
+    /// Solve one instance and show it.
+    Solve,
+    /// Solve many seeds and give means with confidence intervals.
+    Evaluate,
+}
+
+impl Command {
+    /// Name on the command line and in the results.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Command::Solve => "solve",
+            Command::Evaluate => "evaluate",
+        }
+    }
+}
+
+/// Flags that all tasks have. `None` means that the task chooses, per variant if it likes.
+#[derive(Args, Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Variant of the task: the one a softness is tuned on, or the one it is transferred to.
+    #[arg(long, value_enum, default_value = "original")]
+    pub variant: Variant,
+
+    /// Softness: logistic, gauss, exp, gamma, mlp, or a softness file in JSON.
+    #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
+    pub softness: Option<SoftnessChoice>,
+
+    /// Width of the soft edge, in NDC (NDC² with --squared); positive.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    pub scale: Option<f64>,
+
+    /// Scale at the last step of a decay; implies --schedule decay.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    pub scale_end: Option<f64>,
+
+    /// Whether the scale stays or falls geometrically from --scale to --scale-end.
+    #[arg(long, value_enum)]
+    pub schedule: Option<Schedule>,
+
+    /// Feed the softness the squared distance.
+    #[arg(long)]
+    pub squared: bool,
+
+    /// Optimisation steps.
+    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    pub steps: Option<usize>,
+
+    /// Learning rate of the optimiser; positive.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    pub learning_rate: Option<f64>,
+
+    /// Width and height of the image, in pixels.
+    #[arg(long, value_name = "N", value_parser = size, allow_negative_numbers = true)]
+    pub size: Option<usize>,
+
+    /// Seed of the run; `evaluate` takes this one and those that follow.
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    pub seed: u64,
+
+    /// Number of seeds that `evaluate` takes.
+    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    pub runs: Option<usize>,
+
+    /// Folder for the results; made if missing [default: out/<task>].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+
+    /// Print one JSON object instead of the summary.
+    #[arg(long)]
+    pub json: bool,
+
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// The two variants of every task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Variant {
+    /// The one a softness is tuned on.
+    Original,
+    /// The one a tuned softness must also work on.
+    Transfer,
+}
+
+impl Variant {
+    /// Name on the command line and in the results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Variant::Original => "original",
+            Variant::Transfer => "transfer",
+        }
+    }
+}
+
+/// How the scale changes over a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Schedule {
+    /// It does not.
+    Static,
+    /// Geometrically from `--scale` to `--scale-end`.
+    Decay,
+}
+
+/// A softness as named on the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SoftnessChoice {
+    /// One of [`SoftnessChoice::NAMES`].
+    Named(&'static str),
+    /// A file, not opened yet.
+    File(PathBuf),
+}
+
+impl SoftnessChoice {
+    /// The names that the command line knows.
+    pub const NAMES: [&'static str; 5] = ["logistic", "gauss", "exp", "gamma", "mlp"];
+}
+
+impl Settings {
+    /// Checks what concerns several flags at once, and fills in what one flag says about another.
+    pub(crate) fn reconcile(&mut self, command: Command) -> Result<(), Error> {
+        match (self.schedule, self.scale_end) {
+            (Some(Schedule::Static), Some(_)) => {
+                return Err(Error::Usage(
+                    "--scale-end needs --schedule decay, but --schedule static was given".into(),
+                ));
+            }
+            (None, Some(_)) => self.schedule = Some(Schedule::Decay),
+            _ => {}
+        }
+        match (command, self.runs) {
+            (Command::Solve, Some(2..)) => Err(Error::Usage(
+                "solve makes one run: ask for more with the command evaluate".into(),
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn softness(text: &str) -> Result<SoftnessChoice, String> {
+    if let Some(name) = SoftnessChoice::NAMES.into_iter().find(|&name| name == text) {
+        return Ok(SoftnessChoice::Named(name));
+    }
+    if text.to_ascii_lowercase().ends_with(".json") {
+        return Ok(SoftnessChoice::File(text.into()));
+    }
+    Err(format!(
+        "expected one of {} or a file that ends in .json",
+        SoftnessChoice::NAMES.join(", ")
+    ))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
+        _ => Err("expected a positive number".into()),
+    }
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number from 1".into())
+}
+
+/// Larger images would not fit into memory.
+const LARGEST: usize = 4096;
+
+fn size(text: &str) -> Result<usize, String> {
+    let size = text.parse().ok().filter(|n| (1..=LARGEST).contains(n));
+    size.ok_or_else(|| format!("expected a whole number of pixels from 1 to {LARGEST}"))
+}
