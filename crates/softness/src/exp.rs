@@ -1,0 +1,39 @@
+use burn::tensor::{Tensor, backend::Backend};
+
+use crate::half_line::HalfLine;
+
+/// The exponential law, `F(y) = 1 - exp(-y)`; φ `[2]` is the logarithm of the scale, in the unit
+/// of x, and the shift in scales. Use it as [`Reversed`](crate::Reversed) or
+/// [`Forward`](crate::Forward).
+///
+/// Source: Wu et al. 2024, Sec. 4.2 (Exp); Petersen et al. 2022, Table 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exp;
+
+impl HalfLine for Exp {
+    const PARAMETERS: usize = 2;
+
+    fn split<B: Backend, const D: usize>(
+        _phi: &Tensor<B, 1>,
+        y: Tensor<B, D>,
+    ) -> (Tensor<B, D>, Tensor<B, D>) {
+        // 1 - exp(-y) without the difference: burn has no expm1.
+        let t = (y.clone() * 0.5).tanh();
+        (t.clone() * 2.0 / (t + 1.0), y.neg().exp())
+    }
+
+    fn slope<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
+        y.neg().exp()
+    }
+
+    fn depth<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
+        y
+    }
+
+    fn depth_slope<B: Backend, const D: usize>(
+        _phi: &Tensor<B, 1>,
+        y: Tensor<B, D>,
+    ) -> Tensor<B, D> {
+        y.ones_like()
+    }
+}

@@ -1,0 +1,125 @@
+use std::ops::RangeInclusive;
+
+use burn::tensor::{Tensor, backend::Backend};
+
+use crate::{half_line::HalfLine, ln_gamma::ln_gamma, parameter::parameter};
+
+/// The shapes that the fixed numbers of terms below are good for; others count as the nearest end.
+const SHAPES: RangeInclusive<f64> = 0.02..=20.0;
+
+/// Terms of the power series and of the continued fraction: below 2e-15 at the switch.
+const TERMS: usize = 48;
+
+/// The power series serves up to `p + SWITCH`, the continued fraction from there.
+const SWITCH: f64 = 2.0;
+
+/// Below this distance, in scales, the distribution function is a straight line from 0.
+///
+/// For `p < 1` the density grows without bound towards 0; it stops at that line's slope,
+/// `F(FLOOR) / FLOOR`: 1.1e4 per scale for p = 0.5.
+const FLOOR: f64 = 1e-8;
+
+/// The Gamma law, `F(y) = P(p, y)`, the regularised incomplete gamma function; φ `[3]` is the
+/// logarithm of the scale, in the unit of x, the logarithm of the shape p, and the shift in scales.
+/// Use it as [`Reversed`](crate::Reversed) or [`Forward`](crate::Forward).
+///
+/// Reversed with p = 0.5, `s = erfc(sqrt(-x / scale))` outside. Shapes lie in [0.02, 20]; closer
+/// than 1e-8 scales to the edge, s runs straight, so that the density stays finite for p < 1.
+///
+/// Source: Wu et al. 2024, Sec. 4.2 (Gamma, p = 0.5); Petersen et al. 2022, Table 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gamma;
+
+/// The pieces of the incomplete gamma function at one set of distances.
+struct Pieces<B: Backend, const D: usize> {
+    /// The shape, `[1; D]`.
+    p: Tensor<B, D>,
+    /// The distance, at least [`FLOOR`].
+    y: Tensor<B, D>,
+    /// Where the continued fraction serves.
+    far: Tensor<B, D, burn::tensor::Bool>,
+    /// `P(p, y)` where the series serves, 0 elsewhere.
+    below: Tensor<B, D>,
+    /// The continued fraction `y^p exp(-y) / (Γ(p) Q(p, y))`, at a farther distance where the
+    /// series serves.
+    fraction: Tensor<B, D>,
+    /// `-ln Q(p, y)` where the fraction serves.
+    far_depth: Tensor<B, D>,
+}
+
+impl<B: Backend, const D: usize> Pieces<B, D> {
+    fn new(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Self {
+        let p: Tensor<B, D> = parameter(phi, 1).clamp(SHAPES.start().ln(), SHAPES.end().ln()).exp();
+        let y = y.clamp_min(FLOOR);
+        let switch = p.clone() + SWITCH;
+        let far = (y.clone() - switch.clone()).greater_equal_elem(0.0);
+
+        // Both are selected by their argument, so that neither meets one that it cannot bear.
+        let y_near = y.clone().clamp_max(SHAPES.end() + SWITCH);
+        let ln_front = p.clone() * y_near.clone().log() - y_near.clone();
+        let below = (ln_front - ln_gamma(p.clone() + 1.0)).exp() * series(p.clone(), y_near);
+        let below = below.mask_fill(far.clone(), 0.0);
+
+        let y_far = (y.clone() + switch).mask_where(far.clone(), y.clone());
+        let fraction = fraction(p.clone(), y_far.clone());
+        let far_depth =
+            y_far.clone() - p.clone() * y_far.log() + ln_gamma(p.clone()) + fraction.clone().log();
+        Self { p, y, far, below, fraction, far_depth }
+    }
+}
+
+/// `Σ yⁿ / ((p + 1) … (p + n))`.
+fn series<B: Backend, const D: usize>(p: Tensor<B, D>, y: Tensor<B, D>) -> Tensor<B, D> {
+    (1..=TERMS)
+        .rev()
+        .fold(y.ones_like(), |sum, k| sum * y.clone() * (p.clone() + k as f64).recip() + 1.0)
+}
+
+/// `y + 1 - p - (1 - p) / (y + 3 - p - 2 (2 - p) / (y + 5 - p - …))`.
+fn fraction<B: Backend, const D: usize>(p: Tensor<B, D>, y: Tensor<B, D>) -> Tensor<B, D> {
+    let start = y - p.clone() + 1.0;
+    let deepest = start.clone() + 2.0 * TERMS as f64;
+    (1..=TERMS).rev().fold(deepest, |rest, k| {
+        let k = k as f64;
+        start.clone() + 2.0 * (k - 1.0) - (p.clone().neg() + k) * k / rest
+    })
+}
+
+impl HalfLine for Gamma {
+    const PARAMETERS: usize = 3;
+
+    fn split<B: Backend, const D: usize>(
+        phi: &Tensor<B, 1>,
+        y: Tensor<B, D>,
+    ) -> (Tensor<B, D>, Tensor<B, D>) {
+        let line = y.clone().clamp_max(FLOOR) / FLOOR;
+        let Pieces { far, below, far_depth, .. } = Pieces::new(phi, y);
+        let above = far_depth.neg().exp();
+        let below = below * line;
+        let (near_rest, far_rest) = (below.clone().neg() + 1.0, above.clone().neg() + 1.0);
+        (below.mask_where(far.clone(), far_rest), near_rest.mask_where(far, above))
+    }
+
+    fn slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
+        let close = y.clone().lower_elem(FLOOR);
+        let Pieces { p, y, below, .. } = Pieces::new(phi, y);
+        let curve = ((p.clone() - 1.0) * y.clone().log() - y - ln_gamma(p)).exp();
+        curve.mask_where(close, below / FLOOR)
+    }
+
+    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
+        let line = y.clone().clamp_max(FLOOR) / FLOOR;
+        let Pieces { far, below, far_depth, .. } = Pieces::new(phi, y);
+        (below * line).neg().log1p().neg().mask_where(far, far_depth)
+    }
+
+    fn depth_slope<B: Backend, const D: usize>(
+        phi: &Tensor<B, 1>,
+        y: Tensor<B, D>,
+    ) -> Tensor<B, D> {
+        let line = y.clone().clamp_max(FLOOR) / FLOOR;
+        let slope = Self::slope(phi, y.clone());
+        let Pieces { y, far, below, fraction, .. } = Pieces::new(phi, y);
+        (slope / ((below * line).neg() + 1.0)).mask_where(far, fraction / y)
+    }
+}

@@ -1,0 +1,56 @@
+use crate::mlp::{WEIGHTS, WIDTH};
+
+/// The logit far inside an untrained MLP: with 1280 faces on top of one another, what it leaves of
+/// them far outside adds up to 1e-3. Source: META 2.4, ln(1280 / 1e-3).
+const REACH: f64 = 14.1;
+
+/// Weights `[56]` of an MLP softness that has not been trained, drawn from `seed`.
+///
+/// They are uniform in [0, 1), then W5 is scaled so that the logit tends to 14.1 far inside, and W1
+/// so that its slope at 0 is `1 / scale`. Source: Wu et al. 2024, Sec. 4.1 (random uniform). Not in
+/// the paper: the two scalings, because without them a logit of at most 4 leaves every face visible
+/// everywhere.
+///
+/// # Panics
+///
+/// If `scale` is not positive.
+pub fn initial_mlp(seed: u64, scale: f64) -> Vec<f64> {
+    assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
+    let mut state = seed;
+    let mut weights: Vec<f64> = (0..WEIGHTS).map(|_| uniform(&mut state)).collect();
+
+    let (limit, _) = response(&weights, [1.0; WIDTH]);
+    weights[WEIGHTS - WIDTH..].iter_mut().for_each(|w| *w *= REACH / limit);
+    let first: [f64; WIDTH] = std::array::from_fn(|k| weights[k]);
+    let (_, slope) = response(&weights, first);
+    weights[..WIDTH].iter_mut().for_each(|w| *w /= slope * scale);
+    weights
+}
+
+/// The logit for a first hidden layer `h`, and its linear part in `h` (the slope at 0).
+fn response(weights: &[f64], h: [f64; WIDTH]) -> (f64, f64) {
+    let (mut full, mut slope) = (h, h);
+    for layer in 0..3 {
+        let matrix = &weights[WIDTH + layer * WIDTH * WIDTH..][..WIDTH * WIDTH];
+        let product = |v: [f64; WIDTH]| -> [f64; WIDTH] {
+            std::array::from_fn(|row| (0..WIDTH).map(|k| matrix[row * WIDTH + k] * v[k]).sum())
+        };
+        full = product(full);
+        slope = product(slope);
+        let skip = if layer == 2 { h } else { [0.0; WIDTH] };
+        full = std::array::from_fn(|k| (full[k] + skip[k]).tanh());
+        slope = std::array::from_fn(|k| slope[k] + skip[k]);
+    }
+    let last = &weights[WEIGHTS - WIDTH..];
+    let sum = |v: [f64; WIDTH]| (0..WIDTH).map(|k| last[k] * v[k]).sum();
+    (sum(full), sum(slope))
+}
+
+/// The next number of the `SplitMix64` generator, in [0, 1).
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
