@@ -1,1 +1,15 @@
-//! Placeholder.
+//! Triangle meshes for softrast: a careful OBJ reader and writer, and small generators.
+//!
+//! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
+//! has at least one face. Whatever breaks these rules is a [`MeshError`] of one line that names
+//! the file, the line and the reason. Nothing here depends on burn.
+
+mod clean;
+mod error;
+mod mesh;
+mod polygon;
+mod read;
+mod statements;
+
+pub use error::{LineError, MeshError};
+pub use mesh::Mesh;
