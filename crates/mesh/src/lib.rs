@@ -7,9 +7,11 @@
 mod clean;
 mod error;
 mod mesh;
+mod normalized;
 mod polygon;
 mod read;
 mod statements;
+mod write;
 
 pub use error::{LineError, MeshError};
 pub use mesh::Mesh;
