@@ -6,12 +6,17 @@
 
 mod clean;
 mod error;
+mod fox;
+mod icosphere;
 mod mesh;
 mod normalized;
 mod polygon;
 mod read;
 mod statements;
+mod surface_net;
 mod write;
 
 pub use error::{LineError, MeshError};
+pub use fox::fox;
+pub use icosphere::icosphere;
 pub use mesh::Mesh;
