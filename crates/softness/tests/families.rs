@@ -17,7 +17,7 @@ const STEP: f64 = 1e-5;
 
 /// Distances in scales, clear of the kinks at 0 and ±1 and of the point where Gamma changes method.
 const DISTANCES: [f64; 18] = [
-    -23.7, -11.3, -6.1, -2.9, -1.3, -0.77, -0.41, -0.17, -0.031, 0.029, 0.19, 0.43, 0.71, 1.37,
+    -23.7, -11.3, -6.1, -2.9, -1.3, -0.77, -0.41, -0.17, -0.093, 0.087, 0.19, 0.43, 0.71, 1.37,
     3.1, 5.9, 12.1, 24.3,
 ];
 
@@ -27,7 +27,7 @@ fn tensor<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
 }
 
 fn numbers<B: Backend>(tensor: Tensor<B, 1>) -> Vec<f64> {
-    tensor.into_data().to_vec().unwrap()
+    tensor.into_data().to_vec().expect("the tensor holds f64")
 }
 
 /// Families, as they are and of the squared distance, with φ moved away from its defaults.
@@ -147,7 +147,7 @@ fn families_rise_from_outside_to_inside() {
 fn gradient(curve: Curve, softness: EdgeSoftness, phi: &[f64], x: &[f64]) -> Vec<f64> {
     let at = tensor::<First>(phi).require_grad();
     let grads = curve.of(softness, at.clone(), tensor(x)).sum().backward();
-    numbers(at.grad(&grads).unwrap())
+    numbers(at.grad(&grads).expect("φ has a gradient"))
 }
 
 /// `f` differenced along entry `k` of `phi`.
@@ -186,7 +186,7 @@ fn second_order(
     let x = tensor::<First>(x).require_grad();
     let outer_x = Tensor::<Second, 1>::from_inner(x.clone()).require_grad();
     let y = curve.of(softness, Tensor::from_inner(phi.clone()), outer_x.clone());
-    let slope = outer_x.grad(&y.sum().backward()).unwrap();
+    let slope = outer_x.grad(&y.sum().backward()).expect("x has a gradient");
     let grads = slope.clone().sum().backward();
     let zeros = |like: &Tensor<First, 1>| like.clone().inner().zeros_like();
     let by_phi = phi.grad(&grads).unwrap_or_else(|| zeros(&phi));
