@@ -68,14 +68,10 @@ fn draw<DB: DrawingBackend>(
         .x_label_area_size(46)
         .y_label_area_size(78)
         .build_cartesian_2d(0.0..last_step, lowest..highest + room)?;
-    let name = match measure.unit {
-        "" => measure.name.to_owned(),
-        unit => format!("{} ({unit})", measure.name),
-    };
     chart
         .configure_mesh()
         .x_desc("step")
-        .y_desc(name)
+        .y_desc(measure.title())
         .y_labels(6)
         .x_label_formatter(&|step| format!("{step:.0}"))
         .y_label_formatter(&|value| tick(*value))

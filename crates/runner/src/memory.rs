@@ -13,9 +13,9 @@ mod tests {
     #[test]
     fn peak_memory_grows_by_what_is_touched() {
         let before = super::peak_rss_mib().unwrap();
-        let touched = vec![1_u8; 64 << 20];
+        let touched = std::hint::black_box(vec![1_u8; 64 << 20]);
         let after = super::peak_rss_mib().unwrap();
-        assert_eq!(touched[touched.len() - 1], 1);
+        drop(touched);
         assert!(after - before > 32.0, "{before} to {after} MiB");
     }
 }

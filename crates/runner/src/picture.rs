@@ -40,7 +40,7 @@ pub fn difference(target: &RgbImage, result: &RgbImage) -> RgbImage {
     })
 }
 
-/// Images side by side in rows of `columns`, with a thin gray line between them.
+/// Images side by side in rows of `columns`, with a thin gray line around each.
 ///
 /// Cells have the size of the largest image; smaller ones sit at the top left of theirs, on white.
 ///
@@ -54,14 +54,15 @@ pub fn contact_sheet(images: &[RgbImage], columns: usize) -> RgbImage {
     let width = images.iter().map(RgbImage::width).max().unwrap_or(0);
     let height = images.iter().map(RgbImage::height).max().unwrap_or(0);
     let (pitch_x, pitch_y) = (width + SEPARATOR, height + SEPARATOR);
-    let size = (columns * pitch_x - SEPARATOR, rows * pitch_y - SEPARATOR);
+    let size = (columns * pitch_x + SEPARATOR, rows * pitch_y + SEPARATOR);
     let mut sheet = RgbImage::from_fn(size.0, size.1, |x, y| {
-        let between = x % pitch_x >= width || y % pitch_y >= height;
-        if between { SEPARATOR_COLOUR } else { WHITE }
+        let line = x % pitch_x < SEPARATOR || y % pitch_y < SEPARATOR;
+        if line { SEPARATOR_COLOUR } else { WHITE }
     });
     for (k, image) in images.iter().enumerate() {
         let (column, row) = (k as u32 % columns, k as u32 / columns);
-        imageops::replace(&mut sheet, image, (column * pitch_x).into(), (row * pitch_y).into());
+        let (x, y) = (column * pitch_x + SEPARATOR, row * pitch_y + SEPARATOR);
+        imageops::replace(&mut sheet, image, x.into(), y.into());
     }
     sheet
 }
@@ -115,19 +116,25 @@ mod tests {
     }
 
     #[test]
-    fn contact_sheet_has_lines_between_cells_only() {
+    fn contact_sheet_has_lines_around_every_cell() {
         let sheet = contact_sheet(&[plain(4, 3, 1), plain(4, 3, 2), plain(2, 2, 3)], 2);
-        assert_eq!(sheet.dimensions(), (4 + SEPARATOR + 4, 3 + SEPARATOR + 3));
-        assert_eq!(sheet.get_pixel(3, 2).0, [1; 3]);
-        assert_eq!(*sheet.get_pixel(4, 2), SEPARATOR_COLOUR);
-        assert_eq!(sheet.get_pixel(4 + SEPARATOR, 0).0, [2; 3]);
-        assert_eq!(sheet.get_pixel(1, 3 + SEPARATOR + 1).0, [3; 3]);
-        assert_eq!(*sheet.get_pixel(3, 3 + SEPARATOR), WHITE);
+        assert_eq!(sheet.dimensions(), (2 * 4 + 3 * SEPARATOR, 2 * 3 + 3 * SEPARATOR));
+        let at = |x, y| sheet.get_pixel(x, y).0;
+        let second = (2 * SEPARATOR + 4, 2 * SEPARATOR + 3);
+        assert_eq!(at(SEPARATOR, SEPARATOR), [1; 3]);
+        assert_eq!(at(second.0, SEPARATOR), [2; 3]);
+        assert_eq!(at(SEPARATOR, second.1), [3; 3]);
+        assert_eq!(at(second.0, second.1), WHITE.0, "a cell without image");
+        assert_eq!(at(SEPARATOR + 2, second.1), WHITE.0, "beside a smaller image");
+        for line in [0, second.0 - 1, sheet.width() - 1] {
+            assert_eq!(at(line, SEPARATOR), SEPARATOR_COLOUR.0);
+        }
     }
 
     #[test]
     fn a_row_enlarges_by_whole_factors() {
         let row = labelled_row(&[("start", &plain(3, 3, 0)), ("result", &plain(3, 3, 0))], 10);
-        assert_eq!(row.dimensions(), (12 + SEPARATOR + 12, 12 + label::HEIGHT));
+        let height = 12 + label::HEIGHT + 2 * SEPARATOR;
+        assert_eq!(row.dimensions(), (2 * 12 + 3 * SEPARATOR, height));
     }
 }

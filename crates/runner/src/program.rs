@@ -44,13 +44,14 @@ pub fn execute<T: Task>(
     let mut line = match parse::<T>(&words) {
         Ok(line) => line,
         Err(help) if !help.use_stderr() => {
-            return Ok(write!(stdout, "{}", help.render()).context(STDOUT)?);
+            let text = help.render().to_string();
+            return Ok(writeln!(stdout, "{}", text.trim_end()).context(STDOUT)?);
         }
         Err(wrong) => return Err(wrong.into()),
     };
     line.settings.reconcile(line.command).map_err(anyhow::Error::from)?;
     let summary = work::<T>(&line, &repeat::<T>(&words))?;
-    for warning in &summary.warnings {
+    for warning in summary.first_warnings() {
         eprintln!("warning: {warning}");
     }
     let shown = match line.settings.json {

@@ -63,7 +63,7 @@ pub struct Settings {
     pub squared: bool,
 
     /// Optimisation steps.
-    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub steps: Option<usize>,
 
     /// Learning rate of the optimiser; positive.
@@ -75,14 +75,14 @@ pub struct Settings {
     pub size: Option<usize>,
 
     /// Seed of the run; `evaluate` takes this one and those that follow.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
 
     /// Number of seeds that `evaluate` takes.
-    #[arg(long, value_name = "N", value_parser = at_least_one, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub runs: Option<usize>,
 
-    /// Folder for the results; made if missing [default: out/<task>].
+    /// Folder for the results, `out` and the name of the task by default; made if missing.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
@@ -178,8 +178,12 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-fn at_least_one(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "expected a whole number from 1".into())
+/// More steps or runs than this are a slip of the finger.
+const MOST: usize = 1_000_000;
+
+fn count(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|n| (1..=MOST).contains(n));
+    count.ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
 }
 
 /// Larger images would not fit into memory.
@@ -188,4 +192,8 @@ const LARGEST: usize = 4096;
 fn size(text: &str) -> Result<usize, String> {
     let size = text.parse().ok().filter(|n| (1..=LARGEST).contains(n));
     size.ok_or_else(|| format!("expected a whole number of pixels from 1 to {LARGEST}"))
+}
+
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "expected a whole number from 0".into())
 }

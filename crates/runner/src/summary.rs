@@ -129,6 +129,17 @@ impl Summary {
         main.into_iter().flat_map(|error| std::iter::once(error).chain(error.more.values()))
     }
 
+    /// The first warnings, and how many more there are.
+    pub(crate) fn first_warnings(&self) -> Vec<String> {
+        const SHOWN: usize = 3;
+        let mut shown: Vec<String> = self.warnings.iter().take(SHOWN).cloned().collect();
+        match self.warnings.len().saturating_sub(SHOWN) {
+            0 => {}
+            more => shown.push(format!("and {more} more, listed in result.json")),
+        }
+        shown
+    }
+
     /// A few lines for people.
     pub(crate) fn text(&self) -> String {
         let mut lines = vec![self.head()];
@@ -148,10 +159,10 @@ impl Summary {
         lines.push(format!("  {:<22} {}", "success", self.success()));
         let memory = self.peak_memory_mib.map(|mib| format!(", peak memory {mib:.0} MiB"));
         lines.push(format!(
-            "  {:<22} {:.1} s, {:.1} ms per step{}",
+            "  {:<22} {:.1} s, {} ms per step{}",
             "time",
             self.seconds.total,
-            self.seconds.step_median * 1e3,
+            short(self.seconds.step_median * 1e3),
             memory.unwrap_or_default()
         ));
         lines.push(format!("  {:<22} {}", "report", self.out.join("report.html").display()));
@@ -167,7 +178,8 @@ impl Summary {
         let seeds = match self.runs {
             1 => format!("seed {}", self.seed),
             n => {
-                format!("seeds {} to {}, means over {n} runs", self.seed, self.seed + n as u64 - 1)
+                let last = self.seed.wrapping_add(n as u64 - 1);
+                format!("means over {n} runs, seeds {} to {last}", self.seed)
             }
         };
         let (task, variant, softness, steps) =
@@ -177,12 +189,12 @@ impl Summary {
 
     /// How often the runs succeeded and what that means.
     pub(crate) fn success(&self) -> String {
-        let means = &self.success_means;
+        let asked = &self.success_means;
         match self.success_ci95 {
-            None if self.success_rate > 0.0 => format!("yes: {means}"),
-            None => format!("no; it would be if {means}"),
+            None if self.success_rate > 0.0 => format!("yes (asked: {asked})"),
+            None => format!("no (asked: {asked})"),
             Some([low, high]) => format!(
-                "{:.1} % of runs: {means} (95 % interval {:.1} to {:.1} %)",
+                "{:.1} % of runs, 95 % interval {:.1} to {:.1} % (asked: {asked})",
                 self.success_rate * 100.0,
                 low * 100.0,
                 high * 100.0
@@ -192,6 +204,11 @@ impl Summary {
 }
 
 impl ErrorSummary {
+    /// Name with the unit.
+    pub(crate) fn title(&self) -> String {
+        Measure { name: self.name, unit: self.unit }.title()
+    }
+
     fn new(measure: Measure, runs: &[Run], many: bool, of: impl Fn(&Point) -> f64) -> Self {
         let each = |pick: fn(&[f64]) -> f64| -> Vec<f64> {
             runs.iter().map(|run| pick(&run.curve.iter().map(&of).collect::<Vec<_>>())).collect()
@@ -210,12 +227,27 @@ impl ErrorSummary {
     }
 }
 
-/// A number with four digits that count.
+/// A number with about four digits that count.
 pub(crate) fn short(x: f64) -> String {
-    let size = x.abs();
-    if size != 0.0 && !(1e-3..1e5).contains(&size) {
-        return format!("{x:.3e}");
+    match x.abs() {
+        0.0 => "0".into(),
+        1e-3..1.0 => format!("{x:.4}"),
+        1.0..10.0 => format!("{x:.3}"),
+        10.0..100.0 => format!("{x:.2}"),
+        100.0..1e3 => format!("{x:.1}"),
+        1e3..1e6 => format!("{x:.0}"),
+        _ => format!("{x:.3e}"),
     }
-    let whole = if size < 1.0 { 0 } else { size.log10() as usize };
-    format!("{x:.*}", 3_usize.saturating_sub(whole).max(if size < 1.0 { 4 } else { 0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn numbers_are_cut_to_about_four_digits() {
+        let shown = [0.0, 0.012345, 1.23456, -12.3456, 123.456, 12345.6, 1e-9, 2.5e7].map(short);
+        let expected = ["0", "0.0123", "1.235", "-12.35", "123.5", "12346", "1.000e-9", "2.500e7"];
+        assert_eq!(shown, expected);
+    }
 }

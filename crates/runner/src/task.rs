@@ -109,6 +109,16 @@ pub struct Measure {
     pub unit: &'static str,
 }
 
+impl Measure {
+    /// Name with the unit, such as `camera angle (degrees)`.
+    pub(crate) fn title(&self) -> String {
+        match self.unit {
+            "" => self.name.to_owned(),
+            unit => format!("{} ({unit})", self.name),
+        }
+    }
+}
+
 /// An error beside the two that every task has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExtraError {
