@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::{CommandFactory, FromArgMatches};
 
 use crate::{
-    Command, Failure, Progress, Run, Task, animation, chart,
+    Command, Error, Failure, Progress, Run, Task, animation, chart,
     folder::{self, Folder},
     job, picture, report,
     settings::CommandLine,
@@ -35,7 +35,8 @@ pub fn main<T: Task>() -> ExitCode {
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line; then no result file was touched.
+/// Everything that should end the program with an error line. Unless only `stdout` failed, no
+/// result file was touched then.
 pub fn execute<T: Task>(
     words: impl IntoIterator<Item = OsString>,
     stdout: &mut dyn Write,
@@ -79,7 +80,7 @@ fn work<T: Task>(line: &CommandLine<T::Args>, command: &str) -> anyhow::Result<S
     let task = T::prepare(settings, &line.args)?;
     let description = task.describe();
     let out = settings.out.clone().unwrap_or_else(|| PathBuf::from("out").join(T::NAME));
-    let mut folder = Folder::open(&out)?;
+    let folder = Folder::open(&out)?;
 
     let count = match line.command {
         Command::Solve => 1,
@@ -100,15 +101,26 @@ fn work<T: Task>(line: &CommandLine<T::Args>, command: &str) -> anyhow::Result<S
     let chart = chart::svg(&description, &runs)?;
     let pictures = Encoded::new(&runs)?;
     let page = report::html(T::ABOUT, &summary, &runs, &chart, pictures.as_ref(), command);
-    if let Some(pictures) = &pictures {
+    let curve = table::csv(&description, &runs);
+    write(folder, pictures.as_ref(), &curve, &page, &serde_json::to_vec_pretty(&summary)?)?;
+    Ok(summary)
+}
+
+fn write(
+    mut folder: Folder,
+    pictures: Option<&Encoded>,
+    curve: &str,
+    page: &str,
+    result: &[u8],
+) -> Result<(), Error> {
+    if let Some(pictures) = pictures {
         folder.stage(folder::BEFORE_AFTER, &pictures.before_after)?;
         folder.stage(folder::ANIMATION, &pictures.animation)?;
     }
-    folder.stage(folder::CURVE, table::csv(&description, &runs).as_bytes())?;
+    folder.stage(folder::CURVE, curve.as_bytes())?;
     folder.stage(folder::REPORT, page.as_bytes())?;
-    folder.stage(folder::RESULT, &serde_json::to_vec_pretty(&summary)?)?;
-    folder.commit()?;
-    Ok(summary)
+    folder.stage(folder::RESULT, result)?;
+    folder.commit()
 }
 
 /// Pictures of the first run as files.

@@ -120,7 +120,7 @@ fn results(summary: &Summary) -> String {
     let many = summary.success_ci95.is_some();
     let mut text = String::from("<table>\n<thead><tr><th>Error</th>");
     let interval = if many { &["95 % interval of the end"][..] } else { &[] };
-    for name in ["Start", "End", "Best step"].iter().chain(interval) {
+    for name in ["Start", "End", "Lowest"].iter().chain(interval) {
         text += &format!("<th class=\"number\">{name}</th>");
     }
     text += "</tr></thead>\n<tbody>\n";
@@ -134,21 +134,25 @@ fn results(summary: &Summary) -> String {
         }
         text += "</tr>\n";
     }
-    let over =
-        if many { " Errors are means over the runs; \"best step\" is each run's own." } else { "" };
     let _ = write!(
         text,
-        "</tbody>\n</table>\n<p><strong>Success:</strong> {}.</p>\n<p class=\"note\">Lower is \
-         better.{over} {:.1} s in all, {} ms per step{}.</p>\n",
+        "</tbody>\n</table>\n<p><strong>Success:</strong> {}.</p>\n<p class=\"note\">{}</p>\n",
         escape(&summary.success()),
-        summary.seconds.total,
-        short(summary.seconds.step_median * 1e3),
-        summary
-            .peak_memory_mib
-            .map(|mib| format!(", peak memory {mib:.0} MiB"))
-            .unwrap_or_default(),
+        results_note(summary),
     );
     text
+}
+
+fn results_note(summary: &Summary) -> String {
+    let means = if summary.runs > 1 { " All are means over the runs." } else { "" };
+    let memory = summary.peak_memory_mib.map(|mib| format!(", peak memory {mib:.0} MiB"));
+    format!(
+        "The lower the better; \"lowest\" is over all steps, for each error by itself.{means} \
+         {:.1} s in all, {} ms per step{}.",
+        summary.seconds.total,
+        short(summary.seconds.step_median * 1e3),
+        memory.unwrap_or_default()
+    )
 }
 
 /// How every run ended, folded away; nothing for a single run.

@@ -90,12 +90,6 @@ impl Summary {
         };
         let successes = runs.iter().filter(|run| run.success).count();
         let steps: Vec<f64> = runs.iter().flat_map(|run| run.step_seconds.clone()).collect();
-        let mut warnings: Vec<String> = Vec::new();
-        for warning in runs.iter().flat_map(|run| &run.warnings) {
-            if !warnings.contains(warning) {
-                warnings.push(warning.clone());
-            }
-        }
         Self {
             task,
             command: command.name(),
@@ -118,7 +112,7 @@ impl Summary {
             seconds: Seconds { total: seconds, step_median: median(&steps) },
             peak_memory_mib: peak_rss_mib(),
             settings: description.settings.clone(),
-            warnings,
+            warnings: distinct_warnings(runs),
             out,
         }
     }
@@ -201,6 +195,16 @@ impl Summary {
             ),
         }
     }
+}
+
+fn distinct_warnings(runs: &[Run]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for warning in runs.iter().flat_map(|run| &run.warnings) {
+        if !warnings.contains(warning) {
+            warnings.push(warning.clone());
+        }
+    }
+    warnings
 }
 
 impl ErrorSummary {
