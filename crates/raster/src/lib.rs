@@ -1,1 +1,24 @@
-//! Placeholder.
+//! Differentiable soft rasterizer ops on burn: cameras, silhouettes, exact second order.
+//!
+//! A silhouette is a sum over faces of a one-dimensional function of the signed distance
+//! ([`profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
+//! softness and the T-conorm ([`Profile`]). [`Rasterizer`] puts the pieces together;
+//! [`reference`] is the same in plain tensor ops over every pixel-face pair.
+
+mod backend;
+mod camera;
+mod hard;
+mod kernel;
+mod loss;
+mod profile;
+pub mod reference;
+mod silhouette;
+mod t_conorm;
+
+pub use backend::{ProfileSum, RasterBackend, profile_sum};
+pub use camera::{NEAR, project, view_rotation};
+pub use hard::hard_silhouette;
+pub use loss::{iou_loss, mse_loss};
+pub use profile::Profile;
+pub use silhouette::{Rasterizer, Silhouette};
+pub use t_conorm::{TConorm, UnknownTConorm};

@@ -1,0 +1,38 @@
+use std::sync::Arc;
+
+use burn::tensor::{Tensor, TensorData, backend::Backend};
+
+use crate::{NEAR, kernel::inside_spans};
+
+/// Hard silhouettes: 1 where the centre of a pixel lies in a face (edges included), else 0.
+///
+/// `vertices` `[views, vertices, 3]`: x and y in NDC, depth. The result is `[views, size, size]`,
+/// top row first, in the float type of `vertices`; it has no gradient. Used for targets and metrics.
+/// Faces that the soft rasterizer does not draw are not drawn here either.
+///
+/// Source: FACTS 1.5 (hard), 1.1 (pixel centres).
+///
+/// # Panics
+///
+/// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
+pub fn hard_silhouette<B: Backend>(
+    vertices: Tensor<B, 3>,
+    faces: &Arc<[[u32; 3]]>,
+    size: usize,
+) -> Tensor<B, 3> {
+    let [views, count, _] = vertices.dims();
+    let (device, dtype) = (vertices.device(), vertices.dtype());
+    let vertices: Vec<f64> = vertices.into_data().iter().collect();
+    let mut image = vec![0.0f64; views * size * size];
+    for view in 0..views {
+        let vertices = &vertices[3 * count * view..3 * count * (view + 1)];
+        let image = &mut image[size * size * view..size * size * (view + 1)];
+        for face in faces.iter() {
+            let corners = face.map(|v| &vertices[3 * v as usize..3 * v as usize + 3]);
+            inside_spans(corners, NEAR, size, |row, start, end| {
+                image[row * size + start..row * size + end].fill(1.0);
+            });
+        }
+    }
+    Tensor::from_data(TensorData::new(image, [views, size, size]), (&device, dtype))
+}

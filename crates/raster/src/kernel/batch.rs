@@ -1,0 +1,238 @@
+//! Pixels against one face, as a structure of arrays.
+//!
+//! The pixels of a face's rows are lined up so that every loop here runs over contiguous numbers
+//! with no branch: the compiler turns each into vector code for the instruction set in force.
+
+use super::{
+    face::Face,
+    pair::closest,
+    real::{Float, Real},
+    table::Lookup,
+};
+
+/// Pixels computed together: one vector of f32 where vectors are widest. The inner loops over them
+/// have this constant length, which the compiler turns into straight vector code.
+pub(crate) const LANES: usize = 16;
+/// Most pixels in a batch, in units of [`LANES`].
+const CHUNKS: usize = 16;
+/// Batches are filled up to whole chunks with pixels that stand here, in NDC: beyond every image
+/// and support, finite when squared in f32.
+const NOWHERE: f64 = 1e15;
+
+type Chunk<N> = [N; LANES];
+
+/// Pixels waiting for one face. Reused from face to face.
+pub(crate) struct Batch<T: Real> {
+    len: usize,
+    px: [Chunk<T::Float>; CHUNKS],
+    py: [Chunk<T::Float>; CHUNKS],
+    /// Position of the pixel in the band.
+    at: [Chunk<u32>; CHUNKS],
+    /// From the closest point to the pixel.
+    dx: [Chunk<T>; CHUNKS],
+    dy: [Chunk<T>; CHUNKS],
+    /// Barycentric weights of the closest point.
+    weights: [[Chunk<T>; 3]; CHUNKS],
+    /// Row of the table.
+    row: [Chunk<u32>; CHUNKS],
+    /// Place within the cell, in [0, 1], and its derivative by the squared distance.
+    t: [Chunk<T>; CHUNKS],
+    rate: [Chunk<T::Float>; CHUNKS],
+}
+
+impl<T: Real> Batch<T> {
+    pub(crate) fn new() -> Self {
+        Self {
+            len: 0,
+            px: [[T::Float::ZERO; LANES]; CHUNKS],
+            py: [[T::Float::ZERO; LANES]; CHUNKS],
+            at: [[0; LANES]; CHUNKS],
+            dx: [[T::ZERO; LANES]; CHUNKS],
+            dy: [[T::ZERO; LANES]; CHUNKS],
+            weights: [[[T::ZERO; LANES]; 3]; CHUNKS],
+            row: [[0; LANES]; CHUNKS],
+            t: [[T::ZERO; LANES]; CHUNKS],
+            rate: [[T::Float::ZERO; LANES]; CHUNKS],
+        }
+    }
+
+    /// Adds up to [`LANES`] of `count` pixels of a row and returns how many that was. `centres`
+    /// starts with their x and holds a whole chunk; `at` is the position of the first in the band.
+    #[inline(always)]
+    pub(crate) fn push(
+        &mut self,
+        centres: &[T::Float],
+        count: usize,
+        py: T::Float,
+        at: usize,
+    ) -> usize {
+        // A whole chunk is written; what is too much is written over by the next.
+        let range = self.len..self.len + LANES;
+        let centres: &Chunk<T::Float> = centres[..LANES].try_into().expect("a whole chunk");
+        self.px.as_flattened_mut()[range.clone()].copy_from_slice(centres);
+        self.py.as_flattened_mut()[range.clone()].copy_from_slice(&[py; LANES]);
+        let mut positions = [at as u32; LANES];
+        for (lane, position) in positions.iter_mut().enumerate() {
+            *position += lane as u32;
+        }
+        self.at.as_flattened_mut()[range].copy_from_slice(&positions);
+        let count = count.min(LANES);
+        self.len += count;
+        count
+    }
+
+    /// Whether there is no room for another chunk.
+    #[inline(always)]
+    pub(crate) fn is_full(&self) -> bool {
+        self.len > (CHUNKS - 2) * LANES
+    }
+
+    /// Whether no pixel waits.
+    #[inline(always)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Forgets the pixels.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    #[inline(always)]
+    fn chunks(&self) -> usize {
+        self.len.div_ceil(LANES)
+    }
+
+    /// Closest points of the waiting pixels and their places in the profile table; `GRADIENT`
+    /// keeps what the gradient needs of them.
+    #[inline(always)]
+    pub(crate) fn places<const GRADIENT: bool>(
+        &mut self,
+        face: &Face<T>,
+        lookup: &Lookup<T::Float>,
+    ) {
+        let nowhere = [T::Float::from_f64(NOWHERE); LANES];
+        let rest = self.len..self.len + LANES;
+        self.px.as_flattened_mut()[rest.clone()].copy_from_slice(&nowhere);
+        self.py.as_flattened_mut()[rest].copy_from_slice(&nowhere);
+        for c in 0..self.chunks() {
+            for i in 0..LANES {
+                let point = closest(face, self.px[c][i], self.py[c][i]);
+                let inside = point.inside >= T::Float::ZERO;
+                let inverse = lookup.inverse(inside);
+                let y = point.distance2.scale(inverse);
+                let place = lookup.place(y.value(), inside);
+                self.row[c][i] = place.row;
+                self.t[c][i] = (y - T::constant(place.start)).scale(place.rate);
+                if GRADIENT {
+                    self.rate[c][i] = place.rate * inverse;
+                    self.dx[c][i] = point.dx;
+                    self.dy[c][i] = point.dy;
+                    self.weights[c][0][i] = point.weights[0];
+                    self.weights[c][1][i] = point.weights[1];
+                    self.weights[c][2][i] = point.weights[2];
+                }
+            }
+        }
+    }
+
+    /// Cubics of the cells of a chunk.
+    #[inline(always)]
+    fn cubics(&self, chunk: usize, table: &[[T; 4]]) -> [Chunk<T>; 4] {
+        let mut rows = [[T::ZERO; 4]; LANES];
+        for i in 0..LANES {
+            rows[i] = table[self.row[chunk][i] as usize];
+        }
+        let mut cubics = [[T::ZERO; LANES]; 4];
+        for i in 0..LANES {
+            cubics[0][i] = rows[i][0];
+            cubics[1][i] = rows[i][1];
+            cubics[2][i] = rows[i][2];
+            cubics[3][i] = rows[i][3];
+        }
+        cubics
+    }
+
+    /// Adds `profile - tail` to the pixels of the band.
+    #[inline(always)]
+    pub(crate) fn add_values(&self, table: &[[T; 4]], image: &mut [T], tail: T) {
+        for chunk in 0..self.chunks() {
+            let [a, b, c, d] = self.cubics(chunk, table);
+            let mut values = [T::ZERO; LANES];
+            for i in 0..LANES {
+                let t = self.t[chunk][i];
+                values[i] = a[i] + t * (b[i] + t * (c[i] + t * d[i])) - tail;
+            }
+            let count = LANES.min(self.len - chunk * LANES);
+            for (at, value) in self.at[chunk][..count].iter().zip(values) {
+                image[*at as usize] += value;
+            }
+        }
+    }
+
+    /// Adds the gradient to x and y of the three corners, without its factor -2.
+    #[inline(always)]
+    pub(crate) fn add_corners(&self, table: &[[T; 4]], upstream: &[T::Float], sums: &mut [T; 6]) {
+        let two = T::Float::from_f64(2.0);
+        let three = T::Float::from_f64(3.0);
+        let mut lanes = [[T::ZERO; LANES]; 6];
+        for chunk in 0..self.chunks() {
+            let [_, b, c, d] = self.cubics(chunk, table);
+            let mut g = [T::Float::ZERO; LANES];
+            let count = LANES.min(self.len - chunk * LANES);
+            for (g, at) in g.iter_mut().zip(&self.at[chunk][..count]) {
+                *g = upstream[*at as usize];
+            }
+            let weights = &self.weights[chunk];
+            for i in 0..LANES {
+                let t = self.t[chunk][i];
+                let slope = b[i] + t * (c[i].scale(two) + t * d[i].scale(three));
+                let pull = slope.scale(self.rate[chunk][i] * g[i]);
+                let (x, y) = (pull * self.dx[chunk][i], pull * self.dy[chunk][i]);
+                lanes[0][i] += x * weights[0][i];
+                lanes[1][i] += y * weights[0][i];
+                lanes[2][i] += x * weights[1][i];
+                lanes[3][i] += y * weights[1][i];
+                lanes[4][i] += x * weights[2][i];
+                lanes[5][i] += y * weights[2][i];
+            }
+        }
+        for (sum, lanes) in sums.iter_mut().zip(lanes) {
+            *sum += tree_sum(lanes);
+        }
+    }
+
+    /// Adds the gradient to the coefficients of the cells, and the sum of `upstream` to `visited`.
+    #[inline(always)]
+    pub(crate) fn add_table(
+        &self,
+        upstream: &[T::Float],
+        table: &mut [[T; 4]],
+        visited: &mut T::Float,
+    ) {
+        let [at, row] = [&self.at, &self.row].map(|a| &a.as_flattened()[..self.len]);
+        for ((at, row), &t) in at.iter().zip(row).zip(self.t.as_flattened()) {
+            let g = upstream[*at as usize];
+            let mut power = T::constant(g);
+            for coefficient in &mut table[*row as usize] {
+                *coefficient += power;
+                power = power * t;
+            }
+            *visited += g;
+        }
+    }
+}
+
+/// Sum in a fixed order that vectorises.
+#[inline(always)]
+fn tree_sum<T: Real>(mut lanes: Chunk<T>) -> T {
+    let mut width = LANES / 2;
+    while width > 0 {
+        for i in 0..width {
+            lanes[i] = lanes[i] + lanes[i + width];
+        }
+        width /= 2;
+    }
+    lanes[0]
+}

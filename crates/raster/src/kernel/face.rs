@@ -1,0 +1,200 @@
+//! One projected triangle: its edges, and the pixels of a row that its support can reach.
+
+use super::real::{Float, Real};
+
+/// Edge vectors shorter than this (NDC², squared length) count as a point.
+const POINT: f64 = 1e-30;
+/// Projected coordinates beyond this (NDC) are not drawn: their squares would leave the f32 range.
+const FAR_AWAY: f64 = 1e9;
+
+/// A projected triangle prepared for distances; corner k starts edge k.
+#[derive(Clone, Copy)]
+pub(crate) struct Face<T: Real> {
+    pub(crate) x: [T; 3],
+    pub(crate) y: [T; 3],
+    pub(crate) edge_x: [T; 3],
+    pub(crate) edge_y: [T; 3],
+    /// One over the squared length of each edge; 0 for an edge that is a point.
+    pub(crate) inverse: [T; 3],
+    /// Sign of the area; 0 for a triangle without area.
+    pub(crate) orientation: T::Float,
+    /// What `orientation * edge function` must reach inside: 0, or 1 to say never.
+    pub(crate) threshold: T::Float,
+}
+
+impl<T: Real> Face<T> {
+    /// Prepares the triangle with the given corners (NDC).
+    #[inline(always)]
+    pub(crate) fn new(x: [T; 3], y: [T; 3]) -> Self {
+        let zero = T::Float::ZERO;
+        let one = T::Float::ONE;
+        let mut edge_x = [T::ZERO; 3];
+        let mut edge_y = [T::ZERO; 3];
+        let mut inverse = [T::ZERO; 3];
+        for k in 0..3 {
+            let next = (k + 1) % 3;
+            edge_x[k] = x[next] - x[k];
+            edge_y[k] = y[next] - y[k];
+            let length2 = edge_x[k] * edge_x[k] + edge_y[k] * edge_y[k];
+            if length2.value() > T::Float::from_f64(POINT) {
+                inverse[k] = length2.recip();
+            }
+        }
+        let area = edge_x[0].value() * edge_y[1].value() - edge_y[0].value() * edge_x[1].value();
+        let orientation = if area > zero {
+            one
+        } else if area < zero {
+            -one
+        } else {
+            zero
+        };
+        let threshold = if orientation == zero { one } else { zero };
+        Self { x, y, edge_x, edge_y, inverse, orientation, threshold }
+    }
+}
+
+/// Bounding box of a face in NDC: lower x, upper x, lower y, upper y.
+pub(crate) type Bounds = [f64; 4];
+
+/// Bounding box of a face; `None` where the face is not drawn: a corner nearer than `near`, behind
+/// the camera, not finite or farther than 1e9 NDC away.
+#[inline]
+pub(crate) fn bounds<F: Float>(corners: [&[F]; 3], near: f64) -> Option<Bounds> {
+    let mut bounds = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
+    for corner in corners {
+        let [x, y, z] = [corner[0].to_f64(), corner[1].to_f64(), corner[2].to_f64()];
+        // Written so that NaN is not drawn either.
+        if !(z >= near && x.abs() <= FAR_AWAY && y.abs() <= FAR_AWAY) {
+            return None;
+        }
+        bounds = [bounds[0].min(x), bounds[1].max(x), bounds[2].min(y), bounds[3].max(y)];
+    }
+    Some(bounds)
+}
+
+/// Rows of a `size` px image, top row first, whose centres lie in [low, high] (NDC, y up).
+#[inline]
+pub(crate) fn rows(low: f64, high: f64, size: usize) -> (usize, usize) {
+    columns(-high, -low, size)
+}
+
+/// Columns of a `size` px image whose centres lie in [low, high] (NDC), as a half-open range.
+#[inline]
+pub(crate) fn columns(low: f64, high: f64, size: usize) -> (usize, usize) {
+    let size = size as f64;
+    let start = (((low + 1.0) * size - 1.0) * 0.5).ceil().clamp(0.0, size);
+    let end = (((high + 1.0) * size - 1.0) * 0.5).floor().clamp(-1.0, size - 1.0) + 1.0;
+    (start as usize, end as usize)
+}
+
+/// The three edges of a face as limits on x in a given row.
+pub(crate) struct Spans<F> {
+    // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
+    // out of reach.
+    low: [F; 3],
+    high: [F; 3],
+    tilt: [F; 3],
+}
+
+impl<F: Float> Spans<F> {
+    /// Limits for pixels no farther than `radius` outside the face.
+    #[inline(always)]
+    pub(crate) fn new<T: Real<Float = F>>(face: &Face<T>, radius: F) -> Self {
+        let never = F::from_f64(FAR_AWAY);
+        let mut spans = Self { low: [-never; 3], high: [never; 3], tilt: [F::ZERO; 3] };
+        for k in 0..3 {
+            let ex = face.edge_x[k].value() * face.orientation;
+            let ey = face.edge_y[k].value() * face.orientation;
+            let (x, y) = (face.x[k].value(), face.y[k].value());
+            // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for
+            // an edge that is all but horizontal, or for a face without area.
+            let flat = F::from_f64(1e-3);
+            if ey * ey <= flat * flat * ex * ex {
+                continue;
+            }
+            let inverse = ey.recip();
+            let tilt = ex * inverse;
+            let reach = radius * (F::ONE + tilt * tilt).sqrt();
+            spans.tilt[k] = tilt;
+            let bound = x - tilt * y;
+            if ey < F::ZERO {
+                spans.low[k] = bound - reach;
+            } else {
+                spans.high[k] = bound + reach;
+            }
+        }
+        spans
+    }
+
+    /// Columns that all three edges allow in the rows at heights `y`, within the columns `within`:
+    /// first column and the one after the last.
+    #[inline(always)]
+    pub(crate) fn columns<const N: usize>(
+        &self,
+        y: &[F; N],
+        within: (usize, usize),
+        size: usize,
+    ) -> ([i32; N], [i32; N]) {
+        let half = F::from_f64(0.5 * size as f64);
+        let middle = F::from_f64(0.5 * (size as f64 - 1.0));
+        // A hundredth of a pixel makes up for rounding.
+        let margin = F::from_f64(0.01);
+        let limits = [within.0, within.1].map(|column| F::from_f64(column as f64));
+        let mut starts = [0; N];
+        let mut ends = [0; N];
+        for i in 0..N {
+            let (mut low, mut high) = (-F::ONE - F::ONE, F::ONE + F::ONE);
+            for k in 0..3 {
+                let shift = self.tilt[k] * y[i];
+                let (l, h) = (self.low[k] + shift, self.high[k] + shift);
+                low = if l > low { l } else { low };
+                high = if h < high { h } else { high };
+            }
+            // Truncation rounds up the first and down the last column, as neither is negative.
+            let low = low * half + middle - margin + F::ONE;
+            let high = high * half + middle + margin + F::ONE;
+            let low = if low > limits[0] { low } else { limits[0] };
+            let high = if high < limits[1] { high } else { limits[1] };
+            starts[i] = low.truncate();
+            ends[i] = if high > F::ZERO { high } else { F::ZERO }.truncate();
+        }
+        (starts, ends)
+    }
+}
+
+/// Calls `fill(row, start, end)` for the pixels whose centre a face covers (edges included).
+pub(crate) fn inside_spans<F: Float>(
+    corners: [&[F]; 3],
+    near: f64,
+    size: usize,
+    mut fill: impl FnMut(usize, usize, usize),
+) {
+    let Some([x0, x1, y0, y1]) = bounds(corners, near) else { return };
+    // Exact decisions: the edge functions of the corners as given, in f64.
+    let at = |k: usize, axis: usize| corners[k][axis].to_f64();
+    let face = Face::<f64>::new([at(0, 0), at(1, 0), at(2, 0)], [at(0, 1), at(1, 1), at(2, 1)]);
+    if face.orientation == 0.0 {
+        return;
+    }
+    let (top, bottom) = rows(y0, y1, size);
+    let (left, right) = columns(x0, x1, size);
+    for row in top..bottom {
+        let y = pixel_centre(size - 1 - row, size);
+        let covers = |column: &usize| {
+            let x = pixel_centre(*column, size);
+            (0..3).all(|k| {
+                let (wx, wy) = (x - face.x[k], y - face.y[k]);
+                face.orientation * (face.edge_x[k] * wy - face.edge_y[k] * wx) >= 0.0
+            })
+        };
+        let Some(start) = (left..right).find(covers) else { continue };
+        let end = (start..right).find(|column| !covers(column)).unwrap_or(right);
+        fill(row, start, end);
+    }
+}
+
+/// Centre of pixel `index` along an axis in NDC; rows count from the bottom here.
+#[inline]
+pub(crate) fn pixel_centre(index: usize, size: usize) -> f64 {
+    (2.0 * index as f64 + 1.0 - size as f64) / size as f64
+}

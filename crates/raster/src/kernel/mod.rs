@@ -1,0 +1,22 @@
+//! The fused op on the CPU: plain Rust over slices, no burn type in sight.
+//!
+//! One traversal serves every pass. A view is cut into bands of rows; each band lists the faces
+//! whose support reaches it and walks their pixels in blocks of a row. Bands are independent, so
+//! they run in parallel, and every sum is taken in an order that does not depend on the number of
+//! threads. The arithmetic of a pixel-face pair is written once, generic over [`Real`]: floats give
+//! the image and its gradient, dual numbers give both second-order products.
+
+mod bands;
+mod batch;
+mod face;
+mod pair;
+mod real;
+mod sum;
+mod table;
+
+pub(crate) use face::inside_spans;
+pub(crate) use real::Float;
+pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};
+pub(crate) use table::Grid;
+#[cfg(test)]
+mod probe;

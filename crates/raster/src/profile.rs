@@ -1,0 +1,266 @@
+use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use softrast_softness::{Softness, support};
+
+use crate::{TConorm, kernel::Grid};
+
+/// Octaves of the squared distance that a table may resolve, and cells in an octave (as a power of
+/// two) that it may use, coarsest first.
+const OCTAVES: [u32; 5] = [16, 24, 36, 56, 80];
+const BITS: std::ops::RangeInclusive<u32> = 2..=7;
+/// Stands in for a support that does not end, in NDC.
+const EVERYWHERE: f64 = 1e4;
+/// A side that is constant still needs a cell.
+const NARROWEST: f64 = 1e-9;
+
+/// A softness under a T-conorm as a piecewise cubic function of the squared distance: what
+/// [`profile_sum`](crate::profile_sum) adds up over the faces of a pixel.
+///
+/// The table consists of two one-sided halves that meet at the edge of the face, where families
+/// kink or rise with infinite slope. Its cells are spaced by the leading bits of the squared
+/// distance: each octave holds the same number of cells, so that no family needs a spacing of its
+/// own, and a look-up needs no logarithm, no square root and no search.
+///
+/// Only the values and slopes at the knots touch the softness. They are tensor ops, so gradients of
+/// any order reach its parameters, and an MLP costs no more per pixel than a logistic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile {
+    pub(crate) grid: Grid,
+    t_conorm: TConorm,
+    error: f64,
+}
+
+impl Profile {
+    /// Chooses support and knots for a softness with parameters `phi` in scenes of up to `faces`
+    /// faces, such that no pixel is off by more than `tolerance` (in alpha, in exact arithmetic).
+    ///
+    /// Half of the tolerance goes to culling. A face that is farther from the pixel than the outer
+    /// radius adds `g(s)` within `e = slack / faces` of its left limit, so all of them together
+    /// change the sum by at most `slack` and the coverage by at most `tolerance / 2`
+    /// ([`TConorm::slack`]). Deeper inside than the inner radius one face alone covers the pixel to
+    /// within `tolerance / 2`, and a T-conorm never falls below its largest argument.
+    ///
+    /// The other half goes to interpolation: the cells are refined until the error at a knot-free
+    /// sample is below `tolerance / 4` times the value plus `e / 2`. A relative error ρ of every
+    /// term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= ρ / e`. [`Profile::error`] tells what
+    /// was reached: for a kink away from the edge that no knot meets it can be more.
+    ///
+    /// **Gradients.** A culled face gives no gradient, and Adam would have moved it however small
+    /// its gradient was. At the default tolerance of 1e-5 the gradient of a face that lies wholly in
+    /// the culled tail is below Adam's usual epsilon of 1e-8 times the image's own; choose a
+    /// smaller tolerance where faces must be drawn in from afar (META 6.2).
+    ///
+    /// `device` belongs to the backend that evaluates the softness, in f64 where it can.
+    ///
+    /// # Panics
+    ///
+    /// If `tolerance` is not in (0, 1), `faces` is 0, or `phi` has the wrong length.
+    pub fn new<B: Backend>(
+        softness: &impl Softness,
+        t_conorm: TConorm,
+        phi: &[f64],
+        faces: usize,
+        tolerance: f64,
+        device: &B::Device,
+    ) -> Self {
+        assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
+        assert!(faces > 0, "a profile needs at least one face");
+        let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
+        let support = {
+            // The T-conorm bends the optical depth: ask for the depth that makes up the excess.
+            let limits = support::<B>(softness, phi, excess, device);
+            let depth = depth_of_excess(t_conorm, limits.left, excess);
+            support::<B>(softness, phi, depth, device)
+        };
+        // Deep inside, what counts is the light left, which knows nothing of the number of faces.
+        let shallow = support_inside::<B>(softness, phi, tolerance / 2.0, device);
+        let radius = |r: f64| r.clamp(NARROWEST, EVERYWHERE);
+        let mut grid = Grid {
+            outer: radius(support.outer),
+            inner: radius(support.inner.min(shallow)),
+            octaves: OCTAVES[0],
+            bits: *BITS.start(),
+        };
+        let error = |grid: Grid| {
+            interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, excess, device)
+        };
+        // The innermost cell decides the octaves, all others the cells in an octave.
+        let mut reached = error(grid);
+        for octaves in OCTAVES {
+            grid.octaves = octaves;
+            reached = error(grid);
+            if reached.innermost <= 1.0 {
+                break;
+            }
+        }
+        for bits in BITS {
+            grid.bits = bits;
+            reached = error(grid);
+            if reached.rest <= 1.0 {
+                break;
+            }
+        }
+        let error = reached.innermost.max(reached.rest) * tolerance / 2.0;
+        Self { grid, t_conorm, error }
+    }
+
+    /// Distances, in NDC, beyond which a pixel outside and inside sees a constant.
+    pub fn support(&self) -> [f64; 2] {
+        [self.grid.outer, self.grid.inner]
+    }
+
+    /// Number of knots of the table, both sides together.
+    pub fn knots(&self) -> usize {
+        2 * (self.grid.cells() + 1)
+    }
+
+    /// Largest error of a pixel that interpolation leaves, measured between the knots; at most half
+    /// the tolerance unless the knots ran out.
+    pub fn error(&self) -> f64 {
+        self.error
+    }
+
+    /// The T-conorm that turns sums into coverage.
+    pub fn t_conorm(&self) -> TConorm {
+        self.t_conorm
+    }
+
+    /// Coefficients of the cubics, `[rows, 4]`, in the float type of `phi` `[parameters]`.
+    ///
+    /// `softness` may differ from the one the profile was chosen for only in its parameters.
+    pub fn table<B: Backend>(&self, softness: &impl Softness, phi: Tensor<B, 1>) -> Tensor<B, 2> {
+        let knots = self.grid.knots();
+        let cells = self.grid.cells();
+        let (device, dtype) = (phi.device(), phi.dtype());
+        let constant = |values: Vec<f64>| {
+            let shape = [values.len()];
+            Tensor::<B, 1>::from_data(TensorData::new(values, shape), (&device, dtype))
+        };
+        // Both sides in one tensor: an op costs more than its few hundred numbers.
+        let sides = [-self.grid.outer, self.grid.inner];
+        let distances = sides.iter().flat_map(|r| knots.iter().map(move |y| r * y.sqrt()));
+        let distances: Vec<_> = distances.collect();
+        // dy/dd at the knots, to turn slopes by distance into slopes by cell. Where the distance is
+        // 0 the slope by its square may be infinite; the innermost cell is linear and needs none.
+        let rate = |r: f64, y: f64| if y == 0.0 { 0.0 } else { r / (2.0 * y.sqrt()) };
+        let rates = sides.iter().flat_map(|&r| knots.iter().map(move |&y| rate(r, y)));
+        let rates = constant(rates.collect());
+        let count = knots.len();
+        let nudge =
+            |(k, d): (usize, f64)| if k % count == 0 { sides[k / count] * 1e-15 } else { d };
+        let distances = constant(distances.into_iter().enumerate().map(nudge).collect());
+        let (value, slope) = self.t_conorm.profile(softness, phi, distances);
+        let slope = slope * rates;
+
+        let mut rows = Vec::with_capacity(6);
+        let widths: Vec<_> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        for side in 0..2 {
+            let start = side * count;
+            let [first, second] =
+                [0, 1].map(|k| value.clone().narrow(0, start + k, 1).reshape([1, 1]));
+            let zero = first.clone() * 0.0;
+            rows.push(Tensor::cat(
+                vec![first.clone(), second - first, zero.clone(), zero.clone()],
+                1,
+            ));
+            let width = constant(widths[1..].to_vec());
+            let ends = |values: &Tensor<B, 1>| {
+                [1, 2].map(|k| values.clone().narrow(0, start + k, cells - 1))
+            };
+            let [v0, v1] = ends(&value);
+            let [m0, m1] = ends(&slope).map(|m| m * width.clone());
+            let rise = v1 - v0.clone();
+            let square = rise.clone() * 3.0 - m0.clone() * 2.0 - m1.clone();
+            let cube = rise * -2.0 + m0.clone() + m1;
+            rows.push(Tensor::stack(vec![v0, m0, square, cube], 1));
+            let last = value.clone().narrow(0, start + count - 1, 1).reshape([1, 1]);
+            rows.push(Tensor::cat(vec![last, zero.clone(), zero.clone(), zero], 1));
+        }
+        Tensor::cat(rows, 0)
+    }
+}
+
+/// How far interpolation misses its target, as multiples of it.
+struct Reached {
+    innermost: f64,
+    rest: f64,
+}
+
+/// Compares the cubics of a grid with the profile itself at three places in each cell.
+fn interpolation_error<B: Backend>(
+    softness: &impl Softness,
+    t_conorm: TConorm,
+    phi: &[f64],
+    grid: Grid,
+    tolerance: f64,
+    excess: f64,
+    device: &B::Device,
+) -> Reached {
+    let dtype = if B::supports_dtype(device, DType::F64) { DType::F64 } else { DType::F32 };
+    let tensor = |values: Vec<f64>| {
+        let shape = [values.len()];
+        Tensor::<B, 1>::from_data(TensorData::new(values, shape), (device, dtype))
+    };
+    let profile = Profile { grid, t_conorm, error: 0.0 };
+    let numbers = |tensor: Tensor<B, 1>| tensor.into_data().iter::<f64>().collect::<Vec<_>>();
+    let table = profile.table(softness, tensor(phi.to_vec()));
+    let table = numbers(table.reshape([4 * grid.rows() as i64]));
+    let knots = grid.knots();
+    let places = [0.25, 0.5, 0.75];
+    let mut distances = Vec::with_capacity(6 * knots.len());
+    let mut interpolated = Vec::with_capacity(6 * knots.len());
+    for (side, radius) in [-grid.outer, grid.inner].into_iter().enumerate() {
+        for (cell, ends) in knots.windows(2).enumerate() {
+            let row = 4 * (side * (grid.cells() + 1) + cell);
+            for t in places {
+                distances.push(radius * (ends[0] + t * (ends[1] - ends[0])).sqrt());
+                let c = &table[row..row + 4];
+                interpolated.push(c[0] + t * (c[1] + t * (c[2] + t * c[3])));
+            }
+        }
+    }
+    let (exact, _) = t_conorm.profile(softness, tensor(phi.to_vec()), tensor(distances));
+    let exact = numbers(exact);
+    let mut reached = Reached { innermost: 0.0, rest: 0.0 };
+    let per_side = places.len() * grid.cells();
+    // What rounding alone makes of a value.
+    let rounding = if dtype == DType::F64 { 1e-14 } else { 1e-6 };
+    for (i, (exact, interpolated)) in exact.into_iter().zip(interpolated).enumerate() {
+        let target = (tolerance / 4.0 + rounding) * exact.abs() + excess / 2.0;
+        // Where one face alone covers the pixel, its error is damped by the light it leaves.
+        let damped = (exact - interpolated).abs() * (-exact.min(700.0)).exp().max(1e-9);
+        let error = (exact - interpolated).abs().min(damped * exact.max(1.0)) / target;
+        let place =
+            if i % per_side < places.len() { &mut reached.innermost } else { &mut reached.rest };
+        *place = place.max(error);
+    }
+    reached
+}
+
+/// The optical depth above `left` that makes up `excess` of the generator's sum.
+fn depth_of_excess(t_conorm: TConorm, left: f64, excess: f64) -> f64 {
+    if t_conorm == TConorm::Probabilistic {
+        return excess;
+    }
+    let base = t_conorm.generator(left);
+    let (mut low, mut high): (f64, f64) = (1e-300, 40.0);
+    for _ in 0..200 {
+        let middle = (low * high).sqrt();
+        if t_conorm.generator(left + middle) - base <= excess {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+/// Depth inside a face beyond which it lets less than `light` through; infinite if there is none.
+fn support_inside<B: Backend>(
+    softness: &impl Softness,
+    phi: &[f64],
+    light: f64,
+    device: &B::Device,
+) -> f64 {
+    let support = support::<B>(softness, phi, light, device);
+    if (-support.right).exp() <= light { support.inner } else { f64::INFINITY }
+}

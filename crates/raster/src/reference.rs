@@ -1,0 +1,232 @@
+//! The definition: burn tensor ops over every pixel-face pair, on any backend, to any order.
+//!
+//! Slow (about 1.3 kB of traffic a pair) and simple; every faster path is tested against it.
+
+use burn::{
+    backend::Autodiff,
+    tensor::{Int, Tensor, TensorData, backend::Backend},
+};
+use softrast_softness::Softness;
+
+use crate::{NEAR, TConorm};
+
+/// Squared edge lengths below this (NDC²) count as a point.
+const POINT: f64 = 1e-30;
+/// Squared distances below this (NDC²) count as this: a pixel on an edge has gradient 0, instead of
+/// the infinite one of the square root.
+const ON_EDGE: f64 = 1e-24;
+/// Pixel-face pairs that one chunk of [`sums`] and [`vjp`] may hold.
+const PAIRS: usize = 1 << 20;
+
+/// What to draw: faces over the vertices of every view, on a square image.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Corners of each face, as vertex numbers.
+    pub faces: &'a [[u32; 3]],
+    /// Width and height of the image in pixels.
+    pub size: usize,
+}
+
+/// Signed distances from pixels to faces in NDC, positive inside: `[views, pixels, faces]`.
+///
+/// `vertices` is `[views, vertices, 3]` (x and y in NDC, depth), `pixels` `[pixels, 2]` in NDC.
+/// Inside or outside is told by edge functions, the distance is that to the nearest point of the
+/// boundary. Edges belong to the inside; a face without area has none.
+///
+/// Source: FACTS 1.3, computed by projection onto the edges instead of barycentric coordinates.
+pub fn signed_distance<B: Backend>(
+    vertices: Tensor<B, 3>,
+    faces: &[[u32; 3]],
+    pixels: Tensor<B, 2>,
+) -> Tensor<B, 3> {
+    let corners = corners(vertices, faces);
+    let count = pixels.dims()[0];
+    let [px, py] = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));
+    let area = {
+        let [a, b, c] = &corners;
+        let (ux, uy) = (b[0].clone() - a[0].clone(), b[1].clone() - a[1].clone());
+        let (vx, vy) = (c[0].clone() - b[0].clone(), c[1].clone() - b[1].clone());
+        ux * vy - uy * vx
+    };
+    let orientation = area.clone().sign().detach();
+    let mut nearest: Option<Tensor<B, 3>> = None;
+    let mut inside = None;
+    for k in 0..3 {
+        let [x, y, _] = &corners[k];
+        let [next_x, next_y, _] = &corners[(k + 1) % 3];
+        let (ex, ey) = (next_x.clone() - x.clone(), next_y.clone() - y.clone());
+        let (wx, wy) = (px.clone() - x.clone(), py.clone() - y.clone());
+        let length2 = ex.clone() * ex.clone() + ey.clone() * ey.clone();
+        let point = length2.clone().lower_elem(POINT);
+        let inverse = length2.mask_fill(point.clone(), 1.0).recip().mask_fill(point, 0.0);
+        let t = ((wx.clone() * ex.clone() + wy.clone() * ey.clone()) * inverse).clamp(0.0, 1.0);
+        let dx = wx.clone() - t.clone() * ex.clone();
+        let dy = wy.clone() - t * ey.clone();
+        let distance2 = dx.clone() * dx + dy.clone() * dy;
+        nearest = Some(match nearest {
+            None => distance2,
+            Some(best) => {
+                let nearer = distance2.clone().lower(best.clone());
+                best.mask_where(nearer, distance2)
+            }
+        });
+        let side = (ex * wy - ey * wx) * orientation.clone();
+        let within = side.greater_equal_elem(0.0);
+        inside = Some(match inside {
+            None => within,
+            Some(inside) => within.bool_and(inside),
+        });
+    }
+    let nearest = nearest.expect("a face has three edges");
+    let flat = orientation.equal_elem(0.0).expand(nearest.dims());
+    let inside = inside.expect("a face has three edges").bool_and(flat.bool_not());
+    let distance = nearest.clamp_min(ON_EDGE).sqrt();
+    distance.clone().neg().mask_where(inside, distance)
+}
+
+/// Sums of `g(s(d))` over the faces of each pixel: `[views, size, size]`, top row first.
+///
+/// Computed in chunks of pixels of one view, so that memory stays bounded; under autodiff the tape
+/// still holds all chunks, see [`vjp`] for a gradient that does not. Faces with a vertex nearer than
+/// [`NEAR`] are left out.
+pub fn sums<B: Backend>(
+    scene: Scene,
+    vertices: Tensor<B, 3>,
+    softness: &impl Softness,
+    t_conorm: TConorm,
+    phi: Tensor<B, 1>,
+) -> Tensor<B, 3> {
+    let views = vertices.dims()[0];
+    let chunks = chunks(scene, views);
+    let parts = chunks
+        .into_iter()
+        .map(|(view, pixels)| {
+            let vertices = vertices.clone().narrow(0, view, 1);
+            chunk_sums(scene, vertices, softness, t_conorm, phi.clone(), &pixels)
+        })
+        .collect();
+    Tensor::cat(parts, 0).reshape([views, scene.size, scene.size])
+}
+
+/// Gradient of `Σ upstream · sums` to the vertices `[views, vertices, 3]`, chunk by chunk: memory
+/// is that of one chunk. `upstream` is `[views, size, size]`.
+///
+/// # Panics
+///
+/// Never with shapes that fit.
+pub fn vjp<B: Backend>(
+    scene: Scene,
+    vertices: Tensor<B, 3>,
+    softness: &impl Softness,
+    t_conorm: TConorm,
+    phi: Tensor<B, 1>,
+    upstream: Tensor<B, 3>,
+) -> Tensor<B, 3> {
+    let [views, count, _] = vertices.dims();
+    let phi = Tensor::<Autodiff<B>, 1>::from_inner(phi);
+    let upstream = upstream.reshape([views * scene.size * scene.size]);
+    let mut start = 0;
+    let mut totals: Vec<Option<Tensor<B, 3>>> = vec![None; views];
+    for (view, pixels) in chunks(scene, views) {
+        let leaf = Tensor::<Autodiff<B>, 3>::from_inner(vertices.clone().narrow(0, view, 1))
+            .require_grad();
+        let sums = chunk_sums(scene, leaf.clone(), softness, t_conorm, phi.clone(), &pixels);
+        let upstream = Tensor::from_inner(upstream.clone().narrow(0, start, pixels.len()));
+        start += pixels.len();
+        let grads = (sums * upstream).sum().backward();
+        if let Some(grad) = leaf.grad(&grads) {
+            let total = &mut totals[view];
+            *total = Some(total.take().map_or(grad.clone(), |total| total + grad));
+        }
+    }
+    let empty = || vertices.clone().narrow(0, 0, 1) * 0.0;
+    let parts = totals.into_iter().map(|total| total.unwrap_or_else(empty)).collect();
+    Tensor::cat(parts, 0).reshape([views, count, 3])
+}
+
+/// Silhouettes under the T-conorm `max`, `[views, size, size]`: the largest coverage at each pixel.
+///
+/// `max` has no additive generator, so it stays out of the fused op. Its gradient reaches only the
+/// face that wins.
+pub fn maximum<B: Backend>(
+    scene: Scene,
+    vertices: Tensor<B, 3>,
+    softness: &impl Softness,
+    phi: Tensor<B, 1>,
+) -> Tensor<B, 3> {
+    let views = vertices.dims()[0];
+    let parts = chunks(scene, views)
+        .into_iter()
+        .map(|(view, pixels)| {
+            let vertices = vertices.clone().narrow(0, view, 1);
+            let distance =
+                signed_distance(vertices.clone(), scene.faces, places(&vertices, scene, &pixels));
+            let coverage = softness.value(phi.clone(), distance);
+            let hidden = hidden(vertices, scene.faces).expand(coverage.dims());
+            coverage.mask_fill(hidden, 0.0).max_dim(2).reshape([pixels.len()])
+        })
+        .collect();
+    Tensor::cat(parts, 0).reshape([views, scene.size, scene.size])
+}
+
+/// Sums of one chunk: `vertices` `[1, vertices, 3]`, pixels of that view; `[pixels]`.
+fn chunk_sums<B: Backend>(
+    scene: Scene,
+    vertices: Tensor<B, 3>,
+    softness: &impl Softness,
+    t_conorm: TConorm,
+    phi: Tensor<B, 1>,
+    pixels: &std::ops::Range<usize>,
+) -> Tensor<B, 1> {
+    let places = places(&vertices, scene, pixels);
+    let distance = signed_distance(vertices.clone(), scene.faces, places);
+    let (value, _) = t_conorm.profile(softness, phi, distance);
+    let hidden = hidden(vertices, scene.faces).expand(value.dims());
+    value.mask_fill(hidden, 0.0).sum_dim(2).reshape([pixels.len()])
+}
+
+/// Faces that are not drawn: `[views, 1, faces]`.
+fn hidden<B: Backend>(
+    vertices: Tensor<B, 3>,
+    faces: &[[u32; 3]],
+) -> Tensor<B, 3, burn::tensor::Bool> {
+    let [a, b, c] = corners(vertices, faces).map(|[_, _, depth]| depth.lower_elem(NEAR));
+    a.bool_or(b).bool_or(c)
+}
+
+/// Coordinates of the corners, each `[views, 1, faces]`: first the corner, then x, y, depth.
+fn corners<B: Backend>(vertices: Tensor<B, 3>, faces: &[[u32; 3]]) -> [[Tensor<B, 3>; 3]; 3] {
+    let [views, _, _] = vertices.dims();
+    let device = vertices.device();
+    [0, 1, 2].map(|k| {
+        let index: Vec<i64> = faces.iter().map(|face| i64::from(face[k])).collect();
+        let index = Tensor::<B, 1, Int>::from_data(TensorData::new(index, [faces.len()]), &device);
+        let corner = vertices.clone().select(1, index);
+        [0, 1, 2].map(|axis| corner.clone().narrow(2, axis, 1).reshape([views, 1, faces.len()]))
+    })
+}
+
+/// Centres of the given pixels, `[pixels, 2]` in NDC.
+fn places<B: Backend>(
+    like: &Tensor<B, 3>,
+    scene: Scene,
+    pixels: &std::ops::Range<usize>,
+) -> Tensor<B, 2> {
+    let size = scene.size as f64;
+    let centre = |index: usize| (2.0 * index as f64 + 1.0 - size) / size;
+    let place = |pixel: usize| {
+        let (row, column) = (pixel / scene.size, pixel % scene.size);
+        [centre(column), centre(scene.size - 1 - row)]
+    };
+    let places: Vec<f64> = pixels.clone().flat_map(place).collect();
+    let data = TensorData::new(places, [pixels.len(), 2]);
+    Tensor::from_data(data, (&like.device(), like.dtype()))
+}
+
+/// Views and pixel ranges of at most [`PAIRS`] pairs.
+fn chunks(scene: Scene, views: usize) -> Vec<(usize, std::ops::Range<usize>)> {
+    let pixels = scene.size * scene.size;
+    let step = (PAIRS / scene.faces.len().max(1)).clamp(1, pixels);
+    let ranges = move || (0..pixels).step_by(step).map(move |at| at..(at + step).min(pixels));
+    (0..views).flat_map(|view| ranges().map(move |range| (view, range))).collect()
+}

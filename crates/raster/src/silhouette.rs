@@ -1,0 +1,118 @@
+use std::sync::Arc;
+
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_softness::Softness;
+
+use crate::{NEAR, Profile, ProfileSum, RasterBackend, TConorm, profile_sum};
+
+/// How silhouettes are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rasterizer {
+    /// Width and height of the image in pixels.
+    pub size: usize,
+    /// Largest error of any pixel against evaluating every pixel-face pair; see [`Profile::new`].
+    pub tolerance: f64,
+    /// How the coverages of several faces make one.
+    pub t_conorm: TConorm,
+}
+
+impl Rasterizer {
+    /// The largest error of a pixel unless asked for another.
+    pub const TOLERANCE: f64 = 1e-5;
+
+    /// A rasterizer for `size` × `size` images with the probabilistic sum and the default tolerance.
+    pub fn new(size: usize) -> Self {
+        Self { size, tolerance: Self::TOLERANCE, t_conorm: TConorm::Probabilistic }
+    }
+
+    /// Prepares silhouettes of meshes with these faces, for a softness near the parameters `phi`.
+    ///
+    /// The parameters decide the support and the knots only; they are read from the tensor once.
+    /// Prepare anew when they have moved so far that the support no longer fits.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, or `phi` has the wrong length.
+    pub fn prepare<B: Backend, S: Softness>(
+        &self,
+        faces: &Arc<[[u32; 3]]>,
+        softness: S,
+        phi: &Tensor<B, 1>,
+    ) -> Silhouette<S> {
+        assert!(self.size > 0, "an image needs at least one pixel");
+        let values: Vec<f64> = phi.to_data().iter().collect();
+        let profile = Profile::new::<B>(
+            &softness,
+            self.t_conorm,
+            &values,
+            faces.len(),
+            self.tolerance,
+            &phi.device(),
+        );
+        let op =
+            ProfileSum { faces: faces.clone(), grid: profile.grid, size: self.size, near: NEAR };
+        Silhouette { softness, profile, op }
+    }
+}
+
+/// Soft silhouettes of one mesh topology under one softness, through the fused op.
+#[derive(Clone, Debug)]
+pub struct Silhouette<S> {
+    softness: S,
+    profile: Profile,
+    op: ProfileSum,
+}
+
+impl<S: Softness> Silhouette<S> {
+    /// Coverage `[views, size, size]` in [0, 1], top row first.
+    ///
+    /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as
+    /// [`project`](crate::project) returns them; `phi` `[parameters]` belongs to the softness. Both
+    /// receive gradients, to second order on `Autodiff<Autodiff<B>>`.
+    pub fn coverage<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        phi: Tensor<B, 1>,
+    ) -> Tensor<B, 3> {
+        self.coverage_by_table(vertices, self.table(phi))
+    }
+
+    /// The table of the softness, `[rows, 4]`: compute it once where `phi` does not change.
+    pub fn table<B: Backend>(&self, phi: Tensor<B, 1>) -> Tensor<B, 2> {
+        self.profile.table(&self.softness, phi)
+    }
+
+    /// Like [`Silhouette::coverage`], from a table.
+    pub fn coverage_by_table<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, 2>,
+    ) -> Tensor<B, 3> {
+        self.profile.t_conorm().coverage(profile_sum(&self.op, vertices, table))
+    }
+
+    /// Coverage with another function in the backward pass: the image is that of `self`, the
+    /// gradient to the vertices is that of `felt` times the image's own `dA/dS`.
+    ///
+    /// This is a straight-through estimator: a sharp image with a wide gradient. What comes back is
+    /// **not** the derivative of the image. Gradients reach the parameters of neither softness at the
+    /// outermost level of autodiff. Costs one more forward pass.
+    ///
+    /// Source: DESIGN 2 (`surrogate`).
+    pub fn coverage_with_surrogate<B: RasterBackend, T: Softness>(
+        &self,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, 2>,
+        felt: &Silhouette<T>,
+        felt_table: Tensor<B, 2>,
+    ) -> Tensor<B, 3> {
+        let shown = profile_sum(&self.op, vertices.clone().detach(), table.detach());
+        let felt = profile_sum(&felt.op, vertices, felt_table.detach());
+        self.profile.t_conorm().coverage(shown + (felt.clone() - felt.detach()))
+    }
+
+    /// Support, knots and error of the table in use.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+}
