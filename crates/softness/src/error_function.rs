@@ -66,6 +66,14 @@ pub(crate) fn erfcx<B: Backend, const D: usize>(a: Tensor<B, D>) -> Tensor<B, D>
     t * rest
 }
 
+/// `1 / (exp(a²) erfc(a))` for `a >= 0`.
+///
+/// Not the reciprocal of [`erfcx`], whose derivative leaves the range of f32 far out.
+pub(crate) fn per_erfcx<B: Backend, const D: usize>(a: Tensor<B, D>) -> Tensor<B, D> {
+    let (_, rest) = factors(a.clone());
+    (a * 0.5 + 1.0) / rest
+}
+
 /// `ln(exp(a²) erfc(a))` for `a >= 0`.
 pub(crate) fn ln_erfcx<B: Backend, const D: usize>(a: Tensor<B, D>) -> Tensor<B, D> {
     let (_, rest) = factors(a.clone());

@@ -206,6 +206,15 @@ impl Family {
             _ => vec![scale.ln()],
         }
     }
+
+    /// How many of the leading parameters are logarithms (of a scale, then of a shape).
+    pub(crate) fn logarithms(self) -> usize {
+        match self {
+            Self::Gamma | Self::GammaForward => 2,
+            Self::Mlp => 0,
+            _ => 1,
+        }
+    }
 }
 
 impl fmt::Display for Family {

@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, LN_2, PI};
 use burn::tensor::{Tensor, backend::Backend};
 
 use crate::{
-    error_function::{erfc, erfcx, ln_erfcx},
+    error_function::{erfc, ln_erfcx, per_erfcx},
     parameter::magnitude,
     unit_step::UnitStep,
 };
@@ -38,7 +38,7 @@ impl UnitStep for Gauss {
         let below = u.clone().lower_elem(0.0);
         let reach = magnitude(u.clone()) * FRAC_1_SQRT_2;
         let thin = Self::slope(u) / (erfc(reach.clone()) * -0.5 + 1.0);
-        let thick = erfcx(reach).recip() * (2.0 / PI).sqrt();
+        let thick = per_erfcx(reach) * (2.0 / PI).sqrt();
         thick.mask_where(below, thin)
     }
 }

@@ -5,7 +5,7 @@ use crate::unit_step::UnitStep;
 /// Where the double exponential has long settled: `exp(-exp(20))` is 0.
 const SETTLED: f64 = 20.0;
 
-/// Below this argument the series of [`expm1_ratio`] serves; its first term left out is 2e-17.
+/// Below this argument the series of [`expm1_ratio`] serves; its first term left out is 3e-22.
 const SMALL: f64 = 1e-2;
 
 /// `s(x) = exp(-exp(-x / scale))`; φ `[1]` is the logarithm of the scale, in the unit of x.
@@ -30,9 +30,11 @@ fn rise<B: Backend, const D: usize>(v: Tensor<B, D>) -> Tensor<B, D> {
 /// `(1 - exp(-v)) / v` for `v >= 0`, with 1 at 0.
 fn expm1_ratio<B: Backend, const D: usize>(v: Tensor<B, D>) -> Tensor<B, D> {
     let small = v.clone().lower_elem(SMALL);
+    let near = v.clone().clamp_max(SMALL);
     // 1 - v/2 (1 - v/3 (1 - v/4 …)).
-    let series =
-        (2..=8).rev().fold(v.ones_like(), |sum, k| (sum * v.clone()) * (-1.0 / f64::from(k)) + 1.0);
+    let series = (2..=8)
+        .rev()
+        .fold(v.ones_like(), |sum, k| (sum * near.clone()) * (-1.0 / f64::from(k)) + 1.0);
     let v = v.mask_fill(small.clone(), 1.0);
     (rise(v.clone()) / v).mask_where(small, series)
 }

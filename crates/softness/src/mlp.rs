@@ -35,10 +35,11 @@ pub(crate) fn weights<B: Backend>(phi: &Tensor<B, 1>) -> [Tensor<B, 2>; 5] {
     ]
 }
 
-/// A layer's output and its derivative by x.
-type Dual<B> = (Tensor<B, 2>, Tensor<B, 2>);
+/// A layer's output `[points, units]` and its derivative by the input of the network.
+pub(crate) type Dual<B> = (Tensor<B, 2>, Tensor<B, 2>);
 
-fn linear<B: Backend>((h, dh): Dual<B>, weight: Tensor<B, 2>) -> Dual<B> {
+/// A layer without its activation.
+pub(crate) fn linear<B: Backend>((h, dh): Dual<B>, weight: Tensor<B, 2>) -> Dual<B> {
     (h.matmul(weight.clone()), dh.matmul(weight))
 }
 

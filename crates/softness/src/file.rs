@@ -1,0 +1,208 @@
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{EdgeSoftness, Softness};
+
+/// The largest size of a parameter that is a logarithm: its exponential must fit an f32.
+const LARGEST_LOGARITHM: f64 = 80.0;
+
+/// A softness and its parameters, as kept in a JSON file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SoftnessFile {
+    /// Which softness.
+    pub softness: EdgeSoftness,
+    /// Its parameters φ, as many as [`Softness::parameters`] says.
+    pub phi: Vec<f64>,
+    /// Where the parameters come from, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+/// A softness file could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SoftnessFileError {
+    /// The file could not be read.
+    #[error("cannot read softness {path:?}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file, or the temporary one beside it, could not be written.
+    #[error("cannot write softness {path:?}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The text is not what a softness file holds.
+    #[error("softness {path:?} is not valid: {source}")]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        source: serde_json::Error,
+    },
+    /// φ has the wrong length.
+    #[error("softness {path:?} has {found} parameters, but {family} has {expected}")]
+    Length {
+        /// The file.
+        path: PathBuf,
+        /// The family's name.
+        family: &'static str,
+        /// Parameters found.
+        found: usize,
+        /// Parameters of the family.
+        expected: usize,
+    },
+    /// A parameter is not a number.
+    #[error("softness {path:?}: phi[{index}] is {found}, expected a finite number")]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// Which parameter.
+        index: usize,
+        /// Its value.
+        found: f64,
+    },
+    /// The exponential of a parameter is not a positive number in f32.
+    #[error(
+        "softness {path:?}: phi[{index}] is the logarithm {found}, expected -{limit} to {limit}",
+        limit = LARGEST_LOGARITHM
+    )]
+    Logarithm {
+        /// The file.
+        path: PathBuf,
+        /// Which parameter.
+        index: usize,
+        /// Its value.
+        found: f64,
+    },
+}
+
+impl SoftnessFile {
+    /// Reads and checks the file at `path`.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do not
+    /// suit the family.
+    pub fn load(path: &Path) -> Result<Self, SoftnessFileError> {
+        let text = fs::read_to_string(path)
+            .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })?;
+        let file: Self = serde_json::from_str(&text)
+            .map_err(|source| SoftnessFileError::Parse { path: path.to_owned(), source })?;
+        file.check(path)?;
+        Ok(file)
+    }
+
+    /// Checks the parameters and writes the file at `path`, replacing what was there.
+    ///
+    /// The text goes to a temporary file in the same folder first, so that `path` never holds half
+    /// a softness.
+    ///
+    /// # Errors
+    ///
+    /// If the parameters do not suit the family, or the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), SoftnessFileError> {
+        self.check(path)?;
+        let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
+        let mut text =
+            serde_json::to_string_pretty(self).map_err(io::Error::from).map_err(failed)?;
+        text.push('\n');
+        let mut beside = path.as_os_str().to_owned();
+        beside.push(format!(".{}.tmp", std::process::id()));
+        fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|source| {
+            // What is left of it is of no use; that it may not exist is no second error.
+            let _ = fs::remove_file(&beside);
+            failed(source)
+        })
+    }
+
+    fn check(&self, path: &Path) -> Result<(), SoftnessFileError> {
+        let path = path.to_owned();
+        let family = self.softness.family;
+        let (found, expected) = (self.phi.len(), family.parameters());
+        if found != expected {
+            return Err(SoftnessFileError::Length { path, family: family.name(), found, expected });
+        }
+        for (index, &found) in self.phi.iter().enumerate() {
+            if !found.is_finite() {
+                return Err(SoftnessFileError::NotFinite { path, index, found });
+            }
+            if index < family.logarithms() && found.abs() > LARGEST_LOGARITHM {
+                return Err(SoftnessFileError::Logarithm { path, index, found });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Family;
+
+    fn example(family: Family) -> SoftnessFile {
+        let softness = EdgeSoftness { family, squared: true };
+        SoftnessFile { softness, phi: softness.default_phi(1e-4), note: Some("a start".into()) }
+    }
+
+    fn error(text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        fs::write(&path, text).unwrap();
+        SoftnessFile::load(&path).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_saved_softness_comes_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        for family in Family::ALL {
+            let file = example(family);
+            file.save(&path).unwrap();
+            assert_eq!(SoftnessFile::load(&path).unwrap(), file);
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn unknown_fields_and_families_are_refused() {
+        let message = error(
+            r#"{"softness": {"family": "gauss", "squared": true}, "phi": [0], "colour": "red"}"#,
+        );
+        assert!(message.contains("unknown field `colour`"), "{message}");
+        let message = error(r#"{"softness": {"family": "gaus", "squared": true}, "phi": [0]}"#);
+        assert!(message.contains("`gaus`") && message.contains("gumbel_min"), "{message}");
+    }
+
+    #[test]
+    fn parameters_that_do_not_suit_are_refused_by_name() {
+        let message = error(r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#);
+        assert!(message.ends_with("softness.json\" has 1 parameters, but exp has 2"), "{message}");
+        let message = error(r#"{"softness": {"family": "gauss", "squared": false}, "phi": [-90]}"#);
+        assert!(message.ends_with("phi[0] is the logarithm -90, expected -80 to 80"), "{message}");
+        let message =
+            error(r#"{"softness": {"family": "gauss", "squared": false}, "phi": [1e999]}"#);
+        assert!(message.contains("number out of range"), "{message}");
+    }
+
+    #[test]
+    fn a_softness_that_is_not_a_number_is_not_saved() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        let mut file = example(Family::Exp);
+        file.phi[1] = f64::NAN;
+        let message = file.save(&path).unwrap_err().to_string();
+        assert!(message.ends_with("phi[1] is NaN, expected a finite number"), "{message}");
+        assert!(!path.exists());
+    }
+}
