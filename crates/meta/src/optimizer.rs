@@ -1,0 +1,23 @@
+use std::fmt::Debug;
+
+use burn::tensor::{Tensor, backend::Backend};
+
+/// An optimiser as a pure function: state in, state out.
+///
+/// A step is made of tensor ops, so that on `Autodiff<B>` its result depends on the parameters, the
+/// gradient and the state it was given, to any order.
+pub trait Optimizer {
+    /// What a step leaves for the next one.
+    type State<B: Backend, const D: usize>: Clone + Debug;
+
+    /// The state before the first step for parameters shaped like `theta`.
+    fn init<B: Backend, const D: usize>(&self, theta: &Tensor<B, D>) -> Self::State<B, D>;
+
+    /// The parameters and the state after one step down the gradient `grad`, shaped like `theta`.
+    fn step<B: Backend, const D: usize>(
+        &self,
+        theta: Tensor<B, D>,
+        grad: Tensor<B, D>,
+        state: Self::State<B, D>,
+    ) -> (Tensor<B, D>, Self::State<B, D>);
+}
