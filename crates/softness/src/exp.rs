@@ -1,6 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::half_line::HalfLine;
+use crate::{half_line::HalfLine, rise::rise};
 
 /// The exponential law, `F(y) = 1 - exp(-y)`; φ `[2]` is the logarithm of the scale, in the unit
 /// of x, and the shift in scales. Use it as [`Reversed`](crate::Reversed) or
@@ -17,9 +17,7 @@ impl HalfLine for Exp {
         _phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
     ) -> (Tensor<B, D>, Tensor<B, D>) {
-        // 1 - exp(-y) without the difference: burn has no expm1.
-        let t = (y.clone() * 0.5).tanh();
-        (t.clone() * 2.0 / (t + 1.0), y.neg().exp())
+        (rise(y.clone()), y.neg().exp())
     }
 
     fn slope<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {

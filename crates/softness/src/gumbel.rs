@@ -1,6 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::unit_step::UnitStep;
+use crate::{rise::rise, unit_step::UnitStep};
 
 /// Where the double exponential has long settled: `exp(-exp(20))` is 0.
 const SETTLED: f64 = 20.0;
@@ -20,12 +20,6 @@ pub struct GumbelMax;
 /// et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GumbelMin;
-
-/// `1 - exp(-v)` for `v >= 0`, exact also near 0.
-fn rise<B: Backend, const D: usize>(v: Tensor<B, D>) -> Tensor<B, D> {
-    let t = (v * 0.5).tanh();
-    t.clone() * 2.0 / (t + 1.0)
-}
 
 /// `(1 - exp(-v)) / v` for `v >= 0`, with 1 at 0.
 fn expm1_ratio<B: Backend, const D: usize>(v: Tensor<B, D>) -> Tensor<B, D> {

@@ -47,6 +47,7 @@ mod mlp;
 mod parameter;
 mod polynomial;
 mod reciprocal;
+mod rise;
 mod soft_step;
 mod softness;
 mod support;

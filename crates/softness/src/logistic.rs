@@ -25,9 +25,12 @@ impl UnitStep for Logistic {
     }
 
     fn depth<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        // Softplus: max(u, 0) + ln(1 + exp(-|u|)).
-        let size = magnitude(u.clone());
-        (u + size.clone()) * 0.5 + size.neg().exp().log1p()
+        // Softplus, as max(u, 0) + ln(1 + exp(-|u|)); chosen half by half, because a sum of the two
+        // halves would leave the tail's derivative as a difference of numbers near 1/2.
+        let below = u.clone().lower_elem(0.0);
+        let size = magnitude(u);
+        let thin = size.clone().neg().exp().log1p();
+        (size + thin.clone()).mask_where(below, thin)
     }
 
     fn depth_slope<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {

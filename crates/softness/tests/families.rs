@@ -108,7 +108,7 @@ fn derivatives_match_automatic_ones_to_the_last_digits() {
             let grads = curve.of(softness, tensor(&phi), at.clone()).sum().backward();
             let slopes = numbers(at.grad(&grads).unwrap());
             let what = format!("{derivative:?} of {softness:?} {phi:?}");
-            assert_close(&derivative.at(softness, &phi, &x), &slopes, 1e-11, 1e-12, &what);
+            assert_close(&derivative.at(softness, &phi, &x), &slopes, 1e-12, 1e-300, &what);
         }
     }
 }
