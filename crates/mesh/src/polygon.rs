@@ -8,7 +8,7 @@ const MOST_CORNERS_CLIPPED: usize = 1024;
 
 /// The `n - 2` triangles of a polygon with the `n >= 3` corners `polygon`, in its winding.
 ///
-/// The polygon is seen along its axis of largest area. Again and again a convex corner with no other
+/// The polygon is seen along the axis that shows most of its area. Again and again a convex corner with no other
 /// corner in its triangle is cut off, so a concave outline keeps its area; a convex one becomes the
 /// fan from its first corner. What has no such corner (crossing itself, no area) is cut anyhow.
 pub(crate) fn triangles(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[u32; 3]> {
@@ -31,7 +31,7 @@ pub(crate) fn triangles(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[u32; 3]
     cut
 }
 
-/// The corners in a plane, counterclockwise: without the axis along which the polygon is widest.
+/// The corners in a plane, counterclockwise: seen along the axis that shows most of their area.
 fn flattened(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[f64; 2]> {
     let first = positions[polygon[0] as usize];
     let offsets: Vec<_> =
