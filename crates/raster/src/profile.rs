@@ -5,7 +5,7 @@ use crate::{TConorm, kernel::Grid};
 
 /// Octaves of the squared distance that a table may resolve, and cells in an octave (as a power of
 /// two) that it may use, coarsest first.
-const OCTAVES: [u32; 5] = [16, 24, 36, 56, 80];
+const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 112];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
 /// Stands in for a support that does not end, in NDC.
 const EVERYWHERE: f64 = 1e4;
@@ -39,10 +39,13 @@ impl Profile {
     /// ([`TConorm::slack`]). Deeper inside than the inner radius one face alone covers the pixel to
     /// within `tolerance / 2`, and a T-conorm never falls below its largest argument.
     ///
-    /// The other half goes to interpolation: the cells are refined until the error at a knot-free
-    /// sample is below `tolerance / 4` times the value plus `e / 2`. A relative error ρ of every
-    /// term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= ρ / e`. [`Profile::error`] tells what
-    /// was reached: for a kink away from the edge that no knot meets it can be more.
+    /// The other half goes to interpolation: the cells are refined until, at three samples of each,
+    /// the error is below `tolerance / 4` times the value plus a share of `e / 2`; the value being
+    /// the term or, where one face all but covers the pixel, the coverage that it alone makes. A
+    /// relative error ρ of every term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= 0.37 ρ`; a
+    /// relative error ρ of every coverage moves it by at most ρ times the probability that exactly
+    /// one face covers the pixel. [`Profile::error`] tells what was reached: for a kink away from
+    /// the edge that no knot meets it can be more.
     ///
     /// **Gradients.** A culled face gives no gradient, and Adam would have moved it however small
     /// its gradient was. At the default tolerance of 1e-5 the gradient of a face that lies wholly in
@@ -81,7 +84,7 @@ impl Profile {
             bits: *BITS.start(),
         };
         let error = |grid: Grid| {
-            interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, excess, device)
+            interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, faces, device)
         };
         // The innermost cell decides the octaves, all others the cells in an octave.
         let mut reached = error(grid);
@@ -192,9 +195,11 @@ fn interpolation_error<B: Backend>(
     phi: &[f64],
     grid: Grid,
     tolerance: f64,
-    excess: f64,
+    faces: usize,
     device: &B::Device,
 ) -> Reached {
+    let faces = faces as f64;
+    let excess = t_conorm.slack(tolerance / 2.0) / faces;
     let dtype = if B::supports_dtype(device, DType::F64) { DType::F64 } else { DType::F32 };
     let tensor = |values: Vec<f64>| {
         let shape = [values.len()];
@@ -225,10 +230,12 @@ fn interpolation_error<B: Backend>(
     // What rounding alone makes of a value.
     let rounding = if dtype == DType::F64 { 1e-14 } else { 1e-6 };
     for (i, (exact, interpolated)) in exact.into_iter().zip(interpolated).enumerate() {
-        let target = (tolerance / 4.0 + rounding) * exact.abs() + excess / 2.0;
-        // Where one face alone covers the pixel, its error is damped by the light it leaves.
-        let damped = (exact - interpolated).abs() * (-exact.min(700.0)).exp().max(1e-9);
-        let error = (exact - interpolated).abs().min(damped * exact.max(1.0)) / target;
+        // Either the term itself is right, or the coverage that it alone makes.
+        let relative = tolerance / 4.0 + rounding;
+        let term = (exact - interpolated).abs() / (relative * exact.abs() + excess / 2.0);
+        let [shown, wanted] = [interpolated, exact].map(|sum| t_conorm.coverage_of(sum.max(0.0)));
+        let alone = (shown - wanted).abs() / (relative * wanted + tolerance / (4.0 * faces));
+        let error = term.min(alone);
         let place =
             if i % per_side < places.len() { &mut reached.innermost } else { &mut reached.rest };
         *place = place.max(error);

@@ -207,6 +207,26 @@ impl TConorm {
         }
     }
 
+    /// [`TConorm::coverage`] in plain numbers.
+    pub fn coverage_of(self, sum: f64) -> f64 {
+        match self {
+            Self::Probabilistic => -(-sum).exp_m1(),
+            Self::Einstein => sum.tanh(),
+            Self::Hamacher(p) => {
+                let covered = -(-sum).exp_m1();
+                covered / (covered * (1.0 - p) + p)
+            }
+            Self::Frank(p) => 1.0 - ((-sum).exp() * (p - 1.0)).ln_1p() / p.ln(),
+            Self::Yager(p) => sum.powf(1.0 / p).min(1.0),
+            Self::AczelAlsina(p) => -(-sum.powf(1.0 / p)).exp_m1(),
+            Self::Dombi(p) => {
+                let odds = sum.powf(1.0 / p);
+                odds / (odds + 1.0)
+            }
+            Self::SchweizerSklar(p) => 1.0 - (sum + 1.0).powf(1.0 / p),
+        }
+    }
+
     /// `g` as a function of the optical depth, in plain numbers.
     pub fn generator(self, q: f64) -> f64 {
         let s = -(-q).exp_m1();
