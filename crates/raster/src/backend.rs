@@ -28,6 +28,32 @@ pub struct ProfileSum {
     pub(crate) near: f64,
 }
 
+impl ProfileSum {
+    /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what
+    /// each pass over all views visits.
+    pub(crate) fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
+        let [views, _, _] = vertices.dims();
+        let data = vertices.into_data();
+        match data.dtype {
+            DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
+            DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
+            other => panic!("profile_sum works in f32 and f64, found {other:?}"),
+        }
+    }
+
+    fn inputs<'a, F>(&'a self, views: usize, vertices: &'a [F], table: &'a [F]) -> Inputs<'a, F> {
+        Inputs {
+            vertices,
+            table,
+            faces: &self.faces,
+            grid: self.grid,
+            size: self.size,
+            near: self.near,
+            views,
+        }
+    }
+}
+
 /// A backend that can add up profiles over faces.
 ///
 /// The defaults run on the host and serve every CPU backend; the implementation for `Autodiff<B>`
@@ -132,25 +158,18 @@ fn host<B: Backend>(op: &ProfileSum, tensors: Vec<FloatTensor<B>>, pass: Pass) -
     B::float_from_data(result, &device)
 }
 
+fn slice<F: burn::tensor::Element>(data: &TensorData) -> &[F] {
+    data.as_slice().expect("all tensors of a call have one float type")
+}
+
 fn run<F: Float + burn::tensor::Element>(
     op: &ProfileSum,
     views: usize,
     data: &[TensorData],
     pass: &Pass,
 ) -> TensorData {
-    let slices: Vec<&[F]> = data
-        .iter()
-        .map(|data| data.as_slice().expect("all tensors of a call have one float type"))
-        .collect();
-    let inputs = Inputs {
-        vertices: slices[0],
-        table: slices[1],
-        faces: &op.faces,
-        grid: op.grid,
-        size: op.size,
-        near: op.near,
-        views,
-    };
+    let slices: Vec<&[F]> = data.iter().map(slice).collect();
+    let inputs = op.inputs(views, slices[0], slices[1]);
     let flat = |values: Vec<F>| {
         let length = values.len();
         TensorData::new(values, [length])

@@ -7,6 +7,8 @@
 
 mod backend;
 mod camera;
+#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
+mod default_backend;
 mod hard;
 mod kernel;
 mod loss;
@@ -17,6 +19,8 @@ mod t_conorm;
 
 pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use camera::{NEAR, project, view_rotation};
+#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
+pub use default_backend::{DEFAULT_BACKEND, DefaultBackend};
 pub use hard::hard_silhouette;
 pub use loss::{iou_loss, mse_loss};
 pub use profile::Profile;

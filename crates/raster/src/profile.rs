@@ -5,10 +5,10 @@ use crate::{TConorm, kernel::Grid};
 
 /// Octaves of the squared distance that a table may resolve, and cells in an octave (as a power of
 /// two) that it may use, coarsest first.
-const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 112];
+const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 120];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
-/// Stands in for a support that does not end, in NDC.
-const EVERYWHERE: f64 = 1e4;
+/// Stands in for a support that does not end, in NDC: no drawn face is farther from a pixel.
+const EVERYWHERE: f64 = 4e6;
 /// A side that is constant still needs a cell.
 const NARROWEST: f64 = 1e-9;
 

@@ -12,8 +12,8 @@ use crate::{NEAR, TConorm};
 
 /// Squared edge lengths below this (NDC²) count as a point.
 const POINT: f64 = 1e-30;
-/// Squared distances below this (NDC²) count as this: a pixel on an edge has gradient 0, instead of
-/// the infinite one of the square root.
+/// Squared distances below this (NDC²) count as 0, with gradient 0 instead of the infinite one of the
+/// square root.
 const ON_EDGE: f64 = 1e-24;
 /// Pixel-face pairs that one chunk of [`sums`] and [`vjp`] may hold.
 const PAIRS: usize = 1 << 20;
@@ -80,7 +80,9 @@ pub fn signed_distance<B: Backend>(
     let nearest = nearest.expect("a face has three edges");
     let flat = orientation.equal_elem(0.0).expand(nearest.dims());
     let inside = inside.expect("a face has three edges").bool_and(flat.bool_not());
-    let distance = nearest.clamp_min(ON_EDGE).sqrt();
+    // Selected by the argument, so that neither the root nor its gradient meets 0.
+    let on_edge = nearest.clone().lower_elem(ON_EDGE);
+    let distance = nearest.mask_fill(on_edge.clone(), 1.0).sqrt().mask_fill(on_edge, 0.0);
     distance.clone().neg().mask_where(inside, distance)
 }
 

@@ -88,7 +88,38 @@ impl<S: Softness> Silhouette<S> {
         vertices: Tensor<B, 3>,
         table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
-        self.profile.t_conorm().coverage(profile_sum(&self.op, vertices, table))
+        self.profile.t_conorm().coverage(self.sums(vertices, table))
+    }
+
+    /// Sums over the faces of each pixel, `[views, size, size]`: what the T-conorm of the profile
+    /// turns into coverage. Arguments are those of [`Silhouette::coverage_by_table`].
+    pub fn sums<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, 2>,
+    ) -> Tensor<B, 3> {
+        profile_sum(&self.op, vertices, table)
+    }
+
+    /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what
+    /// one pass over all views visits, forward or backward.
+    pub fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
+        self.op.pairs(vertices)
+    }
+
+    /// The same support with `2^bits` cells in each octave of the squared distance, instead of as
+    /// many as the tolerance asks for. For measuring what knots are worth: the bound of
+    /// [`Profile::new`] does not hold for the result, and [`Profile::error`] is not measured anew.
+    ///
+    /// # Panics
+    ///
+    /// If `bits` is above 12.
+    #[must_use]
+    pub fn with_cells(mut self, bits: u32) -> Self {
+        assert!(bits <= 12, "a table of 2^{bits} cells in an octave is too large");
+        self.profile.grid.bits = bits;
+        self.op.grid.bits = bits;
+        self
     }
 
     /// Coverage with another function in the backward pass: the image is that of `self`, the

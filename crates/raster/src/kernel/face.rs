@@ -4,8 +4,8 @@ use super::real::{Float, Real};
 
 /// Edge vectors shorter than this (NDC², squared length) count as a point.
 const POINT: f64 = 1e-30;
-/// Projected coordinates beyond this (NDC) are not drawn: their squares would leave the f32 range.
-const FAR_AWAY: f64 = 1e9;
+/// Projected coordinates beyond this (NDC) are not drawn: a table reaches no farther.
+const FAR_AWAY: f64 = 1e6;
 
 /// A projected triangle prepared for distances; corner k starts edge k.
 #[derive(Clone, Copy)]
@@ -57,7 +57,7 @@ impl<T: Real> Face<T> {
 pub(crate) type Bounds = [f64; 4];
 
 /// Bounding box of a face; `None` where the face is not drawn: a corner nearer than `near`, behind
-/// the camera, not finite or farther than 1e9 NDC away.
+/// the camera, not finite or farther than 1e6 NDC away.
 #[inline]
 pub(crate) fn bounds<F: Float>(corners: [&[F]; 3], near: f64) -> Option<Bounds> {
     let mut bounds = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];

@@ -10,11 +10,13 @@ mod bands;
 mod batch;
 mod face;
 mod pair;
+mod pairs;
 mod real;
 mod sum;
 mod table;
 
 pub(crate) use face::inside_spans;
+pub(crate) use pairs::pairs;
 pub(crate) use real::Float;
 pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};
 pub(crate) use table::Grid;

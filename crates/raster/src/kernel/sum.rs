@@ -377,7 +377,7 @@ pub(crate) struct Inputs<'a, F> {
 }
 
 impl<F: Float> Inputs<'_, F> {
-    fn bands(&self) -> Bands {
+    pub(crate) fn bands(&self) -> Bands {
         let per_view = self.vertices.len() / 3 / self.views.max(1);
         Bands::new(self.vertices, per_view, self.faces, self.size, self.near, self.grid.outer)
     }
