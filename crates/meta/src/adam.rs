@@ -91,7 +91,8 @@ impl Optimizer for Adam {
         let m = state.m * self.beta1 + grad.clone() * (1.0 - self.beta1);
         let v = state.v * self.beta2 + grad.clone() * grad * (1.0 - self.beta2);
         let [m_start, v_start] = [self.beta1, self.beta2].map(|beta| 1.0 - beta.powf(step as f64));
-        let root = (v.clone() / v_start + self.epsilon_root).sqrt() + self.epsilon;
+        // Not `v / v_start`: burn 0.21 differentiates a division by a number in f32.
+        let root = (v.clone() * v_start.recip() + self.epsilon_root).sqrt() + self.epsilon;
         let theta = theta - m.clone() * (self.learning_rate / m_start) / root;
         (theta, AdamState { m, v, step })
     }

@@ -5,9 +5,13 @@
 //! just solves, on `Autodiff<B>` its result still depends on φ. Nothing here knows of rendering.
 
 mod adam;
+mod inner_loop;
+mod objective;
 mod optimizer;
 mod sgd;
 
 pub use adam::{Adam, AdamState};
+pub use inner_loop::{InnerLoop, gradient};
+pub use objective::Objective;
 pub use optimizer::Optimizer;
 pub use sgd::Sgd;

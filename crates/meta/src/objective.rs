@@ -1,0 +1,11 @@
+use burn::tensor::{Tensor, backend::Backend};
+
+/// What an inner loop minimises over `theta`, given `phi`.
+///
+/// Generic over the backend, not per method: an objective that needs more of a backend than
+/// `Backend` says so in its `impl`. An inner loop on `B` asks for an objective on `Autodiff<B>`, and
+/// one that is learned through for `Autodiff<Autodiff<B>>`.
+pub trait Objective<B: Backend> {
+    /// The loss `[1]` of a scene `theta` `[N]` under a softness `phi` `[P]`.
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1>;
+}
