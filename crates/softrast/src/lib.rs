@@ -1,1 +1,20 @@
-//! Placeholder.
+//! Differentiable soft rasterizer on burn whose softness is learned.
+//!
+//! This crate re-exports the libraries of the project under short names; each can be used alone:
+//!
+//! - [`mesh`]: triangle meshes, a careful OBJ loader, generators;
+//! - [`softness`]: soft step functions as burn tensor ops;
+//! - [`raster`]: cameras, silhouettes, losses, exact to second order;
+//! - [`meta`]: optimisers and inner loops that can be differentiated.
+//!
+//! The README of the project has a first program.
+
+pub use softrast_mesh as mesh;
+pub use softrast_meta as meta;
+pub use softrast_raster as raster;
+pub use softrast_softness as softness;
+
+/// Compiles and runs the README's examples.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+pub struct Readme;
