@@ -20,4 +20,3 @@ pub(crate) use pairs::pairs;
 pub(crate) use real::Float;
 pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};
 pub(crate) use table::Grid;
-#[cfg(test)]
