@@ -143,6 +143,27 @@ fn families_rise_from_outside_to_inside() {
     }
 }
 
+#[test]
+fn automatic_derivatives_are_right_at_the_edge_itself() {
+    for family in Family::ALL {
+        let softness = EdgeSoftness { family, squared: false };
+        let phi = family.default_phi(SCALE);
+        for (curve, derivative) in [(Curve::Value, Curve::Density), (Curve::Depth, Curve::Hazard)] {
+            let (slope, _, curvature) = second_order(curve, softness, &phi, &[0.0]);
+            let what = format!("{derivative:?} of {family} at 0");
+            assert_close(&slope, &derivative.at(softness, &phi, &[0.0]), 1e-12, 0.0, &what);
+            let kinked = ["exp", "gamma", "laplace", "reciprocal"];
+            if !kinked.iter().any(|kinked| family.name().starts_with(kinked)) {
+                let step = 1e-5 * SCALE;
+                let high = derivative.at(softness, &phi, &[step])[0];
+                let low = derivative.at(softness, &phi, &[-step])[0];
+                let expected = (high - low) / (2.0 * step);
+                assert_close(&curvature, &[expected], 1e-6, 1e-5, &what);
+            }
+        }
+    }
+}
+
 /// The gradient of `Σ curve` to φ.
 fn gradient(curve: Curve, softness: EdgeSoftness, phi: &[f64], x: &[f64]) -> Vec<f64> {
     let at = tensor::<First>(phi).require_grad();
