@@ -38,6 +38,9 @@ pub(crate) struct Batch<T: Real> {
     /// Place within the cell, in [0, 1], and its derivative by the squared distance.
     t: [Chunk<T>; CHUNKS],
     rate: [Chunk<T::Float>; CHUNKS],
+    /// Coefficients of the cell, pixel by pixel and then coefficient by coefficient.
+    fetched: [Chunk<[T; 4]>; CHUNKS],
+    cubics: [[Chunk<T>; 4]; CHUNKS],
 }
 
 impl<T: Real> Batch<T> {
@@ -53,6 +56,8 @@ impl<T: Real> Batch<T> {
             row: [[0; LANES]; CHUNKS],
             t: [[T::ZERO; LANES]; CHUNKS],
             rate: [[T::Float::ZERO; LANES]; CHUNKS],
+            fetched: [[[T::ZERO; 4]; LANES]; CHUNKS],
+            cubics: [[[T::ZERO; LANES]; 4]; CHUNKS],
         }
     }
 
@@ -137,28 +142,31 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// Cubics of the cells of a chunk.
+    /// Fetches the cubics of the cells.
     #[inline(always)]
-    fn cubics(&self, chunk: usize, table: &[[T; 4]]) -> [Chunk<T>; 4] {
-        let mut rows = [[T::ZERO; 4]; LANES];
-        for i in 0..LANES {
-            rows[i] = table[self.row[chunk][i] as usize];
+    pub(crate) fn fetch(&mut self, table: &[[T; 4]]) {
+        let padded = self.chunks() * LANES;
+        let rows = &self.row.as_flattened()[..padded];
+        for (cubic, &row) in self.fetched.as_flattened_mut().iter_mut().zip(rows) {
+            *cubic = table[row as usize];
         }
-        let mut cubics = [[T::ZERO; LANES]; 4];
-        for i in 0..LANES {
-            cubics[0][i] = rows[i][0];
-            cubics[1][i] = rows[i][1];
-            cubics[2][i] = rows[i][2];
-            cubics[3][i] = rows[i][3];
+        // A loop of its own: all four columns are turned at once, in vectors.
+        let chunks = self.chunks();
+        for (columns, rows) in self.cubics.iter_mut().zip(&self.fetched).take(chunks) {
+            for i in 0..LANES {
+                columns[0][i] = rows[i][0];
+                columns[1][i] = rows[i][1];
+                columns[2][i] = rows[i][2];
+                columns[3][i] = rows[i][3];
+            }
         }
-        cubics
     }
 
     /// Adds `profile - tail` to the pixels of the band.
     #[inline(always)]
-    pub(crate) fn add_values(&self, table: &[[T; 4]], image: &mut [T], tail: T) {
+    pub(crate) fn add_values(&self, image: &mut [T], tail: T) {
         for chunk in 0..self.chunks() {
-            let [a, b, c, d] = self.cubics(chunk, table);
+            let [a, b, c, d] = &self.cubics[chunk];
             let mut values = [T::ZERO; LANES];
             for i in 0..LANES {
                 let t = self.t[chunk][i];
@@ -173,12 +181,12 @@ impl<T: Real> Batch<T> {
 
     /// Adds the gradient to x and y of the three corners, without its factor -2.
     #[inline(always)]
-    pub(crate) fn add_corners(&self, table: &[[T; 4]], upstream: &[T::Float], sums: &mut [T; 6]) {
+    pub(crate) fn add_corners(&self, upstream: &[T::Float], sums: &mut [T; 6]) {
         let two = T::Float::from_f64(2.0);
         let three = T::Float::from_f64(3.0);
         let mut lanes = [[T::ZERO; LANES]; 6];
         for chunk in 0..self.chunks() {
-            let [_, b, c, d] = self.cubics(chunk, table);
+            let [_, b, c, d] = &self.cubics[chunk];
             let mut g = [T::Float::ZERO; LANES];
             let count = LANES.min(self.len - chunk * LANES);
             for (g, at) in g.iter_mut().zip(&self.at[chunk][..count]) {

@@ -139,6 +139,7 @@ impl<F: Float> Spans<F> {
         let middle = F::from_f64(0.5 * (size as f64 - 1.0));
         // A hundredth of a pixel makes up for rounding.
         let margin = F::from_f64(0.01);
+        let point_five = F::from_f64(0.5);
         let limits = [within.0, within.1].map(|column| F::from_f64(column as f64));
         let mut starts = [0; N];
         let mut ends = [0; N];
@@ -150,13 +151,13 @@ impl<F: Float> Spans<F> {
                 low = if l > low { l } else { low };
                 high = if h < high { h } else { high };
             }
-            // Truncation rounds up the first and down the last column, as neither is negative.
-            let low = low * half + middle - margin + F::ONE;
-            let high = high * half + middle + margin + F::ONE;
+            // The first centre at or after low, and the one after the last at or before high.
+            let low = low * half + middle - margin + point_five;
+            let high = high * half + middle + margin + point_five;
             let low = if low > limits[0] { low } else { limits[0] };
             let high = if high < limits[1] { high } else { limits[1] };
-            starts[i] = low.truncate();
-            ends[i] = if high > F::ZERO { high } else { F::ZERO }.truncate();
+            starts[i] = if low < limits[1] { low } else { limits[1] }.nearest();
+            ends[i] = if high > F::ZERO { high } else { F::ZERO }.nearest();
         }
         (starts, ends)
     }

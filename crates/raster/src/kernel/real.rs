@@ -41,8 +41,8 @@ pub(crate) trait Float: Real<Float = Self> + PartialOrd + Default + std::fmt::De
     fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self);
     /// Square root.
     fn sqrt(self) -> Self;
-    /// Towards zero, to the nearest integer there is.
-    fn truncate(self) -> i32;
+    /// Nearest integer, for numbers in [0, 2^22].
+    fn nearest(self) -> i32;
 }
 
 macro_rules! float {
@@ -97,8 +97,11 @@ macro_rules! float {
                 self.sqrt()
             }
             #[inline(always)]
-            fn truncate(self) -> i32 {
-                self as i32
+            fn nearest(self) -> i32 {
+                // Adding 2^mantissa leaves the integer in the low bits; a cast would check its range
+                // number by number.
+                let shift = (1u64 << $mantissa) as Self;
+                ((self + shift).to_bits() - shift.to_bits()) as i32
             }
         }
     };

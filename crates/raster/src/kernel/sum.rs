@@ -150,11 +150,12 @@ impl<T: Real> Sink<'_, T> {
         sums: &mut [T; 6],
     ) {
         batch.places::<GRADIENT>(face, &scene.lookup);
+        batch.fetch(scene.table);
         if IMAGE {
-            batch.add_values(scene.table, self.image, scene.table[scene.grid.tail()][0]);
+            batch.add_values(self.image, scene.table[scene.grid.tail()][0]);
         }
         if GRADIENT {
-            batch.add_corners(scene.table, self.upstream, sums);
+            batch.add_corners(self.upstream, sums);
         }
         if TABLE {
             batch.add_table(self.upstream, &mut self.gradient.table, &mut self.visited);
