@@ -1,0 +1,74 @@
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+
+/// Flags that only POSE has.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Args {
+    /// Mesh to view, used as it stands; the project's own fox by default.
+    #[arg(long, value_name = "FILE.obj")]
+    pub mesh: Option<PathBuf>,
+
+    /// Centre the mesh, and scale it so that the longest side of its box is 2.
+    #[arg(long)]
+    pub normalize: bool,
+
+    /// Degrees between the start and the target [default: 35-55].
+    #[arg(long, value_enum)]
+    pub range: Option<Range>,
+
+    /// Where the pairs of start and target come from.
+    #[arg(long, value_enum, default_value_t)]
+    pub instances: Instances,
+
+    /// Optimise the field of view too, from a random start, instead of knowing it.
+    #[arg(long)]
+    pub optimise_fov: bool,
+}
+
+/// How far from the target a run starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Range {
+    /// 15 to 35 degrees.
+    #[value(name = "15-35")]
+    Near,
+    /// 35 to 55 degrees.
+    #[default]
+    #[value(name = "35-55")]
+    Middle,
+    /// 55 to 75 degrees.
+    #[value(name = "55-75")]
+    Far,
+}
+
+impl Range {
+    /// Least and largest angle, in degrees.
+    ///
+    /// Source: Wu et al. 2024, Sec. 5.1 (three parts of [15, 75]).
+    pub fn degrees(self) -> [f64; 2] {
+        match self {
+            Range::Near => [15.0, 35.0],
+            Range::Middle => [35.0, 55.0],
+            Range::Far => [55.0, 75.0],
+        }
+    }
+
+    /// Name on the command line and in the results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Range::Near => "15-35",
+            Range::Middle => "35-55",
+            Range::Far => "55-75",
+        }
+    }
+}
+
+/// Where the pairs of start and target come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Instances {
+    /// Drawn from the seed.
+    #[default]
+    Seeded,
+    /// The 24 pairs of the released runs; the seed counts from 0 to 23.
+    Released24,
+}

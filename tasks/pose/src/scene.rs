@@ -1,0 +1,133 @@
+use std::sync::Arc;
+
+use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use softrast_mesh::Mesh;
+use softrast_raster::{hard_silhouette, project, view_rotation};
+
+use crate::Instance;
+
+/// How much nearer than its farthest vertex a camera may not come, as a factor.
+const CLEARANCE: f64 = 1.05;
+/// Half the field of view stays within these bounds, in degrees.
+const HALF_FOV_DEG: [f64; 2] = [1.0, 80.0];
+
+/// Instances of POSE that are solved together, one view each.
+///
+/// The optimised θ is `[views, 3]`: distance in world units, elevation and azimuth in degrees; with
+/// an optimised field of view `[views, 4]`, the last being half of it in degrees.
+#[derive(Clone, Debug)]
+pub struct Scene<B: Backend> {
+    /// The mesh as each target camera sees it, turned but not moved: `[views, vertices, 3]`.
+    turned: Tensor<B, 3>,
+    /// Half the field of view of each view in degrees, `[views, 1]`, unless θ holds it.
+    half_fov: Option<Tensor<B, 2>>,
+    start: Tensor<B, 2>,
+    /// Nearest distance of each view, `[views, 1]`.
+    nearest: Tensor<B, 2>,
+    faces: Arc<[[u32; 3]]>,
+    target: Tensor<B, 3>,
+    size: usize,
+}
+
+impl<B: Backend> Scene<B> {
+    /// Instances of `mesh` on images of `size` × `size` pixels.
+    ///
+    /// The start's field of view is used as it is, and optimised if `optimise_fov`.
+    ///
+    /// # Panics
+    ///
+    /// If there is no instance.
+    pub fn new(mesh: &Mesh, instances: &[Instance], size: usize, optimise_fov: bool) -> Self {
+        let views = instances.len();
+        assert!(views > 0, "a scene needs an instance");
+        let column = |of: fn(&Instance) -> f64| -> Tensor<B, 2> {
+            tensor(instances.iter().map(of).collect(), [views, 1])
+        };
+        let orbits = |of: fn(&Instance) -> [f64; 4]| -> Tensor<B, 2> {
+            tensor(instances.iter().flat_map(of).collect(), [views, 4])
+        };
+        let positions: Vec<f64> = mesh.positions().iter().flatten().copied().collect();
+        let count = mesh.positions().len();
+        let positions = tensor::<B, 3>(positions, [1, count, 3]);
+        let faces: Arc<[[u32; 3]]> = mesh.faces().into();
+
+        let targets = orbits(|instance| instance.target.orbit());
+        let target = hard_silhouette(project(positions.clone(), targets.clone()), &faces, size);
+        let angle = |k: usize| targets.clone().narrow(1, k, 1).reshape([views]);
+        let rotation = view_rotation(angle(1), angle(2));
+        let turned = positions.expand([views, count, 3]).matmul(rotation.swap_dims(1, 2));
+
+        let starts = orbits(|instance| instance.start.orbit());
+        let start = starts.clone().narrow(1, 0, if optimise_fov { 4 } else { 3 });
+        let half_fov = (!optimise_fov).then(|| starts.narrow(1, 3, 1));
+        let given = column(|instance| instance.start.distance.min(instance.target.distance));
+        let nearest = given.clamp_max(nearest_distance(mesh));
+        Self { turned, half_fov, start, nearest, faces, target, size }
+    }
+
+    /// θ before the first step.
+    pub fn start(&self) -> Tensor<B, 2> {
+        self.start.clone()
+    }
+
+    /// Hard silhouettes to arrive at, `[views, size, size]`.
+    pub fn target(&self) -> Tensor<B, 3> {
+        self.target.clone()
+    }
+
+    /// Faces of the mesh.
+    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
+        &self.faces
+    }
+
+    /// The mesh as seen at θ: `[views, vertices, 3]`, x and y in NDC and the depth.
+    pub fn project(&self, theta: Tensor<B, 2>) -> Tensor<B, 3> {
+        let orbits = match &self.half_fov {
+            None => theta,
+            Some(half_fov) => Tensor::cat(vec![theta, half_fov.clone()], 1),
+        };
+        project(self.turned.clone(), orbits)
+    }
+
+    /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
+    pub fn hard(&self, projected: Tensor<B, 3>) -> Tensor<B, 3> {
+        hard_silhouette(projected, &self.faces, self.size)
+    }
+
+    /// θ moved to the nearest pose that is allowed.
+    ///
+    /// The camera stays outside the ball around the origin that holds the mesh, with 5 % to spare,
+    /// so that the whole mesh is in front of it (a step of Adam can be 0.3 world units, whatever
+    /// there is to gain); an instance that starts or ends nearer may go that near. Half the field of
+    /// view stays within 1 to 80 degrees. Not in the paper, whose released code lets the mesh pass
+    /// through the camera (FACTS S11).
+    pub fn allowed(&self, theta: Tensor<B, 2>) -> Tensor<B, 2> {
+        let part = |start: usize, length: usize| theta.clone().narrow(1, start, length);
+        let mut columns = vec![part(0, 1).max_pair(self.nearest.clone()), part(1, 2)];
+        if self.half_fov.is_none() {
+            let [least, largest] = HALF_FOV_DEG;
+            columns.push(part(3, 1).clamp(least, largest));
+        }
+        Tensor::cat(columns, 1)
+    }
+}
+
+/// Distance from the origin beyond which a camera has the whole mesh in front of it.
+pub(crate) fn nearest_distance(mesh: &Mesh) -> f64 {
+    let radius = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
+    CLEARANCE * mesh.triangles().flatten().map(radius).fold(0.0, f64::max)
+}
+
+/// A tensor in the float type of its backend, whatever type the device defaults to.
+pub(crate) fn tensor<B: Backend, const D: usize>(
+    values: Vec<f64>,
+    shape: [usize; D],
+) -> Tensor<B, D> {
+    let dtype = <B::FloatElem as Element>::dtype();
+    Tensor::from_data(TensorData::new(values, shape), (&Default::default(), dtype))
+}
+
+/// Numbers of a tensor, row by row.
+pub(crate) fn numbers<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
+    tensor.into_data().iter().collect()
+}

@@ -1,0 +1,259 @@
+use anyhow::ensure;
+use burn::backend::Autodiff;
+use softrast_mesh::{Mesh, fox};
+use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
+use softrast_runner::{
+    Batch, Description, Error, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Settings,
+    Task, Variant,
+};
+use softrast_softness::Softness;
+
+use crate::{
+    Args, Instance, Instances, Method, PoseError, Range, Scene,
+    picture::Album,
+    scene::{nearest_distance, numbers},
+    solve::{Solver, State},
+};
+
+/// A run succeeds when the camera ends at most this far from the target.
+const SUCCESS_DEG: f64 = 5.0;
+/// Instances solved together in `evaluate`: all released pairs fit.
+const BATCH: usize = 25;
+
+/// The prepared task.
+pub struct Pose {
+    mesh: Mesh,
+    mesh_name: String,
+    source: Source,
+    optimise_fov: bool,
+    solver: Solver,
+}
+
+/// Where instances come from.
+enum Source {
+    Seeded(Range),
+    Released(Vec<Instance>),
+}
+
+impl Task for Pose {
+    const NAME: &'static str = "pose";
+    const ABOUT: &'static str = "Recovers the pose of a camera from a silhouette";
+    type Args = Args;
+
+    fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
+        let (steps, learning_rate) = match settings.variant {
+            Variant::Original => (300, 0.3),
+            Variant::Transfer => (150, 0.5),
+        };
+        let solver = Solver {
+            method: Method::new(settings)?,
+            size: settings.size.unwrap_or(64),
+            steps: settings.steps.unwrap_or(steps),
+            learning_rate: settings.learning_rate.unwrap_or(learning_rate),
+        };
+        let (mesh, mesh_name) = mesh(args)?;
+        let source = Source::new(settings, args)?;
+        Ok(Self { mesh, mesh_name, source, optimise_fov: args.optimise_fov, solver })
+    }
+
+    fn describe(&self) -> Description {
+        let Solver { method, size, steps, learning_rate } = &self.solver;
+        let (instances, range) = match &self.source {
+            Source::Seeded(range) => ("seeded", range.name()),
+            Source::Released(_) => ("released24", Range::Near.name()),
+        };
+        let settings = serde_json::json!({
+            "mesh": self.mesh_name,
+            "instances": instances,
+            "range": range,
+            "optimise_fov": self.optimise_fov,
+            "learning_rate": learning_rate,
+            "schedule": if method.is_static() { "static" } else { "decay" },
+            "scale": method.scale(0, *steps),
+            "scale_end": method.scale(*steps, *steps),
+            "squared": method.softness().squared,
+        });
+        Description {
+            softness: method.name().to_owned(),
+            parameters: method.softness().parameters(),
+            backend: DEFAULT_BACKEND.to_owned(),
+            steps: *steps,
+            size: *size,
+            faces: self.mesh.faces().len(),
+            runs: match &self.source {
+                Source::Seeded(_) => 50,
+                Source::Released(pairs) => pairs.len(),
+            },
+            image_error: Measure { name: "soft IoU loss", unit: "" },
+            parameter_error: Measure { name: "camera angle", unit: "degrees" },
+            extra: EXTRA.to_vec(),
+            success: format!("the camera ends within {SUCCESS_DEG} degrees"),
+            settings: settings.as_object().cloned().unwrap_or_default(),
+        }
+    }
+
+    fn batch_size(&self) -> usize {
+        BATCH
+    }
+
+    fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
+        let instances = batch.seeds.iter().map(|&seed| self.instance(seed));
+        let instances = instances.collect::<anyhow::Result<Vec<_>>>()?;
+        let Solver { size, steps, .. } = self.solver;
+        let scene =
+            Scene::<Autodiff<DefaultBackend>>::new(&self.mesh, &instances, size, self.optimise_fov);
+        let targets = numbers(scene.target().inner());
+        let targets: Vec<&[f64]> = targets.chunks(size * size).collect();
+        let mut album = Album::new(targets[0].to_vec(), size);
+        let mut curves = vec![Vec::with_capacity(steps + 1); instances.len()];
+        let mut step_seconds = Vec::with_capacity(steps);
+        self.solver.run(&scene, |state: State| {
+            for (view, curve) in curves.iter_mut().enumerate() {
+                curve.push(point(&state, view, &instances[view]));
+            }
+            if batch.pictures {
+                let image: Vec<f64> = state.image.iter().take(size * size).collect();
+                album.take(&image, batch.wants_frame(state.step, steps));
+            }
+            step_seconds.extend(state.seconds);
+            let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
+            if state.step == 0 { Ok(()) } else { progress.step(state.step, loss) }
+        })?;
+
+        let mut pictures = batch.pictures.then(|| album.pictures());
+        let runs = batch.seeds.iter().zip(curves).enumerate().map(|(view, (&seed, curve))| Run {
+            seed,
+            success: curve.last().is_some_and(|end: &Point| end.parameter_error <= SUCCESS_DEG),
+            warnings: self.warnings(seed, &instances[view], targets[view], &curve),
+            curve,
+            step_seconds: step_seconds.clone(),
+            pictures: pictures.take(),
+        });
+        Ok(runs.collect())
+    }
+}
+
+/// Errors beside the soft image error and the angle, in the order of [`point`].
+const EXTRA: [ExtraError; 3] = [
+    ExtraError {
+        group: ErrorGroup::Image,
+        key: "hard",
+        measure: Measure { name: "hard IoU loss", unit: "" },
+    },
+    ExtraError {
+        group: ErrorGroup::Parameter,
+        key: "distance",
+        measure: Measure { name: "camera distance", unit: "world units" },
+    },
+    ExtraError {
+        group: ErrorGroup::Parameter,
+        key: "released",
+        measure: Measure { name: "squared chord / 3", unit: "" },
+    },
+];
+
+fn point(state: &State, view: usize, instance: &Instance) -> Point {
+    let theta = &state.theta[view];
+    let error = PoseError::new([theta[0], theta[1], theta[2]], instance.target.distance);
+    Point {
+        step: state.step,
+        loss: state.soft[view],
+        image_error: state.soft[view],
+        parameter_error: error.angle_deg,
+        scale: state.scale,
+        extra: vec![state.hard[view], error.distance, error.released()],
+    }
+}
+
+impl Pose {
+    fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
+        match &self.source {
+            Source::Released(pairs) => {
+                let pair = usize::try_from(seed).ok().and_then(|k| pairs.get(k)).copied();
+                pair.ok_or_else(|| too_many(pairs.len()))
+            }
+            Source::Seeded(range) => {
+                let mut instance = Instance::seeded(seed, *range);
+                if !self.optimise_fov {
+                    instance.start.half_fov_deg = instance.target.half_fov_deg;
+                }
+                Ok(instance)
+            }
+        }
+    }
+
+    /// What is wrong with an instance, so that nobody trusts its numbers.
+    fn warnings(
+        &self,
+        seed: u64,
+        instance: &Instance,
+        target: &[f64],
+        curve: &[Point],
+    ) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let covered = target.iter().filter(|&&p| p > 0.5).count();
+        if covered == 0 {
+            warnings.push(format!(
+                "seed {seed}: the target image is empty, so there is nothing to match: check that \
+                 the mesh is around the origin (--normalize moves it there) and raise --size"
+            ));
+        } else if covered == target.len() {
+            warnings.push(format!(
+                "seed {seed}: the mesh fills the whole target image, so no edge shows its pose: try \
+                 --normalize or a larger --size"
+            ));
+        }
+        let (nearest, camera) = (nearest_distance(&self.mesh), instance.target.distance);
+        if camera < nearest {
+            warnings.push(format!(
+                "seed {seed}: the mesh reaches to the target camera: it would have to be {nearest:.3} \
+                 from the origin but is at {camera:.3}; try --normalize"
+            ));
+        }
+        if covered > 0 && curve.last().is_some_and(|end| end.extra[0] >= 1.0) {
+            warnings.push(format!(
+                "seed {seed}: the mesh ends outside the target's silhouette, where nothing pulls it \
+                 back: try a larger --scale or a smaller --learning-rate"
+            ));
+        }
+        warnings
+    }
+}
+
+impl Source {
+    fn new(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
+        if args.instances == Instances::Seeded {
+            return Ok(Source::Seeded(args.range.unwrap_or_default()));
+        }
+        if args.range.is_some() {
+            let message =
+                "--range does not go with --instances released24, whose angles are 15 to 35";
+            return Err(Error::Usage(message.into()).into());
+        }
+        let pairs = Instance::released()?;
+        let last = settings.seed.saturating_add(settings.runs.unwrap_or(1) as u64);
+        ensure!(last <= pairs.len() as u64, too_many(pairs.len()));
+        Ok(Source::Released(pairs))
+    }
+}
+
+fn too_many(pairs: usize) -> anyhow::Error {
+    let message = format!(
+        "--instances released24 has {pairs} pairs, counted from seed 0: --seed and --runs together \
+         may not go beyond"
+    );
+    Error::Usage(message).into()
+}
+
+/// The mesh to view and its name.
+fn mesh(args: &Args) -> anyhow::Result<(Mesh, String)> {
+    let (mesh, name) = match &args.mesh {
+        None => (fox(), "fox".to_owned()),
+        Some(path) => (Mesh::load(path)?, path.display().to_string()),
+    };
+    Ok(if args.normalize {
+        (mesh.normalized(), format!("{name}, normalized"))
+    } else {
+        (mesh, name)
+    })
+}
