@@ -1,0 +1,93 @@
+//! The 24 released pairs on spot against values measured before, to 5e-4.
+//!
+//! Source: FACTS 8.1. The mesh belongs to others and is not part of this repository.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::{Path, PathBuf};
+
+use burn::{
+    backend::NdArray,
+    tensor::{DType, Tensor, TensorData},
+};
+use pose::{Instance, PoseError, Scene};
+use softrast_mesh::Mesh;
+use softrast_raster::{Rasterizer, iou_loss};
+use softrast_softness::{EdgeSoftness, Family};
+
+type B = NdArray<f32>;
+
+const SIZE: usize = 64;
+const TOLERANCE: f64 = 5e-4;
+
+/// The mesh spot, where it is at hand.
+fn spot() -> Option<PathBuf> {
+    let shared = "../../../shared/data/meshes/paper/spot.obj";
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(shared);
+    if !path.exists() {
+        println!("skipped: {path:?} is missing");
+        return None;
+    }
+    Some(path)
+}
+
+fn assert_close(what: &str, found: f64, expected: f64, tolerance: f64) {
+    let off = (found / expected - 1.0).abs();
+    assert!(off < tolerance, "{what}: {found}, expected {expected}, off by {off:.1e}");
+}
+
+fn sum(losses: Tensor<B, 1>) -> f64 {
+    losses.into_data().iter::<f64>().sum()
+}
+
+#[test]
+fn targets_and_losses_before_any_step_are_those_measured_before() {
+    let Some(path) = spot() else { return };
+    let mesh = Mesh::load(path).unwrap();
+    let instances = Instance::released().unwrap();
+    let scene = Scene::<B>::new(&mesh, &instances, SIZE, false);
+    let target = scene.target();
+    let coverage: f64 = target.clone().mean().into_scalar().into();
+    assert_close("coverage of the targets", coverage, 0.25180, TOLERANCE);
+
+    let projected = scene.project(scene.start());
+    let hard = sum(iou_loss(scene.hard(projected.clone()), target.clone()));
+    assert_close("hard loss", hard, 16.5601, TOLERANCE);
+
+    let released = instances.iter().map(|Instance { target, start }| {
+        let pose = [start.distance, start.elevation_deg, start.azimuth_deg];
+        PoseError::new(pose, target.distance).released()
+    });
+    assert_close("parameter error", released.sum(), 1.64015, 1e-5);
+
+    for (family, scale, expected) in [
+        (Family::Gauss, 1e-2, 15.648),
+        (Family::Gauss, 10f64.powf(-2.5), 16.431),
+        (Family::Gamma, 0.1, 14.617),
+        (Family::Gamma, 1e-2, 15.084),
+    ] {
+        let softness = EdgeSoftness { family, squared: false };
+        let phi = softness.default_phi(scale);
+        let data = TensorData::new(phi.clone(), [phi.len()]);
+        let phi = Tensor::<B, 1>::from_data(data, (&Default::default(), DType::F32));
+        let silhouette = Rasterizer::new(SIZE).prepare(scene.faces(), softness, &phi);
+        let image = silhouette.coverage(projected.clone(), phi);
+        let loss = sum(iou_loss(image, target.clone()));
+        assert_close(&format!("{family} {scale}"), loss, expected, TOLERANCE);
+    }
+}
+
+#[test]
+fn the_first_step_with_a_gamma_moves_as_the_released_one() {
+    let Some(path) = spot() else { return };
+    let out = tempfile::tempdir().unwrap();
+    let line = "pose evaluate --instances released24 --softness gamma --scale 0.1 --steps 1 --quiet \
+                --json --mesh";
+    let mut words: Vec<_> = line.split_whitespace().map(Into::into).collect();
+    words.extend([path.into_os_string(), "--out".into(), out.path().into()]);
+    let mut stdout = Vec::new();
+    softrast_runner::execute::<pose::Pose>(words, &mut stdout).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&stdout).unwrap();
+    let released = json["parameter_error"]["released"]["final"].as_f64().unwrap();
+    assert_close("parameter error after a step", 24.0 * released, 1.63487, 1e-4);
+}

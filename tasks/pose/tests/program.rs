@@ -1,0 +1,144 @@
+//! The whole program on small scenes: what it recovers, and what it says when it cannot.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{ffi::OsString, fs, path::Path};
+
+use pose::Pose;
+use serde_json::Value;
+use softrast_runner::{Failure, execute};
+
+/// Runs a command line with results in `out`; its JSON line.
+fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
+    let words = ["pose"].into_iter().chain(line.split_whitespace());
+    let mut words: Vec<OsString> = words.map(OsString::from).collect();
+    words.extend(["--quiet".into(), "--json".into(), "--out".into(), out.into()]);
+    let mut stdout = Vec::new();
+    execute::<Pose>(words, &mut stdout)?;
+    Ok(serde_json::from_slice(&stdout).unwrap())
+}
+
+fn run(line: &str) -> Result<Value, Failure> {
+    run_in(tempfile::tempdir().unwrap().path(), line)
+}
+
+fn warnings(json: &Value) -> String {
+    json["warnings"].to_string()
+}
+
+/// A mesh file of one triangle, or of whatever the text says.
+fn with_mesh(text: &str, line: &str) -> Result<Value, Failure> {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("mesh.obj");
+    fs::write(&mesh, text).unwrap();
+    run(&format!("{line} --mesh {}", mesh.display()))
+}
+
+fn assert_finite(json: &Value) {
+    for error in ["image_error", "parameter_error"] {
+        for key in ["initial", "final", "best"] {
+            assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
+        }
+    }
+}
+
+#[test]
+fn a_few_steps_lower_the_loss_and_write_every_file() {
+    let out = tempfile::tempdir().unwrap();
+    let json = run_in(out.path(), "--range 15-35 --size 24 --steps 30").unwrap();
+    let of = |key: &str| json["image_error"][key].as_f64().unwrap();
+    assert!(of("final") < 0.8 * of("initial"), "{json}");
+    assert!(json["image_error"]["hard"]["final"].is_number());
+    for key in ["distance", "released"] {
+        assert!(json["parameter_error"][key]["final"].is_number());
+    }
+    for file in ["result.json", "curve.csv", "before_after.png", "animation.gif", "report.html"] {
+        assert!(out.path().join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_run_does_not_depend_on_its_batch() {
+    let line = "--size 16 --steps 5 --range 15-35";
+    let many = run(&format!("evaluate --runs 3 {line}")).unwrap();
+    let alone = run(&format!("solve --seed 2 {line}")).unwrap();
+    let [many, alone] =
+        [&many["parameter_error"]["per_run"][2], &alone["parameter_error"]["final"]]
+            .map(|angle| angle.as_f64().unwrap());
+    assert!((many - alone).abs() < 1e-3, "{many} {alone}");
+}
+
+#[test]
+fn a_decay_goes_from_scale_to_scale() {
+    let out = tempfile::tempdir().unwrap();
+    let line = "--scale 0.1 --scale-end 0.001 --steps 3 --size 8 --softness gauss";
+    run_in(out.path(), line).unwrap();
+    let table = fs::read_to_string(out.path().join("curve.csv")).unwrap();
+    let scales: Vec<f64> =
+        table.lines().skip(1).map(|row| row.split(',').nth(5).unwrap().parse().unwrap()).collect();
+    for (scale, expected) in scales.iter().zip([0.1, 0.01, 0.001, 0.001]) {
+        assert!((scale / expected - 1.0).abs() < 1e-9, "{scales:?}");
+    }
+}
+
+#[test]
+fn one_field_of_view_more_can_be_optimised() {
+    assert_finite(&run("--optimise-fov --steps 3 --size 16").unwrap());
+}
+
+#[test]
+fn a_mesh_out_of_view_is_said_to_be_so() {
+    let far = "v 90 0 0\nv 91 0 0\nv 90 1 0\nf 1 2 3\n";
+    let json = with_mesh(far, "--steps 3 --size 16").unwrap();
+    assert_finite(&json);
+    assert!(warnings(&json).contains("target image is empty"), "{json}");
+    let json = with_mesh(far, "--steps 3 --size 16 --normalize").unwrap();
+    assert!(!warnings(&json).contains("target image is empty"), "{json}");
+}
+
+#[test]
+fn a_mesh_around_the_camera_ends_with_finite_numbers() {
+    let huge = "v -50 -50 0\nv 50 -50 0\nv 0 90 1\nv 0 0 40\nf 1 2 3\nf 1 4 2\nf 2 4 3\n";
+    let json = with_mesh(huge, "--steps 5 --size 16").unwrap();
+    assert_finite(&json);
+    assert!(warnings(&json).contains("reaches to the target camera"), "{json}");
+}
+
+#[test]
+fn one_pixel_and_one_face_end_with_finite_numbers() {
+    assert_finite(&run("--size 1 --steps 5").unwrap());
+    let face = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    assert_finite(&with_mesh(face, "--size 16 --steps 20").unwrap());
+    let point = "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n";
+    let json = with_mesh(point, "--size 16 --steps 3").unwrap();
+    assert_finite(&json);
+    assert!(warnings(&json).contains("target image is empty"), "{json}");
+}
+
+#[test]
+fn every_named_softness_ends_with_finite_numbers_at_any_scale() {
+    for name in ["logistic", "gauss", "exp", "gamma", "mlp"] {
+        for scale in ["1e-6", "1e-2", "10"] {
+            let line = format!("--softness {name} --scale {scale} --size 8 --steps 3");
+            assert_finite(&run(&line).unwrap());
+        }
+    }
+    assert_finite(&run("--squared --schedule decay --size 8 --steps 3").unwrap());
+}
+
+#[test]
+fn contradictions_are_usage_errors_and_missing_files_are_not() {
+    for (line, code, part) in [
+        ("evaluate --instances released24 --runs 25", 2, "24 pairs"),
+        ("--instances released24 --seed 24", 2, "24 pairs"),
+        ("--instances released24 --range 35-55", 2, "--range does not go with"),
+        ("--softness missing.json --scale 0.1", 2, "holds its own parameters"),
+        ("--softness missing.json --schedule decay", 2, "holds its own parameters"),
+        ("--softness missing.json", 1, "missing.json"),
+        ("--mesh missing.obj", 1, "missing.obj"),
+    ] {
+        let failure = run(line).unwrap_err();
+        assert_eq!(failure.code, code, "{line}: {failure}");
+        assert!(failure.message.contains(part), "{line}: {failure}");
+    }
+}
