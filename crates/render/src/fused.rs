@@ -1,0 +1,124 @@
+//! The fused op on the backend of the program, timed.
+
+use std::time::Instant;
+
+use burn::{
+    backend::Autodiff,
+    tensor::{DType, Tensor, backend::Backend},
+};
+use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer, Silhouette, mse_loss, project};
+use softrast_runner::median;
+use softrast_softness::EdgeSoftness;
+
+use crate::{
+    measured::{Knots, Measured},
+    scene::Scene,
+};
+
+type B = DefaultBackend;
+type A = Autodiff<B>;
+
+/// Draws the scene `repeat` times, after once to warm up.
+pub(crate) fn measure(scene: &Scene, repeat: usize) -> Measured {
+    let fused = Fused::new(scene);
+    let mut last = fused.step();
+    let steps: Vec<Step> = (0..repeat)
+        .map(|_| {
+            last = fused.step();
+            last.clone()
+        })
+        .collect();
+    let times = |of: fn(&Step) -> f64| median(&steps.iter().map(of).collect::<Vec<_>>());
+    Measured {
+        alpha: last.image.to_data().iter().collect(),
+        loss: last.loss,
+        pairs: fused.silhouette.pairs(project(fused.vertices.clone(), fused.orbits.clone())),
+        forward_ms: times(|step| step.forward_ms),
+        backward_ms: last.loss.map(|_| times(|step| step.backward_ms)),
+        total_ms: times(|step| step.forward_ms + step.backward_ms),
+        profile: Some(fused.knots()),
+    }
+}
+
+/// What stays the same from step to step.
+struct Fused {
+    silhouette: Silhouette<EdgeSoftness>,
+    prepare_ms: f64,
+    table: Tensor<B, 2>,
+    vertices: Tensor<B, 3>,
+    orbits: Tensor<B, 2>,
+    target: Option<Tensor<B, 3>>,
+}
+
+/// One image, its loss and gradient norm if there is a target, and what they took.
+#[derive(Clone)]
+struct Step {
+    image: Tensor<B, 3>,
+    loss: Option<[f64; 2]>,
+    forward_ms: f64,
+    backward_ms: f64,
+}
+
+impl Fused {
+    fn new(scene: &Scene) -> Self {
+        let &Scene { size, tolerance, t_conorm, .. } = scene;
+        let start = Instant::now();
+        let phi = scene.phi::<B>(DType::F32);
+        let rasterizer = Rasterizer { size, tolerance, t_conorm };
+        let silhouette = rasterizer.prepare(&scene.faces, scene.softness, &phi);
+        let table = silhouette.table(phi);
+        let prepare_ms = milliseconds(start);
+        Self {
+            silhouette,
+            prepare_ms,
+            table,
+            vertices: scene.vertices(DType::F32),
+            orbits: scene.orbits(DType::F32),
+            target: scene.target(DType::F32),
+        }
+    }
+
+    fn knots(&self) -> Knots {
+        let profile = self.silhouette.profile();
+        let prepare_ms = self.prepare_ms;
+        Knots { count: profile.knots(), support_ndc: profile.support(), prepare_ms }
+    }
+
+    fn step(&self) -> Step {
+        let [orbits, table] = [&self.orbits, &self.table].map(Clone::clone);
+        let start = Instant::now();
+        let Some(target) = &self.target else {
+            let image = self.coverage(self.vertices.clone(), orbits, table);
+            let forward_ms = milliseconds(start);
+            return Step { image, loss: None, forward_ms, backward_ms: 0.0 };
+        };
+        let vertices = Tensor::<A, 3>::from_inner(self.vertices.clone()).require_grad();
+        let [orbits, table] = [orbits, table].map(Tensor::from_inner);
+        let image = self.coverage(vertices.clone(), orbits, table);
+        let forward_ms = milliseconds(start);
+
+        let start = Instant::now();
+        let loss = mse_loss(image.clone(), Tensor::from_inner(target.clone())).mean();
+        let grad = vertices.grad(&loss.backward()).expect("the image depends on the vertices");
+        let backward_ms = milliseconds(start);
+        let norm = grad.to_data().iter::<f64>().map(|g| g * g).sum::<f64>().sqrt();
+        let loss = loss.into_scalar();
+        Step { image: image.inner(), loss: Some([loss.into(), norm]), forward_ms, backward_ms }
+    }
+
+    /// From world vertices to coverage.
+    fn coverage<C: RasterBackend>(
+        &self,
+        vertices: Tensor<C, 3>,
+        orbits: Tensor<C, 2>,
+        table: Tensor<C, 2>,
+    ) -> Tensor<C, 3> {
+        self.silhouette.coverage_by_table(project(vertices, orbits), table)
+    }
+}
+
+/// Time since `start`, once the device has done what it was asked.
+fn milliseconds(start: Instant) -> f64 {
+    B::sync(&Default::default()).expect("the device finishes its work");
+    start.elapsed().as_secs_f64() * 1e3
+}

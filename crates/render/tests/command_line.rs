@@ -1,0 +1,94 @@
+//! The program as called: what it prints, what it writes, and how it refuses.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+use softrast_mesh::icosphere;
+use softrast_runner::Failure;
+
+fn mesh(folder: &Path) -> String {
+    let path = folder.join("sphere.obj");
+    icosphere(1).write_obj(&path).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn run(words: &[&str]) -> Result<String, Failure> {
+    let mut stdout = Vec::new();
+    let words = ["render"].iter().chain(words).map(|&word| word.into());
+    render::execute(words, &mut stdout)?;
+    Ok(String::from_utf8(stdout).unwrap())
+}
+
+fn json(words: &[&str]) -> Value {
+    serde_json::from_str(run(words).unwrap().lines().last().unwrap()).unwrap()
+}
+
+#[test]
+fn the_fused_op_gives_the_numbers_of_the_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, out) = (mesh(folder.path()), folder.path().join("a/sphere.png"));
+    let words = "--size 24 --azimuths 0,50,100 --scale 0.02 --target disk:0.1,-0.05,0.4 --json";
+    let words: Vec<&str> = words.split(' ').collect();
+    let words = [&[&mesh, "--out", out.to_str().unwrap()], &words[..]].concat();
+    let fused = json(&words);
+    let dense = json(&[&words[..], &["--reference"]].concat());
+    for (key, bound) in [("mean_alpha", 1e-4), ("loss", 1e-4), ("gradient_norm", 1e-3)] {
+        let [a, b] = [&fused, &dense].map(|report| report[key].as_f64().unwrap());
+        assert!((a - b).abs() <= bound * b, "{key}: {a} and {b}");
+    }
+    assert_eq!(dense["pairs"], 24 * 24 * 80 * 3);
+    assert!(fused["pairs"].as_u64() <= dense["pairs"].as_u64());
+    assert_eq!([&fused["faces"], &fused["views"], &fused["size"]], [80, 3, 24]);
+    for key in ["forward_ms", "backward_ms", "total_ms", "profile_knots"] {
+        assert!(fused[key].as_f64().unwrap() > 0.0, "{key}");
+    }
+    let picture = image::open(&out).unwrap();
+    assert_eq!(picture.width(), 3 * 24 + 4 * 2, "a contact sheet of three");
+    assert_eq!(fs::read_dir(out.parent().unwrap()).unwrap().count(), 1, "nothing else is left");
+}
+
+#[test]
+fn a_picture_is_its_own_target() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = mesh(folder.path());
+    let out = folder.path().join("sphere.png");
+    let out = out.to_str().unwrap();
+    run(&[&mesh, "--size", "40", "--out", out]).unwrap();
+    let report = json(&[&mesh, "--size", "40", "--out", out, "--target", out, "--json"]);
+    // The picture has 8 bits.
+    assert!(report["loss"].as_f64().unwrap() < 1e-5, "{report}");
+}
+
+#[test]
+fn bad_input_is_one_line_and_leaves_no_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = mesh(folder.path());
+    let blocked = folder.path().join("sphere.obj/out.png");
+    let blocked = blocked.to_str().unwrap();
+    let out = folder.path().join("out.png");
+    let cases: [(&[&str], u8, &str); 12] = [
+        (&["missing.obj"], 1, "missing.obj: cannot be read"),
+        (&[&mesh, "--size", "0"], 2, "whole number of pixels"),
+        (&[&mesh, "--scale", "-1"], 2, "expected a positive number"),
+        (&[&mesh, "--azimuths", "1,,2"], 2, "with commas between them"),
+        (&[&mesh, "--fov", "180"], 2, "between 0 and 180"),
+        (&[&mesh, "--tolerance", "1"], 2, "between 0 and 1"),
+        (&[&mesh, "--softness", "soft"], 2, "known are logistic, gauss"),
+        (&[&mesh, "--softness", "missing.json"], 1, "missing.json"),
+        (&[&mesh, "--softness", "a.json", "--squared"], 2, "a file has its own"),
+        (&[&mesh, "--t-conorm", "max"], 2, "use probabilistic, einstein"),
+        (&[&mesh, "--target", &mesh], 1, "cannot read the target"),
+        (&[&mesh, "--out", blocked], 1, "choose another file with --out"),
+    ];
+    for (words, code, message) in cases {
+        let mut words = words.to_vec();
+        if !words.contains(&"--out") {
+            words.extend(["--out", out.to_str().unwrap()]);
+        }
+        let failure = run(&words).unwrap_err();
+        let line = failure.to_string();
+        assert!(line.contains(message) && !line.contains('\n'), "{words:?}: {line}");
+        assert_eq!(failure.code, code, "{line}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the mesh alone is left");
+}
