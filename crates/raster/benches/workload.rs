@@ -1,0 +1,102 @@
+//! The scenes that are measured.
+
+use std::{path::Path, sync::Arc};
+
+use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use softrast_mesh::{Mesh, fox, icosphere};
+use softrast_raster::{Rasterizer, Silhouette, TConorm, project};
+use softrast_softness::{EdgeSoftness, Family};
+
+/// A logistic of the signed squared distance: `width` is the root of its scale, in NDC.
+pub(crate) const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
+
+/// A mesh, its views and how soft it is.
+pub(crate) struct Workload {
+    pub(crate) name: String,
+    pub(crate) faces: Arc<[[u32; 3]]>,
+    /// `[vertices, 3]`, world units.
+    pub(crate) vertices: Vec<f64>,
+    /// `[views, 4]`.
+    pub(crate) orbits: Vec<f64>,
+    pub(crate) size: usize,
+    pub(crate) width: f64,
+}
+
+impl Workload {
+    /// A mesh seen from 2.732 away with a field of view of 60 degrees, at width 1e-2.
+    pub(crate) fn new(name: &str, mesh: &Mesh, azimuths: &[f64], size: usize) -> Self {
+        let orbit = |&azimuth: &f64| [2.732, 0.0, azimuth, 30.0];
+        Self {
+            name: name.to_owned(),
+            faces: mesh.faces().into(),
+            vertices: mesh.positions().as_flattened().to_vec(),
+            orbits: azimuths.iter().flat_map(orbit).collect(),
+            size,
+            width: 1e-2,
+        }
+    }
+
+    /// A sphere of 1,280 faces in 24 views of 64 x 64.
+    pub(crate) fn w1() -> Self {
+        let azimuths: Vec<f64> = (0..24).map(|k| 15.0 * f64::from(k)).collect();
+        let sphere = known("sphere_642.obj").unwrap_or_else(|| icosphere(3));
+        Self::new("W1 (sphere, 24 views of 64 px)", &sphere, &azimuths, 64)
+    }
+
+    /// A cow of 5,856 faces in one view of 256 x 256; where it is missing, our fox of 2,856.
+    pub(crate) fn w2() -> Self {
+        match known("spot.obj") {
+            Some(spot) => Self::new("W2 (spot, 256 px)", &spot, &[180.0], 256),
+            None => Self::new("W2 (fox for spot, 256 px)", &fox(), &[180.0], 256),
+        }
+    }
+
+    /// World vertices `[1, vertices, 3]`.
+    pub(crate) fn world<B: Backend>(&self, dtype: DType) -> Tensor<B, 3> {
+        tensor(&self.vertices, [1, self.vertices.len() / 3, 3], dtype)
+    }
+
+    /// Cameras `[views, 4]`.
+    pub(crate) fn cameras<B: Backend>(&self, dtype: DType) -> Tensor<B, 2> {
+        tensor(&self.orbits, [self.orbits.len() / 4, 4], dtype)
+    }
+
+    /// Vertices as the op takes them, `[views, vertices, 3]`.
+    pub(crate) fn projected<B: Backend>(&self, dtype: DType) -> Tensor<B, 3> {
+        project(self.world(dtype), self.cameras(dtype))
+    }
+
+    /// Parameters of the softness.
+    pub(crate) fn phi<B: Backend>(&self, dtype: DType) -> Tensor<B, 1> {
+        let phi = SOFTNESS.default_phi(self.width * self.width);
+        tensor(&phi, [phi.len()], dtype)
+    }
+
+    /// The silhouette and its table, made for a tolerance.
+    pub(crate) fn prepare<B: Backend>(
+        &self,
+        tolerance: f64,
+        dtype: DType,
+    ) -> (Silhouette<EdgeSoftness>, Tensor<B, 2>) {
+        let rasterizer =
+            Rasterizer { size: self.size, tolerance, t_conorm: TConorm::Probabilistic };
+        let silhouette = rasterizer.prepare(&self.faces, SOFTNESS, &self.phi::<B>(dtype));
+        let table = silhouette.table(self.phi(dtype));
+        (silhouette, table)
+    }
+}
+
+/// A tensor of these values.
+pub(crate) fn tensor<B: Backend, const D: usize>(
+    values: &[f64],
+    shape: [usize; D],
+    dtype: DType,
+) -> Tensor<B, D> {
+    Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), dtype))
+}
+
+/// A well-known mesh that is not part of this repository, from the folder beside it.
+fn known(file: &str) -> Option<Mesh> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/meshes/paper");
+    Mesh::load(folder.join(file)).ok()
+}
