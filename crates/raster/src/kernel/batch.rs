@@ -19,6 +19,10 @@ const CHUNKS: usize = 16;
 /// and support, finite when squared in f32.
 const NOWHERE: f64 = 1e15;
 
+/// Largest rate at which a place in a cell moves with the squared distance, in NDC⁻². Reached only
+/// next to the edge under a softness narrower than f32 can tell from a step.
+const STEEPEST: f64 = 1e30;
+
 type Chunk<N> = [N; LANES];
 
 /// Pixels waiting for one face. Reused from face to face.
@@ -129,9 +133,13 @@ impl<T: Real> Batch<T> {
                 let y = point.distance2.scale(inverse);
                 let place = lookup.place(y.value(), inside);
                 self.row[c][i] = place.row;
-                self.t[c][i] = (y - T::constant(place.start)).scale(place.rate);
+                // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
+                let t = (y - T::constant(place.start)).scale(place.rate);
+                self.t[c][i] = if y.value() < T::Float::ONE { t } else { T::ZERO };
                 if GRADIENT {
-                    self.rate[c][i] = place.rate * inverse;
+                    let rate = place.rate * inverse;
+                    let steepest = T::Float::from_f64(STEEPEST);
+                    self.rate[c][i] = if rate < steepest { rate } else { steepest };
                     self.dx[c][i] = point.dx;
                     self.dy[c][i] = point.dy;
                     self.weights[c][0][i] = point.weights[0];

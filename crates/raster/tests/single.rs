@@ -1,0 +1,95 @@
+//! The fused op in f32: close to f64, and finite where f32 itself is at its limits.
+
+use std::sync::Arc;
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::{DType, Tensor, TensorData, backend::Backend},
+};
+use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_softness::{EdgeSoftness, Family};
+
+const SIZE: usize = 16;
+
+fn tensor<T: Backend>(values: &[f64], dtype: DType) -> Tensor<T, 1> {
+    let data = TensorData::new(values.to_vec(), [values.len()]);
+    Tensor::from_data(data, (&Default::default(), dtype))
+}
+
+/// Coverage and the gradient of `Σ coverage²` to the vertices and to phi.
+fn render<T: RasterBackend>(
+    corners: &[[f64; 3]],
+    softness: EdgeSoftness,
+    scale: f64,
+    dtype: DType,
+) -> [Vec<f64>; 3]
+where
+    Autodiff<T>: RasterBackend,
+{
+    let faces: Arc<[[u32; 3]]> =
+        (0..corners.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let vertices = tensor::<Autodiff<T>>(&corners.concat(), dtype).require_grad();
+    let phi = tensor::<Autodiff<T>>(&softness.default_phi(scale), dtype).require_grad();
+    let silhouette = Rasterizer::new(SIZE).prepare(&faces, softness, &phi);
+    let shaped = vertices.clone().reshape([1, corners.len() as i64, 3]);
+    let image = silhouette.coverage(shaped, phi.clone());
+    let grads = (image.clone() * image.clone()).sum().backward();
+    let numbers = |t: Tensor<T, 1>| t.into_data().iter::<f64>().collect::<Vec<_>>();
+    [
+        numbers(image.inner().reshape([SIZE * SIZE])),
+        numbers(vertices.grad(&grads).expect("vertices are tracked")),
+        numbers(phi.grad(&grads).expect("phi is tracked")),
+    ]
+}
+
+/// A triangle, one behind it, one off screen, and one on pixel centres.
+fn scene() -> Vec<[f64; 3]> {
+    vec![
+        [-0.7, -0.6, 2.0],
+        [0.6, -0.5, 2.0],
+        [0.1, 0.8, 2.0],
+        [-0.3, -0.9, 3.0],
+        [0.9, 0.1, 3.0],
+        [-0.2, 0.7, 3.0],
+        [40.0, 40.0, 2.0],
+        [41.0, 40.0, 2.0],
+        [40.0, 41.0, 2.0],
+        [-7.0 / 16.0, -7.0 / 16.0, 2.0],
+        [5.0 / 16.0, -7.0 / 16.0, 2.0],
+        [-7.0 / 16.0, 5.0 / 16.0, 2.0],
+    ]
+}
+
+#[test]
+fn no_scale_is_too_narrow_or_too_wide_for_finite_numbers() {
+    for family in Family::ALL {
+        for squared in [false, true] {
+            let softness = EdgeSoftness { family, squared };
+            for scale in [1e-14, 1e-9, 1e-7, 1e-5, 1e-2, 1.0, 1e3] {
+                let [image, vertices, phi] =
+                    render::<NdArray<f32>>(&scene(), softness, scale, DType::F32);
+                let name = format!("{family}, squared {squared}, scale {scale}");
+                assert!(image.iter().all(|a| (0.0..=1.0).contains(a)), "{name}: {image:?}");
+                assert!(vertices.iter().all(|g| g.is_finite()), "{name}: {vertices:?}");
+                assert!(phi.iter().all(|g| g.is_finite()), "{name}: {phi:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn f32_agrees_with_f64() {
+    let difference = |a: &[f64], b: &[f64]| {
+        let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+        norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
+    };
+    for family in [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp] {
+        let softness = EdgeSoftness { family, squared: false };
+        let single = render::<NdArray<f32>>(&scene(), softness, 0.05, DType::F32);
+        let double = render::<NdArray<f32>>(&scene(), softness, 0.05, DType::F64);
+        for (k, (single, double)) in single.iter().zip(&double).enumerate() {
+            let error = difference(single, double);
+            assert!(error < 1e-4, "{family}, quantity {k}: relative difference {error:e}");
+        }
+    }
+}
