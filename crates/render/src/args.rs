@@ -19,7 +19,7 @@ pub(crate) struct Args {
     pub(crate) size: usize,
 
     /// Azimuths of the views in degrees: 0 looks along +z from -z, 90 from +x.
-    #[arg(long, value_name = "A,B,..", default_value = "30", value_delimiter = ',', value_parser = finite)]
+    #[arg(long, value_name = "A,B,..", default_value = "30", value_delimiter = ',', value_parser = finite, allow_hyphen_values = true)]
     pub(crate) azimuths: Vec<f64>,
 
     /// Elevation of the views, in degrees above the ground.
