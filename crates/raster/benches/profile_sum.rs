@@ -136,7 +136,8 @@ fn passes(group: &mut BenchmarkGroup<WallTime>, prefix: &str, op: &Op) {
     group.throughput(Throughput::Elements(op.pairs() as u64));
     for threads in [1, 2] {
         let pool = pool(threads);
-        let name = |pass: &str| format!("{prefix}{pass}, {threads} threads");
+        let plural = if threads == 1 { "" } else { "s" };
+        let name = |pass: &str| format!("{prefix}{pass}, {threads} thread{plural}");
         group.bench_function(name("forward"), |b| b.iter(|| pool.install(|| op.forward())));
         let backward = |tape| pool.install(|| backward(tape));
         group.bench_function(name("vjp"), |b| {

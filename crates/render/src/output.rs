@@ -65,7 +65,7 @@ pub(crate) fn picture(alpha: &[f64], size: usize) -> RgbImage {
 /// Columns of a sheet that is wider than high, without empty cells where that can be.
 fn columns(views: usize) -> usize {
     let root = views.isqrt() + usize::from(views.isqrt().pow(2) < views);
-    (root..=2 * root).find(|columns| views % columns == 0).unwrap_or(root)
+    (root..=2 * root).find(|columns| views.is_multiple_of(*columns)).unwrap_or(root)
 }
 
 #[cfg(test)]

@@ -8,19 +8,21 @@ use softrast_runner::Failure;
 
 fn mesh(folder: &Path) -> String {
     let path = folder.join("sphere.obj");
-    icosphere(1).write_obj(&path).unwrap();
-    path.to_str().unwrap().to_owned()
+    icosphere(1).write_obj(&path).expect("the folder can be written");
+    path.to_str().expect("a path in ASCII").to_owned()
 }
 
 fn run(words: &[&str]) -> Result<String, Failure> {
     let mut stdout = Vec::new();
     let words = ["render"].iter().chain(words).map(|&word| word.into());
     render::execute(words, &mut stdout)?;
-    Ok(String::from_utf8(stdout).unwrap())
+    Ok(String::from_utf8(stdout).expect("the results are UTF-8"))
 }
 
 fn json(words: &[&str]) -> Value {
-    serde_json::from_str(run(words).unwrap().lines().last().unwrap()).unwrap()
+    let printed = run(words).expect("the command line is right");
+    let last = printed.lines().last().expect("something is printed");
+    serde_json::from_str(last).expect("the last line is JSON")
 }
 
 #[test]
