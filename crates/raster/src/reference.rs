@@ -34,6 +34,10 @@ pub struct Scene<'a> {
 /// boundary. Edges belong to the inside; a face without area has none.
 ///
 /// Source: FACTS 1.3, computed by projection onto the edges instead of barycentric coordinates.
+///
+/// # Panics
+///
+/// If a face uses a vertex that is not there.
 pub fn signed_distance<B: Backend>(
     vertices: Tensor<B, 3>,
     faces: &[[u32; 3]],
@@ -115,7 +119,7 @@ pub fn sums<B: Backend>(
 ///
 /// # Panics
 ///
-/// Never with shapes that fit.
+/// If `upstream` does not fit the image, or a face uses a vertex that is not there.
 pub fn vjp<B: Backend>(
     scene: Scene,
     vertices: Tensor<B, 3>,
