@@ -31,9 +31,9 @@ pub(crate) struct State {
     pub(crate) scale: f64,
     /// θ of each view.
     pub(crate) theta: Vec<Vec<f64>>,
-    /// Soft IoU loss of each view, what the optimiser lowers.
+    /// Soft `IoU` loss of each view, what the optimiser lowers.
     pub(crate) soft: Vec<f64>,
-    /// IoU loss of the hard silhouette of each view.
+    /// `IoU` loss of the hard silhouette of each view.
     pub(crate) hard: Vec<f64>,
     /// Soft silhouettes, `[views, size, size]`.
     pub(crate) image: TensorData,
