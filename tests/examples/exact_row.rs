@@ -8,6 +8,7 @@
 use std::{env, time::Instant};
 
 use burn::backend::NdArray;
+use softrast_runner::peak_rss_mib;
 use softrast_tests::{Row, Workload, w1, w2};
 
 type B = NdArray<f64>;
@@ -37,12 +38,6 @@ fn main() {
             row.errors(&exact).map(|e| format!("{e:.1e}"))
         );
     }
-    println!("{seconds:.1} s, peak memory {}", peak_memory());
-}
-
-/// The line of the process status that tells the most memory held so far.
-fn peak_memory() -> String {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.map_or("unknown".to_owned(), |text| text.trim().to_owned())
+    let memory = peak_rss_mib().map_or("unknown".to_owned(), |mib| format!("{mib:.0} MiB"));
+    println!("{seconds:.1} s, peak memory {memory}");
 }

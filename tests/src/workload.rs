@@ -66,6 +66,7 @@ impl Row {
     /// If they do not.
     pub fn assert_agrees(&self, exact: &Self) {
         let errors = self.errors(exact);
+        println!("{self:?}: relative errors {errors:?}");
         let [loss, mean_alpha, gradient_norm] = errors;
         let close = loss <= 1e-4 && mean_alpha <= 1e-4 && gradient_norm <= 1e-3;
         assert!(close, "{self:?} is off by {errors:?} of {exact:?}");
@@ -99,6 +100,14 @@ fn load(name: &str) -> Option<Mesh> {
 
 impl Workload {
     /// The result by the fused op with this tolerance, in the float type of `B`.
+    ///
+    /// # Panics
+    ///
+    /// If nothing of the mesh can be seen.
+    ///
+    /// # Panics
+    ///
+    /// If the loss does not depend on the vertices.
     pub fn by_fused_op<B: RasterBackend>(&self, tolerance: f64) -> Row {
         let faces: Arc<[[u32; 3]]> = self.mesh.faces().into();
         let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(self.size) };
@@ -112,6 +121,14 @@ impl Workload {
     }
 
     /// The result by the reference: every pixel-face pair, chunk by chunk.
+    ///
+    /// # Panics
+    ///
+    /// If nothing of the mesh can be seen.
+    ///
+    /// # Panics
+    ///
+    /// If the loss does not depend on the vertices.
     pub fn by_reference<B: Backend>(&self) -> Row {
         let scene = reference::Scene { faces: self.mesh.faces(), size: self.size };
         let conorm = TConorm::default();
