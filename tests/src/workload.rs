@@ -104,10 +104,6 @@ impl Workload {
     /// # Panics
     ///
     /// If nothing of the mesh can be seen.
-    ///
-    /// # Panics
-    ///
-    /// If the loss does not depend on the vertices.
     pub fn by_fused_op<B: RasterBackend>(&self, tolerance: f64) -> Row {
         let faces: Arc<[[u32; 3]]> = self.mesh.faces().into();
         let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(self.size) };
@@ -125,10 +121,6 @@ impl Workload {
     /// # Panics
     ///
     /// If nothing of the mesh can be seen.
-    ///
-    /// # Panics
-    ///
-    /// If the loss does not depend on the vertices.
     pub fn by_reference<B: Backend>(&self) -> Row {
         let scene = reference::Scene { faces: self.mesh.faces(), size: self.size };
         let conorm = TConorm::default();
