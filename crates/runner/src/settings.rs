@@ -75,7 +75,7 @@ pub struct Settings {
     pub size: Option<usize>,
 
     /// Seed of the run; `evaluate` takes this one and those that follow.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = seed, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
 
     /// Number of seeds that `evaluate` takes.
