@@ -26,7 +26,6 @@ compile_error!("pose needs a backend: turn on one of the features ndarray, flex 
 mod args;
 mod error;
 mod instance;
-mod method;
 mod picture;
 mod scene;
 mod solve;
@@ -35,6 +34,5 @@ mod task;
 pub use args::{Args, Instances, Range};
 pub use error::PoseError;
 pub use instance::{Camera, Instance};
-pub use method::Method;
 pub use scene::Scene;
 pub use task::Pose;

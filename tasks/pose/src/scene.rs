@@ -1,7 +1,8 @@
 use std::sync::Arc;
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Tensor, backend::Backend};
 use softrast_mesh::Mesh;
+use softrast_method::tensor;
 use softrast_raster::{hard_silhouette, project, view_rotation};
 
 use crate::Instance;
@@ -116,18 +117,4 @@ impl<B: Backend> Scene<B> {
 pub(crate) fn nearest_distance(mesh: &Mesh) -> f64 {
     let radius = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
     CLEARANCE * mesh.triangles().flatten().map(radius).fold(0.0, f64::max)
-}
-
-/// A tensor in the float type of its backend, whatever type the device defaults to.
-pub(crate) fn tensor<B: Backend, const D: usize>(
-    values: Vec<f64>,
-    shape: [usize; D],
-) -> Tensor<B, D> {
-    let dtype = <B::FloatElem as Element>::dtype();
-    Tensor::from_data(TensorData::new(values, shape), (&Default::default(), dtype))
-}
-
-/// Numbers of a tensor, row by row.
-pub(crate) fn numbers<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
-    tensor.into_data().iter().collect()
 }

@@ -1,20 +1,14 @@
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData},
 };
 use softrast_meta::{Adam, Optimizer};
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, iou_loss};
-use softrast_softness::EdgeSoftness;
+use softrast_method::{Method, MovingSilhouette, numbers};
+use softrast_raster::{RasterBackend, Rasterizer, iou_loss};
 
-use crate::{
-    Method, Scene,
-    scene::{numbers, tensor},
-};
-
-/// A scale may fall by this factor before support and knots are chosen anew.
-const STALE: f64 = 0.95;
+use crate::Scene;
 
 /// How to solve the instances of a scene.
 #[derive(Clone, Debug)]
@@ -52,15 +46,18 @@ impl Solver {
         let target = scene.target().inner();
         let mut theta = scene.start().inner();
         let mut moments = adam.init(&theta);
-        let mut renderer = Renderer::<B>::new(self, scene.faces());
+        let first = self.method.scale(0, self.steps);
+        let rasterizer = Rasterizer::new(self.size);
+        let mut silhouette =
+            MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
         let mut seconds = None;
         for step in 0..=self.steps {
             let clock = Instant::now();
             let scale = self.method.scale(step, self.steps);
-            renderer.turn_to(scale);
+            silhouette.turn_to(scale);
             let leaf = Tensor::from_inner(theta.clone()).require_grad();
             let projected = scene.project(leaf.clone());
-            let image = renderer.image(projected.clone());
+            let image = silhouette.image(projected.clone());
             let loss = iou_loss(image.clone(), scene.target());
             let mut time = clock.elapsed();
 
@@ -87,53 +84,5 @@ impl Solver {
             seconds = Some(time.as_secs_f64());
         }
         Ok(())
-    }
-}
-
-/// Draws soft silhouettes at a scale that moves.
-struct Renderer<'a, B: RasterBackend> {
-    method: &'a Method,
-    size: usize,
-    faces: &'a Arc<[[u32; 3]]>,
-    silhouette: Silhouette<EdgeSoftness>,
-    /// The scale that support and knots of `silhouette` were chosen for.
-    prepared: f64,
-    table: Tensor<Autodiff<B>, 2>,
-    /// The scale of `table`.
-    scale: f64,
-}
-
-impl<'a, B: RasterBackend> Renderer<'a, B> {
-    fn new(solver: &'a Solver, faces: &'a Arc<[[u32; 3]]>) -> Self {
-        let Solver { method, size, .. } = solver;
-        let scale = method.scale(0, solver.steps);
-        let phi = Self::phi(method, scale);
-        let silhouette = Rasterizer::new(*size).prepare(faces, method.softness(), &phi);
-        let table = silhouette.table(phi);
-        Self { method, size: *size, faces, silhouette, prepared: scale, table, scale }
-    }
-
-    /// Makes the next images at `scale`, with as little work as that takes.
-    fn turn_to(&mut self, scale: f64) {
-        if self.scale == scale {
-            return;
-        }
-        let phi = Self::phi(self.method, scale);
-        if !(STALE..=1.0).contains(&(scale / self.prepared)) {
-            let rasterizer = Rasterizer::new(self.size);
-            self.silhouette = rasterizer.prepare(self.faces, self.method.softness(), &phi);
-            self.prepared = scale;
-        }
-        (self.table, self.scale) = (self.silhouette.table(phi), scale);
-    }
-
-    fn image(&self, projected: Tensor<Autodiff<B>, 3>) -> Tensor<Autodiff<B>, 3> {
-        self.silhouette.coverage_by_table(projected, self.table.clone())
-    }
-
-    fn phi(method: &Method, scale: f64) -> Tensor<Autodiff<B>, 1> {
-        let phi = method.phi(scale);
-        let shape = [phi.len()];
-        tensor(phi, shape)
     }
 }

@@ -2,18 +2,18 @@ use softrast_raster::DefaultBackend;
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
 
-use crate::scene::{numbers, tensor};
+use crate::{numbers, tensor};
 
-/// First and last scale of a decay, in NDC, and that of a static softness: wide enough at first to
-/// pull from afar, and at last as narrow as still gives the best hard silhouettes.
-///
-/// Measured with a logistic. The 24 released pairs on spot end at a hard `IoU` loss, summed, of 1.09
-/// at 0.0015, 1.12 at 0.002, 1.26 at 0.003 and 3.2 at 0.01. Of 50 seeds on the fox that start 35 to
-/// 55 degrees away 41 succeed at 0.002, and 48 with a decay to it from 0.03 (from 0.01: 45, from
-/// 0.05: 47). This is below the quarter of a pixel that META 6.6 asks for, because thousands of
-/// small faces add up to an edge that is wider than that of one (META 6.7).
-const DECAY: [f64; 2] = [0.03, STATIC];
-const STATIC: f64 = 0.002;
+/// Scales of a task that the command line does not name, as widths in NDC.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Defaults {
+    /// How the scale moves if neither a schedule nor a scale is given.
+    pub schedule: Schedule,
+    /// First and last scale of a decay.
+    pub decay: [f64; 2],
+    /// Scale of a static softness.
+    pub fixed: f64,
+}
 
 /// A softness and how its scale moves over the steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +33,7 @@ enum Path {
 }
 
 impl Method {
-    /// The method that the command line asks for; by default a logistic that decays.
+    /// The method that the command line asks for; by default a logistic.
     ///
     /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are
     /// squared, so that they mean the same widths.
@@ -41,7 +41,7 @@ impl Method {
     /// # Errors
     ///
     /// If a softness file cannot be used, or flags contradict each other.
-    pub fn new(settings: &Settings) -> anyhow::Result<Self> {
+    pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 let scaled = settings.scale.is_some() || settings.scale_end.is_some();
@@ -63,7 +63,7 @@ impl Method {
                 };
                 let family: Family = name.parse()?;
                 let softness = EdgeSoftness { family, squared: settings.squared };
-                let path = scale_path(settings);
+                let path = scale_path(settings, defaults);
                 Ok(Self { softness, name: family.name().to_owned(), path })
             }
         }
@@ -111,21 +111,21 @@ impl Method {
     }
 }
 
-fn scale_path(settings: &Settings) -> Path {
+fn scale_path(settings: &Settings, defaults: &Defaults) -> Path {
     let unit = |scale: f64| if settings.squared { scale * scale } else { scale };
     let Settings { scale, scale_end, .. } = *settings;
     let schedule = match (settings.schedule, scale) {
         (Some(schedule), _) => schedule,
         (None, Some(_)) => Schedule::Static,
-        (None, None) => Schedule::Decay,
+        (None, None) => defaults.schedule,
     };
     match schedule {
         Schedule::Static => {
-            let scale = scale.unwrap_or(unit(STATIC));
+            let scale = scale.unwrap_or(unit(defaults.fixed));
             Path::Scale { first: scale, last: scale }
         }
         Schedule::Decay => {
-            let [first, last] = DECAY.map(unit);
+            let [first, last] = defaults.decay.map(unit);
             let first = scale.unwrap_or(first.max(scale_end.unwrap_or(0.0)));
             Path::Scale { first, last: scale_end.unwrap_or(last.min(first)) }
         }
@@ -154,6 +154,9 @@ mod tests {
 
     use super::*;
 
+    const DEFAULTS: Defaults =
+        Defaults { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+
     /// First, middle and last scale of the method that a command line gives.
     fn scales(line: &str) -> [f64; 3] {
         #[derive(Parser)]
@@ -161,8 +164,8 @@ mod tests {
             #[command(flatten)]
             settings: Settings,
         }
-        let words = ["pose"].into_iter().chain(line.split_whitespace());
-        let method = Method::new(&Line::parse_from(words).settings).unwrap();
+        let words = ["task"].into_iter().chain(line.split_whitespace());
+        let method = Method::new(&Line::parse_from(words).settings, &DEFAULTS).unwrap();
         [0, 50, 101].map(|step| method.scale(step, 101))
     }
 
