@@ -33,7 +33,7 @@ impl ProfileSum {
     /// each pass over all views visits.
     pub(crate) fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
         let [views, _, _] = vertices.dims();
-        let data = vertices.into_data();
+        let data = vertices.swap_dims(1, 2).into_data();
         match data.dtype {
             DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
             DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
@@ -60,9 +60,14 @@ impl ProfileSum {
 /// makes the op differentiable twice: `forward` differentiates by `B`'s `vjp`, and `vjp` by `B`'s
 /// `vjp_of_vjp`. A third order panics. Saved for the backward pass are the inputs alone.
 ///
-/// Shapes: `vertices` `[views, vertices, 3]` (x and y in NDC, depth in world units), `table`
+/// Shapes: `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units), `table`
 /// `[rows, 4]`, sums `[views, size, size]`, top row first.
 pub trait RasterBackend: Backend {
+    /// The numbers of a tensor, row by row, for a kernel on the host.
+    fn host_data(tensor: FloatTensor<Self>) -> TensorData {
+        read::<Self>(tensor)
+    }
+
     /// Sums of the profile over the faces of each pixel.
     fn profile_sum(
         op: &ProfileSum,
@@ -98,13 +103,48 @@ pub trait RasterBackend: Backend {
 }
 
 #[cfg(feature = "ndarray")]
-impl RasterBackend for burn::backend::NdArray<f32> {}
+impl RasterBackend for burn::backend::NdArray<f32> {
+    fn host_data(tensor: FloatTensor<Self>) -> TensorData {
+        ndarray_data::<Self>(tensor)
+    }
+}
 #[cfg(feature = "ndarray")]
-impl RasterBackend for burn::backend::NdArray<f64> {}
+impl RasterBackend for burn::backend::NdArray<f64> {
+    fn host_data(tensor: FloatTensor<Self>) -> TensorData {
+        ndarray_data::<Self>(tensor)
+    }
+}
 #[cfg(feature = "flex")]
 impl RasterBackend for burn::backend::Flex {}
 #[cfg(feature = "wgpu")]
 impl RasterBackend for burn::backend::Wgpu {}
+
+fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
+    try_read_sync(B::float_into_data(tensor))
+        .expect("the host path reads tensors synchronously")
+        .expect("tensor data can be read")
+}
+
+/// Like [`read`], which copies number by number where a tensor is shared.
+#[cfg(feature = "ndarray")]
+fn ndarray_data<B>(tensor: FloatTensor<B>) -> TensorData
+where
+    B: Backend<FloatTensorPrimitive = burn::backend::ndarray::NdArrayTensor>,
+{
+    use burn::backend::ndarray::NdArrayTensor;
+
+    let shape = tensor.shape();
+    let copy = match &tensor {
+        NdArrayTensor::F32(array) => {
+            array.view().as_slice().map(|values| TensorData::new(values.to_vec(), shape))
+        }
+        NdArrayTensor::F64(array) => {
+            array.view().as_slice().map(|values| TensorData::new(values.to_vec(), shape))
+        }
+        _ => None,
+    };
+    copy.unwrap_or_else(|| read::<B>(tensor))
+}
 
 /// Sums `profile(d)` over the faces of each pixel: the one op under every silhouette.
 ///
@@ -126,7 +166,7 @@ pub fn profile_sum<B: RasterBackend>(
     assert_eq!(vertices.dtype(), table.dtype(), "vertices and table differ in float type");
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
-    let sums = B::profile_sum(op, primitive(vertices), primitive(table));
+    let sums = B::profile_sum(op, primitive(vertices.swap_dims(1, 2)), primitive(table));
     Tensor::from_primitive(TensorPrimitive::Float(sums))
 }
 
@@ -141,15 +181,14 @@ enum Pass {
 }
 
 /// Runs a pass on the host in the float type of the tensors.
-fn host<B: Backend>(op: &ProfileSum, tensors: Vec<FloatTensor<B>>, pass: Pass) -> FloatTensor<B> {
+fn host<B: RasterBackend>(
+    op: &ProfileSum,
+    tensors: Vec<FloatTensor<B>>,
+    pass: Pass,
+) -> FloatTensor<B> {
     let device = B::float_device(&tensors[0]);
     let views = tensors[0].shape()[0];
-    let read = |tensor| {
-        try_read_sync(B::float_into_data(tensor))
-            .expect("the host path reads tensors synchronously")
-            .expect("tensor data can be read")
-    };
-    let data: Vec<TensorData> = tensors.into_iter().map(read).collect();
+    let data: Vec<TensorData> = tensors.into_iter().map(B::host_data).collect();
     let result = match data[0].dtype {
         DType::F32 => run::<f32>(op, views, &data, &pass),
         DType::F64 => run::<f64>(op, views, &data, &pass),

@@ -54,16 +54,20 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 pub fn project<B: Backend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     let [views, four] = orbits.dims();
     assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", orbits.dims());
-    let [held, count, three] = vertices.dims();
+    let [held, _, three] = vertices.dims();
     assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
     let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([views]);
     let rotation = view_rotation(column(1), column(2));
-    let camera = vertices.expand([views, count, 3]).matmul(rotation.swap_dims(1, 2));
     let [distance, half_angle] = [column(0), column(3)].map(|c| c.reshape([views, 1, 1]));
-    let depth = camera.clone().narrow(2, 2, 1) + distance;
     let [sin, cos] = sin_cos(half_angle);
-    let xy = camera.narrow(2, 0, 2) * (cos / sin) / depth.clone().clamp_min(NEAR);
-    Tensor::cat(vec![xy, depth], 2)
+    let focal = cos / sin;
+    let zoom = Tensor::cat(vec![focal.clone(), focal.clone(), focal.ones_like()], 1);
+    // One row for each axis: every op then runs along all vertices. The rasterizer wants the rows
+    // too, and turning them back is free.
+    let camera = (rotation * zoom).matmul(vertices.swap_dims(1, 2));
+    let depth = camera.clone().narrow(1, 2, 1) + distance;
+    let xy = camera.narrow(1, 0, 2) * depth.clone().clamp_min(NEAR).recip();
+    Tensor::cat(vec![xy, depth], 1).swap_dims(1, 2)
 }
 
 fn sin_cos<B: Backend, const D: usize>(degrees: Tensor<B, D>) -> [Tensor<B, D>; 2] {

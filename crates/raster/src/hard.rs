@@ -22,14 +22,13 @@ pub fn hard_silhouette<B: Backend>(
 ) -> Tensor<B, 3> {
     let [views, count, _] = vertices.dims();
     let (device, dtype) = (vertices.device(), vertices.dtype());
-    let vertices: Vec<f64> = vertices.into_data().iter().collect();
+    let vertices: Vec<f64> = vertices.swap_dims(1, 2).into_data().iter().collect();
     let mut image = vec![0.0f64; views * size * size];
     for view in 0..views {
         let vertices = &vertices[3 * count * view..3 * count * (view + 1)];
         let image = &mut image[size * size * view..size * size * (view + 1)];
         for face in faces.iter() {
-            let corners = face.map(|v| &vertices[3 * v as usize..3 * v as usize + 3]);
-            inside_spans(corners, NEAR, size, |row, start, end| {
+            inside_spans(vertices, face, NEAR, size, |row, start, end| {
                 image[row * size + start..row * size + end].fill(1.0);
             });
         }

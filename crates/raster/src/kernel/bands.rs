@@ -3,21 +3,30 @@
 use rayon::prelude::*;
 
 use super::{
-    face::{bounds, rows},
+    face::{Reach, bounds},
     real::Float,
 };
 
 /// Rows of a band.
-pub(crate) const ROWS: usize = 16;
+pub(crate) const ROWS: usize = 32;
 
 /// Faces of one view by band, in ascending order of faces.
 #[derive(Debug)]
 pub(crate) struct View {
     /// `entries[offsets[b]..offsets[b + 1]]` are the faces of band b.
-    pub(crate) offsets: Vec<u32>,
-    pub(crate) entries: Vec<u32>,
-    /// Faces that are drawn at all.
+    offsets: Vec<u32>,
+    entries: Vec<u32>,
+    /// Pixels that each face may reach; none for a face that is not drawn.
+    pub(crate) reaches: Vec<Reach>,
+    /// Faces that are drawn at all, on the image or beside it.
     pub(crate) drawn: usize,
+}
+
+impl View {
+    /// Faces of band `band`.
+    pub(crate) fn faces(&self, band: usize) -> &[u32] {
+        &self.entries[self.offsets[band] as usize..self.offsets[band + 1] as usize]
+    }
 }
 
 /// The lists of all views.
@@ -29,7 +38,7 @@ pub(crate) struct Bands {
 }
 
 impl Bands {
-    /// Lists the faces of each band of each view. `vertices` `[views, vertices, 3]` holds x, y in
+    /// Lists the faces of each band of each view. `vertices` `[views, 3, vertices]` holds x, y in
     /// NDC and the depth; a face enters the bands that its bounding box grown by `radius` touches.
     pub(crate) fn new<F: Float>(
         vertices: &[F],
@@ -41,35 +50,44 @@ impl Bands {
     ) -> Self {
         let count = size.div_ceil(ROWS);
         let view = |vertices: &[F]| {
-            let range = |face: &[u32; 3]| {
-                let corners = face.map(|v| &vertices[3 * v as usize..3 * v as usize + 3]);
-                bounds(corners, near).map(|[x0, x1, y0, y1]| {
-                    let (top, bottom) = rows(y0 - radius, y1 + radius, size);
-                    let misses = x0 - radius > 1.0 || x1 + radius < -1.0 || bottom <= top;
-                    if misses { (0, 0) } else { (top / ROWS, bottom.div_ceil(ROWS)) }
-                })
-            };
-            let ranges: Vec<_> = faces.iter().map(range).collect();
-            let mut offsets = vec![0u32; count + 1];
-            for (first, end) in ranges.iter().flatten() {
-                offsets[*first..*end].iter_mut().for_each(|n| *n += 1);
-            }
-            let mut total = 0;
-            for offset in &mut offsets {
-                total += std::mem::replace(offset, total);
-            }
-            let mut entries = vec![0u32; total as usize];
-            let mut next = offsets.clone();
-            for (face, range) in ranges.iter().enumerate() {
-                let Some((first, end)) = *range else { continue };
-                for slot in &mut next[first..end] {
-                    entries[*slot as usize] = face as u32;
-                    *slot += 1;
+            let mut drawn = 0;
+            let reach = |face: &[u32; 3]| match bounds(vertices, face, near) {
+                None => Reach::NOTHING,
+                Some(bounds) => {
+                    drawn += 1;
+                    Reach::new(bounds, radius, size)
                 }
-            }
-            View { offsets, entries, drawn: ranges.iter().flatten().count() }
+            };
+            let reaches: Vec<Reach> = faces.iter().map(reach).collect();
+            let (offsets, entries) = by_band(&reaches, count);
+            View { offsets, entries, reaches, drawn }
         };
         let views = vertices.par_chunks(3 * vertices_per_view.max(1)).map(view).collect();
         Self { views, count }
     }
+}
+
+/// Sorts faces into the bands that they reach.
+fn by_band(reaches: &[Reach], count: usize) -> (Vec<u32>, Vec<u32>) {
+    let bands = |reach: &Reach| {
+        let [top, bottom] = [reach.top, reach.bottom].map(|row| row as usize);
+        top / ROWS..bottom.div_ceil(ROWS)
+    };
+    let mut offsets = vec![0u32; count + 1];
+    for reach in reaches {
+        offsets[bands(reach)].iter_mut().for_each(|n| *n += 1);
+    }
+    let mut total = 0;
+    for offset in &mut offsets {
+        total += std::mem::replace(offset, total);
+    }
+    let mut entries = vec![0u32; total as usize];
+    let mut next = offsets.clone();
+    for (face, reach) in reaches.iter().enumerate() {
+        for slot in &mut next[bands(reach)] {
+            entries[*slot as usize] = face as u32;
+            *slot += 1;
+        }
+    }
+    (offsets, entries)
 }

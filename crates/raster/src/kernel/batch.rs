@@ -10,11 +10,15 @@ use super::{
     table::Lookup,
 };
 
-/// Pixels computed together: one vector of f32 where vectors are widest. The inner loops over them
-/// have this constant length, which the compiler turns into straight vector code.
-pub(crate) const LANES: usize = 16;
+/// Pixels computed together: one vector of f32 on most machines. The inner loops over them have
+/// this constant length, which the compiler turns into straight vector code.
+pub(crate) const LANES: usize = 8;
 /// Most pixels in a batch, in units of [`LANES`].
 const CHUNKS: usize = 16;
+/// Neighbours of a row that always come together. A row that is not a multiple as long takes a few
+/// pixels more, which are as good as the others: rows are padded to hold them, and no lane needs a
+/// mask or an address of its own.
+pub(crate) const GROUP: usize = 4;
 /// Batches are filled up to whole chunks with pixels that stand here, in NDC: beyond every image
 /// and support, finite when squared in f32.
 const NOWHERE: f64 = 1e15;
@@ -28,10 +32,12 @@ type Chunk<N> = [N; LANES];
 /// Pixels waiting for one face. Reused from face to face.
 pub(crate) struct Batch<T: Real> {
     len: usize,
+    /// Position of the first pixel of each group in the band.
+    at: [u32; CHUNKS * LANES / GROUP],
     px: [Chunk<T::Float>; CHUNKS],
     py: [Chunk<T::Float>; CHUNKS],
-    /// Position of the pixel in the band.
-    at: [Chunk<u32>; CHUNKS],
+    /// What the pixels give to the gradient.
+    upstream: [Chunk<T::Float>; CHUNKS],
     /// From the closest point to the pixel.
     dx: [Chunk<T>; CHUNKS],
     dy: [Chunk<T>; CHUNKS],
@@ -42,18 +48,21 @@ pub(crate) struct Batch<T: Real> {
     /// Place within the cell, in [0, 1], and its derivative by the squared distance.
     t: [Chunk<T>; CHUNKS],
     rate: [Chunk<T::Float>; CHUNKS],
-    /// Coefficients of the cell, pixel by pixel and then coefficient by coefficient.
+    /// Coefficients of the cells, pixel by pixel and then coefficient by coefficient.
     fetched: [Chunk<[T; 4]>; CHUNKS],
     cubics: [[Chunk<T>; 4]; CHUNKS],
+    /// The profile without its tail.
+    values: [Chunk<T>; CHUNKS],
 }
 
 impl<T: Real> Batch<T> {
     pub(crate) fn new() -> Self {
         Self {
             len: 0,
+            at: [0; CHUNKS * LANES / GROUP],
             px: [[T::Float::ZERO; LANES]; CHUNKS],
             py: [[T::Float::ZERO; LANES]; CHUNKS],
-            at: [[0; LANES]; CHUNKS],
+            upstream: [[T::Float::ZERO; LANES]; CHUNKS],
             dx: [[T::ZERO; LANES]; CHUNKS],
             dy: [[T::ZERO; LANES]; CHUNKS],
             weights: [[[T::ZERO; LANES]; 3]; CHUNKS],
@@ -62,38 +71,35 @@ impl<T: Real> Batch<T> {
             rate: [[T::Float::ZERO; LANES]; CHUNKS],
             fetched: [[[T::ZERO; 4]; LANES]; CHUNKS],
             cubics: [[[T::ZERO; LANES]; 4]; CHUNKS],
+            values: [[T::ZERO; LANES]; CHUNKS],
         }
     }
 
-    /// Adds up to [`LANES`] of `count` pixels of a row and returns how many that was. `centres`
-    /// starts with their x and holds a whole chunk; `at` is the position of the first in the band.
+    /// Adds a group of pixels. `centres` starts with their x; `at` is the position of the first in
+    /// the band, to which `upstream` (if the gradient is wanted) belongs.
     #[inline(always)]
-    pub(crate) fn push(
+    pub(crate) fn push<const GRADIENT: bool>(
         &mut self,
         centres: &[T::Float],
-        count: usize,
         py: T::Float,
         at: usize,
-    ) -> usize {
-        // A whole chunk is written; what is too much is written over by the next.
-        let range = self.len..self.len + LANES;
-        let centres: &Chunk<T::Float> = centres[..LANES].try_into().expect("a whole chunk");
-        self.px.as_flattened_mut()[range.clone()].copy_from_slice(centres);
-        self.py.as_flattened_mut()[range.clone()].copy_from_slice(&[py; LANES]);
-        let mut positions = [at as u32; LANES];
-        for (lane, position) in positions.iter_mut().enumerate() {
-            *position += lane as u32;
+        upstream: &[T::Float],
+    ) {
+        let range = self.len..self.len + GROUP;
+        self.px.as_flattened_mut()[range.clone()].copy_from_slice(&centres[..GROUP]);
+        self.py.as_flattened_mut()[range.clone()].copy_from_slice(&[py; GROUP]);
+        if GRADIENT {
+            let group = &upstream[at..at + GROUP];
+            self.upstream.as_flattened_mut()[range].copy_from_slice(group);
         }
-        self.at.as_flattened_mut()[range].copy_from_slice(&positions);
-        let count = count.min(LANES);
-        self.len += count;
-        count
+        self.at[self.len / GROUP] = at as u32;
+        self.len += GROUP;
     }
 
-    /// Whether there is no room for another chunk.
+    /// Whether there is no room for another group.
     #[inline(always)]
     pub(crate) fn is_full(&self) -> bool {
-        self.len > (CHUNKS - 2) * LANES
+        self.len == CHUNKS * LANES
     }
 
     /// Whether no pixel waits.
@@ -121,10 +127,11 @@ impl<T: Real> Batch<T> {
         face: &Face<T>,
         lookup: &Lookup<T::Float>,
     ) {
-        let nowhere = [T::Float::from_f64(NOWHERE); LANES];
-        let rest = self.len..self.len + LANES;
-        self.px.as_flattened_mut()[rest.clone()].copy_from_slice(&nowhere);
-        self.py.as_flattened_mut()[rest].copy_from_slice(&nowhere);
+        // Fills up the last chunk.
+        let rest = self.len..self.chunks() * LANES;
+        self.px.as_flattened_mut()[rest.clone()].fill(T::Float::from_f64(NOWHERE));
+        self.py.as_flattened_mut()[rest.clone()].fill(T::Float::from_f64(NOWHERE));
+        self.upstream.as_flattened_mut()[rest].fill(T::Float::ZERO);
         for c in 0..self.chunks() {
             for i in 0..LANES {
                 let point = closest(face, self.px[c][i], self.py[c][i]);
@@ -172,39 +179,35 @@ impl<T: Real> Batch<T> {
 
     /// Adds `profile - tail` to the pixels of the band.
     #[inline(always)]
-    pub(crate) fn add_values(&self, image: &mut [T], tail: T) {
+    pub(crate) fn add_values(&mut self, image: &mut [T], tail: T) {
         for chunk in 0..self.chunks() {
-            let [a, b, c, d] = &self.cubics[chunk];
-            let mut values = [T::ZERO; LANES];
+            let ([a, b, c, d], t) = (&self.cubics[chunk], &self.t[chunk]);
+            let values = &mut self.values[chunk];
             for i in 0..LANES {
-                let t = self.t[chunk][i];
-                values[i] = a[i] + t * (b[i] + t * (c[i] + t * d[i])) - tail;
+                values[i] = a[i] + t[i] * (b[i] + t[i] * (c[i] + t[i] * d[i])) - tail;
             }
-            let count = LANES.min(self.len - chunk * LANES);
-            for (at, value) in self.at[chunk][..count].iter().zip(values) {
-                image[*at as usize] += value;
+        }
+        let values = self.values.as_flattened().chunks_exact(GROUP);
+        for (at, values) in self.at[..self.len / GROUP].iter().zip(values) {
+            let pixels = &mut image[*at as usize..*at as usize + GROUP];
+            for i in 0..GROUP {
+                pixels[i] += values[i];
             }
         }
     }
 
     /// Adds the gradient to x and y of the three corners, without its factor -2.
     #[inline(always)]
-    pub(crate) fn add_corners(&self, upstream: &[T::Float], sums: &mut [T; 6]) {
+    pub(crate) fn add_corners(&self, sums: &mut [T; 6]) {
         let two = T::Float::from_f64(2.0);
         let three = T::Float::from_f64(3.0);
         let mut lanes = [[T::ZERO; LANES]; 6];
         for chunk in 0..self.chunks() {
-            let [_, b, c, d] = &self.cubics[chunk];
-            let mut g = [T::Float::ZERO; LANES];
-            let count = LANES.min(self.len - chunk * LANES);
-            for (g, at) in g.iter_mut().zip(&self.at[chunk][..count]) {
-                *g = upstream[*at as usize];
-            }
-            let weights = &self.weights[chunk];
+            let ([_, b, c, d], weights) = (&self.cubics[chunk], &self.weights[chunk]);
             for i in 0..LANES {
                 let t = self.t[chunk][i];
                 let slope = b[i] + t * (c[i].scale(two) + t * d[i].scale(three));
-                let pull = slope.scale(self.rate[chunk][i] * g[i]);
+                let pull = slope.scale(self.rate[chunk][i] * self.upstream[chunk][i]);
                 let (x, y) = (pull * self.dx[chunk][i], pull * self.dy[chunk][i]);
                 lanes[0][i] += x * weights[0][i];
                 lanes[1][i] += y * weights[0][i];
@@ -221,15 +224,9 @@ impl<T: Real> Batch<T> {
 
     /// Adds the gradient to the coefficients of the cells, and the sum of `upstream` to `visited`.
     #[inline(always)]
-    pub(crate) fn add_table(
-        &self,
-        upstream: &[T::Float],
-        table: &mut [[T; 4]],
-        visited: &mut T::Float,
-    ) {
-        let [at, row] = [&self.at, &self.row].map(|a| &a.as_flattened()[..self.len]);
-        for ((at, row), &t) in at.iter().zip(row).zip(self.t.as_flattened()) {
-            let g = upstream[*at as usize];
+    pub(crate) fn add_table(&self, table: &mut [[T; 4]], visited: &mut T::Float) {
+        let (row, t) = (&self.row.as_flattened()[..self.len], self.t.as_flattened());
+        for ((row, &t), &g) in row.iter().zip(t).zip(self.upstream.as_flattened()) {
             let mut power = T::constant(g);
             for coefficient in &mut table[*row as usize] {
                 *coefficient += power;

@@ -56,35 +56,59 @@ impl<T: Real> Face<T> {
 /// Bounding box of a face in NDC: lower x, upper x, lower y, upper y.
 pub(crate) type Bounds = [f64; 4];
 
-/// Bounding box of a face; `None` where the face is not drawn: a corner nearer than `near`, behind
-/// the camera, not finite or farther than 1e6 NDC away.
+/// Bounding box of a face over `vertices` `[3, vertices]`; `None` where the face is not drawn: a
+/// corner nearer than `near`, behind the camera, not finite or farther than 1e6 NDC away.
 #[inline]
-pub(crate) fn bounds<F: Float>(corners: [&[F]; 3], near: f64) -> Option<Bounds> {
-    let mut bounds = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
-    for corner in corners {
-        let [x, y, z] = [corner[0].to_f64(), corner[1].to_f64(), corner[2].to_f64()];
-        // Written so that NaN is not drawn either.
-        if !(z >= near && x.abs() <= FAR_AWAY && y.abs() <= FAR_AWAY) {
-            return None;
-        }
-        bounds = [bounds[0].min(x), bounds[1].max(x), bounds[2].min(y), bounds[3].max(y)];
+pub(crate) fn bounds<F: Float>(vertices: &[F], face: &[u32; 3], near: f64) -> Option<Bounds> {
+    let count = vertices.len() / 3;
+    let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize]));
+    let [near, far] = [near, FAR_AWAY].map(F::from_f64);
+    // Written so that NaN is not drawn either.
+    let drawn =
+        corners.map(|[x, y, z]| (z >= near) & (x <= far) & (x >= -far) & (y <= far) & (y >= -far));
+    if !(drawn[0] & drawn[1] & drawn[2]) {
+        return None;
     }
-    Some(bounds)
+    let least = |a: F, b: F| if a < b { a } else { b };
+    let largest = |a: F, b: F| if a > b { a } else { b };
+    let over = |axis: usize, pick: fn(F, F) -> F| {
+        pick(pick(corners[0][axis], corners[1][axis]), corners[2][axis]).to_f64()
+    };
+    Some([over(0, least), over(0, largest), over(1, least), over(1, largest)])
 }
 
-/// Rows of a `size` px image, top row first, whose centres lie in [low, high] (NDC, y up).
-#[inline]
-pub(crate) fn rows(low: f64, high: f64, size: usize) -> (usize, usize) {
-    columns(-high, -low, size)
+/// Pixels that a face may reach: rows and columns as half-open ranges, top row first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Reach {
+    pub(crate) top: u32,
+    pub(crate) bottom: u32,
+    pub(crate) left: u32,
+    pub(crate) right: u32,
+}
+
+impl Reach {
+    /// No pixel.
+    pub(crate) const NOTHING: Self = Self { top: 0, bottom: 0, left: 0, right: 0 };
+
+    /// Pixels of a `size` px image whose centres lie in the bounds grown by `radius`.
+    #[inline]
+    pub(crate) fn new([x0, x1, y0, y1]: Bounds, radius: f64, size: usize) -> Self {
+        let (left, right) = columns(x0 - radius, x1 + radius, size);
+        let (top, bottom) = columns(-y1 - radius, -y0 + radius, size);
+        if left < right && top < bottom { Self { top, bottom, left, right } } else { Self::NOTHING }
+    }
 }
 
 /// Columns of a `size` px image whose centres lie in [low, high] (NDC), as a half-open range.
 #[inline]
-pub(crate) fn columns(low: f64, high: f64, size: usize) -> (usize, usize) {
+fn columns(low: f64, high: f64, size: usize) -> (u32, u32) {
     let size = size as f64;
-    let start = (((low + 1.0) * size - 1.0) * 0.5).ceil().clamp(0.0, size);
-    let end = (((high + 1.0) * size - 1.0) * 0.5).floor().clamp(-1.0, size - 1.0) + 1.0;
-    (start as usize, end as usize)
+    // The first centre at or after `low`, and the first after `high`. A cast truncates, at once on
+    // every instruction set; ceil and floor may be calls.
+    let start = (((low + 1.0) * size - 1.0) * 0.5).clamp(0.0, size);
+    let end = (((high + 1.0) * size + 1.0) * 0.5).clamp(0.0, size);
+    let whole = start as u32;
+    (whole + u32::from(f64::from(whole) < start), end as u32)
 }
 
 /// The three edges of a face as limits on x in a given row.
@@ -95,6 +119,9 @@ pub(crate) struct Spans<F> {
     high: [F; 3],
     tilt: [F; 3],
 }
+
+/// Rows that [`Spans::columns`] handles at once.
+pub(crate) const SPANS: usize = 8;
 
 impl<F: Float> Spans<F> {
     /// Limits for pixels no farther than `radius` outside the face.
@@ -109,41 +136,36 @@ impl<F: Float> Spans<F> {
             // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for
             // an edge that is all but horizontal, or for a face without area.
             let flat = F::from_f64(1e-3);
-            if ey * ey <= flat * flat * ex * ex {
-                continue;
-            }
-            let inverse = ey.recip();
+            let useless = ey * ey <= flat * flat * ex * ex;
+            let inverse = if useless { F::ZERO } else { ey.recip() };
             let tilt = ex * inverse;
             let reach = radius * (F::ONE + tilt * tilt).sqrt();
-            spans.tilt[k] = tilt;
             let bound = x - tilt * y;
-            if ey < F::ZERO {
-                spans.low[k] = bound - reach;
-            } else {
-                spans.high[k] = bound + reach;
-            }
+            spans.tilt[k] = tilt;
+            spans.low[k] = if ey < F::ZERO && !useless { bound - reach } else { -never };
+            spans.high[k] = if ey > F::ZERO && !useless { bound + reach } else { never };
         }
         spans
     }
 
-    /// Columns that all three edges allow in the rows at heights `y`, within the columns `within`:
-    /// first column and the one after the last.
+    /// Columns that all three edges allow in the rows at heights `y`, within the columns of
+    /// `reach`: first column and the one after the last.
     #[inline(always)]
-    pub(crate) fn columns<const N: usize>(
+    pub(crate) fn columns(
         &self,
-        y: &[F; N],
-        within: (usize, usize),
+        y: &[F; SPANS],
+        reach: Reach,
         size: usize,
-    ) -> ([i32; N], [i32; N]) {
+    ) -> ([i32; SPANS], [i32; SPANS]) {
         let half = F::from_f64(0.5 * size as f64);
         let middle = F::from_f64(0.5 * (size as f64 - 1.0));
         // A hundredth of a pixel makes up for rounding.
         let margin = F::from_f64(0.01);
         let point_five = F::from_f64(0.5);
-        let limits = [within.0, within.1].map(|column| F::from_f64(column as f64));
-        let mut starts = [0; N];
-        let mut ends = [0; N];
-        for i in 0..N {
+        let limits = [reach.left, reach.right].map(|column| F::from_f64(f64::from(column)));
+        let mut starts = [0; SPANS];
+        let mut ends = [0; SPANS];
+        for i in 0..SPANS {
             let (mut low, mut high) = (-F::ONE - F::ONE, F::ONE + F::ONE);
             for k in 0..3 {
                 let shift = self.tilt[k] * y[i];
@@ -163,23 +185,26 @@ impl<F: Float> Spans<F> {
     }
 }
 
-/// Calls `fill(row, start, end)` for the pixels whose centre a face covers (edges included).
+/// Calls `fill(row, start, end)` for the pixels whose centre a face over `vertices`
+/// `[3, vertices]` covers (edges included).
 pub(crate) fn inside_spans<F: Float>(
-    corners: [&[F]; 3],
+    vertices: &[F],
+    face: &[u32; 3],
     near: f64,
     size: usize,
     mut fill: impl FnMut(usize, usize, usize),
 ) {
-    let Some([x0, x1, y0, y1]) = bounds(corners, near) else { return };
+    let Some(bounds) = bounds(vertices, face, near) else { return };
     // Exact decisions: the edge functions of the corners as given, in f64.
-    let at = |k: usize, axis: usize| corners[k][axis].to_f64();
-    let face = Face::<f64>::new([at(0, 0), at(1, 0), at(2, 0)], [at(0, 1), at(1, 1), at(2, 1)]);
+    let count = vertices.len() / 3;
+    let [xs, ys] = [0, 1].map(|axis| face.map(|v| vertices[axis * count + v as usize].to_f64()));
+    let face = Face::<f64>::new(xs, ys);
     if face.orientation == 0.0 {
         return;
     }
-    let (top, bottom) = rows(y0, y1, size);
-    let (left, right) = columns(x0, x1, size);
-    for row in top..bottom {
+    let reach = Reach::new(bounds, 0.0, size);
+    let (left, right) = (reach.left as usize, reach.right as usize);
+    for row in reach.top as usize..reach.bottom as usize {
         let y = pixel_centre(size - 1 - row, size);
         let covers = |column: &usize| {
             let x = pixel_centre(*column, size);

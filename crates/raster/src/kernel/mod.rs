@@ -14,6 +14,7 @@ mod pairs;
 mod real;
 mod sum;
 mod table;
+mod walk;
 
 pub(crate) use face::inside_spans;
 pub(crate) use pairs::pairs;

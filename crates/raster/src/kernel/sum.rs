@@ -4,248 +4,20 @@ use rayon::prelude::*;
 
 use super::{
     bands::{Bands, ROWS, View},
-    batch::{Batch, LANES},
-    face::{Face, Spans, columns, pixel_centre, rows},
     real::{Dual, Float, Real},
-    table::{Grid, Lookup},
+    table::Grid,
+    walk::{
+        BandGradient, Place, Scene, walk_everything, walk_gradient, walk_gradient_and_table,
+        walk_image,
+    },
 };
 
-/// Everything a traversal reads, in one number type.
-pub(crate) struct Scene<'a, T: Real> {
-    /// `[views, vertices, 3]`: x and y in NDC, depth.
-    vertices: &'a [T],
-    faces: &'a [[u32; 3]],
-    /// Cubic coefficients of each cell, `[grid.rows()]`.
-    table: &'a [[T; 4]],
-    grid: Grid,
-    size: usize,
-    lookup: Lookup<T::Float>,
-    /// Centres of the columns, with a chunk more than the image has.
-    centres: Vec<T::Float>,
-}
-
 /// Gradient of `Σ upstream S`.
-pub(crate) struct Gradient<T: Real> {
-    /// `[views, vertices, 3]`; the third column is 0, a silhouette does not see depth.
-    pub(crate) vertices: Vec<T>,
+struct Gradient<T: Real> {
+    /// `[views, 3, vertices]`; the third row is 0, a silhouette does not see depth.
+    vertices: Vec<T>,
     /// Like [`Scene::table`].
-    pub(crate) table: Vec<[T; 4]>,
-}
-
-/// What one band gives back.
-struct BandGradient<T: Real> {
-    /// For each entry of the band, the gradient to x and y of its three corners.
-    corners: Vec<[T; 6]>,
     table: Vec<[T; 4]>,
-}
-
-impl<'a, T: Real> Scene<'a, T> {
-    pub(crate) fn new(
-        vertices: &'a [T],
-        faces: &'a [[u32; 3]],
-        table: &'a [[T; 4]],
-        grid: Grid,
-        size: usize,
-    ) -> Self {
-        let centre = |column| T::Float::from_f64(pixel_centre(column, size));
-        Self {
-            vertices,
-            faces,
-            table,
-            grid,
-            size,
-            lookup: Lookup::new(&grid),
-            centres: (0..size + LANES).map(centre).collect(),
-        }
-    }
-
-    fn view(&self, index: usize, views: usize) -> &[T] {
-        let length = self.vertices.len() / views;
-        &self.vertices[index * length..(index + 1) * length]
-    }
-
-    /// Rows of the image that band `band` holds.
-    fn band_rows(&self, band: usize) -> std::ops::Range<usize> {
-        band * ROWS..((band + 1) * ROWS).min(self.size)
-    }
-}
-
-/// One walk over the pairs of a band. `upstream` and `image` are `[rows, size]`.
-#[inline(always)]
-fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
-    scene: &Scene<T>,
-    vertices: &[T],
-    entries: &[u32],
-    band: usize,
-    upstream: &[T::Float],
-    image: &mut [T],
-    gradient: &mut BandGradient<T>,
-) {
-    let mut batch = Batch::new();
-    let mut sink = Sink { upstream, image, gradient, visited: T::Float::ZERO };
-    let radius = scene.grid.outer;
-    let band_rows = scene.band_rows(band);
-    let mut heights = [T::Float::ZERO; ROWS];
-    for (height, row) in heights.iter_mut().zip(band_rows.clone()) {
-        *height = scene.centres[scene.size - 1 - row];
-    }
-    for (slot, &face) in entries.iter().enumerate() {
-        let mut x = [T::ZERO; 3];
-        let mut y = [T::ZERO; 3];
-        let mut box_ = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
-        for k in 0..3 {
-            let at = 3 * scene.faces[face as usize][k] as usize;
-            (x[k], y[k]) = (vertices[at], vertices[at + 1]);
-            let (x, y) = (x[k].value().to_f64(), y[k].value().to_f64());
-            box_ = [box_[0].min(x), box_[1].max(x), box_[2].min(y), box_[3].max(y)];
-        }
-        let face = Face::new(x, y);
-        let (top, bottom) = rows(box_[2] - radius, box_[3] + radius, scene.size);
-        let within = columns(box_[0] - radius, box_[1] + radius, scene.size);
-        let spans = Spans::new(&face, T::Float::from_f64(radius));
-        let (starts, ends) = spans.columns(&heights, within, scene.size);
-        let mut sums = [T::ZERO; 6];
-        for row in top.max(band_rows.start)..bottom.min(band_rows.end) {
-            let in_band = row - band_rows.start;
-            let (mut start, end) = (starts[in_band] as usize, ends[in_band] as usize);
-            while start < end {
-                let at = in_band * scene.size + start;
-                start += batch.push(&scene.centres[start..], end - start, heights[in_band], at);
-                if batch.is_full() {
-                    sink.take::<IMAGE, GRADIENT, TABLE>(scene, &face, &mut batch, &mut sums);
-                }
-            }
-        }
-        if !batch.is_empty() {
-            sink.take::<IMAGE, GRADIENT, TABLE>(scene, &face, &mut batch, &mut sums);
-        }
-        if GRADIENT {
-            for sum in &mut sums {
-                *sum = sum.scale(T::Float::from_f64(-2.0));
-            }
-            sink.gradient.corners[slot] = sums;
-        }
-    }
-    if TABLE {
-        sink.gradient.table[scene.grid.tail()][0] += T::constant(-sink.visited);
-    }
-}
-
-/// Where the pairs of a band go.
-struct Sink<'a, T: Real> {
-    upstream: &'a [T::Float],
-    image: &'a mut [T],
-    gradient: &'a mut BandGradient<T>,
-    /// Sum of `upstream` over the pairs, each of which replaced a tail.
-    visited: T::Float,
-}
-
-impl<T: Real> Sink<'_, T> {
-    #[inline(always)]
-    fn take<const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
-        &mut self,
-        scene: &Scene<T>,
-        face: &Face<T>,
-        batch: &mut Batch<T>,
-        sums: &mut [T; 6],
-    ) {
-        batch.places::<GRADIENT>(face, &scene.lookup);
-        batch.fetch(scene.table);
-        if IMAGE {
-            batch.add_values(self.image, scene.table[scene.grid.tail()][0]);
-        }
-        if GRADIENT {
-            batch.add_corners(self.upstream, sums);
-        }
-        if TABLE {
-            batch.add_table(self.upstream, &mut self.gradient.table, &mut self.visited);
-        }
-        batch.clear();
-    }
-}
-
-/// Compiles a walk for the instruction sets that matter and picks one at run time. Products and
-/// sums are never contracted, so that every set gives the same bits.
-macro_rules! dispatched {
-    ($name:ident, $image:literal, $gradient:literal, $table:literal) => {
-        fn $name<T: Real>(
-            scene: &Scene<T>,
-            vertices: &[T],
-            entries: &[u32],
-            band: usize,
-            upstream: &[T::Float],
-            image: &mut [T],
-            gradient: &mut BandGradient<T>,
-        ) {
-            #[cfg(target_arch = "x86_64")]
-            {
-                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-                fn avx512<T: Real>(
-                    scene: &Scene<T>,
-                    vertices: &[T],
-                    entries: &[u32],
-                    band: usize,
-                    upstream: &[T::Float],
-                    image: &mut [T],
-                    gradient: &mut BandGradient<T>,
-                ) {
-                    walk::<T, $image, $gradient, $table>(
-                        scene, vertices, entries, band, upstream, image, gradient,
-                    );
-                }
-                #[target_feature(enable = "avx2")]
-                fn avx2<T: Real>(
-                    scene: &Scene<T>,
-                    vertices: &[T],
-                    entries: &[u32],
-                    band: usize,
-                    upstream: &[T::Float],
-                    image: &mut [T],
-                    gradient: &mut BandGradient<T>,
-                ) {
-                    walk::<T, $image, $gradient, $table>(
-                        scene, vertices, entries, band, upstream, image, gradient,
-                    );
-                }
-                let has = |name: &str| match name {
-                    "avx512" => {
-                        is_x86_feature_detected!("avx512f")
-                            && is_x86_feature_detected!("avx512vl")
-                            && is_x86_feature_detected!("avx512dq")
-                            && is_x86_feature_detected!("avx512bw")
-                    }
-                    _ => is_x86_feature_detected!("avx2"),
-                };
-                if has("avx512") {
-                    // SAFETY: the features were just detected.
-                    #[allow(unsafe_code)]
-                    unsafe {
-                        return avx512(scene, vertices, entries, band, upstream, image, gradient);
-                    }
-                }
-                if has("avx2") {
-                    // SAFETY: the feature was just detected.
-                    #[allow(unsafe_code)]
-                    unsafe {
-                        return avx2(scene, vertices, entries, band, upstream, image, gradient);
-                    }
-                }
-            }
-            walk::<T, $image, $gradient, $table>(
-                scene, vertices, entries, band, upstream, image, gradient,
-            );
-        }
-    };
-}
-
-dispatched!(walk_image, true, false, false);
-dispatched!(walk_gradient, false, true, false);
-dispatched!(walk_gradient_and_table, false, true, true);
-dispatched!(walk_everything, true, true, true);
-
-/// Entries of band `band` of a view.
-fn entries(view: &View, band: usize) -> &[u32] {
-    &view.entries[view.offsets[band] as usize..view.offsets[band + 1] as usize]
 }
 
 /// Runs the image part of a walk over all bands; `[views, size, size]`.
@@ -259,12 +31,30 @@ fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<T> {
             let empty = scene.table[scene.grid.tail()][0].scale(drawn(view));
             image.par_chunks_mut(ROWS * size).enumerate().for_each(|(band, image)| {
                 let mut none = BandGradient { corners: Vec::new(), table: Vec::new() };
-                walk_image(scene, vertices, entries(view, band), band, &[], image, &mut none);
-                image.iter_mut().for_each(|pixel| *pixel += empty);
+                let place = Place { vertices, view, band };
+                let mut padded = vec![empty; scene.band_rows(band).len() * scene.stride()];
+                walk_image(scene, place, &[], &mut padded, &mut none);
+                trim(&padded, image, scene);
             });
         },
     );
     image
+}
+
+/// Rows of a band as they stand in the image.
+fn trim<T: Real>(padded: &[T], image: &mut [T], scene: &Scene<T>) {
+    for (row, padded) in image.chunks_exact_mut(scene.size).zip(padded.chunks(scene.stride())) {
+        row.copy_from_slice(&padded[..scene.size]);
+    }
+}
+
+/// Rows of the image as they stand in a band, followed by zeros.
+fn pad<T: Real>(rows: &[T::Float], scene: &Scene<T>) -> Vec<T::Float> {
+    let mut padded = vec![T::Float::ZERO; rows.len() / scene.size * scene.stride()];
+    for (padded, row) in padded.chunks_mut(scene.stride()).zip(rows.chunks(scene.size)) {
+        padded[..scene.size].copy_from_slice(row);
+    }
+    padded
 }
 
 /// Faces drawn in a view, as a factor.
@@ -292,12 +82,11 @@ fn gradient<T: Real, const IMAGE: bool>(
             let walked: Vec<_> = (0..bands.count)
                 .into_par_iter()
                 .map(|band| {
-                    let entries = entries(view, band);
                     let rows = scene.band_rows(band);
-                    let mut image =
-                        if IMAGE { vec![T::ZERO; rows.len() * size] } else { Vec::new() };
+                    let length = rows.len() * scene.stride();
+                    let mut image = if IMAGE { vec![T::ZERO; length] } else { Vec::new() };
                     let mut gradient = BandGradient {
-                        corners: vec![[T::ZERO; 6]; entries.len()],
+                        corners: vec![[T::ZERO; 6]; view.faces(band).len()],
                         table: vec![[T::ZERO; 4]; table_rows],
                     };
                     let walk = match (IMAGE, wrt_table) {
@@ -305,8 +94,9 @@ fn gradient<T: Real, const IMAGE: bool>(
                         (false, true) => walk_gradient_and_table,
                         (false, false) => walk_gradient,
                     };
-                    let upstream = &upstream[rows.start * size..rows.end * size];
-                    walk(scene, vertices, entries, band, upstream, &mut image, &mut gradient);
+                    let upstream = pad(&upstream[rows.start * size..rows.end * size], scene);
+                    let place = Place { vertices, view, band };
+                    walk(scene, place, &upstream, &mut image, &mut gradient);
                     (gradient, image)
                 })
                 .collect();
@@ -339,16 +129,19 @@ fn gather<T: Real>(
         table: vec![[T::ZERO; 4]; walked.first().map_or(0, |(band, _)| band.table.len())],
     };
     let tail = scene.table[scene.grid.tail()][0].scale(drawn(view));
-    let mut image = Vec::new();
+    let mut image = Vec::with_capacity(walked.iter().map(|(_, rows)| rows.len()).sum());
     for (band, (gradient, rows)) in walked.into_iter().enumerate() {
-        for (&face, corners) in entries(view, band).iter().zip(&gradient.corners) {
+        let (x, rest) = total.vertices.split_at_mut(length / 3);
+        for (&face, corners) in view.faces(band).iter().zip(&gradient.corners) {
             for (corner, xy) in scene.faces[face as usize].iter().zip(corners.chunks_exact(2)) {
-                total.vertices[3 * *corner as usize] += xy[0];
-                total.vertices[3 * *corner as usize + 1] += xy[1];
+                x[*corner as usize] += xy[0];
+                rest[*corner as usize] += xy[1];
             }
         }
         add_rows(&mut total.table, &gradient.table);
-        image.extend(rows.into_iter().map(|sum| sum + tail));
+        for row in rows.chunks(scene.stride()) {
+            image.extend(row[..scene.size].iter().map(|&sum| sum + tail));
+        }
     }
     if !total.table.is_empty() {
         let sum = upstream.iter().fold(T::Float::ZERO, |sum, &g| sum + g);
@@ -366,7 +159,7 @@ fn add_rows<T: Real>(total: &mut [[T; 4]], part: &[[T; 4]]) {
 /// The inputs of the op in one float type.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, F> {
-    /// `[views, vertices, 3]`.
+    /// `[views, 3, vertices]`.
     pub(crate) vertices: &'a [F],
     /// `[grid.rows(), 4]`.
     pub(crate) table: &'a [F],

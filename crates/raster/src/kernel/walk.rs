@@ -1,0 +1,273 @@
+//! One walk over the pixel-face pairs of a band, for the image, its gradient or both.
+
+use std::ops::Range;
+
+use super::{
+    bands::{ROWS, View},
+    batch::{Batch, GROUP},
+    face::{Face, Reach, SPANS, Spans, pixel_centre},
+    real::{Float, Real},
+    table::{Grid, Lookup},
+};
+
+/// Everything a traversal reads, in one number type.
+pub(crate) struct Scene<'a, T: Real> {
+    /// `[views, 3, vertices]`: x and y in NDC, depth.
+    pub(crate) vertices: &'a [T],
+    pub(crate) faces: &'a [[u32; 3]],
+    /// Cubic coefficients of each cell, `[grid.rows()]`.
+    pub(crate) table: &'a [[T; 4]],
+    pub(crate) grid: Grid,
+    pub(crate) size: usize,
+    lookup: Lookup<T::Float>,
+    /// Centres of the columns, with a group more than the image has.
+    centres: Vec<T::Float>,
+    /// Centres of the rows, likewise.
+    heights: Vec<T::Float>,
+}
+
+/// Which band of which view.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<'a, T> {
+    /// `[3, vertices]`.
+    pub(crate) vertices: &'a [T],
+    pub(crate) view: &'a View,
+    pub(crate) band: usize,
+}
+
+impl<T: Real> Place<'_, T> {
+    /// Face `index` of the scene as this view sees it.
+    #[inline(always)]
+    pub(crate) fn face(&self, scene: &Scene<T>, index: u32) -> Face<T> {
+        let (x, rest) = self.vertices.split_at(self.vertices.len() / 3);
+        let corners = scene.faces[index as usize].map(|v| v as usize);
+        Face::new(corners.map(|v| x[v]), corners.map(|v| rest[v]))
+    }
+}
+
+/// What one band gives back.
+pub(crate) struct BandGradient<T: Real> {
+    /// For each face of the band, the gradient to x and y of its three corners.
+    pub(crate) corners: Vec<[T; 6]>,
+    pub(crate) table: Vec<[T; 4]>,
+}
+
+impl<'a, T: Real> Scene<'a, T> {
+    pub(crate) fn new(
+        vertices: &'a [T],
+        faces: &'a [[u32; 3]],
+        table: &'a [[T; 4]],
+        grid: Grid,
+        size: usize,
+    ) -> Self {
+        let centre = |column| T::Float::from_f64(pixel_centre(column, size));
+        Self {
+            vertices,
+            faces,
+            table,
+            grid,
+            size,
+            lookup: Lookup::new(&grid),
+            centres: (0..size + GROUP).map(centre).collect(),
+            heights: (0..size + SPANS).map(|row| -centre(row)).collect(),
+        }
+    }
+
+    /// Vertices of view `index` of `views`, `[3, vertices]`.
+    pub(crate) fn view(&self, index: usize, views: usize) -> &'a [T] {
+        let length = self.vertices.len() / views;
+        &self.vertices[index * length..(index + 1) * length]
+    }
+
+    /// Length of a row of a band: that of the image, and a group for what reaches beyond.
+    pub(crate) fn stride(&self) -> usize {
+        self.size + GROUP
+    }
+
+    /// Rows of the image that band `band` holds.
+    pub(crate) fn band_rows(&self, band: usize) -> std::ops::Range<usize> {
+        band * ROWS..((band + 1) * ROWS).min(self.size)
+    }
+}
+
+/// One walk over the pairs of a band. `upstream` and `image` are `[rows, stride]`.
+#[inline(always)]
+fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
+    scene: &Scene<T>,
+    place: Place<T>,
+    upstream: &[T::Float],
+    image: &mut [T],
+    gradient: &mut BandGradient<T>,
+) {
+    let mut batch = Batch::new();
+    let mut sink = Sink { image, gradient, visited: T::Float::ZERO };
+    let rows = scene.band_rows(place.band);
+    for (slot, &index) in place.view.faces(place.band).iter().enumerate() {
+        let face = place.face(scene, index);
+        let reach = place.view.reaches[index as usize];
+        let runs = Runs::new(&face, reach, rows.clone(), scene);
+        let mut sums = [T::ZERO; 6];
+        for row in runs.rows.clone() {
+            let (mut start, end) = runs.columns(row);
+            let first = (row - rows.start) * scene.stride();
+            while start < end {
+                let (centres, height) = (&scene.centres[start..], scene.heights[row]);
+                batch.push::<GRADIENT>(centres, height, first + start, upstream);
+                start += GROUP;
+                if batch.is_full() {
+                    sink.take::<IMAGE, GRADIENT, TABLE>(scene, &face, &mut batch, &mut sums);
+                }
+            }
+        }
+        if !batch.is_empty() {
+            sink.take::<IMAGE, GRADIENT, TABLE>(scene, &face, &mut batch, &mut sums);
+        }
+        if GRADIENT {
+            for sum in &mut sums {
+                *sum = sum.scale(T::Float::from_f64(-2.0));
+            }
+            sink.gradient.corners[slot] = sums;
+        }
+    }
+    if TABLE {
+        sink.gradient.table[scene.grid.tail()][0] += T::constant(-sink.visited);
+    }
+}
+
+/// The pixels of a band that a face may reach, row by row.
+pub(crate) struct Runs {
+    /// Rows of the image.
+    pub(crate) rows: Range<usize>,
+    starts: [[i32; SPANS]; ROWS / SPANS],
+    ends: [[i32; SPANS]; ROWS / SPANS],
+}
+
+impl Runs {
+    /// Those of `face` among `rows`, which is a band.
+    #[inline(always)]
+    pub(crate) fn new<T: Real>(
+        face: &Face<T>,
+        reach: Reach,
+        rows: Range<usize>,
+        scene: &Scene<T>,
+    ) -> Self {
+        let spans = Spans::new(face, T::Float::from_f64(scene.grid.outer));
+        let rows = rows.start.max(reach.top as usize)..rows.end.min(reach.bottom as usize);
+        let mut runs = Self {
+            rows: rows.clone(),
+            starts: [[0; SPANS]; ROWS / SPANS],
+            ends: [[0; SPANS]; ROWS / SPANS],
+        };
+        for (k, row) in rows.step_by(SPANS).enumerate() {
+            let heights = scene.heights[row..row + SPANS].try_into().expect("heights are padded");
+            (runs.starts[k], runs.ends[k]) = spans.columns(heights, reach, scene.size);
+        }
+        runs
+    }
+
+    /// First column and the one after the last in a row of `rows`; there may be none between.
+    #[inline(always)]
+    pub(crate) fn columns(&self, row: usize) -> (usize, usize) {
+        let k = row - self.rows.start;
+        (self.starts.as_flattened()[k] as usize, self.ends.as_flattened()[k] as usize)
+    }
+}
+
+/// Where the pairs of a band go.
+struct Sink<'a, T: Real> {
+    image: &'a mut [T],
+    gradient: &'a mut BandGradient<T>,
+    /// Sum of `upstream` over the pairs, each of which replaced a tail.
+    visited: T::Float,
+}
+
+impl<T: Real> Sink<'_, T> {
+    #[inline(always)]
+    fn take<const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
+        &mut self,
+        scene: &Scene<T>,
+        face: &Face<T>,
+        batch: &mut Batch<T>,
+        sums: &mut [T; 6],
+    ) {
+        batch.places::<GRADIENT>(face, &scene.lookup);
+        batch.fetch(scene.table);
+        if IMAGE {
+            batch.add_values(self.image, scene.table[scene.grid.tail()][0]);
+        }
+        if GRADIENT {
+            batch.add_corners(sums);
+        }
+        if TABLE {
+            batch.add_table(&mut self.gradient.table, &mut self.visited);
+        }
+        batch.clear();
+    }
+}
+
+/// Compiles a walk for the instruction sets that matter and picks one at run time. Products and
+/// sums are never contracted, so that every set gives the same bits.
+macro_rules! dispatched {
+    ($name:ident, $image:literal, $gradient:literal, $table:literal) => {
+        pub(crate) fn $name<T: Real>(
+            scene: &Scene<T>,
+            place: Place<T>,
+            upstream: &[T::Float],
+            image: &mut [T],
+            gradient: &mut BandGradient<T>,
+        ) {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
+                fn avx512<T: Real>(
+                    scene: &Scene<T>,
+                    place: Place<T>,
+                    upstream: &[T::Float],
+                    image: &mut [T],
+                    gradient: &mut BandGradient<T>,
+                ) {
+                    walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
+                }
+                #[target_feature(enable = "avx2")]
+                fn avx2<T: Real>(
+                    scene: &Scene<T>,
+                    place: Place<T>,
+                    upstream: &[T::Float],
+                    image: &mut [T],
+                    gradient: &mut BandGradient<T>,
+                ) {
+                    walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
+                }
+                let has = |name: &str| match name {
+                    "avx512" => {
+                        is_x86_feature_detected!("avx512f")
+                            && is_x86_feature_detected!("avx512vl")
+                            && is_x86_feature_detected!("avx512dq")
+                            && is_x86_feature_detected!("avx512bw")
+                    }
+                    _ => is_x86_feature_detected!("avx2"),
+                };
+                if has("avx512") {
+                    // SAFETY: the features were just detected.
+                    #[allow(unsafe_code)]
+                    unsafe {
+                        return avx512(scene, place, upstream, image, gradient);
+                    }
+                }
+                if has("avx2") {
+                    // SAFETY: the feature was just detected.
+                    #[allow(unsafe_code)]
+                    unsafe {
+                        return avx2(scene, place, upstream, image, gradient);
+                    }
+                }
+            }
+            walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
+        }
+    };
+}
+
+dispatched!(walk_image, true, false, false);
+dispatched!(walk_gradient, false, true, false);
+dispatched!(walk_gradient_and_table, false, true, true);
+dispatched!(walk_everything, true, true, true);
