@@ -28,6 +28,9 @@ pub(crate) struct Against {
     pub(crate) seconds: f64,
     pub(crate) difference: Differences,
     pub(crate) settings: Map<String, Value>,
+    /// What to call the two methods.
+    #[serde(skip)]
+    pub(crate) titles: [String; 2],
 }
 
 /// The errors of the first method at the last step less those of the second, seed by seed.
@@ -56,11 +59,14 @@ pub(crate) struct Difference {
 }
 
 impl Against {
-    /// Compares two methods on the seeds that both have solved, which come first in both lists;
-    /// `description` is that of the second.
-    pub(crate) fn new(description: &Description, first: &[Run], second: &Evaluation) -> Self {
-        let runs = first.len().min(second.runs.len());
-        let (seconds, first, second) = (second.seconds, &first[..runs], &second.runs[..runs]);
+    /// Compares two methods, each with its description, on the seeds that both have solved, which
+    /// come first in both.
+    pub(crate) fn new(
+        (one, first): (&Description, &Evaluation),
+        (description, second): (&Description, &Evaluation),
+    ) -> Self {
+        let runs = first.runs.len().min(second.runs.len());
+        let (seconds, first, second) = (second.seconds, &first.runs[..runs], &second.runs[..runs]);
         let successes = second.iter().filter(|run| run.success).count();
         let group = |group| ErrorSummary::of_group(group, description, second, true);
         let difference = |group| Difference::of_group(group, description, first, second);
@@ -78,6 +84,7 @@ impl Against {
                 parameter_error: difference(ErrorGroup::Parameter),
             },
             settings: description.settings.clone(),
+            titles: [title(one, description), title(description, one)],
         }
     }
 
@@ -90,7 +97,7 @@ impl Against {
     /// A few lines for people.
     pub(crate) fn lines(&self) -> Vec<String> {
         let mut lines =
-            vec![format!("  against {}, on the same {} seeds:", self.softness, self.runs)];
+            vec![format!("  against {}, on the same {} seeds:", self.titles[1], self.runs)];
         for (difference, second) in self.differences().zip(self.errors()) {
             let [low, high] = difference.ci95.map(short);
             lines.push(format!(
@@ -117,6 +124,21 @@ impl Against {
         let main = [&self.image_error, &self.parameter_error];
         main.into_iter().flat_map(|one| std::iter::once(one).chain(one.more.values()))
     }
+}
+
+/// The softness of a method, and where the other has the same what else is different.
+fn title(one: &Description, other: &Description) -> String {
+    if one.softness != other.softness {
+        return one.softness.clone();
+    }
+    let differs =
+        one.settings.iter().filter(|(key, value)| other.settings.get(*key) != Some(value));
+    let named = differs.map(|(key, value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        format!("{} {value}", key.replace('_', " "))
+    });
+    let named: Vec<String> = [one.softness.clone()].into_iter().chain(named).collect();
+    named.join(", ")
 }
 
 impl Difference {

@@ -139,7 +139,11 @@ impl Journal {
 fn difference(at: &str, found: &Value, asked: &Value) -> Option<String> {
     let (Value::Object(found_map), Value::Object(asked_map)) = (found, asked) else {
         let at = if at.is_empty() { "it" } else { at };
-        return (found != asked).then(|| format!("{at} is {found} there, {asked} here"));
+        return (found != asked).then(|| match (found, asked) {
+            (Value::Object(_), Value::Null) => format!("{at} is only there"),
+            (Value::Null, Value::Object(_)) => format!("{at} is only here"),
+            _ => format!("{at} is {found} there, {asked} here"),
+        });
     };
     let nothing = Value::Null;
     let keys = asked_map.keys().chain(found_map.keys().filter(|k| !asked_map.contains_key(*k)));

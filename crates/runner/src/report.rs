@@ -28,16 +28,15 @@ pub(crate) fn html(
 ) -> String {
     let figures = pictures.map(|pictures| figures(summary, pictures)).unwrap_or_default();
     let head = escape(&summary.head());
-    let mut notes: Vec<String> =
-        summary.partial.map(|partial| partial.says("runs")).into_iter().collect();
-    if summary.partial.is_some() {
-        notes[0] += "; add --resume to the command below to go on";
-    }
+    let partial = summary
+        .partial
+        .map(|partial| format!("Stopped: {}; --resume goes on from them", partial.says("runs")));
+    let mut notes: Vec<String> = partial.into_iter().collect();
     notes.extend(summary.first_warnings());
     let warnings = frame::warnings(&notes);
     let searched = summary.search.as_ref().map(search::section).unwrap_or_default();
     let against = summary.against.as_ref();
-    let against = against.map(|other| against::section(other, &summary.softness));
+    let against = against.map(|other| against::section(other));
     let against = against.unwrap_or_default();
     let (results, each, settings) = (results(summary), each_run(summary, runs), settings(summary));
     let chart_says = chart_caption(summary);
@@ -109,7 +108,7 @@ fn chart_caption(summary: &Summary) -> String {
         );
     }
     if let Some(other) = &summary.against {
-        let [first, second] = [&summary.softness, &other.softness].map(|name| escape(name));
+        let [first, second] = [&other.titles[0], &other.titles[1]].map(|name| escape(name));
         text += &format!(
             " <span class=\"first\">Blue is the first method ({first})</span>, <span \
              class=\"second\">orange the second ({second})</span>."

@@ -130,7 +130,9 @@ impl SearchSummary {
     pub(crate) fn lines(&self) -> Vec<String> {
         let score = self.score.name;
         let mut lines = vec![format!("  {:<22} {}", "searched", self.head())];
-        lines.extend(self.partial.map(|partial| format!("  {}", partial.says("settings"))));
+        lines.extend(
+            self.partial.map(|partial| format!("  {:<22} {}", "stopped", partial.says("settings"))),
+        );
         let mean = self.best.cell.mean.map_or_else(|| "none".into(), short);
         lines.push(format!("  {:<22} {}", "best", self.best.flags));
         lines.push(format!("  {:<22} {score} {mean} on the training seeds", ""));

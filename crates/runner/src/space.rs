@@ -137,7 +137,7 @@ impl Space {
 
 /// A number with all its digits and few zeros.
 pub(crate) fn exact(x: f64) -> String {
-    if x.abs() < 1e-3 { format!("{x:e}") } else { x.to_string() }
+    if (1e-3..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
 fn some(values: &[f64]) -> Vec<Option<f64>> {

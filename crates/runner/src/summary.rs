@@ -123,7 +123,9 @@ impl Summary {
     pub(crate) fn text(&self) -> String {
         let mut lines = vec![self.head()];
         lines.extend(self.search.iter().flat_map(SearchSummary::lines));
-        lines.extend(self.partial.map(|partial| format!("  {}", partial.says("runs"))));
+        lines.extend(
+            self.partial.map(|partial| format!("  {:<22} {}", "stopped", partial.says("runs"))),
+        );
         for error in self.errors() {
             let [initial, last, best] = [error.initial, error.last, error.best].map(short);
             let interval = match error.ci95 {
@@ -186,9 +188,9 @@ impl Summary {
 }
 
 impl Partial {
-    /// That it is not all, in words.
+    /// How much that is, in words.
     pub(crate) fn says(self, what: &str) -> String {
-        format!("stopped early: {} of {} {what} are finished", self.finished, self.asked)
+        format!("{} of {} {what} are finished", self.finished, self.asked)
     }
 }
 

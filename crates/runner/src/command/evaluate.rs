@@ -52,8 +52,10 @@ pub(crate) fn evaluate<T: Task>(
     let mut summary = finished.summary(line.command, out);
     summary.partial = stopped.then_some(Partial { finished: summary.runs, asked: seeds.len() });
     if let Some(Finished { prepared, evaluation }) = &other {
-        let runs = &finished.evaluation.runs;
-        summary.against = Some(Against::new(&prepared.description, runs, evaluation));
+        summary.against = Some(Against::new(
+            (&first.description, finished.evaluation),
+            (&prepared.description, evaluation),
+        ));
     }
     write(folder, &finished, other.as_ref(), &summary, again)?;
     Results::of(&summary)

@@ -3,9 +3,9 @@ use std::fmt::Write;
 use super::frame::escape;
 use crate::{against::Against, summary::short};
 
-/// How the first method, named by its softness, compares with the second.
-pub(super) fn section(against: &Against, first: &str) -> String {
-    let (first, second) = (escape(first), escape(&against.softness));
+/// How the first method compares with the second.
+pub(super) fn section(against: &Against) -> String {
+    let [first, second] = [0, 1].map(|k| escape(&against.titles[k]));
     let mut text = format!(
         "<h2>Against <span class=\"second\">{second}</span></h2>
 <p>On the same {} seeds, at the last step. A difference below 0 means that the first method

@@ -4,7 +4,7 @@ use crate::{heat_map, search_summary::SearchSummary, summary::short};
 /// The page of a search that was stopped before its best setting was scored.
 pub(crate) fn of_search(title: &str, about: &str, found: &SearchSummary, command: &str) -> String {
     let partial = found.partial.map(|partial| {
-        format!("{}; add --resume to the command below to go on", partial.says("settings"))
+        format!("Stopped: {}; --resume goes on from them", partial.says("settings"))
     });
     let partial: Vec<String> = partial.into_iter().collect();
     let body = format!("{}{}", warnings(&partial), section(found));
