@@ -36,7 +36,7 @@ pub(crate) fn html(
     let warnings = frame::warnings(&notes);
     let searched = summary.search.as_ref().map(search::section).unwrap_or_default();
     let against = summary.against.as_ref();
-    let against = against.map(|other| against::section(other));
+    let against = against.map(against::section);
     let against = against.unwrap_or_default();
     let (results, each, settings) = (results(summary), each_run(summary, runs), settings(summary));
     let chart_says = chart_caption(summary);

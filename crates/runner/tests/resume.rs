@@ -145,7 +145,7 @@ fn a_search_that_is_stopped_in_every_part_resumes_to_the_same_results() {
         assert_eq!(part["search"], found);
         let finished = found["cells"].as_array().unwrap().len();
         assert_eq!(finished, cells.min(stop / 2));
-        assert_eq!(part["partial"].is_object(), true, "{part}");
+        assert!(part["partial"].is_object(), "{part}");
         assert_eq!(part.get("image_error").is_some(), stop > 2 * cells);
         done = stop;
     }
