@@ -18,7 +18,8 @@ pub(crate) struct Control {
     #[arg(long, value_name = "NAME|FILE.json", value_parser = rival)]
     pub(crate) against: Option<Rival>,
 
-    /// Training seeds that `search` tries every setting on.
+    /// Training seeds, counted from 1000000, that `search` tries every setting on [default: 8, or
+    /// what the task says].
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub(crate) search_runs: Option<usize>,
 

@@ -1,5 +1,8 @@
 //! What every softrast task shares: command line, progress, results, charts and the report page.
 //!
+//! `evaluate` and `search` keep what they have finished, so that they can be stopped and resumed;
+//! `docs/evaluating.md` says what they do and how methods are compared.
+//!
 //! A task is a library type that implements [`Task`], and a binary whose `main` is one call of
 //! [`main`]. The task knows scenes, cameras and optimisers; this crate sees seeds, numbers and RGB
 //! images. `examples/parabola.rs` is a whole task in one file.

@@ -12,7 +12,8 @@ use crate::{
     space::{Setting, Space},
 };
 
-/// First of the seeds that settings are compared on, far from those they are scored on.
+/// First of the seeds that settings are compared on, far from those they are scored on: a search
+/// with `n` training seeds takes this one and the `n - 1` that follow.
 pub(crate) const TRAINING_SEED: u64 = 1_000_000;
 
 /// A setting and how it did on the training seeds.
