@@ -1,29 +1,40 @@
-use std::collections::BTreeMap;
-
 use anyhow::anyhow;
 use plotters::prelude::*;
 
-use crate::{Description, Measure, Run, quantile, task::Point};
+use crate::{
+    Description, Measure,
+    convergence::{Convergence, Spread},
+    quantity::Quantity,
+};
 
-const SIZE: (u32, u32) = (860, 620);
-const IMAGE_COLOUR: RGBColor = RGBColor(31, 96, 168);
-const PARAMETER_COLOUR: RGBColor = RGBColor(196, 84, 24);
+const WIDTH: u32 = 860;
+const PANEL_HEIGHT: u32 = 310;
+/// Of the first method and of the one it is compared with.
+const COLOURS: [RGBColor; 2] = [RGBColor(31, 96, 168), RGBColor(196, 84, 24)];
 const GRID: RGBColor = RGBColor(225, 228, 232);
 
-/// Both errors over the steps as SVG: the curve of one run, or the median of several with a band
-/// that holds the middle half of them.
-pub(crate) fn svg(description: &Description, runs: &[Run]) -> anyhow::Result<String> {
+/// The quantities over the steps as SVG, one panel each: for every method a line, and around the
+/// mean of several runs a band that is its interval.
+///
+/// # Errors
+///
+/// If the chart cannot be drawn.
+pub(crate) fn svg(
+    description: &Description,
+    quantities: &[Quantity],
+    methods: &[Convergence],
+) -> anyhow::Result<String> {
     let mut text = String::new();
+    let all = Quantity::all(description);
     {
-        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+        let size = (WIDTH, PANEL_HEIGHT * quantities.len() as u32);
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
         root.fill(&WHITE).map_err(|e| anyhow!("cannot draw the chart: {e}"))?;
-        let panels = root.split_evenly((2, 1));
-        let measures = [
-            (description.image_error, IMAGE_COLOUR, (|p| p.image_error) as fn(&Point) -> f64),
-            (description.parameter_error, PARAMETER_COLOUR, |p| p.parameter_error),
-        ];
-        for (panel, (measure, colour, of)) in panels.iter().zip(measures) {
-            draw(panel, measure, colour, &bands(runs, of))
+        let panels = root.split_evenly((quantities.len(), 1));
+        for (panel, quantity) in panels.iter().zip(quantities) {
+            let place = all.iter().position(|other| other == quantity).unwrap_or_default();
+            let lines: Vec<Line> = methods.iter().map(|method| line(method, place)).collect();
+            draw(panel, quantity.measure(description), &lines)
                 .map_err(|e| anyhow!("cannot draw the chart: {e}"))?;
         }
         root.present().map_err(|e| anyhow!("cannot draw the chart: {e}"))?;
@@ -31,37 +42,22 @@ pub(crate) fn svg(description: &Description, runs: &[Run]) -> anyhow::Result<Str
     Ok(text)
 }
 
-/// Lower quartile, median and upper quartile over the runs after one step.
-struct Band {
-    step: f64,
-    low: f64,
-    median: f64,
-    high: f64,
-}
+/// Steps, and mean and interval after each.
+type Line = Vec<(f64, Spread)>;
 
-fn bands(runs: &[Run], of: fn(&Point) -> f64) -> Vec<Band> {
-    let mut steps = BTreeMap::<usize, Vec<f64>>::new();
-    for point in runs.iter().flat_map(|run| &run.curve) {
-        steps.entry(point.step).or_default().push(of(point));
-    }
-    let band = |(step, values): (usize, Vec<f64>)| Band {
-        step: step as f64,
-        low: quantile(&values, 0.25),
-        median: quantile(&values, 0.5),
-        high: quantile(&values, 0.75),
-    };
-    steps.into_iter().map(band).collect()
+fn line(method: &Convergence, place: usize) -> Line {
+    method.rows.iter().map(|row| (row.step as f64, row.spreads[place])).collect()
 }
 
 fn draw<DB: DrawingBackend>(
     panel: &DrawingArea<DB, plotters::coord::Shift>,
     measure: Measure,
-    colour: RGBColor,
-    bands: &[Band],
+    lines: &[Line],
 ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
-    let last_step = bands.last().map_or(0.0, |band| band.step).max(1.0);
-    let highest = bands.iter().map(|band| band.high).fold(0.0, f64::max);
-    let lowest = bands.iter().map(|band| band.low).fold(0.0, f64::min);
+    let points = || lines.iter().flatten();
+    let last_step = points().map(|(step, _)| *step).fold(1.0, f64::max);
+    let highest = points().map(|(_, spread)| spread.high).fold(0.0, f64::max);
+    let lowest = points().map(|(_, spread)| spread.low).fold(0.0, f64::min);
     let room = if highest > lowest { (highest - lowest) * 0.06 } else { 1.0 };
     let mut chart = ChartBuilder::on(panel)
         .margin(14)
@@ -80,11 +76,14 @@ fn draw<DB: DrawingBackend>(
         .bold_line_style(GRID)
         .light_line_style(TRANSPARENT)
         .draw()?;
-    let above = bands.iter().map(|band| (band.step, band.high));
-    let below = bands.iter().rev().map(|band| (band.step, band.low));
-    chart.draw_series([Polygon::new(above.chain(below).collect::<Vec<_>>(), colour.mix(0.18))])?;
-    let median = bands.iter().map(|band| (band.step, band.median));
-    chart.draw_series(LineSeries::new(median, colour.stroke_width(2)))?;
+    for (line, colour) in lines.iter().zip(COLOURS) {
+        let above = line.iter().map(|(step, spread)| (*step, spread.high));
+        let below = line.iter().rev().map(|(step, spread)| (*step, spread.low));
+        let band: Vec<_> = above.chain(below).collect();
+        chart.draw_series([Polygon::new(band, colour.mix(0.18))])?;
+        let mean = line.iter().map(|(step, spread)| (*step, spread.mean));
+        chart.draw_series(LineSeries::new(mean, colour.stroke_width(2)))?;
+    }
     Ok(())
 }
 

@@ -14,20 +14,27 @@ pub enum Error {
         /// What the system says.
         reason: std::io::Error,
     },
+    /// The user asked the program to stop. Exit code 130.
+    #[error("stopped before anything was finished")]
+    Interrupted,
 }
+
+/// Exit code of an interrupted program: 128 and the number of SIGINT.
+pub(crate) const INTERRUPTED: u8 = 130;
 
 /// How a program that could not do its work ends: one line on stderr and an exit code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// 2 where the command line is at fault, 1 for the rest.
+    /// 2 where the command line is at fault, 130 where the user stopped the program, 1 for the rest.
     pub code: u8,
-    /// The line behind `error: `.
+    /// The line behind `error: `, or behind `interrupted: `.
     pub message: String,
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error: {}", self.message)
+        let kind = if self.code == INTERRUPTED { "interrupted" } else { "error" };
+        write!(f, "{kind}: {}", self.message)
     }
 }
 
@@ -38,6 +45,7 @@ impl From<anyhow::Error> for Failure {
             Some(Error::Usage(_)) => {
                 Failure { code: 2, message: format!("{message} (see --help)") }
             }
+            Some(Error::Interrupted) => Failure { code: INTERRUPTED, message },
             _ => Failure { code: 1, message },
         }
     }
@@ -46,12 +54,16 @@ impl From<anyhow::Error> for Failure {
 impl From<clap::Error> for Failure {
     /// Keeps what clap found and its tip; its usage and the pointer to `--help` become a bracket.
     fn from(error: clap::Error) -> Self {
-        let text = error.render().to_string();
-        let found = text.split("\n\nUsage:").next().unwrap_or_default();
-        let found = found.split("\n\nFor more information").next().unwrap_or_default();
-        let found = one_line(found.trim_start_matches("error: "));
-        Failure { code: 2, message: format!("{found} (see --help)") }
+        Failure { code: 2, message: format!("{} (see --help)", found(&error)) }
     }
+}
+
+/// What clap found wrong and its tip, in one line.
+pub(crate) fn found(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let found = text.split("\n\nUsage:").next().unwrap_or_default();
+    let found = found.split("\n\nFor more information").next().unwrap_or_default();
+    one_line(found.trim_start_matches("error: "))
 }
 
 /// Joins the paragraphs of a message by `; ` and the lines of a paragraph by a space.

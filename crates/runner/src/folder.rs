@@ -6,15 +6,22 @@ use std::{
 
 use tempfile::NamedTempFile;
 
-use crate::Error;
+use crate::{Command, Error};
 
 pub(crate) const RESULT: &str = "result.json";
 pub(crate) const CURVE: &str = "curve.csv";
 pub(crate) const BEFORE_AFTER: &str = "before_after.png";
 pub(crate) const ANIMATION: &str = "animation.gif";
 pub(crate) const REPORT: &str = "report.html";
+pub(crate) const CONVERGENCE: &str = "convergence.csv";
+pub(crate) const AGAINST_CURVE: &str = "against_curve.csv";
+pub(crate) const SEARCH: &str = "search.json";
+pub(crate) const CELLS: &str = "search.csv";
 
-const ALL: [&str; 5] = [CURVE, BEFORE_AFTER, ANIMATION, REPORT, RESULT];
+/// Files that tell of the last runs. Those of a search stay until the next one.
+const OF_RUNS: [&str; 7] =
+    [CURVE, CONVERGENCE, AGAINST_CURVE, BEFORE_AFTER, ANIMATION, REPORT, RESULT];
+const OF_SEARCH: [&str; 2] = [CELLS, SEARCH];
 
 /// The folder for the results, in which files appear whole or not at all.
 ///
@@ -32,16 +39,24 @@ impl Folder {
         let missing = path.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
         let made = missing.map(Path::to_path_buf).collect();
         let folder = Folder { path: path.into(), made, staged: Vec::new() };
-        let tried = fs::create_dir_all(path).and_then(|()| folder.temporary()).and_then(|_| {
-            match ALL.iter().find(|name| path.join(name).is_dir()) {
+        let tried =
+            fs::create_dir_all(path).and_then(|()| folder.temporary()).and_then(|_| match OF_RUNS
+                .iter()
+                .chain(&OF_SEARCH)
+                .find(|name| path.join(name).is_dir())
+            {
                 Some(name) => Err(io::Error::other(format!("{name} in it is a folder"))),
                 None => Ok(()),
-            }
-        });
+            });
         match tried {
             Ok(()) => Ok(folder),
             Err(reason) => Err(folder.refused(reason)),
         }
+    }
+
+    /// Where the journal of a command stands.
+    pub(crate) fn journal(&self, command: Command) -> PathBuf {
+        self.path.join(format!("{}.jsonl", command.name()))
     }
 
     /// Writes a file under a hidden name.
@@ -55,7 +70,8 @@ impl Folder {
     /// Gives all files their names; removes those of an earlier run that this one does not have.
     pub(crate) fn commit(mut self) -> Result<(), Error> {
         let staged = std::mem::take(&mut self.staged);
-        let stale = ALL.into_iter().filter(|name| staged.iter().all(|(staged, _)| staged != name));
+        let missing = |name: &&str| staged.iter().all(|(staged, _)| staged != name);
+        let stale = OF_RUNS.into_iter().filter(missing);
         for name in stale.collect::<Vec<_>>() {
             match fs::remove_file(self.path.join(name)) {
                 Err(reason) if reason.kind() != io::ErrorKind::NotFound => {

@@ -1,27 +1,48 @@
 //! What every softrast task shares: command line, progress, results, charts and the report page.
 //!
+//! `evaluate` and `search` keep what they have finished, so that they can be stopped and resumed;
+//! `docs/evaluating.md` says what they do and how methods are compared.
+//!
 //! A task is a library type that implements [`Task`], and a binary whose `main` is one call of
 //! [`main`]. The task knows scenes, cameras and optimisers; this crate sees seeds, numbers and RGB
 //! images. `examples/parabola.rs` is a whole task in one file.
 
+mod against;
 mod animation;
 mod chart;
+mod command;
+mod control;
+mod convergence;
+mod encoded;
 mod error;
+mod error_summary;
+mod evaluation;
 mod folder;
+mod grid;
+mod heat_map;
+mod interrupt;
 mod job;
+mod journal;
 mod label;
 mod memory;
 mod picture;
+mod prepared;
 mod program;
 mod progress;
+mod quantity;
 mod report;
+mod search;
+mod search_summary;
 mod settings;
+mod space;
 mod statistics;
+mod stored;
 mod summary;
 mod table;
 mod task;
 
 pub use error::{Error, Failure};
+pub use grid::Grid;
 pub use memory::peak_rss_mib;
 pub use picture::{contact_sheet, difference, rgb_from_gray};
 pub use program::{execute, main};
@@ -29,5 +50,5 @@ pub use progress::Progress;
 pub use settings::{Command, Schedule, Settings, SoftnessChoice, Variant};
 pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
 pub use task::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, NoArgs, Pictures, Point, Run, Task,
+    Batch, Description, ErrorGroup, ExtraError, Measure, NoArgs, Pictures, Point, Run, Score, Task,
 };

@@ -1,52 +1,83 @@
 use std::{
     io::IsTerminal,
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Shows on stderr how far the work is.
+use crate::Error;
+
+/// Shows on stderr how far the work is, and stops it when the user asks for that.
 ///
-/// On a terminal it is a bar with step, loss and time left; elsewhere a line every ten seconds.
+/// On a terminal it is a bar with steps, loss and time left; elsewhere a line every ten seconds. Each
+/// step counts once for every run that makes it, so that batches of any size share one bar.
 pub struct Progress {
     bar: ProgressBar,
     lines: bool,
     last_line: Instant,
+    stop: &'static AtomicBool,
+    /// Steps of all runs of earlier batches.
     before: u64,
+    /// Runs and steps of this batch.
+    runs: usize,
+    steps: usize,
     prefix: String,
 }
 
 /// Time between two lines where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
+/// For work that nobody stops.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
 impl Progress {
-    /// Progress that nobody sees, for a task that is run as a library.
+    /// Progress that nobody sees or stops, for a task that is run as a library.
     pub fn hidden() -> Self {
-        Self::new(0, ProgressDrawTarget::hidden(), false)
+        Self::quiet(&NEVER)
     }
 
-    /// Progress of `steps` steps over all batches.
-    pub(crate) fn visible(steps: usize) -> Self {
+    /// Progress that nobody sees.
+    pub(crate) fn quiet(stop: &'static AtomicBool) -> Self {
+        Self::new(ProgressDrawTarget::hidden(), false, stop)
+    }
+
+    /// Progress that ends once `stop` is set.
+    pub(crate) fn visible(stop: &'static AtomicBool) -> Self {
         if std::io::stderr().is_terminal() {
-            Self::new(steps, ProgressDrawTarget::stderr(), false)
+            Self::new(ProgressDrawTarget::stderr(), false, stop)
         } else {
-            Self::new(steps, ProgressDrawTarget::hidden(), true)
+            Self::new(ProgressDrawTarget::hidden(), true, stop)
         }
     }
 
-    fn new(steps: usize, target: ProgressDrawTarget, lines: bool) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(steps as u64), target);
+    fn new(target: ProgressDrawTarget, lines: bool, stop: &'static AtomicBool) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(0), target);
         let template = "{prefix} [{bar:32}] step {pos}/{len}, {msg}, {eta} left";
         let style = ProgressStyle::with_template(template).expect("the template is valid");
         bar.set_style(style.progress_chars("=> "));
-        Self { bar, lines, last_line: Instant::now(), before: 0, prefix: String::new() }
+        let last_line = Instant::now();
+        Self { bar, lines, last_line, stop, before: 0, runs: 1, steps: 0, prefix: String::new() }
     }
 
-    /// Starts a batch; `prefix` says which, and `before` counts the steps of those before it.
-    pub(crate) fn start(&mut self, prefix: String, before: usize) {
-        self.before = before as u64;
+    /// Says how many steps all runs of all batches have together.
+    pub(crate) fn expect(&self, steps: usize) {
+        self.bar.set_length(steps as u64);
+    }
+
+    /// Starts a batch of `runs` that make `steps` each; `prefix` says which.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Interrupted`] if the user has asked the program to stop.
+    pub(crate) fn begin(&mut self, prefix: String, runs: usize, steps: usize) -> Result<(), Error> {
+        if self.stop.load(Ordering::SeqCst) {
+            return Err(Error::Interrupted);
+        }
+        (self.runs, self.steps) = (runs, steps);
         self.bar.set_prefix(prefix.clone());
         self.prefix = prefix;
+        Ok(())
     }
 
     /// Tells that `step` steps of this batch are done, and the loss they led to.
@@ -55,7 +86,7 @@ impl Progress {
     ///
     /// Fails when the work should stop here; the task passes that on.
     pub fn step(&mut self, step: usize, loss: f64) -> anyhow::Result<()> {
-        let done = self.before + step as u64;
+        let done = self.before + (step * self.runs) as u64;
         self.bar.set_message(format!("loss {loss:.4e}"));
         self.bar.set_position(done);
         if self.lines && self.last_line.elapsed() >= LINE_EVERY {
@@ -64,11 +95,60 @@ impl Progress {
             let left = indicatif::HumanDuration(self.bar.eta());
             eprintln!("{}: step {done}/{steps}, loss {loss:.4e}, {left} left", self.prefix);
         }
+        // After the last step the batch is as good as finished, and would be lost.
+        if step < self.steps && self.stop.load(Ordering::SeqCst) {
+            return Err(Error::Interrupted.into());
+        }
         Ok(())
+    }
+
+    /// Ends the batch that began last.
+    pub(crate) fn end(&mut self) {
+        self.before += (self.runs * self.steps) as u64;
+        self.bar.set_position(self.before);
+    }
+
+    /// Passes over steps that an earlier call of the program has made.
+    pub(crate) fn skip(&mut self, runs: usize, steps: usize) {
+        self.before += (runs * steps) as u64;
+        self.bar.set_position(self.before);
+        // They took no time now, so they say nothing about the time left.
+        self.bar.reset_eta();
     }
 
     /// Removes the bar.
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stopped_batch_ends_after_its_step_unless_that_was_its_last() {
+        let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
+        let mut progress = Progress::quiet(stop);
+        progress.begin("run".into(), 1, 3).unwrap();
+        progress.step(1, 0.5).unwrap();
+        stop.store(true, Ordering::SeqCst);
+        let stopped = progress.step(2, 0.5).unwrap_err();
+        assert!(matches!(stopped.downcast_ref(), Some(Error::Interrupted)));
+        progress.step(3, 0.5).unwrap();
+        progress.end();
+        assert!(matches!(progress.begin("run".into(), 1, 3), Err(Error::Interrupted)));
+    }
+
+    #[test]
+    fn batches_of_any_size_share_one_bar() {
+        let mut progress = Progress::hidden();
+        progress.expect(100);
+        progress.skip(2, 10);
+        progress.begin("runs".into(), 4, 10).unwrap();
+        progress.step(5, 0.5).unwrap();
+        assert_eq!(progress.bar.position(), 40);
+        progress.end();
+        assert_eq!((progress.bar.position(), progress.bar.length()), (60, Some(100)));
     }
 }

@@ -1,3 +1,7 @@
+mod against;
+mod frame;
+mod search;
+
 use std::fmt::Write;
 
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -5,9 +9,13 @@ use serde_json::Value;
 
 use crate::{
     Run,
-    program::Encoded,
-    summary::{ErrorSummary, Summary, short},
+    encoded::Encoded,
+    error_summary::ErrorSummary,
+    summary::{Summary, short},
 };
+
+use frame::{escape, frame};
+pub(crate) use search::of_search;
 
 /// The results as one page that needs no other file.
 pub(crate) fn html(
@@ -18,27 +26,24 @@ pub(crate) fn html(
     pictures: Option<&Encoded>,
     command: &str,
 ) -> String {
-    let title = escape(summary.task);
     let figures = pictures.map(|pictures| figures(summary, pictures)).unwrap_or_default();
-    let (about, head, command) = (escape(about), escape(&summary.head()), escape(command));
-    let (warnings, settings) = (warnings(summary), settings(summary));
-    let (results, each) = (results(summary), each_run(summary, runs));
+    let head = escape(&summary.head());
+    let partial = summary
+        .partial
+        .map(|partial| format!("Stopped: {}; --resume goes on from them", partial.says("runs")));
+    let mut notes: Vec<String> = partial.into_iter().collect();
+    notes.extend(summary.first_warnings());
+    let warnings = frame::warnings(&notes);
+    let searched = summary.search.as_ref().map(search::section).unwrap_or_default();
+    let against = summary.against.as_ref();
+    let against = against.map(against::section);
+    let against = against.unwrap_or_default();
+    let (results, each, settings) = (results(summary), each_run(summary, runs), settings(summary));
     let chart_says = chart_caption(summary);
-    format!(
-        "<!DOCTYPE html>
-<html lang=\"en\">
-<head>
-<meta charset=\"utf-8\">
-<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">
-<title>{title}: softrast report</title>
-<style>{STYLE}</style>
-</head>
-<body>
-<h1>{title}</h1>
-<p class=\"about\">{about}.</p>
-<p>{head}.</p>
-{warnings}<h2>Results</h2>
-{results}{figures}<h2>Convergence</h2>
+    let body = format!(
+        "<p>{head}.</p>
+{warnings}{searched}<h2>Results</h2>
+{results}{against}{figures}<h2>Convergence</h2>
 <figure>
 {chart}
 <figcaption>{chart_says}</figcaption>
@@ -46,30 +51,28 @@ pub(crate) fn html(
 {each}<h2>Settings</h2>
 {settings}<p class=\"note\">The softness is the smooth step that stands for the hard edge of a face, so
 that the image changes smoothly with the scene; its scale is the width of that step.</p>
-<h2>Run it again</h2>
-<pre>{command}</pre>
-<p class=\"note\">Beside this page: <code>result.json</code> holds all results, <code>curve.csv</code>
-every error of every run after every step.</p>
-</body>
-</html>
 "
-    )
+    );
+    frame(summary.task, about, &body, command, &beside(summary))
 }
 
-const STYLE: &str = "
-body { max-width: 56rem; margin: 2rem auto 4rem; padding: 0 1rem; color: #1f2328;
-  background: #fff; font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', sans-serif; }
-h1 { margin-bottom: 0; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #d8dee4; }
-.about { margin-top: 0; font-size: 1.15rem; color: #57606a; }
-table { border-collapse: collapse; } th, td { padding: .3rem .9rem .3rem 0; text-align: left; }
-tr { border-bottom: 1px solid #eaeef2; } thead th { color: #57606a; font-weight: 600; }
-td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
-figure { margin: 1rem 0; } figure img, figure svg { max-width: 100%; height: auto; }
-figcaption, .note { color: #57606a; font-size: .93rem; }
-.warning { background: #fff8e5; border-left: 4px solid #d4a72c; padding: .5rem .9rem; }
-pre { background: #f6f8fa; padding: .7rem .9rem; overflow-x: auto; }
-summary { cursor: pointer; }
-";
+/// What the other files hold.
+fn beside(summary: &Summary) -> String {
+    let mut text =
+        "<code>result.json</code> holds all results, <code>curve.csv</code> every error of \
+                    every run after every step"
+            .to_owned();
+    if summary.success_ci95.is_some() {
+        text += ", <code>convergence.csv</code> the means over the runs and their intervals";
+    }
+    if summary.against.is_some() {
+        text += ", <code>against_curve.csv</code> the runs of the second method";
+    }
+    if summary.search.is_some() {
+        text += ", <code>search.json</code> and <code>search.csv</code> every setting tried";
+    }
+    text
+}
 
 fn figures(summary: &Summary, pictures: &Encoded) -> String {
     let which = match summary.runs {
@@ -96,24 +99,22 @@ the result is brighter, white where they agree.{which}</figcaption>
 }
 
 fn chart_caption(summary: &Summary) -> String {
-    let errors = [&summary.image_error, &summary.parameter_error].map(|e| escape(e.name));
-    let [image, parameter] = errors;
-    let which = format!(
-        "Above the error seen in the image ({image}), below the error of what is optimised \
-         ({parameter}); both should fall to 0."
-    );
-    match summary.runs {
-        1 => which,
-        n => format!(
-            "{which} The line is the median of {n} runs, the band holds the middle half of them \
-             (25 % to 75 %)."
-        ),
+    let mut text = "All errors should fall to 0.".to_owned();
+    if summary.runs > 1 {
+        text += &format!(
+            " A line is the mean of {} runs, the band around it the 95 % interval of the mean, by the \
+             bootstrap.",
+            summary.runs
+        );
     }
-}
-
-fn warnings(summary: &Summary) -> String {
-    let line = |warning: String| format!("<p class=\"warning\">{}</p>\n", escape(&warning));
-    summary.first_warnings().into_iter().map(line).collect()
+    if let Some(other) = &summary.against {
+        let [first, second] = [&other.titles[0], &other.titles[1]].map(|name| escape(name));
+        text += &format!(
+            " <span class=\"first\">Blue is the first method ({first})</span>, <span \
+             class=\"second\">orange the second ({second})</span>."
+        );
+    }
+    text
 }
 
 fn results(summary: &Summary) -> String {
@@ -200,9 +201,4 @@ fn settings(summary: &Summary) -> String {
     };
     let rows: String = rows.iter().map(row).collect();
     format!("<table>\n<tbody>\n{rows}</tbody>\n</table>\n")
-}
-
-fn escape(text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('<', "&lt;");
-    text.replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
 
-use crate::Error;
+use crate::{Error, control::Control};
 
 /// Everything on the command line of a task.
 #[derive(Debug, Parser)]
@@ -12,6 +12,8 @@ pub(crate) struct CommandLine<A: Args> {
     pub(crate) command: Command,
     #[command(flatten)]
     pub(crate) settings: Settings,
+    #[command(flatten)]
+    pub(crate) control: Control,
     #[command(flatten)]
     pub(crate) args: A,
 }
@@ -23,6 +25,8 @@ pub enum Command {
     Solve,
     /// Solve many seeds and give means with confidence intervals.
     Evaluate,
+    /// Find the best scale and learning rate on training seeds, then evaluate them on others.
+    Search,
 }
 
 impl Command {
@@ -31,6 +35,7 @@ impl Command {
         match self {
             Command::Solve => "solve",
             Command::Evaluate => "evaluate",
+            Command::Search => "search",
         }
     }
 }
@@ -74,11 +79,11 @@ pub struct Settings {
     #[arg(long, value_name = "N", value_parser = size, allow_negative_numbers = true)]
     pub size: Option<usize>,
 
-    /// Seed of the run; `evaluate` takes this one and those that follow.
+    /// Seed of the run; `evaluate` and `search` take this one and those that follow.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
 
-    /// Number of seeds that `evaluate` takes.
+    /// Number of seeds to evaluate on.
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub runs: Option<usize>,
 
@@ -158,7 +163,7 @@ impl Settings {
     }
 }
 
-fn softness(text: &str) -> Result<SoftnessChoice, String> {
+pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
     if let Some(name) = SoftnessChoice::NAMES.into_iter().find(|&name| name == text) {
         return Ok(SoftnessChoice::Named(name));
     }
@@ -171,7 +176,7 @@ fn softness(text: &str) -> Result<SoftnessChoice, String> {
     ))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
         _ => Err("expected a positive number".into()),
@@ -181,7 +186,7 @@ fn positive(text: &str) -> Result<f64, String> {
 /// More steps or runs than this are a slip of the finger.
 const MOST: usize = 1_000_000;
 
-fn count(text: &str) -> Result<usize, String> {
+pub(crate) fn count(text: &str) -> Result<usize, String> {
     let count = text.parse().ok().filter(|n| (1..=MOST).contains(n));
     count.ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
 }

@@ -36,17 +36,44 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
 /// Draws `resamples` samples of the same length with replacement, and gives the 2.5 % and 97.5 %
 /// quantiles of their means. One value gives an interval of no width; none gives NaN.
 pub fn bootstrap_mean_interval(values: &[f64], resamples: usize, seed: u64) -> [f64; 2] {
-    if values.is_empty() {
-        return [f64::NAN; 2];
+    Resampling::new(values.len(), resamples, seed).mean_interval(values)
+}
+
+/// Samples with replacement that are drawn once, for many lists of the same length.
+pub(crate) struct Resampling {
+    values: usize,
+    /// Places in the list, one row of `values` per sample.
+    draws: Vec<usize>,
+}
+
+impl Resampling {
+    /// `resamples` samples of a list of `values`.
+    pub(crate) fn new(values: usize, resamples: usize, seed: u64) -> Self {
+        let mut random = StdRng::seed_from_u64(seed);
+        let draws = (0..resamples * values).map(|_| random.random_range(0..values)).collect();
+        Self { values, draws }
     }
-    let mut random = StdRng::seed_from_u64(seed);
-    let means: Vec<f64> = (0..resamples)
-        .map(|_| {
-            let draws = (0..values.len()).map(|_| values[random.random_range(0..values.len())]);
-            draws.sum::<f64>() / values.len() as f64
-        })
-        .collect();
-    [quantile(&means, 0.025), quantile(&means, 0.975)]
+
+    /// Length of the lists.
+    pub(crate) fn values(&self) -> usize {
+        self.values
+    }
+
+    /// 2.5 % and 97.5 % quantiles of the means of the samples; NaN of nothing.
+    ///
+    /// # Panics
+    ///
+    /// If the list does not have the length that the samples were drawn for.
+    pub(crate) fn mean_interval(&self, values: &[f64]) -> [f64; 2] {
+        assert_eq!(values.len(), self.values, "the samples were drawn for another length");
+        if values.is_empty() {
+            return [f64::NAN; 2];
+        }
+        let sum = |draws: &[usize]| draws.iter().map(|&place| values[place]).sum::<f64>();
+        let means = self.draws.chunks(self.values).map(|draws| sum(draws) / self.values as f64);
+        let means: Vec<f64> = means.collect();
+        [quantile(&means, 0.025), quantile(&means, 0.975)]
+    }
 }
 
 /// 95 % interval of a rate of which `successes` of `trials` were seen: `[low, high]`.

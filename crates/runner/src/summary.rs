@@ -1,15 +1,12 @@
-use std::{collections::BTreeMap, path::PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
 use crate::{
-    Command, Description, ErrorGroup, Measure, Run, Settings, bootstrap_mean_interval, mean,
-    median, peak_rss_mib, task::Point, wilson_interval,
+    Command, Description, ErrorGroup, Run, Settings, against::Against, error_summary::ErrorSummary,
+    evaluation::Evaluation, folder, median, peak_rss_mib, search_summary::SearchSummary,
+    wilson_interval,
 };
-
-/// Samples behind a confidence interval, and the seed that draws them.
-const RESAMPLES: usize = 10_000;
-const RESAMPLING_SEED: u64 = 0;
 
 /// What a program found out, as it stands in `result.json`.
 #[derive(Debug, Serialize)]
@@ -35,29 +32,23 @@ pub(crate) struct Summary {
     pub(crate) peak_memory_mib: Option<f64>,
     pub(crate) settings: serde_json::Map<String, serde_json::Value>,
     pub(crate) warnings: Vec<String>,
+    /// There where the user stopped the program before all runs were finished.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) partial: Option<Partial>,
+    /// There where a second method was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) against: Option<Against>,
+    /// There where the settings were searched for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) search: Option<SearchSummary>,
     pub(crate) out: PathBuf,
 }
 
-/// One error over all runs: means over the runs, each run's own value where there may be several.
-#[derive(Debug, Serialize)]
-pub(crate) struct ErrorSummary {
-    pub(crate) name: &'static str,
-    pub(crate) unit: &'static str,
-    /// Before the first step.
-    pub(crate) initial: f64,
-    /// After the last step.
-    #[serde(rename = "final")]
-    pub(crate) last: f64,
-    /// Lowest over all steps.
-    pub(crate) best: f64,
-    /// Of the mean of `last`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) ci95: Option<[f64; 2]>,
-    /// `last` of every run, in the order of the seeds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) per_run: Option<Vec<f64>>,
-    #[serde(flatten)]
-    pub(crate) more: BTreeMap<&'static str, ErrorSummary>,
+/// How much of a job is finished.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Partial {
+    pub(crate) finished: usize,
+    pub(crate) asked: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -69,25 +60,18 @@ pub(crate) struct Seconds {
 }
 
 impl Summary {
+    /// Of a finished or partial evaluation, which has one run at least.
     pub(crate) fn new(
         task: &'static str,
         command: Command,
         settings: &Settings,
         description: &Description,
-        runs: &[Run],
-        seconds: f64,
+        evaluation: &Evaluation,
         out: PathBuf,
     ) -> Self {
-        let many = command == Command::Evaluate;
-        let error = |group, measure, main: fn(&Point) -> f64| {
-            let mut error = ErrorSummary::new(measure, runs, many, main);
-            for (k, extra) in description.extra.iter().enumerate().filter(|(_, e)| e.group == group)
-            {
-                let more = ErrorSummary::new(extra.measure, runs, many, |point| point.extra[k]);
-                error.more.insert(extra.key, more);
-            }
-            error
-        };
+        let runs = &evaluation.runs;
+        let many = command != Command::Solve;
+        let error = |group| ErrorSummary::of_group(group, description, runs, many);
         let successes = runs.iter().filter(|run| run.success).count();
         let steps: Vec<f64> = runs.iter().flat_map(|run| run.step_seconds.clone()).collect();
         Self {
@@ -102,17 +86,18 @@ impl Summary {
             steps: description.steps,
             size: description.size,
             faces: description.faces,
-            image_error: error(ErrorGroup::Image, description.image_error, |p| p.image_error),
-            parameter_error: error(ErrorGroup::Parameter, description.parameter_error, |p| {
-                p.parameter_error
-            }),
+            image_error: error(ErrorGroup::Image),
+            parameter_error: error(ErrorGroup::Parameter),
             success_rate: successes as f64 / runs.len() as f64,
             success_ci95: many.then(|| wilson_interval(successes, runs.len())),
             success_means: description.success.clone(),
-            seconds: Seconds { total: seconds, step_median: median(&steps) },
+            seconds: Seconds { total: evaluation.seconds, step_median: median(&steps) },
             peak_memory_mib: peak_rss_mib(),
             settings: description.settings.clone(),
             warnings: distinct_warnings(runs),
+            partial: None,
+            against: None,
+            search: None,
             out,
         }
     }
@@ -137,6 +122,10 @@ impl Summary {
     /// A few lines for people.
     pub(crate) fn text(&self) -> String {
         let mut lines = vec![self.head()];
+        lines.extend(self.search.iter().flat_map(SearchSummary::lines));
+        lines.extend(
+            self.partial.map(|partial| format!("  {:<22} {}", "stopped", partial.says("runs"))),
+        );
         for error in self.errors() {
             let [initial, last, best] = [error.initial, error.last, error.best].map(short);
             let interval = match error.ci95 {
@@ -159,7 +148,8 @@ impl Summary {
             short(self.seconds.step_median * 1e3),
             memory.unwrap_or_default()
         ));
-        lines.push(format!("  {:<22} {}", "report", self.out.join("report.html").display()));
+        lines.extend(self.against.iter().flat_map(Against::lines));
+        lines.push(format!("  {:<22} {}", "report", self.out.join(folder::REPORT).display()));
         lines.join("\n")
     }
 
@@ -197,6 +187,13 @@ impl Summary {
     }
 }
 
+impl Partial {
+    /// How much that is, in words.
+    pub(crate) fn says(self, what: &str) -> String {
+        format!("{} of {} {what} are finished", self.finished, self.asked)
+    }
+}
+
 fn distinct_warnings(runs: &[Run]) -> Vec<String> {
     let mut warnings = Vec::new();
     for warning in runs.iter().flat_map(|run| &run.warnings) {
@@ -205,30 +202,6 @@ fn distinct_warnings(runs: &[Run]) -> Vec<String> {
         }
     }
     warnings
-}
-
-impl ErrorSummary {
-    /// Name with the unit.
-    pub(crate) fn title(&self) -> String {
-        Measure { name: self.name, unit: self.unit }.title()
-    }
-
-    fn new(measure: Measure, runs: &[Run], many: bool, of: impl Fn(&Point) -> f64) -> Self {
-        let each = |pick: fn(&[f64]) -> f64| -> Vec<f64> {
-            runs.iter().map(|run| pick(&run.curve.iter().map(&of).collect::<Vec<_>>())).collect()
-        };
-        let last = each(|curve| curve[curve.len() - 1]);
-        Self {
-            name: measure.name,
-            unit: measure.unit,
-            initial: mean(&each(|curve| curve[0])),
-            last: mean(&last),
-            best: mean(&each(|curve| curve.iter().copied().fold(f64::INFINITY, f64::min))),
-            ci95: many.then(|| bootstrap_mean_interval(&last, RESAMPLES, RESAMPLING_SEED)),
-            per_run: many.then_some(last),
-            more: BTreeMap::new(),
-        }
-    }
 }
 
 /// A number with about four digits that count.

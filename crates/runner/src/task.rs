@@ -1,6 +1,6 @@
 use image::RgbImage;
 
-use crate::{Progress, Settings};
+use crate::{Grid, Progress, Settings};
 
 /// A problem that the shared command line can solve and evaluate.
 pub trait Task: Sized {
@@ -30,10 +30,24 @@ pub trait Task: Sized {
         1
     }
 
+    /// The error by which `search` compares settings.
+    fn score(&self) -> Score {
+        Score::Image
+    }
+
+    /// What `search` tries where the command line does not say.
+    ///
+    /// By default a grid around the numbers `scale`, `scale_end` and `learning_rate` of
+    /// [`Description::settings`], see [`Grid::around`].
+    fn grid(&self) -> Grid {
+        Grid::around(&self.describe().settings)
+    }
+
     /// Solves one instance for every seed of the batch, and returns them in the order of the seeds.
     ///
     /// A run depends on its seed alone, not on the others in its batch. Call
-    /// [`Progress::step`] after every step, and pass its error on with `?`.
+    /// [`Progress::step`] after every step, and pass its error on with `?`: that is how Ctrl-C
+    /// ends a batch.
     ///
     /// # Errors
     ///
@@ -128,6 +142,17 @@ pub struct ExtraError {
     pub key: &'static str,
     /// Name and unit.
     pub measure: Measure,
+}
+
+/// One of the errors that a task reports, by its value at the last step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Score {
+    /// [`Description::image_error`].
+    Image,
+    /// [`Description::parameter_error`].
+    Parameter,
+    /// The first of [`Description::extra`] with this key.
+    Extra(&'static str),
 }
 
 /// The two kinds of error.

@@ -188,6 +188,16 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("--no-such-flag", 2, "unexpected argument"),
         ("--steps", 2, "--steps"),
         ("--radius", 2, "--radius"),
+        ("--resume", 2, "--resume goes with evaluate and search, not with solve"),
+        ("--against logistic", 2, "--against goes with evaluate"),
+        ("search --against logistic", 2, "--against goes with evaluate"),
+        ("evaluate --against sofft", 2, "expected one of logistic, gauss"),
+        ("evaluate --against gauss", 2, "--against: the parabola has no softness gauss"),
+        ("evaluate --scales 1,2", 2, "--scales goes with search"),
+        ("search --scales 0.1,0", 2, "positive"),
+        ("search --search-runs 0", 2, "from 1"),
+        ("search --schedule static --scale 1 --learning-rate 1", 2, "nothing to choose from"),
+        ("search --seed 999999", 2, "seeds 1000000 to 1000007"),
     ];
     let root = tempfile::tempdir().unwrap();
     for (line, code, says) in cases {
@@ -225,7 +235,9 @@ fn numbers_that_start_out_wrong_are_an_error_and_leave_nothing() {
 fn help_goes_to_the_standard_output() {
     let out = tempfile::tempdir().unwrap();
     let help = run_in(out.path(), "--help").unwrap();
-    for flag in ["solve", "evaluate", "--softness", "--radius", "out/parabola"] {
+    for flag in
+        ["solve", "evaluate", "search", "--resume", "--softness", "--radius", "out/parabola"]
+    {
         assert!(help.contains(flag), "{flag}");
     }
     assert!(names(out.path()).is_empty());

@@ -5,7 +5,7 @@ use softrast_method::{Defaults, Method, numbers};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
     Batch, Description, Error, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule,
-    Settings, Task, Variant,
+    Score, Settings, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -105,6 +105,11 @@ impl Task for Pose {
 
     fn batch_size(&self) -> usize {
         BATCH
+    }
+
+    /// What can be seen of a pose; the soft loss of a method falls with its scale.
+    fn score(&self) -> Score {
+        Score::Extra("hard")
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
