@@ -34,9 +34,13 @@ impl ProfileSum {
     pub(crate) fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
         let [views, _, _] = vertices.dims();
         let data = vertices.swap_dims(1, 2).into_data();
-        match data.dtype {
-            DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
-            DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
+        self.pairs_of(views, &data)
+    }
+
+    fn pairs_of(&self, views: usize, vertices: &TensorData) -> usize {
+        match vertices.dtype {
+            DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(vertices), &[])),
+            DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(vertices), &[])),
             other => panic!("profile_sum works in f32 and f64, found {other:?}"),
         }
     }
@@ -189,19 +193,24 @@ fn host<B: RasterBackend>(
     let device = B::float_device(&tensors[0]);
     let views = tensors[0].shape()[0];
     let data: Vec<TensorData> = tensors.into_iter().map(B::host_data).collect();
-    let result = match data[0].dtype {
-        DType::F32 => run::<f32>(op, views, &data, &pass),
-        DType::F64 => run::<f64>(op, views, &data, &pass),
+    B::float_from_data(run(op, views, &data, &pass), &device)
+}
+
+/// Runs a pass in the float type of the data. Not generic, so that the kernels are compiled with
+/// this crate and not again with everything that uses it.
+fn run(op: &ProfileSum, views: usize, data: &[TensorData], pass: &Pass) -> TensorData {
+    match data[0].dtype {
+        DType::F32 => run_in::<f32>(op, views, data, pass),
+        DType::F64 => run_in::<f64>(op, views, data, pass),
         other => panic!("profile_sum works in f32 and f64, found {other:?}"),
-    };
-    B::float_from_data(result, &device)
+    }
 }
 
 fn slice<F: burn::tensor::Element>(data: &TensorData) -> &[F] {
     data.as_slice().expect("all tensors of a call have one float type")
 }
 
-fn run<F: Float + burn::tensor::Element>(
+fn run_in<F: Float + burn::tensor::Element>(
     op: &ProfileSum,
     views: usize,
     data: &[TensorData],

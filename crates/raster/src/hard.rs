@@ -20,18 +20,23 @@ pub fn hard_silhouette<B: Backend>(
     faces: &Arc<[[u32; 3]]>,
     size: usize,
 ) -> Tensor<B, 3> {
-    let [views, count, _] = vertices.dims();
+    let [views, _, _] = vertices.dims();
     let (device, dtype) = (vertices.device(), vertices.dtype());
     let vertices: Vec<f64> = vertices.swap_dims(1, 2).into_data().iter().collect();
-    let mut image = vec![0.0f64; views * size * size];
-    for view in 0..views {
-        let vertices = &vertices[3 * count * view..3 * count * (view + 1)];
-        let image = &mut image[size * size * view..size * size * (view + 1)];
-        for face in faces.iter() {
+    let image = TensorData::new(covered(&vertices, views, faces, size), [views, size, size]);
+    Tensor::from_data(image, (&device, dtype))
+}
+
+/// The images of `vertices` `[views, 3, vertices]`.
+fn covered(vertices: &[f64], views: usize, faces: &[[u32; 3]], size: usize) -> Vec<f64> {
+    let mut image = vec![0.0; views * size * size];
+    let length = (vertices.len() / views.max(1)).max(1);
+    for (vertices, image) in vertices.chunks(length).zip(image.chunks_mut(size * size)) {
+        for face in faces {
             inside_spans(vertices, face, NEAR, size, |row, start, end| {
                 image[row * size + start..row * size + end].fill(1.0);
             });
         }
     }
-    Tensor::from_data(TensorData::new(image, [views, size, size]), (&device, dtype))
+    image
 }

@@ -6,7 +6,8 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor, TensorData, backend::Backend},
 };
-use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_mesh::{Mesh, fox};
+use softrast_raster::{RasterBackend, Rasterizer, project};
 use softrast_softness::{EdgeSoftness, Family};
 
 const SIZE: usize = 16;
@@ -93,3 +94,63 @@ fn f32_agrees_with_f64() {
         }
     }
 }
+
+#[test]
+fn gradients_are_finite_on_every_broken_mesh_that_loads() {
+    type A = Autodiff<NdArray<f32>>;
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../mesh/tests/nasty");
+    let mut loaded = 0;
+    for entry in std::fs::read_dir(folder).expect("the nasty files are part of the repository") {
+        let path = entry.expect("the folder can be read").path();
+        if path.extension().is_none_or(|extension| extension != "obj") {
+            continue;
+        }
+        let Ok(mesh) = Mesh::load(&path) else { continue };
+        loaded += 1;
+        let positions = mesh.positions().as_flattened();
+        let vertices = tensor::<A>(positions, DType::F32).require_grad();
+        let orbit = tensor::<A>(&[2.732, 10.0, 30.0, 30.0], DType::F32).reshape([1, 4]);
+        let shaped = vertices.clone().reshape([1, mesh.positions().len() as i64, 3]);
+        let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+        let phi = tensor::<A>(&softness.default_phi(0.02), DType::F32).require_grad();
+        let silhouette = Rasterizer::new(SIZE).prepare(&mesh.faces().into(), softness, &phi);
+        let image = silhouette.coverage(project(shaped, orbit), phi.clone());
+        assert!(image.to_data().iter::<f64>().all(|a| (0.0..=1.0).contains(&a)), "{path:?}");
+        let grads = (image.clone() * image).sum().backward();
+        let grad = vertices.grad(&grads).expect("vertices are tracked");
+        assert!(grad.into_data().iter::<f64>().all(f64::is_finite), "{path:?}");
+        let grad = phi.grad(&grads).expect("phi is tracked");
+        assert!(grad.into_data().iter::<f64>().all(f64::is_finite), "{path:?}");
+    }
+    assert!(loaded > 20, "only {loaded} files loaded");
+}
+
+/// Coverage in tenths, `.` for none and `#` for all.
+fn drawn(softness: EdgeSoftness, scale: f64) -> String {
+    type N = NdArray<f32>;
+    const WIDE: usize = 24;
+    let fox = fox();
+    let positions = fox.positions().as_flattened();
+    let vertices = tensor::<N>(positions, DType::F32).reshape([1, fox.positions().len() as i64, 3]);
+    let orbit = tensor::<N>(&[3.0, 10.0, 90.0, 20.0], DType::F32).reshape([1, 4]);
+    let phi = tensor::<N>(&softness.default_phi(scale), DType::F32);
+    let silhouette = Rasterizer::new(WIDE).prepare(&fox.faces().into(), softness, &phi);
+    let image = silhouette.coverage(project(vertices, orbit), phi);
+    let character = |a: f64| match (10.0 * a).round() as u32 {
+        0 => '.',
+        10.. => '#',
+        tenth => char::from_digit(tenth, 10).expect("one digit"),
+    };
+    let image: String = image.into_data().iter::<f64>().map(character).collect();
+    (0..WIDE).map(|row| format!("{}\n", &image[row * WIDE..(row + 1) * WIDE])).collect()
+}
+
+#[test]
+fn a_fox_looks_like_one() {
+    let sharp = EdgeSoftness { family: Family::Logistic, squared: false };
+    assert_eq!(drawn(sharp, 0.002), SHARP);
+    assert_eq!(drawn(EdgeSoftness { squared: true, ..sharp }, 0.01), SOFT);
+}
+
+const SHARP: &str = "";
+const SOFT: &str = "";

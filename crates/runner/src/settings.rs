@@ -19,9 +19,10 @@ pub(crate) struct CommandLine<A: Args> {
 }
 
 /// What a task binary can be asked to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Command {
     /// Solve one instance and show it.
+    #[default]
     Solve,
     /// Solve many seeds and give means with confidence intervals.
     Evaluate,
@@ -43,6 +44,10 @@ impl Command {
 /// Flags that all tasks have. `None` means that the task chooses, per variant if it likes.
 #[derive(Args, Clone, Debug, PartialEq)]
 pub struct Settings {
+    /// What is asked for: `solve` may try harder than the protocol of `evaluate` allows.
+    #[arg(skip)]
+    pub command: Command,
+
     /// Variant of the task: the one a softness is tuned on, or the one it is transferred to.
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,
@@ -145,6 +150,7 @@ impl SoftnessChoice {
 impl Settings {
     /// Checks what concerns several flags at once, and fills in what one flag says about another.
     pub(crate) fn reconcile(&mut self, command: Command) -> Result<(), Error> {
+        self.command = command;
         match (self.schedule, self.scale_end) {
             (Some(Schedule::Static), Some(_)) => {
                 return Err(Error::Usage(

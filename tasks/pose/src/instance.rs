@@ -43,6 +43,10 @@ pub struct Instance {
 /// Half the field of view of every target camera.
 const HALF_FOV_DEG: f64 = 20.0;
 
+/// How far further starts lie from the given one. Poses that look alike are mostly front for back
+/// or left for right, so steps much smaller than a right angle lead out of them.
+const AROUND_DEG: f64 = 50.0;
+
 impl Instance {
     /// An instance that depends on `seed` alone.
     ///
@@ -69,6 +73,19 @@ impl Instance {
             half_fov_deg: 10.0 + 20.0 * random.random::<f64>(),
         };
         Self { target, start }
+    }
+
+    /// The same target from `count` starts: its own, and others on a circle of 50 degrees around it
+    /// in the plane of elevation and azimuth, evenly spaced from the side on.
+    pub fn starts(&self, count: usize) -> Vec<Self> {
+        let around = |k: usize| {
+            let direction = std::f64::consts::TAU * k as f64 / (count - 1) as f64;
+            let mut instance = *self;
+            instance.start.elevation_deg += AROUND_DEG * direction.sin();
+            instance.start.azimuth_deg += AROUND_DEG * direction.cos();
+            instance
+        };
+        std::iter::once(*self).chain((1..count).map(around)).collect()
     }
 
     /// The 24 pairs of the released runs.
@@ -114,6 +131,20 @@ mod tests {
                 assert!((10.0..30.0).contains(&start.half_fov_deg));
             }
         }
+    }
+
+    #[test]
+    fn further_starts_surround_the_given_one() {
+        let given = Instance::seeded(3, Range::Middle);
+        let starts = given.starts(5);
+        assert_eq!(starts[0], given);
+        for other in &starts[1..] {
+            let up = other.start.elevation_deg - given.start.elevation_deg;
+            let side = other.start.azimuth_deg - given.start.azimuth_deg;
+            assert!((up.hypot(side) - 50.0).abs() < 1e-9);
+            assert_eq!(other.target, given.target);
+        }
+        assert_eq!(given.starts(1), [given]);
     }
 
     #[test]

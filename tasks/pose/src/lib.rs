@@ -14,9 +14,10 @@
 //! calibrated camera does, or optimise it with `--optimise-fov`. `--instances released24` keeps the
 //! released values, right or wrong, so that its numbers compare with the released curves.
 //!
-//! **Method.** One run from one start, as in the paper. By default a logistic whose scale decays;
-//! about one run in twenty from 35 to 55 degrees ends in a wrong pose that looks alike, such as
-//! front for back. `evaluate` counts them.
+//! **Method.** By default a logistic whose scale decays. From one start, as in the paper and in
+//! `evaluate`, about one run in twenty from 35 to 55 degrees ends in a wrong pose that looks alike,
+//! such as front for back. `solve` therefore starts from eight poses side by side and keeps the run
+//! whose image ends nearest to the target; `--starts 1` is the single start.
 //!
 //! **Transfer.** Fewer steps and a larger learning rate, on whichever mesh `--mesh` names.
 

@@ -8,6 +8,7 @@ const OUTLINE: [f64; 3] = [255.0, 120.0, 0.0];
 const SHINE: f64 = 0.35;
 
 /// Collects the pictures of one view while it is solved.
+#[derive(Clone)]
 pub(crate) struct Album {
     target: Vec<f64>,
     start: Vec<f64>,

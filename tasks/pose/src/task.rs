@@ -4,8 +4,8 @@ use softrast_mesh::{Mesh, fox};
 use softrast_method::{Defaults, Method, numbers};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, Error, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule,
-    Score, Settings, Task, Variant,
+    Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Point, Progress, Run,
+    Schedule, Score, Settings, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -18,6 +18,8 @@ use crate::{
 
 /// A run succeeds when the camera ends at most this far from the target.
 const SUCCESS_DEG: f64 = 5.0;
+/// Starts of `solve`, unless asked for another number.
+const STARTS: usize = 8;
 /// Instances solved together in `evaluate`: all released pairs fit.
 const BATCH: usize = 25;
 
@@ -37,6 +39,8 @@ pub struct Pose {
     mesh_name: String,
     source: Source,
     optimise_fov: bool,
+    /// Poses that every run starts from.
+    starts: usize,
     solver: Solver,
 }
 
@@ -64,7 +68,9 @@ impl Task for Pose {
         };
         let (mesh, mesh_name) = mesh(args)?;
         let source = Source::new(settings, args)?;
-        Ok(Self { mesh, mesh_name, source, optimise_fov: args.optimise_fov, solver })
+        let thorough = settings.command == Command::Solve && args.instances == Instances::Seeded;
+        let starts = args.starts.map_or(if thorough { STARTS } else { 1 }, |n| n as usize);
+        Ok(Self { mesh, mesh_name, source, optimise_fov: args.optimise_fov, starts, solver })
     }
 
     fn describe(&self) -> Description {
@@ -78,6 +84,7 @@ impl Task for Pose {
             "instances": instances,
             "range": range,
             "optimise_fov": self.optimise_fov,
+            "starts": self.starts,
             "learning_rate": learning_rate,
             "schedule": if method.is_static() { "static" } else { "decay" },
             "scale": method.scale(0, *steps),
@@ -115,38 +122,52 @@ impl Task for Pose {
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
         let instances = batch.seeds.iter().map(|&seed| self.instance(seed));
         let instances = instances.collect::<anyhow::Result<Vec<_>>>()?;
+        let views: Vec<_> = instances.iter().flat_map(|one| one.starts(self.starts)).collect();
         let Solver { size, steps, .. } = self.solver;
         let scene =
-            Scene::<Autodiff<DefaultBackend>>::new(&self.mesh, &instances, size, self.optimise_fov);
+            Scene::<Autodiff<DefaultBackend>>::new(&self.mesh, &views, size, self.optimise_fov);
         let targets = numbers(scene.target().inner());
-        let targets: Vec<&[f64]> = targets.chunks(size * size).collect();
-        let mut album = Album::new(targets[0].to_vec(), size);
-        let mut curves = vec![Vec::with_capacity(steps + 1); instances.len()];
+        let targets: Vec<&[f64]> = targets.chunks(size * size).step_by(self.starts).collect();
+        let shown = if batch.pictures { self.starts } else { 0 };
+        let mut albums = vec![Album::new(targets[0].to_vec(), size); shown];
+        let mut curves = vec![Vec::with_capacity(steps + 1); views.len()];
         let mut step_seconds = Vec::with_capacity(steps);
         self.solver.run(&scene, |state: State| {
             for (view, curve) in curves.iter_mut().enumerate() {
-                curve.push(point(&state, view, &instances[view]));
+                curve.push(point(&state, view, &views[view]));
             }
-            if batch.pictures {
-                let image: Vec<f64> = state.image.iter().take(size * size).collect();
-                album.take(&image, batch.wants_frame(state.step, steps));
+            let images: Vec<f64> = state.image.iter().take(shown * size * size).collect();
+            for (album, image) in albums.iter_mut().zip(images.chunks(size * size)) {
+                album.take(image, batch.wants_frame(state.step, steps));
             }
             step_seconds.extend(state.seconds);
             let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
             if state.step == 0 { Ok(()) } else { progress.step(state.step, loss) }
         })?;
 
-        let mut pictures = batch.pictures.then(|| album.pictures());
-        let runs = batch.seeds.iter().zip(curves).enumerate().map(|(view, (&seed, curve))| Run {
-            seed,
-            success: curve.last().is_some_and(|end: &Point| end.parameter_error <= SUCCESS_DEG),
-            warnings: self.warnings(seed, &instances[view], targets[view], &curve),
-            curve,
-            step_seconds: step_seconds.clone(),
-            pictures: pictures.take(),
+        let curves = curves.chunks(self.starts);
+        let runs = batch.seeds.iter().zip(curves).enumerate().map(|(k, (&seed, curves))| {
+            let kept = nearest(curves);
+            let curve = curves[kept].clone();
+            let album = albums.get(kept).filter(|_| k == 0);
+            Run {
+                seed,
+                success: curve.last().is_some_and(|end| end.parameter_error <= SUCCESS_DEG),
+                warnings: self.warnings(seed, &instances[k], targets[k], &curve),
+                curve,
+                step_seconds: step_seconds.clone(),
+                pictures: album.map(|album| album.clone().pictures()),
+            }
         });
         Ok(runs.collect())
     }
+}
+
+/// The curve that ends with the least loss: what can be told without knowing the answer.
+fn nearest(curves: &[Vec<Point>]) -> usize {
+    let end = |k: &usize| curves[*k].last().map_or(f64::INFINITY, |point| point.loss);
+    let order = |a: &usize, b: &usize| end(a).total_cmp(&end(b));
+    (0..curves.len()).min_by(order).unwrap_or_default()
 }
 
 /// Errors beside the soft image error and the angle, in the order of [`point`].
