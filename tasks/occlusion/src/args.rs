@@ -11,7 +11,7 @@ pub struct Args {
     pub depth_softness: Option<DepthSoftnessChoice>,
 
     /// Width of the soft depth, in units of the distance between the near and the far plane;
-    /// positive [default: 0.2].
+    /// positive [default: 0.1].
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub depth_scale: Option<f64>,
 }

@@ -7,7 +7,7 @@ use crate::{Args, args::DepthSoftnessChoice};
 
 /// Width of the soft depth unless the command line names one, in units of the distance between the
 /// planes.
-pub(crate) const DEPTH_SCALE: f64 = 0.2;
+pub(crate) const DEPTH_SCALE: f64 = 0.1;
 
 /// A depth softness with its parameters; they stay as they are over a run.
 #[derive(Clone, Debug, PartialEq)]

@@ -106,12 +106,17 @@ impl<B: Backend> Scene<B> {
         mse_loss(image, self.target())
     }
 
-    /// θ moved to the nearest depths that are allowed, see [`Problem::room`].
+    /// θ within the room that [`Problem::room`] gives: where a depth has left it, all depths of that
+    /// view are drawn together about its middle, by the factor that brings the farthest back.
     ///
-    /// Not in the paper: without it, depths would drift apart for ever once their order is right.
+    /// That keeps their order, which a clamp would turn into ties. Not in the paper: without it,
+    /// depths would drift apart for ever once their order is right.
     pub fn allowed(&self, theta: Tensor<B, 2>) -> Tensor<B, 2> {
         let [least, largest] = self.problem.room();
-        theta.clamp(least, largest)
+        let [middle, reach] = [0.5 * (largest + least), 0.5 * (largest - least)];
+        let off = theta - middle;
+        let farthest = off.clone().abs().max_dim(1).clamp_min(reach);
+        off * farthest.recip() * reach + middle
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
 const BATCH: usize = 10;
 
 const SCALES: Defaults =
-    Defaults { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002 };
+    Defaults { schedule: Schedule::Static, decay: [0.02, 0.0005], fixed: 0.0005 };
 
 /// The prepared task.
 pub struct Occlusion {
@@ -35,7 +35,7 @@ impl Task for Occlusion {
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let (steps, learning_rate) = match settings.variant {
             Variant::Original => (100, 0.03),
-            Variant::Transfer => (10, 0.35),
+            Variant::Transfer => (10, 0.7),
         };
         let solver = Solver {
             edge: Method::new(settings, &SCALES)?,
