@@ -3,7 +3,8 @@ use crate::instance::{front, pairs};
 /// How far depths are from those of the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthError {
-    /// Share of all pairs of quads that are in the wrong order; a tie is wrong.
+    /// Share of all pairs of quads that are in the wrong order, also of pairs whose order a nearer
+    /// quad hides in the target; a tie is wrong.
     pub wrong_pairs: f64,
     /// Mean absolute difference of the depths. An image without perspective does not show depths,
     /// only their order, so this need not fall.

@@ -179,12 +179,19 @@ impl Occlusion {
         let asked =
             |(i, j): (usize, usize)| !self.problem.front_only || i == nearest || j == nearest;
         let overlaps = instance.visible_overlaps(self.solver.size);
-        let unseen = overlaps.iter().zip(pairs(instance.quads.len()));
-        let unseen = unseen.filter(|&(&count, pair)| count == 0 && asked(pair)).count();
+        let pairs = pairs(instance.quads.len());
+        let counts: Vec<usize> = overlaps
+            .into_iter()
+            .zip(pairs)
+            .filter(|&(_, pair)| asked(pair))
+            .map(|(n, _)| n)
+            .collect();
+        let unseen = counts.iter().filter(|&&count| count == 0).count();
         if unseen > 0 {
             warnings.push(format!(
-                "seed {seed}: the target does not show the order of {unseen} pairs of quads: raise \
-                 --size"
+                "seed {seed}: the target does not show the order of {unseen} of {} pairs of quads: \
+                 raise --size",
+                counts.len()
             ));
         }
         // The start went through the float type of the backend.

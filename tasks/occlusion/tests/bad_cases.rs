@@ -102,8 +102,15 @@ fn depths_that_leave_their_room_keep_their_order() {
     let scene = Scene::<B>::new(&problem, &[instance], 2);
     let allowed = |theta: [f64; 4]| numbers(scene.allowed(tensor(&theta, [1, 4])));
     assert_eq!(problem.room(), [0.0, 2.0]);
-    assert_eq!(allowed([0.1, 0.5, 1.5, 1.9]), [0.1, 0.5, 1.5, 1.9]);
-    assert_eq!(allowed([-1.0, -0.8, 1.0, 1.2]), [0.0, 0.09999999999999998, 1.0, 1.1]);
+    for (theta, expected) in [
+        ([0.1, 0.5, 1.5, 1.9], [0.1, 0.5, 1.5, 1.9]),
+        ([-1.0, -0.8, 1.0, 1.2], [0.0, 0.1, 1.0, 1.1]),
+        ([1.0, 1.0, 1.0, 6.0], [1.0, 1.0, 1.0, 2.0]),
+    ] {
+        for (found, expected) in allowed(theta).into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{theta:?}: {found}, not {expected}");
+        }
+    }
 }
 
 #[test]
