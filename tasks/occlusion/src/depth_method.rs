@@ -7,6 +7,10 @@ use crate::{Args, args::DepthSoftnessChoice};
 
 /// Width of the soft depth unless the command line names one, in units of the distance between the
 /// planes.
+///
+/// Narrower, gradients vanish where the order is wrong; wider, hidden quads shine through. Success of
+/// 50 seeds with `evaluate --runs 50 --size 32 --depth-scale X`, original and transfer: 98 and 98 %
+/// at 0.05, 100 and 100 % at 0.1, 100 and 98 % at 0.2, 100 and 90 % at 0.4; 88 % at 0.02 (original).
 pub(crate) const DEPTH_SCALE: f64 = 0.1;
 
 /// A depth softness with its parameters; they stay as they are over a run.
