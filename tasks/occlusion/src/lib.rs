@@ -6,8 +6,8 @@
 //!
 //! **Definition.** A pixel's colour is a mean of the textures, each weighted by how much its quad
 //! covers the pixel and by how near it is (Eq. 4): `C = Σ a(dⱼ) b(zⱼ) cⱼ / Σ a(dⱼ) b(zⱼ)`, with the
-//! signed distance d to the quad and its depth z. The background counts as a quad on the far plane
-//! that covers every pixel by [`BACKGROUND`]. The loss of an instance is the mean squared error
+//! signed distance d to the quad and its depth z. The background counts as a quad as far away as
+//! quads may go that covers every pixel by [`BACKGROUND`]. The loss of an instance is the mean squared error
 //! against the hard image of the target; instances in a batch are independent. Source: Wu et al.
 //! 2024, Eq. 3 and 4, Sec. 5.1; FACTS 4.5.
 //!

@@ -5,9 +5,9 @@ use softrast_softness::{DepthSoftness, EdgeSoftness};
 
 use crate::{Instance, Problem, instance::places};
 
-/// Weight of the background relative to a face on the far plane that covers the pixel.
+/// Weight of the background relative to a quad that covers the pixel as far away as quads may go.
 ///
-/// Where a quad covers a pixel, the background takes at most this share of it; beside the quads it
+/// Not on the far plane itself, where the depth network is 0. Where a quad covers a pixel, the background takes at most this share of it; beside the quads it
 /// prevails. Not in the paper, whose Eq. 4 is 0/0 far from all faces; this is the least weight that
 /// META 6.3 asks for.
 pub const BACKGROUND: f64 = 1e-3;
@@ -89,7 +89,9 @@ impl<B: Backend> Scene<B> {
         let [views, count] = theta.dims();
         let near = nearness(theta, self.problem.planes());
         let depths = softness.log_weight(phi.clone(), near).reshape([views, count, 1]);
-        let far = softness.log_weight(phi, tensor::<B, 1>(vec![0.0], [1]));
+        let [_, farthest] = self.problem.room();
+        let farthest = nearness(tensor::<B, 1>(vec![farthest], [1]), self.problem.planes());
+        let far = softness.log_weight(phi, farthest);
         let background =
             Background { colour: tensor(BLACK.to_vec(), [3]), log_weight: far + BACKGROUND.ln() };
         blend(edges + depths, self.colour.clone(), &background)
