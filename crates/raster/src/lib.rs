@@ -3,10 +3,12 @@
 //! A silhouette is a sum over faces of a one-dimensional function of the signed distance
 //! ([`profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
 //! softness and the T-conorm ([`Profile`]). [`Rasterizer`] puts the pieces together;
-//! [`reference`] is the same in plain tensor ops over every pixel-face pair.
+//! [`reference`] is the same in plain tensor ops over every pixel-face pair. Scenes of a few faces
+//! that hide one another take their colours from [`blend`].
 
 mod backend;
 mod camera;
+mod colour;
 #[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
 mod default_backend;
 mod hard;
@@ -19,6 +21,7 @@ mod t_conorm;
 
 pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use camera::{NEAR, project, view_rotation};
+pub use colour::{Background, blend, hard_colour, nearness};
 #[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
 pub use default_backend::{DEFAULT_BACKEND, DefaultBackend};
 pub use hard::hard_silhouette;

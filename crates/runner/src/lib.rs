@@ -49,7 +49,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 pub use error::{Error, Failure};
 pub use grid::Grid;
 pub use memory::peak_rss_mib;
-pub use picture::{contact_sheet, difference, rgb_from_gray};
+pub use picture::{contact_sheet, difference, rgb_from_gray, rgb_from_planes};
 pub use program::{execute, main};
 pub use progress::Progress;
 pub use settings::{Command, Schedule, Settings, SoftnessChoice, Variant};

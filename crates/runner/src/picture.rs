@@ -17,8 +17,34 @@ pub fn rgb_from_gray(values: &[f64], width: usize, height: usize) -> RgbImage {
     assert_eq!(values.len(), width * height, "an image of {width} x {height} needs as many values");
     RgbImage::from_fn(width as u32, height as u32, |x, y| {
         let value = values[y as usize * width + x as usize];
-        Rgb([(value.clamp(0.0, 1.0) * 255.0).round() as u8; 3])
+        Rgb([level(value); 3])
     })
+}
+
+/// A coloured image as RGB: `values` `[3 * height * width]`, first all of red, then green, then
+/// blue, each row by row from the top, 0 dark to 1 bright.
+///
+/// Values outside [0, 1] are clamped, NaN becomes dark.
+///
+/// # Panics
+///
+/// If the number of values is not `3 * width * height`.
+pub fn rgb_from_planes(values: &[f64], width: usize, height: usize) -> RgbImage {
+    let pixels = width * height;
+    assert_eq!(
+        values.len(),
+        3 * pixels,
+        "{width} x {height} pixels need three times as many values"
+    );
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let pixel = y as usize * width + x as usize;
+        Rgb([0, 1, 2].map(|channel| level(values[channel * pixels + pixel])))
+    })
+}
+
+/// The byte of a value in [0, 1].
+fn level(value: f64) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
 /// Where two images of the same size differ, and in which direction.
@@ -103,6 +129,13 @@ mod tests {
         let image = rgb_from_gray(&[0.0, 0.5, 1.0, 7.0, -1.0, f64::NAN], 3, 2);
         let levels: Vec<u8> = image.pixels().map(|p| p.0[0]).collect();
         assert_eq!(levels, [0, 128, 255, 255, 0, 0]);
+    }
+
+    #[test]
+    fn planes_become_the_channels_of_each_pixel() {
+        let image = rgb_from_planes(&[1.0, 0.0, 0.5, 2.0, f64::NAN, 0.2], 2, 1);
+        let pixels: Vec<_> = image.pixels().map(|p| p.0).collect();
+        assert_eq!(pixels, [[255, 128, 0], [0, 255, 51]]);
     }
 
     #[test]

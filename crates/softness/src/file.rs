@@ -3,7 +3,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{EdgeSoftness, Softness};
 
@@ -95,10 +95,7 @@ impl SoftnessFile {
     /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do not
     /// suit the family.
     pub fn load(path: &Path) -> Result<Self, SoftnessFileError> {
-        let text = fs::read_to_string(path)
-            .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })?;
-        let file: Self = serde_json::from_str(&text)
-            .map_err(|source| SoftnessFileError::Parse { path: path.to_owned(), source })?;
+        let file: Self = read(path)?;
         file.check(path)?;
         Ok(file)
     }
@@ -113,36 +110,58 @@ impl SoftnessFile {
     /// If the parameters do not suit the family, or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), SoftnessFileError> {
         self.check(path)?;
-        let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
-        let mut text =
-            serde_json::to_string_pretty(self).map_err(io::Error::from).map_err(failed)?;
-        text.push('\n');
-        let mut beside = path.as_os_str().to_owned();
-        beside.push(format!(".{}.tmp", std::process::id()));
-        fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|source| {
-            // What is left of it is of no use; that it may not exist is no second error.
-            let _ = fs::remove_file(&beside);
-            failed(source)
-        })
+        write(path, self)
     }
 
     fn check(&self, path: &Path) -> Result<(), SoftnessFileError> {
-        let path = path.to_owned();
         let family = self.softness.family;
-        let (found, expected) = (self.phi.len(), family.parameters());
-        if found != expected {
-            return Err(SoftnessFileError::Length { path, family: family.name(), found, expected });
-        }
-        for (index, &found) in self.phi.iter().enumerate() {
-            if !found.is_finite() {
-                return Err(SoftnessFileError::NotFinite { path, index, found });
-            }
-            if index < family.logarithms() && found.abs() > LARGEST_LOGARITHM {
-                return Err(SoftnessFileError::Logarithm { path, index, found });
-            }
-        }
-        Ok(())
+        check(path, family.name(), [family.parameters(), family.logarithms()], &self.phi)
     }
+}
+
+/// Parses the JSON file at `path`.
+pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SoftnessFileError> {
+    let text = fs::read_to_string(path)
+        .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })?;
+    serde_json::from_str(&text)
+        .map_err(|source| SoftnessFileError::Parse { path: path.to_owned(), source })
+}
+
+/// Writes a JSON file at `path`, by way of a temporary one beside it.
+pub(crate) fn write(path: &Path, content: &impl Serialize) -> Result<(), SoftnessFileError> {
+    let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
+    let mut text =
+        serde_json::to_string_pretty(content).map_err(io::Error::from).map_err(failed)?;
+    text.push('\n');
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(format!(".{}.tmp", std::process::id()));
+    fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|source| {
+        // What is left of it is of no use; that it may not exist is no second error.
+        let _ = fs::remove_file(&beside);
+        failed(source)
+    })
+}
+
+/// Checks that `phi` has the expected length, of which so many at the front are logarithms.
+pub(crate) fn check(
+    path: &Path,
+    family: &'static str,
+    [expected, logarithms]: [usize; 2],
+    phi: &[f64],
+) -> Result<(), SoftnessFileError> {
+    let (path, found) = (path.to_owned(), phi.len());
+    if found != expected {
+        return Err(SoftnessFileError::Length { path, family, found, expected });
+    }
+    for (index, &found) in phi.iter().enumerate() {
+        if !found.is_finite() {
+            return Err(SoftnessFileError::NotFinite { path, index, found });
+        }
+        if index < logarithms && found.abs() > LARGEST_LOGARITHM {
+            return Err(SoftnessFileError::Logarithm { path, index, found });
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

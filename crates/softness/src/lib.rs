@@ -4,7 +4,8 @@
 //! is optically. Its parameters are one explicit vector φ, so that an optimiser sees nothing else.
 //! A [`Family`] is one chosen by name; an [`EdgeSoftness`] applies it to the distance or to its
 //! signed square; [`support`] says how far from the edge it still changes; a [`SoftnessFile`] keeps
-//! it; a [`SoftStep`] puts it into a network.
+//! it; a [`SoftStep`] puts it into a network. A [`DepthSoftness`] says how much a face counts by its
+//! depth.
 //!
 //! ```
 //! use burn::{backend::NdArray, tensor::{DType, Tensor}};
@@ -27,7 +28,9 @@ mod atan_ratio;
 mod cauchy;
 mod cubic_hermite;
 mod depth;
+mod depth_file;
 mod depth_mlp;
+mod depth_softness;
 mod edge;
 mod error_function;
 mod exp;
@@ -43,6 +46,7 @@ mod laplace;
 mod levy;
 mod ln_gamma;
 mod logistic;
+mod mirror;
 mod mlp;
 mod parameter;
 mod polynomial;
@@ -57,7 +61,9 @@ mod wigner;
 
 pub use cauchy::Cauchy;
 pub use cubic_hermite::CubicHermite;
+pub use depth_file::DepthSoftnessFile;
 pub use depth_mlp::DepthMlp;
+pub use depth_softness::{DepthSoftness, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
 pub use exp::Exp;
 pub use family::{Family, UnknownFamily};

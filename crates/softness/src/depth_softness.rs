@@ -1,0 +1,188 @@
+use std::{fmt, str::FromStr};
+
+use burn::tensor::{Tensor, backend::Backend};
+use serde::{Deserialize, Serialize};
+
+use crate::{DepthMlp, EdgeSoftness, Family, OPAQUE, Softness, initial_mlp};
+
+/// How much a face counts by its depth: a family, or the network of [`DepthMlp`].
+///
+/// It sees the nearness of a face, which is 1 at the near plane and 0 at the far plane. A family
+/// sees it from the near plane on, as `x = nearness - 1`: there it falls off behind the plane as it
+/// falls off outside an edge. [`DepthMlp`] sees the nearness itself.
+///
+/// Source: Wu et al. 2024, Eq. 3 and 4. Not in the paper: where a family has its edge. The released
+/// code leaves it at nearness 0, where the reversed families are 1 for every face and narrow ones
+/// saturate, so that no depth is told from another (FACTS 0.11, S28).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum DepthSoftness {
+    /// A family, in units of the distance between the planes.
+    Family(Family),
+    /// [`DepthMlp`].
+    Mlp,
+}
+
+/// No depth softness has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "unknown depth softness {found:?}; known are {} and {}",
+    Family::ALL.map(Family::name).join(", "),
+    DepthSoftness::Mlp.name()
+)]
+pub struct UnknownDepthSoftness {
+    /// The name that was asked for.
+    pub found: String,
+}
+
+impl DepthSoftness {
+    /// The name in files and on the command line: that of the family, or `depth_mlp`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Family(family) => family.name(),
+            Self::Mlp => "depth_mlp",
+        }
+    }
+
+    /// Length of φ.
+    pub fn parameters(self) -> usize {
+        match self {
+            Self::Family(family) => family.parameters(),
+            Self::Mlp => DepthMlp.parameters(),
+        }
+    }
+
+    /// Parameters to start from: of a family those at `scale`, in units of the distance between the
+    /// planes; of the network, which has no scale, positive weights that give a face at the near
+    /// plane the weight 1.
+    ///
+    /// # Panics
+    ///
+    /// If `scale` is not positive.
+    pub fn default_phi(self, scale: f64) -> Vec<f64> {
+        match self {
+            Self::Family(family) => family.default_phi(scale),
+            Self::Mlp => initial_mlp(0, 1.0),
+        }
+    }
+
+    /// Logarithm of the weight of faces at `nearness`, same shape; φ is `[parameters]`.
+    ///
+    /// No network weight is below [`OPAQUE`], where its logarithm is flat: the network may give 0 or
+    /// less.
+    pub fn log_weight<B: Backend, const D: usize>(
+        self,
+        phi: Tensor<B, 1>,
+        nearness: Tensor<B, D>,
+    ) -> Tensor<B, D> {
+        match self {
+            Self::Family(family) => {
+                let softness = EdgeSoftness { family, squared: false };
+                softness.log_value(phi, nearness - 1.0)
+            }
+            Self::Mlp => DepthMlp.value(phi, nearness).clamp_min(OPAQUE).log(),
+        }
+    }
+
+    /// How many of the leading parameters are logarithms.
+    pub(crate) fn logarithms(self) -> usize {
+        match self {
+            Self::Family(family) => family.logarithms(),
+            Self::Mlp => 0,
+        }
+    }
+}
+
+impl fmt::Display for DepthSoftness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for DepthSoftness {
+    type Err = UnknownDepthSoftness;
+
+    fn from_str(name: &str) -> Result<Self, UnknownDepthSoftness> {
+        if name == Self::Mlp.name() {
+            return Ok(Self::Mlp);
+        }
+        let unknown = |_| UnknownDepthSoftness { found: name.to_owned() };
+        name.parse().map(Self::Family).map_err(unknown)
+    }
+}
+
+impl From<DepthSoftness> for String {
+    fn from(softness: DepthSoftness) -> Self {
+        softness.name().to_owned()
+    }
+}
+
+impl TryFrom<String> for DepthSoftness {
+    type Error = UnknownDepthSoftness;
+
+    fn try_from(name: String) -> Result<Self, UnknownDepthSoftness> {
+        name.parse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::{
+        backend::NdArray,
+        tensor::{DType, TensorData},
+    };
+
+    use super::*;
+
+    type B = NdArray<f64>;
+
+    fn tensor(values: Vec<f64>) -> Tensor<B, 1> {
+        let count = values.len();
+        let data = TensorData::new(values, [count]);
+        Tensor::from_data(data, (&Default::default(), DType::F64))
+    }
+
+    fn log_weights(softness: DepthSoftness, phi: Vec<f64>) -> Vec<f64> {
+        let nearness = (1..10).map(|k| 0.1 * f64::from(k)).collect();
+        softness.log_weight(tensor(phi), tensor(nearness)).into_data().iter().collect()
+    }
+
+    #[test]
+    fn every_default_favours_the_nearer_face() {
+        let families = Family::ALL.map(DepthSoftness::Family);
+        for softness in families.into_iter().chain([DepthSoftness::Mlp]) {
+            // Forward laws are 0 before their edge, and bounded ones beyond their reach.
+            let dull = [Family::ExpForward, Family::GammaForward, Family::LevyForward];
+            if dull.map(DepthSoftness::Family).contains(&softness) {
+                continue;
+            }
+            let weights = log_weights(softness, softness.default_phi(2.0));
+            assert!(weights.windows(2).all(|w| w[0] < w[1]), "{softness}: {weights:?}");
+        }
+    }
+
+    #[test]
+    fn exp_is_a_softmax_of_the_nearness() {
+        let softness = DepthSoftness::Family(Family::Exp);
+        let weights = log_weights(softness, softness.default_phi(0.05));
+        assert!(weights.windows(2).all(|w| (w[1] - w[0] - 2.0).abs() < 1e-12), "{weights:?}");
+    }
+
+    #[test]
+    fn a_network_that_is_off_gives_the_least_weight_everywhere() {
+        let phi = initial_mlp(0, 1.0).into_iter().map(|w| -w).collect();
+        assert!(log_weights(DepthSoftness::Mlp, phi).iter().all(|w| *w == OPAQUE.ln()));
+    }
+
+    #[test]
+    fn names_agree_between_files_and_the_command_line() {
+        for softness in [DepthSoftness::Family(Family::GumbelMin), DepthSoftness::Mlp] {
+            let json = serde_json::to_value(softness).unwrap();
+            assert_eq!(json, softness.to_string());
+            assert_eq!(softness.name().parse(), Ok(softness));
+            assert_eq!(softness.default_phi(0.1).len(), softness.parameters());
+        }
+        let message = "deep".parse::<DepthSoftness>().unwrap_err().to_string();
+        assert!(message.ends_with("gumbel_min, mlp and depth_mlp"), "{message}");
+    }
+}

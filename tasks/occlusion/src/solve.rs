@@ -1,0 +1,95 @@
+use std::time::Instant;
+
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, TensorData, backend::Backend},
+};
+use softrast_meta::{Adam, Optimizer};
+use softrast_method::{Method, numbers, tensor};
+
+use crate::{Scene, depth_method::DepthMethod};
+
+/// How to solve the instances of a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Solver {
+    pub(crate) edge: Method,
+    pub(crate) depth: DepthMethod,
+    pub(crate) size: usize,
+    pub(crate) steps: usize,
+    pub(crate) learning_rate: f64,
+}
+
+/// All views after some steps.
+pub(crate) struct State {
+    pub(crate) step: usize,
+    /// Scale of the edge softness.
+    pub(crate) scale: f64,
+    /// Depths of the quads of each view.
+    pub(crate) depths: Vec<Vec<f64>>,
+    /// Mean squared error of each soft image, what the optimiser lowers.
+    pub(crate) soft: Vec<f64>,
+    /// Mean squared error of each hard image.
+    pub(crate) hard: Vec<f64>,
+    /// Soft images, `[views, 3, pixels]`.
+    pub(crate) image: TensorData,
+    /// Time of the step that ended here, in seconds; none before the first.
+    pub(crate) seconds: Option<f64>,
+}
+
+impl Solver {
+    /// Solves all views of `scene`, and shows each state from the start to the end to `visit`.
+    pub(crate) fn run<B: Backend>(
+        &self,
+        scene: &Scene<Autodiff<B>>,
+        mut visit: impl FnMut(State) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let adam = Adam::new(self.learning_rate);
+        let mut theta = scene.start().inner();
+        let mut moments = adam.init(&theta);
+        let depth_phi = tensor::<Autodiff<B>, 1>(self.depth.phi.clone(), [self.depth.phi.len()]);
+        let mut scale = self.edge.scale(0, self.steps);
+        let mut edges = self.edges(scene, scale);
+        let mut seconds = None;
+        for step in 0..=self.steps {
+            let clock = Instant::now();
+            let now = self.edge.scale(step, self.steps);
+            if now != scale {
+                (scale, edges) = (now, self.edges(scene, now));
+            }
+            let leaf = Tensor::from_inner(theta.clone()).require_grad();
+            let softness = self.depth.softness;
+            let image = scene.image(leaf.clone(), edges.clone(), softness, depth_phi.clone());
+            let loss = scene.loss(image.clone());
+            let mut time = clock.elapsed();
+
+            let hard = scene.loss(scene.hard(Tensor::from_inner(theta.clone())));
+            visit(State {
+                step,
+                scale,
+                depths: numbers(theta.clone()).chunks(theta.dims()[1]).map(<[_]>::to_vec).collect(),
+                soft: numbers(loss.clone().inner()),
+                hard: numbers(hard.inner()),
+                image: image.into_data(),
+                seconds,
+            })?;
+            if step == self.steps {
+                break;
+            }
+            let clock = Instant::now();
+            let grads = loss.sum().backward();
+            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
+            let (moved, next) = adam.step(theta, grad, moments);
+            (theta, moments) = (scene.allowed(Tensor::from_inner(moved)).inner(), next);
+            time += clock.elapsed();
+            seconds = Some(time.as_secs_f64());
+        }
+        Ok(())
+    }
+
+    /// The edge part of all images, without a tape.
+    fn edges<B: Backend>(&self, scene: &Scene<Autodiff<B>>, scale: f64) -> Tensor<Autodiff<B>, 3> {
+        let phi = self.edge.phi(scale);
+        let shape = [phi.len()];
+        scene.edges(self.edge.softness(), tensor(phi, shape)).detach()
+    }
+}

@@ -1,0 +1,163 @@
+//! The whole program on small scenes: what it finds, and what it says when it cannot.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{ffi::OsString, fs, path::Path};
+
+use occlusion::Occlusion;
+use serde_json::Value;
+use softrast_runner::{Failure, execute};
+use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
+
+/// Runs a command line with results in `out`; its JSON line.
+fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
+    let words = ["occlusion"].into_iter().chain(line.split_whitespace());
+    let mut words: Vec<OsString> = words.map(OsString::from).collect();
+    words.extend(["--quiet".into(), "--json".into(), "--out".into(), out.into()]);
+    let mut stdout = Vec::new();
+    execute::<Occlusion>(words, &mut stdout)?;
+    Ok(serde_json::from_slice(&stdout).unwrap())
+}
+
+fn run(line: &str) -> Result<Value, Failure> {
+    run_in(tempfile::tempdir().unwrap().path(), line)
+}
+
+fn warnings(json: &Value) -> String {
+    json["warnings"].to_string()
+}
+
+fn assert_finite(json: &Value) {
+    for error in ["image_error", "parameter_error"] {
+        for key in ["initial", "final", "best"] {
+            assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
+        }
+    }
+}
+
+#[test]
+fn the_defaults_find_the_order_and_write_every_file() {
+    let out = tempfile::tempdir().unwrap();
+    let json = run_in(out.path(), "").unwrap();
+    assert_eq!(json["success_rate"], 1.0, "{json}");
+    assert_eq!(json["parameter_error"]["final"], 0.0);
+    assert_eq!(json["image_error"]["hard"]["final"], 0.0);
+    assert!(json["parameter_error"]["initial"].as_f64().unwrap() > 0.0);
+    for key in ["front", "depth"] {
+        assert!(json["parameter_error"][key]["final"].is_number());
+    }
+    assert_eq!(warnings(&json), "[]");
+    for file in ["result.json", "curve.csv", "before_after.png", "animation.gif", "report.html"] {
+        assert!(out.path().join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn most_seeds_of_both_variants_succeed() {
+    for (variant, least) in [("original", 0.9), ("transfer", 0.9)] {
+        let line = format!("evaluate --runs 20 --size 24 --seed 500 --variant {variant}");
+        let rate = run(&line).unwrap()["success_rate"].as_f64().unwrap();
+        assert!(rate >= least, "{variant}: {rate}");
+    }
+}
+
+#[test]
+fn a_run_does_not_depend_on_its_batch() {
+    let line = "--size 16 --steps 5";
+    let many = run(&format!("evaluate --runs 3 {line}")).unwrap();
+    let alone = run(&format!("solve --seed 2 {line}")).unwrap();
+    let [many, alone] = [
+        &many["parameter_error"]["depth"]["per_run"][2],
+        &alone["parameter_error"]["depth"]["final"],
+    ]
+    .map(|depth| depth.as_f64().unwrap());
+    assert!((many - alone).abs() < 1e-6, "{many} {alone}");
+}
+
+#[test]
+fn the_depth_softness_is_that_of_the_edges_unless_named() {
+    let softness = |line: &str| {
+        let json = run(&format!("--size 8 --steps 2 {line}")).unwrap();
+        let depth = json["settings"]["depth_softness"].as_str().unwrap().to_owned();
+        (json["softness"].as_str().unwrap().to_owned(), depth, json["parameters"].as_u64().unwrap())
+    };
+    let named = |softness: &str, depth: &str, n| (softness.to_owned(), depth.to_owned(), n);
+    assert_eq!(softness(""), named("logistic", "logistic", 2));
+    assert_eq!(softness("--softness exp"), named("exp", "exp", 4));
+    let mlp = named("mlp edges and depth_mlp depths", "depth_mlp", 112);
+    assert_eq!(softness("--softness mlp"), mlp);
+    let gauss = named("logistic edges and gauss depths", "gauss", 2);
+    assert_eq!(softness("--depth-softness gauss"), gauss);
+}
+
+#[test]
+fn a_depth_softness_file_is_used_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("depth.json");
+    let depth_softness = DepthSoftness::Family(Family::Exp);
+    let phi = depth_softness.default_phi(0.2);
+    DepthSoftnessFile { depth_softness, phi, note: None }.save(&path).unwrap();
+    let line = |depth: &str| format!("--size 12 --steps 8 --depth-softness {depth}");
+    let [file, named] = [path.display().to_string(), "exp --depth-scale 0.2".into()]
+        .map(|depth| run(&line(&depth)).unwrap()["image_error"]["final"].clone());
+    assert_eq!(file, named);
+}
+
+#[test]
+fn every_depth_softness_ends_with_finite_numbers_at_any_scale() {
+    for family in Family::ALL {
+        for scale in ["1e-6", "1e6"] {
+            let line =
+                format!("--depth-softness {family} --depth-scale {scale} --size 8 --steps 3");
+            assert_finite(&run(&line).unwrap());
+        }
+    }
+    for name in ["logistic", "gauss", "exp", "gamma", "mlp"] {
+        for scale in ["1e-6", "1e-2", "10"] {
+            assert_finite(
+                &run(&format!("--softness {name} --scale {scale} --size 8 --steps 3")).unwrap(),
+            );
+        }
+    }
+    assert_finite(&run("--squared --schedule decay --size 8 --steps 3").unwrap());
+}
+
+#[test]
+fn a_softness_that_tells_no_depths_apart_is_said_to_be_so() {
+    let json = run("--depth-scale 1e6 --size 16 --steps 3").unwrap();
+    assert!(warnings(&json).contains("weighs all depths alike"), "{json}");
+    let json = run("--depth-softness uniform --depth-scale 1e-6 --size 16 --steps 3").unwrap();
+    assert!(warnings(&json).contains("no quad moved"), "{json}");
+}
+
+#[test]
+fn one_pixel_ends_with_finite_numbers_and_a_warning() {
+    for variant in ["original", "transfer"] {
+        assert_finite(&run(&format!("--size 1 --steps 5 --variant {variant}")).unwrap());
+    }
+    let json = run("--size 1 --steps 5").unwrap();
+    assert!(warnings(&json).contains("does not show the order of 2 of 3 pairs"), "{json}");
+}
+
+#[test]
+fn contradictions_are_usage_errors_and_broken_files_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let huge = folder.path().join("huge.json");
+    let phi = vec![1e30; 56];
+    let text = serde_json::json!({"depth_softness": "depth_mlp", "phi": phi}).to_string();
+    fs::write(&huge, text).unwrap();
+    let huge = format!("--depth-softness {}", huge.display());
+    for (line, code, part) in [
+        ("--depth-softness deep", 2, "unknown depth softness"),
+        ("--depth-softness depth_mlp --depth-scale 0.1", 2, "depth_mlp has no scale"),
+        ("--depth-softness missing.json --depth-scale 0.1", 2, "holds its own parameters"),
+        ("--depth-softness missing.json", 1, "missing.json"),
+        ("--depth-scale inf", 2, "positive number"),
+        ("--depth-scale NaN", 2, "positive number"),
+        (&huge, 1, "not finite"),
+    ] {
+        let failure = run(line).unwrap_err();
+        assert_eq!(failure.code, code, "{line}: {failure}");
+        assert!(failure.message.contains(part), "{line}: {failure}");
+    }
+}
