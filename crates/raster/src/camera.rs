@@ -4,6 +4,10 @@ use burn::tensor::{Tensor, backend::Backend};
 /// a vertex are not drawn.
 pub const NEAR: f64 = 1e-2;
 
+/// Vertices farther than this from the origin along an axis, in world units, are moved there: their
+/// squares would leave the range of f32, and their gradients with them.
+const FARTHEST: f64 = 1e15;
+
 /// Rotation from world to camera axes for cameras that look at the origin with y up.
 ///
 /// `elevation` and `azimuth` are `[views]` in degrees; the result is `[views, 3, 3]` with rows x
@@ -43,7 +47,8 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 /// and **half** the field of view in degrees. The result is `[views, vertices, 3]`: x and y in NDC
 /// (the image is [-1, 1]², x right, y up) and the camera depth in world units.
 ///
-/// A vertex nearer than [`NEAR`] is projected as though it were that near, so that nothing divides
+/// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
+/// vertex nearer than [`NEAR`] is projected as though it were that near, so that nothing divides
 /// by zero; the rasterizer does not draw its faces, by their depth.
 ///
 /// Source: FACTS 1.1.
@@ -64,7 +69,8 @@ pub fn project<B: Backend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tens
     let zoom = Tensor::cat(vec![focal.clone(), focal.clone(), focal.ones_like()], 1);
     // One row for each axis: every op then runs along all vertices. The rasterizer wants the rows
     // too, and turning them back is free.
-    let camera = (rotation * zoom).matmul(vertices.swap_dims(1, 2));
+    let vertices = vertices.clamp(-FARTHEST, FARTHEST).swap_dims(1, 2);
+    let camera = (rotation * zoom).matmul(vertices);
     let depth = camera.clone().narrow(1, 2, 1) + distance;
     let xy = camera.narrow(1, 0, 2) * depth.clone().clamp_min(NEAR).recip();
     Tensor::cat(vec![xy, depth], 1).swap_dims(1, 2)
