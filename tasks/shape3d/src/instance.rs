@@ -87,9 +87,8 @@ mod tests {
             assert!((square - 0.25).abs() < 1e-12);
         }
         assert_ne!(starts[1], starts[2]);
-        assert_eq!(
-            starts[0],
-            sphere.positions().iter().map(|p| p.map(|x| 0.5 * x)).collect::<Vec<_>>()
-        );
+        for (p, unit) in starts[0].iter().zip(sphere.positions()) {
+            assert!((0..3).all(|k| (p[k] - 0.5 * unit[k]).abs() < 1e-12));
+        }
     }
 }
