@@ -16,9 +16,19 @@ use crate::{
 /// A run succeeds when its hard mean squared error ends below this.
 const SUCCESS: f64 = 0.02;
 
-/// First and last scale of a decay, in NDC, and that of a static softness.
-const SCALES: Defaults = Defaults { schedule: Schedule::Decay, decay: [0.02, 0.002], fixed: 0.005 };
-/// Largest move of a coordinate in a step, roughly, in NDC.
+/// First and last scale of a decay, in NDC, and that of a static softness: a quarter of a pixel of
+/// the default size, because triangles lie so densely that few need to be pulled from afar.
+///
+/// Measured with a logistic, hard mean squared error at the last step, seed 0. Letters: static 0.0028
+/// at 0.0015, 0.0024 at 0.002, 0.0035 at 0.003 and 0.0078 at 0.005; with a decay to 0.002 0.0031 from 0.01 and
+/// 0.0029 from 0.02 or 0.04, to 0.001 from 0.02 0.0034. Skyline: 0.0111 at 0.002, 0.0166 with a decay to
+/// it from 0.02, which sees one white sheet at first.
+const SCALES: Defaults =
+    Defaults { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002 };
+/// Largest move of a coordinate in a step, roughly, in NDC: about a pixel of the default size.
+///
+/// Hard mean squared errors on the letters end at 0.0026 with 0.005, 0.0024 with 0.01 and 0.0034 with
+/// 0.02.
 const LEARNING_RATE: f64 = 0.01;
 
 /// The prepared task.
