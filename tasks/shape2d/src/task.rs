@@ -139,28 +139,37 @@ impl Shape2d {
             }
             _ => None,
         };
+        let end = curve.last().map_or(f64::INFINITY, |end| end.extra[0]);
         Ok(Run {
             seed,
-            success: curve.last().is_some_and(|end| end.extra[0] < SUCCESS),
-            warnings: self.warnings(),
+            success: end < SUCCESS,
+            warnings: self.warnings(seed, end),
             curve,
             step_seconds,
             pictures,
         })
     }
 
-    /// What is wrong with the picture, so that nobody trusts its numbers.
-    fn warnings(&self) -> Vec<String> {
+    /// What is wrong with the picture or the run of `seed`, so that nobody trusts its numbers.
+    fn warnings(&self, seed: u64, hard_at_end: f64) -> Vec<String> {
         let white = self.target.iter().filter(|&&p| p > 0.5).count();
+        let black_image = self.target.iter().map(|p| p * p).sum::<f64>() / self.target.len() as f64;
         let warning = if white == 0 {
             "the target has nothing white, so the triangles can only vanish: give another --target \
              or raise --size"
+                .to_owned()
         } else if white == self.target.len() {
             "the target has nothing black, so it shows no shape: give another --target or raise \
              --size"
+                .to_owned()
+        } else if hard_at_end >= black_image {
+            format!(
+                "seed {seed}: the triangles end no nearer to the target than an empty image: try a \
+                 larger --scale or more --triangles"
+            )
         } else {
             return Vec::new();
         };
-        vec![warning.to_owned()]
+        vec![warning]
     }
 }

@@ -85,8 +85,12 @@ fn empty_full_and_gray_targets_end_with_finite_numbers() {
     assert!(warnings(&full).contains("nothing black"), "{full}");
     let gray = with_target(|_, _| 100, line);
     let dot = with_target(|x, y| if (x, y) == (2, 5) { 255 } else { 0 }, line);
-    assert_eq!(warnings(&dot), "[]");
-    for json in [empty, full, gray, dot] {
+    let missed = with_target(
+        |x, y| if (x, y) == (2, 5) { 255 } else { 0 },
+        "--size 64 --triangles 1 --steps 2 --scale 1e-4",
+    );
+    assert!(warnings(&missed).contains("no nearer to the target"), "{missed}");
+    for json in [empty, full, gray, dot, missed] {
         assert_finite(&json);
     }
 }
