@@ -10,7 +10,7 @@ use burn::{
 };
 use shape2d::{Instance, Logo, Scene};
 use softrast_meta::{Adam, InnerLoop, Objective};
-use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
 use softrast_runner::Variant;
 use softrast_softness::{EdgeSoftness, Family};
 
@@ -34,16 +34,24 @@ fn numbers<B: RasterBackend>(tensor: Tensor<B, 1>) -> Vec<f64> {
 }
 
 /// The whole loss of a few triangles against the letters.
-struct Small;
+struct Small {
+    silhouette: Silhouette<EdgeSoftness>,
+}
+
+impl Small {
+    fn new() -> Self {
+        let rasterizer = Rasterizer { tolerance: 1e-10, ..Rasterizer::new(SIZE) };
+        let near = tensor::<B>(SOFTNESS.default_phi(SCALE));
+        let scene = Scene::<B>::new(&[0.0; SIZE * SIZE], &Instance::seeded(1, TRIANGLES), SIZE);
+        Self { silhouette: rasterizer.prepare(scene.faces(), SOFTNESS, &near) }
+    }
+}
 
 impl<B: RasterBackend> Objective<B> for Small {
     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
         let instance = Instance::seeded(1, TRIANGLES);
         let scene = Scene::<B>::new(&Logo::of(Variant::Original).image(SIZE), &instance, SIZE);
-        let near = tensor::<B>(SOFTNESS.default_phi(SCALE));
-        let rasterizer = Rasterizer { tolerance: 1e-10, ..Rasterizer::new(SIZE) };
-        let silhouette = rasterizer.prepare(scene.faces(), SOFTNESS, &near);
-        let image = silhouette.coverage(scene.vertices(theta.clone()), phi);
+        let image = self.silhouette.coverage(scene.vertices(theta.clone()), phi);
         scene.image_loss(image) + scene.smoothness_loss(theta)
     }
 }
@@ -52,22 +60,23 @@ fn theta() -> Vec<f64> {
     Instance::seeded(1, TRIANGLES).corners.concat()
 }
 
-fn loss<B: RasterBackend>(theta: Vec<f64>, phi: Vec<f64>) -> f64 {
-    numbers::<B>(Small.loss(tensor(theta), tensor(phi)))[0]
+fn loss(small: &Small, theta: Vec<f64>, phi: Vec<f64>) -> f64 {
+    numbers::<B>(small.loss(tensor(theta), tensor(phi)))[0]
 }
 
 #[test]
 fn the_gradient_matches_central_differences() {
+    let small = Small::new();
     let phi = SOFTNESS.default_phi(SCALE);
     let leaf = tensor::<A>(theta()).require_grad();
-    let grads = Small.loss(leaf.clone(), tensor(phi.clone())).backward();
+    let grads = small.loss(leaf.clone(), tensor(phi.clone())).backward();
     let grad = numbers(leaf.grad(&grads).unwrap());
     let largest = grad.iter().fold(0.0, |largest: f64, g| largest.max(g.abs()));
     for (k, grad) in grad.into_iter().enumerate() {
         let at = |h: f64| {
             let mut moved = theta();
             moved[k] += h;
-            loss::<B>(moved, phi.clone())
+            loss(&small, moved, phi.clone())
         };
         let slope = (at(H) - at(-H)) / (2.0 * H);
         let off = (slope - grad).abs() / largest;
@@ -77,16 +86,17 @@ fn the_gradient_matches_central_differences() {
 
 #[test]
 fn the_meta_gradient_through_two_steps_matches_central_differences() {
+    let small = Small::new();
     let inner = InnerLoop { optimizer: Adam::new(0.01), steps: 2 };
     let start = SOFTNESS.default_phi(SCALE);
     let phi = tensor::<A>(start.clone()).require_grad();
-    let end = inner.solve(&Small, tensor::<A>(theta()), &phi);
-    let grads = Small.loss(end, phi.clone()).backward();
+    let end = inner.solve(&small, tensor::<A>(theta()), &phi);
+    let grads = small.loss(end, phi.clone()).backward();
     let grad = numbers(phi.grad(&grads).unwrap())[0];
     let at = |h: f64| {
         let phi = vec![start[0] + h];
-        let end = inner.solve(&Small, tensor::<B>(theta()), &tensor(phi.clone()));
-        loss::<B>(numbers(end), phi)
+        let end = inner.solve(&small, tensor::<B>(theta()), &tensor(phi.clone()));
+        loss(&small, numbers(end), phi)
     };
     let slope = (at(H) - at(-H)) / (2.0 * H);
     assert!((slope / grad - 1.0).abs() < 1e-5, "{slope} and {grad}");

@@ -9,19 +9,24 @@ pub(crate) struct Nearest {
     points: Vec<[f64; 3]>,
     /// Axis of the split at each point that splits.
     axes: Vec<u8>,
+    /// Lowest and highest corner of the box around all points.
+    bounds: [[f64; 3]; 2],
 }
 
 impl Nearest {
     pub(crate) fn new(mut points: Vec<[f64; 3]>) -> Self {
         let mut axes = vec![0; points.len()];
         split(&mut points, &mut axes);
-        Self { points, axes }
+        let bounds = bounds(&points);
+        Self { points, axes, bounds }
     }
 
     /// Squared distance from `p` to the nearest point; infinite if there is none.
     pub(crate) fn squared_distance(&self, p: [f64; 3]) -> f64 {
+        let [low, high] = self.bounds;
+        let outside = [0, 1, 2].map(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0));
         let mut best = f64::INFINITY;
-        search(&self.points, &self.axes, p, &mut best);
+        search(&self.points, &self.axes, p, outside, &mut best);
         best
     }
 }
@@ -42,23 +47,23 @@ fn split(points: &mut [[f64; 3]], axes: &mut [u8]) {
 
 /// The axis along which the points spread most.
 fn widest(points: &[[f64; 3]]) -> usize {
-    let spread = |k: usize| {
-        let ends = points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| {
-            [low.min(p[k]), high.max(p[k])]
-        });
-        ends[1] - ends[0]
-    };
-    let [x, y, z] = [0, 1, 2].map(spread);
-    if x >= y && x >= z {
-        0
-    } else if y >= z {
-        1
-    } else {
-        2
-    }
+    let [low, high] = bounds(points);
+    let spread = |&a: &usize, &b: &usize| (high[a] - low[a]).total_cmp(&(high[b] - low[b]));
+    (0..3).max_by(spread).unwrap_or(0)
 }
 
-fn search(points: &[[f64; 3]], axes: &[u8], p: [f64; 3], best: &mut f64) {
+fn bounds(points: &[[f64; 3]]) -> [[f64; 3]; 2] {
+    let start = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    points.iter().fold(start, |[low, high], p| {
+        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+    })
+}
+
+/// `outside` is how far `p` is from the box of these points along each axis: a lower bound that
+/// leaves out whole ranges, however far all points are.
+///
+/// Source: Arya and Mount 1993 (incremental distance).
+fn search(points: &[[f64; 3]], axes: &[u8], p: [f64; 3], outside: [f64; 3], best: &mut f64) {
     let squared = |q: &[f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
     if points.len() <= LEAF {
         *best = points.iter().map(squared).fold(*best, f64::min);
@@ -71,9 +76,11 @@ fn search(points: &[[f64; 3]], axes: &[u8], p: [f64; 3], best: &mut f64) {
     let before = (&points[..middle], &axes[..middle]);
     let after = (&points[middle + 1..], &axes[middle + 1..]);
     let (near, far) = if beyond < 0.0 { (before, after) } else { (after, before) };
-    search(near.0, near.1, p, best);
-    if beyond * beyond < *best {
-        search(far.0, far.1, p, best);
+    search(near.0, near.1, p, outside, best);
+    let mut across = outside;
+    across[axis] = beyond.abs();
+    if across.iter().map(|x| x * x).sum::<f64>() < *best {
+        search(far.0, far.1, p, across, best);
     }
 }
 
@@ -93,7 +100,10 @@ mod tests {
         for count in [1, 7, 8, 9, 10, 500] {
             let points = draw(count);
             let tree = Nearest::new(points.clone());
-            for p in draw(100) {
+            // Beside the points, and far from all of them.
+            let far = |p: &[f64; 3]| p.map(|x| 40.0 * x - 300.0);
+            let near = draw(100);
+            for p in near.iter().copied().chain(near.iter().map(far)) {
                 let squared = |q: &[f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
                 let least = points.iter().map(squared).fold(f64::INFINITY, f64::min);
                 assert_eq!(tree.squared_distance(p), least);

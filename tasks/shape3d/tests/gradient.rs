@@ -11,7 +11,7 @@ use burn::{
 use shape3d::{Instance, Scene};
 use softrast_mesh::{airplane, icosphere};
 use softrast_meta::{Adam, InnerLoop, Objective};
-use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
 use softrast_softness::{EdgeSoftness, Family};
 
 type B = NdArray<f64>;
@@ -33,17 +33,24 @@ fn numbers<B: RasterBackend>(tensor: Tensor<B, 1>) -> Vec<f64> {
 }
 
 /// The whole loss of a small sphere against the airplane.
-struct Small;
+struct Small {
+    silhouette: Silhouette<EdgeSoftness>,
+}
+
+impl Small {
+    fn new() -> Self {
+        let rasterizer = Rasterizer { tolerance: 1e-10, ..Rasterizer::new(SIZE) };
+        let near = tensor::<B>(SOFTNESS.default_phi(SCALE));
+        Self { silhouette: rasterizer.prepare(&icosphere(0).faces().into(), SOFTNESS, &near) }
+    }
+}
 
 impl<B: RasterBackend> Objective<B> for Small {
     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
         let instance = Instance { elevation_deg: 30.0, turn: 3 };
         let scene = Scene::<B>::new(&airplane(), &icosphere(0), &instance, SIZE);
-        let near = tensor::<B>(SOFTNESS.default_phi(SCALE));
-        let rasterizer = Rasterizer { tolerance: 1e-10, ..Rasterizer::new(SIZE) };
-        let silhouette = rasterizer.prepare(scene.faces(), SOFTNESS, &near);
         let vertices = scene.vertices(theta);
-        let image = silhouette.coverage(scene.project(vertices.clone()), phi);
+        let image = self.silhouette.coverage(scene.project(vertices.clone()), phi);
         scene.image_loss(image) + scene.smoothness_loss(vertices)
     }
 }
@@ -53,22 +60,23 @@ fn theta() -> Vec<f64> {
     (0..39).map(|k| 0.3 * (1.7 * f64::from(k)).sin()).collect()
 }
 
-fn loss<B: RasterBackend>(theta: Vec<f64>, phi: Vec<f64>) -> f64 {
-    numbers::<B>(Small.loss(tensor(theta), tensor(phi)))[0]
+fn loss(small: &Small, theta: Vec<f64>, phi: Vec<f64>) -> f64 {
+    numbers::<B>(small.loss(tensor(theta), tensor(phi)))[0]
 }
 
 #[test]
 fn the_gradient_matches_central_differences() {
+    let small = Small::new();
     let phi = SOFTNESS.default_phi(SCALE);
     let leaf = tensor::<A>(theta()).require_grad();
-    let grads = Small.loss(leaf.clone(), tensor(phi.clone())).backward();
+    let grads = small.loss(leaf.clone(), tensor(phi.clone())).backward();
     let grad = numbers(leaf.grad(&grads).unwrap());
     let largest = grad.iter().fold(0.0, |largest: f64, g| largest.max(g.abs()));
     for (k, grad) in grad.into_iter().enumerate() {
         let at = |h: f64| {
             let mut moved = theta();
             moved[k] += h;
-            loss::<B>(moved, phi.clone())
+            loss(&small, moved, phi.clone())
         };
         let slope = (at(H) - at(-H)) / (2.0 * H);
         let off = (slope - grad).abs() / largest;
@@ -78,16 +86,17 @@ fn the_gradient_matches_central_differences() {
 
 #[test]
 fn the_meta_gradient_through_two_steps_matches_central_differences() {
+    let small = Small::new();
     let inner = InnerLoop { optimizer: Adam::new(0.03), steps: 2 };
     let start = SOFTNESS.default_phi(SCALE);
     let phi = tensor::<A>(start.clone()).require_grad();
-    let end = inner.solve(&Small, tensor::<A>(theta()), &phi);
-    let grads = Small.loss(end, phi.clone()).backward();
+    let end = inner.solve(&small, tensor::<A>(theta()), &phi);
+    let grads = small.loss(end, phi.clone()).backward();
     let grad = numbers(phi.grad(&grads).unwrap())[0];
     let at = |h: f64| {
         let phi = vec![start[0] + h];
-        let end = inner.solve(&Small, tensor::<B>(theta()), &tensor(phi.clone()));
-        loss::<B>(numbers(end), phi)
+        let end = inner.solve(&small, tensor::<B>(theta()), &tensor(phi.clone()));
+        loss(&small, numbers(end), phi)
     };
     let slope = (at(H) - at(-H)) / (2.0 * H);
     assert!((slope / grad - 1.0).abs() < 1e-5, "{slope} and {grad}");
