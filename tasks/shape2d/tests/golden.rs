@@ -19,7 +19,7 @@ fn assert_close(what: &str, found: f64, expected: f64) {
 }
 
 /// Hard mean squared errors, original and transfer.
-const MSE: [f64; 2] = [0.4463, 0.4724];
+const MSE: [f64; 2] = [0.4463, 0.4694];
 /// `0.03 / 2.155² · 2.25 · 3 r²` for each triangle, whose areas `3 √3 r² / 4` add up to 2.
 const SMOOTHNESS: f64 = 0.067_133;
 
