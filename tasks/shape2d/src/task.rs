@@ -20,9 +20,9 @@ const SUCCESS: f64 = 0.02;
 /// the default size, because triangles lie so densely that few need to be pulled from afar.
 ///
 /// Measured with a logistic, hard mean squared error at the last step, seed 0. Letters: static 0.0028
-/// at 0.0015, 0.0024 at 0.002, 0.0035 at 0.003 and 0.0078 at 0.005; with a decay to 0.002 0.0031 from 0.01 and
-/// 0.0029 from 0.02 or 0.04, to 0.001 from 0.02 0.0034. Skyline, then with a few more windows lit: 0.0111 at 0.002, 0.0166 with a decay to
-/// it from 0.02, which sees one white sheet at first.
+/// at 0.0015, 0.0024 at 0.002, 0.0035 at 0.003 and 0.0078 at 0.005; with a decay to 0.002 0.0031 from
+/// 0.01 and 0.0029 from 0.02 or 0.04, to 0.001 from 0.02 0.0034. Skyline: 0.0108 at 0.002, and 0.0156
+/// with a decay to it from 0.02, which sees one white sheet at first.
 const SCALES: Defaults =
     Defaults { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002 };
 /// Largest move of a coordinate in a step, roughly, in NDC: about a pixel of the default size.
