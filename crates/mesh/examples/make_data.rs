@@ -2,7 +2,12 @@
 
 use std::path::Path;
 
+use softrast_mesh::{airplane, chair, fox};
+
 fn main() -> Result<(), softrast_mesh::MeshError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/meshes");
-    softrast_mesh::fox().write_obj(folder.join("fox.obj"))
+    for (name, mesh) in [("fox", fox()), ("airplane", airplane()), ("chair", chair())] {
+        mesh.write_obj(folder.join(name).with_extension("obj"))?;
+    }
+    Ok(())
 }

@@ -4,6 +4,8 @@
 //! has at least one face. Whatever breaks these rules is a [`MeshError`] of one line that names
 //! the file, the line and the reason. Nothing here depends on burn.
 
+mod airplane;
+mod chair;
 mod clean;
 mod error;
 mod fox;
@@ -13,9 +15,12 @@ mod normalized;
 mod polygon;
 mod read;
 mod statements;
+mod stroke;
 mod surface_net;
 mod write;
 
+pub use airplane::airplane;
+pub use chair::chair;
 pub use error::{LineError, MeshError};
 pub use fox::fox;
 pub use icosphere::icosphere;

@@ -1,0 +1,88 @@
+use std::sync::Arc;
+
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_method::tensor;
+use softrast_raster::{hard_silhouette, mse_loss};
+
+use crate::Instance;
+
+/// Weight of the Laplacian in the loss.
+///
+/// Source: FACTS 4.4: 0.03, on coordinates that the camera multiplies by 2.155 to get to NDC.
+const LAPLACIAN: f64 = 0.03 / (2.155 * 2.155);
+/// A corner is this much farther from the middle of the other two than from the centroid.
+const FROM_CENTROID: f64 = 1.5;
+
+/// Loose triangles, and the picture that they should cover.
+///
+/// The optimised θ is flat, `[6 triangles]`: x and y of every corner in NDC. There is no camera, and
+/// corners move freely. Not as in the released code, whose log-odds keep each coordinate on its
+/// side of the centre.
+#[derive(Clone, Debug)]
+pub struct Scene<B: Backend> {
+    start: Tensor<B, 1>,
+    target: Tensor<B, 3>,
+    faces: Arc<[[u32; 3]]>,
+    size: usize,
+}
+
+impl<B: Backend> Scene<B> {
+    /// The triangles of `instance` and the picture `target` `[size * size]`, top row first, in
+    /// [0, 1].
+    ///
+    /// # Panics
+    ///
+    /// If the picture does not have as many pixels.
+    pub fn new(target: &[f64], instance: &Instance, size: usize) -> Self {
+        let corners = &instance.corners;
+        let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
+        Self {
+            start: tensor(corners.concat(), [2 * corners.len()]),
+            target: tensor(target.to_vec(), [1, size, size]),
+            faces: faces.collect(),
+            size,
+        }
+    }
+
+    /// θ before the first step.
+    pub fn start(&self) -> Tensor<B, 1> {
+        self.start.clone()
+    }
+
+    /// The picture to cover, `[1, size, size]`.
+    pub fn target(&self) -> Tensor<B, 3> {
+        self.target.clone()
+    }
+
+    /// The triangles, as corner numbers.
+    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
+        &self.faces
+    }
+
+    /// The corners at θ as the rasterizer wants them, `[1, corners, 3]`: x and y in NDC, depth 1.
+    pub fn vertices(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+        let count = 3 * self.faces.len();
+        let depth = tensor(vec![1.0; count], [1, count, 1]);
+        Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2)
+    }
+
+    /// Hard silhouette `[1, size, size]` of corners that [`Scene::vertices`] gave.
+    pub fn hard(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
+        hard_silhouette(vertices, &self.faces, self.size)
+    }
+
+    /// Mean squared difference of `image` `[1, size, size]` to the picture, `[1]`.
+    pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        mse_loss(image, self.target.clone())
+    }
+
+    /// What keeps triangles small: the Laplacian loss of each by itself, weighted, `[1]`.
+    ///
+    /// `Σ |corner - middle of the other two|²` over all corners, times 0.0065. Source: FACTS 4.4.
+    pub fn smoothness_loss(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        let corners = theta.reshape([self.faces.len(), 3, 2]);
+        let centroids = corners.clone().sum_dim(1) * (1.0 / 3.0);
+        let away = corners - centroids;
+        (away.clone() * away).sum() * (LAPLACIAN * FROM_CENTROID * FROM_CENTROID)
+    }
+}

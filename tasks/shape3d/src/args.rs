@@ -1,0 +1,31 @@
+use std::path::PathBuf;
+
+/// Flags that only 3D SHAPE has.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Args {
+    /// Mesh whose silhouettes are the target, used as it stands; by default the project's own
+    /// airplane, or its chair with --variant transfer.
+    #[arg(long, value_name = "FILE.obj")]
+    pub mesh: Option<PathBuf>,
+
+    /// Centre the target mesh, and scale it so that the longest side of its box is 1.
+    #[arg(long)]
+    pub normalize: bool,
+
+    /// Mesh that is deformed, centred and with the longest side of its box scaled to 1; a sphere of
+    /// 642 vertices by default.
+    #[arg(long, value_name = "FILE.obj")]
+    pub template: Option<PathBuf>,
+
+    /// Elevation of all 24 cameras in degrees, -90 to 90; without it, seeds 0 to 4 stand for 30, 60,
+    /// 0, -30 and -60.
+    #[arg(long, value_name = "DEGREES", value_parser = elevation, allow_negative_numbers = true)]
+    pub elevation: Option<f64>,
+}
+
+fn elevation(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(degrees) if (-90.0..=90.0).contains(&degrees) => Ok(degrees),
+        _ => Err("expected degrees from -90 to 90".into()),
+    }
+}

@@ -1,0 +1,39 @@
+//! 3D SHAPE: deforms a sphere until it has the silhouettes of a target.
+//!
+//! 24 cameras stand around a target mesh, all at one elevation. A template, by default a sphere of
+//! 642 vertices, is moved vertex by vertex by Adam, by the gradient of soft silhouettes, until its
+//! silhouettes are those of the target.
+//!
+//! **Definition.** The loss is the soft `IoU` loss against the target's hard silhouettes, mean over
+//! the views, plus 0.03 times the Laplacian and 0.0003 times the flatness of the surface. How θ moves
+//! the vertices is told by [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; FACTS 4.1 and 4.2.
+//!
+//! **Errors.** Seen in the image: the `IoU` loss, soft and hard. Of the shape: the [`Chamfer`]
+//! distance to the target's surface. Both from cameras at one elevation only: what none of them
+//! sees counts in the Chamfer distance alone.
+//!
+//! **Seeds.** Seeds 0 to 4 are the elevations 30, 60, 0, -30 and -60 degrees; further ones repeat
+//! them with the template turned at random, see [`Instance::seeded`].
+//!
+//! **Transfer.** The same on a chair instead of an airplane; `--mesh` names any other.
+
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
+compile_error!("shape3d needs a backend: turn on one of the features ndarray, flex and wgpu");
+
+mod args;
+mod chamfer;
+mod edges;
+mod flatness;
+mod instance;
+mod laplacian;
+mod nearest;
+mod picture;
+mod scene;
+mod solve;
+mod task;
+
+pub use args::Args;
+pub use chamfer::Chamfer;
+pub use instance::Instance;
+pub use scene::{Scene, VIEWS};
+pub use task::Shape3d;

@@ -1,0 +1,126 @@
+use std::sync::Arc;
+
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_mesh::Mesh;
+use softrast_method::tensor;
+use softrast_raster::{hard_silhouette, iou_loss, project};
+
+use crate::{Instance, edges::Edges, flatness::Flatness, laplacian::Laplacian};
+
+/// Cameras around the target, evenly in azimuth.
+pub const VIEWS: usize = 24;
+/// Distance of the cameras in world units, and half their field of view in degrees.
+///
+/// Source: FACTS 4.2.
+pub(crate) const DISTANCE: f64 = 2.732;
+const HALF_FOV_DEG: f64 = 15.0;
+
+/// Weights of the bending of the surface in the loss: Laplacian and flatness. Source: FACTS 4.2.
+const LAPLACIAN: f64 = 0.03;
+const FLATNESS: f64 = 0.0003;
+
+/// A coordinate this near to a plane through the origin, in world units, stays in that plane: its
+/// log-odds would be about minus infinity.
+const ON_PLANE: f64 = 1e-6;
+
+/// A template that is deformed, and the silhouettes that it should have.
+///
+/// The optimised θ is flat, `[3 vertices + 3]`: a displacement `d` of each coordinate, then the centre
+/// `k`. A coordinate that starts at `v` is at `s·σ(logit|v| + d)·(1 - s·c) + c` with `s` the sign of `v`
+/// and `c = tanh k`, all within -1 to 1. So no vertex crosses the planes through the centre, and a
+/// coordinate that starts at 0 stays at that of the centre. Source: FACTS 4.2.
+#[derive(Clone, Debug)]
+pub struct Scene<B: Backend> {
+    /// `logit |v|` of each coordinate, `[vertices, 3]`; 0 where the sign is 0.
+    log_odds: Tensor<B, 2>,
+    /// -1, 0 or 1, `[vertices, 3]`.
+    sign: Tensor<B, 2>,
+    orbits: Tensor<B, 2>,
+    faces: Arc<[[u32; 3]]>,
+    laplacian: Laplacian<B>,
+    flatness: Flatness<B>,
+    target: Tensor<B, 3>,
+    size: usize,
+}
+
+impl<B: Backend> Scene<B> {
+    /// The `instance` with these meshes on images of `size` × `size` pixels.
+    pub fn new(target: &Mesh, template: &Mesh, instance: &Instance, size: usize) -> Self {
+        let azimuths_deg = (0..VIEWS).map(|view| 360.0 / VIEWS as f64 * view as f64);
+        let orbit = |azimuth| [DISTANCE, instance.elevation_deg, azimuth, HALF_FOV_DEG];
+        let orbits = tensor(azimuths_deg.flat_map(orbit).collect(), [VIEWS, 4]);
+        let count = target.positions().len();
+        let positions: Tensor<B, 3> = tensor(target.positions().concat(), [1, count, 3]);
+        let target = hard_silhouette(
+            project(positions, Tensor::clone(&orbits)),
+            &target.faces().into(),
+            size,
+        );
+
+        let start = instance.start(template).concat();
+        let count = template.positions().len();
+        let on_plane = |v: f64| v.abs() < ON_PLANE;
+        let log_odds = |&v: &f64| if on_plane(v) { 0.0 } else { (v.abs() / (1.0 - v.abs())).ln() };
+        let sign = |&v: &f64| if on_plane(v) { 0.0 } else { v.signum() };
+        let edges = Edges::new(template.faces());
+        Self {
+            log_odds: tensor(start.iter().map(log_odds).collect(), [count, 3]),
+            sign: tensor(start.iter().map(sign).collect(), [count, 3]),
+            orbits,
+            laplacian: Laplacian::new(&edges, count),
+            flatness: Flatness::new(&edges),
+            faces: template.faces().into(),
+            target,
+            size,
+        }
+    }
+
+    /// θ before the first step: zeros.
+    pub fn start(&self) -> Tensor<B, 1> {
+        let [vertices, _] = self.sign.dims();
+        tensor(vec![0.0; 3 * vertices + 3], [3 * vertices + 3])
+    }
+
+    /// Hard silhouettes to arrive at, `[views, size, size]`.
+    pub fn target(&self) -> Tensor<B, 3> {
+        self.target.clone()
+    }
+
+    /// Faces of the template.
+    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
+        &self.faces
+    }
+
+    /// Where the vertices are at θ, `[vertices, 3]` in world units.
+    pub fn vertices(&self, theta: Tensor<B, 1>) -> Tensor<B, 2> {
+        let [vertices, _] = self.sign.dims();
+        let displacement = theta.clone().narrow(0, 0, 3 * vertices).reshape([vertices, 3]);
+        let centre = theta.narrow(0, 3 * vertices, 3).tanh().reshape([1, 3]);
+        let size = ((displacement + self.log_odds.clone()) * 0.5).tanh() * 0.5 + 0.5;
+        let sign = self.sign.clone();
+        let away = sign.clone() - sign.clone() * sign * centre.clone();
+        size * away + centre
+    }
+
+    /// Vertices `[vertices, 3]` as each camera sees them, `[views, vertices, 3]`: x and y in NDC, and
+    /// the depth.
+    pub fn project(&self, vertices: Tensor<B, 2>) -> Tensor<B, 3> {
+        project(vertices.unsqueeze(), self.orbits.clone())
+    }
+
+    /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
+    pub fn hard(&self, projected: Tensor<B, 3>) -> Tensor<B, 3> {
+        hard_silhouette(projected, &self.faces, self.size)
+    }
+
+    /// `IoU` loss of `image` `[views, size, size]`, mean over the views, `[1]`.
+    pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        iou_loss(image, self.target.clone()).mean()
+    }
+
+    /// What keeps the surface of `vertices` `[vertices, 3]` smooth: 0.03 times the Laplacian loss
+    /// and 0.0003 times the flatness loss, `[1]`. Second derivatives are finite everywhere.
+    pub fn smoothness_loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
+        self.laplacian.loss(vertices.clone()) * LAPLACIAN + self.flatness.loss(vertices) * FLATNESS
+    }
+}

@@ -1,0 +1,98 @@
+use std::time::Instant;
+
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, TensorData},
+};
+use softrast_meta::{Adam, Optimizer};
+use softrast_method::{Method, MovingSilhouette, numbers};
+use softrast_raster::{RasterBackend, Rasterizer};
+
+use crate::Scene;
+
+/// Decays of the means of Adam. Source: FACTS 3.2 (inner loop of the released script).
+const BETAS: [f64; 2] = [0.5, 0.95];
+
+/// How to solve a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Solver {
+    pub(crate) method: Method,
+    pub(crate) size: usize,
+    pub(crate) steps: usize,
+    pub(crate) learning_rate: f64,
+}
+
+/// The scene after some steps.
+pub(crate) struct State {
+    pub(crate) step: usize,
+    pub(crate) scale: f64,
+    /// Vertices in world units.
+    pub(crate) vertices: Vec<[f64; 3]>,
+    /// What the optimiser lowers.
+    pub(crate) loss: f64,
+    /// Soft `IoU` loss, mean over the views.
+    pub(crate) soft: f64,
+    /// `IoU` loss of the hard silhouettes, mean over the views.
+    pub(crate) hard: f64,
+    /// Soft silhouettes, `[views, size, size]`.
+    pub(crate) image: TensorData,
+    /// Time of the step that ended here, in seconds; none before the first.
+    pub(crate) seconds: Option<f64>,
+}
+
+impl Solver {
+    /// Solves `scene`, and shows each state from the start to the end to `visit`.
+    pub(crate) fn run<B: RasterBackend>(
+        &self,
+        scene: &Scene<Autodiff<B>>,
+        mut visit: impl FnMut(State) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let [beta1, beta2] = BETAS;
+        let adam = Adam { beta1, beta2, ..Adam::new(self.learning_rate) };
+        let mut theta = scene.start().inner();
+        let mut moments = adam.init(&theta);
+        let first = self.method.scale(0, self.steps);
+        let rasterizer = Rasterizer::new(self.size);
+        let mut silhouette =
+            MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
+        let mut seconds = None;
+        for step in 0..=self.steps {
+            let clock = Instant::now();
+            let scale = self.method.scale(step, self.steps);
+            silhouette.turn_to(scale);
+            let leaf = Tensor::from_inner(theta.clone()).require_grad();
+            let vertices = scene.vertices(leaf.clone());
+            let projected = scene.project(vertices.clone());
+            let image = silhouette.image(projected.clone());
+            let soft = scene.image_loss(image.clone());
+            let loss = soft.clone() + scene.smoothness_loss(vertices.clone());
+            let mut time = clock.elapsed();
+
+            visit(State {
+                step,
+                scale,
+                vertices: numbers(vertices).chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
+                loss: number(&loss),
+                soft: number(&soft),
+                hard: number(&scene.image_loss(scene.hard(projected))),
+                image: image.into_data(),
+                seconds,
+            })?;
+            if step == self.steps {
+                break;
+            }
+            let clock = Instant::now();
+            let grads = loss.backward();
+            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
+            (theta, moments) = adam.step(theta, grad, moments);
+            time += clock.elapsed();
+            seconds = Some(time.as_secs_f64());
+        }
+        Ok(())
+    }
+}
+
+/// The only number of a tensor.
+fn number<B: RasterBackend>(tensor: &Tensor<B, 1>) -> f64 {
+    numbers(tensor.clone())[0]
+}
