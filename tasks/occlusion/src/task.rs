@@ -2,8 +2,8 @@ use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Settings,
-    Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
+    Settings, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -97,6 +97,11 @@ impl Task for Occlusion {
 
     fn batch_size(&self) -> usize {
         BATCH
+    }
+
+    /// What can be seen of the result; the soft error of a method falls with its scale.
+    fn score(&self) -> Score {
+        Score::Extra("hard")
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {

@@ -3,7 +3,7 @@ use softrast_method::{Defaults, Method};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Point, Progress, Run, Schedule,
-    Settings, Task, Variant, difference, rgb_from_gray,
+    Score, Settings, Task, Variant, difference, rgb_from_gray,
 };
 use softrast_softness::Softness;
 
@@ -87,6 +87,11 @@ impl Task for Shape2d {
             success: format!("the hard MSE ends below {SUCCESS}"),
             settings: settings.as_object().cloned().unwrap_or_default(),
         }
+    }
+
+    /// What can be seen of the result; the soft error of a method falls with its scale.
+    fn score(&self) -> Score {
+        Score::Extra("hard")
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {

@@ -5,8 +5,8 @@ use softrast_mesh::{Mesh, airplane, chair, icosphere};
 use softrast_method::{Defaults, Method, numbers};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Settings,
-    Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
+    Settings, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -98,6 +98,11 @@ impl Task for Shape3d {
             success: format!("the hard IoU loss ends below {SUCCESS}"),
             settings: settings.as_object().cloned().unwrap_or_default(),
         }
+    }
+
+    /// What can be seen of the result; the soft error of a method falls with its scale.
+    fn score(&self) -> Score {
+        Score::Extra("hard")
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
