@@ -75,17 +75,19 @@ impl Instance {
         Self { target, start }
     }
 
-    /// The same target from `count` starts: its own, and others on a circle of 50 degrees around it
-    /// in the plane of elevation and azimuth, evenly spaced from the side on.
-    pub fn starts(&self, count: usize) -> Vec<Self> {
-        let around = |k: usize| {
-            let direction = std::f64::consts::TAU * k as f64 / (count - 1) as f64;
-            let mut instance = *self;
+    /// The same target from start `k` of `count`: 0 is its own, the others lie on a circle of 50
+    /// degrees around it in the plane of elevation and azimuth, evenly spaced; neighbours in `k` are
+    /// far apart.
+    pub fn around(&self, k: usize, count: usize) -> Self {
+        let mut instance = *self;
+        if k > 0 {
+            // Odd numbers on one half of the circle, even ones opposite.
+            let turn = (k - 1) as f64 / (count - 1).max(1) as f64 + (k % 2) as f64;
+            let direction = std::f64::consts::TAU * turn / 2.0;
             instance.start.elevation_deg += AROUND_DEG * direction.sin();
             instance.start.azimuth_deg += AROUND_DEG * direction.cos();
-            instance
-        };
-        std::iter::once(*self).chain((1..count).map(around)).collect()
+        }
+        instance
     }
 
     /// The 24 pairs of the released runs.
@@ -136,15 +138,17 @@ mod tests {
     #[test]
     fn further_starts_surround_the_given_one() {
         let given = Instance::seeded(3, Range::Middle);
-        let starts = given.starts(5);
-        assert_eq!(starts[0], given);
-        for other in &starts[1..] {
+        assert_eq!(given.around(0, 8), given);
+        let mut mean = [0.0; 2];
+        for k in 1..8 {
+            let other = given.around(k, 8);
             let up = other.start.elevation_deg - given.start.elevation_deg;
             let side = other.start.azimuth_deg - given.start.azimuth_deg;
             assert!((up.hypot(side) - 50.0).abs() < 1e-9);
             assert_eq!(other.target, given.target);
+            mean = [mean[0] + up / 7.0, mean[1] + side / 7.0];
         }
-        assert_eq!(given.starts(1), [given]);
+        assert!(mean[0].hypot(mean[1]) < 10.0, "{mean:?}");
     }
 
     #[test]

@@ -16,8 +16,8 @@
 //!
 //! **Method.** By default a logistic whose scale decays. From one start, as in the paper and in
 //! `evaluate`, about one run in twenty from 35 to 55 degrees ends in a wrong pose that looks alike,
-//! such as front for back. `solve` therefore starts from eight poses side by side and keeps the run
-//! whose image ends nearest to the target; `--starts 1` is the single start.
+//! such as front for back. The image tells: `solve` then tries other starts around the given one and
+//! keeps the run whose image fits best; `--starts 1` is the single start.
 //!
 //! **Transfer.** Fewer steps and a larger learning rate, on whichever mesh `--mesh` names.
 
