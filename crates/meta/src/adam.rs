@@ -96,6 +96,19 @@ impl Optimizer for Adam {
         let theta = theta - m.clone() * (self.learning_rate / m_start) / root;
         (theta, AdamState { m, v, step })
     }
+
+    fn tensors<B: Backend, const D: usize>(&self, state: AdamState<B, D>) -> Vec<Tensor<B, D>> {
+        vec![state.m, state.v]
+    }
+
+    fn state<B: Backend, const D: usize>(
+        &self,
+        steps: usize,
+        tensors: Vec<Tensor<B, D>>,
+    ) -> AdamState<B, D> {
+        let [m, v]: [_; 2] = tensors.try_into().expect("Adam remembers two tensors");
+        AdamState { m, v, step: steps }
+    }
 }
 
 #[cfg(test)]
