@@ -1,4 +1,5 @@
 use burn::tensor::{Tensor, backend::Backend};
+use serde::{Deserialize, Serialize};
 
 use crate::Optimizer;
 
@@ -15,7 +16,8 @@ use crate::Optimizer;
 /// The learning rate may change from step to step: the optimiser is only read.
 ///
 /// Source: Kingma and Ba 2015, Algorithm 1; META 2.1 for `epsilon_root`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Adam {
     /// Largest move of a parameter in one step, roughly.
     pub learning_rate: f64,
