@@ -1,5 +1,5 @@
 use burn::tensor::{Tensor, backend::Backend};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::Optimizer;
 
@@ -16,8 +16,7 @@ use crate::Optimizer;
 /// The learning rate may change from step to step: the optimiser is only read.
 ///
 /// Source: Kingma and Ba 2015, Algorithm 1; META 2.1 for `epsilon_root`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Adam {
     /// Largest move of a parameter in one step, roughly.
     pub learning_rate: f64,

@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use burn::tensor::{Tensor, backend::Backend};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::{
     Adam, MetaEstimate, MetaGradient, Optimizer, Progress, Record, Tasks,
@@ -12,8 +12,7 @@ use crate::{
 /// The outer loop: Adam on the mean meta-gradient of batches of instances.
 ///
 /// Source: Wu et al. 2024, Algorithm 1; META 2.4 for what goes beyond it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Learner {
     /// How the meta-gradient is taken.
     pub mode: MetaGradient,
@@ -32,8 +31,7 @@ pub struct Learner {
 }
 
 /// Instances apart from those that are learned on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Validation {
     /// Seed of the first instance; the others count on from it.
     pub seed: u64,
@@ -164,7 +162,7 @@ impl Validation {
         assert!(self.count > 0 && self.every > 0, "validation needs an instance and an interval");
         let last = progress.step >= steps;
         progress.finished = last;
-        if !last && progress.step % self.every != 0 {
+        if !last && !progress.step.is_multiple_of(self.every) {
             return None;
         }
         let seeds = (0..self.count).map(|k| self.seed.wrapping_add(k as u64));

@@ -2,15 +2,15 @@ use burn::{
     backend::Autodiff,
     tensor::{Tensor, backend::Backend},
 };
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::{
     MetaEstimate, Objective, Optimizer, Problem, evolution::evolution, unrolled::unrolled,
 };
 
 /// How the derivative of the outer loss by the softness is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum MetaGradient {
     /// Exact second order, through every inner step.
     Unrolled {

@@ -8,6 +8,9 @@ use softrast_meta::{
     Adam, InnerLoop, Measured, MetaEstimate, MetaGradient, Objective, Optimizer, Problem, Sgd,
 };
 
+mod waves;
+use waves::{WAVES, Waves};
+
 type B = NdArray<f64>;
 type A = Autodiff<B>;
 
@@ -21,34 +24,6 @@ fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
 
 fn numbers<B: Backend>(tensor: Tensor<B, 1>) -> Vec<f64> {
     tensor.into_data().iter().collect()
-}
-
-/// `Σ exp(φ0) log cosh(θ - 0.2) + φ1 sin(θ) θ_next`, at step t times `1 + 0.1 t`: smooth, coupled,
-/// not convex, different from step to step. The last parameter feels nothing if `dead`.
-#[derive(Clone, Copy)]
-struct Waves {
-    dead: bool,
-}
-
-const WAVES: Waves = Waves { dead: false };
-
-impl<B: Backend> Objective<B> for Waves {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
-        let count = theta.dims()[0] - usize::from(self.dead);
-        let theta = theta.narrow(0, 0, count);
-        let next = Tensor::cat(
-            vec![theta.clone().narrow(0, 1, count - 1), theta.clone().narrow(0, 0, 1)],
-            0,
-        );
-        let off = theta.clone() - 0.2;
-        let valley = ((off.clone().exp() + off.neg().exp()) * 0.5).log().sum();
-        let [width, tilt] = [0, 1].map(|k| phi.clone().narrow(0, k, 1));
-        valley * width.exp() + (theta.sin() * next).sum() * tilt
-    }
-
-    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
-        self.loss(theta, phi) * (1.0 + 0.1 * step as f64)
-    }
 }
 
 /// `Σ (θ - 0.1)²`, whatever the softness.
@@ -139,36 +114,29 @@ fn losses_on_the_way_are_averaged() {
     assert_close(&numbers(found.gradient), &whole, 1e-12);
 }
 
-#[test]
-fn one_step_of_gradient_descent_agrees_with_central_differences() {
-    // Source: META 2.5, V5.
-    let sgd = problem(Referee, Sgd { learning_rate: 0.1 }, 1);
+/// Derivative of the outer loss by central differences.
+fn central_difference(problem: &Problem<B, Waves, Referee, impl Optimizer>) -> Vec<f64> {
     let h = 1e-5;
-    let difference = |k: usize| {
+    let slope = |k: usize| {
         let [low, high] = [-h, h].map(|h| {
             let mut phi = PHI;
             phi[k] += h;
-            sgd.loss(&vector(&phi))
+            problem.loss(&vector(&phi))
         });
         (high - low) / (2.0 * h)
     };
-    assert_close(&gradient(&sgd, EXACT), &[difference(0), difference(1)], 1e-7);
+    (0..2).map(slope).collect()
 }
 
 #[test]
-fn thirty_smooth_steps_of_adam_agree_with_central_differences() {
-    // Source: META 2.5, V8.
-    let adam = problem(Referee, adam(), 30);
-    let h = 1e-5;
-    let difference = |k: usize| {
-        let [low, high] = [-h, h].map(|h| {
-            let mut phi = PHI;
-            phi[k] += h;
-            adam.loss(&vector(&phi))
-        });
-        (high - low) / (2.0 * h)
-    };
-    assert_close(&gradient(&adam, EXACT), &[difference(0), difference(1)], 1e-5);
+fn unrolled_gradients_agree_with_central_differences() {
+    // Source: META 2.5: one step is V5, three and ten are V6, thirty smooth ones are V8.
+    for steps in [1, 3, 10, 30] {
+        let sgd = problem(Referee, Sgd { learning_rate: 0.1 }, steps);
+        assert_close(&gradient(&sgd, EXACT), &central_difference(&sgd), 1e-7);
+        let adam = problem(Referee, adam(), steps);
+        assert_close(&gradient(&adam, EXACT), &central_difference(&adam), 1e-5);
+    }
 }
 
 #[test]
