@@ -73,7 +73,7 @@ fn learner() -> Learner {
 }
 
 fn run(learner: &Learner, tasks: &Pulls, progress: &mut Progress) -> Vec<Record> {
-    std::iter::from_fn(|| learner.advance(tasks, progress).unwrap()).collect()
+    std::iter::from_fn(|| learner.advance(tasks, progress).expect("finite instances")).collect()
 }
 
 /// A record or progress without what no two runs share.

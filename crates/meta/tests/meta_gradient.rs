@@ -68,9 +68,9 @@ fn whole_tape<R: Objective<A>>(
         let theta = inner.solve(&problem.objective, vector::<A>(&START), &phi);
         problem.referee.loss(theta, phi.clone())
     });
-    let loss = losses.reduce(|a, b| a + b).unwrap() * (at.len() as f64).recip();
+    let loss = losses.reduce(|a, b| a + b).expect("a loss") * (at.len() as f64).recip();
     let grads = loss.backward();
-    (loss.into_scalar(), numbers(phi.grad(&grads).unwrap()))
+    (loss.into_scalar(), numbers(phi.grad(&grads).expect("it depends on phi")))
 }
 
 fn assert_close(found: &[f64], expected: &[f64], bound: f64) {
