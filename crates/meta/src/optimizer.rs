@@ -6,7 +6,7 @@ use burn::tensor::{Tensor, backend::Backend};
 ///
 /// A step is made of tensor ops, so that on `Autodiff<B>` its result depends on the parameters, the
 /// gradient and the state it was given, to any order.
-pub trait Optimizer: Sync {
+pub trait Optimizer {
     /// What a step leaves for the next one.
     type State<B: Backend, const D: usize>: Clone + Debug;
 
