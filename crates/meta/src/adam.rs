@@ -1,4 +1,5 @@
 use burn::tensor::{Tensor, backend::Backend};
+use serde::Serialize;
 
 use crate::Optimizer;
 
@@ -15,7 +16,7 @@ use crate::Optimizer;
 /// The learning rate may change from step to step: the optimiser is only read.
 ///
 /// Source: Kingma and Ba 2015, Algorithm 1; META 2.1 for `epsilon_root`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Adam {
     /// Largest move of a parameter in one step, roughly.
     pub learning_rate: f64,
@@ -95,6 +96,19 @@ impl Optimizer for Adam {
         let root = (v.clone() * v_start.recip() + self.epsilon_root).sqrt() + self.epsilon;
         let theta = theta - m.clone() * (self.learning_rate / m_start) / root;
         (theta, AdamState { m, v, step })
+    }
+
+    fn tensors<B: Backend, const D: usize>(&self, state: AdamState<B, D>) -> Vec<Tensor<B, D>> {
+        vec![state.m, state.v]
+    }
+
+    fn state<B: Backend, const D: usize>(
+        &self,
+        steps: usize,
+        tensors: Vec<Tensor<B, D>>,
+    ) -> AdamState<B, D> {
+        let [m, v]: [_; 2] = tensors.try_into().expect("Adam remembers two tensors");
+        AdamState { m, v, step: steps }
     }
 }
 

@@ -29,24 +29,25 @@ impl<O: Optimizer> InnerLoop<O> {
     ) -> Tensor<B, 1> {
         let mut state = self.optimizer.init(&theta);
         let mut theta = theta;
-        for _ in 0..self.steps {
-            let grad = gradient(objective, theta.clone(), phi.clone());
+        for step in 0..self.steps {
+            let grad = gradient(objective, theta.clone(), phi.clone(), step);
             (theta, state) = self.optimizer.step(theta, grad, state);
         }
         theta
     }
 }
 
-/// Gradient of the loss to `theta` `[N]`; zero where the loss does not depend on it.
+/// Gradient of the loss at inner step `step` to `theta` `[N]`; zero where it does not depend on it.
 ///
 /// On an `Autodiff` backend the gradient is tracked in turn.
 pub fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
     objective: &P,
     theta: Tensor<B, 1>,
     phi: Tensor<B, 1>,
+    step: usize,
 ) -> Tensor<B, 1> {
     let leaf = Tensor::<Autodiff<B>, 1>::from_inner(theta.clone()).require_grad();
-    let grads = objective.loss(leaf.clone(), Tensor::from_inner(phi)).backward();
+    let grads = objective.loss_at(leaf.clone(), Tensor::from_inner(phi), step).backward();
     leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like())
 }
 

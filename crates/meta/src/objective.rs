@@ -8,4 +8,11 @@ use burn::tensor::{Tensor, backend::Backend};
 pub trait Objective<B: Backend> {
     /// The loss `[1]` of a scene `theta` `[N]` under a softness `phi` `[P]`.
     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1>;
+
+    /// The loss `[1]` whose gradient the inner step number `step`, counted from 0, goes down.
+    ///
+    /// It is [`loss`](Objective::loss) unless the softness changes from step to step.
+    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
+        self.loss(theta, phi)
+    }
 }

@@ -20,4 +20,21 @@ pub trait Optimizer {
         grad: Tensor<B, D>,
         state: Self::State<B, D>,
     ) -> (Tensor<B, D>, Self::State<B, D>);
+
+    /// The tensors of a state, in an order of the optimiser's choice.
+    ///
+    /// With [`state`](Optimizer::state) a state can be stored, moved between `B` and `Autodiff<B>`,
+    /// and differentiated by.
+    fn tensors<B: Backend, const D: usize>(&self, state: Self::State<B, D>) -> Vec<Tensor<B, D>>;
+
+    /// The state after `steps` steps that consists of `tensors`.
+    ///
+    /// # Panics
+    ///
+    /// If there are not as many as [`tensors`](Optimizer::tensors) gives.
+    fn state<B: Backend, const D: usize>(
+        &self,
+        steps: usize,
+        tensors: Vec<Tensor<B, D>>,
+    ) -> Self::State<B, D>;
 }

@@ -1,0 +1,70 @@
+use std::f64::consts::TAU;
+
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
+use rand::{Rng, SeedableRng, rngs::StdRng};
+
+use crate::{
+    MetaEstimate, Objective, Optimizer, Problem,
+    vector::{numbers, tensor},
+};
+
+/// The mean of `(L(φ + σ ε) - L(φ - σ ε)) / 2σ · ε` over `pairs` normal ε drawn from `seed`.
+///
+/// Both runs of a pair solve the same instance, so that what they have in common cancels.
+///
+/// Source: META 2.3; Salimans et al. 2017 for the estimator.
+pub(crate) fn evolution<B, P, R, O>(
+    problem: &Problem<B, P, R, O>,
+    phi: &Tensor<B, 1>,
+    sigma: f64,
+    pairs: usize,
+    seed: u64,
+) -> MetaEstimate<B>
+where
+    B: Backend,
+    P: Objective<Autodiff<B>>,
+    R: Objective<B>,
+    O: Optimizer,
+{
+    assert!(sigma > 0.0 && pairs > 0, "an evolution strategy needs a sigma and a pair");
+    let mut random = StdRng::seed_from_u64(seed);
+    let middle = numbers(phi.clone());
+    let (mut loss, mut gradient) = (0.0, vec![0.0; middle.len()]);
+    for _ in 0..pairs {
+        let noise: Vec<f64> = middle.iter().map(|_| normal(&mut random)).collect();
+        let [low, high] = [-sigma, sigma].map(|sigma| {
+            let moved: Vec<f64> = middle.iter().zip(&noise).map(|(x, e)| x + sigma * e).collect();
+            problem.loss(&tensor(&moved))
+        });
+        loss += (low + high) / (2 * pairs) as f64;
+        let slope = (high - low) / (2.0 * sigma * pairs as f64);
+        gradient.iter_mut().zip(noise).for_each(|(sum, e)| *sum += slope * e);
+    }
+    MetaEstimate::without_steps(loss, tensor(&gradient))
+}
+
+/// A normal number, by Box and Muller.
+fn normal(random: &mut StdRng) -> f64 {
+    // From (0, 1], where the logarithm is finite.
+    let reach = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
+    reach * (TAU * random.random::<f64>()).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_has_the_moments_of_a_normal_number() {
+        let mut random = StdRng::seed_from_u64(7);
+        let noise: Vec<f64> = (0..20_000).map(|_| normal(&mut random)).collect();
+        let mean = |power: i32| noise.iter().map(|x| x.powi(power)).sum::<f64>() / 20_000.0;
+        // Four standard errors each.
+        assert!(
+            mean(1).abs() < 0.03 && (mean(2) - 1.0).abs() < 0.04 && (mean(4) - 3.0).abs() < 0.3
+        );
+    }
+}

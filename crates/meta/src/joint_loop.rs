@@ -1,0 +1,85 @@
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
+
+use crate::{InnerLoop, Objective, Optimizer};
+
+/// An inner loop that moves the softness along with the scene, down the same loss.
+///
+/// No meta-learning at all, and what the released pose code does: the baseline that meta-learning
+/// has to beat. Source: META 1 and 3J.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLoop<O, S> {
+    /// How the scene is stepped, and how often.
+    pub inner: InnerLoop<O>,
+    /// How the softness is stepped, at a learning rate of its own.
+    pub softness: S,
+}
+
+impl<O: Optimizer, S: Optimizer> JointLoop<O, S> {
+    /// The scene and the softness reached from `theta` `[N]` and `phi` `[P]`.
+    pub fn solve<B: Backend, P: Objective<Autodiff<B>>>(
+        &self,
+        objective: &P,
+        mut theta: Tensor<B, 1>,
+        mut phi: Tensor<B, 1>,
+    ) -> (Tensor<B, 1>, Tensor<B, 1>) {
+        let InnerLoop { optimizer, steps } = &self.inner;
+        let mut state = optimizer.init(&theta);
+        let mut softness_state = self.softness.init(&phi);
+        for step in 0..*steps {
+            let [leaf, soft] = [&theta, &phi]
+                .map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()).require_grad());
+            let grads = objective.loss_at(leaf.clone(), soft.clone(), step).backward();
+            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
+            let soft_grad = soft.grad(&grads).unwrap_or_else(|| phi.zeros_like());
+            (theta, state) = optimizer.step(theta, grad, state);
+            (phi, softness_state) = self.softness.step(phi, soft_grad, softness_state);
+        }
+        (theta, phi)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::backend::NdArray;
+
+    use super::*;
+    use crate::{
+        Sgd,
+        vector::{numbers, tensor},
+    };
+
+    type B = NdArray<f64>;
+
+    /// `(θ - φ)² + φ²`.
+    struct Chase;
+
+    impl<B: Backend> Objective<B> for Chase {
+        fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+            let off = theta - phi.clone();
+            (off.clone() * off).sum() + (phi.clone() * phi).sum()
+        }
+    }
+
+    #[test]
+    fn both_take_a_step_from_the_same_place_at_their_own_rates() {
+        let inner = InnerLoop { optimizer: Sgd { learning_rate: 0.1 }, steps: 1 };
+        let joint = JointLoop { inner, softness: Sgd { learning_rate: 0.01 } };
+        let (theta, phi) = joint.solve::<B, _>(&Chase, tensor(&[3.0]), tensor(&[1.0]));
+        // Slopes: 2 (3 - 1) = 4 by θ, -4 + 2 by φ.
+        assert_eq!(numbers(theta), [3.0 - 0.1 * 4.0]);
+        assert_eq!(numbers(phi), [1.0 + 0.01 * 2.0]);
+    }
+
+    #[test]
+    fn softness_at_rest_leaves_the_plain_inner_loop() {
+        let inner = InnerLoop { optimizer: Sgd { learning_rate: 0.1 }, steps: 5 };
+        let joint = JointLoop { inner, softness: Sgd { learning_rate: 0.0 } };
+        let (theta, phi) = joint.solve::<B, _>(&Chase, tensor(&[3.0]), tensor(&[1.0]));
+        let plain = inner.solve::<B, _>(&Chase, tensor(&[3.0]), &tensor(&[1.0]));
+        assert_eq!(numbers(theta), numbers(plain));
+        assert_eq!(numbers(phi), [1.0]);
+    }
+}

@@ -1,0 +1,27 @@
+use serde::Serialize;
+
+/// What one outer step found, all of it about the softness that the step started with.
+///
+/// The last record of a run has no gradient: there is no step after it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Record {
+    /// Updates of φ before this step.
+    pub step: usize,
+    /// Mean outer loss over the batch.
+    pub loss: Option<f64>,
+    /// Mean outer loss over the validation instances, where it was due and all of them are finite.
+    pub validation_loss: Option<f64>,
+    /// Norm of the mean gradient, before it was clipped.
+    pub gradient_norm: Option<f64>,
+    /// Powers of ten by which the adjoint would have grown in the median instance, see
+    /// [`MetaEstimate::adjoint_growth`](crate::MetaEstimate).
+    pub adjoint_growth: Option<f64>,
+    /// How often the adjoint was clipped, over the batch.
+    pub clips: usize,
+    /// Instances of the batch left out because their loss or gradient was not finite.
+    pub dropped: usize,
+    /// Duration.
+    pub seconds: f64,
+    /// The softness.
+    pub phi: Vec<f64>,
+}

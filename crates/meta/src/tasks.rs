@@ -1,0 +1,23 @@
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
+
+use crate::{Objective, Optimizer, Problem};
+
+/// What a softness is learned on: instances by seed.
+pub trait Tasks<B: Backend> {
+    /// What the inner loops minimise.
+    type Objective: Objective<Autodiff<B>> + Objective<Autodiff<Autodiff<B>>>;
+    /// What judges their results.
+    type Referee: Objective<B> + Objective<Autodiff<B>>;
+    /// What steps them.
+    type Optimizer: Optimizer;
+
+    /// The instance with this seed, always the same one; prepared for softnesses near `phi` `[P]`.
+    fn problem(
+        &self,
+        seed: u64,
+        phi: &Tensor<B, 1>,
+    ) -> Problem<B, Self::Objective, Self::Referee, Self::Optimizer>;
+}
