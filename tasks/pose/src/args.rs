@@ -21,7 +21,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t)]
     pub instances: Instances,
 
-    /// Poses to start from: the given one and, while the image does not fit (hard IoU loss above 0.1),
+    /// Poses to start from: the given one and, while the image does not fit (hard `IoU` loss above 0.1),
     /// others 50 degrees around it. The one that ends with the best image is kept [default: 8 to solve
     /// a seed, else 1].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
