@@ -148,8 +148,11 @@ impl Profile {
         let rates = sides.iter().flat_map(|&r| knots.iter().map(move |&y| rate(r, y)));
         let rates = constant(rates.collect());
         let count = knots.len();
-        let nudge =
-            |(k, d): (usize, f64)| if k % count == 0 { sides[k / count] * 1e-15 } else { d };
+        // A distance of 0 has no side; this one has, and is next to nothing also in a wide support.
+        let nudge = |(k, d): (usize, f64)| match k % count {
+            0 => sides[k / count].clamp(-1.0, 1.0) * 1e-15,
+            _ => d,
+        };
         let distances = constant(distances.into_iter().enumerate().map(nudge).collect());
         let (value, slope) = self.t_conorm.profile(softness, phi, distances);
         let slope = slope * rates;

@@ -92,6 +92,19 @@ proptest! {
 }
 
 #[test]
+fn heavy_tails_under_a_steep_t_conorm_get_the_knots_that_they_need() {
+    let softness = EdgeSoftness { family: Family::Reciprocal, squared: false };
+    let phi = softness.default_phi(10f64.powf(-1.910_500_4));
+    let tolerance = 10f64.powf(-6.260_48);
+    let (culled, exact, error) =
+        images(&triangles(0, 3), softness, TConorm::Dombi(0.5), &phi, tolerance);
+    assert!(error <= tolerance / 2.0, "interpolation error {error:e}");
+    for (culled, exact) in culled.iter().zip(&exact) {
+        assert!((culled - exact).abs() <= tolerance, "{culled} instead of {exact}");
+    }
+}
+
+#[test]
 fn permuting_the_faces_changes_nothing_above_rounding() {
     let (vertices, faces) = triangles(3, 40);
     let mut shuffled = faces.to_vec();
