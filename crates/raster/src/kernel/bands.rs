@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{
-    face::{Reach, bounds},
+    face::{Reach, in_pixels},
     real::Float,
 };
 
@@ -49,14 +49,18 @@ impl Bands {
         radius: f64,
     ) -> Self {
         let count = size.div_ceil(ROWS);
+        let radius = F::from_f64(0.5 * radius * size as f64);
+        let near = F::from_f64(near);
         let view = |vertices: &[F]| {
+            let (x, rest) = vertices.split_at(vertices_per_view);
+            let (y, z) = rest.split_at(vertices_per_view);
+            let place = |((&x, &y), &z)| in_pixels([x, y, z], near, size);
+            let places: Vec<_> = x.iter().zip(y).zip(z).map(place).collect();
             let mut drawn = 0;
-            let reach = |face: &[u32; 3]| match bounds(vertices, face, near) {
-                None => Reach::NOTHING,
-                Some(bounds) => {
-                    drawn += 1;
-                    Reach::new(bounds, radius, size)
-                }
+            let reach = |face: &[u32; 3]| {
+                let reach = Reach::around(face.map(|v| places[v as usize]), radius, size);
+                drawn += usize::from(reach.is_some());
+                reach.unwrap_or(Reach::NOTHING)
             };
             let reaches: Vec<Reach> = faces.iter().map(reach).collect();
             let (offsets, entries) = by_band(&reaches, count);

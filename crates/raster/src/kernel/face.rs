@@ -53,28 +53,18 @@ impl<T: Real> Face<T> {
     }
 }
 
-/// Bounding box of a face in NDC: lower x, upper x, lower y, upper y.
-pub(crate) type Bounds = [f64; 4];
-
-/// Bounding box of a face over `vertices` `[3, vertices]`; `None` where the face is not drawn: a
-/// corner nearer than `near`, behind the camera, not finite or farther than 1e6 NDC away.
-#[inline]
-pub(crate) fn bounds<F: Float>(vertices: &[F], face: &[u32; 3], near: f64) -> Option<Bounds> {
-    let count = vertices.len() / 3;
-    let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize]));
-    let [near, far] = [near, FAR_AWAY].map(F::from_f64);
+/// Where a vertex lies in a `size` px image: column and row, whole numbers at the centres of
+/// pixels, the top row first. Infinite for a vertex whose faces are not drawn: one nearer than
+/// `near`, behind the camera, not finite, or farther than 1e6 NDC away.
+#[inline(always)]
+pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: usize) -> [F; 2] {
+    let far = F::from_f64(FAR_AWAY);
+    let half = F::from_f64(0.5 * size as f64);
+    let middle = F::from_f64(0.5 * (size as f64 - 1.0));
     // Written so that NaN is not drawn either.
-    let drawn =
-        corners.map(|[x, y, z]| (z >= near) & (x <= far) & (x >= -far) & (y <= far) & (y >= -far));
-    if !(drawn[0] & drawn[1] & drawn[2]) {
-        return None;
-    }
-    let least = |a: F, b: F| if a < b { a } else { b };
-    let largest = |a: F, b: F| if a > b { a } else { b };
-    let over = |axis: usize, pick: fn(F, F) -> F| {
-        pick(pick(corners[0][axis], corners[1][axis]), corners[2][axis]).to_f64()
-    };
-    Some([over(0, least), over(0, largest), over(1, least), over(1, largest)])
+    let drawn = (z >= near) & (x <= far) & (x >= -far) & (y <= far) & (y >= -far);
+    let place = |at: F| if drawn { at * half + middle } else { F::from_f64(f64::INFINITY) };
+    [place(x), place(-y)]
 }
 
 /// Pixels that a face may reach: rows and columns as half-open ranges, top row first.
@@ -90,25 +80,29 @@ impl Reach {
     /// No pixel.
     pub(crate) const NOTHING: Self = Self { top: 0, bottom: 0, left: 0, right: 0 };
 
-    /// Pixels of a `size` px image whose centres lie in the bounds grown by `radius`.
-    #[inline]
-    pub(crate) fn new([x0, x1, y0, y1]: Bounds, radius: f64, size: usize) -> Self {
-        let (left, right) = columns(x0 - radius, x1 + radius, size);
-        let (top, bottom) = columns(-y1 - radius, -y0 + radius, size);
-        if left < right && top < bottom { Self { top, bottom, left, right } } else { Self::NOTHING }
+    /// Pixels of a `size` px image no farther than `radius` pixels from the bounding box of three
+    /// corners, given as [`in_pixels`] does; `None` where one of them is not drawn.
+    #[inline(always)]
+    pub(crate) fn around<F: Float>(corners: [[F; 2]; 3], radius: F, size: usize) -> Option<Self> {
+        let size = F::from_f64(size as f64);
+        // More than places of pixels are rounded by.
+        let grown = radius + size * F::from_f64(1e-6) + F::from_f64(0.5);
+        let least = |a: F, b: F| if a < b { a } else { b };
+        let largest = |a: F, b: F| if a > b { a } else { b };
+        let limit = |at: F| least(largest(at, F::ZERO), size).nearest() as u32;
+        let highest =
+            |axis: usize| largest(largest(corners[0][axis], corners[1][axis]), corners[2][axis]);
+        let range = |axis: usize| {
+            let low = least(least(corners[0][axis], corners[1][axis]), corners[2][axis]);
+            (limit(low - grown + F::ONE), limit(highest(axis) + grown))
+        };
+        if highest(0) == F::from_f64(f64::INFINITY) {
+            return None;
+        }
+        let ((left, right), (top, bottom)) = (range(0), range(1));
+        let some = left < right && top < bottom;
+        Some(if some { Self { top, bottom, left, right } } else { Self::NOTHING })
     }
-}
-
-/// Columns of a `size` px image whose centres lie in [low, high] (NDC), as a half-open range.
-#[inline]
-fn columns(low: f64, high: f64, size: usize) -> (u32, u32) {
-    let size = size as f64;
-    // The first centre at or after `low`, and the first after `high`. A cast truncates, at once on
-    // every instruction set; ceil and floor may be calls.
-    let start = (((low + 1.0) * size - 1.0) * 0.5).clamp(0.0, size);
-    let end = (((high + 1.0) * size + 1.0) * 0.5).clamp(0.0, size);
-    let whole = start as u32;
-    (whole + u32::from(f64::from(whole) < start), end as u32)
 }
 
 /// The three edges of a face as limits on x in a given row.
@@ -194,15 +188,16 @@ pub(crate) fn inside_spans<F: Float>(
     size: usize,
     mut fill: impl FnMut(usize, usize, usize),
 ) {
-    let Some(bounds) = bounds(vertices, face, near) else { return };
     // Exact decisions: the edge functions of the corners as given, in f64.
     let count = vertices.len() / 3;
-    let [xs, ys] = [0, 1].map(|axis| face.map(|v| vertices[axis * count + v as usize].to_f64()));
-    let face = Face::<f64>::new(xs, ys);
+    let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize].to_f64()));
+    let Some(reach) = Reach::around(corners.map(|at| in_pixels(at, near, size)), 0.0, size) else {
+        return;
+    };
+    let face = Face::<f64>::new(corners.map(|at| at[0]), corners.map(|at| at[1]));
     if face.orientation == 0.0 {
         return;
     }
-    let reach = Reach::new(bounds, 0.0, size);
     let (left, right) = (reach.left as usize, reach.right as usize);
     for row in reach.top as usize..reach.bottom as usize {
         let y = pixel_centre(size - 1 - row, size);
