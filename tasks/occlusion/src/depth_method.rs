@@ -1,4 +1,4 @@
-use softrast_method::{numbers, tensor};
+use softrast_method::{Searched, numbers, tensor};
 use softrast_raster::DefaultBackend;
 use softrast_runner::{Error, Settings, SoftnessChoice};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
@@ -51,7 +51,9 @@ impl DepthMethod {
             }
             return Ok(Self { softness, phi: softness.default_phi(1.0), name, scale: None });
         }
-        let scale = args.depth_scale.unwrap_or(DEPTH_SCALE);
+        let searched = Searched::of("occlusion", softness.name());
+        let searched = searched.and_then(|found| found.depth_scale);
+        let scale = args.depth_scale.or(settings.own).or(searched).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()
     }
 
