@@ -53,10 +53,8 @@ impl TaskName {
     /// Seeds of a quick one.
     pub(crate) fn quick_runs(self) -> u32 {
         match self {
-            Self::Shape2d => 2,
-            Self::Shape3d => 1,
-            Self::Pose => 10,
-            Self::Occlusion => 20,
+            Self::Shape2d | Self::Shape3d => 1,
+            Self::Pose | Self::Occlusion => 5,
         }
     }
 }
