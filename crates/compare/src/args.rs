@@ -72,3 +72,22 @@ impl Args {
         Ok(cells.collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(line: &str) -> Args {
+        Args::parse_from(["compare"].into_iter().chain(line.split_whitespace()))
+    }
+
+    #[test]
+    fn cells_go_through_tasks_variants_and_methods() {
+        let cells = args("--quick").cells().unwrap();
+        assert_eq!(cells.len(), 4 * 2 * 5);
+        assert_eq!((cells[0].task, cells[5].variant), (TaskName::Shape2d, "transfer"));
+        let some = args("--tasks pose --methods gauss,a/b.json --runs 7").cells().unwrap();
+        assert!(some.len() == 4 && some[3].runs == 7 && some[3].method_name() == "b");
+        assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));
+    }
+}

@@ -178,3 +178,43 @@ fn in_papers_unit(one: &Measured) -> (f64, Option<f64>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::Cell;
+
+    /// A cell whose hard errors by seed are these.
+    fn measured(method: &str, per_run: [f64; 3]) -> Measured {
+        let task = TaskName::Pose;
+        let cell = Cell { task, variant: "original", method: method.to_owned(), runs: 3 };
+        let mean = per_run.iter().sum::<f64>() / 3.0;
+        let error = json!({"name": "hard", "unit": "", "final": mean, "ci95": [0.0, 1.0], "per_run": per_run});
+        let with = |key: &str| {
+            let mut main = error.clone();
+            main[key] = error.clone();
+            main
+        };
+        let json: Value = json!({
+            "image_error": with("hard"), "parameter_error": with("released"), "success_rate": 0.5,
+            "seconds": {"step_median": 0.01}, "steps": 300, "size": 64, "faces": 9,
+            "settings": {"scale": 0.03, "scale_end": 0.002, "learning_rate": 0.3},
+        });
+        Measured::new(cell, &json).unwrap()
+    }
+
+    #[test]
+    fn a_table_has_our_figures_their_differences_and_the_papers() {
+        let table = markdown(
+            &[measured("logistic", [0.1, 0.2, 0.3]), measured("gauss", [0.2, 0.3, 0.4])],
+            "x",
+        );
+        let row = table.lines().find(|line| line.starts_with("| gauss")).unwrap();
+        let expected = "| gauss | scale 0.0300 to 0.00200, rate 0.300 | 0.300 (0.00 to 1.00) | \
+                        **0.100 (0.100 to 0.100)** | 0.300 (0.00 to 1.00) | 50 % | 7.20 / 7.20 | \
+                        15.3 / 0.190 |";
+        assert_eq!(row, expected);
+    }
+}
