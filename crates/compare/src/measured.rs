@@ -59,7 +59,7 @@ impl Measured {
         };
         let settings = &json["settings"];
         let named = |(key, name): (&str, &str)| {
-            settings[key].as_f64().map(|value| format!("{name} {}", short(value)))
+            settings[key].as_f64().map(|value| format!("{name} {}", plain(value)))
         };
         let first = settings["scale"].as_f64();
         let end =
@@ -101,22 +101,35 @@ impl Error {
 
 /// A number with three digits that count.
 pub(crate) fn short(x: f64) -> String {
-    let magnitude = if x == 0.0 { 0.0 } else { x.abs().log10().floor() };
-    match magnitude as i32 {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    match x.abs().log10().floor() as i32 {
         digits @ -4..=2 => format!("{x:.*}", (2 - digits) as usize),
         3..6 => format!("{x:.0}"),
         _ => format!("{x:.2e}"),
     }
 }
 
+/// A number of three digits as one would type it.
+fn plain(x: f64) -> String {
+    let rounded = format!("{x:.2e}").parse().unwrap_or(x);
+    if rounded < 1e-4 { format!("{rounded:e}") } else { rounded.to_string() }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::short;
+    use super::{plain, short};
+
+    #[test]
+    fn settings_are_as_one_would_type_them() {
+        assert_eq!([0.03, 0.0005, 1e-6, 0.7000001].map(plain), ["0.03", "0.0005", "1e-6", "0.7"]);
+    }
 
     #[test]
     fn three_digits_count() {
         let shown = [0.0, 0.00123, 0.0456, 1.234, 56.78, 234.5, 12345.0, 1.5e-7].map(short);
-        let expected = ["0.00", "0.00123", "0.0456", "1.23", "56.8", "234", "12345", "1.50e-7"];
+        let expected = ["0", "0.00123", "0.0456", "1.23", "56.8", "234", "12345", "1.50e-7"];
         assert_eq!(shown, expected);
     }
 }

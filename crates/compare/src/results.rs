@@ -1,7 +1,8 @@
 //! Tables 2 and 3 as Markdown.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
+use softrast_method::Searched;
 use softrast_runner::{bootstrap_mean_interval, mean};
 
 use crate::{Error, Measured, Printed, TaskName, measured::short};
@@ -36,8 +37,9 @@ const HEAD: &str = "# Results\n\nTables 2 and 3 of the paper (Wu et al. 2024) wi
 const READING: &str = "\
 Errors are means over runs at the last step, in brackets the 95 % interval of the mean (bootstrap). All methods start from the
 same seeds, 0 and those that follow, which no setting was chosen on, and share everything but softness, scale and learning rate.
-Those of each family come from `search` on training seeds of the original variant; the transfer keeps them (POSE and OCCLUSION
-have a learning rate of their own there). `mlp` is the network before it has learned anything. Methods are compared by the error
+What `search` found for a family on training seeds of the original variant stands in `crates/method/searched.json`; the transfer
+keeps it (POSE and OCCLUSION have a learning rate of their own there). Settings with a * were not searched for: they are the
+task's own, found with a logistic. `mlp` is the network before it has learned anything. Methods are compared by the error
 of the **hard** image, because a method's own soft error falls with its scale. \"Less NAME\" is the mean of the
 differences in that error to the first method, seed by seed: below 0 is better, and in bold where its interval leaves out 0. Under
 \"in the paper's unit\" stand image and parameter error as the paper has them, as far as its definitions are known, and beside them
@@ -123,9 +125,11 @@ fn errors(measured: &[&Measured]) -> String {
         let printed = Printed::of(one.cell.task, one.cell.variant, name);
         let printed = printed.map(|printed| pair(printed.image, printed.parameter));
         let (image, parameter) = in_papers_unit(one);
+        let searched = Searched::of(one.cell.task.name(), name).is_some();
+        let star = if searched || Path::new(&one.cell.method).exists() { "" } else { " *" };
         let _ = writeln!(
             text,
-            "| {name} | {} | {} | {difference} | {} | {:.0} % | {} | {} |",
+            "| {name} | {}{star} | {} | {difference} | {} | {:.0} % | {} | {} |",
             one.settings,
             with_interval(&one.hard),
             with_interval(&one.parameter),
@@ -212,8 +216,8 @@ mod tests {
             "x",
         );
         let row = table.lines().find(|line| line.starts_with("| gauss")).unwrap();
-        let expected = "| gauss | scale 0.0300 to 0.00200, rate 0.300 | 0.300 (0.00 to 1.00) | \
-                        **0.100 (0.100 to 0.100)** | 0.300 (0.00 to 1.00) | 50 % | 7.20 / 7.20 | \
+        let expected = "| gauss | scale 0.03 to 0.002, rate 0.3 * | 0.300 (0 to 1.00) | \
+                        **0.100 (0.100 to 0.100)** | 0.300 (0 to 1.00) | 50 % | 7.20 / 7.20 | \
                         15.3 / 0.190 |";
         assert_eq!(row, expected);
     }
