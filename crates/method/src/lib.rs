@@ -1,7 +1,8 @@
 //! What all tasks share: a softness, how its scale moves over the steps, drawing with it, and the
 //! steps themselves.
 //!
-//! A [`Method`] is what the command line names: a softness family or file with a path of scales. A
+//! A [`Method`] is what the command line names: a softness family or file with a path of scales, where
+//! nobody says otherwise the one that [`Searched`] has for the task. A
 //! [`MovingSilhouette`] draws with it, and prepares support and knots anew only when the scale has
 //! moved so far that it must. A [`Descent`] goes down the gradient of a task's loss and shows every
 //! step.
@@ -12,9 +13,11 @@ compile_error!("softrast-method needs a backend: turn on one of the features nda
 mod descent;
 mod method;
 mod moving_silhouette;
+mod searched;
 mod tensor;
 
 pub use descent::{Descent, Moment};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;
+pub use searched::Searched;
 pub use tensor::{numbers, tensor};

@@ -2,11 +2,14 @@ use softrast_raster::DefaultBackend;
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
 
-use crate::{numbers, tensor};
+use crate::{Searched, numbers, tensor};
 
-/// Scales of a task that the command line does not name, as widths in NDC.
+/// Scales of a task that the command line does not name, as widths in NDC. A family that
+/// [`Searched`] knows has its own instead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Defaults {
+    /// Name of the task.
+    pub task: &'static str,
     /// How the scale moves if neither a schedule nor a scale is given.
     pub schedule: Schedule,
     /// First and last scale of a decay.
@@ -63,10 +66,15 @@ impl Method {
                 };
                 let family: Family = name.parse()?;
                 let softness = EdgeSoftness { family, squared: settings.squared };
-                let path = scale_path(settings, defaults);
+                let path = scale_path(settings, &defaults.searched(family));
                 Ok(Self { softness, name: family.name().to_owned(), path })
             }
         }
+    }
+
+    /// What was searched for this family on a task.
+    pub fn searched(&self, task: &str) -> Option<&'static Searched> {
+        Searched::of(task, &self.name)
     }
 
     /// Name of the family, or of the file.
@@ -107,6 +115,21 @@ impl Method {
         match &self.path {
             Path::Fixed { phi, .. } => phi.clone(),
             Path::Scale { .. } => self.softness.default_phi(scale),
+        }
+    }
+}
+
+impl Defaults {
+    /// With the schedule and the scale that were searched for a family of this task.
+    fn searched(self, family: Family) -> Self {
+        match Searched::of(self.task, family.name()) {
+            None => self,
+            Some(&Searched { scale, scale_end: None, .. }) => {
+                Self { schedule: Schedule::Static, fixed: scale, ..self }
+            }
+            Some(&Searched { scale, scale_end: Some(end), .. }) => {
+                Self { schedule: Schedule::Decay, decay: [scale, end], ..self }
+            }
         }
     }
 }
@@ -155,7 +178,7 @@ mod tests {
     use super::*;
 
     const DEFAULTS: Defaults =
-        Defaults { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+        Defaults { task: "none", schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
 
     /// First, middle and last scale of the method that a command line gives.
     fn scales(line: &str) -> [f64; 3] {

@@ -9,11 +9,24 @@ pub struct Grid {
     pub scales: Vec<f64>,
     /// Learning rates, ascending. Empty where the task has none.
     pub learning_rates: Vec<f64>,
+    /// A number that only this task has. The task finds the value to try in [`Settings::own`].
+    ///
+    /// [`Settings::own`]: crate::Settings::own
+    pub own: Option<OwnAxis>,
     /// Values of the fine grid between the best value and each of its neighbours, evenly spaced in
     /// the logarithm.
     pub fine: usize,
     /// Training seeds that every setting is tried on.
     pub runs: usize,
+}
+
+/// Values to try for a flag of the task, as they stand on the command line.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OwnAxis {
+    /// The flag without dashes, such as `depth-scale`.
+    pub flag: &'static str,
+    /// Values, ascending and positive.
+    pub values: Vec<f64>,
 }
 
 /// Ratio of neighbours where nothing asks for another: half a decade.
@@ -45,7 +58,7 @@ impl Grid {
         });
         let rates = number("learning_rate");
         let learning_rates = rates.map_or_else(Vec::new, |rate| geometric(rate, RATIO, -1..=1));
-        Self { scales, learning_rates, fine: 1, runs: 8 }
+        Self { scales, learning_rates, own: None, fine: 1, runs: 8 }
     }
 }
 

@@ -14,15 +14,19 @@ const TOP: f64 = 52.0;
 /// Dark for low errors, light for high ones.
 const COLOURS: [[f64; 3]; 2] = [[23.0, 78.0, 140.0], [238.0, 243.0, 249.0]];
 
-/// Mean scores as SVG: a row for every scale or decay, a column for every learning rate.
+/// Mean scores as SVG: a row for every scale or decay (and number of the task's own), a column for
+/// every learning rate.
 ///
 /// The colours go from the lowest mean to the upper quartile of all; worse is as light as that. The
 /// best has a frame, and what was not tried stays white.
 pub(crate) fn svg(cells: &[Cell]) -> String {
     let rows = sorted(
         cells,
-        |s| (s.scale_end.is_some(), s.scale, s.scale_end),
-        |a, b| (a.0.cmp(&b.0)).then(order(a.1, b.1)).then(order(a.2, b.2)),
+        |s| (s.scale_end.is_some(), s.scale, s.scale_end, s.own.map(|(_, value)| value)),
+        |a, b| {
+            let scales = order(a.1, b.1).then(order(a.2, b.2));
+            a.0.cmp(&b.0).then(scales).then(order(a.3, b.3))
+        },
     );
     let columns = sorted(cells, |s| s.learning_rate, |a, b| order(*a, *b));
     let means: Vec<f64> = cells.iter().filter_map(|cell| cell.mean).collect();
@@ -38,22 +42,26 @@ pub(crate) fn svg(cells: &[Cell]) -> String {
             "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\" fill=\"{fill}\">{word}</text>\n"
         )
     };
-    text += &word(LEFT - 10.0, TOP - 10.0, "end", "#57606a", "scale");
+    let own = cells.first().and_then(|cell| cell.setting.own);
+    let own = own.map(|(flag, _)| format!(", {}", flag.replace('-', " "))).unwrap_or_default();
+    text += &word(LEFT - 10.0, TOP - 10.0, "end", "#57606a", &format!("scale{own}"));
     text += &word(LEFT + 4.0, TOP - 32.0, "start", "#57606a", "learning rate");
     for (k, rate) in columns.iter().enumerate() {
         let x = LEFT + CELL[0] * (k as f64 + 0.5);
         text += &word(x, TOP - 10.0, "middle", "#1f2328", &rate.map_or("own".into(), exact));
     }
-    for (k, (_, scale, end)) in rows.iter().enumerate() {
+    for (k, (_, scale, end, own)) in rows.iter().enumerate() {
         let y = TOP + CELL[1] * (k as f64 + 0.7);
         let end = end.map(|end| format!(" → {}", exact(end))).unwrap_or_default();
-        let label = format!("{}{end}", scale.map_or("own".into(), exact));
+        let own = own.map(|own| format!(", {}", exact(own))).unwrap_or_default();
+        let label = format!("{}{end}{own}", scale.map_or("own".into(), exact));
         text += &word(LEFT - 10.0, y, "end", "#1f2328", &label);
     }
     let best = best(cells).map(|cell| cell.setting);
     for cell in cells {
-        let Setting { scale, scale_end, learning_rate } = cell.setting;
-        let row = rows.iter().position(|row| (row.1, row.2) == (scale, scale_end));
+        let Setting { scale, scale_end, learning_rate, own } = cell.setting;
+        let own = own.map(|(_, value)| value);
+        let row = rows.iter().position(|row| (row.1, row.2, row.3) == (scale, scale_end, own));
         let column = columns.iter().position(|rate| *rate == learning_rate);
         let (Some(row), Some(column)) = (row, column) else { continue };
         let (x, y) = (LEFT + CELL[0] * column as f64, TOP + CELL[1] * row as f64);

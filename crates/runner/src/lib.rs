@@ -47,7 +47,7 @@ mod task;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pub use error::{Error, Failure};
-pub use grid::Grid;
+pub use grid::{Grid, OwnAxis};
 pub use memory::peak_rss_mib;
 pub use picture::{contact_sheet, difference, rgb_from_gray, rgb_from_planes};
 pub use program::{execute, main};

@@ -223,7 +223,12 @@ mod tests {
     fn cell(scale: f64, mean: Option<f64>, non_finite: usize) -> Cell {
         Cell {
             grid: Stage::Coarse,
-            setting: Setting { scale: Some(scale), scale_end: None, learning_rate: None },
+            setting: Setting {
+                scale: Some(scale),
+                scale_end: None,
+                learning_rate: None,
+                own: None,
+            },
             mean,
             n: 4 - non_finite,
             non_finite,

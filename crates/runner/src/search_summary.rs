@@ -80,8 +80,8 @@ impl SearchSummary {
         let edges = space.at_edge(best.setting, &tried);
         let warning = |flag: &&str| {
             format!(
-                "the best {flag} lies at the edge of what was tried: a wider --scales or \
-                 --learning-rates may hold a better one"
+                "the best --{flag} lies at the edge of what was tried, and may lie beyond: give \
+                 --scales, --learning-rates or the flag itself"
             )
         };
         let warnings =
@@ -141,21 +141,25 @@ impl SearchSummary {
 
     /// All cells as CSV, one row each.
     ///
-    /// Columns: `grid,scale,scale_end,learning_rate,mean,n,non_finite,success_rate,seconds`; a field
-    /// without a value is empty.
+    /// Columns: `grid,scale,scale_end,learning_rate,mean,n,non_finite,success_rate,seconds`, and last
+    /// the task's own number if it has one; a field without a value is empty.
     pub(crate) fn csv(&self) -> String {
         let mut text = String::from(
-            "grid,scale,scale_end,learning_rate,mean,n,non_finite,success_rate,seconds\n",
+            "grid,scale,scale_end,learning_rate,mean,n,non_finite,success_rate,seconds",
         );
+        let own = self.best.cell.setting.own.map(|(flag, _)| format!(",{flag}"));
+        text += &own.unwrap_or_default().replace('-', "_");
+        text.push('\n');
         let field = |x: Option<f64>| x.map(exact).unwrap_or_default();
         for cell in &self.cells {
             let grid = if cell.grid == Stage::Coarse { "coarse" } else { "fine" };
-            let Setting { scale, scale_end, learning_rate } = cell.setting;
+            let Setting { scale, scale_end, learning_rate, own } = cell.setting;
             let [scale, end, rate, mean] = [scale, scale_end, learning_rate, cell.mean].map(field);
+            let own = own.map(|(_, value)| format!(",{}", exact(value))).unwrap_or_default();
             // Writing to a string does not fail.
             let _ = writeln!(
                 text,
-                "{grid},{scale},{end},{rate},{mean},{},{},{},{}",
+                "{grid},{scale},{end},{rate},{mean},{},{},{},{}{own}",
                 cell.n, cell.non_finite, cell.success_rate, cell.seconds
             );
         }

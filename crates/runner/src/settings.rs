@@ -48,6 +48,10 @@ pub struct Settings {
     #[arg(skip)]
     pub command: Command,
 
+    /// The value that `search` tries for the flag of [`Grid::own`](crate::Grid::own).
+    #[arg(skip)]
+    pub own: Option<f64>,
+
     /// Variant of the task: the one a softness is tuned on, or the one it is transferred to.
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,

@@ -1,9 +1,9 @@
-use softrast_method::{numbers, tensor};
+use softrast_method::{Searched, numbers, tensor};
 use softrast_raster::DefaultBackend;
-use softrast_runner::{Error, Settings, SoftnessChoice};
+use softrast_runner::{Error, Settings, SoftnessChoice, Task};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
 
-use crate::{Args, args::DepthSoftnessChoice};
+use crate::{Args, Occlusion, args::DepthSoftnessChoice};
 
 /// Width of the soft depth unless the command line names one, in units of the distance between the
 /// planes.
@@ -51,7 +51,9 @@ impl DepthMethod {
             }
             return Ok(Self { softness, phi: softness.default_phi(1.0), name, scale: None });
         }
-        let scale = args.depth_scale.unwrap_or(DEPTH_SCALE);
+        let searched = Searched::of(Occlusion::NAME, softness.name());
+        let searched = searched.and_then(|found| found.depth_scale);
+        let scale = args.depth_scale.or(settings.own).or(searched).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()
     }
 

@@ -2,8 +2,8 @@ use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
-    Settings, Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Point, Progress, Run,
+    Schedule, Score, Settings, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -25,13 +25,22 @@ const BATCH: usize = 10;
 /// 100 % at 0.0005 and at 0.002, 90 and 100 % at 0.005, 48 and 70 % at 0.02, where near quads bleed
 /// over the background and over one another. At 64 pixels, `evaluate --runs 50` succeeds in 100 % of
 /// runs (95 % interval from 93 %), and `evaluate --variant transfer --runs 200` in 100 % (from 98 %).
-const SCALES: Defaults =
-    Defaults { schedule: Schedule::Static, decay: [0.02, 0.0005], fixed: 0.0005 };
+const SCALES: Defaults = Defaults {
+    task: Occlusion::NAME,
+    schedule: Schedule::Static,
+    decay: [0.02, 0.0005],
+    fixed: 0.0005,
+};
+
+/// Widths of the soft depth that a search tries.
+const DEPTH_SCALES: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
 
 /// The prepared task.
 pub struct Occlusion {
     problem: Problem,
     solver: Solver,
+    /// The width of the soft depth was not asked for, but is there to be chosen.
+    depth_is_free: bool,
 }
 
 impl Task for Occlusion {
@@ -43,18 +52,21 @@ impl Task for Occlusion {
         // The transfer has to cross 3.5 world units in ten steps. Front quads found of 50 with
         // `evaluate --variant transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 %
         // at 0.7 and at 1.4.
+        let edge = Method::new(settings, &SCALES)?;
+        let searched = edge.searched(Self::NAME).and_then(|found| found.learning_rate);
         let (steps, learning_rate) = match settings.variant {
-            Variant::Original => (100, 0.03),
+            Variant::Original => (100, searched.unwrap_or(0.03)),
             Variant::Transfer => (10, 0.7),
         };
         let solver = Solver {
-            edge: Method::new(settings, &SCALES)?,
+            edge,
             depth: DepthMethod::new(settings, args)?,
             size: settings.size.unwrap_or(64),
             steps: settings.steps.unwrap_or(steps),
             learning_rate: settings.learning_rate.unwrap_or(learning_rate),
         };
-        Ok(Self { problem: Problem::of(settings.variant), solver })
+        let depth_is_free = args.depth_scale.is_none() && solver.depth.scale.is_some();
+        Ok(Self { problem: Problem::of(settings.variant), solver, depth_is_free })
     }
 
     fn describe(&self) -> Description {
@@ -102,6 +114,14 @@ impl Task for Occlusion {
     /// What can be seen of the result; the soft error of a method falls with its scale.
     fn score(&self) -> Score {
         Score::Extra("hard")
+    }
+
+    /// The edge of the task and a wider one, because edges stay where they are, and several depths.
+    fn grid(&self) -> Grid {
+        let around = Grid::around(&self.describe().settings);
+        let own = OwnAxis { flag: "depth-scale", values: DEPTH_SCALES.to_vec() };
+        let scales = around.scales.into_iter().skip(2).step_by(2).collect();
+        Grid { scales, own: self.depth_is_free.then_some(own), ..around }
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {

@@ -137,6 +137,18 @@ fn a_softness_that_tells_no_depths_apart_is_said_to_be_so() {
 }
 
 #[test]
+fn a_search_chooses_the_width_of_the_soft_depth_unless_it_is_named() {
+    let line = "search --size 8 --steps 2 --runs 1 --search-runs 1 --schedule static --scale 1e-3 \
+                --learning-rates 0.03,0.3";
+    let searched = |more: &str| run(&format!("{line} {more}")).unwrap()["search"].clone();
+    let free = searched("");
+    assert!(free["best"]["flags"].as_str().unwrap().contains("--depth-scale"), "{free}");
+    assert!(free["cells"].as_array().unwrap().len() > 2 * 4);
+    let named = searched("--depth-scale 0.2");
+    assert!(!named["best"]["flags"].as_str().unwrap().contains("--depth-scale"), "{named}");
+}
+
+#[test]
 fn one_pixel_ends_with_finite_numbers_and_a_warning() {
     for variant in ["original", "transfer"] {
         assert_finite(&run(&format!("--size 1 --steps 5 --variant {variant}")).unwrap());

@@ -34,7 +34,8 @@ const BATCH: usize = 25;
 /// 55 degrees away 41 succeed at 0.002, and 48 with a decay to it from 0.03 (from 0.01: 45, from
 /// 0.05: 47). This is below the quarter of a pixel that META 6.6 asks for, because thousands of
 /// small faces add up to an edge that is wider than that of one (META 6.7).
-const SCALES: Defaults = Defaults { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+const SCALES: Defaults =
+    Defaults { task: Pose::NAME, schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
 
 /// The prepared task.
 pub struct Pose {
@@ -59,12 +60,14 @@ impl Task for Pose {
     type Args = Args;
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
+        let method = Method::new(settings, &SCALES)?;
+        let searched = method.searched(Self::NAME).and_then(|found| found.learning_rate);
         let (steps, learning_rate) = match settings.variant {
-            Variant::Original => (300, 0.3),
+            Variant::Original => (300, searched.unwrap_or(0.3)),
             Variant::Transfer => (150, 0.5),
         };
         let solver = Solver {
-            method: Method::new(settings, &SCALES)?,
+            method,
             size: settings.size.unwrap_or(64),
             steps: settings.steps.unwrap_or(steps),
             learning_rate: settings.learning_rate.unwrap_or(learning_rate),

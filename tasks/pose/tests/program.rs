@@ -5,6 +5,7 @@
 use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
+use softrast_mesh::{Mesh, icosphere};
 use softrast_runner::Failure;
 
 /// Runs a command line with results in `out`; its JSON line.
@@ -111,8 +112,22 @@ fn a_mesh_around_the_camera_ends_with_finite_numbers() {
 }
 
 #[test]
+fn a_mesh_that_fills_the_view_is_said_to_do_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("ball.obj");
+    let ball = icosphere(1);
+    let large = ball.positions().iter().map(|p| p.map(|x| 2.2 * x)).collect();
+    Mesh::new(large, ball.faces().to_vec()).unwrap().write_obj(&mesh).unwrap();
+    let json = run(&format!("--size 16 --steps 3 --mesh {}", mesh.display())).unwrap();
+    assert_finite(&json);
+    assert!(warnings(&json).contains("fills the whole target image"), "{json}");
+}
+
+#[test]
 fn one_pixel_and_one_face_end_with_finite_numbers() {
-    assert_finite(&run("--size 1 --steps 5").unwrap());
+    let pixel = run("--size 1 --steps 5").unwrap();
+    assert_finite(&pixel);
+    assert!(warnings(&pixel).contains("fills the whole target image"), "{pixel}");
     let face = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     assert_finite(&with_mesh(face, "--size 16 --steps 20").unwrap());
     let point = "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n";

@@ -23,8 +23,12 @@ const SUCCESS: f64 = 0.02;
 /// at 0.0015, 0.0024 at 0.002, 0.0035 at 0.003 and 0.0078 at 0.005; with a decay to 0.002 0.0031 from
 /// 0.01 and 0.0029 from 0.02 or 0.04, to 0.001 from 0.02 0.0034. Skyline: 0.0108 at 0.002, and 0.0156
 /// with a decay to it from 0.02, which sees one white sheet at first.
-const SCALES: Defaults =
-    Defaults { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002 };
+const SCALES: Defaults = Defaults {
+    task: Shape2d::NAME,
+    schedule: Schedule::Static,
+    decay: [0.02, 0.002],
+    fixed: 0.002,
+};
 /// Largest move of a coordinate in a step, roughly, in NDC: about a pixel of the default size.
 ///
 /// Hard mean squared errors on the letters end at 0.0026 with 0.005, 0.0024 with 0.01 and 0.0034 with
@@ -45,11 +49,14 @@ impl Task for Shape2d {
     type Args = Args;
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
+        let method = Method::new(settings, &SCALES)?;
+        let searched = method.searched(Self::NAME).and_then(|found| found.learning_rate);
+        let learning_rate = settings.learning_rate.or(searched).unwrap_or(LEARNING_RATE);
         let solver = Solver {
-            method: Method::new(settings, &SCALES)?,
+            method,
             size: settings.size.unwrap_or(256),
             steps: settings.steps.unwrap_or(200),
-            learning_rate: settings.learning_rate.unwrap_or(LEARNING_RATE),
+            learning_rate,
         };
         let (triangles, logo) = match settings.variant {
             Variant::Original => (800, "letters"),

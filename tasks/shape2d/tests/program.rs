@@ -103,7 +103,9 @@ fn empty_full_and_gray_targets_end_with_finite_numbers() {
 
 #[test]
 fn one_pixel_and_one_triangle_end_with_finite_numbers() {
-    assert_finite(&run("--size 1 --steps 5").unwrap());
+    let pixel = run("--size 1 --steps 5").unwrap();
+    assert_finite(&pixel);
+    assert!(warnings(&pixel).contains("nothing white"), "{pixel}");
     assert_finite(&run("--triangles 1 --size 16 --steps 20 --learning-rate 0.1").unwrap());
 }
 

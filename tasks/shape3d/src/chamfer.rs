@@ -1,5 +1,4 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
-use rayon::prelude::*;
 
 use crate::nearest::Nearest;
 
@@ -21,8 +20,7 @@ const FACTOR: f64 = 1e3;
 ///
 /// Not in the paper: a definition. Source of this one: FACTS 6, row 17.
 pub struct Chamfer {
-    points: Vec<[f64; 3]>,
-    nearest: Nearest,
+    target: Nearest,
 }
 
 impl Chamfer {
@@ -32,8 +30,7 @@ impl Chamfer {
     ///
     /// If there is no face, or a face uses a vertex that is not there.
     pub fn new(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Self {
-        let points = spread(positions, faces, SEEDS[0]);
-        Self { nearest: Nearest::new(points.clone()), points }
+        Self { target: Nearest::new(spread(positions, faces, SEEDS[0])) }
     }
 
     /// The distance of the surface with these vertices and faces.
@@ -42,17 +39,10 @@ impl Chamfer {
     ///
     /// As [`Chamfer::new`].
     pub fn distance(&self, positions: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
-        let points = spread(positions, faces, SEEDS[1]);
-        let nearest = Nearest::new(points.clone());
-        0.5 * FACTOR * (mean_squared(&points, &self.nearest) + mean_squared(&self.points, &nearest))
+        let surface = Nearest::new(spread(positions, faces, SEEDS[1]));
+        let there = surface.mean_squared_distance(&self.target);
+        0.5 * FACTOR * (there + self.target.mean_squared_distance(&surface))
     }
-}
-
-/// Mean squared distance of points to the nearest of others.
-fn mean_squared(points: &[[f64; 3]], others: &Nearest) -> f64 {
-    // Collected, then summed in order: the sum does not depend on the number of threads.
-    let squared: Vec<f64> = points.par_iter().map(|&p| others.squared_distance(p)).collect();
-    squared.iter().sum::<f64>() / points.len() as f64
 }
 
 /// Points on a surface, evenly by area.

@@ -1,17 +1,25 @@
+use rayon::prelude::*;
+
 /// Points in a range of at most this length are compared one by one.
-const LEAF: usize = 8;
+const LEAF: usize = 16;
+/// Points that look for their nearest ones together: neighbours have much of the way in common, and
+/// their distances to a point are straight vector code.
+const GROUP: usize = 8;
 
 /// Points sorted so that the nearest one is found without looking at all: a k-d tree.
 ///
 /// The middle point of a range splits it along one axis: those before it are not beyond it, those
 /// after it are not before it. Source: Bentley 1975.
 pub(crate) struct Nearest {
+    /// Neighbours in this order are neighbours in space, by and large.
     points: Vec<[f64; 3]>,
     /// Axis of the split at each point that splits.
     axes: Vec<u8>,
-    /// Lowest and highest corner of the box around all points.
-    bounds: [[f64; 3]; 2],
+    bounds: Bounds,
 }
+
+/// Lowest and highest corner of a box.
+type Bounds = [[f64; 3]; 2];
 
 impl Nearest {
     pub(crate) fn new(mut points: Vec<[f64; 3]>) -> Self {
@@ -21,13 +29,80 @@ impl Nearest {
         Self { points, axes, bounds }
     }
 
-    /// Squared distance from `p` to the nearest point; infinite if there is none.
-    pub(crate) fn squared_distance(&self, p: [f64; 3]) -> f64 {
-        let [low, high] = self.bounds;
-        let outside = [0, 1, 2].map(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0));
-        let mut best = f64::INFINITY;
-        search(&self.points, &self.axes, p, outside, &mut best);
-        best
+    /// Mean over these points of the squared distance to the nearest of others; infinite if there
+    /// is no other.
+    pub(crate) fn mean_squared_distance(&self, others: &Self) -> f64 {
+        // Collected, then summed in order: the sum does not depend on the number of threads.
+        let groups = self.points.par_chunks(GROUP);
+        let squared: Vec<f64> = groups.map(|group| others.sum_of_squares(group)).collect();
+        squared.iter().sum::<f64>() / self.points.len() as f64
+    }
+
+    /// Sum over a few points of the squared distance to the nearest of these.
+    fn sum_of_squares(&self, points: &[[f64; 3]]) -> f64 {
+        let mut group = Group::new(points);
+        let ([low, high], [least, most]) = (self.bounds, group.bounds);
+        let outside = [0, 1, 2].map(|k| (low[k] - most[k]).max(least[k] - high[k]).max(0.0));
+        group.search(&self.points, &self.axes, outside);
+        group.best[..points.len()].iter().sum()
+    }
+}
+
+/// Points that look for their nearest ones together; if they are few, the last one several times.
+struct Group {
+    /// By axis.
+    at: [[f64; GROUP]; 3],
+    bounds: Bounds,
+    /// Squared distance of each to the nearest point met, and the largest of them.
+    best: [f64; GROUP],
+    worst: f64,
+}
+
+impl Group {
+    fn new(points: &[[f64; 3]]) -> Self {
+        let point = |k: usize| points[k.min(points.len() - 1)];
+        Self {
+            at: [0, 1, 2].map(|axis| std::array::from_fn(|k| point(k)[axis])),
+            bounds: bounds(points),
+            best: [f64::INFINITY; GROUP],
+            worst: f64::INFINITY,
+        }
+    }
+
+    /// `outside` is how far the group is from the box of these points along each axis: a lower
+    /// bound that leaves out whole ranges, however far all points are.
+    ///
+    /// Source: Arya and Mount 1993 (incremental distance).
+    fn search(&mut self, points: &[[f64; 3]], axes: &[u8], outside: [f64; 3]) {
+        if points.len() <= LEAF {
+            points.iter().for_each(|q| self.meet(q));
+            self.worst = self.best.iter().copied().fold(0.0, f64::max);
+            return;
+        }
+        let middle = points.len() / 2;
+        let (axis, split) = (usize::from(axes[middle]), points[middle]);
+        self.meet(&split);
+        let [low, high] = self.bounds.map(|corner| corner[axis] - split[axis]);
+        let before = (&points[..middle], &axes[..middle]);
+        let after = (&points[middle + 1..], &axes[middle + 1..]);
+        // On the side of the middle of the group first.
+        let (near, far, gap) =
+            if low + high < 0.0 { (before, after, -high) } else { (after, before, low) };
+        self.search(near.0, near.1, outside);
+        let mut across = outside;
+        across[axis] = across[axis].max(gap);
+        if across.iter().map(|x| x * x).sum::<f64>() < self.worst {
+            self.search(far.0, far.1, across);
+        }
+    }
+
+    fn meet(&mut self, q: &[f64; 3]) {
+        for k in 0..GROUP {
+            let [x, y, z] = [0, 1, 2].map(|axis| self.at[axis][k] - q[axis]);
+            let squared = x * x + y * y + z * z;
+            // Not `f64::min`, which looks for NaN as well.
+            self.best[k] = if squared < self.best[k] { squared } else { self.best[k] };
+        }
     }
 }
 
@@ -52,36 +127,11 @@ fn widest(points: &[[f64; 3]]) -> usize {
     (0..3).max_by(spread).unwrap_or(0)
 }
 
-fn bounds(points: &[[f64; 3]]) -> [[f64; 3]; 2] {
+fn bounds(points: &[[f64; 3]]) -> Bounds {
     let start = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     points.iter().fold(start, |[low, high], p| {
         [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
     })
-}
-
-/// `outside` is how far `p` is from the box of these points along each axis: a lower bound that
-/// leaves out whole ranges, however far all points are.
-///
-/// Source: Arya and Mount 1993 (incremental distance).
-fn search(points: &[[f64; 3]], axes: &[u8], p: [f64; 3], outside: [f64; 3], best: &mut f64) {
-    let squared = |q: &[f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
-    if points.len() <= LEAF {
-        *best = points.iter().map(squared).fold(*best, f64::min);
-        return;
-    }
-    let middle = points.len() / 2;
-    let axis = usize::from(axes[middle]);
-    *best = best.min(squared(&points[middle]));
-    let beyond = p[axis] - points[middle][axis];
-    let before = (&points[..middle], &axes[..middle]);
-    let after = (&points[middle + 1..], &axes[middle + 1..]);
-    let (near, far) = if beyond < 0.0 { (before, after) } else { (after, before) };
-    search(near.0, near.1, p, outside, best);
-    let mut across = outside;
-    across[axis] = beyond.abs();
-    if across.iter().map(|x| x * x).sum::<f64>() < *best {
-        search(far.0, far.1, p, across, best);
-    }
 }
 
 #[cfg(test)]
@@ -97,17 +147,26 @@ mod tests {
             // Few distinct coordinates, so that many points coincide or share a plane.
             (0..count).map(|_| [(); 3].map(|()| f64::from(random.random_range(0..20)))).collect()
         };
-        for count in [1, 7, 8, 9, 10, 500] {
+        for count in [1, 15, 16, 17, 34, 500] {
             let points = draw(count);
             let tree = Nearest::new(points.clone());
-            // Beside the points, and far from all of them.
+            // Beside the points, and far from all of them; alone, and with others near or far.
             let far = |p: &[f64; 3]| p.map(|x| 40.0 * x - 300.0);
             let near = draw(100);
-            for p in near.iter().copied().chain(near.iter().map(far)) {
-                let squared = |q: &[f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
-                let least = points.iter().map(squared).fold(f64::INFINITY, f64::min);
-                assert_eq!(tree.squared_distance(p), least);
+            let all: Vec<[f64; 3]> = near.iter().copied().chain(near.iter().map(far)).collect();
+            let squared = |p: &[f64; 3]| {
+                let to = |q: &[f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
+                points.iter().map(to).fold(f64::INFINITY, f64::min)
+            };
+            for size in [1, 3, GROUP] {
+                for group in all.chunks(size) {
+                    // Whole numbers: exact in any order.
+                    let expected: f64 = group.iter().map(squared).sum();
+                    assert_eq!(tree.sum_of_squares(group), expected);
+                }
             }
+            let mean = all.iter().map(squared).sum::<f64>() / all.len() as f64;
+            assert_eq!(Nearest::new(all).mean_squared_distance(&tree), mean);
         }
     }
 }

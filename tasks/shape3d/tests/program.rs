@@ -107,7 +107,9 @@ fn a_mesh_beyond_the_cameras_ends_with_finite_numbers() {
 
 #[test]
 fn one_pixel_one_face_and_no_area_end_with_finite_numbers() {
-    assert_finite(&run("--size 1 --steps 2").unwrap());
+    let pixel = run("--size 1 --steps 2").unwrap();
+    assert_finite(&pixel);
+    assert!(warnings(&pixel).contains("fills 24 of 24 target images"), "{pixel}");
     let face = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let point = "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n";
     for flag in ["--mesh", "--template"] {

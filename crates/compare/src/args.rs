@@ -1,0 +1,93 @@
+use std::path::PathBuf;
+
+use clap::Parser;
+
+use crate::{Cell, TaskName};
+
+/// Softness families whose settings are searched for, and the MLP as it is before it has learned.
+const METHODS: &str = "logistic,gauss,exp,gamma,mlp";
+
+/// Evaluates all methods on all tasks, original and transfer, and writes the tables.
+///
+/// After a kill the same command goes on from what is finished.
+#[derive(Clone, Debug, Parser)]
+#[command(version)]
+pub struct Args {
+    /// Tasks: shape2d, shape3d, pose, occlusion, or all.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "all")]
+    pub tasks: Vec<String>,
+
+    /// Methods: softness families or softness files in JSON.
+    #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS)]
+    pub methods: Vec<String>,
+
+    /// Seeds of every cell, instead of the number that its task asks for.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub runs: Option<u32>,
+
+    /// Few seeds, for a table in minutes instead of hours.
+    #[arg(long, conflicts_with = "runs")]
+    pub quick: bool,
+
+    /// Folder for the results of every cell.
+    #[arg(long, value_name = "DIR", default_value = "out/compare")]
+    pub out: PathBuf,
+
+    /// File for the tables [default: results.md in the folder].
+    #[arg(long, value_name = "FILE.md")]
+    pub tables: Option<PathBuf>,
+
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl Args {
+    /// All cells in the order of the tables: by task, variant and method.
+    ///
+    /// # Errors
+    ///
+    /// If there is no task of that name.
+    pub fn cells(&self) -> anyhow::Result<Vec<Cell>> {
+        let mut tasks = Vec::new();
+        for name in &self.tasks {
+            match name.as_str() {
+                "all" => tasks.extend(TaskName::ALL),
+                name => tasks.push(name.parse()?),
+            }
+        }
+        tasks.dedup();
+        let cells = tasks.into_iter().flat_map(|task| {
+            let runs = match (self.runs, self.quick) {
+                (Some(runs), _) => runs,
+                (None, true) => task.quick_runs(),
+                (None, false) => task.runs(),
+            };
+            ["original", "transfer"].into_iter().flat_map(move |variant| {
+                let cell =
+                    move |method: &String| Cell { task, variant, method: method.clone(), runs };
+                self.methods.iter().map(cell)
+            })
+        });
+        Ok(cells.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(line: &str) -> Args {
+        Args::parse_from(["compare"].into_iter().chain(line.split_whitespace()))
+    }
+
+    #[test]
+    fn cells_go_through_tasks_variants_and_methods() {
+        let cells = args("--quick").cells().unwrap();
+        assert_eq!(cells.len(), 4 * 2 * 5);
+        assert_eq!((cells[0].task, cells[5].variant), (TaskName::Shape2d, "transfer"));
+        let some = args("--tasks pose --methods gauss,a/b.json --runs 7").cells().unwrap();
+        assert!(some.len() == 4 && some[3].runs == 7 && some[3].method_name() == "b");
+        assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));
+    }
+}
