@@ -5,6 +5,7 @@ use burn::{
 
 use crate::{
     Objective, Optimizer, gradient,
+    inner_loop::allowed,
     vector::{norm, numbers},
 };
 
@@ -54,6 +55,7 @@ impl<B: Backend> Adjoint<B> {
         let grad = gradient(objective, theta.clone(), tracked_phi.clone(), before.step);
         let state_before = optimizer.state(before.step, state.clone());
         let (theta_after, state_after) = optimizer.step(theta.clone(), grad, state_before);
+        let theta_after = allowed(objective, theta_after);
 
         let after = std::iter::once(theta_after).chain(optimizer.tensors(state_after));
         let adjoints = std::iter::once(self.theta).chain(self.state);

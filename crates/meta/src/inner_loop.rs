@@ -32,9 +32,18 @@ impl<O: Optimizer> InnerLoop<O> {
         for step in 0..self.steps {
             let grad = gradient(objective, theta.clone(), phi.clone(), step);
             (theta, state) = self.optimizer.step(theta, grad, state);
+            theta = allowed(objective, theta);
         }
         theta
     }
+}
+
+/// The nearest scene `[N]` that the objective allows; tracked like `theta` on an `Autodiff` backend.
+pub(crate) fn allowed<B: Backend, P: Objective<Autodiff<B>>>(
+    objective: &P,
+    theta: Tensor<B, 1>,
+) -> Tensor<B, 1> {
+    objective.allowed(Tensor::from_inner(theta)).inner()
 }
 
 /// Gradient of the loss at inner step `step` to `theta` `[N]`; zero where it does not depend on it.

@@ -15,4 +15,11 @@ pub trait Objective<B: Backend> {
     fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         self.loss(theta, phi)
     }
+
+    /// The scene `[N]` nearest to `theta` `[N]` that is allowed: where every inner step ends.
+    ///
+    /// It is `theta` itself unless the scene has bounds.
+    fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        theta
+    }
 }

@@ -3,14 +3,42 @@
 //! A [`Method`] is what the command line names: a softness family or file with a path of scales. A
 //! [`MovingSilhouette`] draws with it, and prepares support and knots anew only when the scale has
 //! moved so far that it must.
+//!
+//! A task that implements [`Lesson`] can have a softness learned on it: `study` turns it into what the
+//! command `learn` drives.
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-method needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+#[cfg(feature = "ndarray")]
+mod course;
+#[cfg(not(feature = "ndarray"))]
+mod course {
+    //! Learning needs doubles and two levels of autodiff, which this backend does not have.
+
+    /// Says that it cannot be done.
+    ///
+    /// # Errors
+    ///
+    /// Always.
+    pub fn study(
+        _lesson: impl crate::Lesson,
+        _plan: &softrast_runner::Plan,
+    ) -> anyhow::Result<Box<dyn softrast_runner::Study>> {
+        anyhow::bail!("learn needs a program that was built with the feature ndarray")
+    }
+}
+mod judge;
+mod learned_edge;
+mod lesson;
 mod method;
 mod moving_silhouette;
 mod tensor;
 
+pub use course::study;
+pub use judge::Judge;
+pub use learned_edge::{LearnedEdge, PreparedRun};
+pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;
 pub use tensor::{numbers, tensor};

@@ -27,6 +27,7 @@ compile_error!("pose needs a backend: turn on one of the features ndarray, flex 
 mod args;
 mod error;
 mod instance;
+mod lesson;
 mod picture;
 mod scene;
 mod solve;

@@ -24,7 +24,7 @@ const SUCCESS: f64 = 0.02;
 /// 0.01 and 0.0029 from 0.02 or 0.04, to 0.001 from 0.02 0.0034. Skyline: 0.0108 at 0.002, and 0.0156
 /// with a decay to it from 0.02, which sees one white sheet at first.
 const SCALES: Defaults =
-    Defaults { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002 };
+    Defaults { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002, size: 256 };
 /// Largest move of a coordinate in a step, roughly, in NDC: about a pixel of the default size.
 ///
 /// Hard mean squared errors on the letters end at 0.0026 with 0.005, 0.0024 with 0.01 and 0.0034 with
@@ -47,7 +47,7 @@ impl Task for Shape2d {
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let solver = Solver {
             method: Method::new(settings, &SCALES)?,
-            size: settings.size.unwrap_or(256),
+            size: settings.size.unwrap_or(SCALES.size),
             steps: settings.steps.unwrap_or(200),
             learning_rate: settings.learning_rate.unwrap_or(LEARNING_RATE),
         };

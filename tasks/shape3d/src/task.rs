@@ -29,7 +29,8 @@ const SUCCESS: f64 = 0.3;
 /// 0.103 for a decay from 0.03 to 0.003, 0.104 to 0.002, 0.127 to 0.005 and 0.128 from 0.02 to 0.003;
 /// without a decay 0.126 at 0.002, 0.104 at 0.003, 0.139 at 0.005, 0.172 at 0.007, 0.261 at 0.01 and 0.507
 /// at 0.02. The decay also has the smaller Chamfer distance, 0.28 against 0.53 at 0.003.
-const SCALES: Defaults = Defaults { schedule: Schedule::Decay, decay: [0.03, 0.003], fixed: 0.003 };
+const SCALES: Defaults =
+    Defaults { schedule: Schedule::Decay, decay: [0.03, 0.003], fixed: 0.003, size: 64 };
 
 /// Largest move of a parameter in a step, roughly.
 ///
@@ -56,7 +57,7 @@ impl Task for Shape3d {
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let solver = Solver {
             method: Method::new(settings, &SCALES)?,
-            size: settings.size.unwrap_or(64),
+            size: settings.size.unwrap_or(SCALES.size),
             steps: settings.steps.unwrap_or(100),
             learning_rate: settings.learning_rate.unwrap_or(LEARNING_RATE),
         };
