@@ -55,8 +55,16 @@ pub fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
     phi: Tensor<B, 1>,
     step: usize,
 ) -> Tensor<B, 1> {
+    gradient_of(&theta, |theta| objective.loss_at(theta, Tensor::from_inner(phi), step))
+}
+
+/// Gradient of a loss `[1]` to `theta` `[N]`.
+pub(crate) fn gradient_of<B: Backend>(
+    theta: &Tensor<B, 1>,
+    loss: impl FnOnce(Tensor<Autodiff<B>, 1>) -> Tensor<Autodiff<B>, 1>,
+) -> Tensor<B, 1> {
     let leaf = Tensor::<Autodiff<B>, 1>::from_inner(theta.clone()).require_grad();
-    let grads = objective.loss_at(leaf.clone(), Tensor::from_inner(phi), step).backward();
+    let grads = loss(leaf.clone()).backward();
     leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like())
 }
 

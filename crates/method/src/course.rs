@@ -12,7 +12,7 @@ use softrast_meta::{
 };
 use softrast_runner::{Judged, Learned, Order, OuterStep, Plan, Referee, Study};
 
-use crate::{FINER, Lesson, numbers};
+use crate::{FINER, Lesson, Of, Step, numbers};
 
 /// Learning runs in doubles: rounding grows with every step that is walked back (META 2.5, V9).
 type B = NdArray<f64>;
@@ -113,8 +113,8 @@ impl<L: Lesson> Study for Course<L> {
     }
 }
 
-/// Instances of a lesson by seed.
-pub(crate) struct Class<L: Lesson> {
+/// Instances of a lesson by seed, for a learner or a meta-gradient.
+pub struct Class<L: Lesson> {
     lesson: Arc<L>,
     own_referee: bool,
     measured: Measured,
@@ -123,7 +123,8 @@ pub(crate) struct Class<L: Lesson> {
 }
 
 impl<L: Lesson> Class<L> {
-    pub(crate) fn new(lesson: L, plan: &Plan) -> Self {
+    /// The lesson with the referee that `plan` asks for.
+    pub fn new(lesson: L, plan: &Plan) -> Self {
         let measured = match plan.judged {
             Judged::End => Measured::End,
             Judged::Quarters => Measured::Quarters,
@@ -189,7 +190,7 @@ impl<L: Lesson> Tasks<B> for Class<L> {
 }
 
 /// What the inner loop lowers.
-pub(crate) struct Inner<L: Lesson> {
+pub struct Inner<L: Lesson> {
     lesson: Arc<L>,
     drawing: Arc<L::Drawing>,
     one: L::Scene<A>,
@@ -197,7 +198,7 @@ pub(crate) struct Inner<L: Lesson> {
 }
 
 /// What judges the result: the lesson's judge, or its own loss at the last step.
-pub(crate) struct Outer<L: Lesson> {
+pub struct Outer<L: Lesson> {
     lesson: Arc<L>,
     own: Option<Arc<L::Drawing>>,
     zero: L::Scene<B>,
@@ -206,7 +207,7 @@ pub(crate) struct Outer<L: Lesson> {
 
 /// One objective on two backends, each with its own scene.
 macro_rules! objectives {
-    ($backend:ty, $scene:ident) => {
+    ($backend:ty, $scene:ident, $tracked:expr) => {
         impl<L: Lesson> Objective<$backend> for Inner<L> {
             fn loss(
                 &self,
@@ -222,7 +223,27 @@ macro_rules! objectives {
                 phi: Tensor<$backend, 1>,
                 step: usize,
             ) -> Tensor<$backend, 1> {
-                self.lesson.loss(&self.$scene, &self.drawing, theta, phi, step)
+                let tracked: fn(&Tensor<$backend, 1>) -> bool = $tracked;
+                let of = if tracked(&phi) { Of::Phi } else { Of::Values };
+                self.lesson.loss(&self.$scene, &self.drawing, theta, phi, Step { number: step, of })
+            }
+
+            fn prepared(&self, phi: Tensor<$backend, 1>, step: usize) -> Tensor<$backend, 1> {
+                self.lesson.prepared(&self.drawing, phi, step)
+            }
+
+            fn stage(&self, step: usize) -> usize {
+                self.lesson.stage(step)
+            }
+
+            fn loss_from(
+                &self,
+                theta: Tensor<$backend, 1>,
+                prepared: Tensor<$backend, 1>,
+                step: usize,
+            ) -> Tensor<$backend, 1> {
+                let step = Step { number: step, of: Of::Prepared };
+                self.lesson.loss(&self.$scene, &self.drawing, theta, prepared, step)
             }
 
             fn allowed(&self, theta: Tensor<$backend, 1>) -> Tensor<$backend, 1> {
@@ -245,7 +266,9 @@ macro_rules! judges {
                 match &self.own {
                     None => self.lesson.judge(scene, theta),
                     Some(drawing) => {
-                        self.lesson.loss(scene, drawing, theta, phi, self.lesson.inner().steps)
+                        let number = self.lesson.inner().steps;
+                        let step = Step { number, of: Of::Phi };
+                        self.lesson.loss(scene, drawing, theta, phi, step)
                     }
                 }
             }
@@ -253,7 +276,9 @@ macro_rules! judges {
     };
 }
 
-objectives!(A, one);
-objectives!(AA, two);
+// On the lower level a joint loop alone asks for the derivative by φ; on the higher one φ belongs to a
+// tape below.
+objectives!(A, one, Tensor::is_require_grad);
+objectives!(AA, two, |_| true);
 judges!(B, zero);
 judges!(A, one);

@@ -1,14 +1,15 @@
-use std::sync::Arc;
+use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
-use burn::tensor::Tensor;
+use burn::tensor::{Element, Tensor, TensorData};
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
 use softrast_runner::{Curve, Figure, Plan};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
 use crate::{Method, numbers, tensor};
 
-/// A scale may fall by this factor before support and knots are chosen anew.
-const STALE: f64 = 0.95;
+/// A scale may fall by this factor before support and knots are chosen anew, which costs as much here
+/// as drawing several images.
+const STALE: f64 = 0.85;
 /// Least share of a scale that stands above the floor where a path starts.
 const ABOVE_FLOOR: f64 = 0.05;
 
@@ -104,7 +105,7 @@ impl LearnedEdge {
             }
             of_step.push(silhouettes.len() - 1);
         }
-        PreparedRun { silhouettes, of_step }
+        PreparedRun { silhouettes, of_step, tables: RefCell::default() }
     }
 
     /// The file `softness.json` of a learned vector: name and text.
@@ -206,6 +207,11 @@ impl LearnedEdge {
         step.min(last) as f64 / last as f64
     }
 
+    /// Steps with the same number have the same softness.
+    pub fn stage(&self, step: usize) -> usize {
+        if self.path.is_some() { step } else { 0 }
+    }
+
     fn knots(&self) -> usize {
         self.path.as_ref().map_or(0, |path| path.knots.len())
     }
@@ -216,11 +222,39 @@ impl LearnedEdge {
     }
 }
 
+/// A step of an inner loop, and what it is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// How many steps came before.
+    pub number: usize,
+    /// What the vector is that stands for the softness.
+    pub of: Of,
+}
+
+/// What stands for a softness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Of {
+    /// φ, by which derivatives are asked for.
+    Phi,
+    /// φ as mere numbers: what depends on it alone may be kept.
+    Values,
+    /// What [`Lesson::prepared`](crate::Lesson::prepared) gave.
+    Prepared,
+}
+
 /// Silhouettes for every step of a run, whose support and knots suit the scale there.
 #[derive(Clone, Debug)]
 pub struct PreparedRun {
     silhouettes: Vec<Silhouette<EdgeSoftness>>,
     of_step: Vec<usize>,
+    /// A learned vector, and tables of the steps that were drawn under it without a gradient to it.
+    tables: RefCell<Tables>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Tables {
+    learned: Vec<f64>,
+    of_step: BTreeMap<usize, TensorData>,
 }
 
 impl PreparedRun {
@@ -231,9 +265,38 @@ impl PreparedRun {
         edge: &LearnedEdge,
         vertices: Tensor<B, 3>,
         learned: &Tensor<B, 1>,
-        step: usize,
+        step: Step,
     ) -> Tensor<B, 3> {
-        let silhouette = &self.silhouettes[self.of_step[step.min(self.of_step.len() - 1)]];
-        silhouette.coverage(vertices, edge.phi(learned, step))
+        let number = step.number.min(self.of_step.len() - 1);
+        let silhouette = &self.silhouettes[self.of_step[number]];
+        let table = match step.of {
+            Of::Prepared => learned.clone().reshape([-1, 4]),
+            Of::Phi => silhouette.table(edge.phi(learned, number)),
+            Of::Values => {
+                let mut tables = self.tables.borrow_mut();
+                let values = numbers(learned.clone());
+                if tables.learned != values {
+                    *tables = Tables { learned: values, of_step: BTreeMap::new() };
+                }
+                let table = tables
+                    .of_step
+                    .entry(edge.stage(number))
+                    .or_insert_with(|| silhouette.table(edge.phi(learned, number)).into_data());
+                let dtype = <B::FloatElem as Element>::dtype();
+                Tensor::from_data(table.clone(), (&learned.device(), dtype))
+            }
+        };
+        silhouette.coverage_by_table(vertices, table)
+    }
+
+    /// The table of a step, flat: all that [`image`](PreparedRun::image) needs of the softness.
+    pub fn prepared<B: RasterBackend>(
+        &self,
+        edge: &LearnedEdge,
+        learned: &Tensor<B, 1>,
+        step: usize,
+    ) -> Tensor<B, 1> {
+        let number = step.min(self.of_step.len() - 1);
+        self.silhouettes[self.of_step[number]].table(edge.phi(learned, number)).flatten(0, 1)
     }
 }

@@ -36,8 +36,10 @@ mod moving_silhouette;
 mod tensor;
 
 pub use course::study;
+#[cfg(feature = "ndarray")]
+pub use course::{Class, Inner, Outer};
 pub use judge::Judge;
-pub use learned_edge::{LearnedEdge, PreparedRun};
+pub use learned_edge::{LearnedEdge, Of, PreparedRun, Step};
 pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;

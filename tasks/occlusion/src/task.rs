@@ -1,9 +1,9 @@
 use burn::backend::Autodiff;
-use softrast_method::{Defaults, Method, numbers};
+use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
-    Settings, Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run, Schedule,
+    Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -11,6 +11,7 @@ use crate::{
     Args, DepthError, Instance, Problem, Scene,
     depth_method::DepthMethod,
     instance::{front, pairs},
+    lesson,
     picture::Album,
     solve::{Solver, State},
 };
@@ -30,8 +31,8 @@ const SCALES: Defaults =
 
 /// The prepared task.
 pub struct Occlusion {
-    problem: Problem,
-    solver: Solver,
+    pub(crate) problem: Problem,
+    pub(crate) solver: Solver,
 }
 
 impl Task for Occlusion {
@@ -140,6 +141,10 @@ impl Task for Occlusion {
             pictures: pictures.take(),
         });
         Ok(runs.collect())
+    }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        study(lesson::OcclusionLesson::new(self, plan), plan)
     }
 }
 

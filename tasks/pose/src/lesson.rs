@@ -1,20 +1,21 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
-use softrast_method::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, PreparedRun};
+use softrast_method::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, PreparedRun, Step};
 use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer, iou_loss};
 use softrast_runner::{Figure, Plan};
 
 use crate::{Pose, Scene};
 
 /// POSE as something to learn a softness on: every instance is one view.
-pub(crate) struct PoseLesson {
+pub struct PoseLesson {
     pose: Pose,
     edge: LearnedEdge,
     judge: Judge,
 }
 
 impl PoseLesson {
-    pub(crate) fn new(pose: Pose, plan: &Plan) -> Self {
+    /// Learns on `pose` as `plan` says.
+    pub fn new(pose: Pose, plan: &Plan) -> Self {
         let solver = &pose.solver;
         let edge = LearnedEdge::new(&solver.method, plan, solver.steps, solver.size);
         let judge = Judge::new::<DefaultBackend>(&pose.mesh.faces().into(), solver.size);
@@ -56,13 +57,26 @@ impl Lesson for PoseLesson {
         self.edge.prepare::<DefaultBackend>(rasterizer, &mesh.faces().into(), phi)
     }
 
+    fn prepared<B: RasterBackend>(
+        &self,
+        drawing: &PreparedRun,
+        phi: Tensor<B, 1>,
+        step: usize,
+    ) -> Tensor<B, 1> {
+        drawing.prepared(&self.edge, &phi, step)
+    }
+
+    fn stage(&self, step: usize) -> usize {
+        self.edge.stage(step)
+    }
+
     fn loss<B: RasterBackend>(
         &self,
         scene: &Scene<B>,
         drawing: &PreparedRun,
         theta: Tensor<B, 1>,
         phi: Tensor<B, 1>,
-        step: usize,
+        step: Step,
     ) -> Tensor<B, 1> {
         let projected = scene.project(theta.unsqueeze());
         iou_loss(drawing.image(&self.edge, projected, &phi, step), scene.target())

@@ -36,5 +36,6 @@ mod task;
 pub use args::{Args, Instances, Range};
 pub use error::PoseError;
 pub use instance::{Camera, Instance};
+pub use lesson::PoseLesson;
 pub use scene::Scene;
 pub use task::Pose;

@@ -41,14 +41,19 @@ pub(crate) struct State {
 }
 
 impl Solver {
+    /// What steps the scene.
+    pub(crate) fn adam(&self) -> Adam {
+        let [beta1, beta2] = BETAS;
+        Adam { beta1, beta2, ..Adam::new(self.learning_rate) }
+    }
+
     /// Solves `scene`, and shows each state from the start to the end to `visit`.
     pub(crate) fn run<B: RasterBackend>(
         &self,
         scene: &Scene<Autodiff<B>>,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let [beta1, beta2] = BETAS;
-        let adam = Adam { beta1, beta2, ..Adam::new(self.learning_rate) };
+        let adam = self.adam();
         let mut theta = scene.start().inner();
         let mut moments = adam.init(&theta);
         let first = self.method.scale(0, self.steps);

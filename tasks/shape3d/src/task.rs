@@ -2,17 +2,18 @@ use std::path::Path;
 
 use burn::backend::Autodiff;
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
-use softrast_method::{Defaults, Method, numbers};
+use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
-    Settings, Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run, Schedule,
+    Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
 use crate::{
     Args, Chamfer, Instance, Scene,
     instance::ELEVATIONS_DEG,
+    lesson,
     picture::Album,
     scene::{DISTANCE, VIEWS},
     solve::{Solver, State},
@@ -40,13 +41,13 @@ const LEARNING_RATE: f64 = 0.0316;
 
 /// The prepared task.
 pub struct Shape3d {
-    target: Mesh,
+    pub(crate) target: Mesh,
     target_name: String,
-    template: Mesh,
+    pub(crate) template: Mesh,
     template_name: String,
-    elevation_deg: Option<f64>,
+    pub(crate) elevation_deg: Option<f64>,
     chamfer: Chamfer,
-    solver: Solver,
+    pub(crate) solver: Solver,
 }
 
 impl Task for Shape3d {
@@ -113,6 +114,10 @@ impl Task for Shape3d {
             self.one(&Batch { seeds: vec![seed], pictures }, seed, progress)
         });
         runs.collect()
+    }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        study(lesson::Shape3dLesson::new(self, plan), plan)
     }
 }
 
