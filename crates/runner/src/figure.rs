@@ -58,6 +58,7 @@ fn draw<DB: DrawingBackend>(
         .bold_line_style(GRID)
         .light_line_style(TRANSPARENT)
         .draw()?;
+    let corner = corner(&lines, across, up);
     for ((name, points), colour) in lines.into_iter().zip(COLOURS) {
         // A single point would not be seen as a line.
         if let [point] = points[..] {
@@ -70,11 +71,25 @@ fn draw<DB: DrawingBackend>(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(corner)
         .label_font(("sans-serif", 14))
         .background_style(WHITE.mix(0.85))
         .border_style(GRID)
         .draw()
+}
+
+/// A corner on the right that the lines leave free.
+fn corner(
+    lines: &[(&String, Vec<(f64, f64)>)],
+    across: [f64; 2],
+    up: [f64; 2],
+) -> SeriesLabelPosition {
+    let right = across[0] + 0.7 * (across[1] - across[0]);
+    let ends = lines.iter().flat_map(|(_, points)| points).filter(|(x, _)| *x > right);
+    let [high, low] = ends.fold([0, 0], |[high, low], (_, y)| {
+        if *y > 0.5 * (up[0] + up[1]) { [high + 1, low] } else { [high, low + 1] }
+    });
+    if high > low { SeriesLabelPosition::LowerRight } else { SeriesLabelPosition::UpperRight }
 }
 
 /// Least and largest number with some room around them; 0 to 1 for none.
