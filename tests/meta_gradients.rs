@@ -3,6 +3,8 @@
 //!
 //! The fused op keeps the support and knots that were chosen at φ while φ is varied.
 
+mod task_meta_gradients;
+
 use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor, TensorData, backend::Backend},

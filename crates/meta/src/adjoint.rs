@@ -4,7 +4,8 @@ use burn::{
 };
 
 use crate::{
-    Objective, Optimizer, gradient,
+    Objective, Optimizer,
+    inner_loop::{allowed, gradient_of},
     vector::{norm, numbers},
 };
 
@@ -33,7 +34,7 @@ impl<B: Backend> Adjoint<B> {
         Self { theta: self.theta * factor, state }
     }
 
-    /// The adjoint before the stored step, and the share of `phi` in that step.
+    /// The adjoint before the stored step, and the derivative by what was `prepared` for it.
     ///
     /// Only the tape of this one step exists, and is gone afterwards.
     pub(crate) fn back<P, O>(
@@ -41,19 +42,22 @@ impl<B: Backend> Adjoint<B> {
         objective: &P,
         optimizer: &O,
         before: Stored<B>,
-        phi: &Tensor<B, 1>,
+        prepared: &Tensor<B, 1>,
     ) -> (Self, Tensor<B, 1>)
     where
         P: Objective<Autodiff<Autodiff<B>>>,
         O: Optimizer,
     {
         let leaf = |x: Tensor<B, 1>| Tensor::<Autodiff<B>, 1>::from_inner(x).require_grad();
-        let (theta, tracked_phi) = (leaf(before.theta), leaf(phi.clone()));
+        let (theta, prepared) = (leaf(before.theta), leaf(prepared.clone()));
         let state: Vec<_> = before.state.into_iter().map(leaf).collect();
 
-        let grad = gradient(objective, theta.clone(), tracked_phi.clone(), before.step);
+        let grad = gradient_of(&theta, |theta| {
+            objective.loss_from(theta, Tensor::from_inner(prepared.clone()), before.step)
+        });
         let state_before = optimizer.state(before.step, state.clone());
         let (theta_after, state_after) = optimizer.step(theta.clone(), grad, state_before);
+        let theta_after = allowed(objective, theta_after);
 
         let after = std::iter::once(theta_after).chain(optimizer.tensors(state_after));
         let adjoints = std::iter::once(self.theta).chain(self.state);
@@ -64,6 +68,6 @@ impl<B: Backend> Adjoint<B> {
             x.grad(&grads).unwrap_or_else(|| x.clone().inner().zeros_like())
         };
         let before = Self { theta: by(&theta), state: state.iter().map(by).collect() };
-        (before, by(&tracked_phi))
+        (before, by(&prepared))
     }
 }

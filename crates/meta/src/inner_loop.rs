@@ -32,9 +32,18 @@ impl<O: Optimizer> InnerLoop<O> {
         for step in 0..self.steps {
             let grad = gradient(objective, theta.clone(), phi.clone(), step);
             (theta, state) = self.optimizer.step(theta, grad, state);
+            theta = allowed(objective, theta);
         }
         theta
     }
+}
+
+/// The nearest scene `[N]` that the objective allows; tracked like `theta` on an `Autodiff` backend.
+pub(crate) fn allowed<B: Backend, P: Objective<Autodiff<B>>>(
+    objective: &P,
+    theta: Tensor<B, 1>,
+) -> Tensor<B, 1> {
+    objective.allowed(Tensor::from_inner(theta)).inner()
 }
 
 /// Gradient of the loss at inner step `step` to `theta` `[N]`; zero where it does not depend on it.
@@ -46,8 +55,16 @@ pub fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
     phi: Tensor<B, 1>,
     step: usize,
 ) -> Tensor<B, 1> {
+    gradient_of(&theta, |theta| objective.loss_at(theta, Tensor::from_inner(phi), step))
+}
+
+/// Gradient of a loss `[1]` to `theta` `[N]`.
+pub(crate) fn gradient_of<B: Backend>(
+    theta: &Tensor<B, 1>,
+    loss: impl FnOnce(Tensor<Autodiff<B>, 1>) -> Tensor<Autodiff<B>, 1>,
+) -> Tensor<B, 1> {
     let leaf = Tensor::<Autodiff<B>, 1>::from_inner(theta.clone()).require_grad();
-    let grads = objective.loss_at(leaf.clone(), Tensor::from_inner(phi), step).backward();
+    let grads = loss(leaf.clone()).backward();
     leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like())
 }
 

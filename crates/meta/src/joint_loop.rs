@@ -3,7 +3,10 @@ use burn::{
     tensor::{Tensor, backend::Backend},
 };
 
-use crate::{InnerLoop, Objective, Optimizer};
+use crate::{
+    Adam, InnerLoop, MetaEstimate, Objective, Optimizer, Problem, inner_loop::allowed,
+    vector::numbers,
+};
 
 /// An inner loop that moves the softness along with the scene, down the same loss.
 ///
@@ -22,23 +25,59 @@ impl<O: Optimizer, S: Optimizer> JointLoop<O, S> {
     pub fn solve<B: Backend, P: Objective<Autodiff<B>>>(
         &self,
         objective: &P,
-        mut theta: Tensor<B, 1>,
-        mut phi: Tensor<B, 1>,
+        theta: Tensor<B, 1>,
+        phi: Tensor<B, 1>,
     ) -> (Tensor<B, 1>, Tensor<B, 1>) {
-        let InnerLoop { optimizer, steps } = &self.inner;
-        let mut state = optimizer.init(&theta);
-        let mut softness_state = self.softness.init(&phi);
-        for step in 0..*steps {
-            let [leaf, soft] = [&theta, &phi]
-                .map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()).require_grad());
-            let grads = objective.loss_at(leaf.clone(), soft.clone(), step).backward();
-            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
-            let soft_grad = soft.grad(&grads).unwrap_or_else(|| phi.zeros_like());
-            (theta, state) = optimizer.step(theta, grad, state);
-            (phi, softness_state) = self.softness.step(phi, soft_grad, softness_state);
-        }
-        (theta, phi)
+        solve(&self.inner, &self.softness, objective, theta, phi)
     }
+}
+
+fn solve<B, P, O, S>(
+    inner: &InnerLoop<O>,
+    softness: &S,
+    objective: &P,
+    mut theta: Tensor<B, 1>,
+    mut phi: Tensor<B, 1>,
+) -> (Tensor<B, 1>, Tensor<B, 1>)
+where
+    B: Backend,
+    P: Objective<Autodiff<B>>,
+    O: Optimizer,
+    S: Optimizer,
+{
+    let InnerLoop { optimizer, steps } = inner;
+    let mut state = optimizer.init(&theta);
+    let mut softness_state = softness.init(&phi);
+    for step in 0..*steps {
+        let [leaf, soft] =
+            [&theta, &phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()).require_grad());
+        let grads = objective.loss_at(leaf.clone(), soft.clone(), step).backward();
+        let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
+        let soft_grad = soft.grad(&grads).unwrap_or_else(|| phi.zeros_like());
+        (theta, state) = optimizer.step(theta, grad, state);
+        theta = allowed(objective, theta);
+        (phi, softness_state) = softness.step(phi, soft_grad, softness_state);
+    }
+    (theta, phi)
+}
+
+/// The outer loss after a joint loop from `phi` `[P]`, and how far `phi` was left behind.
+pub(crate) fn joint<B, P, R, O>(
+    problem: &Problem<B, P, R, O>,
+    phi: &Tensor<B, 1>,
+    learning_rate: f64,
+) -> MetaEstimate<B>
+where
+    B: Backend,
+    P: Objective<Autodiff<B>>,
+    R: Objective<B>,
+    O: Optimizer,
+{
+    let Problem { objective, referee, inner, start, .. } = problem;
+    let softness = Adam::new(learning_rate);
+    let (theta, end) = solve(inner, &softness, objective, start.clone(), phi.clone());
+    let loss = numbers(referee.loss(theta, end.clone())).iter().sum();
+    MetaEstimate::without_steps(loss, phi.clone() - end)
 }
 
 #[cfg(test)]

@@ -124,7 +124,6 @@ impl Learner {
         let gradients = estimates.iter().map(|estimate| estimate.gradient.clone());
         let mean = gradients.fold(phi.zeros_like(), |sum, gradient| sum + gradient * share);
         let length = norm(&numbers(mean.clone()));
-        let mean = if length > self.clip { mean * (self.clip / length) } else { mean };
 
         record.loss = Some(estimates.iter().map(|estimate| estimate.loss * share).sum());
         record.gradient_norm = Some(length);
@@ -132,21 +131,40 @@ impl Learner {
         record.clips = estimates.iter().map(|estimate| estimate.clips).sum();
         record.dropped = self.batch - estimates.len();
 
-        let state = if progress.optimizer.is_empty() {
-            self.optimizer.init(&phi)
-        } else {
-            let moments = progress.optimizer.iter().map(|Moment(values)| tensor(values));
-            self.optimizer.state(step, moments.collect())
+        let phi = match self.mode {
+            MetaGradient::Joint { .. } => phi - mean,
+            _ => self.step(phi, shortened(mean, length, self.clip), progress),
         };
-        let (phi, state) = self.optimizer.step(phi, mean, state);
-        let moments = self.optimizer.tensors(state).into_iter();
-        progress.optimizer = moments.map(|moment| Moment(numbers(moment))).collect();
         progress.phi = numbers(phi);
         progress.step += 1;
         progress.dropped += record.dropped;
         progress.tried += self.batch;
         Ok(())
     }
+
+    /// One step of the outer optimiser, whose state is in `progress`.
+    fn step<B: Backend>(
+        &self,
+        phi: Tensor<B, 1>,
+        gradient: Tensor<B, 1>,
+        progress: &mut Progress,
+    ) -> Tensor<B, 1> {
+        let state = if progress.optimizer.is_empty() {
+            self.optimizer.init(&phi)
+        } else {
+            let moments = progress.optimizer.iter().map(|Moment(values)| tensor(values));
+            self.optimizer.state(progress.step, moments.collect())
+        };
+        let (phi, state) = self.optimizer.step(phi, gradient, state);
+        let moments = self.optimizer.tensors(state).into_iter();
+        progress.optimizer = moments.map(|moment| Moment(numbers(moment))).collect();
+        phi
+    }
+}
+
+/// A gradient of this length, brought to the limit if it is longer.
+fn shortened<B: Backend>(gradient: Tensor<B, 1>, length: f64, limit: f64) -> Tensor<B, 1> {
+    if length > limit { gradient * (limit / length) } else { gradient }
 }
 
 impl Validation {
@@ -166,7 +184,7 @@ impl Validation {
             return None;
         }
         let seeds = (0..self.count).map(|k| self.seed.wrapping_add(k as u64));
-        let loss = seeds.map(|seed| tasks.problem(seed, phi).loss(phi)).sum::<f64>();
+        let loss = seeds.map(|seed| tasks.judged(seed, phi)).sum::<f64>();
         // A softness under which some instance breaks down is not a good one.
         let loss = Some(loss / self.count as f64).filter(|loss| loss.is_finite());
         match loss.filter(|loss| progress.best.as_ref().is_none_or(|best| *loss < best.loss)) {

@@ -5,7 +5,8 @@ use burn::{
 use serde::Serialize;
 
 use crate::{
-    MetaEstimate, Objective, Optimizer, Problem, evolution::evolution, unrolled::unrolled,
+    MetaEstimate, Objective, Optimizer, Problem, evolution::evolution, joint_loop::joint,
+    unrolled::unrolled,
 };
 
 /// How the derivative of the outer loss by the softness is taken.
@@ -35,6 +36,13 @@ pub enum MetaGradient {
         sigma: f64,
         /// Pairs of inner loops.
         pairs: usize,
+    },
+    /// No derivative of the outer loss at all: the softness goes along with the scene, down the inner
+    /// loss, and stays where it ends. What the released pose code does. Its "gradient" is the way that
+    /// φ went, turned round, and a learner takes all of it.
+    Joint {
+        /// Rate of the Adam that moves φ, once per inner step.
+        learning_rate: f64,
     },
 }
 
@@ -73,6 +81,7 @@ impl MetaGradient {
             Self::Truncated { steps, clip } => unrolled(problem, phi, steps, clip),
             Self::Direct => unrolled(problem, phi, 0, None),
             Self::Es { sigma, pairs } => evolution(problem, phi, sigma, pairs, seed),
+            Self::Joint { learning_rate } => joint(problem, phi, learning_rate),
         }
     }
 }

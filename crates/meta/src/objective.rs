@@ -15,4 +15,29 @@ pub trait Objective<B: Backend> {
     fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         self.loss(theta, phi)
     }
+
+    /// What the loss at inner step `step` needs of `phi` `[P]`, flat: `phi` itself unless something
+    /// costly can be worked out from it that does not depend on the scene.
+    ///
+    /// Meta-gradients go to it first, and through it only once for each [`stage`](Objective::stage).
+    fn prepared(&self, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
+        phi
+    }
+
+    /// Steps with the same number in a row share what [`prepared`](Objective::prepared) gives.
+    fn stage(&self, _step: usize) -> usize {
+        0
+    }
+
+    /// [`loss_at`](Objective::loss_at) from what [`prepared`](Objective::prepared) gave.
+    fn loss_from(&self, theta: Tensor<B, 1>, prepared: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
+        self.loss_at(theta, prepared, step)
+    }
+
+    /// The scene `[N]` nearest to `theta` `[N]` that is allowed: where every inner step ends.
+    ///
+    /// It is `theta` itself unless the scene has bounds.
+    fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        theta
+    }
 }

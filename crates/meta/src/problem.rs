@@ -3,7 +3,9 @@ use burn::{
     tensor::{Tensor, backend::Backend},
 };
 
-use crate::{InnerLoop, Measured, Objective, Optimizer, gradient, vector::numbers};
+use crate::{
+    InnerLoop, Measured, Objective, Optimizer, gradient, inner_loop::allowed, vector::numbers,
+};
 
 /// One instance of a task, to learn a softness on: what is optimised, and how the result is judged.
 #[derive(Clone, Debug)]
@@ -57,6 +59,7 @@ impl<B: Backend, P: Objective<Autodiff<B>>, R, O: Optimizer> Problem<B, P, R, O>
         for step in 0..self.inner.steps {
             let grad = gradient(&self.objective, theta.clone(), phi.clone(), step);
             (theta, state) = optimizer.step(theta, grad, state);
+            theta = allowed(&self.objective, theta);
             see(step + 1, &theta, &state);
         }
     }

@@ -76,11 +76,20 @@ where
     if !kept.is_empty() {
         estimate.adjoint_norms.push(norm);
     }
+    let mut prepared: Option<Prepared<B>> = None;
     while let Some(before) = kept.pop_back() {
         let step = before.step;
-        let (earlier, by_phi) = adjoint.back(&problem.objective, optimizer, before, phi);
+        let stage = <P as Objective<Autodiff<Autodiff<B>>>>::stage(&problem.objective, step);
+        if prepared.as_ref().is_none_or(|prepared| prepared.stage != stage) {
+            let next = Prepared::new(&problem.objective, phi, step, stage);
+            let last = prepared.replace(next).map(Prepared::by_phi);
+            estimate.gradient = last.into_iter().fold(estimate.gradient, |sum, by| sum + by);
+        }
+        let Some(now) = &mut prepared else { break };
+        let (earlier, by_prepared) =
+            adjoint.back(&problem.objective, optimizer, before, &now.value);
         adjoint = earlier;
-        estimate.gradient = estimate.gradient + by_phi;
+        now.adjoint = now.adjoint.clone() + by_prepared;
         let grown = adjoint.norm();
         if norm > 0.0 && grown > 0.0 {
             estimate.adjoint_growth += (grown / norm).log10();
@@ -94,7 +103,39 @@ where
             estimate.clips += 1;
         }
     }
+    let last = prepared.map(Prepared::by_phi);
+    estimate.gradient = last.into_iter().fold(estimate.gradient, |sum, by| sum + by);
     estimate
+}
+
+/// What some steps in a row need of φ.
+struct Prepared<B: Backend> {
+    stage: usize,
+    phi: Tensor<Autodiff<B>, 1>,
+    tracked: Tensor<Autodiff<B>, 1>,
+    value: Tensor<B, 1>,
+    /// Derivative of the outer loss by it, through the steps walked back so far.
+    adjoint: Tensor<B, 1>,
+}
+
+impl<B: Backend> Prepared<B> {
+    fn new<P: Objective<Autodiff<Autodiff<B>>>>(
+        objective: &P,
+        phi: &Tensor<B, 1>,
+        step: usize,
+        stage: usize,
+    ) -> Self {
+        let phi = Tensor::<Autodiff<B>, 1>::from_inner(phi.clone()).require_grad();
+        let tracked = objective.prepared(Tensor::from_inner(phi.clone()), step).inner();
+        let value = tracked.clone().inner();
+        Self { stage, phi, tracked, adjoint: value.zeros_like(), value }
+    }
+
+    /// The derivative by φ itself.
+    fn by_phi(self) -> Tensor<B, 1> {
+        let grads = (self.tracked * Tensor::from_inner(self.adjoint)).sum().backward();
+        self.phi.grad(&grads).unwrap_or_else(|| self.phi.inner().zeros_like())
+    }
 }
 
 /// The loss, and its derivatives by the scene and by the softness.

@@ -6,17 +6,47 @@
 //! [`MovingSilhouette`] draws with it, and prepares support and knots anew only when the scale has
 //! moved so far that it must. A [`Descent`] goes down the gradient of a task's loss and shows every
 //! step.
+//!
+//! A task that implements [`Lesson`] can have a softness learned on it: `study` turns it into what the
+//! command `learn` drives.
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-method needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+#[cfg(feature = "ndarray")]
+mod course;
+#[cfg(not(feature = "ndarray"))]
+mod course {
+    //! Learning needs doubles and two levels of autodiff, which this backend does not have.
+
+    /// Says that it cannot be done.
+    ///
+    /// # Errors
+    ///
+    /// Always.
+    pub fn study(
+        _lesson: impl crate::Lesson,
+        _plan: &softrast_runner::Plan,
+    ) -> anyhow::Result<Box<dyn softrast_runner::Study>> {
+        anyhow::bail!("learn needs a program that was built with the feature ndarray")
+    }
+}
 mod descent;
+mod judge;
+mod learned_edge;
+mod lesson;
 mod method;
 mod moving_silhouette;
 mod searched;
 mod tensor;
 
+pub use course::study;
+#[cfg(feature = "ndarray")]
+pub use course::{Class, Inner, Outer};
 pub use descent::{Descent, Moment};
+pub use judge::Judge;
+pub use learned_edge::{LearnedEdge, Of, PreparedRun, Step};
+pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;

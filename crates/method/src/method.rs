@@ -1,6 +1,6 @@
 use softrast_raster::DefaultBackend;
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice};
-use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
+use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
 use crate::{Searched, numbers, tensor};
 
@@ -16,6 +16,8 @@ pub struct Defaults {
     pub decay: [f64; 2],
     /// Scale of a static softness.
     pub fixed: f64,
+    /// Width and height of the image where the command line does not say, in pixels.
+    pub size: usize,
 }
 
 /// A softness and how its scale moves over the steps.
@@ -30,6 +32,8 @@ pub struct Method {
 enum Path {
     /// Parameters of a file, and a scale that stands for them.
     Fixed { phi: Vec<f64>, scale: f64 },
+    /// Parameters of a file at scale 1, and the scale over a run on images of this size.
+    Learned { phi: Vec<f64>, path: ScalePath, size: usize },
     /// The default parameters of the family at a scale that goes geometrically from the first to
     /// the last.
     Scale { first: f64, last: f64 },
@@ -54,10 +58,14 @@ impl Method {
                          --squared and --schedule decay, or name a family",
                     ));
                 }
-                let SoftnessFile { softness, phi, .. } = SoftnessFile::load(file)?;
-                let scale = nominal_scale(softness, &phi);
-                let name = file.display().to_string();
-                Ok(Self { softness, name, path: Path::Fixed { phi, scale } })
+                let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(file)?;
+                let path = match path {
+                    None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
+                    Some(path) => {
+                        Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) }
+                    }
+                };
+                Ok(Self { softness, name: file.display().to_string(), path })
             }
             named => {
                 let name = match named {
@@ -89,8 +97,9 @@ impl Method {
 
     /// Whether the scale moves.
     pub fn is_static(&self) -> bool {
-        match self.path {
+        match &self.path {
             Path::Fixed { .. } => true,
+            Path::Learned { path, .. } => path.knots.len() == 1,
             Path::Scale { first, last } => first == last,
         }
     }
@@ -102,11 +111,12 @@ impl Method {
     pub fn scale(&self, step: usize, steps: usize) -> f64 {
         match self.path {
             Path::Fixed { scale, .. } => scale,
-            Path::Scale { first, last } => {
-                let last_step = steps.saturating_sub(1).max(1);
-                let part = step.min(last_step) as f64 / last_step as f64;
-                first * (last / first).powf(part)
+            Path::Learned { ref path, size, .. } => {
+                let knots = tensor::<DefaultBackend, 1>(path.knots.clone(), [path.knots.len()]);
+                let floor = path.floor(self.softness, size);
+                numbers(ScalePath::scale(&knots, floor, part(step, steps)))[0]
             }
+            Path::Scale { first, last } => first * (last / first).powf(part(step, steps)),
         }
     }
 
@@ -114,9 +124,27 @@ impl Method {
     pub fn phi(&self, scale: f64) -> Vec<f64> {
         match &self.path {
             Path::Fixed { phi, .. } => phi.clone(),
+            Path::Learned { phi, .. } => {
+                let phi = tensor::<DefaultBackend, 1>(phi.clone(), [phi.len()]);
+                numbers(self.softness.widened(phi, tensor(vec![scale], [1])))
+            }
             Path::Scale { .. } => self.softness.default_phi(scale),
         }
     }
+
+    /// Parameters at scale 1, for a path of scales.
+    pub(crate) fn unit_phi(&self) -> Vec<f64> {
+        match &self.path {
+            Path::Fixed { phi, .. } | Path::Learned { phi, .. } => phi.clone(),
+            Path::Scale { .. } => self.softness.default_phi(1.0),
+        }
+    }
+}
+
+/// Which part of a run is over, 0 to 1: the last gradient is taken at the end.
+fn part(step: usize, steps: usize) -> f64 {
+    let last = steps.saturating_sub(1).max(1);
+    step.min(last) as f64 / last as f64
 }
 
 impl Defaults {
@@ -177,8 +205,13 @@ mod tests {
 
     use super::*;
 
-    const DEFAULTS: Defaults =
-        Defaults { task: "none", schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+    const DEFAULTS: Defaults = Defaults {
+        task: "none",
+        schedule: Schedule::Decay,
+        decay: [0.03, 0.002],
+        fixed: 0.002,
+        size: 64,
+    };
 
     /// First, middle and last scale of the method that a command line gives.
     fn scales(line: &str) -> [f64; 3] {

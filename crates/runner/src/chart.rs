@@ -88,7 +88,7 @@ fn draw<DB: DrawingBackend>(
 }
 
 /// A number on an axis, without zeros that say nothing.
-fn tick(value: f64) -> String {
+pub(crate) fn tick(value: f64) -> String {
     let rounded = format!("{value:.4}");
     let short = rounded.trim_end_matches('0').trim_end_matches('.');
     if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e5) {

@@ -1,4 +1,5 @@
 mod evaluate;
+mod learn;
 mod search;
 
 use std::path::PathBuf;
@@ -22,6 +23,7 @@ use crate::{
 };
 
 pub(crate) use evaluate::evaluate;
+pub(crate) use learn::learn;
 pub(crate) use search::search;
 
 /// What a command has to say once its files are written.
@@ -97,6 +99,11 @@ fn ended(error: anyhow::Error, worker: &Worker) -> anyhow::Error {
         return error;
     }
     error.context("what was finished before is kept, and --resume goes on from it")
+}
+
+/// An error that ended learning, with a word on what is kept.
+fn ended_learning(error: anyhow::Error) -> anyhow::Error {
+    error.context("learning stopped; what was learned before is kept, and --resume goes on from it")
 }
 
 /// Writes all files that tell of runs, which `folder` may have others beside.

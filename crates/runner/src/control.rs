@@ -9,7 +9,7 @@ use crate::{
 /// Flags that say how to work, not what on: the task does not see them.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Control {
-    /// Go on from what an interrupted `evaluate` or `search` has finished.
+    /// Go on from what an interrupted `evaluate`, `search` or `learn` has finished.
     #[arg(long)]
     pub(crate) resume: bool,
 
@@ -82,7 +82,7 @@ impl Control {
     /// [`Error::Usage`] that names the flag.
     pub(crate) fn check(&self, command: Command) -> Result<(), Error> {
         let given = [
-            (self.resume, "--resume", &[Command::Evaluate, Command::Search][..]),
+            (self.resume, "--resume", &[Command::Evaluate, Command::Search, Command::Learn][..]),
             (self.against.is_some(), "--against", &[Command::Evaluate]),
             (self.search_runs.is_some(), "--search-runs", &[Command::Search]),
             (!self.scales.is_empty(), "--scales", &[Command::Search]),

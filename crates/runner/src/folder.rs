@@ -18,6 +18,8 @@ pub(crate) const AGAINST_CURVE: &str = "against_curve.csv";
 pub(crate) const SEARCH: &str = "search.json";
 pub(crate) const CELLS: &str = "search.csv";
 
+pub(crate) const LEARN: &str = "learn.json";
+
 /// Files that tell of the last runs. Those of a search stay until the next one.
 const OF_RUNS: [&str; 7] =
     [CURVE, CONVERGENCE, AGAINST_CURVE, BEFORE_AFTER, ANIMATION, REPORT, RESULT];
@@ -57,6 +59,11 @@ impl Folder {
     /// Where the journal of a command stands.
     pub(crate) fn journal(&self, command: Command) -> PathBuf {
         self.path.join(format!("{}.jsonl", command.name()))
+    }
+
+    /// Where learning stands.
+    pub(crate) fn checkpoint(&self) -> PathBuf {
+        self.path.join("learn.checkpoint.json")
     }
 
     /// Writes a file under a hidden name.

@@ -1,7 +1,7 @@
 //! What every softrast task shares: command line, progress, results, charts and the report page.
 //!
 //! `evaluate` and `search` keep what they have finished, so that they can be stopped and resumed;
-//! `docs/evaluating.md` says what they do and how methods are compared.
+//! `docs/evaluating.md` says what they do and how methods are compared. `learn` drives a [`Study`].
 //!
 //! A task is a library type that implements [`Task`], and a binary whose `main` is one call of
 //! [`main`]. The task knows scenes, cameras and optimisers; this crate sees seeds, numbers and RGB
@@ -17,6 +17,7 @@ mod encoded;
 mod error;
 mod error_summary;
 mod evaluation;
+mod figure;
 mod folder;
 mod grid;
 mod heat_map;
@@ -26,6 +27,7 @@ mod journal;
 mod label;
 mod memory;
 mod picture;
+mod plan;
 mod prepared;
 mod program;
 mod progress;
@@ -37,6 +39,7 @@ mod settings;
 mod space;
 mod statistics;
 mod stored;
+mod study;
 mod summary;
 mod table;
 mod task;
@@ -50,10 +53,12 @@ pub use error::{Error, Failure};
 pub use grid::{Grid, OwnAxis};
 pub use memory::peak_rss_mib;
 pub use picture::{contact_sheet, difference, rgb_from_gray, rgb_from_planes};
+pub use plan::{Judged, Order, Plan, Referee};
 pub use program::{execute, main};
 pub use progress::Progress;
 pub use settings::{Command, Schedule, Settings, SoftnessChoice, Variant};
 pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
+pub use study::{Curve, Figure, Learned, OuterStep, Study};
 pub use task::{
     Batch, Description, ErrorGroup, ExtraError, Measure, NoArgs, Pictures, Point, Run, Score, Task,
 };

@@ -47,10 +47,12 @@ pub fn execute<T: Task>(
     };
     line.settings.reconcile(line.command).map_err(anyhow::Error::from)?;
     line.control.check(line.command).map_err(anyhow::Error::from)?;
+    line.learning.check(line.command).map_err(anyhow::Error::from)?;
     let again = repeat::<T>(&words);
     let results = match line.command {
         Command::Solve | Command::Evaluate => command::evaluate::<T>(&line, &again)?,
         Command::Search => command::search::<T>(&line, &again)?,
+        Command::Learn => command::learn::<T>(&line, &again)?,
     };
     for warning in &results.warnings {
         eprintln!("warning: {warning}");

@@ -1,5 +1,6 @@
 mod against;
 mod frame;
+mod learn;
 mod search;
 
 use std::fmt::Write;
@@ -15,6 +16,7 @@ use crate::{
 };
 
 use frame::{escape, frame};
+pub(crate) use learn::of_learning;
 pub(crate) use search::of_search;
 
 /// The results as one page that needs no other file.

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
 
-use crate::{Error, control::Control};
+use crate::{Error, control::Control, plan::LearnFlags};
 
 /// Everything on the command line of a task.
 #[derive(Debug, Parser)]
@@ -14,6 +14,8 @@ pub(crate) struct CommandLine<A: Args> {
     pub(crate) settings: Settings,
     #[command(flatten)]
     pub(crate) control: Control,
+    #[command(flatten)]
+    pub(crate) learning: LearnFlags,
     #[command(flatten)]
     pub(crate) args: A,
 }
@@ -28,6 +30,8 @@ pub enum Command {
     Evaluate,
     /// Find the best scale and learning rate on training seeds, then evaluate them on others.
     Search,
+    /// Learn the softness on training seeds, by the gradient of what a whole run ends with.
+    Learn,
 }
 
 impl Command {
@@ -37,6 +41,7 @@ impl Command {
             Command::Solve => "solve",
             Command::Evaluate => "evaluate",
             Command::Search => "search",
+            Command::Learn => "learn",
         }
     }
 }
@@ -167,6 +172,10 @@ impl Settings {
         match (command, self.runs) {
             (Command::Solve, Some(2..)) => Err(Error::Usage(
                 "solve makes one run: ask for more with the command evaluate".into(),
+            )),
+            (Command::Learn, Some(_)) => Err(Error::Usage(
+                "learn has no --runs: say --batch and --validation-runs, then evaluate what it learned"
+                    .into(),
             )),
             _ => Ok(()),
         }

@@ -1,6 +1,6 @@
 use image::RgbImage;
 
-use crate::{Grid, Progress, Settings};
+use crate::{Error, Grid, Plan, Progress, Settings, Study};
 
 /// A problem that the shared command line can solve and evaluate.
 pub trait Task: Sized {
@@ -54,6 +54,15 @@ pub trait Task: Sized {
     /// Whatever keeps the batch from being solved. A value that stops being finite is no error:
     /// the results then end at the step before, with a warning.
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>>;
+
+    /// Prepares to learn a softness on instances of this task.
+    ///
+    /// # Errors
+    ///
+    /// If there is nothing to learn, as by default, or the settings do not go with learning.
+    fn study(self, _plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        Err(Error::Usage(format!("{} has no softness to learn", Self::NAME)).into())
+    }
 }
 
 /// A [`Task::Args`] without flags.

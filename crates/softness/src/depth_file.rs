@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     DepthSoftness, SoftnessFileError,
-    file::{check, read, write},
+    file::{check, read, text, write},
 };
 
 /// A depth softness and its parameters, as kept in a JSON file.
@@ -42,6 +42,16 @@ impl DepthSoftnessFile {
     pub fn save(&self, path: &Path) -> Result<(), SoftnessFileError> {
         self.check(path)?;
         write(path, self)
+    }
+
+    /// Checks the parameters; what [`save`](DepthSoftnessFile::save) would write at `path`.
+    ///
+    /// # Errors
+    ///
+    /// If the parameters do not suit the softness.
+    pub fn text(&self, path: &Path) -> Result<String, SoftnessFileError> {
+        self.check(path)?;
+        text(path, self)
     }
 
     fn check(&self, path: &Path) -> Result<(), SoftnessFileError> {

@@ -5,7 +5,7 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::{EdgeSoftness, Softness};
+use crate::{EdgeSoftness, ScalePath, Softness, path::MOST_KNOTS};
 
 /// The largest size of a parameter that is a logarithm: its exponential must fit an f32.
 const LARGEST_LOGARITHM: f64 = 80.0;
@@ -18,6 +18,9 @@ pub struct SoftnessFile {
     pub softness: EdgeSoftness,
     /// Its parameters φ, as many as [`Softness::parameters`] says.
     pub phi: Vec<f64>,
+    /// How its width moves over a run; a softness without one stays as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<ScalePath>,
     /// Where the parameters come from, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
@@ -85,6 +88,14 @@ pub enum SoftnessFileError {
         /// Its value.
         found: f64,
     },
+    /// The path of scales cannot be used.
+    #[error("softness {path:?} has a path with {what}")]
+    Path {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
 }
 
 impl SoftnessFile {
@@ -113,9 +124,32 @@ impl SoftnessFile {
         write(path, self)
     }
 
+    /// Checks the parameters; what [`save`](SoftnessFile::save) would write at `path`.
+    ///
+    /// # Errors
+    ///
+    /// If the parameters do not suit the family.
+    pub fn text(&self, path: &Path) -> Result<String, SoftnessFileError> {
+        self.check(path)?;
+        text(path, self)
+    }
+
     fn check(&self, path: &Path) -> Result<(), SoftnessFileError> {
         let family = self.softness.family;
-        check(path, family.name(), [family.parameters(), family.logarithms()], &self.phi)
+        check(path, family.name(), [family.parameters(), family.logarithms()], &self.phi)?;
+        let wrong = |what: String| SoftnessFileError::Path { path: path.to_owned(), what };
+        let Some(ScalePath { knots, floor_px }) = &self.path else { return Ok(()) };
+        if !(1..=MOST_KNOTS).contains(&knots.len()) {
+            return Err(wrong(format!("{} knots, expected 1 to {MOST_KNOTS}", knots.len())));
+        }
+        if let Some(knot) = knots.iter().find(|knot| !(knot.abs() <= LARGEST_LOGARITHM)) {
+            let limit = LARGEST_LOGARITHM;
+            return Err(wrong(format!("a knot of {knot}, expected -{limit} to {limit}")));
+        }
+        if !(*floor_px >= 0.0 && floor_px.is_finite()) {
+            return Err(wrong(format!("a floor of {floor_px} pixels, expected 0 or more")));
+        }
+        Ok(())
     }
 }
 
@@ -130,9 +164,7 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SoftnessFileEr
 /// Writes a JSON file at `path`, by way of a temporary one beside it.
 pub(crate) fn write(path: &Path, content: &impl Serialize) -> Result<(), SoftnessFileError> {
     let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
-    let mut text =
-        serde_json::to_string_pretty(content).map_err(io::Error::from).map_err(failed)?;
-    text.push('\n');
+    let text = text(path, content)?;
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}.tmp", std::process::id()));
     fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|source| {
@@ -140,6 +172,13 @@ pub(crate) fn write(path: &Path, content: &impl Serialize) -> Result<(), Softnes
         let _ = fs::remove_file(&beside);
         failed(source)
     })
+}
+
+/// The text of a JSON file for `path`.
+pub(crate) fn text(path: &Path, content: &impl Serialize) -> Result<String, SoftnessFileError> {
+    let text = serde_json::to_string_pretty(content).map_err(io::Error::from);
+    let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
+    text.map(|text| text + "\n").map_err(failed)
 }
 
 /// Checks that `phi` has the expected length, of which so many at the front are logarithms.
@@ -171,7 +210,9 @@ mod tests {
 
     fn example(family: Family) -> SoftnessFile {
         let softness = EdgeSoftness { family, squared: true };
-        SoftnessFile { softness, phi: softness.default_phi(1e-4), note: Some("a start".into()) }
+        let path = ScalePath { knots: vec![-3.5, -6.2], floor_px: 0.05 };
+        let note = Some("a start".into());
+        SoftnessFile { softness, phi: softness.default_phi(1e-4), path: Some(path), note }
     }
 
     fn error(text: &str) -> String {
@@ -212,6 +253,20 @@ mod tests {
         let message =
             error(r#"{"softness": {"family": "gauss", "squared": false}, "phi": [1e999]}"#);
         assert!(message.contains("number out of range"), "{message}");
+    }
+
+    #[test]
+    fn a_path_that_cannot_be_followed_is_refused() {
+        for (path, part) in [
+            (r#"{"knots": [], "floor_px": 0}"#, "0 knots, expected 1 to 16"),
+            (r#"{"knots": [-1, 99], "floor_px": 0}"#, "a knot of 99, expected -80 to 80"),
+            (r#"{"knots": [-1], "floor_px": -1}"#, "a floor of -1 pixels, expected 0 or more"),
+        ] {
+            let softness = r#"{"family": "gauss", "squared": false}"#;
+            let message =
+                error(&format!(r#"{{"softness": {softness}, "phi": [0], "path": {path}}}"#));
+            assert!(message.ends_with(part), "{message}");
+        }
     }
 
     #[test]

@@ -1,9 +1,9 @@
 use burn::backend::Autodiff;
-use softrast_method::{Defaults, Method, numbers};
+use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Point, Progress, Run,
-    Schedule, Score, Settings, Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress, Run,
+    Schedule, Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -11,6 +11,7 @@ use crate::{
     Args, DepthError, Instance, Problem, Scene,
     depth_method::DepthMethod,
     instance::{front, pairs},
+    lesson,
     picture::Album,
     solve::{Solver, State},
 };
@@ -30,6 +31,7 @@ const SCALES: Defaults = Defaults {
     schedule: Schedule::Static,
     decay: [0.02, 0.0005],
     fixed: 0.0005,
+    size: 64,
 };
 
 /// Widths of the soft depth that a search tries.
@@ -37,8 +39,8 @@ const DEPTH_SCALES: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
 
 /// The prepared task.
 pub struct Occlusion {
-    problem: Problem,
-    solver: Solver,
+    pub(crate) problem: Problem,
+    pub(crate) solver: Solver,
     /// The width of the soft depth was not asked for, but is there to be chosen.
     depth_is_free: bool,
 }
@@ -61,7 +63,7 @@ impl Task for Occlusion {
         let solver = Solver {
             edge,
             depth: DepthMethod::new(settings, args)?,
-            size: settings.size.unwrap_or(64),
+            size: settings.size.unwrap_or(SCALES.size),
             steps: settings.steps.unwrap_or(steps),
             learning_rate: settings.learning_rate.unwrap_or(learning_rate),
         };
@@ -160,6 +162,10 @@ impl Task for Occlusion {
             pictures: pictures.take(),
         });
         Ok(runs.collect())
+    }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        study(lesson::OcclusionLesson::new(self, plan), plan)
     }
 }
 

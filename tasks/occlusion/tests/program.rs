@@ -179,3 +179,67 @@ fn contradictions_are_usage_errors_and_broken_files_are_not() {
         assert!(failure.message.contains(part), "{line}: {failure}");
     }
 }
+
+/// A few outer steps on small scenes.
+const LEARN: &str = "learn --outer 3 --inner 6 --batch 2 --validation-runs 2 --size 10";
+
+#[test]
+fn a_learned_softness_is_one_that_the_task_accepts() {
+    for flags in
+        ["", "--softness mlp --order direct", "--schedule decay --order es", "--order joint"]
+    {
+        let out = tempfile::tempdir().unwrap();
+        let json = run_in(out.path(), &format!("{LEARN} {flags}")).unwrap();
+        assert!(json["best"]["validation_loss"].as_f64().is_some_and(f64::is_finite), "{json}");
+        assert_eq!(json["instances"], serde_json::json!({ "tried": 6, "dropped": 0 }));
+        let lines = fs::read_to_string(out.path().join("learn.jsonl")).unwrap();
+        assert_eq!(lines.lines().count(), 4, "one for each outer step and the last validation");
+        let page = fs::read_to_string(out.path().join("report.html")).unwrap();
+        assert!(page.matches("<svg").count() >= 3 && !page.contains("NaN"), "{flags}");
+        let [edge, depth] =
+            ["softness.json", "depth_softness.json"].map(|name| out.path().join(name));
+        let line = format!(
+            "evaluate --runs 2 --size 10 --steps 6 --softness {} --depth-softness {}",
+            edge.display(),
+            depth.display()
+        );
+        assert_finite(&run(&line).unwrap());
+    }
+}
+
+#[test]
+fn learning_goes_on_only_from_its_own_checkpoint() {
+    let out = tempfile::tempdir().unwrap();
+    let whole = run_in(out.path(), LEARN).unwrap();
+    let softness = fs::read(out.path().join("softness.json")).unwrap();
+    // A line that was being written when the program was killed.
+    let log = out.path().join("learn.jsonl");
+    let lines = fs::read_to_string(&log).unwrap();
+    fs::write(&log, format!("{lines}{{\"step\": 9, \"lo")).unwrap();
+    let again = run_in(out.path(), &format!("{LEARN} --resume")).unwrap();
+    assert_eq!((&again["best"], &again["plan"]), (&whole["best"], &whole["plan"]));
+    assert_eq!(fs::read(out.path().join("softness.json")).unwrap(), softness);
+    assert_eq!(fs::read_to_string(&log).unwrap(), lines);
+
+    let other = run_in(out.path(), &format!("{LEARN} --resume --outer-rate 0.1")).unwrap_err();
+    assert!(other.message.contains("belongs to another job"), "{other}");
+    fs::write(out.path().join("learn.checkpoint.json"), "{").unwrap();
+    let damaged = run_in(out.path(), &format!("{LEARN} --resume")).unwrap_err();
+    assert!(damaged.message.contains("is no checkpoint, or a damaged one"), "{damaged}");
+}
+
+#[test]
+fn flags_of_learning_that_make_no_sense_are_refused() {
+    for (line, part) in [
+        ("solve --outer 3", "--outer goes with learn, not with solve"),
+        ("learn --runs 3", "learn has no --runs"),
+        ("learn --order truncated:0", "expected a whole number"),
+        ("learn --order direct --referee fixed", "leave out --referee fixed"),
+        ("learn --knots 6", "expected a whole number from 1 to 5"),
+        ("learn --scales 0.1", "--scales goes with search"),
+    ] {
+        let failure = run(line).unwrap_err();
+        assert_eq!(failure.code, 2, "{line}: {failure}");
+        assert!(failure.message.contains(part), "{line}: {failure}");
+    }
+}

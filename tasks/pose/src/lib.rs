@@ -27,6 +27,7 @@ compile_error!("pose needs a backend: turn on one of the features ndarray, flex 
 mod args;
 mod error;
 mod instance;
+mod lesson;
 mod picture;
 mod scene;
 mod solve;
@@ -35,5 +36,6 @@ mod task;
 pub use args::{Args, Instances, Range};
 pub use error::PoseError;
 pub use instance::{Camera, Instance};
+pub use lesson::PoseLesson;
 pub use scene::Scene;
 pub use task::Pose;

@@ -1,16 +1,17 @@
 use anyhow::ensure;
 use burn::backend::Autodiff;
 use softrast_mesh::{Mesh, fox};
-use softrast_method::{Defaults, Method, numbers};
+use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Point, Progress, Run,
-    Schedule, Score, Settings, Task, Variant,
+    Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Plan, Point, Progress,
+    Run, Schedule, Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
 use crate::{
     Args, Instance, Instances, PoseError, Range, Scene,
+    lesson::PoseLesson,
     picture::Album,
     scene::nearest_distance,
     solve::{Solver, State},
@@ -34,18 +35,23 @@ const BATCH: usize = 25;
 /// 55 degrees away 41 succeed at 0.002, and 48 with a decay to it from 0.03 (from 0.01: 45, from
 /// 0.05: 47). This is below the quarter of a pixel that META 6.6 asks for, because thousands of
 /// small faces add up to an edge that is wider than that of one (META 6.7).
-const SCALES: Defaults =
-    Defaults { task: Pose::NAME, schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+const SCALES: Defaults = Defaults {
+    task: Pose::NAME,
+    schedule: Schedule::Decay,
+    decay: [0.03, 0.002],
+    fixed: 0.002,
+    size: 64,
+};
 
 /// The prepared task.
 pub struct Pose {
-    mesh: Mesh,
+    pub(crate) mesh: Mesh,
     mesh_name: String,
     source: Source,
-    optimise_fov: bool,
+    pub(crate) optimise_fov: bool,
     /// Poses that a run may start from.
     starts: usize,
-    solver: Solver,
+    pub(crate) solver: Solver,
 }
 
 /// Where instances come from.
@@ -68,7 +74,7 @@ impl Task for Pose {
         };
         let solver = Solver {
             method,
-            size: settings.size.unwrap_or(64),
+            size: settings.size.unwrap_or(SCALES.size),
             steps: settings.steps.unwrap_or(steps),
             learning_rate: settings.learning_rate.unwrap_or(learning_rate),
         };
@@ -156,6 +162,15 @@ impl Task for Pose {
         });
         Ok(runs.collect())
     }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        if let Source::Released(_) = self.source {
+            let message =
+                "learn needs more instances than --instances released24 has: leave it out";
+            return Err(Error::Usage(message.into()).into());
+        }
+        study(PoseLesson::new(self, plan), plan)
+    }
 }
 
 /// One instance, solved from one start.
@@ -240,7 +255,7 @@ impl Pose {
         Ok(all)
     }
 
-    fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
+    pub(crate) fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
         match &self.source {
             Source::Released(pairs) => {
                 let pair = usize::try_from(seed).ok().and_then(|k| pairs.get(k)).copied();

@@ -21,6 +21,7 @@ compile_error!("shape2d needs a backend: turn on one of the features ndarray, fl
 
 mod args;
 mod instance;
+mod lesson;
 mod letters;
 mod logo;
 mod scene;
@@ -30,6 +31,7 @@ mod task;
 
 pub use args::Args;
 pub use instance::Instance;
+pub use lesson::Shape2dLesson;
 pub use logo::Logo;
 pub use scene::Scene;
 pub use task::Shape2d;

@@ -1,14 +1,16 @@
+use std::path::PathBuf;
+
 use burn::backend::Autodiff;
-use softrast_method::{Defaults, Method};
+use softrast_method::{Defaults, Method, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Point, Progress, Run, Schedule,
-    Score, Settings, Task, Variant, difference, rgb_from_gray,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Plan, Point, Progress, Run,
+    Schedule, Score, Settings, Study, Task, Variant, difference, rgb_from_gray,
 };
 use softrast_softness::Softness;
 
 use crate::{
-    Args, Instance, Logo, Scene,
+    Args, Instance, Logo, Scene, lesson,
     solve::{Solver, State},
     target::luminance,
 };
@@ -28,6 +30,7 @@ const SCALES: Defaults = Defaults {
     schedule: Schedule::Static,
     decay: [0.02, 0.002],
     fixed: 0.002,
+    size: 256,
 };
 /// Largest move of a coordinate in a step, roughly, in NDC: about a pixel of the default size.
 ///
@@ -37,10 +40,27 @@ const LEARNING_RATE: f64 = 0.01;
 
 /// The prepared task.
 pub struct Shape2d {
-    target: Vec<f64>,
+    pub(crate) target: Vec<f64>,
     target_name: String,
-    triangles: usize,
-    solver: Solver,
+    pub(crate) triangles: usize,
+    pub(crate) source: Source,
+    pub(crate) solver: Solver,
+}
+
+/// Where the picture comes from.
+pub(crate) enum Source {
+    Logo(Variant),
+    File(PathBuf),
+}
+
+impl Source {
+    /// The picture on `size` × `size` pixels, top row first, in [0, 1].
+    pub(crate) fn image(&self, size: usize) -> anyhow::Result<Vec<f64>> {
+        match self {
+            Source::Logo(variant) => Ok(Logo::of(*variant).image(size)),
+            Source::File(path) => luminance(path, size),
+        }
+    }
 }
 
 impl Task for Shape2d {
@@ -54,7 +74,7 @@ impl Task for Shape2d {
         let learning_rate = settings.learning_rate.or(searched).unwrap_or(LEARNING_RATE);
         let solver = Solver {
             method,
-            size: settings.size.unwrap_or(256),
+            size: settings.size.unwrap_or(SCALES.size),
             steps: settings.steps.unwrap_or(200),
             learning_rate,
         };
@@ -62,12 +82,13 @@ impl Task for Shape2d {
             Variant::Original => (800, "letters"),
             Variant::Transfer => (4000, "skyline"),
         };
-        let (target, target_name) = match &args.target {
-            None => (Logo::of(settings.variant).image(solver.size), logo.to_owned()),
-            Some(path) => (luminance(path, solver.size)?, path.display().to_string()),
+        let (source, target_name) = match &args.target {
+            None => (Source::Logo(settings.variant), logo.to_owned()),
+            Some(path) => (Source::File(path.clone()), path.display().to_string()),
         };
+        let target = source.image(solver.size)?;
         let triangles = args.triangles.unwrap_or(triangles);
-        Ok(Self { target, target_name, triangles, solver })
+        Ok(Self { target, target_name, triangles, source, solver })
     }
 
     fn describe(&self) -> Description {
@@ -108,6 +129,10 @@ impl Task for Shape2d {
             self.one(&Batch { seeds: vec![seed], pictures }, seed, progress)
         });
         runs.collect()
+    }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        study(lesson::Shape2dLesson::new(self, plan)?, plan)
     }
 }
 

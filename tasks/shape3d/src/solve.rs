@@ -39,15 +39,19 @@ pub(crate) struct State {
 }
 
 impl Solver {
+    /// What steps the scene.
+    pub(crate) fn adam(&self) -> Adam {
+        let [beta1, beta2] = BETAS;
+        Adam { beta1, beta2, ..Adam::new(self.learning_rate) }
+    }
+
     /// Solves `scene`, and shows each state from the start to the end to `visit`.
     pub(crate) fn run<B: RasterBackend>(
         &self,
         scene: &Scene<Autodiff<B>>,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let [beta1, beta2] = BETAS;
-        let optimizer = Adam { beta1, beta2, ..Adam::new(self.learning_rate) };
-        let descent = Descent { optimizer, steps: self.steps };
+        let descent = Descent { optimizer: self.adam(), steps: self.steps };
         let first = self.method.scale(0, self.steps);
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =

@@ -2,17 +2,18 @@ use std::path::Path;
 
 use burn::backend::Autodiff;
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
-use softrast_method::{Defaults, Method, numbers};
+use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
-    Settings, Task, Variant,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run, Schedule,
+    Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
 use crate::{
     Args, Chamfer, Instance, Scene,
     instance::ELEVATIONS_DEG,
+    lesson,
     picture::Album,
     scene::{DISTANCE, VIEWS},
     solve::{Solver, State},
@@ -29,8 +30,13 @@ const SUCCESS: f64 = 0.3;
 /// 0.103 for a decay from 0.03 to 0.003, 0.104 to 0.002, 0.127 to 0.005 and 0.128 from 0.02 to 0.003;
 /// without a decay 0.126 at 0.002, 0.104 at 0.003, 0.139 at 0.005, 0.172 at 0.007, 0.261 at 0.01 and 0.507
 /// at 0.02. The decay also has the smaller Chamfer distance, 0.28 against 0.53 at 0.003.
-const SCALES: Defaults =
-    Defaults { task: Shape3d::NAME, schedule: Schedule::Decay, decay: [0.03, 0.003], fixed: 0.003 };
+const SCALES: Defaults = Defaults {
+    task: Shape3d::NAME,
+    schedule: Schedule::Decay,
+    decay: [0.03, 0.003],
+    fixed: 0.003,
+    size: 64,
+};
 
 /// Largest move of a parameter in a step, roughly.
 ///
@@ -40,13 +46,13 @@ const LEARNING_RATE: f64 = 0.0316;
 
 /// The prepared task.
 pub struct Shape3d {
-    target: Mesh,
+    pub(crate) target: Mesh,
     target_name: String,
-    template: Mesh,
+    pub(crate) template: Mesh,
     template_name: String,
-    elevation_deg: Option<f64>,
+    pub(crate) elevation_deg: Option<f64>,
     chamfer: Chamfer,
-    solver: Solver,
+    pub(crate) solver: Solver,
 }
 
 impl Task for Shape3d {
@@ -60,7 +66,7 @@ impl Task for Shape3d {
         let learning_rate = settings.learning_rate.or(searched).unwrap_or(LEARNING_RATE);
         let solver = Solver {
             method,
-            size: settings.size.unwrap_or(64),
+            size: settings.size.unwrap_or(SCALES.size),
             steps: settings.steps.unwrap_or(100),
             learning_rate,
         };
@@ -116,6 +122,10 @@ impl Task for Shape3d {
             self.one(&Batch { seeds: vec![seed], pictures }, seed, progress)
         });
         runs.collect()
+    }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        study(lesson::Shape3dLesson::new(self, plan), plan)
     }
 }
 

@@ -1,0 +1,284 @@
+use std::{cell::RefCell, path::Path, sync::Arc};
+
+use anyhow::Context;
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
+use serde_json::{Value, json};
+use softrast_meta::{
+    Adam, Checkpoint, Learner, Measured, MetaGradient, Objective, Problem, Progress, Tasks,
+    Validation,
+};
+use softrast_runner::{Judged, Learned, Order, OuterStep, Plan, Referee, Study};
+
+use crate::{FINER, Lesson, Of, Step, numbers};
+
+/// Learning runs in doubles: rounding grows with every step that is walked back (META 2.5, V9).
+type B = NdArray<f64>;
+type A = Autodiff<B>;
+type AA = Autodiff<A>;
+
+/// Standard deviation of an evolution strategy's steps in φ, whose entries are mostly logarithms;
+/// larger ones straddle kinks that Adam's steps fall on either side of.
+const SIGMA: f64 = 0.05;
+/// Largest norm of the mean meta-gradient. Source: META 2.4.
+const CLIP: f64 = 1.0;
+/// Validations during a run, beside that of the start.
+const VALIDATIONS: usize = 10;
+
+/// Learns a softness as `plan` says.
+///
+/// # Errors
+///
+/// If an instance cannot be made.
+pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+    // What would fail later fails here, where an error can be told.
+    let seeds = (0..(plan.outer * plan.batch) as u64).map(|k| plan.seed + k);
+    let last = seeds.last().into_iter().chain([plan.validation_seed]);
+    last.map(|seed| lesson.scene::<B>(seed, 1)).collect::<Result<Vec<_>, _>>()?;
+    let mode = match plan.order {
+        Order::Unrolled => MetaGradient::default(),
+        Order::Truncated(steps) => MetaGradient::Truncated { steps, clip: Some(1.0) },
+        Order::Direct => MetaGradient::Direct,
+        Order::Joint => MetaGradient::Joint { learning_rate: plan.outer_rate },
+        Order::Es => MetaGradient::Es { sigma: SIGMA, pairs: 1 },
+    };
+    let validation = Validation {
+        seed: plan.validation_seed,
+        count: plan.validation_runs,
+        every: plan.outer.div_ceil(VALIDATIONS),
+        patience: plan.patience,
+    };
+    let learner = Learner {
+        mode,
+        optimizer: Adam::new(plan.outer_rate),
+        clip: CLIP,
+        steps: plan.outer,
+        batch: plan.batch,
+        seed: plan.seed,
+        validation,
+    };
+    let progress = Progress::new(lesson.start());
+    let class = Class::new(lesson, plan);
+    Ok(Box::new(Course { class, learner, progress }))
+}
+
+struct Course<L: Lesson> {
+    class: Class<L>,
+    learner: Learner,
+    progress: Progress,
+}
+
+impl<L: Lesson> Study for Course<L> {
+    fn identity(&self) -> Value {
+        json!({ "learner": self.learner, "start": self.class.lesson.start() })
+    }
+
+    fn advance(&mut self) -> anyhow::Result<Option<OuterStep>> {
+        let Some(record) = self.learner.advance::<B>(&self.class, &mut self.progress)? else {
+            return Ok(None);
+        };
+        let (loss, validation) = (record.loss, record.validation_loss);
+        let record_json = serde_json::to_value(&record)?;
+        Ok(Some(OuterStep { step: record.step, loss, validation, record: record_json }))
+    }
+
+    fn save(&self, path: &Path, job: &str) -> anyhow::Result<()> {
+        Checkpoint { job: job.to_owned(), progress: self.progress.clone() }.save(path)?;
+        Ok(())
+    }
+
+    fn resume(&mut self, path: &Path, job: &str) -> anyhow::Result<usize> {
+        self.progress = Checkpoint::load(path, job)?;
+        // The record of the last step, after which there is no update, is on file too.
+        Ok(self.progress.step + usize::from(self.progress.finished))
+    }
+
+    fn learned(&self, note: &str) -> anyhow::Result<Learned> {
+        let Progress { best, seconds, tried, dropped, .. } = &self.progress;
+        let best = best.as_ref().map(|best| (best.step, best.loss));
+        let loss = best.map(|(step, loss)| format!("; validation loss {loss:.6} after {step}"));
+        let note = format!("{note}{}; {seconds:.0} s", loss.unwrap_or_default());
+        let phi = self.progress.best_phi();
+        let lesson = &self.class.lesson;
+        Ok(Learned {
+            files: lesson.files(phi, &note).context("the learned softness")?,
+            figures: lesson.figures(phi),
+            parameters: phi.len(),
+            best,
+            seconds: *seconds,
+            instances: [*tried, *dropped],
+        })
+    }
+}
+
+/// Instances of a lesson by seed, for a learner or a meta-gradient.
+pub struct Class<L: Lesson> {
+    lesson: Arc<L>,
+    own_referee: bool,
+    measured: Measured,
+    /// The latest φ and what was prepared for it.
+    prepared: RefCell<Option<(Vec<f64>, Arc<L::Drawing>)>>,
+}
+
+impl<L: Lesson> Class<L> {
+    /// The lesson with the referee that `plan` asks for.
+    pub fn new(lesson: L, plan: &Plan) -> Self {
+        let measured = match plan.judged {
+            Judged::End => Measured::End,
+            Judged::Quarters => Measured::Quarters,
+        };
+        let own_referee = plan.referee == Referee::Own;
+        Self { lesson: Arc::new(lesson), own_referee, measured, prepared: RefCell::new(None) }
+    }
+
+    fn drawing(&self, phi: &[f64]) -> Arc<L::Drawing> {
+        let mut prepared = self.prepared.borrow_mut();
+        match prepared.as_ref().filter(|(of, _)| of == phi) {
+            Some((_, drawing)) => drawing.clone(),
+            None => {
+                let drawing = Arc::new(self.lesson.prepare(phi));
+                *prepared = Some((phi.to_vec(), drawing.clone()));
+                drawing
+            }
+        }
+    }
+
+    fn made(
+        &self,
+        seed: u64,
+        phi: &Tensor<B, 1>,
+        own_referee: bool,
+    ) -> Problem<B, Inner<L>, Outer<L>, Adam> {
+        let lesson = &self.lesson;
+        let drawing = self.drawing(&numbers(phi.clone()));
+        let made = "its neighbours could be made";
+        let at_two = lesson.scene::<AA>(seed, 1).expect(made);
+        let inner = Inner {
+            lesson: lesson.clone(),
+            drawing: drawing.clone(),
+            one: lesson.scene::<A>(seed, 1).expect(made),
+            two: at_two,
+        };
+        let finer = if own_referee { 1 } else { FINER };
+        let outer = Outer {
+            lesson: lesson.clone(),
+            own: own_referee.then_some(drawing),
+            zero: lesson.scene::<B>(seed, finer).expect(made),
+            one: lesson.scene::<A>(seed, finer).expect(made),
+        };
+        let start = lesson.theta(&outer.zero);
+        let (inner_loop, measured) = (lesson.inner(), self.measured);
+        Problem { objective: inner, referee: outer, inner: inner_loop, start, measured }
+    }
+}
+
+impl<L: Lesson> Tasks<B> for Class<L> {
+    type Objective = Inner<L>;
+    type Referee = Outer<L>;
+    type Optimizer = Adam;
+
+    fn problem(&self, seed: u64, phi: &Tensor<B, 1>) -> Problem<B, Inner<L>, Outer<L>, Adam> {
+        self.made(seed, phi, self.own_referee)
+    }
+
+    /// Always by the fixed referee.
+    fn judged(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
+        self.made(seed, phi, false).loss(phi)
+    }
+}
+
+/// What the inner loop lowers.
+pub struct Inner<L: Lesson> {
+    lesson: Arc<L>,
+    drawing: Arc<L::Drawing>,
+    one: L::Scene<A>,
+    two: L::Scene<AA>,
+}
+
+/// What judges the result: the lesson's judge, or its own loss at the last step.
+pub struct Outer<L: Lesson> {
+    lesson: Arc<L>,
+    own: Option<Arc<L::Drawing>>,
+    zero: L::Scene<B>,
+    one: L::Scene<A>,
+}
+
+/// One objective on two backends, each with its own scene.
+macro_rules! objectives {
+    ($backend:ty, $scene:ident, $tracked:expr) => {
+        impl<L: Lesson> Objective<$backend> for Inner<L> {
+            fn loss(
+                &self,
+                theta: Tensor<$backend, 1>,
+                phi: Tensor<$backend, 1>,
+            ) -> Tensor<$backend, 1> {
+                self.loss_at(theta, phi, self.lesson.inner().steps)
+            }
+
+            fn loss_at(
+                &self,
+                theta: Tensor<$backend, 1>,
+                phi: Tensor<$backend, 1>,
+                step: usize,
+            ) -> Tensor<$backend, 1> {
+                let tracked: fn(&Tensor<$backend, 1>) -> bool = $tracked;
+                let of = if tracked(&phi) { Of::Phi } else { Of::Values };
+                self.lesson.loss(&self.$scene, &self.drawing, theta, phi, Step { number: step, of })
+            }
+
+            fn prepared(&self, phi: Tensor<$backend, 1>, step: usize) -> Tensor<$backend, 1> {
+                self.lesson.prepared(&self.drawing, phi, step)
+            }
+
+            fn stage(&self, step: usize) -> usize {
+                self.lesson.stage(step)
+            }
+
+            fn loss_from(
+                &self,
+                theta: Tensor<$backend, 1>,
+                prepared: Tensor<$backend, 1>,
+                step: usize,
+            ) -> Tensor<$backend, 1> {
+                let step = Step { number: step, of: Of::Prepared };
+                self.lesson.loss(&self.$scene, &self.drawing, theta, prepared, step)
+            }
+
+            fn allowed(&self, theta: Tensor<$backend, 1>) -> Tensor<$backend, 1> {
+                self.lesson.allowed(&self.$scene, theta)
+            }
+        }
+    };
+}
+
+/// One judge on two backends, each with its own scene.
+macro_rules! judges {
+    ($backend:ty, $scene:ident) => {
+        impl<L: Lesson> Objective<$backend> for Outer<L> {
+            fn loss(
+                &self,
+                theta: Tensor<$backend, 1>,
+                phi: Tensor<$backend, 1>,
+            ) -> Tensor<$backend, 1> {
+                let scene = &self.$scene;
+                match &self.own {
+                    None => self.lesson.judge(scene, theta),
+                    Some(drawing) => {
+                        let number = self.lesson.inner().steps;
+                        let step = Step { number, of: Of::Phi };
+                        self.lesson.loss(scene, drawing, theta, phi, step)
+                    }
+                }
+            }
+        }
+    };
+}
+
+// On the lower level a joint loop alone asks for the derivative by φ; on the higher one φ belongs to a
+// tape below.
+objectives!(A, one, Tensor::is_require_grad);
+objectives!(AA, two, |_| true);
+judges!(B, zero);
+judges!(A, one);

@@ -1,0 +1,236 @@
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use crate::{
+    Command, Error,
+    settings::{count, positive},
+};
+
+/// Flags that say how to learn.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct LearnFlags {
+    /// How `learn` gets its gradient: unrolled (exact, through all inner steps), truncated:K (the last
+    /// K), direct (at the end alone), joint (down the inner loss), es (differences) [default: unrolled].
+    #[arg(long, value_name = "ORDER", value_parser = order)]
+    order: Option<Order>,
+
+    /// Updates of the softness [default: 50].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    outer: Option<usize>,
+
+    /// Steps of each optimisation that is learned through [default: the steps of the task].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    inner: Option<usize>,
+
+    /// Instances for each update [default: 8].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    batch: Option<usize>,
+
+    /// Largest move of a parameter of the softness in an update, roughly [default: 0.03].
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    outer_rate: Option<f64>,
+
+    /// Instances that decide which softness is kept [default: 8].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    validation_runs: Option<usize>,
+
+    /// End after so many validations that found nothing better [default: never].
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    patience: Option<usize>,
+
+    /// What judges a result: a fixed narrow softness on a finer image, or the loss that was
+    /// optimised [default: fixed; own for direct, which sees nothing else].
+    #[arg(long, value_enum)]
+    referee: Option<Referee>,
+
+    /// When it judges: after the last step, or also after a quarter and half of them [default: end].
+    #[arg(long, value_enum)]
+    judged: Option<Judged>,
+
+    /// Numbers that describe how the scale moves, where it does (--schedule decay) [default: 3].
+    #[arg(long, value_name = "N", value_parser = knots, allow_negative_numbers = true)]
+    knots: Option<usize>,
+
+    /// Pixels that a moving scale stays above [default: 0.03].
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    floor: Option<f64>,
+}
+
+/// What a task has to know to have a softness learned on it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// How the gradient is taken.
+    pub order: Order,
+    /// Updates of the softness.
+    pub outer: usize,
+    /// Instances for each.
+    pub batch: usize,
+    /// Learning rate of the updates.
+    pub outer_rate: f64,
+    /// Seed of the first training instance.
+    pub seed: u64,
+    /// Seed of the first validation instance.
+    pub validation_seed: u64,
+    /// Instances to validate on.
+    pub validation_runs: usize,
+    /// Validations in vain before learning ends early.
+    pub patience: Option<usize>,
+    /// What judges a result.
+    pub referee: Referee,
+    /// When it judges.
+    pub judged: Judged,
+    /// Knots of a scale that moves.
+    pub knots: usize,
+    /// What it stays above, in pixels.
+    pub floor_px: f64,
+}
+
+/// How the derivative of the outer loss is taken; see `MetaGradient` of `softrast-meta`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// Exactly, through every inner step.
+    Unrolled,
+    /// Through the last steps.
+    Truncated(usize),
+    /// At the end alone, as in the released shape code.
+    Direct,
+    /// Not at all: the softness goes down the inner loss, as in the released pose code.
+    Joint,
+    /// By differences.
+    Es,
+}
+
+/// What judges the result of an inner loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Referee {
+    /// A fixed narrow softness on a finer image, which no learned softness can flatter.
+    Fixed,
+    /// The loss that was optimised, under the learned softness itself, as in the paper.
+    Own,
+}
+
+/// After which inner steps results are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Judged {
+    /// The last.
+    End,
+    /// A quarter, half and all of them.
+    Quarters,
+}
+
+/// Seeds of training instances count from here, as in a search, and those of validation from there;
+/// `evaluate` counts from 0.
+const TRAINING_SEED: u64 = crate::search::TRAINING_SEED;
+const VALIDATION_SEED: u64 = 2 * TRAINING_SEED;
+
+impl LearnFlags {
+    /// Inner steps, if the command line names them.
+    pub(crate) fn inner(&self) -> Option<usize> {
+        self.inner
+    }
+
+    /// The plan that the flags make; `seed` is added to the seeds of training and validation.
+    ///
+    /// # Errors
+    ///
+    /// If flags contradict each other.
+    pub(crate) fn plan(&self, seed: u64) -> Result<Plan, Error> {
+        let order = self.order.unwrap_or(Order::Unrolled);
+        let direct = order == Order::Direct;
+        if direct && self.referee == Some(Referee::Fixed) {
+            let message = "--order direct sees how the loss depends on the softness where a run ends, \
+                           and a fixed referee does not: leave out --referee fixed";
+            return Err(Error::Usage(message.into()));
+        }
+        Ok(Plan {
+            order,
+            outer: self.outer.unwrap_or(50),
+            batch: self.batch.unwrap_or(8),
+            outer_rate: self.outer_rate.unwrap_or(0.03),
+            seed: TRAINING_SEED.saturating_add(seed),
+            validation_seed: VALIDATION_SEED.saturating_add(seed),
+            validation_runs: self.validation_runs.unwrap_or(8),
+            patience: self.patience,
+            referee: self.referee.unwrap_or(if direct { Referee::Own } else { Referee::Fixed }),
+            judged: self.judged.unwrap_or(Judged::End),
+            knots: self.knots.unwrap_or(3),
+            floor_px: self.floor.unwrap_or(0.03),
+        })
+    }
+
+    /// Refuses flags that mean nothing to the command.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] that names the flag.
+    pub(crate) fn check(&self, command: Command) -> Result<(), Error> {
+        let given = [
+            (self.order.is_some(), "--order"),
+            (self.outer.is_some(), "--outer"),
+            (self.inner.is_some(), "--inner"),
+            (self.batch.is_some(), "--batch"),
+            (self.outer_rate.is_some(), "--outer-rate"),
+            (self.validation_runs.is_some(), "--validation-runs"),
+            (self.patience.is_some(), "--patience"),
+            (self.referee.is_some(), "--referee"),
+            (self.judged.is_some(), "--judged"),
+            (self.knots.is_some(), "--knots"),
+            (self.floor.is_some(), "--floor"),
+        ];
+        match given.into_iter().find(|(given, _)| *given && command != Command::Learn) {
+            None => Ok(()),
+            Some((_, flag)) => {
+                let command = command.name();
+                Err(Error::Usage(format!("{flag} goes with learn, not with {command}")))
+            }
+        }
+    }
+}
+
+fn order(text: &str) -> Result<Order, String> {
+    match text.split_once(':') {
+        None => match text {
+            "unrolled" => Ok(Order::Unrolled),
+            "direct" => Ok(Order::Direct),
+            "joint" => Ok(Order::Joint),
+            "es" => Ok(Order::Es),
+            _ => Err("expected unrolled, truncated:K, direct, joint or es".into()),
+        },
+        Some(("truncated", steps)) => count(steps).map(Order::Truncated),
+        Some(_) => Err("expected unrolled, truncated:K, direct, joint or es".into()),
+    }
+}
+
+/// A path of more knots would follow the noise.
+const MOST_KNOTS: usize = 5;
+
+fn knots(text: &str) -> Result<usize, String> {
+    let knots = text.parse().ok().filter(|n| (1..=MOST_KNOTS).contains(n));
+    knots.ok_or_else(|| format!("expected a whole number from 1 to {MOST_KNOTS}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_have_the_names_of_the_documentation() {
+        assert_eq!(order("truncated:5"), Ok(Order::Truncated(5)));
+        assert_eq!(order("es"), Ok(Order::Es));
+        for wrong in ["truncated", "truncated:0", "unrolled:3", "second"] {
+            assert!(order(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_direct_gradient_needs_a_referee_that_sees_the_softness() {
+        let direct = LearnFlags { order: Some(Order::Direct), ..LearnFlags::default() };
+        assert_eq!(direct.plan(0).unwrap().referee, Referee::Own);
+        assert!(LearnFlags { referee: Some(Referee::Fixed), ..direct }.plan(0).is_err());
+        let seeds = LearnFlags::default().plan(3).unwrap();
+        assert_eq!((seeds.seed, seeds.validation_seed), (1_000_003, 2_000_003));
+    }
+}
