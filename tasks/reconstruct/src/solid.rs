@@ -22,8 +22,24 @@ impl Part {
         Self::Block { centre, half, rounding: 0.01 }
     }
 
+    /// Centre and radius of a ball around the part.
+    pub(crate) fn ball(&self) -> ([f64; 3], f64) {
+        match self {
+            Self::Block { centre, half, .. } => (*centre, norm(*half)),
+            Self::Stroke { from, to, radii, .. } => {
+                let middle = [0, 1, 2].map(|k| f64::midpoint(from[k], to[k]));
+                let half = norm([0, 1, 2].map(|k| to[k] - middle[k]));
+                (middle, half + radii[0].max(radii[1]))
+            }
+            Self::Cone { centre: [x, z], low, high, radii } => {
+                let radius = radii[0].max(radii[1]).hypot((high - low) / 2.0);
+                ([*x, f64::midpoint(*low, *high), *z], radius)
+            }
+        }
+    }
+
     /// At most the distance from `p` to the part; negative inside.
-    fn distance(&self, p: [f64; 3]) -> f64 {
+    pub(crate) fn distance(&self, p: [f64; 3]) -> f64 {
         match self {
             Self::Block { centre, half, rounding } => {
                 let beyond = [0, 1, 2].map(|k| (p[k] - centre[k]).abs() - (half[k] - rounding));
