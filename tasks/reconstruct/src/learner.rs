@@ -1,4 +1,7 @@
-use std::time::Instant;
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
 
 use burn::{
     backend::Autodiff,
@@ -37,6 +40,9 @@ pub(crate) struct Step {
     pub(crate) time: Time,
 }
 
+/// burn has one seed for the whole process: held while weights are drawn from it.
+static DRAWING: Mutex<()> = Mutex::new(());
+
 type Bytes = BinBytesRecorder<FullPrecisionSettings>;
 
 impl<B: RasterBackend> Learner<B> {
@@ -46,11 +52,13 @@ impl<B: RasterBackend> Learner<B> {
     ///
     /// If the T-conorm has no such name.
     pub(crate) fn new(settings: &Settings, device: &B::Device) -> anyhow::Result<Self> {
-        B::seed(device, settings.seed);
         let vertices = Template::<B>::new(device).vertices();
+        let drawing = DRAWING.lock().unwrap_or_else(PoisonError::into_inner);
+        B::seed(device, settings.seed);
         let network = Network::new(settings.width, vertices, device);
         // burn draws weights when they are first read: now, while the seed holds.
         let _count = network.num_params();
+        drop(drawing);
         let softness = soft_step(settings.softness, &settings.phi, device);
         let objective = Objective::new(settings.t_conorm()?, &softness, device);
         let adam = AdamConfig::new().with_epsilon(EPSILON);
