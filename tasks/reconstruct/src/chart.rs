@@ -41,18 +41,24 @@ fn draw(
     root.fill(&WHITE)?;
     let points = || lines.iter().flat_map(|line| &line.points);
     let last = points().map(|p| p.0).fold(1.0, f64::max);
+    // The names stand to the right of all lines.
+    let room = if lines.len() > 1 { 1.22 } else { 1.0 };
     let highest = points().map(|p| p.1).filter(|y| y.is_finite()).fold(1e-3, f64::max);
     let mut chart = ChartBuilder::on(&root)
         .margin(14)
         .x_label_area_size(46)
         .y_label_area_size(70)
-        .build_cartesian_2d(0.0..last, 0.0..highest * 1.05)?;
+        .build_cartesian_2d(0.0..last * room, 0.0..highest * 1.05)?;
     chart
         .configure_mesh()
         .x_desc("epoch")
         .y_desc(title)
         .y_labels(6)
-        .x_label_formatter(&|epoch| format!("{epoch:.0}"))
+        .x_labels(8)
+        .x_label_formatter(&|&epoch| {
+            let whole = (epoch - epoch.round()).abs() < 1e-6 && epoch <= last;
+            if whole { format!("{epoch:.0}") } else { String::new() }
+        })
         .label_style(("sans-serif", 14))
         .axis_desc_style(("sans-serif", 15))
         .bold_line_style(GRID)

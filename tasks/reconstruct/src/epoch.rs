@@ -26,8 +26,10 @@ pub struct Time {
     pub data: f64,
     /// The network, forward and back.
     pub network: f64,
-    /// The rasterizer and the loss of silhouettes, forward and back, with the smoothness on its way back.
+    /// The rasterizer and the loss of silhouettes, forward and back.
     pub rasterizer: f64,
+    /// What keeps surfaces smooth, forward and back.
+    pub smoothness: f64,
     /// The optimisers.
     pub optimizer: f64,
     /// Pictures that the network saw.
@@ -57,6 +59,7 @@ impl Time {
         self.data += other.data;
         self.network += other.network;
         self.rasterizer += other.rasterizer;
+        self.smoothness += other.smoothness;
         self.optimizer += other.optimizer;
         self.pictures += other.pictures;
     }

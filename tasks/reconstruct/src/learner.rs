@@ -20,7 +20,7 @@ use crate::{
     pairs::PairBatch,
 };
 
-/// Added to the root of Adam's second moment. Source: PyTorch's default, which the released code uses.
+/// Added to the root of Adam's second moment. Source: the default that the released code leaves as it is.
 const EPSILON: f32 = 1e-8;
 
 /// A network and a softness, each with an optimiser of its own.
@@ -82,8 +82,8 @@ impl<B: RasterBackend> Learner<B> {
 
     /// One step of both optimisers.
     ///
-    /// The way back has two parts, so that what the rasterizer takes is known: from the losses to the
-    /// vertices and φ, then from the vertices through the network.
+    /// The way back has parts, so that what each takes is known: from either loss to the vertices (and
+    /// φ), then from the vertices through the network.
     pub(crate) fn step(
         &mut self,
         batch: &PairBatch<Autodiff<B>>,
@@ -99,19 +99,27 @@ impl<B: RasterBackend> Learner<B> {
         let mut network = start.elapsed();
 
         let clock = Instant::now();
-        let leaf = Tensor::from_inner(vertices.clone().inner()).require_grad();
-        let losses =
-            self.objective.losses(leaf.clone(), &batch.pictures, &batch.views, &self.softness);
-        let [silhouette, smoothness] =
-            [&losses.silhouette, &losses.smoothness].map(|loss| number(loss.clone().inner()));
-        let mut grads = (losses.silhouette + losses.smoothness).backward();
-        let grad = leaf.grad_remove(&mut grads);
+        let leaf = || Tensor::from_inner(vertices.clone().inner()).require_grad();
+        let smooth = leaf();
+        let smoothness = self.objective.smoothness(smooth.clone());
+        let of_smoothness = smooth.grad_remove(&mut smoothness.backward());
+        let smoothness = number(smoothness.inner());
+        time.smoothness = clock.elapsed().as_secs_f64();
+
+        let clock = Instant::now();
+        let drawn = leaf();
+        let PairBatch { pictures, views } = batch;
+        let silhouette = self.objective.silhouettes(drawn.clone(), pictures, views, &self.softness);
+        let mut grads = silhouette.backward();
+        let of_silhouettes = drawn.grad_remove(&mut grads);
         let of_softness = GradientsParams::from_module(&mut grads, &self.softness);
+        let silhouette = number(silhouette.inner());
         time.rasterizer = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
-        let grad = Tensor::from_inner(grad.unwrap_or_else(|| leaf.inner().zeros_like()));
-        let mut grads = (vertices * grad).sum().backward();
+        let parts = [of_smoothness, of_silhouettes].into_iter().flatten();
+        let grad = parts.fold(vertices.clone().inner().zeros_like(), |sum, part| sum + part);
+        let mut grads = (vertices * Tensor::from_inner(grad)).sum().backward();
         let of_network = GradientsParams::from_module(&mut grads, &self.network);
         network += clock.elapsed();
         time.network = network.as_secs_f64();

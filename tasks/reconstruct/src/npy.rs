@@ -1,4 +1,4 @@
-//! The head of an NPY array: what NumPy's own writer puts there.
+//! The head of an NPY array, as the library that the format comes from writes it.
 
 use std::io::Read;
 

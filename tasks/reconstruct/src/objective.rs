@@ -17,13 +17,6 @@ pub(crate) struct Objective<B: Backend> {
     uses: usize,
 }
 
-/// The losses of a batch, each `[1]`.
-pub(crate) struct Losses<B: Backend> {
-    /// `1 - IoU` of soft silhouettes, mean over all pictures of the batch seen from both views.
-    pub(crate) silhouette: Tensor<B, 1>,
-    pub(crate) smoothness: Tensor<B, 1>,
-}
-
 impl<B: RasterBackend> Objective<B> {
     pub(crate) fn new(t_conorm: TConorm, softness: &SoftStep<B>, device: &B::Device) -> Self {
         let rasterizer = Rasterizer { t_conorm, ..Rasterizer::new(SIZE) };
@@ -45,17 +38,24 @@ impl<B: RasterBackend> Objective<B> {
         &self.template
     }
 
-    /// Losses of `vertices` `[2 pairs, 3, vertices]`, predicted from `pictures` `[2 pairs, 4, 64, 64]`
-    /// that are seen in these views, first all first pictures of the pairs, then all second ones.
+    /// What keeps the shapes with these `vertices` `[shapes, 3, vertices]` smooth, `[1]`.
+    pub(crate) fn smoothness(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
+        self.smoothness.loss(vertices)
+    }
+
+    /// `1 - IoU` of soft silhouettes, `[1]`: of the shapes with `vertices` `[2 pairs, 3, vertices]` that
+    /// were predicted from `pictures` `[2 pairs, 4, 64, 64]` in these views, first all first pictures of
+    /// the pairs, then all second ones.
     ///
-    /// Either prediction of a pair is drawn from both of its views: four silhouettes. Source: FACTS 4.6.
-    pub(crate) fn losses(
+    /// Either prediction of a pair is drawn from both of its views, four silhouettes; the mean is over
+    /// all of them. Source: FACTS 4.6.
+    pub(crate) fn silhouettes(
         &mut self,
         vertices: Tensor<B, 3>,
         pictures: &Tensor<B, 4>,
         views: &[usize],
         softness: &SoftStep<B>,
-    ) -> Losses<B> {
+    ) -> Tensor<B, 1> {
         if self.uses.is_multiple_of(RENEW) {
             let phi = softness.phi.val();
             self.silhouette =
@@ -64,7 +64,6 @@ impl<B: RasterBackend> Objective<B> {
         self.uses += 1;
         let pairs = views.len() / 2;
         let alpha = pictures.clone().narrow(1, 3, 1).reshape([2 * pairs, SIZE, SIZE]);
-        let smoothness = self.smoothness.loss(vertices.clone());
         // Each prediction from its own view, then from that of the other picture of its pair.
         let swapped = |x: &Tensor<B, 3>| {
             Tensor::cat(vec![x.clone().narrow(0, pairs, pairs), x.clone().narrow(0, 0, pairs)], 0)
@@ -74,8 +73,7 @@ impl<B: RasterBackend> Objective<B> {
         let orbits = orbits(views.iter().chain(others).copied(), &vertices.device());
         let shapes = Tensor::cat(vec![vertices.clone(), vertices], 0).swap_dims(1, 2);
         let drawn = self.silhouette.coverage(project(shapes, orbits), softness.phi.val());
-        let silhouette = iou_loss(drawn, targets).mean();
-        Losses { silhouette, smoothness }
+        iou_loss(drawn, targets).mean()
     }
 }
 

@@ -87,7 +87,8 @@ fn figures(header: &Header, sphere: &[f64]) -> String {
         ("time of the steps", format!("{:.1} min", time.all / 60.0)),
         ("pictures a second", format!("{:.1}", time.rate())),
         ("share of the network", format!("{:.0} %", part(time.network))),
-        ("share of the rasterizer and its losses", format!("{:.0} %", part(time.rasterizer))),
+        ("share of the rasterizer", format!("{:.0} %", part(time.rasterizer))),
+        ("share of the smoothness", format!("{:.0} %", part(time.smoothness))),
         ("share of the optimisers", format!("{:.0} %", part(time.optimizer))),
         ("share of the pictures", format!("{:.0} %", part(time.data))),
     ];

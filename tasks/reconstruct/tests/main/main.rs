@@ -1,10 +1,8 @@
 //! The program as its user sees it, and the parts that cross crates.
 
-#[path = "main/files.rs"]
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod files;
-#[path = "main/npz.rs"]
 mod npz;
-#[path = "main/program.rs"]
 mod program;
-#[path = "main/shapes.rs"]
 mod shapes;
