@@ -235,6 +235,8 @@ pub(crate) fn softness(
 fn default_scale(softness: EdgeSoftness) -> f64 {
     match (softness.family, softness.squared) {
         (Family::Uniform | Family::Gauss, false) => 10_f64.powf(-1.5),
+        // Its tails are long, and a wider one covers the whole picture.
+        (Family::Mlp, false) => 10_f64.powf(-2.5),
         (Family::Cauchy, false) => 10_f64.powf(-3.5),
         (Family::Cauchy, true) => 10_f64.powf(-4.5),
         (_, false) => 1e-2,

@@ -7,6 +7,10 @@ use crate::{SIZE, Template, orbit, smoothness::Smoothness};
 /// Steps after which support and knots follow a softness that learns.
 const RENEW: usize = 25;
 
+/// Largest error of a pixel. Steps are noisy anyway, and an MLP that has not learned yet, whose tails
+/// end late, would draw every face on every pixel at a tenth of it.
+const TOLERANCE: f64 = 1e-3;
+
 /// The silhouettes of predicted shapes against those of their pictures.
 #[derive(Debug)]
 pub(crate) struct Objective<B: Backend> {
@@ -19,7 +23,7 @@ pub(crate) struct Objective<B: Backend> {
 
 impl<B: RasterBackend> Objective<B> {
     pub(crate) fn new(t_conorm: TConorm, softness: &SoftStep<B>, device: &B::Device) -> Self {
-        let rasterizer = Rasterizer { t_conorm, ..Rasterizer::new(SIZE) };
+        let rasterizer = Rasterizer { size: SIZE, tolerance: TOLERANCE, t_conorm };
         let template = Template::new(device);
         let smoothness = Smoothness::new(template.faces(), template.vertices(), device);
         let silhouette =
