@@ -7,6 +7,7 @@
 mod airplane;
 mod chair;
 mod clean;
+mod edges;
 mod error;
 mod fox;
 mod icosphere;
@@ -21,6 +22,7 @@ mod write;
 
 pub use airplane::airplane;
 pub use chair::chair;
+pub use edges::Edges;
 pub use error::{LineError, MeshError};
 pub use fox::fox;
 pub use icosphere::icosphere;

@@ -1,6 +1,7 @@
 use burn::tensor::{Int, Tensor, backend::Backend};
+use softrast_mesh::Edges;
 
-use crate::{edges::Edges, laplacian::indices};
+use crate::laplacian::indices;
 
 /// Added to squared lengths before they divide or a root is taken, in squared world units.
 ///

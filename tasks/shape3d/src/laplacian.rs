@@ -1,7 +1,6 @@
 use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData, backend::Backend};
+use softrast_mesh::Edges;
 use softrast_method::tensor;
-
-use crate::edges::Edges;
 
 /// How far vertices are from the mean of their neighbours.
 #[derive(Clone, Debug)]

@@ -22,7 +22,6 @@ compile_error!("shape3d needs a backend: turn on one of the features ndarray, fl
 
 mod args;
 mod chamfer;
-mod edges;
 mod flatness;
 mod instance;
 mod laplacian;

@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
-use softrast_mesh::Mesh;
+use softrast_mesh::{Edges, Mesh};
 use softrast_method::tensor;
 use softrast_raster::{hard_silhouette, iou_loss, project};
 
-use crate::{Instance, edges::Edges, flatness::Flatness, laplacian::Laplacian};
+use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
 
 /// Cameras around the target, evenly in azimuth.
 pub const VIEWS: usize = 24;

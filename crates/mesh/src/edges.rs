@@ -2,18 +2,19 @@
 
 use std::collections::BTreeMap;
 
-/// The edges of some faces.
-pub(crate) struct Edges {
+/// The edges of some faces, for losses that keep a surface smooth.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Edges {
     /// Both ends of every edge, the lower number first, in order.
-    pub(crate) ends: Vec<[u32; 2]>,
+    pub ends: Vec<[u32; 2]>,
     /// Two faces and the edge between them: both ends, then the corner of either face beyond it.
     /// Edges of one face, or of more than two, are left out.
-    pub(crate) hinges: Vec<[u32; 4]>,
+    pub hinges: Vec<[u32; 4]>,
 }
 
 impl Edges {
     /// The edges of `faces`; those from a vertex to itself do not count.
-    pub(crate) fn new(faces: &[[u32; 3]]) -> Self {
+    pub fn new(faces: &[[u32; 3]]) -> Self {
         let mut beyond: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
         for &[a, b, c] in faces {
             for (from, to, corner) in [(a, b, c), (b, c, a), (c, a, b)] {
@@ -32,9 +33,8 @@ impl Edges {
 
 #[cfg(test)]
 mod tests {
-    use softrast_mesh::icosphere;
-
     use super::*;
+    use crate::icosphere;
 
     #[test]
     fn two_triangles_share_one_edge() {

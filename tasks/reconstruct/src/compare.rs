@@ -1,0 +1,150 @@
+use std::fmt::Write;
+
+use anyhow::Context;
+use serde_json::json;
+use softrast_raster::{RasterBackend, TConorm};
+use softrast_runner::Error;
+
+use crate::{
+    Template, Training,
+    args::{self, CompareArgs},
+    checkpoint, data,
+    program::trained,
+    score::{Score, mean, score},
+    settings::Data,
+    shapes::Split,
+    train::CHECKPOINT,
+};
+
+/// Views of each test shape.
+const VIEWS: usize = 4;
+
+/// Mean `IoU` of 13 classes of `ShapeNet` in Table 4 of the paper (Wu et al. 2024): context for the
+/// table, not the same data, budget or classes.
+const PAPER: [(&str, f64); 2] = [("MLP", 0.6076), ("best of 30 renderers for each class", 0.6232)];
+
+/// Trains each method on the same shapes in the same order from the same weights, scores all of them
+/// on the same test shapes, and gives the table that is also written to the folder.
+///
+/// What is finished is kept; with `--resume` it is not done again.
+///
+/// # Errors
+///
+/// If a method does not exist, or a training fails.
+pub(crate) fn compare<B: RasterBackend>(
+    args: &CompareArgs,
+    command: &str,
+    device: &B::Device,
+) -> anyhow::Result<String> {
+    let methods =
+        args.methods.iter().map(|text| method(text)).collect::<anyhow::Result<Vec<_>>>()?;
+    let mut rows = Vec::new();
+    for (name, softness, t_conorm) in methods {
+        let training = Training {
+            settings: args.common.settings(softness, t_conorm),
+            epochs: args.common.epochs(),
+            out: args.out.join(name.replace([':', '+'], "-")),
+            resume: args.common.resume,
+            visible: !args.common.quiet,
+            command: command.to_owned(),
+        };
+        if training.visible {
+            eprintln!("{name}");
+        }
+        let (header, _) = training.run::<B>(device)?;
+        let (_, network) = trained::<B>(&training.out.join(CHECKPOINT), device)?;
+        let shapes = data::open(&training.settings.data, Split::Test, training.settings.seed)?;
+        let views = [args.test_shapes, VIEWS];
+        let score = score(&network, &Template::new(device), shapes.as_ref(), views, device)?;
+        let seconds: f64 = header.epochs.iter().map(|epoch| epoch.time.all).sum();
+        rows.push(Row { name, classes: header.classes, score, minutes: seconds / 60.0 });
+    }
+    let table = markdown(args, &rows, command);
+    checkpoint::write(&args.out.join("compare.md"), &[table.as_bytes()])?;
+    let json: Vec<_> = rows.iter().map(Row::json).collect();
+    checkpoint::write(&args.out.join("compare.json"), &[&serde_json::to_vec_pretty(&json)?])?;
+    Ok(table)
+}
+
+/// What is known of a method.
+struct Row {
+    name: String,
+    classes: Vec<String>,
+    score: Score,
+    minutes: f64,
+}
+
+impl Row {
+    fn json(&self) -> serde_json::Value {
+        json!({
+            "method": self.name,
+            "classes": self.classes,
+            "voxel_iou": self.score.classes,
+            "sphere": self.score.sphere,
+            "pictures": self.score.pictures,
+            "minutes": self.minutes,
+        })
+    }
+}
+
+type Method = (String, (softrast_softness::EdgeSoftness, Vec<f64>), TConorm);
+
+/// A softness and a T-conorm from `softness+t_conorm`.
+fn method(text: &str) -> anyhow::Result<Method> {
+    let (softness, t_conorm) = text.split_once('+').unwrap_or((text, "probabilistic"));
+    let t_conorm = t_conorm.parse::<TConorm>().map_err(|error| Error::Usage(error.to_string()))?;
+    let parsed = args::softness(softness, None, false).with_context(|| format!("method {text}"))?;
+    Ok((text.to_owned(), parsed, t_conorm))
+}
+
+fn markdown(args: &CompareArgs, rows: &[Row], command: &str) -> String {
+    let mut text = String::new();
+    let Some(first) = rows.first() else { return text };
+    let columns = first.classes.join(" | ");
+    let line = "---|".repeat(first.classes.len() + 3);
+    let _ = writeln!(text, "| voxel IoU | {columns} | mean | minutes |\n|{line}");
+    let mut row = |name: &str, values: &[f64], minutes: &str| {
+        let cells: Vec<_> =
+            values.iter().chain([&mean(values)]).map(|x| format!("{x:.3}")).collect();
+        let _ = writeln!(text, "| {name} | {} | {minutes} |", cells.join(" | "));
+    };
+    row("sphere, not deformed", &first.score.sphere, "");
+    for found in rows {
+        row(&found.name, &found.score.classes, &format!("{:.1}", found.minutes));
+    }
+    let settings = args.common.settings(
+        (
+            softrast_softness::EdgeSoftness {
+                family: softrast_softness::Family::Logistic,
+                squared: false,
+            },
+            vec![],
+        ),
+        TConorm::Probabilistic,
+    );
+    let set = match settings.data {
+        Data::Procedural(count) => format!("the procedural set ({count} shapes of a class)"),
+        Data::Files(folder) => folder.display().to_string(),
+    };
+    let _ = writeln!(
+        text,
+        "\n{} epochs of {} steps, {} pairs of pictures each, {} widths, seed {}, on {set}; test shapes: \
+         {} of a class, {VIEWS} views of each. Softness parameters learn beside the network at a rate of \
+         {}.\n\n`{command}`",
+        args.common.epochs(),
+        settings.steps,
+        settings.pairs,
+        settings.width.name(),
+        settings.seed,
+        args.test_shapes,
+        settings.softness_rate,
+    );
+    for (name, iou) in PAPER {
+        let _ = writeln!(
+            text,
+            "\nFor context, not for comparison: {name}, ShapeNet, 250,000 steps of 64 pairs: {iou:.3} \
+             (Wu et al. 2024, Table 4)."
+        );
+    }
+    text
+}

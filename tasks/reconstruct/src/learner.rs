@@ -1,0 +1,184 @@
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Instant,
+};
+
+use burn::{
+    backend::Autodiff,
+    module::{AutodiffModule, Module},
+    optim::{Adam, AdamConfig, GradientsParams, Optimizer, adaptor::OptimizerAdaptor},
+    record::{BinBytesRecorder, FullPrecisionSettings, Recorder},
+    tensor::{Tensor, backend::Backend},
+};
+use softrast_raster::RasterBackend;
+use softrast_softness::SoftStep;
+
+use crate::{
+    Network, Settings, Template,
+    epoch::Time,
+    objective::{Objective, soft_step},
+    pairs::PairBatch,
+};
+
+/// Added to the root of Adam's second moment. Source: the default that the released code leaves as it is.
+const EPSILON: f32 = 1e-8;
+
+/// A network and a softness, each with an optimiser of its own.
+pub(crate) struct Learner<B: RasterBackend> {
+    network: Network<Autodiff<B>>,
+    softness: SoftStep<Autodiff<B>>,
+    of_network: OptimizerAdaptor<Adam, Network<Autodiff<B>>, Autodiff<B>>,
+    of_softness: OptimizerAdaptor<Adam, SoftStep<Autodiff<B>>, Autodiff<B>>,
+    objective: Objective<Autodiff<B>>,
+}
+
+/// What a step found.
+pub(crate) struct Step {
+    /// Before the step: `1 - IoU` of the silhouettes, and the smoothness.
+    pub(crate) silhouette: f64,
+    pub(crate) smoothness: f64,
+    pub(crate) time: Time,
+}
+
+/// burn has one seed for the whole process: held while weights are drawn from it.
+static DRAWING: Mutex<()> = Mutex::new(());
+
+type Bytes = BinBytesRecorder<FullPrecisionSettings>;
+
+impl<B: RasterBackend> Learner<B> {
+    /// One that has learned nothing.
+    ///
+    /// # Errors
+    ///
+    /// If the T-conorm has no such name.
+    pub(crate) fn new(settings: &Settings, device: &B::Device) -> anyhow::Result<Self> {
+        let vertices = Template::<B>::new(device).vertices();
+        let drawing = DRAWING.lock().unwrap_or_else(PoisonError::into_inner);
+        B::seed(device, settings.seed);
+        let network = Network::new(settings.width, vertices, device);
+        // burn draws weights when they are first read: now, while the seed holds.
+        let _count = network.num_params();
+        drop(drawing);
+        let softness = soft_step(settings.softness, &settings.phi, device);
+        let objective = Objective::new(settings.t_conorm()?, &softness, device);
+        let adam = AdamConfig::new().with_epsilon(EPSILON);
+        Ok(Self { network, softness, of_network: adam.init(), of_softness: adam.init(), objective })
+    }
+
+    /// The network as it stands, without gradients.
+    pub(crate) fn network(&self) -> Network<B> {
+        self.network.valid()
+    }
+
+    /// Parameters of the softness as they stand.
+    pub(crate) fn phi(&self) -> Vec<f64> {
+        crate::objective::phi(&self.softness)
+    }
+
+    /// Starts an epoch.
+    pub(crate) fn begin(&mut self) {
+        self.objective.begin();
+    }
+
+    /// One step of both optimisers.
+    ///
+    /// The way back has parts, so that what each takes is known: from either loss to the vertices (and
+    /// φ), then from the vertices through the network.
+    pub(crate) fn step(
+        &mut self,
+        batch: &PairBatch<Autodiff<B>>,
+        network_rate: f64,
+        softness_rate: f64,
+    ) -> Step {
+        let start = Instant::now();
+        let mut time = Time { pictures: batch.views.len(), ..Time::default() };
+        let (centre, displacement) = self.network.forward(batch.pictures.clone());
+        let vertices = self.objective.template().deformed(centre, displacement);
+        // Some backends work while the program goes on: waiting makes the times true.
+        wait::<B>(&vertices);
+        let mut network = start.elapsed();
+
+        let clock = Instant::now();
+        let leaf = || Tensor::from_inner(vertices.clone().inner()).require_grad();
+        let smooth = leaf();
+        let smoothness = self.objective.smoothness(smooth.clone());
+        let of_smoothness = smooth.grad_remove(&mut smoothness.backward());
+        let smoothness = number(smoothness.inner());
+        time.smoothness = clock.elapsed().as_secs_f64();
+
+        let clock = Instant::now();
+        let drawn = leaf();
+        let PairBatch { pictures, views } = batch;
+        let silhouette = self.objective.silhouettes(drawn.clone(), pictures, views, &self.softness);
+        let mut grads = silhouette.backward();
+        let of_silhouettes = drawn.grad_remove(&mut grads);
+        let of_softness = GradientsParams::from_module(&mut grads, &self.softness);
+        let silhouette = number(silhouette.inner());
+        time.rasterizer = clock.elapsed().as_secs_f64();
+
+        let clock = Instant::now();
+        let parts = [of_smoothness, of_silhouettes].into_iter().flatten();
+        let grad = parts.fold(vertices.clone().inner().zeros_like(), |sum, part| sum + part);
+        let mut grads = (vertices * Tensor::from_inner(grad)).sum().backward();
+        let of_network = GradientsParams::from_module(&mut grads, &self.network);
+        network += clock.elapsed();
+        time.network = network.as_secs_f64();
+
+        let clock = Instant::now();
+        self.network = self.of_network.step(network_rate, self.network.clone(), of_network);
+        if softness_rate > 0.0 {
+            self.softness =
+                self.of_softness.step(softness_rate, self.softness.clone(), of_softness);
+        }
+        time.optimizer = clock.elapsed().as_secs_f64();
+        time.all = start.elapsed().as_secs_f64();
+        Step { silhouette, smoothness, time }
+    }
+
+    /// Everything that learns, as bytes.
+    ///
+    /// # Errors
+    ///
+    /// If burn cannot write them.
+    pub(crate) fn to_bytes(&self) -> anyhow::Result<Vec<u8>> {
+        let modules = (self.network.clone().into_record(), self.softness.clone().into_record());
+        let optimizers = (self.of_network.to_record(), self.of_softness.to_record());
+        let recorder = Bytes::default();
+        Ok(Recorder::<Autodiff<B>>::record(&recorder, (modules, optimizers), ())?)
+    }
+
+    /// The same learner with what [`Learner::to_bytes`] has kept.
+    ///
+    /// # Errors
+    ///
+    /// If they are not that.
+    pub(crate) fn with_bytes(mut self, bytes: Vec<u8>, device: &B::Device) -> anyhow::Result<Self> {
+        let recorder = Bytes::default();
+        let (modules, optimizers): Records<B> =
+            Recorder::<Autodiff<B>>::load(&recorder, bytes, device)?;
+        self.network = self.network.load_record(modules.0);
+        self.softness = self.softness.load_record(modules.1);
+        self.of_network = self.of_network.load_record(optimizers.0);
+        self.of_softness = self.of_softness.load_record(optimizers.1);
+        Ok(self)
+    }
+}
+
+/// What a learner keeps: both modules, then both optimisers.
+type Records<B> = (
+    (ModuleRecord<B, Network<Autodiff<B>>>, ModuleRecord<B, SoftStep<Autodiff<B>>>),
+    (OptimizerRecord<B, Network<Autodiff<B>>>, OptimizerRecord<B, SoftStep<Autodiff<B>>>),
+);
+type ModuleRecord<B, M> = <M as Module<Autodiff<B>>>::Record;
+type OptimizerRecord<B, M> =
+    <OptimizerAdaptor<Adam, M, Autodiff<B>> as Optimizer<M, Autodiff<B>>>::Record;
+
+/// The only number of a tensor.
+fn number<B: Backend>(tensor: Tensor<B, 1>) -> f64 {
+    tensor.into_data().iter::<f64>().next().unwrap_or(f64::NAN)
+}
+
+/// Waits until a tensor is there.
+fn wait<B: RasterBackend>(tensor: &Tensor<Autodiff<B>, 3>) {
+    let _ = tensor.clone().inner().narrow(2, 0, 1).into_data();
+}

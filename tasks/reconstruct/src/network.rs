@@ -1,0 +1,101 @@
+use burn::{
+    module::Module,
+    nn::{
+        BatchNorm, BatchNormConfig, Linear, LinearConfig, PaddingConfig2d,
+        conv::{Conv2d, Conv2dConfig},
+    },
+    tensor::{Tensor, activation::relu, backend::Backend},
+};
+use serde::{Deserialize, Serialize};
+
+use crate::SIZE;
+
+/// Widths of the layers of a [`Network`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Width {
+    /// Those of the paper: 26 million parameters.
+    Paper,
+    /// A quarter of them everywhere: 2.3 million parameters, for a CPU.
+    Quarter,
+}
+
+impl Width {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Quarter => "quarter",
+        }
+    }
+
+    fn of(self, paper: usize) -> usize {
+        match self {
+            Self::Paper => paper,
+            Self::Quarter => paper / 4,
+        }
+    }
+}
+
+/// An encoder that sees a picture and a decoder that says how the vertices of a sphere move.
+///
+/// Three convolutions of 5×5 with stride 2 to 64, 128 and 256 channels, each with a batch norm; fully
+/// connected layers of 1024, 1024 and 512 (the code), then of 1024 and 2048, and from there to a
+/// centre and to all vertices. Rectifiers between all of them. Source: FACTS 4.6.
+#[derive(Module, Debug)]
+pub struct Network<B: Backend> {
+    convolutions: Vec<Conv2d<B>>,
+    norms: Vec<BatchNorm<B>>,
+    connected: Vec<Linear<B>>,
+    centre: Linear<B>,
+    displacement: Linear<B>,
+}
+
+/// Channels of the convolutions after the picture's own four.
+const CHANNELS: [usize; 3] = [64, 128, 256];
+/// Outputs of the fully connected layers of the encoder, then of the decoder.
+const CONNECTED: [usize; 5] = [1024, 1024, 512, 1024, 2048];
+/// The centre moves slowly at first. Source: FACTS 4.6.
+const CENTRE: f64 = 0.1;
+
+impl<B: Backend> Network<B> {
+    /// A network that has learned nothing, for a template of so many `vertices`.
+    pub fn new(width: Width, vertices: usize, device: &B::Device) -> Self {
+        let mut channels = vec![4];
+        channels.extend(CHANNELS.map(|channels| width.of(channels)));
+        let convolution = |ends: &[usize]| {
+            Conv2dConfig::new([ends[0], ends[1]], [5, 5])
+                .with_stride([2, 2])
+                .with_padding(PaddingConfig2d::Explicit(2, 2, 2, 2))
+                .init(device)
+        };
+        let left = SIZE / 8;
+        let mut ends = vec![channels[3] * left * left];
+        ends.extend(CONNECTED.map(|outputs| width.of(outputs)));
+        let last = ends[CONNECTED.len()];
+        Self {
+            convolutions: channels.windows(2).map(convolution).collect(),
+            norms: channels[1..].iter().map(|&c| BatchNormConfig::new(c).init(device)).collect(),
+            connected: ends
+                .windows(2)
+                .map(|ends| LinearConfig::new(ends[0], ends[1]).init(device))
+                .collect(),
+            centre: LinearConfig::new(last, 3).init(device),
+            displacement: LinearConfig::new(last, 3 * vertices).init(device),
+        }
+    }
+
+    /// Pictures `[pictures, 4, 64, 64]` to the centre `[pictures, 3]` and the displacements
+    /// `[pictures, 3, vertices]`, both as [`Template::deformed`](crate::Template::deformed) takes them.
+    pub fn forward(&self, pictures: Tensor<B, 4>) -> (Tensor<B, 2>, Tensor<B, 3>) {
+        let [count, _, _, _] = pictures.dims();
+        let layers = self.convolutions.iter().zip(&self.norms);
+        let seen = layers.fold(pictures, |x, (layer, norm)| relu(norm.forward(layer.forward(x))));
+        let code =
+            self.connected.iter().fold(seen.flatten(1, 3), |x, layer| relu(layer.forward(x)));
+        let centre = self.centre.forward(code.clone()) * CENTRE;
+        let displacement = self.displacement.forward(code);
+        let [_, outputs] = displacement.dims();
+        (centre, displacement.reshape([count, 3, outputs / 3]))
+    }
+}

@@ -1,0 +1,93 @@
+use burn::tensor::backend::Backend;
+use rayon::prelude::*;
+
+use crate::{Network, Shapes, Template, VIEWS, Voxels, pairs, template::points};
+
+/// Pictures that the network sees at once.
+const BATCH: usize = 32;
+
+/// How well shapes are told from single pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Score {
+    /// Mean voxel `IoU` of each class, 0 to 1.
+    pub classes: Vec<f64>,
+    /// The same of the sphere that no network has deformed.
+    pub sphere: Vec<f64>,
+    /// Pictures of each class.
+    pub pictures: Vec<usize>,
+}
+
+/// Mean of the classes, as the paper takes it.
+pub(crate) fn mean(classes: &[f64]) -> f64 {
+    classes.iter().sum::<f64>() / classes.len().max(1) as f64
+}
+
+/// Scores `network` on the first `per_class` shapes of every class, each seen from `views` views
+/// that are spread around it and differ from shape to shape.
+///
+/// # Errors
+///
+/// If a shape cannot be read, or the network gives coordinates that are not finite.
+pub fn score<B: Backend>(
+    network: &Network<B>,
+    template: &Template<B>,
+    shapes: &dyn Shapes,
+    [per_class, views]: [usize; 2],
+    device: &B::Device,
+) -> anyhow::Result<Score> {
+    let faces = template.faces();
+    let sphere = Voxels::of_mesh(&sphere(template, device), faces);
+    let mut score = Score { classes: Vec::new(), sphere: Vec::new(), pictures: Vec::new() };
+    for class in 0..shapes.classes().len() {
+        let chosen: Vec<usize> = (0..per_class.min(shapes.count(class))).collect();
+        let truths = chosen.par_iter().map(|&shape| shapes.voxels(class, shape));
+        let truths = truths.collect::<anyhow::Result<Vec<_>>>()?;
+        let seen: Vec<[usize; 2]> = chosen
+            .iter()
+            .flat_map(|&shape| (0..views).map(move |k| [shape, view_of(shape, k, views)]))
+            .collect();
+        let mut total = 0.0;
+        for seen in seen.chunks(BATCH) {
+            let pictures = seen.par_iter().map(|&[shape, view]| shapes.picture(class, shape, view));
+            let pictures = pictures.collect::<anyhow::Result<Vec<_>>>()?;
+            let predicted = predict(network, template, &pictures, device);
+            let ious = predicted.par_iter().zip(seen).map(|(vertices, &[shape, _])| {
+                Voxels::of_mesh(vertices, faces).iou(&truths[shape])
+            });
+            total += ious.collect::<Vec<f64>>().iter().sum::<f64>();
+        }
+        score.classes.push(total / seen.len() as f64);
+        let of_sphere = truths.iter().map(|truth| sphere.iou(truth)).sum::<f64>();
+        score.sphere.push(of_sphere / truths.len() as f64);
+        score.pictures.push(seen.len());
+    }
+    Ok(score)
+}
+
+/// Which view is the k-th of so many of a shape.
+pub(crate) fn view_of(shape: usize, k: usize, views: usize) -> usize {
+    // 7 and 24 have no common factor: neighbours differ, and all views come up.
+    (7 * shape + k * VIEWS / views) % VIEWS
+}
+
+/// The vertices of the shapes that the network sees in `pictures`.
+pub(crate) fn predict<B: Backend>(
+    network: &Network<B>,
+    template: &Template<B>,
+    pictures: &[Vec<u8>],
+    device: &B::Device,
+) -> Vec<Vec<[f64; 3]>> {
+    let (centre, displacement) = network.forward(pairs::tensor(pictures, device));
+    let planes: Vec<f64> = template.deformed(centre, displacement).into_data().iter().collect();
+    planes.chunks(3 * template.vertices()).map(points).collect()
+}
+
+/// The vertices that nothing has moved.
+fn sphere<B: Backend>(template: &Template<B>, device: &B::Device) -> Vec<[f64; 3]> {
+    use burn::tensor::{Element, Tensor};
+    let dtype = <B::FloatElem as Element>::dtype();
+    let centre = Tensor::zeros([1, 3], (device, dtype));
+    let displacement = Tensor::zeros([1, 3, template.vertices()], (device, dtype));
+    let planes: Vec<f64> = template.deformed(centre, displacement).into_data().iter().collect();
+    points(&planes)
+}

@@ -1,0 +1,235 @@
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
+
+use anyhow::{Context, bail, ensure};
+use burn::{backend::Autodiff, data::dataloader::DataLoaderBuilder};
+use softrast_raster::RasterBackend;
+
+use crate::{
+    Checkpoint, Epoch, Score, Settings, Shapes, Template,
+    bar::Bar,
+    checkpoint::{self, Header},
+    data,
+    epoch::Time,
+    learner::Learner,
+    pairs::{PairBatch, PairBatcher, Pairs},
+    report,
+    score::{mean, score},
+    shapes::Split,
+    sheet,
+};
+
+/// Files of a training in its folder.
+pub(crate) const CHECKPOINT: &str = "checkpoint.bin";
+pub(crate) const REPORT: &str = "report.html";
+
+/// After this part of the epochs the learning rates fall to this factor.
+///
+/// Source: FACTS 4.6 (after 150,000 of 250,000 steps, times 0.3).
+const LATE: (f64, f64) = (0.6, 0.3);
+
+/// A training and where it goes.
+#[derive(Clone, Debug)]
+pub struct Training {
+    /// What is trained.
+    pub settings: Settings,
+    /// Epochs in all.
+    pub epochs: usize,
+    /// Folder for checkpoint, contact sheets and report.
+    pub out: PathBuf,
+    /// Whether to go on from the checkpoint in the folder.
+    pub resume: bool,
+    /// Whether to show progress.
+    pub visible: bool,
+    /// Command line that does the same again.
+    pub command: String,
+}
+
+impl Training {
+    /// Trains until the last epoch, and gives the history with the scores of the undeformed sphere.
+    ///
+    /// After every epoch the checkpoint, a contact sheet and the report are written, each whole or
+    /// not at all.
+    ///
+    /// # Errors
+    ///
+    /// If shapes cannot be read, the folder holds another training, files cannot be written, or the
+    /// loss is not finite any more.
+    pub fn run<B: RasterBackend>(&self, device: &B::Device) -> anyhow::Result<(Header, Vec<f64>)> {
+        let path = self.out.join(CHECKPOINT);
+        let shapes = data::open(&self.settings.data, Split::Train, self.settings.seed)?;
+        let held_out = data::open(&self.settings.data, Split::Val, self.settings.seed)?;
+        let (mut header, mut learner) = self.start::<B>(&path, shapes.as_ref(), device)?;
+        let template = Template::new(device);
+        let bar = Bar::new(self.visible, (self.epochs * self.settings.steps) as u64);
+        bar.skip((header.epochs.len().saturating_sub(1) * self.settings.steps) as u64);
+        let views = [self.settings.val, 2];
+        let judge = |learner: &Learner<B>| -> anyhow::Result<Score> {
+            score(&learner.network(), &template, held_out.as_ref(), views, device)
+        };
+        if header.epochs.is_empty() {
+            let voxel_iou = judge(&learner)?.classes;
+            let phi = learner.phi();
+            let time = Time::default();
+            let first = Epoch { number: 0, loss: None, silhouette_iou: None, voxel_iou, phi, time };
+            bar.epoch(&first, self.epochs);
+            header.epochs.push(first);
+        }
+        let mut sphere = Vec::new();
+        while header.epochs.len() <= self.epochs || sphere.is_empty() {
+            if header.epochs.len() <= self.epochs {
+                let epoch = self.epoch(&mut learner, &shapes, header.epochs.len(), &bar, device)?;
+                header.epochs.push(epoch);
+            }
+            let judged = judge(&learner)?;
+            sphere = judged.sphere;
+            if let Some(epoch) = header.epochs.last_mut() {
+                epoch.voxel_iou = judged.classes;
+                bar.epoch(epoch, self.epochs);
+            }
+            self.write(&header, &learner, &path, &sphere, &template, held_out.as_ref(), device)?;
+        }
+        bar.finish();
+        Ok((header, sphere))
+    }
+
+    /// A new learner, or the one of the checkpoint.
+    fn start<B: RasterBackend>(
+        &self,
+        path: &Path,
+        shapes: &dyn Shapes,
+        device: &B::Device,
+    ) -> anyhow::Result<(Header, Learner<B>)> {
+        let learner = Learner::new(&self.settings, device)?;
+        let name = path.display();
+        if !path.exists() {
+            if self.resume {
+                eprintln!("there is no {name}, so nothing to go on from");
+            }
+            let classes = shapes.classes().to_vec();
+            let header = Header { settings: self.settings.clone(), classes, epochs: Vec::new() };
+            return Ok((header, learner));
+        }
+        if !self.resume {
+            bail!(
+                "{name} is there already: go on from it with --resume, or choose another folder \
+                 with --out"
+            );
+        }
+        let Checkpoint { header, records } = Checkpoint::load(path)?;
+        if let Some(difference) = header.settings.difference(&self.settings) {
+            bail!("{name} belongs to another training: {difference}");
+        }
+        ensure!(
+            header.classes == shapes.classes(),
+            "{name} was trained on the classes {}, but there are {}",
+            header.classes.join(", "),
+            shapes.classes().join(", "),
+        );
+        let learner = learner
+            .with_bytes(records, device)
+            .with_context(|| format!("{name} cannot be used"))?;
+        Ok((header, learner))
+    }
+
+    /// All steps of one epoch.
+    fn epoch<B: RasterBackend>(
+        &self,
+        learner: &mut Learner<B>,
+        shapes: &Arc<dyn Shapes>,
+        number: usize,
+        bar: &Bar,
+        device: &B::Device,
+    ) -> anyhow::Result<Epoch> {
+        let Settings { pairs, steps, seed, learning_rate, softness_rate, .. } = self.settings;
+        let late = number as f64 > LATE.0 * self.epochs as f64;
+        let factor = if late { LATE.1 } else { 1.0 };
+        let dataset =
+            Pairs { shapes: shapes.clone(), seed, epoch: number as u64, count: pairs * steps };
+        let loader =
+            DataLoaderBuilder::<Autodiff<B>, _, Result<PairBatch<_>, String>>::new(PairBatcher {
+                shapes: shapes.clone(),
+            })
+            .batch_size(pairs)
+            .set_device(device.clone())
+            .build(dataset);
+        learner.begin();
+        let (mut loss, mut soft, mut time) = (0.0, 0.0, Time::default());
+        let mut clock = Instant::now();
+        for batch in loader.iter() {
+            let batch = batch.map_err(anyhow::Error::msg)?;
+            let data = clock.elapsed().as_secs_f64();
+            let step = learner.step(&batch, factor * learning_rate, factor * softness_rate);
+            let now = step.silhouette + step.smoothness;
+            ensure!(
+                now.is_finite(),
+                "the loss is {now} in epoch {number}: try a smaller --learning-rate; the checkpoint \
+                 of the epoch before is kept"
+            );
+            loss += now / steps as f64;
+            soft += (1.0 - step.silhouette) / steps as f64;
+            time.add(&Time { data, all: step.time.all + data, ..step.time });
+            bar.step(now, 1.0 - step.silhouette);
+            clock = Instant::now();
+        }
+        Ok(Epoch {
+            number,
+            loss: Some(loss),
+            silhouette_iou: Some(soft),
+            voxel_iou: Vec::new(),
+            phi: learner.phi(),
+            time,
+        })
+    }
+
+    /// Writes what there is after an epoch.
+    #[expect(clippy::too_many_arguments, reason = "they are all that a training holds")]
+    fn write<B: RasterBackend>(
+        &self,
+        header: &Header,
+        learner: &Learner<B>,
+        path: &Path,
+        sphere: &[f64],
+        template: &Template<B>,
+        held_out: &dyn Shapes,
+        device: &B::Device,
+    ) -> anyhow::Result<()> {
+        let number = header.epochs.len() - 1;
+        let sheet = sheet::sheet(&learner.network(), template, held_out, device)?;
+        let mut png = std::io::Cursor::new(Vec::new());
+        sheet.write_to(&mut png, image::ImageFormat::Png).context("cannot encode a sheet")?;
+        checkpoint::write(&self.sheet(number), &[png.get_ref()])?;
+        // Sheets of a few epochs tell how it went: the first, one amid, and the last.
+        let shown = [1.min(number), number.div_ceil(3), number];
+        let mut sheets: Vec<(usize, Vec<u8>)> = Vec::new();
+        for number in shown {
+            if sheets.iter().all(|(other, _)| *other != number) {
+                sheets.extend(std::fs::read(self.sheet(number)).ok().map(|png| (number, png)));
+            }
+        }
+        let page = report::html(header, sphere, &sheets, &self.command)?;
+        checkpoint::write(&self.out.join(REPORT), &[page.as_bytes()])?;
+        let history = serde_json::to_vec_pretty(header)?;
+        checkpoint::write(&self.out.join("history.json"), &[&history])?;
+        Checkpoint { header: header.clone(), records: learner.to_bytes()? }.save(path)
+    }
+
+    fn sheet(&self, epoch: usize) -> PathBuf {
+        self.out.join(format!("epoch_{epoch:03}.png"))
+    }
+}
+
+/// A line for each class and the mean, against the sphere.
+pub(crate) fn table(classes: &[String], iou: &[f64], sphere: &[f64]) -> String {
+    let mut text = format!("{:<14} {:>9} {:>9}", "voxel IoU", "network", "sphere");
+    let names = classes.iter().map(String::as_str).chain(["mean"]);
+    let iou = iou.iter().copied().chain([mean(iou)]);
+    let sphere = sphere.iter().copied().chain([mean(sphere)]);
+    for ((name, iou), sphere) in names.zip(iou).zip(sphere) {
+        text += &format!("\n{name:<14} {iou:>9.3} {sphere:>9.3}");
+    }
+    text
+}
