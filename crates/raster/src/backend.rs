@@ -26,6 +26,8 @@ pub struct ProfileSum {
     pub(crate) grid: Grid,
     pub(crate) size: usize,
     pub(crate) near: f64,
+    #[cfg(feature = "wgpu")]
+    pub(crate) topology: crate::gpu::Topology,
 }
 
 impl ProfileSum {
@@ -120,8 +122,6 @@ impl RasterBackend for burn::backend::NdArray<f64> {
 }
 #[cfg(feature = "flex")]
 impl RasterBackend for burn::backend::Flex {}
-#[cfg(feature = "wgpu")]
-impl RasterBackend for burn::backend::Wgpu {}
 
 fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
     try_read_sync(B::float_into_data(tensor))

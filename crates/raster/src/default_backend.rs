@@ -11,7 +11,7 @@ pub type DefaultBackend = burn::backend::Flex;
 /// The backend of binaries, in floats of 32 bits: the first of `ndarray`, `flex` and `wgpu` whose
 /// feature is on.
 #[cfg(all(feature = "wgpu", not(any(feature = "ndarray", feature = "flex"))))]
-pub type DefaultBackend = burn::backend::Wgpu;
+pub type DefaultBackend = crate::Wgpu;
 
 /// Name of [`DefaultBackend`] and its float type.
 pub const DEFAULT_BACKEND: &str = if cfg!(feature = "ndarray") {

@@ -41,17 +41,34 @@ impl Rasterizer {
     ) -> Silhouette<S> {
         assert!(self.size > 0, "an image needs at least one pixel");
         let values: Vec<f64> = phi.to_data().iter().collect();
-        let profile = Profile::new::<B>(
-            &softness,
-            self.t_conorm,
-            &values,
-            faces.len(),
-            self.tolerance,
-            &phi.device(),
-        );
-        let op =
-            ProfileSum { faces: faces.clone(), grid: profile.grid, size: self.size, near: NEAR };
+        let profile = self.profile(&softness, &values, faces.len(), &phi.device());
+        let op = ProfileSum {
+            faces: faces.clone(),
+            grid: profile.grid,
+            size: self.size,
+            near: NEAR,
+            #[cfg(feature = "wgpu")]
+            topology: Default::default(),
+        };
         Silhouette { softness, profile, op }
+    }
+
+    fn profile<B: Backend>(
+        &self,
+        softness: &impl Softness,
+        phi: &[f64],
+        faces: usize,
+        device: &B::Device,
+    ) -> Profile {
+        let (t_conorm, tolerance) = (self.t_conorm, self.tolerance);
+        // In f64, which GPUs lack, and without a word between host and GPU for every attempt.
+        #[cfg(feature = "wgpu")]
+        if !B::supports_dtype(device, burn::tensor::DType::F64) {
+            type Host = burn::backend::NdArray<f32>;
+            let device = Default::default();
+            return Profile::new::<Host>(softness, t_conorm, phi, faces, tolerance, &device);
+        }
+        Profile::new::<B>(softness, t_conorm, phi, faces, tolerance, device)
     }
 }
 

@@ -1,0 +1,35 @@
+use std::sync::OnceLock;
+
+use burn::backend::wgpu::{
+    WgpuDevice, WgpuRuntime,
+    graphics::{AutoGraphicsApi, GraphicsApi},
+    init_setup,
+};
+use burn_cubecl::cubecl::Runtime;
+
+/// There is nothing that wgpu could run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no adapter for wgpu found: install a Vulkan driver for the graphics card, or Mesa's software \
+     Vulkan (Debian, Ubuntu: apt install mesa-vulkan-drivers libvulkan1)"
+)]
+pub struct NoAdapter;
+
+/// Sets up the default adapter of wgpu, once, and names it: `NVIDIA H200`, `llvmpipe (LLVM 15)`.
+///
+/// Without this, the first tensor sets it up, and panics where there is none.
+///
+/// # Errors
+///
+/// [`NoAdapter`] if the system has none.
+pub fn adapter_name() -> Result<&'static str, NoAdapter> {
+    static NAME: OnceLock<Result<String, NoAdapter>> = OnceLock::new();
+    let name = NAME.get_or_init(|| {
+        if WgpuRuntime::enumerate_all_devices(&AutoGraphicsApi::backend()).is_empty() {
+            return Err(NoAdapter);
+        }
+        let setup = init_setup::<AutoGraphicsApi>(&WgpuDevice::default(), Default::default());
+        Ok(setup.adapter.get_info().name)
+    });
+    name.as_deref().map_err(|&none| none)
+}

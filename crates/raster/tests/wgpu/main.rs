@@ -1,0 +1,147 @@
+//! The fused op on the GPU in f32 against f64 on the CPU: image, gradient, second order.
+//!
+//! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
+//! there is none.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod products;
+
+use std::sync::Arc;
+
+use burn::{
+    backend::NdArray,
+    tensor::{DType, Tensor},
+};
+use products::{Bounds, Path, Products, Scene, tensor};
+use softrast_mesh::{Mesh, fox, icosphere};
+use softrast_raster::{Rasterizer, Wgpu, adapter_name, project};
+use softrast_softness::{EdgeSoftness, Family};
+
+/// Says which adapter the test runs on, or that it does not.
+fn adapter() -> bool {
+    match adapter_name() {
+        Ok(name) => println!("on {name}"),
+        Err(none) => println!("skipped: {none}"),
+    }
+    adapter_name().is_ok()
+}
+
+/// A mesh seen from 2.732 away, at some azimuths in degrees.
+fn seen(mesh: &Mesh, azimuths: &[f64], size: usize, softness: EdgeSoftness, scale: f64) -> Scene {
+    let positions = mesh.positions();
+    let world: Tensor<NdArray<f64>, 3> =
+        tensor(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
+    let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, 0.0, a, 30.0]).collect();
+    let orbits: Tensor<NdArray<f64>, 2> = tensor(&orbits, [azimuths.len(), 4], DType::F64);
+    Scene {
+        vertices: project(world, orbits).into_data().iter().collect(),
+        views: azimuths.len(),
+        faces: mesh.faces().into(),
+        size,
+        softness,
+        scale,
+    }
+}
+
+/// Random triangles, with slivers, and faces beside the image and behind the camera.
+fn random(softness: EdgeSoftness, scale: f64) -> Scene {
+    let (mut vertices, faces) = common::triangles(7, 20);
+    // Far beside the image.
+    for corner in 0..3 {
+        vertices[3 * corner] += 40.0;
+    }
+    // Slivers wide enough for f32 to tell which of their edges is the nearer one.
+    for sliver in vertices.chunks_mut(9).skip(4).step_by(5) {
+        for axis in 0..2 {
+            sliver[6 + axis] += 3e-3;
+        }
+    }
+    Scene { vertices, views: 1, faces, size: 12, softness, scale }
+}
+
+#[test]
+fn a_straight_edge_is_the_softness_itself() {
+    if !adapter() {
+        return;
+    }
+    // The edge x = 0 of a triangle that covers the left half of the image and much beside it.
+    let corners = [0.0, -50.0, 2.0, 0.0, 50.0, 2.0, -50.0, 0.0, 2.0];
+    let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.2), [1], DType::F32);
+    let vertices = tensor::<Wgpu, 3>(&corners, [1, 3, 3], DType::F32);
+    let silhouette = Rasterizer::new(8).prepare(&faces, softness, &phi);
+    let image: Vec<f64> = silhouette.coverage(vertices, phi).into_data().iter().collect();
+    for (pixel, found) in image.into_iter().enumerate() {
+        let x = (2.0 * (pixel % 8) as f64 + 1.0 - 8.0) / 8.0;
+        let expected = 1.0 / (1.0 + (x / 0.2).exp());
+        assert!((found - expected).abs() < 1e-5, "pixel {pixel}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn random_triangles_agree_with_the_reference_to_second_order() {
+    if !adapter() {
+        return;
+    }
+    for family in [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp] {
+        let softness = EdgeSoftness { family, squared: false };
+        let scene = random(softness, 0.05);
+        let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Reference);
+        let found = Products::new::<NdArray<f32>>(&scene, DType::F32, Path::Fused);
+        found.assert_close(&expected, &family.to_string(), Bounds { products: 1e9, image: 1.0 });
+        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+        found.assert_close(&expected, &family.to_string(), Bounds::default());
+    }
+}
+
+#[test]
+fn meshes_agree_with_the_kernel_in_f64_to_second_order() {
+    if !adapter() {
+        return;
+    }
+    let squared = EdgeSoftness { family: Family::Logistic, squared: true };
+    let sphere = seen(&icosphere(2), &[0.0, 105.0, 210.0], 32, squared, 1e-3);
+    let fox = seen(&fox(), &[180.0], 50, squared, 1e-3);
+    for (name, scene) in [("a sphere in three views", sphere), ("a fox", fox)] {
+        let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Fused);
+        let found = Products::new::<NdArray<f32>>(&scene, DType::F32, Path::Fused);
+        found.assert_close(&expected, name, Bounds { products: 1e9, image: 1.0 });
+        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+        let mut worst: Vec<usize> = (0..found.second.len()).collect();
+        worst.sort_by(|&a, &b| (found.second[b] - expected.second[b]).abs().total_cmp(&(found.second[a] - expected.second[a]).abs()));
+        for &k in &worst[..6] { println!("{k}: {} not {}", found.second[k], expected.second[k]); }
+        println!("{:?}", worst.iter().map(|k| k % 3).take(40).collect::<Vec<_>>());
+        found.assert_close(&expected, name, Bounds::default());
+    }
+}
+
+#[test]
+fn the_same_numbers_come_out_every_time() {
+    if !adapter() {
+        return;
+    }
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let scene = seen(&icosphere(1), &[0.0, 30.0], 24, softness, 0.02);
+    let [first, second] = [(); 2].map(|()| Products::new::<Wgpu>(&scene, DType::F32, Path::Fused));
+    assert_eq!(first, second);
+}
+
+#[test]
+fn broken_vertices_give_finite_numbers() {
+    if !adapter() {
+        return;
+    }
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let mut scene = random(softness, 0.05);
+    let broken = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e30, -1e30];
+    for (face, value) in broken.into_iter().enumerate() {
+        scene.vertices[9 * face + face % 3] = value;
+    }
+    let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+    assert!(found.image.iter().all(|a| (0.0..=1.0).contains(a)), "{:?}", found.image);
+    for numbers in [&found.gradient, &found.gradient_phi, &found.second, &found.mixed] {
+        assert!(numbers.iter().all(|x| x.is_finite()), "{numbers:?}");
+    }
+}
