@@ -41,7 +41,7 @@ impl Rasterizer {
     ) -> Silhouette<S> {
         assert!(self.size > 0, "an image needs at least one pixel");
         let values: Vec<f64> = phi.to_data().iter().collect();
-        let profile = self.profile(&softness, &values, faces.len(), &phi.device());
+        let profile = self.profile::<B>(&softness, &values, faces.len(), &phi.device());
         let op = ProfileSum {
             faces: faces.clone(),
             grid: profile.grid,
@@ -53,6 +53,8 @@ impl Rasterizer {
         Silhouette { softness, profile, op }
     }
 
+    /// Support and knots; for a GPU chosen on the CPU, in f64 and without a word between host and
+    /// GPU for every attempt.
     fn profile<B: Backend>(
         &self,
         softness: &impl Softness,
@@ -60,10 +62,9 @@ impl Rasterizer {
         faces: usize,
         device: &B::Device,
     ) -> Profile {
-        let (t_conorm, tolerance) = (self.t_conorm, self.tolerance);
-        // In f64, which GPUs lack, and without a word between host and GPU for every attempt.
+        let Self { t_conorm, tolerance, .. } = *self;
         #[cfg(feature = "wgpu")]
-        if !B::supports_dtype(device, burn::tensor::DType::F64) {
+        if B::name(device).contains("wgpu") {
             type Host = burn::backend::NdArray<f32>;
             let device = Default::default();
             return Profile::new::<Host>(softness, t_conorm, phi, faces, tolerance, &device);
