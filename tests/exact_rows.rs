@@ -1,7 +1,7 @@
 //! The reference and the fused op against results with every pixel-face pair evaluated, in f64.
 //!
 //! The reference visits 126 and 384 million pairs here. Its full runs are left to
-//! `cargo run --release -p softrast-tests --example exact_row -- w1 reference` (and `w2`); the tests
+//! `cargo bench -p softrast-tests --bench exact_row -- w1 reference` (and `w2`); the tests
 //! hold it against the fused op on parts of both workloads.
 
 use burn::backend::NdArray;

@@ -1,6 +1,8 @@
 //! The program as called: what it prints, what it writes, and how it refuses.
 
-use std::{fs, path::Path};
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
 use softrast_mesh::icosphere;
@@ -13,10 +15,15 @@ fn mesh(folder: &Path) -> String {
 }
 
 fn run(words: &[&str]) -> Result<String, Failure> {
-    let mut stdout = Vec::new();
-    let words = ["render"].iter().chain(words).map(|&word| word.into());
-    render::execute(words, &mut stdout)?;
-    Ok(String::from_utf8(stdout).expect("the results are UTF-8"))
+    let output = Command::new(env!("CARGO_BIN_EXE_render")).args(words).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).expect("all that is printed is UTF-8");
+    match output.status.code() {
+        Some(0) => Ok(text(output.stdout)),
+        code => Err(Failure {
+            code: code.unwrap().try_into().unwrap(),
+            message: text(output.stderr).trim_end().to_owned(),
+        }),
+    }
 }
 
 fn json(words: &[&str]) -> Value {

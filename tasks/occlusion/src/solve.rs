@@ -1,11 +1,9 @@
-use std::time::Instant;
-
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData, backend::Backend},
 };
-use softrast_meta::{Adam, Optimizer};
-use softrast_method::{Method, numbers, tensor};
+use softrast_meta::Adam;
+use softrast_method::{Descent, Method, numbers, tensor};
 
 use crate::{Scene, depth_method::DepthMethod};
 
@@ -43,47 +41,37 @@ impl Solver {
         scene: &Scene<Autodiff<B>>,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let adam = Adam::new(self.learning_rate);
-        let mut theta = scene.start().inner();
-        let mut moments = adam.init(&theta);
+        let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
         let depth_phi = tensor::<Autodiff<B>, 1>(self.depth.phi.clone(), [self.depth.phi.len()]);
         let mut scale = self.edge.scale(0, self.steps);
         let mut edges = self.edges(scene, scale);
-        let mut seconds = None;
-        for step in 0..=self.steps {
-            let clock = Instant::now();
-            let now = self.edge.scale(step, self.steps);
-            if now != scale {
-                (scale, edges) = (now, self.edges(scene, now));
-            }
-            let leaf = Tensor::from_inner(theta.clone()).require_grad();
-            let softness = self.depth.softness;
-            let image = scene.image(leaf.clone(), edges.clone(), softness, depth_phi.clone());
-            let loss = scene.loss(image.clone());
-            let mut time = clock.elapsed();
-
-            let hard = scene.loss(scene.hard(Tensor::from_inner(theta.clone())));
-            visit(State {
-                step,
-                scale,
-                depths: numbers(theta.clone()).chunks(theta.dims()[1]).map(<[_]>::to_vec).collect(),
-                soft: numbers(loss.clone().inner()),
-                hard: numbers(hard.inner()),
-                image: image.into_data(),
-                seconds,
-            })?;
-            if step == self.steps {
-                break;
-            }
-            let clock = Instant::now();
-            let grads = loss.sum().backward();
-            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
-            let (moved, next) = adam.step(theta, grad, moments);
-            (theta, moments) = (scene.allowed(Tensor::from_inner(moved)).inner(), next);
-            time += clock.elapsed();
-            seconds = Some(time.as_secs_f64());
-        }
-        Ok(())
+        descent.run(
+            scene.start().inner(),
+            |step, theta| {
+                let now = self.edge.scale(step, self.steps);
+                if now != scale {
+                    (scale, edges) = (now, self.edges(scene, now));
+                }
+                let softness = self.depth.softness;
+                let image = scene.image(theta, edges.clone(), softness, depth_phi.clone());
+                (scene.loss(image.clone()), (scale, image))
+            },
+            |theta| scene.allowed(Tensor::from_inner(theta)).inner(),
+            |now| {
+                let (scale, image) = now.seen;
+                let hard = scene.loss(scene.hard(Tensor::from_inner(now.theta.clone())));
+                let depths = numbers(now.theta.clone());
+                visit(State {
+                    step: now.step,
+                    scale,
+                    depths: depths.chunks(now.theta.dims()[1]).map(<[_]>::to_vec).collect(),
+                    soft: numbers(now.loss),
+                    hard: numbers(hard),
+                    image: image.into_data(),
+                    seconds: now.seconds,
+                })
+            },
+        )
     }
 
     /// The edge part of all images, without a tape.

@@ -2,21 +2,27 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{ffi::OsString, fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
-use occlusion::Occlusion;
 use serde_json::Value;
-use softrast_runner::{Failure, execute};
+use softrast_runner::Failure;
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
 
 /// Runs a command line with results in `out`; its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
-    let words = ["occlusion"].into_iter().chain(line.split_whitespace());
-    let mut words: Vec<OsString> = words.map(OsString::from).collect();
-    words.extend(["--quiet".into(), "--json".into(), "--out".into(), out.into()]);
-    let mut stdout = Vec::new();
-    execute::<Occlusion>(words, &mut stdout)?;
-    Ok(serde_json::from_slice(&stdout).unwrap())
+    let output = Command::new(env!("CARGO_BIN_EXE_occlusion"))
+        .args(line.split_whitespace())
+        .args(["--quiet", "--json", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    match output.status.code() {
+        Some(0) => Ok(serde_json::from_slice(&output.stdout).unwrap()),
+        code => Err(Failure {
+            code: code.unwrap().try_into().unwrap(),
+            message: String::from_utf8(output.stderr).unwrap(),
+        }),
+    }
 }
 
 fn run(line: &str) -> Result<Value, Failure> {

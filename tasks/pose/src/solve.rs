@@ -1,11 +1,9 @@
-use std::time::Instant;
-
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData},
 };
-use softrast_meta::{Adam, Optimizer};
-use softrast_method::{Method, MovingSilhouette, numbers};
+use softrast_meta::Adam;
+use softrast_method::{Descent, Method, MovingSilhouette, numbers};
 use softrast_raster::{RasterBackend, Rasterizer, iou_loss};
 
 use crate::Scene;
@@ -42,47 +40,35 @@ impl Solver {
         scene: &Scene<Autodiff<B>>,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let adam = Adam::new(self.learning_rate);
+        let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
         let target = scene.target().inner();
-        let mut theta = scene.start().inner();
-        let mut moments = adam.init(&theta);
         let first = self.method.scale(0, self.steps);
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
-        let mut seconds = None;
-        for step in 0..=self.steps {
-            let clock = Instant::now();
-            let scale = self.method.scale(step, self.steps);
-            silhouette.turn_to(scale);
-            let leaf = Tensor::from_inner(theta.clone()).require_grad();
-            let projected = scene.project(leaf.clone());
-            let image = silhouette.image(projected.clone());
-            let loss = iou_loss(image.clone(), scene.target());
-            let mut time = clock.elapsed();
-
-            let hard = iou_loss(scene.hard(projected).inner(), target.clone());
-            visit(State {
-                step,
-                scale,
-                theta: numbers(theta.clone()).chunks(theta.dims()[1]).map(<[_]>::to_vec).collect(),
-                soft: numbers(loss.clone().inner()),
-                hard: numbers(hard),
-                image: image.into_data(),
-                seconds,
-            })?;
-            if step == self.steps {
-                break;
-            }
-            let clock = Instant::now();
-            let grads = loss.sum().backward();
-            // No gradient at all where nothing was drawn: the pose then stays.
-            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
-            let (moved, next) = adam.step(theta, grad, moments);
-            (theta, moments) = (scene.allowed(Tensor::from_inner(moved)).inner(), next);
-            time += clock.elapsed();
-            seconds = Some(time.as_secs_f64());
-        }
-        Ok(())
+        descent.run(
+            scene.start().inner(),
+            |step, theta| {
+                let scale = self.method.scale(step, self.steps);
+                silhouette.turn_to(scale);
+                let projected = scene.project(theta);
+                let image = silhouette.image(projected.clone());
+                (iou_loss(image.clone(), scene.target()), (scale, projected, image))
+            },
+            |theta| scene.allowed(Tensor::from_inner(theta)).inner(),
+            |now| {
+                let (scale, projected, image) = now.seen;
+                let poses = numbers(now.theta.clone());
+                visit(State {
+                    step: now.step,
+                    scale,
+                    theta: poses.chunks(now.theta.dims()[1]).map(<[_]>::to_vec).collect(),
+                    soft: numbers(now.loss),
+                    hard: numbers(iou_loss(scene.hard(projected).inner(), target.clone())),
+                    image: image.into_data(),
+                    seconds: now.seconds,
+                })
+            },
+        )
     }
 }

@@ -2,20 +2,26 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{ffi::OsString, fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
-use pose::Pose;
 use serde_json::Value;
-use softrast_runner::{Failure, execute};
+use softrast_runner::Failure;
 
 /// Runs a command line with results in `out`; its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
-    let words = ["pose"].into_iter().chain(line.split_whitespace());
-    let mut words: Vec<OsString> = words.map(OsString::from).collect();
-    words.extend(["--quiet".into(), "--json".into(), "--out".into(), out.into()]);
-    let mut stdout = Vec::new();
-    execute::<Pose>(words, &mut stdout)?;
-    Ok(serde_json::from_slice(&stdout).unwrap())
+    let output = Command::new(env!("CARGO_BIN_EXE_pose"))
+        .args(line.split_whitespace())
+        .args(["--quiet", "--json", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    match output.status.code() {
+        Some(0) => Ok(serde_json::from_slice(&output.stdout).unwrap()),
+        code => Err(Failure {
+            code: code.unwrap().try_into().unwrap(),
+            message: String::from_utf8(output.stderr).unwrap(),
+        }),
+    }
 }
 
 fn run(line: &str) -> Result<Value, Failure> {
@@ -141,4 +147,19 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         assert_eq!(failure.code, code, "{line}: {failure}");
         assert!(failure.message.contains(part), "{line}: {failure}");
     }
+}
+
+/// Source: FACTS 8.1. The mesh belongs to others and is not part of this repository.
+#[test]
+fn the_first_step_with_a_gamma_moves_as_the_released_one() {
+    let shared = "../../../shared/data/meshes/paper/spot.obj";
+    let spot = Path::new(env!("CARGO_MANIFEST_DIR")).join(shared);
+    if !spot.exists() {
+        println!("skipped: {spot:?} is missing");
+        return;
+    }
+    let line = "evaluate --instances released24 --softness gamma --scale 0.1 --steps 1 --mesh";
+    let json = run(&format!("{line} {}", spot.display())).unwrap();
+    let released = 24.0 * json["parameter_error"]["released"]["final"].as_f64().unwrap();
+    assert!((released / 1.63487 - 1.0).abs() < 1e-4, "parameter error after a step: {released}");
 }

@@ -1,11 +1,9 @@
-use std::time::Instant;
-
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, TensorData},
+    tensor::{Tensor, TensorData, backend::Backend},
 };
-use softrast_meta::{Adam, Optimizer};
-use softrast_method::{Method, MovingSilhouette, numbers};
+use softrast_meta::Adam;
+use softrast_method::{Descent, Method, MovingSilhouette, numbers};
 use softrast_raster::{RasterBackend, Rasterizer};
 
 use crate::Scene;
@@ -42,49 +40,39 @@ impl Solver {
         scene: &Scene<Autodiff<B>>,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let adam = Adam::new(self.learning_rate);
-        let mut theta = scene.start().inner();
-        let mut moments = adam.init(&theta);
+        let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
         let first = self.method.scale(0, self.steps);
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
-        let mut seconds = None;
-        for step in 0..=self.steps {
-            let clock = Instant::now();
-            let scale = self.method.scale(step, self.steps);
-            silhouette.turn_to(scale);
-            let leaf = Tensor::from_inner(theta.clone()).require_grad();
-            let vertices = scene.vertices(leaf.clone());
-            let image = silhouette.image(vertices.clone());
-            let soft = scene.image_loss(image.clone());
-            let loss = soft.clone() + scene.smoothness_loss(leaf.clone());
-            let mut time = clock.elapsed();
-
-            visit(State {
-                step,
-                scale,
-                loss: number(&loss),
-                soft: number(&soft),
-                hard: number(&scene.image_loss(scene.hard(vertices))),
-                image: image.into_data(),
-                seconds,
-            })?;
-            if step == self.steps {
-                break;
-            }
-            let clock = Instant::now();
-            let grads = loss.backward();
-            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
-            (theta, moments) = adam.step(theta, grad, moments);
-            time += clock.elapsed();
-            seconds = Some(time.as_secs_f64());
-        }
-        Ok(())
+        descent.run(
+            scene.start().inner(),
+            |step, theta| {
+                let scale = self.method.scale(step, self.steps);
+                silhouette.turn_to(scale);
+                let vertices = scene.vertices(theta.clone());
+                let image = silhouette.image(vertices.clone());
+                let soft = scene.image_loss(image.clone());
+                (soft.clone() + scene.smoothness_loss(theta), (scale, vertices, image, soft))
+            },
+            |theta| theta,
+            |now| {
+                let (scale, vertices, image, soft) = now.seen;
+                visit(State {
+                    step: now.step,
+                    scale,
+                    loss: number(now.loss),
+                    soft: number(soft),
+                    hard: number(scene.image_loss(scene.hard(vertices))),
+                    image: image.into_data(),
+                    seconds: now.seconds,
+                })
+            },
+        )
     }
 }
 
 /// The only number of a tensor.
-fn number<B: RasterBackend>(tensor: &Tensor<B, 1>) -> f64 {
-    numbers(tensor.clone())[0]
+fn number<B: Backend>(tensor: Tensor<B, 1>) -> f64 {
+    numbers(tensor)[0]
 }

@@ -1,11 +1,9 @@
-use std::time::Instant;
-
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, TensorData},
+    tensor::{Tensor, TensorData, backend::Backend},
 };
-use softrast_meta::{Adam, Optimizer};
-use softrast_method::{Method, MovingSilhouette, numbers};
+use softrast_meta::Adam;
+use softrast_method::{Descent, Method, MovingSilhouette, numbers};
 use softrast_raster::{RasterBackend, Rasterizer};
 
 use crate::Scene;
@@ -48,51 +46,43 @@ impl Solver {
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let [beta1, beta2] = BETAS;
-        let adam = Adam { beta1, beta2, ..Adam::new(self.learning_rate) };
-        let mut theta = scene.start().inner();
-        let mut moments = adam.init(&theta);
+        let optimizer = Adam { beta1, beta2, ..Adam::new(self.learning_rate) };
+        let descent = Descent { optimizer, steps: self.steps };
         let first = self.method.scale(0, self.steps);
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
-        let mut seconds = None;
-        for step in 0..=self.steps {
-            let clock = Instant::now();
-            let scale = self.method.scale(step, self.steps);
-            silhouette.turn_to(scale);
-            let leaf = Tensor::from_inner(theta.clone()).require_grad();
-            let vertices = scene.vertices(leaf.clone());
-            let projected = scene.project(vertices.clone());
-            let image = silhouette.image(projected.clone());
-            let soft = scene.image_loss(image.clone());
-            let loss = soft.clone() + scene.smoothness_loss(vertices.clone());
-            let mut time = clock.elapsed();
-
-            visit(State {
-                step,
-                scale,
-                vertices: numbers(vertices).chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
-                loss: number(&loss),
-                soft: number(&soft),
-                hard: number(&scene.image_loss(scene.hard(projected))),
-                image: image.into_data(),
-                seconds,
-            })?;
-            if step == self.steps {
-                break;
-            }
-            let clock = Instant::now();
-            let grads = loss.backward();
-            let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
-            (theta, moments) = adam.step(theta, grad, moments);
-            time += clock.elapsed();
-            seconds = Some(time.as_secs_f64());
-        }
-        Ok(())
+        descent.run(
+            scene.start().inner(),
+            |step, theta| {
+                let scale = self.method.scale(step, self.steps);
+                silhouette.turn_to(scale);
+                let vertices = scene.vertices(theta);
+                let projected = scene.project(vertices.clone());
+                let image = silhouette.image(projected.clone());
+                let soft = scene.image_loss(image.clone());
+                let loss = soft.clone() + scene.smoothness_loss(vertices.clone());
+                (loss, (scale, vertices, projected, image, soft))
+            },
+            |theta| theta,
+            |now| {
+                let (scale, vertices, projected, image, soft) = now.seen;
+                visit(State {
+                    step: now.step,
+                    scale,
+                    vertices: numbers(vertices).chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
+                    loss: number(now.loss),
+                    soft: number(soft),
+                    hard: number(scene.image_loss(scene.hard(projected))),
+                    image: image.into_data(),
+                    seconds: now.seconds,
+                })
+            },
+        )
     }
 }
 
 /// The only number of a tensor.
-fn number<B: RasterBackend>(tensor: &Tensor<B, 1>) -> f64 {
-    numbers(tensor.clone())[0]
+fn number<B: Backend>(tensor: Tensor<B, 1>) -> f64 {
+    numbers(tensor)[0]
 }

@@ -1,8 +1,4 @@
 //! The gradient of the loss to the pose against central differences, in f64.
-//!
-//! A test binary of its own: burn fixes the float type of a device per process.
-
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use burn::{
     backend::{Autodiff, NdArray},

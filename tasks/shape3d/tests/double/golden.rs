@@ -2,15 +2,13 @@
 //!
 //! Source: FACTS 4.2 and 8.3. The meshes belong to others and are not part of this repository.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::{Path, PathBuf};
 
 use burn::{backend::NdArray, tensor::Tensor};
 use shape3d::{Instance, Scene, VIEWS};
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
 
-type B = NdArray<f32>;
+type B = NdArray<f64>;
 
 const SIZE: usize = 64;
 const TOLERANCE: f64 = 5e-4;
@@ -32,7 +30,7 @@ fn start(target: &Mesh, template: &Mesh, elevation_deg: f64) -> [f64; 2] {
     let scene = Scene::<B>::new(target, template, &instance, SIZE);
     let vertices = scene.vertices(scene.start());
     let loss = scene.image_loss(scene.hard(scene.project(vertices)));
-    [scene.target().mean(), loss].map(|tensor: Tensor<B, 1>| tensor.into_scalar().into())
+    [scene.target().mean(), loss].map(|tensor: Tensor<B, 1>| tensor.into_scalar())
 }
 
 fn assert_close(what: &str, found: f64, expected: f64) {

@@ -1,7 +1,5 @@
 //! Scenes that break renderers: every number stays finite, and where the answer is known it is met.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::panic::catch_unwind;
 
 use burn::{

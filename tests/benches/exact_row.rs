@@ -1,6 +1,6 @@
 //! Computes a workload of DESIGN 5 and compares it with its exact row, in f64.
 //!
-//! `cargo run --release -p softrast-tests --example exact_row -- w1|w2|spot64 reference|TOLERANCE`
+//! `cargo bench -p softrast-tests --bench exact_row -- w1|w2|spot64 reference|TOLERANCE`
 //!
 //! `spot64` is W2 at 64 × 64 pixels, for its memory. A tolerance, such as 1e-5, runs the fused op;
 //! `reference` evaluates every pair, which takes minutes.
@@ -14,7 +14,8 @@ use softrast_tests::{Row, Workload, w1, w2};
 type B = NdArray<f64>;
 
 fn main() {
-    let mut arguments = env::args().skip(1);
+    // Cargo adds a flag of its own.
+    let mut arguments = env::args().skip(1).filter(|argument| argument != "--bench");
     let mut argument = || arguments.next().expect("usage: w1|w2|spot64 reference|TOLERANCE");
     let name = argument();
     let (workload, exact) = match name.as_str() {

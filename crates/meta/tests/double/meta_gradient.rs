@@ -8,8 +8,7 @@ use softrast_meta::{
     Adam, InnerLoop, Measured, MetaEstimate, MetaGradient, Objective, Optimizer, Problem, Sgd,
 };
 
-mod waves;
-use waves::{WAVES, Waves};
+use crate::waves::{WAVES, Waves};
 
 type B = NdArray<f64>;
 type A = Autodiff<B>;

@@ -1,7 +1,5 @@
 //! What an instance looks like, small enough to read.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use burn::{
     backend::NdArray,
     tensor::{DType, Tensor, TensorData},

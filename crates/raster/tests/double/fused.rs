@@ -1,14 +1,12 @@
 //! The fused op against the reference, in f64: image, gradient, second order.
 
-mod common;
-
 use std::sync::Arc;
 
+use crate::common::{tensor, triangles};
 use burn::{
     backend::{Autodiff, NdArray},
     tensor::{Tensor, backend::Backend},
 };
-use common::{tensor, triangles};
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
 use softrast_softness::{EdgeSoftness, Family};
 

@@ -1,11 +1,9 @@
 //! Culling keeps its bound, and nothing depends on the order of faces or the number of threads.
 
-mod common;
-
 use std::sync::Arc;
 
+use crate::common::{tensor, triangles};
 use burn::{backend::NdArray, tensor::Tensor};
-use common::{tensor, triangles};
 use proptest::prelude::*;
 use softrast_raster::{Rasterizer, TConorm, reference};
 use softrast_softness::{EdgeSoftness, Family};

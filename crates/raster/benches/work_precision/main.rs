@@ -1,16 +1,16 @@
 //! Measures what accuracy and size cost, and draws it.
 //!
 //! ```text
-//! cargo run --release -p softrast-raster --example work_precision
+//! cargo bench -p softrast-raster --bench work_precision
 //! ```
 //!
 //! Writes `docs/work_precision.svg` and `docs/scaling.svg`, each with its numbers as CSV. Times are
 //! medians, from world vertices to the gradient of a mean squared difference to a disk.
 
 mod chart;
-#[path = "../../benches/scalar.rs"]
+#[path = "../scalar.rs"]
 mod scalar;
-#[path = "../../benches/workload.rs"]
+#[path = "../workload.rs"]
 mod workload;
 
 use std::{error::Error, fs, hint::black_box, path::Path, sync::Arc, time::Instant};
