@@ -21,3 +21,22 @@ pub const DEFAULT_BACKEND: &str = if cfg!(feature = "ndarray") {
 } else {
     "wgpu f32"
 };
+
+/// There is nothing that wgpu could run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no adapter for wgpu found: install the Vulkan driver of your graphics card, or Mesa's software \
+     Vulkan (Debian, Ubuntu: apt install mesa-vulkan-drivers libvulkan1)"
+)]
+pub struct NoAdapter;
+
+/// Sets [`DefaultBackend`] up. Call it before the first tensor, which would panic where it cannot be.
+///
+/// # Errors
+///
+/// [`NoAdapter`] if it is wgpu and the system has no adapter.
+pub fn set_up_default_backend() -> Result<(), NoAdapter> {
+    #[cfg(all(feature = "wgpu", not(any(feature = "ndarray", feature = "flex"))))]
+    crate::adapter_name()?;
+    Ok(())
+}

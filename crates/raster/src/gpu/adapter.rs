@@ -7,13 +7,7 @@ use burn::backend::wgpu::{
 };
 use burn_cubecl::cubecl::Runtime;
 
-/// There is nothing that wgpu could run on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "no adapter for wgpu found: install a Vulkan driver for the graphics card, or Mesa's software \
-     Vulkan (Debian, Ubuntu: apt install mesa-vulkan-drivers libvulkan1)"
-)]
-pub struct NoAdapter;
+use crate::NoAdapter;
 
 /// Sets up the default adapter of wgpu, once, and names it: `NVIDIA H200`, `llvmpipe (LLVM 15)`.
 ///

@@ -16,7 +16,7 @@ mod pass;
 mod reach;
 mod topology;
 
-pub use adapter::{NoAdapter, adapter_name};
+pub use adapter::adapter_name;
 pub(crate) use topology::Topology;
 
 use burn::{

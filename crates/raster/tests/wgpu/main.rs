@@ -4,7 +4,7 @@
 //! there is none.
 
 #[allow(dead_code)]
-#[path = "../common/mod.rs"]
+#[path = "../double/common/mod.rs"]
 mod common;
 mod products;
 
@@ -85,7 +85,7 @@ fn random_triangles_agree_with_the_reference() {
     if !adapter() {
         return;
     }
-    for family in [Family::Logistic, Family::Gamma] {
+    for family in [Family::Logistic, Family::Exp] {
         let scene = random(EdgeSoftness { family, squared: false }, 0.05);
         let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Reference);
         let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);

@@ -35,10 +35,11 @@ pub(crate) enum Path {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Products {
     pub(crate) image: Vec<f64>,
-    /// Gradients to the vertices and to the other input, then a product of second order with the
-    /// other input, and with a table also one with the vertices. Those of the other input are by
-    /// its relative changes: the coefficients of a table differ by many orders of magnitude. The curvature of a table that was
-    /// made in f32 is rounding where its cells are narrow, whoever reads it.
+    /// Gradients to the vertices and to the other input, then the derivatives of a sum of both to
+    /// the other input and, with a table, to the vertices: the curvature of a table that was made in
+    /// f32 is rounding where its cells are narrow, whoever reads it. Of a table, what counts is its
+    /// part along a change of scale: which of two cells gets a pair that lies between them is up to
+    /// rounding.
     pub(crate) products: Vec<Vec<f64>>,
 }
 
@@ -64,12 +65,16 @@ impl Products {
         let Scene { views, size, softness, .. } = *scene;
         let count = scene.vertices.len() / 3 / views;
         let phi = softness.default_phi(scene.scale);
-        let exact = tensor::<NdArray<f64>, 1>(&phi, [phi.len()], DType::F64);
         // Far below what is asked for, and the same on every backend.
         let rasterizer = Rasterizer { tolerance: 1e-7, ..Rasterizer::new(size) };
-        let silhouette = rasterizer.prepare(&scene.faces, softness, &exact);
-        let table = numbers(silhouette.table(exact));
-        let other_values = if path == Path::Table { &table } else { &phi };
+        let exact = |phi: &[f64]| tensor::<NdArray<f64>, 1>(phi, [phi.len()], DType::F64);
+        let silhouette = rasterizer.prepare(&scene.faces, softness, &exact(&phi));
+        let table = numbers(silhouette.table(exact(&phi)));
+        let wider = numbers(silhouette.table(exact(&softness.default_phi(1.01 * scene.scale))));
+        let (other_values, along) = match path {
+            Path::Table => (&table, wider.iter().zip(&table).map(|(b, a)| b - a).collect()),
+            _ => (&phi, vec![1.0; phi.len()]),
+        };
         let flat = |values: &[f64]| {
             tensor::<Autodiff<T>, 1>(values, [values.len()], dtype).require_grad()
         };
@@ -98,19 +103,17 @@ impl Products {
         let to_other = other.grad(&grads).expect("a gradient to the other input");
         let ramp: Vec<f64> = (0..scene.vertices.len()).map(|i| (0.11 * i as f64).cos()).collect();
         let ramp = tensor(&ramp, [ramp.len()], dtype);
-        let scale = inner_other.clone().detach();
-        let sum = (to_vertices.clone() * ramp).sum() + (to_other.clone() * scale).sum() * 0.3;
+        let weights = tensor(&along, [along.len()], dtype);
+        let sum = (to_vertices.clone() * ramp).sum() + (to_other.clone() * weights).sum();
         let again = sum.backward();
         let second = inner_vertices.grad(&again).expect("second order to the vertices");
         let mixed = inner_other.grad(&again).expect("second order to the other input");
-        let scaled = |gradient: Vec<f64>| {
-            gradient.iter().zip(other_values).map(|(g, value)| g * value).collect::<Vec<_>>()
-        };
-        let mut products = vec![
-            numbers(to_vertices),
-            scaled(numbers(to_other)),
-            scaled(numbers(mixed)),
-        ];
+        let mut products = vec![numbers(to_vertices), numbers(to_other), numbers(mixed)];
+        if path == Path::Table {
+            for product in &mut products[1..] {
+                *product = vec![product.iter().zip(&along).map(|(g, x)| g * x).sum()];
+            }
+        }
         if path == Path::Table {
             products.push(numbers(second));
         }
