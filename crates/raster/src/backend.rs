@@ -108,13 +108,13 @@ pub trait RasterBackend: Backend {
     }
 }
 
-#[cfg(feature = "ndarray")]
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
 impl RasterBackend for burn::backend::NdArray<f32> {
     fn host_data(tensor: FloatTensor<Self>) -> TensorData {
         ndarray_data::<Self>(tensor)
     }
 }
-#[cfg(feature = "ndarray")]
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
 impl RasterBackend for burn::backend::NdArray<f64> {
     fn host_data(tensor: FloatTensor<Self>) -> TensorData {
         ndarray_data::<Self>(tensor)
@@ -130,7 +130,7 @@ fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
 }
 
 /// Like [`read`], which copies number by number where a tensor is shared.
-#[cfg(feature = "ndarray")]
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
 fn ndarray_data<B>(tensor: FloatTensor<B>) -> TensorData
 where
     B: Backend<FloatTensorPrimitive = burn::backend::ndarray::NdArrayTensor>,

@@ -30,13 +30,17 @@ pub const DEFAULT_BACKEND: &str = if cfg!(feature = "ndarray") {
 )]
 pub struct NoAdapter;
 
-/// Sets [`DefaultBackend`] up. Call it before the first tensor, which would panic where it cannot be.
+/// Sets [`DefaultBackend`] up. Call it before the first tensor, which would panic where it cannot
+/// be. In a browser, where that is asynchronous, the page does it with burn's `init_setup_async`.
 ///
 /// # Errors
 ///
 /// [`NoAdapter`] if it is wgpu and the system has no adapter.
 pub fn set_up_default_backend() -> Result<(), NoAdapter> {
-    #[cfg(all(feature = "wgpu", not(any(feature = "ndarray", feature = "flex"))))]
+    #[cfg(all(
+        feature = "wgpu",
+        not(any(feature = "ndarray", feature = "flex", target_family = "wasm"))
+    ))]
     crate::adapter_name()?;
     Ok(())
 }

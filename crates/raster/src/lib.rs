@@ -27,7 +27,9 @@ pub use colour::{Background, blend, hard_colour, nearness};
 #[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
 pub use default_backend::{DEFAULT_BACKEND, DefaultBackend, NoAdapter, set_up_default_backend};
 #[cfg(feature = "wgpu")]
-pub use gpu::{Wgpu, adapter_name};
+pub use gpu::Wgpu;
+#[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
+pub use gpu::adapter_name;
 pub use hard::hard_silhouette;
 pub use loss::{iou_loss, mse_loss};
 pub use profile::Profile;

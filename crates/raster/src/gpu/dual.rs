@@ -69,9 +69,5 @@ pub(super) fn load(
     #[comptime] second: bool,
 ) -> Dual {
     let value = values[index];
-    if second {
-        Dual { value, tangent: tangents[tangent_index] }
-    } else {
-        Dual::constant(value)
-    }
+    if second { Dual { value, tangent: tangents[tangent_index] } } else { Dual::constant(value) }
 }

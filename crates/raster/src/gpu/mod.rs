@@ -7,15 +7,19 @@
 //! back: every sum has one order, and a step of an optimisation never waits for the GPU. The second
 //! order is the same kernels over dual numbers.
 
+#[cfg(not(target_family = "wasm"))]
 mod adapter;
+mod cells;
 mod dual;
 mod gradient;
 mod image;
 mod pair;
 mod pass;
 mod reach;
+mod table;
 mod topology;
 
+#[cfg(not(target_family = "wasm"))]
 pub use adapter::adapter_name;
 pub(crate) use topology::Topology;
 

@@ -12,10 +12,12 @@ use burn_cubecl::{
 
 use super::{
     TILE,
+    cells::{CellsLaunch, fill_cells},
     gradient::{UNITS, sum_faces, sum_vertices},
-    image::{CellsLaunch, sum_cubics, sum_pixels, sum_tables},
+    image::sum_pixels,
     pair::LookupLaunch,
-    reach::{count_drawn, fill_cells, prepare},
+    reach::{count_drawn, prepare},
+    table::{sum_cubics, sum_tables},
     topology::OnDevice,
 };
 use crate::ProfileSum;

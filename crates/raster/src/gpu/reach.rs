@@ -1,8 +1,4 @@
-//! Culling: the corners of every face side by side, the pixels it may reach, and the faces of
-//! every cell of the image as bits.
-//!
-//! A bit for every cell and face has a size known beforehand, whatever the scene: nothing is
-//! counted, sorted or read back, and no face is ever dropped.
+//! The corners of every face side by side, and the pixels it may reach.
 
 use cubecl::prelude::*;
 
@@ -44,7 +40,7 @@ impl Reach {
     }
 
     /// Whether one of the pixels from `column`, `row` on, `side` each way, is one of them.
-    fn meets(self, column: u32, row: u32, side: u32) -> bool {
+    pub(super) fn meets(self, column: u32, row: u32, side: u32) -> bool {
         let across = self.left < column + side && self.right > column;
         let down = self.top < row + side && self.bottom > row;
         across && down && self.left < self.right && self.top < self.bottom
@@ -152,9 +148,8 @@ pub(super) fn prepare(
         corners[at + 10] = direction[c];
         corners[at + 11] = direction[c + vertex_count];
     }
-    let drawn = is_drawn(ax, ay, az, near)
-        && is_drawn(bx, by, bz, near)
-        && is_drawn(cx, cy, cz, near);
+    let drawn =
+        is_drawn(ax, ay, az, near) && is_drawn(bx, by, bz, near) && is_drawn(cx, cy, cz, near);
     let left = first_pixel(least(ax, bx, cx) - radius, size);
     let right = end_pixel(largest(ax, bx, cx) + radius, size);
     let top = first_pixel(-largest(ay, by, cy) - radius, size);
@@ -190,36 +185,4 @@ pub(super) fn count_drawn(reaches: &mut Array<u32>, face_count: u32, #[comptime]
         }
         reaches[4 * CUBE_COUNT * face_count as usize + view] = total;
     }
-}
-
-/// Writes 32 faces of a cell as bits, one unit each: `cells` becomes
-/// `[views, rows of cells, cells of a row, words]`, a cell being `side` pixels wide and high.
-#[cube(launch)]
-pub(super) fn fill_cells(
-    reaches: &Array<u32>,
-    cells: &mut Array<u32>,
-    face_count: u32,
-    words: u32,
-    per_row: u32,
-    side: u32,
-    jobs: u32,
-) {
-    let job = ABSOLUTE_POS as u32;
-    if job >= jobs {
-        terminate!();
-    }
-    let word = job % words;
-    let cell = job / words;
-    let column = cell % per_row * side;
-    let row = cell / per_row % per_row * side;
-    let view = cell / (per_row * per_row);
-    let mut bits = 0u32;
-    for bit in 0..32u32 {
-        let face = 32 * word + bit;
-        if face < face_count {
-            let reach = Reach::load(reaches, (view * face_count + face) as usize);
-            bits |= select(reach.meets(column, row, side), 1u32, 0u32) << bit;
-        }
-    }
-    cells[job as usize] = bits;
 }

@@ -111,6 +111,29 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
 }
 
 #[test]
+fn more_views_than_a_launch_takes_are_drawn_in_parts() {
+    if !adapter() {
+        return;
+    }
+    let views = 65_540;
+    let triangle = |view: usize| {
+        let shift = 2.0 * view as f64 / views as f64 - 1.0;
+        [[-0.5, -0.4], [0.5, -0.6], [0.1, 0.5]].map(|[x, y]| [x + shift, y, 2.0])
+    };
+    let scene = Scene {
+        vertices: (0..views).flat_map(triangle).flatten().collect(),
+        views,
+        faces: [[0, 1, 2]].into(),
+        size: 1,
+        softness: EdgeSoftness { family: Family::Logistic, squared: false },
+        scale: 0.1,
+    };
+    let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
+    let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
+    found.assert_close(&expected, "many views");
+}
+
+#[test]
 fn the_same_numbers_come_out_every_time() {
     if !adapter() {
         return;

@@ -75,9 +75,8 @@ impl Products {
             Path::Table => (&table, wider.iter().zip(&table).map(|(b, a)| b - a).collect()),
             _ => (&phi, vec![1.0; phi.len()]),
         };
-        let flat = |values: &[f64]| {
-            tensor::<Autodiff<T>, 1>(values, [values.len()], dtype).require_grad()
-        };
+        let flat =
+            |values: &[f64]| tensor::<Autodiff<T>, 1>(values, [values.len()], dtype).require_grad();
         let inner_vertices = flat(&scene.vertices);
         let inner_other = flat(other_values);
         let vertices = Tensor::<Autodiff<_>, 1>::from_inner(inner_vertices.clone()).require_grad();
