@@ -1,4 +1,4 @@
-use softrast_raster::DefaultBackend;
+use softrast_raster::{DefaultBackend, set_up_default_backend};
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
@@ -47,8 +47,11 @@ impl Method {
     ///
     /// # Errors
     ///
-    /// If a softness file cannot be used, or flags contradict each other.
+    /// If a softness file cannot be used, flags contradict each other, or the backend finds no
+    /// adapter.
     pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
+        // Before the first tensor.
+        set_up_default_backend()?;
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 let scaled = settings.scale.is_some() || settings.scale_end.is_some();

@@ -38,7 +38,7 @@ impl<B: Backend> MovingSilhouette<B> {
     ) -> Self {
         let phi = phi::<B>(method, scale);
         let silhouette = rasterizer.prepare(faces, method.softness(), &phi);
-        let table = silhouette.table(phi);
+        let table = moved(silhouette.table(phi));
         let (method, faces) = (method.clone(), faces.clone());
         Self { method, rasterizer, faces, silhouette, prepared: scale, table, scale }
     }
@@ -48,12 +48,12 @@ impl<B: Backend> MovingSilhouette<B> {
         if self.scale == scale {
             return;
         }
-        let phi = phi(&self.method, scale);
+        let phi = phi::<B>(&self.method, scale);
         if !(STALE..=1.0).contains(&(scale / self.prepared)) {
             self.silhouette = self.rasterizer.prepare(&self.faces, self.method.softness(), &phi);
             self.prepared = scale;
         }
-        (self.table, self.scale) = (self.silhouette.table(phi), scale);
+        (self.table, self.scale) = (moved(self.silhouette.table(phi)), scale);
     }
 }
 
@@ -64,8 +64,32 @@ impl<B: RasterBackend> MovingSilhouette<B> {
     }
 }
 
+/// Parameters at a scale, where supports, knots and tables are computed: on the backend itself.
+#[cfg(not(feature = "wgpu"))]
 fn phi<B: Backend>(method: &Method, scale: f64) -> Tensor<B, 1> {
     let phi = method.phi(scale);
     let shape = [phi.len()];
     tensor(phi, shape)
+}
+
+#[cfg(not(feature = "wgpu"))]
+fn moved<B: Backend>(table: Tensor<B, 2>) -> Tensor<B, 2> {
+    table
+}
+
+/// Parameters at a scale, where supports, knots and tables are computed: on the CPU in f64. A GPU
+/// then gets a table in one piece, instead of some sixty small kernels over a few hundred numbers,
+/// and its curvature is not lost to rounding.
+#[cfg(feature = "wgpu")]
+fn phi<B: Backend>(method: &Method, scale: f64) -> Tensor<burn::backend::NdArray<f32>, 1> {
+    let phi = method.phi(scale);
+    let shape = [phi.len()];
+    let data = burn::tensor::TensorData::new(phi, shape);
+    Tensor::from_data(data, (&Default::default(), burn::tensor::DType::F64))
+}
+
+#[cfg(feature = "wgpu")]
+fn moved<B: Backend>(table: Tensor<burn::backend::NdArray<f32>, 2>) -> Tensor<B, 2> {
+    let shape = table.dims();
+    tensor(crate::numbers(table), shape)
 }

@@ -26,6 +26,8 @@ pub struct ProfileSum {
     pub(crate) grid: Grid,
     pub(crate) size: usize,
     pub(crate) near: f64,
+    #[cfg(feature = "wgpu")]
+    pub(crate) topology: crate::gpu::Topology,
 }
 
 impl ProfileSum {
@@ -106,13 +108,13 @@ pub trait RasterBackend: Backend {
     }
 }
 
-#[cfg(feature = "ndarray")]
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
 impl RasterBackend for burn::backend::NdArray<f32> {
     fn host_data(tensor: FloatTensor<Self>) -> TensorData {
         ndarray_data::<Self>(tensor)
     }
 }
-#[cfg(feature = "ndarray")]
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
 impl RasterBackend for burn::backend::NdArray<f64> {
     fn host_data(tensor: FloatTensor<Self>) -> TensorData {
         ndarray_data::<Self>(tensor)
@@ -120,8 +122,6 @@ impl RasterBackend for burn::backend::NdArray<f64> {
 }
 #[cfg(feature = "flex")]
 impl RasterBackend for burn::backend::Flex {}
-#[cfg(feature = "wgpu")]
-impl RasterBackend for burn::backend::Wgpu {}
 
 fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
     try_read_sync(B::float_into_data(tensor))
@@ -130,7 +130,7 @@ fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
 }
 
 /// Like [`read`], which copies number by number where a tensor is shared.
-#[cfg(feature = "ndarray")]
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
 fn ndarray_data<B>(tensor: FloatTensor<B>) -> TensorData
 where
     B: Backend<FloatTensorPrimitive = burn::backend::ndarray::NdArrayTensor>,

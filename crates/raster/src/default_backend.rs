@@ -11,7 +11,7 @@ pub type DefaultBackend = burn::backend::Flex;
 /// The backend of binaries, in floats of 32 bits: the first of `ndarray`, `flex` and `wgpu` whose
 /// feature is on.
 #[cfg(all(feature = "wgpu", not(any(feature = "ndarray", feature = "flex"))))]
-pub type DefaultBackend = burn::backend::Wgpu;
+pub type DefaultBackend = crate::Wgpu;
 
 /// Name of [`DefaultBackend`] and its float type.
 pub const DEFAULT_BACKEND: &str = if cfg!(feature = "ndarray") {
@@ -21,3 +21,26 @@ pub const DEFAULT_BACKEND: &str = if cfg!(feature = "ndarray") {
 } else {
     "wgpu f32"
 };
+
+/// There is nothing that wgpu could run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no adapter for wgpu found: install the Vulkan driver of your graphics card, or Mesa's software \
+     Vulkan (Debian, Ubuntu: apt install mesa-vulkan-drivers libvulkan1)"
+)]
+pub struct NoAdapter;
+
+/// Sets [`DefaultBackend`] up. Call it before the first tensor, which would panic where it cannot
+/// be. In a browser, where that is asynchronous, the page does it with burn's `init_setup_async`.
+///
+/// # Errors
+///
+/// [`NoAdapter`] if it is wgpu and the system has no adapter.
+pub fn set_up_default_backend() -> Result<(), NoAdapter> {
+    #[cfg(all(
+        feature = "wgpu",
+        not(any(feature = "ndarray", feature = "flex", target_family = "wasm"))
+    ))]
+    crate::adapter_name()?;
+    Ok(())
+}

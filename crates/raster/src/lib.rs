@@ -11,6 +11,8 @@ mod camera;
 mod colour;
 #[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
 mod default_backend;
+#[cfg(feature = "wgpu")]
+mod gpu;
 mod hard;
 mod kernel;
 mod loss;
@@ -23,7 +25,11 @@ pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use camera::{NEAR, project, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
 #[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
-pub use default_backend::{DEFAULT_BACKEND, DefaultBackend};
+pub use default_backend::{DEFAULT_BACKEND, DefaultBackend, NoAdapter, set_up_default_backend};
+#[cfg(feature = "wgpu")]
+pub use gpu::Wgpu;
+#[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
+pub use gpu::adapter_name;
 pub use hard::hard_silhouette;
 pub use loss::{iou_loss, mse_loss};
 pub use profile::Profile;

@@ -41,17 +41,35 @@ impl Rasterizer {
     ) -> Silhouette<S> {
         assert!(self.size > 0, "an image needs at least one pixel");
         let values: Vec<f64> = phi.to_data().iter().collect();
-        let profile = Profile::new::<B>(
-            &softness,
-            self.t_conorm,
-            &values,
-            faces.len(),
-            self.tolerance,
-            &phi.device(),
-        );
-        let op =
-            ProfileSum { faces: faces.clone(), grid: profile.grid, size: self.size, near: NEAR };
+        let profile = self.profile::<B>(&softness, &values, faces.len(), &phi.device());
+        let op = ProfileSum {
+            faces: faces.clone(),
+            grid: profile.grid,
+            size: self.size,
+            near: NEAR,
+            #[cfg(feature = "wgpu")]
+            topology: Default::default(),
+        };
         Silhouette { softness, profile, op }
+    }
+
+    /// Support and knots; for a GPU chosen on the CPU, in f64 and without a word between host and
+    /// GPU for every attempt.
+    fn profile<B: Backend>(
+        &self,
+        softness: &impl Softness,
+        phi: &[f64],
+        faces: usize,
+        device: &B::Device,
+    ) -> Profile {
+        let Self { t_conorm, tolerance, .. } = *self;
+        #[cfg(feature = "wgpu")]
+        if B::name(device).contains("wgpu") {
+            type Host = burn::backend::NdArray<f32>;
+            let device = Default::default();
+            return Profile::new::<Host>(softness, t_conorm, phi, faces, tolerance, &device);
+        }
+        Profile::new::<B>(softness, t_conorm, phi, faces, tolerance, device)
     }
 }
 

@@ -63,6 +63,7 @@ fn work(args: &Args) -> anyhow::Result<Report> {
         // Fails where threads run already: a library user has chosen their number.
         let _ = pool.build_global();
     }
+    softrast_raster::set_up_default_backend()?;
     let scene = Scene::load(args)?;
     let output = Output::open(&args.out)?;
     let setting = Setting {

@@ -1,0 +1,29 @@
+use std::sync::OnceLock;
+
+use burn::backend::wgpu::{
+    WgpuDevice, WgpuRuntime,
+    graphics::{AutoGraphicsApi, GraphicsApi},
+    init_setup,
+};
+use burn_cubecl::cubecl::Runtime;
+
+use crate::NoAdapter;
+
+/// Sets up the default adapter of wgpu, once, and names it: `NVIDIA H200`, `llvmpipe (LLVM 15)`.
+///
+/// Without this, the first tensor sets it up, and panics where there is none.
+///
+/// # Errors
+///
+/// [`NoAdapter`] if the system has none.
+pub fn adapter_name() -> Result<&'static str, NoAdapter> {
+    static NAME: OnceLock<Result<String, NoAdapter>> = OnceLock::new();
+    let name = NAME.get_or_init(|| {
+        if WgpuRuntime::enumerate_all_devices(&AutoGraphicsApi::backend()).is_empty() {
+            return Err(NoAdapter);
+        }
+        let setup = init_setup::<AutoGraphicsApi>(&WgpuDevice::default(), Default::default());
+        Ok(setup.adapter.get_info().name)
+    });
+    name.as_deref().map_err(|&none| none)
+}

@@ -1,0 +1,243 @@
+//! The arithmetic of one pixel and one face, as `kernel/{face,pair,table,batch}.rs` have it.
+
+use cubecl::prelude::*;
+
+use super::dual::{Dual, load};
+
+/// Edge vectors shorter than this (NDC², squared length) count as a point.
+const POINT: f32 = 1e-30;
+/// Largest rate at which a place in a cell moves with the squared distance, in NDC⁻².
+const STEEPEST: f32 = 1e30;
+/// Bits of the fraction of an f32, and the bias of its exponent.
+const MANTISSA: u32 = 23;
+const BIAS: u32 = 127;
+
+/// Where the cells of a profile table lie: a [`Grid`](crate::kernel::Grid) prepared for look-ups.
+#[derive(CubeType, CubeLaunch, Clone, Copy)]
+pub(super) struct Lookup {
+    /// One over the squared radii of the support.
+    pub(super) inverse_outer: f32,
+    pub(super) inverse_inner: f32,
+    /// One over the width of the innermost cell.
+    pub(super) innermost: f32,
+    pub(super) octaves: u32,
+    pub(super) bits: u32,
+    /// Cells of one side, without its tail.
+    pub(super) cells: u32,
+}
+
+/// One edge of a face.
+#[derive(CubeType, Clone, Copy)]
+struct Edge {
+    x: Dual,
+    y: Dual,
+    along_x: Dual,
+    along_y: Dual,
+    /// One over the squared length; 0 for an edge that is a point.
+    inverse: Dual,
+}
+
+/// A projected triangle prepared for distances; corner k starts edge k.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Face {
+    first: Edge,
+    second: Edge,
+    third: Edge,
+    /// Sign of the area; 0 for a triangle without area.
+    orientation: f32,
+}
+
+/// Closest point of an edge, or of the whole boundary, to a pixel.
+#[derive(CubeType, Clone, Copy)]
+struct Closest {
+    distance2: Dual,
+    dx: Dual,
+    dy: Dual,
+    /// Place on its edge, from 0 to 1.
+    along: Dual,
+    edge: u32,
+    /// At least 0 where the pixel is on the inner side of all edges so far.
+    side: f32,
+}
+
+/// What the profile makes of one pixel and one face.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Pair {
+    /// Row of the table.
+    pub(super) row: u32,
+    /// Place within the cell, in [0, 1], and its derivative by the squared distance.
+    pub(super) place: Dual,
+    rate: f32,
+    /// From the closest point to the pixel.
+    pub(super) dx: Dual,
+    pub(super) dy: Dual,
+    along: Dual,
+    edge: u32,
+}
+
+#[cube]
+impl Edge {
+    fn new(x: Dual, y: Dual, next_x: Dual, next_y: Dual) -> Edge {
+        let along_x = next_x.sub(x);
+        let along_y = next_y.sub(y);
+        let length2 = along_x.mul(along_x).add(along_y.mul(along_y));
+        let long = length2.value > POINT;
+        let divisor = Dual::select(long, length2, Dual::constant(1.0f32));
+        let inverse = Dual::select(long, divisor.recip(), Dual::constant(0.0f32));
+        Edge { x, y, along_x, along_y, inverse }
+    }
+
+    fn closest(self, px: f32, py: f32, orientation: f32, edge: u32) -> Closest {
+        let wx = Dual::constant(px).sub(self.x);
+        let wy = Dual::constant(py).sub(self.y);
+        let t = wx.mul(self.along_x).add(wy.mul(self.along_y)).mul(self.inverse);
+        let t = Dual::select(t.value > 0.0f32, t, Dual::constant(0.0f32));
+        let t = Dual::select(t.value < 1.0f32, t, Dual::constant(1.0f32));
+        let dx = wx.sub(t.mul(self.along_x));
+        let dy = wy.sub(t.mul(self.along_y));
+        let edge_function = self.along_x.value * wy.value - self.along_y.value * wx.value;
+        Closest {
+            distance2: dx.mul(dx).add(dy.mul(dy)),
+            dx,
+            dy,
+            along: t,
+            edge,
+            side: orientation * edge_function,
+        }
+    }
+}
+
+#[cube]
+impl Closest {
+    fn nearer(self, other: Closest) -> Closest {
+        let other_wins = other.distance2.value < self.distance2.value;
+        Closest {
+            distance2: Dual::select(other_wins, other.distance2, self.distance2),
+            dx: Dual::select(other_wins, other.dx, self.dx),
+            dy: Dual::select(other_wins, other.dy, self.dy),
+            along: Dual::select(other_wins, other.along, self.along),
+            edge: select(other_wins, other.edge, self.edge),
+            side: select(other.side < self.side, other.side, self.side),
+        }
+    }
+}
+
+#[cube]
+impl Face {
+    /// The face whose six corner coordinates start at `first` in `corners`.
+    pub(super) fn new(corners: &Array<f32>, first: usize, #[comptime] second: bool) -> Face {
+        let ax = load(corners, first, corners, first + 6, second);
+        let ay = load(corners, first + 1, corners, first + 7, second);
+        let bx = load(corners, first + 2, corners, first + 8, second);
+        let by = load(corners, first + 3, corners, first + 9, second);
+        let cx = load(corners, first + 4, corners, first + 10, second);
+        let cy = load(corners, first + 5, corners, first + 11, second);
+        let edge_a = Edge::new(ax, ay, bx, by);
+        let edge_b = Edge::new(bx, by, cx, cy);
+        let edge_c = Edge::new(cx, cy, ax, ay);
+        let area = edge_a.along_x.value * edge_b.along_y.value
+            - edge_a.along_y.value * edge_b.along_x.value;
+        let orientation = select(area > 0.0f32, 1.0f32, select(area < 0.0f32, -1.0f32, 0.0f32));
+        Face { first: edge_a, second: edge_b, third: edge_c, orientation }
+    }
+
+    /// Where the pixel at `px`, `py` (NDC) lies in the table.
+    pub(super) fn pair(self, px: f32, py: f32, lookup: Lookup) -> Pair {
+        let orientation = self.orientation;
+        let first = self.first.closest(px, py, orientation, 0u32);
+        let second = self.second.closest(px, py, orientation, 1u32);
+        let third = self.third.closest(px, py, orientation, 2u32);
+        let nearest = first.nearer(second).nearer(third);
+        let inside = nearest.side >= 0.0f32 && orientation != 0.0f32;
+
+        let inverse = select(inside, lookup.inverse_inner, lookup.inverse_outer);
+        let y = nearest.distance2.scale(inverse);
+        // Exponent and leading mantissa bits count the cells; what remains is the place in one.
+        let raw = u32::reinterpret(select(y.value < 2.0f32, y.value, 2.0f32));
+        let shift = MANTISSA - lookup.bits;
+        let lower = f32::reinterpret((raw >> shift) << shift);
+        let before = (BIAS - lookup.octaves) << lookup.bits;
+        let counted = raw >> shift;
+        // Cell 0 lies below the first octave.
+        let innermost = counted < before;
+        let index = select(innermost, 0u32, counted + 1u32 - before);
+        let index = select(index > lookup.cells, lookup.cells, index);
+        let row = select(inside, index + lookup.cells + 1u32, index);
+        let exponent = raw >> MANTISSA;
+        let inverse_width = f32::reinterpret((2u32 * BIAS + lookup.bits - exponent) << MANTISSA);
+        let start = select(innermost, 0.0f32, lower);
+        let rate = select(innermost, lookup.innermost, inverse_width);
+        // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
+        let place = y.sub(Dual::constant(start)).scale(rate);
+        let place = Dual::select(y.value < 1.0f32, place, Dual::constant(0.0f32));
+        let slope = rate * inverse;
+        Pair {
+            row,
+            place,
+            rate: select(slope < STEEPEST, slope, STEEPEST),
+            dx: nearest.dx,
+            dy: nearest.dy,
+            along: nearest.along,
+            edge: nearest.edge,
+        }
+    }
+}
+
+#[cube]
+impl Pair {
+    /// The profile at this pair.
+    pub(super) fn value(self, cubic: Cubic) -> Dual {
+        let t = self.place;
+        cubic.a.add(t.mul(cubic.b.add(t.mul(cubic.c.add(t.mul(cubic.d))))))
+    }
+
+    /// Derivative of the profile by the squared distance.
+    pub(super) fn slope(self, cubic: Cubic) -> Dual {
+        let t = self.place;
+        let by_place = cubic.b.add(t.mul(cubic.c.scale(2.0f32).add(t.mul(cubic.d.scale(3.0f32)))));
+        by_place.scale(self.rate)
+    }
+
+    /// Barycentric weight of a corner at the closest point.
+    pub(super) fn weight(self, #[comptime] corner: u32) -> Dual {
+        let before = comptime!((corner + 2) % 3);
+        let starts = Dual::constant(1.0f32).sub(self.along);
+        let ends = Dual::select(self.edge == before, self.along, Dual::constant(0.0f32));
+        Dual::select(self.edge == corner, starts, ends)
+    }
+}
+
+/// Coefficients of a cell.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Cubic {
+    a: Dual,
+    b: Dual,
+    c: Dual,
+    d: Dual,
+}
+
+#[cube]
+impl Cubic {
+    /// The constant coefficient.
+    pub(super) fn first(self) -> Dual {
+        self.a
+    }
+
+    /// Row `row` of `table`; the derivatives stand in `direction` from `offset` on.
+    pub(super) fn new(
+        table: &Array<f32>,
+        row: u32,
+        direction: &Array<f32>,
+        offset: u32,
+        #[comptime] second: bool,
+    ) -> Cubic {
+        let at = 4 * row as usize;
+        let along = offset as usize + at;
+        Cubic {
+            a: load(table, at, direction, along, second),
+            b: load(table, at + 1, direction, along + 1, second),
+            c: load(table, at + 2, direction, along + 2, second),
+            d: load(table, at + 3, direction, along + 3, second),
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! One call of the op: which kernels run over which buffers.
+
+use burn::{
+    backend::wgpu::{CubeTensor, WgpuRuntime},
+    tensor::{DType, TensorMetadata},
+};
+use burn_cubecl::{
+    cubecl::{calculate_cube_count_elemwise, prelude::*},
+    kernel::into_contiguous,
+    ops::numeric::zeros_client,
+};
+
+use super::{
+    TILE,
+    cells::{CellsLaunch, fill_cells},
+    gradient::{UNITS, sum_faces, sum_vertices},
+    image::sum_pixels,
+    pair::LookupLaunch,
+    reach::{count_drawn, prepare},
+    table::{sum_cubics, sum_tables},
+    topology::OnDevice,
+};
+use crate::ProfileSum;
+
+type Buffer = CubeTensor<WgpuRuntime>;
+
+/// Largest buffer of a pass's own, in bytes: half of what every adapter can bind (128 MiB).
+const BUFFER: usize = 64 << 20;
+/// All tables of [`sum_cubics`] together, in bytes.
+const TABLES: usize = 32 << 20;
+/// Units of a cube where they do not share anything.
+const CUBE: u32 = 64;
+
+/// Inputs of a pass on the device.
+pub(super) struct Pass<'a> {
+    op: &'a ProfileSum,
+    client: ComputeClient<WgpuRuntime>,
+    /// `[views, 3, vertices]`.
+    vertices: Buffer,
+    /// `[rows, 4]`.
+    table: Buffer,
+    /// Derivatives of both, flat and in this order, in a pass of second order.
+    direction: Option<Buffer>,
+    topology: OnDevice,
+    views: usize,
+    vertex_count: usize,
+    /// Width and height of a cell in pixels.
+    side: usize,
+}
+
+/// Some of the views, culled.
+struct Culled {
+    first_view: usize,
+    views: usize,
+    corners: Buffer,
+    reaches: Buffer,
+    cells: Buffer,
+}
+
+impl<'a> Pass<'a> {
+    pub(super) fn new(
+        op: &'a ProfileSum,
+        vertices: Buffer,
+        table: Buffer,
+        direction: Option<Buffer>,
+    ) -> Self {
+        assert_eq!(vertices.dtype(), DType::F32, "profile_sum on the GPU works in f32");
+        let (client, device) = (vertices.client.clone(), vertices.device.clone());
+        let (views, vertex_count) = (vertices.shape()[0], vertices.shape()[2]);
+        let topology = op.topology.on(&op.faces, vertex_count, &client, &device);
+        let mut side = TILE as usize;
+        while op.size.div_ceil(side).pow(2) * words(op) * 4 > BUFFER {
+            side *= 2;
+        }
+        Self {
+            op,
+            client,
+            vertices: into_contiguous(vertices),
+            table: into_contiguous(table),
+            direction: direction.map(into_contiguous),
+            topology,
+            views,
+            vertex_count,
+            side,
+        }
+    }
+
+    /// Sums of the profile, flat: `[views * size * size]`.
+    pub(super) fn sums(&self) -> Buffer {
+        let sums = self.buffer(self.pixels(), DType::F32);
+        for culled in self.culled() {
+            self.write_sums(&culled, &sums, 0);
+        }
+        sums
+    }
+
+    /// Gradient of `Σ upstream · sums` to vertices and table, flat. In a pass of second order its
+    /// derivative, and behind it that of the sums.
+    pub(super) fn gradient(&self, upstream: Buffer, wrt_table: bool) -> Buffer {
+        let upstream = into_contiguous(upstream);
+        let (coordinates, coefficients) = (3 * self.views * self.vertex_count, 4 * self.rows());
+        let sums = if self.second() { self.pixels() } else { 0 };
+        let length = coordinates + coefficients + sums;
+        // Where the table has no part, its gradient stays 0.
+        let gradient = if wrt_table && self.vertex_count > 0 {
+            self.buffer(length, DType::F32)
+        } else {
+            self.zeros(length)
+        };
+        let tiles = self.views * self.op.size.div_ceil(TILE as usize).pow(2);
+        let cube = (TILE * TILE) as usize;
+        let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, tiles.max(1));
+        let partial = wrt_table.then(|| self.zeros(cubes * cube * coefficients));
+        for culled in self.culled() {
+            self.write_corners(&culled, &upstream, &gradient);
+            if let Some(partial) = &partial {
+                self.add_cubics(&culled, &upstream, partial, cubes);
+            }
+            if self.second() {
+                self.write_sums(&culled, &gradient, coordinates + coefficients);
+            }
+        }
+        if let Some(partial) = partial {
+            sum_tables::launch(
+                &self.client,
+                self.cubes(coefficients, CUBE),
+                CubeDim::new_1d(CUBE),
+                partial.into_array_arg(),
+                gradient.clone().into_array_arg(),
+                (cubes * cube) as u32,
+                coefficients as u32,
+                coordinates as u32,
+            );
+        }
+        gradient
+    }
+
+    /// The views in parts whose buffers all fit, culled one after the other.
+    fn culled(&self) -> impl Iterator<Item = Culled> {
+        let faces = self.op.faces.len();
+        let largest = (4 * self.stride() * faces).max(4 * self.per_row().pow(2) * words(self.op));
+        // A launch counts at most 65535 cubes along an axis.
+        let step = (BUFFER / largest).clamp(1, 65535);
+        (0..self.views).step_by(step).map(move |first| {
+            let views = step.min(self.views - first);
+            self.cull(first, views)
+        })
+    }
+
+    fn cull(&self, first_view: usize, views: usize) -> Culled {
+        let faces = self.op.faces.len();
+        let jobs = views * faces;
+        let corners = self.buffer(self.stride() * jobs, DType::F32);
+        let reaches = self.buffer(4 * jobs + views, DType::U32);
+        prepare::launch(
+            &self.client,
+            self.cubes(jobs, CUBE),
+            CubeDim::new_1d(CUBE),
+            self.vertices.clone().into_array_arg(),
+            self.direction().into_array_arg(),
+            self.topology.faces.clone().into_array_arg(),
+            corners.clone().into_array_arg(),
+            reaches.clone().into_array_arg(),
+            first_view as u32,
+            self.vertex_count as u32,
+            faces as u32,
+            jobs as u32,
+            self.op.size as u32,
+            (self.op.near as f32).to_bits(),
+            self.op.grid.outer as f32,
+            self.second(),
+        );
+        count_drawn::launch(
+            &self.client,
+            CubeCount::Static(views as u32, 1, 1),
+            CubeDim::new_1d(CUBE),
+            reaches.clone().into_array_arg(),
+            faces as u32,
+            CUBE,
+        );
+        let words = views * self.per_row().pow(2) * words(self.op);
+        let cells = self.buffer(words, DType::U32);
+        fill_cells::launch(
+            &self.client,
+            self.cubes(words, CUBE),
+            CubeDim::new_1d(CUBE),
+            reaches.clone().into_array_arg(),
+            cells.clone().into_array_arg(),
+            faces as u32,
+            self::words(self.op) as u32,
+            self.per_row() as u32,
+            self.side as u32,
+            words as u32,
+        );
+        Culled { first_view, views, corners, reaches, cells }
+    }
+
+    /// Writes the sums of the views to `out`, all views being at `offset`.
+    fn write_sums(&self, culled: &Culled, out: &Buffer, offset: usize) {
+        let size = self.op.size;
+        let tiles = size.div_ceil(TILE as usize) as u32;
+        sum_pixels::launch(
+            &self.client,
+            CubeCount::Static(tiles, tiles, culled.views as u32),
+            CubeDim::new_2d(TILE, TILE),
+            culled.corners.clone().into_array_arg(),
+            culled.reaches.clone().into_array_arg(),
+            culled.cells.clone().into_array_arg(),
+            self.table.clone().into_array_arg(),
+            self.direction().into_array_arg(),
+            out.clone().into_array_arg(),
+            self.cells(culled),
+            self.lookup(),
+            self.table_offset(),
+            size as u32,
+            (offset + culled.first_view * size * size) as u32,
+            self.second(),
+        );
+    }
+
+    /// Writes the gradient to the vertices of the views to the start of `out`.
+    fn write_corners(&self, culled: &Culled, upstream: &Buffer, out: &Buffer) {
+        let faces = self.op.faces.len();
+        let jobs = culled.views * faces;
+        let of_faces = self.buffer(6 * jobs, DType::F32);
+        sum_faces::launch(
+            &self.client,
+            self.cubes(jobs * UNITS as usize, UNITS),
+            CubeDim::new_1d(UNITS),
+            culled.corners.clone().into_array_arg(),
+            culled.reaches.clone().into_array_arg(),
+            self.table.clone().into_array_arg(),
+            self.direction().into_array_arg(),
+            upstream.clone().into_array_arg(),
+            of_faces.clone().into_array_arg(),
+            self.lookup(),
+            faces as u32,
+            jobs as u32,
+            self.table_offset(),
+            self.op.size as u32,
+            culled.first_view as u32,
+            self.second(),
+        );
+        let jobs = culled.views * self.vertex_count;
+        sum_vertices::launch(
+            &self.client,
+            self.cubes(jobs, CUBE),
+            CubeDim::new_1d(CUBE),
+            of_faces.into_array_arg(),
+            self.topology.corners.clone().into_array_arg(),
+            out.clone().into_array_arg(),
+            self.vertex_count as u32,
+            faces as u32,
+            jobs as u32,
+            culled.first_view as u32,
+        );
+    }
+
+    /// Adds the gradient to the table of the views to `partial`.
+    fn add_cubics(&self, culled: &Culled, upstream: &Buffer, partial: &Buffer, cubes: usize) {
+        sum_cubics::launch(
+            &self.client,
+            CubeCount::Static(cubes as u32, 1, 1),
+            CubeDim::new_2d(TILE, TILE),
+            culled.corners.clone().into_array_arg(),
+            culled.reaches.clone().into_array_arg(),
+            culled.cells.clone().into_array_arg(),
+            upstream.clone().into_array_arg(),
+            partial.clone().into_array_arg(),
+            self.cells(culled),
+            self.lookup(),
+            self.op.size as u32,
+            culled.first_view as u32,
+            self.second(),
+        );
+    }
+
+    fn second(&self) -> bool {
+        self.direction.is_some()
+    }
+
+    /// The direction; any buffer where there is none, as nothing then reads it.
+    fn direction(&self) -> Buffer {
+        self.direction.as_ref().unwrap_or(&self.table).clone()
+    }
+
+    /// Where the table starts in the direction.
+    fn table_offset(&self) -> u32 {
+        if self.second() { (3 * self.views * self.vertex_count) as u32 } else { 0 }
+    }
+
+    /// Numbers that describe a face.
+    fn stride(&self) -> usize {
+        if self.second() { 12 } else { 6 }
+    }
+
+    fn pixels(&self) -> usize {
+        self.views * self.op.size * self.op.size
+    }
+
+    fn rows(&self) -> usize {
+        self.op.grid.rows()
+    }
+
+    /// Cells in a row of the image.
+    fn per_row(&self) -> usize {
+        self.op.size.div_ceil(self.side)
+    }
+
+    fn cells(&self, culled: &Culled) -> CellsLaunch<WgpuRuntime> {
+        CellsLaunch::new(
+            self.side as u32,
+            self.per_row() as u32,
+            words(self.op) as u32,
+            self.op.faces.len() as u32,
+            culled.views as u32,
+        )
+    }
+
+    fn lookup(&self) -> LookupLaunch<WgpuRuntime> {
+        let grid = &self.op.grid;
+        LookupLaunch::new(
+            grid.outer.powi(-2) as f32,
+            grid.inner.powi(-2) as f32,
+            f32::exp2(grid.octaves as f32),
+            grid.octaves,
+            grid.bits,
+            grid.cells() as u32,
+        )
+    }
+
+    fn cubes(&self, jobs: usize, units: u32) -> CubeCount {
+        calculate_cube_count_elemwise(&self.client, jobs, CubeDim::new_1d(units))
+    }
+
+    /// A flat buffer that nothing has been written to.
+    fn buffer(&self, length: usize, dtype: DType) -> Buffer {
+        let handle = self.client.empty(length * dtype.size());
+        let device = self.vertices.device.clone();
+        CubeTensor::new_contiguous(self.client.clone(), device, [length].into(), handle, dtype)
+    }
+
+    fn zeros(&self, length: usize) -> Buffer {
+        let device = self.vertices.device.clone();
+        zeros_client(self.client.clone(), device, [length].into(), DType::F32)
+    }
+}
+
+/// Words that hold a bit for each face.
+fn words(op: &ProfileSum) -> usize {
+    op.faces.len().div_ceil(32)
+}

@@ -1,0 +1,188 @@
+//! The corners of every face side by side, and the pixels it may reach.
+
+use cubecl::prelude::*;
+
+/// Projected coordinates beyond 1e6 NDC are not drawn. As bits: floats of one sign are ordered as
+/// their bits are, and a shader may assume that no float is NaN, but not that no integer is.
+const FAR_AWAY_BITS: u32 = 1e6f32.to_bits();
+const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
+/// All bits but the sign.
+const MAGNITUDE: u32 = 0x7fff_ffff;
+/// Makes up for rounding, in pixels.
+const MARGIN: f32 = 0.01;
+
+/// Pixels that a face may reach: rows and columns as half-open ranges, top row first. A face that
+/// is not drawn has `left` above `right`.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Reach {
+    pub(super) left: u32,
+    pub(super) right: u32,
+    pub(super) top: u32,
+    pub(super) bottom: u32,
+}
+
+#[cube]
+impl Reach {
+    /// Number `face` of `reaches` `[faces, 4]`.
+    pub(super) fn load(reaches: &Array<u32>, face: usize) -> Reach {
+        let at = 4 * face;
+        Reach {
+            left: reaches[at],
+            right: reaches[at + 1],
+            top: reaches[at + 2],
+            bottom: reaches[at + 3],
+        }
+    }
+
+    /// Whether the pixel is one of them.
+    pub(super) fn holds(self, column: u32, row: u32) -> bool {
+        column >= self.left && column < self.right && row >= self.top && row < self.bottom
+    }
+
+    /// Whether one of the pixels from `column`, `row` on, `side` each way, is one of them.
+    pub(super) fn meets(self, column: u32, row: u32, side: u32) -> bool {
+        let across = self.left < column + side && self.right > column;
+        let down = self.top < row + side && self.bottom > row;
+        across && down && self.left < self.right && self.top < self.bottom
+    }
+}
+
+/// Centre of pixel `index` along an axis, in NDC; rows count from the bottom here.
+#[cube]
+pub(super) fn pixel_centre(index: u32, size: u32) -> f32 {
+    f32::cast_from(2i32 * i32::cast_from(index) + 1i32 - i32::cast_from(size))
+        / f32::cast_from(size)
+}
+
+/// Whether a corner may be drawn: `x` and `y` not far away, `z` not nearer than the float with the
+/// bits `near`; false for NaN.
+#[cube]
+fn is_drawn(x: f32, y: f32, z: f32, near: u32) -> bool {
+    let x = u32::reinterpret(x) & MAGNITUDE;
+    let y = u32::reinterpret(y) & MAGNITUDE;
+    let z = u32::reinterpret(z);
+    x <= FAR_AWAY_BITS && y <= FAR_AWAY_BITS && z >= near && z <= INFINITY_BITS
+}
+
+/// First pixel whose centre lies at or after `low` (NDC).
+#[cube]
+fn first_pixel(low: f32, size: u32) -> u32 {
+    let size = f32::cast_from(size);
+    let place = ((low + 1.0f32) * size - 1.0f32) * 0.5f32 - MARGIN;
+    let place = select(place > 0.0f32, place, 0.0f32);
+    let place = select(place < size, place, size);
+    let whole = u32::cast_from(place);
+    select(f32::cast_from(whole) < place, whole + 1u32, whole)
+}
+
+/// The pixel after the last whose centre lies at or before `high` (NDC).
+#[cube]
+fn end_pixel(high: f32, size: u32) -> u32 {
+    let size = f32::cast_from(size);
+    let place = ((high + 1.0f32) * size + 1.0f32) * 0.5f32 + MARGIN;
+    let place = select(place > 0.0f32, place, 0.0f32);
+    u32::cast_from(select(place < size, place, size))
+}
+
+#[cube]
+fn least(a: f32, b: f32, c: f32) -> f32 {
+    let least = select(a < b, a, b);
+    select(c < least, c, least)
+}
+
+#[cube]
+fn largest(a: f32, b: f32, c: f32) -> f32 {
+    let largest = select(a > b, a, b);
+    select(c > largest, c, largest)
+}
+
+/// Writes corners and reach of every face of every view, one unit each.
+///
+/// `vertices` is `[views, 3, vertices]`; `direction` starts with its derivatives. `corners` becomes
+/// `[views, faces, 6]`, in a pass of second order `[views, faces, 12]` with the derivatives last.
+#[cube(launch)]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn prepare(
+    vertices: &Array<f32>,
+    direction: &Array<f32>,
+    faces: &Array<u32>,
+    corners: &mut Array<f32>,
+    reaches: &mut Array<u32>,
+    first_view: u32,
+    vertex_count: u32,
+    face_count: u32,
+    jobs: u32,
+    size: u32,
+    near: u32,
+    radius: f32,
+    #[comptime] second: bool,
+) {
+    let job = ABSOLUTE_POS;
+    if job >= jobs as usize {
+        terminate!();
+    }
+    let face_count = face_count as usize;
+    let vertex_count = vertex_count as usize;
+    let view = job / face_count + first_view as usize;
+    let face = job % face_count;
+    let origin = 3 * view * vertex_count;
+    let a = origin + faces[3 * face] as usize;
+    let b = origin + faces[3 * face + 1] as usize;
+    let c = origin + faces[3 * face + 2] as usize;
+    let stride = comptime!(if second { 12usize } else { 6usize });
+    let at = stride * job;
+    let (ax, ay, az) = (vertices[a], vertices[a + vertex_count], vertices[a + 2 * vertex_count]);
+    let (bx, by, bz) = (vertices[b], vertices[b + vertex_count], vertices[b + 2 * vertex_count]);
+    let (cx, cy, cz) = (vertices[c], vertices[c + vertex_count], vertices[c + 2 * vertex_count]);
+    corners[at] = ax;
+    corners[at + 1] = ay;
+    corners[at + 2] = bx;
+    corners[at + 3] = by;
+    corners[at + 4] = cx;
+    corners[at + 5] = cy;
+    if second {
+        corners[at + 6] = direction[a];
+        corners[at + 7] = direction[a + vertex_count];
+        corners[at + 8] = direction[b];
+        corners[at + 9] = direction[b + vertex_count];
+        corners[at + 10] = direction[c];
+        corners[at + 11] = direction[c + vertex_count];
+    }
+    let drawn =
+        is_drawn(ax, ay, az, near) && is_drawn(bx, by, bz, near) && is_drawn(cx, cy, cz, near);
+    let left = first_pixel(least(ax, bx, cx) - radius, size);
+    let right = end_pixel(largest(ax, bx, cx) + radius, size);
+    let top = first_pixel(-largest(ay, by, cy) - radius, size);
+    let bottom = end_pixel(-least(ay, by, cy) + radius, size);
+    let seen = drawn && left < right && top < bottom;
+    let hidden = select(drawn, 0u32, 1u32);
+    reaches[4 * job] = select(seen, left, hidden);
+    reaches[4 * job + 1] = select(seen, right, 0u32);
+    reaches[4 * job + 2] = select(seen, top, 0u32);
+    reaches[4 * job + 3] = select(seen, bottom, 0u32);
+}
+
+/// Counts the faces that a view draws, on the image or beside it: one cube a view, `units` each.
+/// The counts follow the reaches, at `[4 * views * faces + view]`.
+#[cube(launch)]
+pub(super) fn count_drawn(reaches: &mut Array<u32>, face_count: u32, #[comptime] units: u32) {
+    let view = CUBE_POS;
+    let first = view * face_count as usize;
+    let mut count = 0u32;
+    let mut face = UNIT_POS;
+    while face < face_count {
+        let at = 4 * (first + face as usize);
+        count += select(reaches[at] <= reaches[at + 1], 1u32, 0u32);
+        face += units;
+    }
+    let mut counts = SharedMemory::<u32>::new(units as usize);
+    counts[UNIT_POS as usize] = count;
+    sync_cube();
+    if UNIT_POS == 0 {
+        let mut total = 0u32;
+        for unit in 0..units as usize {
+            total += counts[unit];
+        }
+        reaches[4 * CUBE_COUNT * face_count as usize + view] = total;
+    }
+}

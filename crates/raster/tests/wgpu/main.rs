@@ -1,0 +1,164 @@
+//! The fused op on the GPU in f32 against f64 on the CPU: image, gradient, second order.
+//!
+//! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
+//! there is none.
+
+#[allow(dead_code)]
+#[path = "../double/common/mod.rs"]
+mod common;
+mod products;
+
+use std::sync::Arc;
+
+use burn::{
+    backend::NdArray,
+    tensor::{DType, Tensor},
+};
+use products::{Path, Products, Scene, tensor};
+use softrast_mesh::{Mesh, fox, icosphere};
+use softrast_raster::{Rasterizer, Wgpu, adapter_name, project};
+use softrast_softness::{EdgeSoftness, Family};
+
+/// Says which adapter the test runs on, or that it does not.
+fn adapter() -> bool {
+    match adapter_name() {
+        Ok(name) => println!("on {name}"),
+        Err(none) => println!("skipped: {none}"),
+    }
+    adapter_name().is_ok()
+}
+
+/// A mesh seen from 2.732 away, at some azimuths in degrees.
+fn seen(mesh: &Mesh, azimuths: &[f64], size: usize, softness: EdgeSoftness, scale: f64) -> Scene {
+    let positions = mesh.positions();
+    let world: Tensor<NdArray<f64>, 3> =
+        tensor(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
+    let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, 17.3, a, 30.0]).collect();
+    let orbits: Tensor<NdArray<f64>, 2> = tensor(&orbits, [azimuths.len(), 4], DType::F64);
+    Scene {
+        vertices: project(world, orbits).into_data().iter().collect(),
+        views: azimuths.len(),
+        faces: mesh.faces().into(),
+        size,
+        softness,
+        scale,
+    }
+}
+
+/// Random triangles, with slivers, and faces beside the image and behind the camera.
+fn random(softness: EdgeSoftness, scale: f64) -> Scene {
+    let (mut vertices, faces) = common::triangles(7, 20);
+    // Far beside the image.
+    for corner in 0..3 {
+        vertices[3 * corner] += 40.0;
+    }
+    // Slivers wide enough for f32 to tell which of their edges is the nearer one.
+    for sliver in vertices.chunks_mut(9).skip(4).step_by(5) {
+        sliver[6] += 0.03;
+        sliver[7] -= 0.02;
+    }
+    Scene { vertices, views: 1, faces, size: 12, softness, scale }
+}
+
+#[test]
+fn a_straight_edge_is_the_softness_itself() {
+    if !adapter() {
+        return;
+    }
+    // The edge x = 0 of a triangle that covers the left half of the image and much beside it.
+    let corners = [0.0, -50.0, 2.0, 0.0, 50.0, 2.0, -50.0, 0.0, 2.0];
+    let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.2), [1], DType::F32);
+    let vertices = tensor::<Wgpu, 3>(&corners, [1, 3, 3], DType::F32);
+    let silhouette = Rasterizer::new(8).prepare(&faces, softness, &phi);
+    let image: Vec<f64> = silhouette.coverage(vertices, phi).into_data().iter().collect();
+    for (pixel, found) in image.into_iter().enumerate() {
+        let x = (2.0 * (pixel % 8) as f64 + 1.0 - 8.0) / 8.0;
+        let expected = 1.0 / (1.0 + (x / 0.2).exp());
+        assert!((found - expected).abs() < 1e-5, "pixel {pixel}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn random_triangles_agree_with_the_reference() {
+    if !adapter() {
+        return;
+    }
+    for family in [Family::Logistic, Family::Exp] {
+        let scene = random(EdgeSoftness { family, squared: false }, 0.05);
+        let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Reference);
+        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+        found.assert_close(&expected, &family.to_string());
+    }
+}
+
+#[test]
+fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
+    if !adapter() {
+        return;
+    }
+    let squared = EdgeSoftness { family: Family::Logistic, squared: true };
+    let sphere = seen(&icosphere(2), &[4.1, 108.3, 211.9], 32, squared, 1e-3);
+    let fox = seen(&fox(), &[171.7], 50, squared, 1e-3);
+    // A tail that is not 0 on the far side.
+    let tail = random(EdgeSoftness { family: Family::Mlp, squared: false }, 0.05);
+    for (name, scene) in [("a sphere", sphere), ("a fox", fox), ("a tail", tail)] {
+        let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
+        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
+        found.assert_close(&expected, name);
+    }
+}
+
+#[test]
+fn more_views_than_a_launch_takes_are_drawn_in_parts() {
+    if !adapter() {
+        return;
+    }
+    // The last views differ from those that any earlier part could have drawn in their place.
+    let views = 65_540;
+    let triangle = |view: usize| {
+        let shift = if view < 65_530 { 0.0 } else { 0.01 * (view - 65_530) as f64 };
+        [[-0.5, -0.4], [0.5, -0.6], [0.1, 0.5]].map(|[x, y]| [x + shift, y + shift, 2.0])
+    };
+    let vertices: Vec<f64> = (0..views).flat_map(triangle).flatten().collect();
+    let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let image = |first: usize, count: usize| -> Vec<f64> {
+        let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.1), [1], DType::F32);
+        let part = &vertices[9 * first..9 * (first + count)];
+        let part = tensor::<Wgpu, 3>(part, [count, 3, 3], DType::F32);
+        let silhouette = Rasterizer::new(1).prepare(&faces, softness, &phi);
+        silhouette.coverage(part, phi).into_data().iter().collect()
+    };
+    assert_eq!(image(0, views)[65_520..], image(65_520, 20));
+}
+
+#[test]
+fn the_same_numbers_come_out_every_time() {
+    if !adapter() {
+        return;
+    }
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let scene = seen(&icosphere(1), &[0.0, 30.0], 24, softness, 0.02);
+    let [first, second] = [(); 2].map(|()| Products::new::<Wgpu>(&scene, DType::F32, Path::Fused));
+    assert_eq!(first, second);
+}
+
+#[test]
+fn broken_vertices_give_finite_numbers() {
+    if !adapter() {
+        return;
+    }
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let mut scene = random(softness, 0.05);
+    let broken = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e30, -1e30];
+    for (face, value) in broken.into_iter().enumerate() {
+        scene.vertices[9 * face + face % 3] = value;
+    }
+    let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+    assert!(found.image.iter().all(|a| (0.0..=1.0).contains(a)), "{:?}", found.image);
+    for numbers in &found.products {
+        assert!(numbers.iter().all(|x| x.is_finite()), "{numbers:?}");
+    }
+}
