@@ -10,12 +10,13 @@ use crate::{
     convergence::Convergence,
     evaluation::Evaluation,
     folder::{self, Folder},
-    interrupt,
+    guidance, interrupt,
     job::{Worker, was_interrupted},
     journal::Journal,
     prepared::Prepared,
     quantity::Quantity,
     report,
+    returned::Returned,
     settings::CommandLine,
     summary::Summary,
     table,
@@ -54,7 +55,13 @@ struct Finished<'a, T> {
 impl<T: Task> Finished<'_, T> {
     fn summary(&self, command: Command, out: PathBuf) -> Summary {
         let Prepared { settings, description, .. } = self.prepared;
-        Summary::new(T::NAME, command, settings, description, self.evaluation, out)
+        let mut summary =
+            Summary::new(T::NAME, command, settings, description, self.evaluation, out);
+        let score = Quantity::score(description, self.prepared.task.score());
+        let runs = &self.evaluation.runs;
+        summary.warnings.extend(guidance::guidance(description, score, runs));
+        summary.returned = Some(Returned::new(description, score, runs));
+        summary
     }
 
     fn convergence(&self) -> Convergence {

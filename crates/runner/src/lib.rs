@@ -9,6 +9,7 @@
 
 mod against;
 mod animation;
+mod best_step;
 mod chart;
 mod command;
 mod control;
@@ -19,6 +20,7 @@ mod error_summary;
 mod evaluation;
 mod folder;
 mod grid;
+mod guidance;
 mod heat_map;
 mod interrupt;
 mod job;
@@ -31,6 +33,7 @@ mod program;
 mod progress;
 mod quantity;
 mod report;
+mod returned;
 mod search;
 mod search_summary;
 mod settings;
@@ -46,12 +49,14 @@ mod task;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
+pub use best_step::best_step;
 pub use error::{Error, Failure};
 pub use grid::Grid;
 pub use memory::peak_rss_mib;
 pub use picture::{contact_sheet, difference, rgb_from_gray, rgb_from_planes};
 pub use program::{execute, main};
 pub use progress::Progress;
+pub use report::{escape, page};
 pub use settings::{Command, Schedule, Settings, SoftnessChoice, Variant};
 pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
 pub use task::{

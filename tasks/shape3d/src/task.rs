@@ -6,7 +6,7 @@ use softrast_method::{Defaults, Method, numbers};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Measure, Point, Progress, Run, Schedule, Score,
-    Settings, Task, Variant,
+    Settings, Task, Variant, best_step,
 };
 use softrast_softness::Softness;
 
@@ -144,12 +144,13 @@ impl Shape3d {
             });
             if let Some(album) = &mut album {
                 let image: Vec<f64> = state.image.iter().collect();
-                album.take(&image, batch.wants_frame(state.step, steps));
+                album.take(&image, state.hard, batch.wants_frame(state.step, steps));
             }
             step_seconds.extend(state.seconds);
             if state.step == 0 { Ok(()) } else { progress.step(state.step, state.loss) }
         })?;
-        let end = curve.last().map_or(f64::INFINITY, |end| end.extra[0]);
+        let end = best_step(&curve, |point| point.extra[0]);
+        let end = end.map_or(f64::INFINITY, |end| end.extra[0]);
         Ok(Run {
             seed,
             success: end < SUCCESS,
