@@ -1,3 +1,4 @@
+mod choose;
 mod evaluate;
 mod search;
 
@@ -22,6 +23,7 @@ use crate::{
     table,
 };
 
+pub(crate) use choose::{choose, resolve};
 pub(crate) use evaluate::evaluate;
 pub(crate) use search::search;
 

@@ -1,4 +1,5 @@
 mod against;
+mod choice;
 mod frame;
 mod search;
 
@@ -14,6 +15,7 @@ use crate::{
     summary::{Summary, short},
 };
 
+pub(crate) use choice::of_choice;
 pub use frame::{escape, page};
 pub(crate) use search::of_search;
 

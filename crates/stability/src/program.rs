@@ -25,6 +25,10 @@ struct Args {
     #[arg(long, value_name = "FILE.json")]
     mlp: Option<PathBuf>,
 
+    /// Methods to test, such as logistic,decay; all six by default.
+    #[arg(long, value_name = "NAME,..", value_delimiter = ',')]
+    methods: Vec<String>,
+
     /// Folder for the results; made if missing.
     #[arg(long, value_name = "DIR", default_value = "out/stability")]
     out: PathBuf,
@@ -91,7 +95,7 @@ fn work(args: &Args) -> anyhow::Result<Matrix> {
     let chosen = chosen(&args.cases)?;
     let refused = || format!("cannot write to the folder {}", args.out.display());
     fs::create_dir_all(&args.out).with_context(refused)?;
-    let methods = Tested::all(args.mlp.clone());
+    let methods = methods(args)?;
     if args.mlp.is_some() {
         // Refused here rather than in every case.
         methods.iter().try_for_each(|method| method.method_at(0.1).map(drop))?;
@@ -106,6 +110,22 @@ fn work(args: &Args) -> anyhow::Result<Matrix> {
     let json = serde_json::to_vec_pretty(&matrix)?;
     fs::write(args.out.join("stability.json"), json).with_context(refused)?;
     Ok(matrix)
+}
+
+/// The methods that `--methods` names.
+fn methods(args: &Args) -> anyhow::Result<Vec<Tested>> {
+    let all = Tested::all(args.mlp.clone());
+    if args.methods.is_empty() {
+        return Ok(all);
+    }
+    let named = |name: &String| {
+        all.iter().find(|tested| tested.name == name).cloned().ok_or_else(|| {
+            let known: Vec<&str> = all.iter().map(|tested| tested.name).collect();
+            Error::Usage(format!("there is no method {name:?}; known are {}", known.join(", ")))
+                .into()
+        })
+    };
+    args.methods.iter().map(named).collect()
 }
 
 /// The cases that `--cases` names.
@@ -132,6 +152,9 @@ pub fn chosen(text: &str) -> Result<Vec<&'static Case>, Error> {
 
 fn again(args: &Args) -> String {
     let mut line = format!("cargo run --release -p stability -- --cases {}", args.cases);
+    if !args.methods.is_empty() {
+        line += &format!(" --methods {}", args.methods.join(","));
+    }
     if let Some(file) = &args.mlp {
         line += &format!(" --mlp {}", file.display());
     }

@@ -101,11 +101,13 @@ fn section(matrix: &Matrix, row: &Row) -> anyhow::Result<String> {
     text += "</dl>\n";
     if !row.guaranteed && row.outcomes.iter().all(has_axis) {
         let svg = chart::svg(row)?;
-        let _ = write!(
-            text,
-            "<figure>\n{svg}\n<figcaption>Share of trials that reach the target over the level, with \
-             its 95 % interval (Wilson).</figcaption>\n</figure>\n"
-        );
+        let caption = match chart::shows_shares(row) {
+            true => {
+                "Share of trials that reach the target over the level, with its 95 % interval (Wilson)."
+            }
+            false => "What is measured over the level; one trial at each.",
+        };
+        let _ = write!(text, "<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>\n");
     }
     let levels = row.outcomes.first().map_or(&[][..], |outcome| &outcome.levels);
     text += "<details>\n<summary>Measured numbers: median (worst), share</summary>\n<table>\n<thead><tr><th>Level</th>";

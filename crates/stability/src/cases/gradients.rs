@@ -3,7 +3,7 @@
 use super::SIZE;
 use crate::{
     Case, Level, Promise, Tested, Trial,
-    drawn::{Drawing, Exact, Single},
+    drawn::{Drawing, Exact, Single, largest, weights},
     flat::Flat,
 };
 
@@ -87,55 +87,54 @@ pub(super) const CASES: &[Case] = &[
     },
 ];
 
-/// Gradient of the sum of all pixels by moving the side of a half-plane outwards: the side goes
-/// through `offset` on the axis that is turned by `angle` from x.
-fn pushed(
-    tested: &Tested,
-    scale: f64,
-    size: usize,
-    offset: f64,
-    angle: f64,
-) -> anyhow::Result<f64> {
-    let method = tested.method_at(scale)?;
+/// Width and height of images of half-planes.
+const FINE: usize = 32;
+/// Width of their pixels in NDC.
+const PIXEL: f64 = 2.0 / FINE as f64;
+
+/// The half-plane left of a line through `offset` on the axis that is turned by `angle` from x: only
+/// this one of the triangle's sides is in view.
+fn half_plane(offset: f64, angle: f64) -> Flat {
     let (sin, cos) = angle.sin_cos();
     let place = |x: f64, y: f64| [cos * x - sin * y, sin * x + cos * y];
-    // Only this one of its sides is in view.
-    let flat = Flat::triangle([place(-60.0, 0.0), place(offset, 40.0), place(offset, -40.0)]);
-    let drawn = Drawing::new(&method, &flat, size).weighed::<Exact>(&vec![1.0; size * size]);
-    let g = &drawn.gradient;
-    Ok([1, 2].into_iter().map(|k| g[3 * k] * cos + g[3 * k + 1] * sin).sum())
+    Flat::triangle([place(-60.0, 0.0), place(offset, 40.0), place(offset, -40.0)])
+}
+
+/// Gradients of the sum of all pixels by moving each of these lines, an offset and an angle, to its
+/// right.
+fn pushed(tested: &Tested, scale: f64, lines: &[[f64; 2]]) -> anyhow::Result<Vec<f64>> {
+    let method = tested.method_at(scale)?;
+    let painter = Drawing::new(&method, &half_plane(0.0, 0.0), FINE).painter::<Exact>();
+    let pushed = |&[offset, angle]: &[f64; 2]| {
+        let (sin, cos) = angle.sin_cos();
+        let g = painter.draw(&half_plane(offset, angle), &[1.0; FINE * FINE]).gradient;
+        [1, 2].into_iter().map(|k| g[3 * k] * cos + g[3 * k + 1] * sin).sum()
+    };
+    Ok(lines.iter().map(pushed).collect())
 }
 
 const PIXELS: [f64; 6] = [0.05, 0.1, 0.25, 0.4, 0.5, 1.0];
 
 fn upright(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    const FINE: usize = 32;
-    let pixel = 2.0 / FINE as f64;
+    let lines: Vec<[f64; 2]> = (0..16).map(|k| [0.1 + f64::from(k) / 16.0 * PIXEL, 0.0]).collect();
     let level = |scale: f64| {
-        let found = (0..16)
-            .map(|k| pushed(tested, scale * pixel, FINE, 0.1 + f64::from(k) / 16.0 * pixel, 0.0));
-        let found = found.collect::<anyhow::Result<Vec<_>>>()?;
+        let found = pushed(tested, scale * PIXEL, &lines)?;
         let mean = found.iter().sum::<f64>() / found.len() as f64;
-        let most = found.iter().map(|g| (g / mean - 1.0).abs()).fold(0.0, f64::max);
+        let most = largest(found.iter().map(|g| g / mean - 1.0));
         Ok(Level::new(scale, vec![Trial::at_most(most, 0.2).with(&found)]))
     };
     PIXELS.map(level).into_iter().collect()
 }
 
 fn turned(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    const FINE: usize = 32;
-    let pixel = 2.0 / FINE as f64;
+    let angle = |k: u32| (2.5 + 5.0 * f64::from(k / 8)).to_radians();
+    let lines = (0..80).map(|k| [f64::from(k % 8) / 8.0 * PIXEL, angle(k)]);
+    let lines: Vec<[f64; 2]> = lines.collect();
     let level = |scale: f64| {
-        let mut found = Vec::new();
-        for degrees in 0..10 {
-            let angle = (2.5 + 5.0 * f64::from(degrees)).to_radians();
-            for offset in 0..8 {
-                let offset = f64::from(offset) / 8.0 * pixel;
-                let gradient = pushed(tested, scale * pixel, FINE, offset, angle)?;
-                // As much of the side as the image shows.
-                found.push(gradient * angle.cos().max(angle.sin()));
-            }
-        }
+        let mut found = pushed(tested, scale * PIXEL, &lines)?;
+        // As much of the line as the image shows.
+        let seen = lines.iter().map(|[_, angle]| angle.cos().max(angle.sin()));
+        found.iter_mut().zip(seen).for_each(|(g, seen)| *g *= seen);
         let n = found.len() as f64;
         let mean = found.iter().sum::<f64>() / n;
         let spread = (found.iter().map(|g| (g / mean - 1.0).powi(2)).sum::<f64>() / n).sqrt();
@@ -149,7 +148,7 @@ fn sizes(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let flat = Flat::plain();
     let gradient = |size: usize| {
         let share = 1.0 / (size * size) as f64;
-        Drawing::new(&method, &flat, size).weighed::<Exact>(&vec![share; size * size])
+        Drawing::new(&method, &flat, size).painter::<Exact>().draw(&flat, &vec![share; size * size])
     };
     let full = gradient(256);
     let level = |size: usize| {
@@ -177,13 +176,14 @@ fn against_all_pairs(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 fn against_differences(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     const STEP: f64 = 1e-6;
     let method = tested.method_at(0.1)?;
+    let painter = Drawing::new(&method, &Flat::plain(), SIZE).painter::<Exact>();
+    let weights = weights(SIZE);
     let level = |seed: u64| {
         let flat = Flat::random(seed, 1);
-        let drawn = Drawing::new(&method, &flat, SIZE).fused::<Exact>();
+        let drawn = painter.draw(&flat, &weights);
         let weighed = |flat: &Flat| {
-            let mut random = crate::flat::Random::new(17);
-            let image = Drawing::new(&method, flat, SIZE).fused::<Exact>().image;
-            image.iter().map(|a| a * random.within(1.0)).sum::<f64>()
+            let image = painter.draw(flat, &weights).image;
+            image.iter().zip(&weights).map(|(a, w)| a * w).sum::<f64>()
         };
         let mut off = Vec::new();
         for k in 0..6 {
@@ -214,7 +214,6 @@ fn ends(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 }
 
 fn dead(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    const FINE: usize = 32;
     let mut flat = Flat::random(14, 60);
     flat.corners.chunks_mut(3).for_each(|face| {
         let centre = [0, 1].map(|k| face.iter().map(|p| p[k]).sum::<f64>() / 3.0);
