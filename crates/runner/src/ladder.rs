@@ -3,7 +3,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Batch, Schedule, Settings, SoftnessChoice, Task, best_step,
+    Batch, Error, Schedule, Settings, SoftnessChoice, Task, best_step,
     job::{Part, Worker, first_not_finite, solve},
     mean,
     prepared::Prepared,
@@ -61,8 +61,8 @@ pub(crate) fn with(settings: &Settings, softness: &'static str, schedule: Schedu
     }
 }
 
-/// Tries the methods of the ladder on `seeds`, for as long as `budget` seconds last; the first one
-/// always, and whether all were tried.
+/// Tries the methods of the ladder on `seeds`, for as long as `budget` seconds last, but the first
+/// one always; says whether all were tried that the task knows.
 ///
 /// # Errors
 ///
@@ -81,10 +81,19 @@ pub(crate) fn climb<T: Task>(
         if !rungs.is_empty() && budget.is_some_and(|budget| next > budget) {
             return Ok((rungs, false));
         }
-        let prepared = Prepared::<T>::new(with(settings, softness, schedule), args)?;
+        let prepared = match Prepared::<T>::new(with(settings, softness, schedule), args) {
+            Ok(prepared) => prepared,
+            // A task need not know every family.
+            Err(error) if !rungs.is_empty() && is_usage(&error) => continue,
+            Err(error) => return Err(error),
+        };
         rungs.push(rung(&prepared, softness, schedule, seeds, worker)?);
     }
     Ok((rungs, true))
+}
+
+fn is_usage(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(Error::Usage(_)))
 }
 
 /// Steps of all runs of the ladder.

@@ -66,7 +66,7 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "G06",
         name: "gradient from 1e-12 to 1e3",
-        quick: true,
+        quick: false,
         promise: Promise::Guaranteed,
         scene: "12 triangles in f32",
         perturbation: "softness from 1e-12 to 1e3 NDC",

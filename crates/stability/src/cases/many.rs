@@ -83,7 +83,7 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: "F20",
         name: "image sizes",
-        quick: true,
+        quick: false,
         promise: Promise::Guaranteed,
         scene: "a triangle, softness 0.1 NDC",
         perturbation: "image of 8 to 1024 pixels a side",

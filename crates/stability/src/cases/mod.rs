@@ -10,7 +10,7 @@ mod numbers;
 mod poses;
 mod shapes;
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use clap::Parser;
 use softrast_method::{Defaults, Method};
@@ -18,7 +18,7 @@ use softrast_runner::{Schedule, Settings};
 
 use crate::{
     Case, Level, Tested, Trial,
-    drawn::{Drawing, Exact, Single},
+    drawn::{Drawing, Exact, Painter, Single, weights},
     flat::Flat,
 };
 
@@ -50,14 +50,35 @@ fn against_dense<L: Into<String>>(
     scenes: impl IntoIterator<Item = (L, Flat)>,
 ) -> anyhow::Result<Vec<Level>> {
     let method = tested.method_at(SCALE)?;
-    let level = |(label, flat): (L, Flat)| {
+    let weights = weights(SIZE);
+    let mut painters: Option<Painters> = None;
+    let mut levels = Vec::new();
+    for (label, flat) in scenes {
         let drawing = Drawing::new(&method, &flat, SIZE);
-        let (exact, single) = (drawing.fused::<Exact>(), drawing.fused::<Single>());
+        // To choose the knots costs more than an image.
+        let kept = painters.take().filter(|kept| kept.faces == flat.faces);
+        let kept = painters.insert(kept.unwrap_or_else(|| Painters::new(&drawing)));
+        let exact = kept.exact.draw(&flat, &weights);
+        let single = kept.single.draw(&flat, &weights);
         let off = exact.off(&drawing.dense());
         let trial = Trial::at_most(off, 1e-5).with(&exact.all()).with(&single.all());
-        Level::named(label, vec![trial])
-    };
-    Ok(scenes.into_iter().map(level).collect())
+        levels.push(Level::named(label, vec![trial]));
+    }
+    Ok(levels)
+}
+
+/// What draws some faces in both float types.
+struct Painters {
+    faces: Arc<[[u32; 3]]>,
+    exact: Painter<Exact>,
+    single: Painter<Single>,
+}
+
+impl Painters {
+    fn new(drawing: &Drawing) -> Self {
+        let faces = drawing.flat.faces.clone();
+        Self { faces, exact: drawing.painter(), single: drawing.painter() }
+    }
 }
 
 /// The method of a softness file.
