@@ -14,10 +14,10 @@ const ABOUT: &str = "Where each softness fails: every method on scenes that brea
 /// If a chart cannot be drawn.
 pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
     let mut body = String::from(STYLE);
-    let _ = write!(
+    let _ = writeln!(
         body,
         "<p>{} cases, {} methods, {} trials in {:.0} s. Trials with a number that is not finite: \
-         {}. Faults of the program: {}.</p>\n",
+         {}. Faults of the program: {}.</p>",
         matrix.rows.len(),
         matrix.methods.len(),
         matrix.trials,
@@ -107,7 +107,7 @@ fn section(matrix: &Matrix, row: &Row) -> anyhow::Result<String> {
             }
             false => "What is measured over the level; one trial at each.",
         };
-        let _ = write!(text, "<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>\n");
+        let _ = writeln!(text, "<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>");
     }
     let levels = row.outcomes.first().map_or(&[][..], |outcome| &outcome.levels);
     text += "<details>\n<summary>Measured numbers: median (worst), share</summary>\n<table>\n<thead><tr><th>Level</th>";
@@ -118,7 +118,7 @@ fn section(matrix: &Matrix, row: &Row) -> anyhow::Result<String> {
     for (k, level) in levels.iter().enumerate() {
         let _ = write!(text, "<tr><td>{}</td>", escape(&level.label));
         for outcome in &row.outcomes {
-            let says = outcome.levels.get(k).map_or(String::new(), numbers);
+            let says = outcome.levels.get(k).map(numbers).unwrap_or_default();
             let _ = write!(text, "<td>{says}</td>");
         }
         text += "</tr>\n";

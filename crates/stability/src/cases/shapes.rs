@@ -191,7 +191,7 @@ fn rates(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 
 fn scales(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let level = |scale: f64| {
-        let flags = format!("--size 32 --steps 40 --triangles 80 --learning-rate 0.03");
+        let flags = "--size 32 --steps 40 --triangles 80 --learning-rate 0.03";
         Ok(Level::new(scale, shape(tested, &format!("{flags} {}", tested.at(scale)), 1, 0.1)?))
     };
     [1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3].map(level).into_iter().collect()
