@@ -69,6 +69,7 @@ fn step(scene: &Scene) -> Measured {
         alpha: image.inner().to_data().iter().collect(),
         loss,
         pairs: scene.views() * scene.size * scene.size * scene.faces.len(),
+        culled: None,
         forward_ms,
         backward_ms: Some(backward_ms),
         total_ms: forward_ms + if loss.is_some() { backward_ms } else { 0.0 },

@@ -29,10 +29,12 @@ pub(crate) fn measure(scene: &Scene, repeat: usize) -> Measured {
         })
         .collect();
     let times = |of: fn(&Step) -> f64| median(&steps.iter().map(of).collect::<Vec<_>>());
+    let pairs = fused.pairs(&fused.silhouette);
     Measured {
         alpha: last.image.to_data().iter().collect(),
         loss: last.loss,
-        pairs: fused.silhouette.pairs(project(fused.vertices.clone(), fused.orbits.clone())),
+        pairs,
+        culled: Some(fused.culled(scene, pairs)),
         forward_ms: times(|step| step.forward_ms),
         backward_ms: last.loss.map(|_| times(|step| step.backward_ms)),
         total_ms: times(|step| step.forward_ms + step.backward_ms),
@@ -76,6 +78,20 @@ impl Fused {
             orbits: scene.orbits(DType::F32),
             target: scene.target(DType::F32),
         }
+    }
+
+    /// Pairs that one pass visits.
+    fn pairs(&self, silhouette: &Silhouette<EdgeSoftness>) -> usize {
+        silhouette.pairs(project(self.vertices.clone(), self.orbits.clone()))
+    }
+
+    /// Share of the pairs which the default tolerance keeps that are not among these `pairs`.
+    fn culled(&self, scene: &Scene, pairs: usize) -> f64 {
+        let &Scene { size, t_conorm, .. } = scene;
+        let rasterizer = Rasterizer { t_conorm, ..Rasterizer::new(size) };
+        let phi = scene.phi::<B>(DType::F32);
+        let kept = self.pairs(&rasterizer.prepare(&scene.faces, scene.softness, &phi));
+        kept.saturating_sub(pairs) as f64 / kept.max(1) as f64
     }
 
     fn knots(&self) -> Knots {

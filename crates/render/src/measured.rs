@@ -7,6 +7,9 @@ pub(crate) struct Measured {
     pub(crate) loss: Option<[f64; 2]>,
     /// Pixel-face pairs that each pass visits.
     pub(crate) pairs: usize,
+    /// Share of the pairs which the default tolerance keeps that this one culls; `None` for the
+    /// reference, which culls none.
+    pub(crate) culled: Option<f64>,
     /// From world vertices to coverage.
     pub(crate) forward_ms: f64,
     /// From coverage to the loss and its gradient to the world vertices.

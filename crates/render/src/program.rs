@@ -50,6 +50,9 @@ pub fn execute(
         Err(wrong) => return Err(wrong.into()),
     };
     let report = work(&args)?;
+    if let Some(warning) = report.warning() {
+        eprintln!("warning: {warning}");
+    }
     let shown = match args.json {
         true => serde_json::to_string(&report).context("cannot write the results as JSON")?,
         false => report.text(),

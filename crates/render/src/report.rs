@@ -1,4 +1,5 @@
 use serde::Serialize;
+use softrast_raster::Rasterizer;
 use softrast_runner::peak_rss_mib;
 
 use crate::{args::Args, measured::Measured, scene::Scene};
@@ -19,6 +20,8 @@ pub(crate) struct Report {
     threads: usize,
     repeat: usize,
     pairs: usize,
+    /// Share of the pairs which the default tolerance keeps that are left out.
+    culled_by_tolerance: Option<f64>,
     mean_alpha: f64,
     loss: Option<f64>,
     gradient_norm: Option<f64>,
@@ -60,6 +63,7 @@ impl Report {
             threads: rayon::current_num_threads(),
             repeat: setting.repeat,
             pairs,
+            culled_by_tolerance: measured.culled,
             mean_alpha: measured.alpha.iter().sum::<f64>() / measured.alpha.len() as f64,
             loss: measured.loss.map(|[loss, _]| loss),
             gradient_norm: measured.loss.map(|[_, norm]| norm),
@@ -73,6 +77,21 @@ impl Report {
             support_ndc: profile.map(|knots| knots.support_ndc),
             out: args.out.display().to_string(),
         }
+    }
+
+    /// That the tolerance leaves out most of what counts, if it does.
+    ///
+    /// Pairs that the default tolerance keeps still pull on their face: without them, gradients are
+    /// off by as much.
+    pub(crate) fn warning(&self) -> Option<String> {
+        let culled = self.culled_by_tolerance.filter(|&culled| culled > 0.5)?;
+        Some(format!(
+            "--tolerance {} culls {:.0} % of the pairs that the default {:e} keeps: faces get no gradient \
+             from pixels that they still cover a little; try a smaller one",
+            self.tolerance,
+            100.0 * culled,
+            Rasterizer::TOLERANCE
+        ))
     }
 
     /// A table for people.

@@ -69,6 +69,21 @@ fn a_picture_is_its_own_target() {
 }
 
 #[test]
+fn a_tolerance_that_culls_most_of_what_counts_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = mesh(folder.path());
+    let out = folder.path().join("sphere.png");
+    let culled = |tolerance: &str| {
+        let words = ["--size", "32", "--scale", "0.05", "--json", "--out", out.to_str().unwrap()];
+        let words = [&[&mesh, "--tolerance", tolerance], &words[..]].concat();
+        json(&words)["culled_by_tolerance"].as_f64().unwrap()
+    };
+    assert_eq!(culled("1e-5"), 0.0);
+    assert_eq!(culled("1e-7"), 0.0);
+    assert!(culled("0.9") > 0.5);
+}
+
+#[test]
 fn bad_input_is_one_line_and_leaves_no_picture() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = mesh(folder.path());

@@ -1,3 +1,4 @@
+mod choose;
 mod evaluate;
 mod learn;
 mod search;
@@ -11,17 +12,19 @@ use crate::{
     convergence::Convergence,
     evaluation::Evaluation,
     folder::{self, Folder},
-    interrupt,
+    guidance, interrupt,
     job::{Worker, was_interrupted},
     journal::Journal,
     prepared::Prepared,
     quantity::Quantity,
     report,
+    returned::Returned,
     settings::CommandLine,
     summary::Summary,
     table,
 };
 
+pub(crate) use choose::{choose, resolve};
 pub(crate) use evaluate::evaluate;
 pub(crate) use learn::learn;
 pub(crate) use search::search;
@@ -56,7 +59,13 @@ struct Finished<'a, T> {
 impl<T: Task> Finished<'_, T> {
     fn summary(&self, command: Command, out: PathBuf) -> Summary {
         let Prepared { settings, description, .. } = self.prepared;
-        Summary::new(T::NAME, command, settings, description, self.evaluation, out)
+        let mut summary =
+            Summary::new(T::NAME, command, settings, description, self.evaluation, out);
+        let score = Quantity::score(description, self.prepared.task.score());
+        let runs = &self.evaluation.runs;
+        summary.warnings.extend(guidance::guidance(description, score, runs));
+        summary.returned = Some(Returned::new(description, score, runs));
+        summary
     }
 
     fn convergence(&self) -> Convergence {

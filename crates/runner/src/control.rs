@@ -9,7 +9,7 @@ use crate::{
 /// Flags that say how to work, not what on: the task does not see them.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Control {
-    /// Go on from what an interrupted `evaluate`, `search` or `learn` has finished.
+    /// Go on from what an interrupted `evaluate`, `search`, `choose` or `learn` has finished.
     #[arg(long)]
     pub(crate) resume: bool,
 
@@ -18,10 +18,14 @@ pub(crate) struct Control {
     #[arg(long, value_name = "NAME|FILE.json", value_parser = rival)]
     pub(crate) against: Option<Rival>,
 
-    /// Training seeds, counted from 1000000, that `search` tries every setting on [default: 8, or
-    /// what the task says].
+    /// Training seeds, counted from 1000000, that `search` and `choose` try every setting on [default:
+    /// 8, or what the task says].
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub(crate) search_runs: Option<usize>,
+
+    /// Seconds that `choose`, or `--softness auto`, may take; no limit by default.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub(crate) budget: Option<f64>,
 
     /// Scales that `search` tries; each pair of a wider and a narrower one is a decay.
     #[arg(long, value_name = "X,X...", value_delimiter = ',', value_parser = positive)]
@@ -82,9 +86,14 @@ impl Control {
     /// [`Error::Usage`] that names the flag.
     pub(crate) fn check(&self, command: Command) -> Result<(), Error> {
         let given = [
-            (self.resume, "--resume", &[Command::Evaluate, Command::Search, Command::Learn][..]),
+            (
+                self.resume,
+                "--resume",
+                &[Command::Evaluate, Command::Search, Command::Choose, Command::Learn][..],
+            ),
             (self.against.is_some(), "--against", &[Command::Evaluate]),
-            (self.search_runs.is_some(), "--search-runs", &[Command::Search]),
+            (self.search_runs.is_some(), "--search-runs", &[Command::Search, Command::Choose]),
+            (self.budget.is_some(), "--budget", &[Command::Choose, Command::Solve]),
             (!self.scales.is_empty(), "--scales", &[Command::Search]),
             (!self.learning_rates.is_empty(), "--learning-rates", &[Command::Search]),
         ];

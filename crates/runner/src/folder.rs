@@ -15,6 +15,7 @@ pub(crate) const ANIMATION: &str = "animation.gif";
 pub(crate) const REPORT: &str = "report.html";
 pub(crate) const CONVERGENCE: &str = "convergence.csv";
 pub(crate) const AGAINST_CURVE: &str = "against_curve.csv";
+pub(crate) const CHOICE: &str = "choose.json";
 pub(crate) const SEARCH: &str = "search.json";
 pub(crate) const CELLS: &str = "search.csv";
 

@@ -9,7 +9,9 @@
 
 mod against;
 mod animation;
+mod best_step;
 mod chart;
+mod choice;
 mod command;
 mod control;
 mod convergence;
@@ -20,11 +22,13 @@ mod evaluation;
 mod figure;
 mod folder;
 mod grid;
+mod guidance;
 mod heat_map;
 mod interrupt;
 mod job;
 mod journal;
 mod label;
+mod ladder;
 mod memory;
 mod picture;
 mod plan;
@@ -33,6 +37,7 @@ mod program;
 mod progress;
 mod quantity;
 mod report;
+mod returned;
 mod search;
 mod search_summary;
 mod settings;
@@ -49,6 +54,7 @@ mod task;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
+pub use best_step::best_step;
 pub use error::{Error, Failure};
 pub use grid::{Grid, OwnAxis};
 pub use memory::peak_rss_mib;
@@ -56,6 +62,7 @@ pub use picture::{contact_sheet, difference, rgb_from_gray, rgb_from_planes};
 pub use plan::{Judged, Order, Plan, Referee};
 pub use program::{execute, main};
 pub use progress::Progress;
+pub use report::{escape, page};
 pub use settings::{Command, Schedule, Settings, SoftnessChoice, Variant};
 pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
 pub use study::{Curve, Figure, Learned, OuterStep, Study};

@@ -49,10 +49,14 @@ pub fn execute<T: Task>(
     line.control.check(line.command).map_err(anyhow::Error::from)?;
     line.learning.check(line.command).map_err(anyhow::Error::from)?;
     let again = repeat::<T>(&words);
+    if let Some(says) = command::resolve::<T>(&mut line)? {
+        eprintln!("{says}");
+    }
     let results = match line.command {
         Command::Solve | Command::Evaluate => command::evaluate::<T>(&line, &again)?,
         Command::Search => command::search::<T>(&line, &again)?,
         Command::Learn => command::learn::<T>(&line, &again)?,
+        Command::Choose => command::choose::<T>(&line, &again)?,
     };
     for warning in &results.warnings {
         eprintln!("warning: {warning}");

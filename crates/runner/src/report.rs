@@ -1,4 +1,5 @@
 mod against;
+mod choice;
 mod frame;
 mod learn;
 mod search;
@@ -15,7 +16,8 @@ use crate::{
     summary::{Summary, short},
 };
 
-use frame::{escape, frame};
+pub(crate) use choice::of_choice;
+pub use frame::{escape, page};
 pub(crate) use learn::of_learning;
 pub(crate) use search::of_search;
 
@@ -55,7 +57,7 @@ pub(crate) fn html(
 that the image changes smoothly with the scene; its scale is the width of that step.</p>
 "
     );
-    frame(summary.task, about, &body, command, &beside(summary))
+    page(summary.task, about, &body, command, &beside(summary))
 }
 
 /// What the other files hold.
@@ -87,8 +89,8 @@ fn figures(summary: &Summary, pictures: &Encoded) -> String {
         "<h2>Pictures</h2>
 <figure>
 <img alt=\"Target, start, result and their difference\" src=\"data:image/png;base64,{row}\">
-<figcaption>From left to right: the target, the image before the first step, the image after the
-last step, and the difference of target and result: red where the target is brighter, blue where
+<figcaption>From left to right: the target, the image before the first step, the image of the
+step that is returned, and the difference of target and result: red where the target is brighter, blue where
 the result is brighter, white where they agree.{which}</figcaption>
 </figure>
 <figure>
@@ -139,11 +141,18 @@ fn results(summary: &Summary) -> String {
     }
     let _ = write!(
         text,
-        "</tbody>\n</table>\n<p><strong>Success:</strong> {}.</p>\n<p class=\"note\">{}</p>\n",
+        "</tbody>\n</table>\n{}<p><strong>Success:</strong> {}.</p>\n<p class=\"note\">{}</p>\n",
+        returned(summary),
         escape(&summary.success()),
         results_note(summary),
     );
     text
+}
+
+/// Which step the result is.
+fn returned(summary: &Summary) -> String {
+    let says = |says: String| format!("<p><strong>Returned:</strong> {}.</p>\n", escape(&says));
+    summary.returned.as_ref().map(|returned| says(returned.says())).unwrap_or_default()
 }
 
 fn results_note(summary: &Summary) -> String {

@@ -32,6 +32,8 @@ pub enum Command {
     Search,
     /// Learn the softness on training seeds, by the gradient of what a whole run ends with.
     Learn,
+    /// Find the least complex method that is as good as the best, on training seeds.
+    Choose,
 }
 
 impl Command {
@@ -42,6 +44,7 @@ impl Command {
             Command::Evaluate => "evaluate",
             Command::Search => "search",
             Command::Learn => "learn",
+            Command::Choose => "choose",
         }
     }
 }
@@ -61,7 +64,8 @@ pub struct Settings {
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,
 
-    /// Softness: logistic, gauss, exp, gamma, mlp, or a softness file in JSON.
+    /// Softness: logistic, gauss, exp, gamma, mlp, a softness file in JSON, or auto for what `choose`
+    /// finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
 
@@ -154,6 +158,9 @@ pub enum SoftnessChoice {
 impl SoftnessChoice {
     /// The names that the command line knows.
     pub const NAMES: [&'static str; 5] = ["logistic", "gauss", "exp", "gamma", "mlp"];
+
+    /// Stands for the method that `choose` finds; a task never sees it.
+    pub(crate) const AUTO: Self = Self::Named("auto");
 }
 
 impl Settings {
@@ -183,6 +190,9 @@ impl Settings {
 }
 
 pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
+    if text == "auto" {
+        return Ok(SoftnessChoice::AUTO);
+    }
     if let Some(name) = SoftnessChoice::NAMES.into_iter().find(|&name| name == text) {
         return Ok(SoftnessChoice::Named(name));
     }
@@ -190,7 +200,7 @@ pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
         return Ok(SoftnessChoice::File(text.into()));
     }
     Err(format!(
-        "expected one of {} or a file that ends in .json",
+        "expected one of {}, auto or a file that ends in .json",
         SoftnessChoice::NAMES.join(", ")
     ))
 }

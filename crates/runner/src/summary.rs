@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::{
     Command, Description, ErrorGroup, Run, Settings, against::Against, error_summary::ErrorSummary,
-    evaluation::Evaluation, folder, median, peak_rss_mib, search_summary::SearchSummary,
-    wilson_interval,
+    evaluation::Evaluation, folder, median, peak_rss_mib, returned::Returned,
+    search_summary::SearchSummary, wilson_interval,
 };
 
 /// What a program found out, as it stands in `result.json`.
@@ -24,6 +24,9 @@ pub(crate) struct Summary {
     pub(crate) faces: usize,
     pub(crate) image_error: ErrorSummary,
     pub(crate) parameter_error: ErrorSummary,
+    /// Which step of each run is returned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) returned: Option<Returned>,
     pub(crate) success_rate: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) success_ci95: Option<[f64; 2]>,
@@ -88,6 +91,7 @@ impl Summary {
             faces: description.faces,
             image_error: error(ErrorGroup::Image),
             parameter_error: error(ErrorGroup::Parameter),
+            returned: None,
             success_rate: successes as f64 / runs.len() as f64,
             success_ci95: many.then(|| wilson_interval(successes, runs.len())),
             success_means: description.success.clone(),
@@ -139,6 +143,7 @@ impl Summary {
                 error.name
             ));
         }
+        lines.extend(self.returned.iter().map(|r| format!("  {:<22} {}", "returned", r.says())));
         lines.push(format!("  {:<22} {}", "success", self.success()));
         let memory = self.peak_memory_mib.map(|mib| format!(", peak memory {mib:.0} MiB"));
         lines.push(format!(

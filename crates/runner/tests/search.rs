@@ -104,3 +104,27 @@ fn another_command_in_the_folder_keeps_the_search() {
     assert_eq!(file(out.path(), "search.json"), before);
     assert!(!out.path().join("convergence.csv").exists());
 }
+
+#[test]
+fn the_least_complex_method_is_chosen_where_it_is_enough() {
+    // The parabola knows the logistic alone; the others are passed over.
+    let (out, json) = solved::<Parabola>("choose --size 16 --steps 3 --search-runs 3");
+    assert_eq!(json["flags"], "--softness logistic --schedule static");
+    let reasons = json["choice"]["reasons"].as_array().unwrap();
+    assert_eq!((reasons.len(), &reasons[0]["verdict"]), (2, &"chosen".into()));
+    assert_eq!(numbers(&reasons[0]["errors"]).len(), 3);
+    assert_eq!(file(out.path(), "choose.json")["choice"], json["choice"]);
+    let page = fs::read_to_string(out.path().join("report.html")).unwrap();
+    assert!(page.contains("--softness logistic --schedule static"), "{page}");
+}
+
+#[test]
+fn auto_solves_with_what_is_chosen_and_returns_the_best_step() {
+    let line = "--size 16 --steps 3 --learning-rate 0.6";
+    let (_out, auto) = solved::<Parabola>(&format!("{line} --softness auto"));
+    let (_out, plain) = solved::<Parabola>(line);
+    assert_eq!(auto["image_error"], plain["image_error"]);
+    let returned = &plain["returned"];
+    assert_eq!((&returned["by"], &returned["of"]), (&"IoU loss".into(), &3.into()));
+    assert_eq!(returned["error"], plain["image_error"]["best"]);
+}

@@ -8,6 +8,8 @@ pub(crate) struct Album {
     result: RgbImage,
     frames: Vec<RgbImage>,
     size: usize,
+    /// Least hard loss so far.
+    least: f64,
 }
 
 impl Album {
@@ -15,18 +17,21 @@ impl Album {
     pub(crate) fn new(target: &[f64], size: usize) -> Self {
         let target = rgb_from_planes(target, size, size);
         let [start, result] = [(); 2].map(|()| target.clone());
-        Self { target, start, result, frames: Vec::new(), size }
+        Self { target, start, result, frames: Vec::new(), size, least: f64::INFINITY }
     }
 
-    /// Takes the soft image `image` `[3 * size * size]` after `step`, the latest as the result, and
-    /// also as a frame of the animation if so asked.
-    pub(crate) fn take(&mut self, image: &[f64], step: usize, frame: bool) {
-        self.result = rgb_from_planes(image, self.size, self.size);
+    /// Takes the soft image `image` `[3 * size * size]` after `step`, as the result if no step before
+    /// had a lower loss `hard` of the hard one, and as a frame of the animation if so asked.
+    pub(crate) fn take(&mut self, image: &[f64], step: usize, hard: f64, frame: bool) {
+        let now = rgb_from_planes(image, self.size, self.size);
         if step == 0 {
-            self.start = self.result.clone();
+            self.start = now.clone();
         }
         if frame {
-            self.frames.push(self.result.clone());
+            self.frames.push(now.clone());
+        }
+        if hard <= self.least {
+            (self.result, self.least) = (now, hard);
         }
     }
 

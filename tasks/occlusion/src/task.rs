@@ -135,6 +135,8 @@ impl Task for Occlusion {
         let targets = numbers(scene.target().inner());
         let mut album = Album::new(&targets[..values], size);
         let mut curves = vec![Vec::with_capacity(steps + 1); instances.len()];
+        // Where the hard image of each view is best: that is what is returned.
+        let mut best = vec![(f64::INFINITY, Vec::new()); instances.len()];
         let mut ends = Vec::new();
         let mut step_seconds = Vec::with_capacity(steps);
         self.solver.run(&scene, |state: State| {
@@ -143,11 +145,17 @@ impl Task for Occlusion {
             }
             if batch.pictures {
                 let image: Vec<f64> = state.image.iter().take(values).collect();
-                album.take(&image, state.step, batch.wants_frame(state.step, steps));
+                let frame = batch.wants_frame(state.step, steps);
+                album.take(&image, state.step, state.hard[0], frame);
             }
             step_seconds.extend(state.seconds);
             let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
             let step = state.step;
+            for ((best, depths), &hard) in best.iter_mut().zip(&state.depths).zip(&state.hard) {
+                if hard <= best.0 || best.1.is_empty() {
+                    *best = (hard, depths.clone());
+                }
+            }
             ends = state.depths;
             if step == 0 { Ok(()) } else { progress.step(step, loss) }
         })?;
@@ -155,7 +163,7 @@ impl Task for Occlusion {
         let mut pictures = batch.pictures.then(|| album.pictures());
         let runs = batch.seeds.iter().zip(curves).enumerate().map(|(view, (&seed, curve))| Run {
             seed,
-            success: self.is_success(&DepthError::new(&ends[view], &instances[view].target)),
+            success: self.is_success(&DepthError::new(&best[view].1, &instances[view].target)),
             warnings: self.warnings(seed, &instances[view], &ends[view]),
             curve,
             step_seconds: step_seconds.clone(),

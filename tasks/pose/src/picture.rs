@@ -15,21 +15,26 @@ pub(crate) struct Album {
     result: Vec<f64>,
     frames: Vec<RgbImage>,
     size: usize,
+    /// Least hard loss so far.
+    least: f64,
 }
 
 impl Album {
     /// An empty album of an instance whose hard target is `target` `[size * size]`.
     pub(crate) fn new(target: Vec<f64>, size: usize) -> Self {
-        Self { target, start: Vec::new(), result: Vec::new(), frames: Vec::new(), size }
+        let (start, result) = (Vec::new(), Vec::new());
+        Self { target, start, result, frames: Vec::new(), size, least: f64::INFINITY }
     }
 
-    /// Takes the soft silhouette `image` `[size * size]` after a step, the latest as the result, and
-    /// also as a frame of the animation if so asked.
-    pub(crate) fn take(&mut self, image: &[f64], frame: bool) {
+    /// Takes the soft silhouette `image` `[size * size]` after a step, as the result if no step before
+    /// had a lower loss `hard` of the hard one, and as a frame of the animation if so asked.
+    pub(crate) fn take(&mut self, image: &[f64], hard: f64, frame: bool) {
         if self.start.is_empty() {
             self.start = image.to_vec();
         }
-        self.result = image.to_vec();
+        if hard <= self.least || self.result.is_empty() {
+            (self.result, self.least) = (image.to_vec(), hard);
+        }
         if frame {
             self.frames.push(self.outlined(image));
         }

@@ -5,7 +5,7 @@ use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
     Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Plan, Point, Progress,
-    Run, Schedule, Score, Settings, Study, Task, Variant,
+    Run, Schedule, Score, Settings, Study, Task, Variant, best_step,
 };
 use softrast_softness::Softness;
 
@@ -153,7 +153,7 @@ impl Task for Pose {
             let (seed, curve) = (batch.seeds[k], solved.curve);
             Run {
                 seed,
-                success: curve.last().is_some_and(|end| end.parameter_error <= SUCCESS_DEG),
+                success: end(&curve).is_some_and(|end| end.parameter_error <= SUCCESS_DEG),
                 warnings: self.warnings(seed, &instances[k], &solved.target, &curve),
                 curve,
                 step_seconds: solved.step_seconds,
@@ -182,9 +182,9 @@ struct Solved {
 }
 
 impl Solved {
-    /// Hard `IoU` loss at the end: what can be told without knowing the answer.
+    /// Hard `IoU` loss of what is returned: what can be told without knowing the answer.
     fn image_loss(&self) -> f64 {
-        self.curve.last().map_or(f64::INFINITY, |end| end.extra[0])
+        end(&self.curve).map_or(f64::INFINITY, |end| end.extra[0])
     }
 }
 
@@ -206,6 +206,11 @@ const EXTRA: [ExtraError; 3] = [
         measure: Measure { name: "squared chord / 3", unit: "" },
     },
 ];
+
+/// The point of a curve that is returned.
+fn end(curve: &[Point]) -> Option<&Point> {
+    best_step(curve, |point| point.extra[0])
+}
 
 fn point(state: &State, view: usize, instance: &Instance) -> Point {
     let theta = &state.theta[view];
@@ -246,7 +251,7 @@ impl Pose {
                 solved.step_seconds.extend(state.seconds);
                 if let Some(album) = &mut solved.album {
                     let image = &image[view * size * size..(view + 1) * size * size];
-                    album.take(image, batch.wants_frame(state.step, steps));
+                    album.take(image, state.hard[view], batch.wants_frame(state.step, steps));
                 }
             }
             let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
@@ -299,7 +304,7 @@ impl Pose {
                  from the origin but is at {camera:.3}; try --normalize"
             ));
         }
-        if covered > 0 && curve.last().is_some_and(|end| end.extra[0] >= 1.0) {
+        if covered > 0 && end(curve).is_some_and(|end| end.extra[0] >= 1.0) {
             warnings.push(format!(
                 "seed {seed}: the mesh ends outside the target's silhouette, where nothing pulls it \
                  back: try a larger --scale or a smaller --learning-rate"

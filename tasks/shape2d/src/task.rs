@@ -5,7 +5,7 @@ use softrast_method::{Defaults, Method, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Plan, Point, Progress, Run,
-    Schedule, Score, Settings, Study, Task, Variant, difference, rgb_from_gray,
+    Schedule, Score, Settings, Study, Task, Variant, best_step, difference, rgb_from_gray,
 };
 use softrast_softness::Softness;
 
@@ -152,6 +152,7 @@ impl Shape2d {
         let mut curve: Vec<Point> = Vec::with_capacity(steps + 1);
         let mut step_seconds = Vec::with_capacity(steps);
         let mut shown = Vec::new();
+        let (mut result, mut least) = (None, f64::INFINITY);
         self.solver.run(&scene, |state: State| {
             curve.push(Point {
                 step: state.step,
@@ -161,14 +162,21 @@ impl Shape2d {
                 scale: state.scale,
                 extra: vec![state.hard],
             });
-            if batch.wants_frame(state.step, steps) {
+            let (frame, best) = (batch.wants_frame(state.step, steps), state.hard <= least);
+            if batch.pictures && (frame || best) {
                 let image: Vec<f64> = state.image.iter().collect();
-                shown.push(rgb_from_gray(&image, size, size));
+                let picture = rgb_from_gray(&image, size, size);
+                if best {
+                    (result, least) = (Some(picture.clone()), state.hard);
+                }
+                if frame {
+                    shown.push(picture);
+                }
             }
             step_seconds.extend(state.seconds);
             if state.step == 0 { Ok(()) } else { progress.step(state.step, state.loss) }
         })?;
-        let pictures = match (shown.first().cloned(), shown.last().cloned()) {
+        let pictures = match (shown.first().cloned(), result) {
             (Some(start), Some(result)) => {
                 let target = rgb_from_gray(&self.target, size, size);
                 let difference = difference(&target, &result);
@@ -176,7 +184,8 @@ impl Shape2d {
             }
             _ => None,
         };
-        let end = curve.last().map_or(f64::INFINITY, |end| end.extra[0]);
+        let end = best_step(&curve, |point| point.extra[0]);
+        let end = end.map_or(f64::INFINITY, |end| end.extra[0]);
         Ok(Run {
             seed,
             success: end < SUCCESS,

@@ -17,22 +17,30 @@ pub(crate) struct Album {
     result: RgbImage,
     frames: Vec<RgbImage>,
     size: usize,
+    /// Least hard loss so far.
+    least: f64,
 }
 
 impl Album {
     /// An empty album of an instance whose hard target is `target` `[views * size * size]`.
     pub(crate) fn new(target: &[f64], size: usize) -> Self {
         let target = sheet(target, size);
-        Self { start: None, result: target.clone(), target, frames: Vec::new(), size }
+        let result = target.clone();
+        let (frames, least) = (Vec::new(), f64::INFINITY);
+        Self { start: None, result, target, frames, size, least }
     }
 
-    /// Takes the soft silhouettes `image` `[views * size * size]` after a step, the latest as the
-    /// result, and also as a frame of the animation if so asked.
-    pub(crate) fn take(&mut self, image: &[f64], frame: bool) {
-        self.result = sheet(image, self.size);
-        self.start.get_or_insert_with(|| self.result.clone());
+    /// Takes the soft silhouettes `image` `[views * size * size]` after a step, as the result if
+    /// no step before had a lower loss `hard` of the hard ones, and as a frame of the animation if so
+    /// asked.
+    pub(crate) fn take(&mut self, image: &[f64], hard: f64, frame: bool) {
+        let now = sheet(image, self.size);
+        self.start.get_or_insert_with(|| now.clone());
         if frame {
-            self.frames.push(self.result.clone());
+            self.frames.push(now.clone());
+        }
+        if hard <= self.least {
+            (self.result, self.least) = (now, hard);
         }
     }
 

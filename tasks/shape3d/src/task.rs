@@ -6,7 +6,7 @@ use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run, Schedule,
-    Score, Settings, Study, Task, Variant,
+    Score, Settings, Study, Task, Variant, best_step,
 };
 use softrast_softness::Softness;
 
@@ -158,12 +158,13 @@ impl Shape3d {
             });
             if let Some(album) = &mut album {
                 let image: Vec<f64> = state.image.iter().collect();
-                album.take(&image, batch.wants_frame(state.step, steps));
+                album.take(&image, state.hard, batch.wants_frame(state.step, steps));
             }
             step_seconds.extend(state.seconds);
             if state.step == 0 { Ok(()) } else { progress.step(state.step, state.loss) }
         })?;
-        let end = curve.last().map_or(f64::INFINITY, |end| end.extra[0]);
+        let end = best_step(&curve, |point| point.extra[0]);
+        let end = end.map_or(f64::INFINITY, |end| end.extra[0]);
         Ok(Run {
             seed,
             success: end < SUCCESS,

@@ -1,5 +1,7 @@
-/// A page that needs no other file; `body` is HTML, the rest plain text.
-pub(super) fn frame(title: &str, about: &str, body: &str, command: &str, beside: &str) -> String {
+/// A page of HTML that needs no other file, in the style of all reports.
+///
+/// `body` and `beside`, which says what lies beside the page, are HTML; the rest is plain text.
+pub fn page(title: &str, about: &str, body: &str, command: &str, beside: &str) -> String {
     let [title, about, command] = [title, about, command].map(escape);
     format!(
         "<!DOCTYPE html>
@@ -39,7 +41,7 @@ summary { cursor: pointer; }
 ";
 
 /// Text as HTML.
-pub(super) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let text = text.replace('&', "&amp;").replace('<', "&lt;");
     text.replace('>', "&gt;").replace('"', "&quot;")
 }

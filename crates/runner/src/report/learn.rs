@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
-use super::frame::{escape, frame, warnings};
+use super::frame::{escape, page, warnings};
 
 /// The page of a learned softness: what `text` says, then the charts (SVG and caption).
 pub(crate) fn of_learning(
@@ -36,5 +36,5 @@ pub(crate) fn of_learning(
     body += "</tbody>\n</table>\n";
     let beside = "<code>learn.json</code> holds the result, <code>learn.jsonl</code> every outer step; \
                   <code>softness.json</code> is for <code>--softness</code> of any task";
-    frame(title, about, &body, command, beside)
+    page(title, about, &body, command, beside)
 }

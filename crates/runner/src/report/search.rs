@@ -1,4 +1,4 @@
-use super::frame::{escape, frame, warnings};
+use super::frame::{escape, page, warnings};
 use crate::{heat_map, search_summary::SearchSummary, summary::short};
 
 /// The page of a search that was stopped before its best setting was scored.
@@ -9,7 +9,7 @@ pub(crate) fn of_search(title: &str, about: &str, found: &SearchSummary, command
     let partial: Vec<String> = partial.into_iter().collect();
     let body = format!("{}{}", warnings(&partial), section(found));
     let beside = "<code>search.json</code> and <code>search.csv</code> hold every setting tried";
-    frame(title, about, &body, command, beside)
+    page(title, about, &body, command, beside)
 }
 
 /// What was tried and what is best.

@@ -1,0 +1,101 @@
+use std::sync::Arc;
+
+/// Triangles in the image: x and y in NDC, and the depth.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Flat {
+    pub(crate) corners: Vec<[f64; 3]>,
+    pub(crate) faces: Arc<[[u32; 3]]>,
+}
+
+impl Flat {
+    /// Loose triangles, three corners each.
+    pub(crate) fn loose(corners: Vec<[f64; 3]>) -> Self {
+        let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        Self { corners, faces }
+    }
+
+    /// One triangle at depth 2.
+    pub(crate) fn triangle(corners: [[f64; 2]; 3]) -> Self {
+        Self::loose(corners.map(|[x, y]| [x, y, 2.0]).into())
+    }
+
+    /// A triangle of about a third of the image that no axis or pixel favours.
+    pub(crate) fn plain() -> Self {
+        Self::triangle([[-0.61, -0.47], [0.73, -0.33], [0.08, 0.69]])
+    }
+
+    /// `count` triangles of all sizes all over the image.
+    pub(crate) fn random(seed: u64, count: usize) -> Self {
+        let mut random = Random::new(seed);
+        let corners = (0..count).flat_map(|_| {
+            let centre = [random.within(1.1), random.within(1.1)];
+            let (reach, depth) = (0.1 + 0.4 * random.unit(), 1.5 + random.unit());
+            let turn = random.within(3.2);
+            [0.0, 2.1, 4.1].map(|angle: f64| {
+                let (sin, cos) = (turn + angle).sin_cos();
+                [centre[0] + reach * cos, centre[1] + reach * sin, depth]
+            })
+        });
+        Self::loose(corners.collect())
+    }
+
+    /// The same face `count` times.
+    pub(crate) fn stack(count: usize) -> Self {
+        let one = Self::plain().corners;
+        Self::loose((0..count).flat_map(|_| one.clone()).collect())
+    }
+
+    /// The square from -0.5 to 0.5 as `2 side²` triangles.
+    pub(crate) fn grid(side: usize) -> Self {
+        let at = |k: usize| k as f64 / side as f64 - 0.5;
+        let cell = |k: usize| {
+            let (x, y) = (k % side, k / side);
+            let [a, b] = [at(x), at(x + 1)];
+            let [c, d] = [at(y), at(y + 1)];
+            [[a, c], [b, c], [b, d], [a, c], [b, d], [a, d]].map(|[x, y]| [x, y, 2.0])
+        };
+        Self::loose((0..side * side).flat_map(cell).collect())
+    }
+
+    /// The same with every coordinate in the image multiplied by `factor`.
+    pub(crate) fn scaled(mut self, factor: f64) -> Self {
+        self.corners.iter_mut().for_each(|p| {
+            p[0] *= factor;
+            p[1] *= factor;
+        });
+        self
+    }
+
+    /// The same faces in another order.
+    pub(crate) fn permuted(&self, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut faces = self.faces.to_vec();
+        for k in (1..faces.len()).rev() {
+            faces.swap(k, (random.unit() * (k + 1) as f64) as usize);
+        }
+        Self { corners: self.corners.clone(), faces: faces.into() }
+    }
+}
+
+/// Numbers that look random and are always the same (`SplitMix64`).
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(1))
+    }
+
+    /// In [0, 1).
+    pub(crate) fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// From `-reach` to `reach`.
+    pub(crate) fn within(&mut self, reach: f64) -> f64 {
+        reach * (2.0 * self.unit() - 1.0)
+    }
+}

@@ -1,0 +1,5 @@
+//! Tests every softness on scenes where rasterizers and optimisers fail.
+
+fn main() -> std::process::ExitCode {
+    stability::main()
+}
