@@ -112,7 +112,7 @@ fn errors(measured: &[&Measured]) -> String {
     let Some(first) = measured.first() else { return String::new() };
     let reference = first.cell.method_name();
     let mut text = format!(
-        "\n**{}**, {} runs\n\n| method | setting | {} | less {reference} | {} | success | in the \
+        "\n**{}**, seeds: {}\n\n| method | setting | {} | less {reference} | {} | success | in the \
          paper's unit | paper |\n|---|---|---|---|---|---|---|---|\n",
         first.cell.variant, first.cell.runs, first.hard.name, first.parameter.name
     );
@@ -142,8 +142,8 @@ fn errors(measured: &[&Measured]) -> String {
 }
 
 fn with_interval(error: &Error) -> String {
-    let [low, high] = error.ci95.map(short);
-    format!("{} ({low} to {high})", short(error.mean))
+    let (mean, [low, high]) = (short(error.mean), error.ci95.map(short));
+    if error.per_run.len() == 1 { mean } else { format!("{mean} ({low} to {high})") }
 }
 
 /// Mean and interval of the differences on the seeds that both have.
@@ -151,11 +151,12 @@ fn difference(one: &Error, reference: &Error) -> String {
     let pairs = one.per_run.iter().zip(&reference.per_run);
     let differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
     let mean = short(mean(&differences));
+    if differences.len() == 1 {
+        return mean;
+    }
     let [low, high] = bootstrap_mean_interval(&differences, RESAMPLES, RESAMPLING_SEED);
     let shown = format!("{mean} ({} to {})", short(low), short(high));
-    // One run has no interval.
-    let clear = differences.len() > 1 && (high < 0.0 || low > 0.0);
-    if clear { format!("**{shown}**") } else { shown }
+    if high < 0.0 || low > 0.0 { format!("**{shown}**") } else { shown }
 }
 
 fn pair(image: f64, parameter: Option<f64>) -> String {
