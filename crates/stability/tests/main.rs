@@ -5,11 +5,15 @@
 use std::{collections::HashSet, ffi::OsString};
 
 use serde_json::Value;
-use stability::{Matrix, Tested, cases, chosen, execute, run};
+use stability::{Matrix, Promise, Tested, cases, chosen, execute, run};
 
 #[test]
 fn nothing_in_the_quick_part_is_broken() {
-    let (cases, methods) = (chosen("quick").unwrap(), Tested::all(None));
+    // The promises, with the methods that are quick to draw with: the program runs all.
+    let mut cases = chosen("quick").unwrap();
+    cases.retain(|case| case.promise == Promise::Guaranteed);
+    let mut methods = Tested::all(None);
+    methods.retain(|method| ["logistic", "mlp", "decay"].contains(&method.name));
     let outcomes = run(&cases, &methods, 2, true);
     let matrix = Matrix::new(&cases, &methods, outcomes, 0.0);
     assert_eq!((matrix.faults(), matrix.non_finite), (Vec::new(), 0));
