@@ -35,7 +35,7 @@ const VALIDATIONS: usize = 10;
 pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
     // What would fail later fails here, where an error can be told.
     let seeds = (0..(plan.outer * plan.batch) as u64).map(|k| plan.seed + k);
-    let last = seeds.last().into_iter().chain([plan.validation_seed]);
+    let last = seeds.max().into_iter().chain([plan.validation_seed]);
     last.map(|seed| lesson.scene::<B>(seed, 1)).collect::<Result<Vec<_>, _>>()?;
     let mode = match plan.order {
         Order::Unrolled => MetaGradient::default(),
@@ -119,8 +119,11 @@ pub struct Class<L: Lesson> {
     own_referee: bool,
     measured: Measured,
     /// The latest φ and what was prepared for it.
-    prepared: RefCell<Option<(Vec<f64>, Arc<L::Drawing>)>>,
+    prepared: RefCell<Option<Prepared<L>>>,
 }
+
+/// A vector φ and what was prepared for it.
+type Prepared<L> = (Vec<f64>, Arc<<L as Lesson>::Drawing>);
 
 impl<L: Lesson> Class<L> {
     /// The lesson with the referee that `plan` asks for.

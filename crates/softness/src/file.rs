@@ -142,11 +142,11 @@ impl SoftnessFile {
         if !(1..=MOST_KNOTS).contains(&knots.len()) {
             return Err(wrong(format!("{} knots, expected 1 to {MOST_KNOTS}", knots.len())));
         }
-        if let Some(knot) = knots.iter().find(|knot| !(knot.abs() <= LARGEST_LOGARITHM)) {
+        if let Some(knot) = knots.iter().find(|k| k.is_nan() || k.abs() > LARGEST_LOGARITHM) {
             let limit = LARGEST_LOGARITHM;
             return Err(wrong(format!("a knot of {knot}, expected -{limit} to {limit}")));
         }
-        if !(*floor_px >= 0.0 && floor_px.is_finite()) {
+        if !floor_px.is_finite() || *floor_px < 0.0 {
             return Err(wrong(format!("a floor of {floor_px} pixels, expected 0 or more")));
         }
         Ok(())

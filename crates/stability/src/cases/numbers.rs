@@ -167,14 +167,16 @@ fn parameters(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     // Of families other than the network a parameter is a logarithm or a shift.
     let big = if edge.parameters() > 3 { 1e4 } else { 60.0 };
     let small = if edge.parameters() > 3 { -1.0 } else { -60.0 };
-    let levels: [(&str, fn(usize) -> f64, f64); 5] = [
+    // Name, sign of each parameter, their size.
+    type Weights = (&'static str, fn(usize) -> f64, f64);
+    let levels: [Weights; 5] = [
         ("all equal", |_| 1.0, 0.5),
         ("huge", |_| 1.0, big),
         ("zero", |_| 0.0, 1.0),
         ("negative", |_| 1.0, small),
         ("alternating", |k| if k.is_multiple_of(2) { 1.0 } else { -1.0 }, 3.0),
     ];
-    let level = |(name, sign, size): (&str, fn(usize) -> f64, f64)| {
+    let level = |(name, sign, size): Weights| {
         let phi = (0..edge.parameters()).map(|k| sign(k) * size).collect();
         SoftnessFile { softness: edge, phi, path: None, note: None }.save(&path)?;
         let method = super::from_file(&path)?;

@@ -198,13 +198,15 @@ fn scales(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 }
 
 fn no_shape(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let levels: [(&str, u32, fn(u32, u32) -> bool); 4] = [
+    // Name, size of the image, which pixels are white.
+    type Target = (&'static str, u32, fn(u32, u32) -> bool);
+    let levels: [Target; 4] = [
         ("black", 16, |_, _| false),
         ("white", 16, |_, _| true),
         ("one pixel", 16, |x, y| (x, y) == (5, 9)),
         ("image of one pixel", 1, |x, _| x < 8),
     ];
-    let level = |(name, size, white): (&str, u32, fn(u32, u32) -> bool)| {
+    let level = |(name, size, white): Target| {
         let folder = tempfile::tempdir()?;
         let path = picture(folder.path(), 16, white)?;
         let flags = format!("--size {size} --triangles 20 --steps 20 --learning-rate 0.1");
