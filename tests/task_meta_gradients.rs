@@ -17,7 +17,7 @@ type B = NdArray<f64>;
 /// Relative to central differences.
 const BOUND: f64 = 1e-5;
 /// Half the distance of a difference, as a share of the parameter's size; see `SHARES`.
-const SHARES: [f64; 4] = [1e-6, 1e-5, 1e-7, 1e-4];
+const SHARES: [f64; 6] = [1e-6, 3e-6, 3e-7, 1e-5, 1e-7, 1e-4];
 const SOFTNESSES: [&str; 3] = [
     "--softness logistic --schedule static",
     "--softness mlp --schedule static",
@@ -110,7 +110,7 @@ fn occlusion() {
 #[test]
 fn shape2d() {
     let lesson = |task, plan: &_| Shape2dLesson::new(task, plan).expect("a logo can be drawn");
-    check::<Shape2d, _>("--size 12 --triangles 8 --scale 0.05", lesson);
+    check::<Shape2d, _>("--size 12 --triangles 8 --scale 0.1", lesson);
 }
 
 #[test]
