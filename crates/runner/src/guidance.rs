@@ -4,7 +4,7 @@ use crate::{Description, ErrorGroup, Point, Run, best_step, median, quantity::Qu
 const IMAGE: f64 = 2.0;
 /// A soft and a hard image whose errors differ by less than this share are the same image.
 const SAME: f64 = 1e-6;
-/// The last step is worse than the best one where its error is larger by this share and this much.
+/// The end is worse than the best step where its error is larger by this share and this much.
 const WORSE: [f64; 2] = [0.05, 2e-3];
 
 /// What curves say about the choice of the softness, a line each; said once for all runs.
@@ -96,9 +96,12 @@ fn past_the_best(score: Quantity, runs: &[Run]) -> Option<String> {
     ))
 }
 
-/// The best step of a run whose scale falls after it, to no good.
+/// The best step of a run whose scale falls after it, to no good: the last tenth of the steps is
+/// worse throughout, because single steps are noise.
 fn passed(score: Quantity, curve: &[Point]) -> Option<&Point> {
-    let (best, last) = (best_step(curve, |point| score.of(point))?, curve.last()?);
+    let tenth = &curve[curve.len() - curve.len().div_ceil(10)..];
+    let best_of = |points| best_step(points, |point| score.of(point));
+    let (best, last) = (best_of(curve)?, best_of(tenth)?);
     let [share, much] = WORSE;
     let worse = score.of(last) > (1.0 + share) * score.of(best) + much;
     (worse && last.scale < best.scale).then_some(best)
