@@ -3,7 +3,7 @@
 //! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
 //! there is none.
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "shared with the tests in f64, which need more of it")]
 #[path = "../double/common/mod.rs"]
 mod common;
 mod products;
