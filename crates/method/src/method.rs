@@ -26,6 +26,7 @@ pub struct Method {
     softness: EdgeSoftness,
     name: String,
     path: Path,
+    searched: Option<&'static Searched>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +69,7 @@ impl Method {
                         Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) }
                     }
                 };
-                Ok(Self { softness, name: file.display().to_string(), path })
+                Ok(Self { softness, name: file.display().to_string(), path, searched: None })
             }
             named => {
                 let name = match named {
@@ -77,15 +78,17 @@ impl Method {
                 };
                 let family: Family = name.parse()?;
                 let softness = EdgeSoftness { family, squared: settings.squared };
-                let path = scale_path(settings, &defaults.searched(family));
-                Ok(Self { softness, name: family.name().to_owned(), path })
+                let schedule = asked_schedule(settings);
+                let searched = Searched::of(defaults.task, family.name(), schedule);
+                let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
+                Ok(Self { softness, name: family.name().to_owned(), path, searched })
             }
         }
     }
 
-    /// What was searched for this family on a task.
-    pub fn searched(&self, task: &str) -> Option<&'static Searched> {
-        Searched::of(task, &self.name)
+    /// What was searched for this family on the task, under the same schedule.
+    pub fn searched(&self) -> Option<&'static Searched> {
+        self.searched
     }
 
     /// Name of the family, or of the file.
@@ -151,29 +154,28 @@ fn part(step: usize, steps: usize) -> f64 {
 }
 
 impl Defaults {
-    /// With the schedule and the scale that were searched for a family of this task.
-    fn searched(self, family: Family) -> Self {
-        match Searched::of(self.task, family.name()) {
-            None => self,
-            Some(&Searched { scale, scale_end: None, .. }) => {
+    /// With the schedule and the scale that were searched for.
+    fn with(self, found: &Searched) -> Self {
+        match *found {
+            Searched { scale, scale_end: None, .. } => {
                 Self { schedule: Schedule::Static, fixed: scale, ..self }
             }
-            Some(&Searched { scale, scale_end: Some(end), .. }) => {
+            Searched { scale, scale_end: Some(end), .. } => {
                 Self { schedule: Schedule::Decay, decay: [scale, end], ..self }
             }
         }
     }
 }
 
+/// The schedule that the flags ask for: a scale without one stays as it is.
+fn asked_schedule(settings: &Settings) -> Option<Schedule> {
+    settings.schedule.or(settings.scale.map(|_| Schedule::Static))
+}
+
 fn scale_path(settings: &Settings, defaults: &Defaults) -> Path {
     let unit = |scale: f64| if settings.squared { scale * scale } else { scale };
     let Settings { scale, scale_end, .. } = *settings;
-    let schedule = match (settings.schedule, scale) {
-        (Some(schedule), _) => schedule,
-        (None, Some(_)) => Schedule::Static,
-        (None, None) => defaults.schedule,
-    };
-    match schedule {
+    match asked_schedule(settings).unwrap_or(defaults.schedule) {
         Schedule::Static => {
             let scale = scale.unwrap_or(unit(defaults.fixed));
             Path::Scale { first: scale, last: scale }
