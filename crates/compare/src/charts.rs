@@ -3,7 +3,7 @@
 use softrast_runner::{median, method_colour, quantile};
 
 use crate::{
-    Measured,
+    Measured, functions,
     plot::{Axis, Plot, Series},
 };
 
@@ -66,6 +66,9 @@ pub(crate) fn of_variant(cells: &[&Measured]) -> Vec<Chart> {
         },
         pareto(cells, &stem, &of),
     ]
+    .into_iter()
+    .chain(functions::chart(cells))
+    .collect()
 }
 
 /// Intervals between the points of a curve.

@@ -7,6 +7,7 @@
 mod args;
 mod cell;
 mod charts;
+mod functions;
 mod measured;
 mod paper;
 mod plot;

@@ -32,6 +32,10 @@ pub struct Measured {
     pub size: u64,
     /// Faces of the scene.
     pub faces: u64,
+    /// Scale at the last step, where there is one, in NDC (NDC² if squared).
+    pub scale_end: Option<f64>,
+    /// Whether the softness sees the squared distance.
+    pub squared: bool,
     /// Scale before the first and at the last step, depth scale if there is one, learning rate.
     pub settings: String,
 }
@@ -82,6 +86,8 @@ impl Measured {
             seconds: number("/seconds/per_run")?,
             peak_mib: json["peak_memory_mib"].as_f64(),
             traces: Vec::new(),
+            scale_end: settings["scale_end"].as_f64(),
+            squared: settings["squared"].as_bool() == Some(true),
             steps: whole("steps")?,
             size: whole("size")?,
             faces: whole("faces")?,

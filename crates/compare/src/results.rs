@@ -36,6 +36,9 @@ pub fn markdown(measured: &[Measured], command: &str, pictures: Option<&str>) ->
         }
     }
     let _ = write!(text, "## Table 5: seconds\n\n{SECONDS}\n{}", seconds(measured).markdown());
+    if let Some(table) = crossed(measured) {
+        let _ = write!(text, "## Table 6: cross evaluation\n\n{CROSSED}\n{}", table.markdown());
+    }
     if let Some(chart) = charts::profile(&by_variant(measured)) {
         text += "## Who is fast how often\n";
         text += &shown(&chart, pictures);
@@ -66,6 +69,9 @@ pub(crate) fn html(measured: &[Measured], command: &str, out: &Path) -> anyhow::
         body += &pictures(&group, out);
     }
     let _ = write!(body, "<h2>Seconds</h2>\n{}{}", paragraph(SECONDS), seconds(measured).html());
+    if let Some(table) = crossed(measured) {
+        let _ = write!(body, "<h2>Cross evaluation</h2>\n{}{}", paragraph(CROSSED), table.html());
+    }
     if let Some(chart) = charts::profile(&by_variant(measured)) {
         let _ = write!(body, "<h2>Who is fast how often</h2>\n<figure>\n{}\n", chart.plot.svg()?);
         let _ = writeln!(body, "<figcaption>{}</figcaption>\n</figure>", escape(&chart.caption));
@@ -123,6 +129,11 @@ const SECONDS: &str = "\
 Wall time of the optimisation steps of a run, its share of a batch where runs are solved together, without the errors that are
 measured beside; the memory is the most that the process had used by then. The paper's figures are from a V100: 3.24 to 4.36 seconds
 to evaluate 3D SHAPE and 0.053 to 0.088 to draw once.
+";
+
+const CROSSED: &str = "\
+What was learned on one task, used on another: the error of the hard image at the last step, mean and 95 % interval. The columns
+have the units of their tasks; compare within a column.
 ";
 
 fn note(task: TaskName) -> &'static str {
@@ -246,6 +257,35 @@ fn seconds(measured: &[Measured]) -> Table {
         ]);
     }
     table
+}
+
+/// Table 6: every softness file on every task, where there are several of them.
+fn crossed(measured: &[Measured]) -> Option<Table> {
+    let mut files: Vec<&str> = Vec::new();
+    for one in measured {
+        let file = one.cell.softness();
+        if file.ends_with(".json") && !files.contains(&file) {
+            files.push(file);
+        }
+    }
+    let groups = by_variant(measured);
+    let column = |group: &&Vec<&Measured>| {
+        let Measured { cell, hard, .. } = group[0];
+        format!("{} {}, {}", cell.task.title(), cell.variant, hard.name)
+    };
+    let head = std::iter::once("softness".to_owned()).chain(groups.iter().map(|g| column(&g)));
+    let mut table = Table { head: head.collect(), rows: Vec::new() };
+    for &file in &files {
+        let of = |group| of_file(group, file);
+        let name = groups.iter().find_map(of)?.cell.method_name();
+        let error = |group| of(group).map_or(String::new(), |one| with_interval(&one.hard));
+        table.rows.push(std::iter::once(name).chain(groups.iter().map(error)).collect());
+    }
+    (files.len() > 1).then_some(table)
+}
+
+fn of_file<'a>(group: &Vec<&'a Measured>, file: &str) -> Option<&'a Measured> {
+    group.iter().find(|one| one.cell.softness() == file).copied()
 }
 
 /// Whether the setting of a cell was searched for, learned, or named by its flags.
