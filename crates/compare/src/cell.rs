@@ -26,12 +26,18 @@ impl Cell {
         stem.unwrap_or(&self.method)
     }
 
-    /// Evaluates the cell in a folder of its own in `out`; what is finished there is not done again.
+    /// Evaluates the cell in a folder of its own in `out`, on a backend that the task's program names; what
+    /// is finished there is not done again.
     ///
     /// # Errors
     ///
     /// Those of the task's program.
-    pub fn evaluate(&self, out: &Path, quiet: bool) -> anyhow::Result<Measured> {
+    pub fn evaluate(
+        &self,
+        out: &Path,
+        backend: Option<&str>,
+        quiet: bool,
+    ) -> anyhow::Result<Measured> {
         let Self { task, variant, method, runs } = self;
         let folder = out.join(format!("{}-{variant}-{}-{runs}", task.name(), self.method_name()));
         let runs = runs.to_string();
@@ -48,6 +54,7 @@ impl Cell {
         ];
         let mut words: Vec<OsString> = line.into_iter().map(OsString::from).collect();
         words.extend(["--out".into(), folder.clone().into_os_string()]);
+        words.extend(backend.into_iter().flat_map(|name| ["--backend".into(), name.into()]));
         words.extend(quiet.then(|| "--quiet".into()));
         words.extend(folder.join("evaluate.jsonl").exists().then(|| "--resume".into()));
         let mut stdout = Vec::new();

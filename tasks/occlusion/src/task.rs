@@ -1,6 +1,6 @@
 use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers, study};
-use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
+use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress, Run,
     Schedule, Score, Settings, Study, Task, Variant,
@@ -32,6 +32,7 @@ const SCALES: Defaults = Defaults {
     decay: [0.02, 0.0005],
     fixed: 0.0005,
     size: 64,
+    backends: compiled_backends!(),
 };
 
 /// Widths of the soft depth that a search tries.
@@ -96,7 +97,7 @@ impl Task for Occlusion {
         Description {
             softness,
             parameters: edge.softness().parameters() + depth.softness.parameters(),
-            backend: DEFAULT_BACKEND.to_owned(),
+            backend: edge.backend().title().to_owned(),
             steps: *steps,
             size: *size,
             faces: self.problem.quads,
@@ -127,10 +128,56 @@ impl Task for Occlusion {
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
+        on_backend!(self.solver.edge.backend(), B => self.run_on::<B>(batch, progress))
+    }
+
+    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+        study(lesson::OcclusionLesson::new(self, plan), plan)
+    }
+}
+
+/// Errors beside the soft image error and the order, in the order of [`point`].
+const EXTRA: [ExtraError; 3] = [
+    ExtraError {
+        group: ErrorGroup::Image,
+        key: "hard",
+        measure: Measure { name: "hard image MSE", unit: "" },
+    },
+    ExtraError {
+        group: ErrorGroup::Parameter,
+        key: "front",
+        measure: Measure { name: "wrong front quad", unit: "of runs" },
+    },
+    ExtraError {
+        group: ErrorGroup::Parameter,
+        key: "depth",
+        measure: Measure { name: "mean depth error", unit: "world units" },
+    },
+];
+
+fn point(state: &State, view: usize, instance: &Instance) -> Point {
+    let error = DepthError::new(&state.depths[view], &instance.target);
+    let wrong_front = f64::from(u8::from(!error.right_front));
+    Point {
+        step: state.step,
+        loss: state.soft[view],
+        image_error: state.soft[view],
+        parameter_error: error.wrong_pairs,
+        scale: state.scale,
+        extra: vec![state.hard[view], wrong_front, error.distance],
+    }
+}
+
+impl Occlusion {
+    fn run_on<B: RasterBackend>(
+        &self,
+        batch: &Batch,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Vec<Run>> {
         let instances: Vec<Instance> =
             batch.seeds.iter().map(|&seed| Instance::seeded(seed, &self.problem)).collect();
         let Solver { size, steps, .. } = self.solver;
-        let scene = Scene::<Autodiff<DefaultBackend>>::new(&self.problem, &instances, size);
+        let scene = Scene::<Autodiff<B>>::new(&self.problem, &instances, size);
         let values = 3 * size * size;
         let targets = numbers(scene.target().inner());
         let mut album = Album::new(&targets[..values], size);
@@ -172,44 +219,6 @@ impl Task for Occlusion {
         Ok(runs.collect())
     }
 
-    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
-        study(lesson::OcclusionLesson::new(self, plan), plan)
-    }
-}
-
-/// Errors beside the soft image error and the order, in the order of [`point`].
-const EXTRA: [ExtraError; 3] = [
-    ExtraError {
-        group: ErrorGroup::Image,
-        key: "hard",
-        measure: Measure { name: "hard image MSE", unit: "" },
-    },
-    ExtraError {
-        group: ErrorGroup::Parameter,
-        key: "front",
-        measure: Measure { name: "wrong front quad", unit: "of runs" },
-    },
-    ExtraError {
-        group: ErrorGroup::Parameter,
-        key: "depth",
-        measure: Measure { name: "mean depth error", unit: "world units" },
-    },
-];
-
-fn point(state: &State, view: usize, instance: &Instance) -> Point {
-    let error = DepthError::new(&state.depths[view], &instance.target);
-    let wrong_front = f64::from(u8::from(!error.right_front));
-    Point {
-        step: state.step,
-        loss: state.soft[view],
-        image_error: state.soft[view],
-        parameter_error: error.wrong_pairs,
-        scale: state.scale,
-        extra: vec![state.hard[view], wrong_front, error.distance],
-    }
-}
-
-impl Occlusion {
     fn is_success(&self, error: &DepthError) -> bool {
         if self.problem.front_only { error.right_front } else { error.wrong_pairs == 0.0 }
     }

@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, PreparedRun, Step};
-use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer, iou_loss};
+use softrast_raster::{HostBackend, RasterBackend, Rasterizer, iou_loss};
 use softrast_runner::{Figure, Plan};
 
 use crate::{Pose, Scene};
@@ -18,7 +18,7 @@ impl PoseLesson {
     pub fn new(pose: Pose, plan: &Plan) -> Self {
         let solver = &pose.solver;
         let edge = LearnedEdge::new(&solver.method, plan, solver.steps, solver.size);
-        let judge = Judge::new::<DefaultBackend>(&pose.mesh.faces().into(), solver.size);
+        let judge = Judge::new::<HostBackend>(&pose.mesh.faces().into(), solver.size);
         Self { pose, edge, judge }
     }
 }
@@ -54,7 +54,7 @@ impl Lesson for PoseLesson {
         let Pose { mesh, solver, .. } = &self.pose;
         let rasterizer =
             Rasterizer { tolerance: LEARNING_TOLERANCE, ..Rasterizer::new(solver.size) };
-        self.edge.prepare::<DefaultBackend>(rasterizer, &mesh.faces().into(), phi)
+        self.edge.prepare::<HostBackend>(rasterizer, &mesh.faces().into(), phi)
     }
 
     fn prepared<B: RasterBackend>(
@@ -91,6 +91,6 @@ impl Lesson for PoseLesson {
     }
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {
-        self.edge.figures::<DefaultBackend>(phi)
+        self.edge.figures::<HostBackend>(phi)
     }
 }

@@ -156,6 +156,7 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--softness missing.json --scale 0.1", 2, "holds its own parameters"),
         ("--softness missing.json --schedule decay", 2, "holds its own parameters"),
         ("--softness missing.json", 1, "missing.json"),
+        ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
         ("--mesh missing.obj", 1, "missing.obj"),
     ] {
         let failure = run(line).unwrap_err();

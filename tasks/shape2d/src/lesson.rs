@@ -3,7 +3,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{FINER, Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, PreparedRun, Step};
-use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer};
+use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 use softrast_runner::{Figure, Plan};
 
 use crate::{Instance, Scene, Shape2d};
@@ -28,7 +28,7 @@ impl Shape2dLesson {
         let solver = &task.solver;
         let edge = LearnedEdge::new(&solver.method, plan, solver.steps, solver.size);
         let faces = (0..task.triangles as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
-        let judge = Judge::new::<DefaultBackend>(&faces, solver.size);
+        let judge = Judge::new::<HostBackend>(&faces, solver.size);
         let finer = task.source.image(FINER * solver.size)?;
         Ok(Self { task, edge, faces, judge, finer })
     }
@@ -60,7 +60,7 @@ impl Lesson for Shape2dLesson {
     fn prepare(&self, phi: &[f64]) -> PreparedRun {
         let size = self.task.solver.size;
         let rasterizer = Rasterizer { tolerance: LEARNING_TOLERANCE, ..Rasterizer::new(size) };
-        self.edge.prepare::<DefaultBackend>(rasterizer, &self.faces, phi)
+        self.edge.prepare::<HostBackend>(rasterizer, &self.faces, phi)
     }
 
     fn prepared<B: RasterBackend>(
@@ -99,6 +99,6 @@ impl Lesson for Shape2dLesson {
     }
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {
-        self.edge.figures::<DefaultBackend>(phi)
+        self.edge.figures::<HostBackend>(phi)
     }
 }

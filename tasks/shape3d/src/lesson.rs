@@ -3,7 +3,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, PreparedRun, Step};
-use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer};
+use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 use softrast_runner::{Figure, Plan};
 
 use crate::{Instance, Scene, Shape3d};
@@ -22,7 +22,7 @@ impl Shape3dLesson {
         let solver = &task.solver;
         let edge = LearnedEdge::new(&solver.method, plan, solver.steps, solver.size);
         let faces: Arc<[[u32; 3]]> = task.template.faces().into();
-        let judge = Judge::new::<DefaultBackend>(&faces, solver.size);
+        let judge = Judge::new::<HostBackend>(&faces, solver.size);
         Self { task, edge, faces, judge }
     }
 }
@@ -53,7 +53,7 @@ impl Lesson for Shape3dLesson {
     fn prepare(&self, phi: &[f64]) -> PreparedRun {
         let size = self.task.solver.size;
         let rasterizer = Rasterizer { tolerance: LEARNING_TOLERANCE, ..Rasterizer::new(size) };
-        self.edge.prepare::<DefaultBackend>(rasterizer, &self.faces, phi)
+        self.edge.prepare::<HostBackend>(rasterizer, &self.faces, phi)
     }
 
     fn prepared<B: RasterBackend>(
@@ -92,6 +92,6 @@ impl Lesson for Shape3dLesson {
     }
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {
-        self.edge.figures::<DefaultBackend>(phi)
+        self.edge.figures::<HostBackend>(phi)
     }
 }
