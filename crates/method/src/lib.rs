@@ -50,4 +50,4 @@ pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;
-pub use tensor::{numbers, tensor};
+pub use tensor::{numbers, on_host, read, tensor};

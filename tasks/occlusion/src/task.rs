@@ -186,12 +186,12 @@ impl Occlusion {
         let mut best = vec![(f64::INFINITY, Vec::new()); instances.len()];
         let mut ends = Vec::new();
         let mut step_seconds = Vec::with_capacity(steps);
-        self.solver.run(&scene, |state: State| {
+        self.solver.run(&scene, batch.pictures, |state: State| {
             for (view, curve) in curves.iter_mut().enumerate() {
                 curve.push(point(&state, view, &instances[view]));
             }
-            if batch.pictures {
-                let image: Vec<f64> = state.image.iter().take(values).collect();
+            if let Some(image) = &state.image {
+                let image: Vec<f64> = image.iter().take(values).collect();
                 let frame = batch.wants_frame(state.step, steps);
                 album.take(&image, state.step, state.hard[0], frame);
             }

@@ -254,12 +254,12 @@ impl Pose {
             album: batch.pictures.then(|| Album::new(target.to_vec(), size)),
         };
         let mut all: Vec<Solved> = targets.chunks(size * size).map(solved).collect();
-        self.solver.run(&scene, |state: State| {
-            let image: Vec<f64> = state.image.iter().collect();
+        self.solver.run(&scene, batch.pictures, |state: State| {
+            let image: Option<Vec<f64>> = state.image.as_ref().map(|image| image.iter().collect());
             for (view, solved) in all.iter_mut().enumerate() {
                 solved.curve.push(point(&state, view, &instances[view]));
                 solved.step_seconds.extend(state.seconds);
-                if let Some(album) = &mut solved.album {
+                if let (Some(album), Some(image)) = (&mut solved.album, &image) {
                     let image = &image[view * size * size..(view + 1) * size * size];
                     album.take(image, state.hard[view], batch.wants_frame(state.step, steps));
                 }

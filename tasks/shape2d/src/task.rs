@@ -160,7 +160,7 @@ impl Shape2d {
         let mut step_seconds = Vec::with_capacity(steps);
         let mut shown = Vec::new();
         let (mut result, mut least) = (None, f64::INFINITY);
-        self.solver.run(&scene, |state: State| {
+        self.solver.run(&scene, batch.pictures, |state: State| {
             curve.push(Point {
                 step: state.step,
                 loss: state.loss,
@@ -170,8 +170,8 @@ impl Shape2d {
                 extra: vec![state.hard],
             });
             let (frame, best) = (batch.wants_frame(state.step, steps), state.hard <= least);
-            if batch.pictures && (frame || best) {
-                let image: Vec<f64> = state.image.iter().collect();
+            if let Some(image) = state.image.filter(|_| frame || best) {
+                let image: Vec<f64> = image.iter().collect();
                 let picture = rgb_from_gray(&image, size, size);
                 if best {
                     (result, least) = (Some(picture.clone()), state.hard);

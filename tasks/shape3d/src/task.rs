@@ -153,7 +153,7 @@ impl Shape3d {
         let mut album = batch.pictures.then(|| Album::new(&target, size));
         let mut curve: Vec<Point> = Vec::with_capacity(steps + 1);
         let mut step_seconds = Vec::with_capacity(steps);
-        self.solver.run(&scene, |state: State| {
+        self.solver.run(&scene, batch.pictures, |state: State| {
             curve.push(Point {
                 step: state.step,
                 loss: state.loss,
@@ -162,8 +162,8 @@ impl Shape3d {
                 scale: state.scale,
                 extra: vec![state.hard],
             });
-            if let Some(album) = &mut album {
-                let image: Vec<f64> = state.image.iter().collect();
+            if let (Some(album), Some(image)) = (&mut album, &state.image) {
+                let image: Vec<f64> = image.iter().collect();
                 album.take(&image, state.hard, batch.wants_frame(state.step, steps));
             }
             step_seconds.extend(state.seconds);
