@@ -87,14 +87,14 @@ pub fn w2() -> Option<Workload> {
     Some(Workload { mesh: load("spot.obj")?, azimuths_deg: vec![180.0], size: 256 })
 }
 
-/// A mesh that is not part of the repository; prints that it was skipped where it is missing.
+/// A mesh that is not part of the repository, from a folder beside it; prints that it was skipped where it is missing.
 fn load(name: &str) -> Option<Mesh> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/meshes/paper");
-    let path = Path::new(folder).join(name);
-    if !path.exists() {
-        println!("skipped: there is no {}", path.display());
+    let places = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(2);
+    let mut places = places.map(|folder| folder.join("shared/data/meshes/paper").join(name));
+    let Some(path) = places.find(|path| path.exists()) else {
+        println!("skipped: there is no shared/data/meshes/paper/{name} beside the checkout");
         return None;
-    }
+    };
     Some(Mesh::load(path).expect("the meshes of the paper are valid"))
 }
 

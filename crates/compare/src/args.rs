@@ -32,6 +32,10 @@ pub struct Args {
     #[arg(long, conflicts_with = "runs")]
     pub quick: bool,
 
+    /// What to compute on: ndarray, flex or wgpu, if the program was built with it.
+    #[arg(long, value_name = "NAME")]
+    pub backend: Option<String>,
+
     /// Folder for the results of every cell.
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     pub out: PathBuf,

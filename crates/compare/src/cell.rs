@@ -48,12 +48,18 @@ impl Cell {
         out.join(format!("{}-{variant}-{method}-{runs}", task.name()))
     }
 
-    /// Evaluates the cell in a folder of its own in `out`; what is finished there is not done again.
+    /// Evaluates the cell in a folder of its own in `out`, on a backend that the task's program names; what
+    /// is finished there is not done again.
     ///
     /// # Errors
     ///
     /// Those of the task's program.
-    pub fn evaluate(&self, out: &Path, quiet: bool) -> anyhow::Result<Measured> {
+    pub fn evaluate(
+        &self,
+        out: &Path,
+        backend: Option<&str>,
+        quiet: bool,
+    ) -> anyhow::Result<Measured> {
         let Self { task, variant, method, runs } = self;
         let folder = self.folder(out);
         let runs = runs.to_string();
@@ -70,6 +76,7 @@ impl Cell {
         let line = line.into_iter().chain(method.split_whitespace());
         let mut words: Vec<OsString> = line.map(OsString::from).collect();
         words.extend(["--out".into(), folder.clone().into_os_string()]);
+        words.extend(backend.into_iter().flat_map(|name| ["--backend".into(), name.into()]));
         words.extend(quiet.then(|| "--quiet".into()));
         words.extend(folder.join("evaluate.jsonl").exists().then(|| "--resume".into()));
         let mut stdout = Vec::new();

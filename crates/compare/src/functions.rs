@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use softrast_method::{numbers, shipped, tensor};
-use softrast_raster::DefaultBackend;
+use softrast_raster::HostBackend;
 use softrast_runner::method_colour;
 use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
 
@@ -28,7 +28,7 @@ pub(crate) fn chart(cells: &[&Measured]) -> Option<Chart> {
     let distances: Vec<f64> = offsets.iter().map(|offset| offset / pixels).collect();
     let series = cells.iter().filter_map(|one| {
         let (softness, phi) = at_the_end(one)?;
-        let phi = tensor::<DefaultBackend, 1>(phi.clone(), [phi.len()]);
+        let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
         let at = tensor(distances.clone(), [distances.len()]);
         let covered = numbers(softness.value(phi, at));
         let name = one.cell.method_name();
@@ -77,7 +77,7 @@ fn at_the_end(one: &Measured) -> Option<(EdgeSoftness, Vec<f64>)> {
     if path.is_none() {
         return Some((softness, phi));
     }
-    let phi = tensor::<DefaultBackend, 1>(phi.clone(), [phi.len()]);
+    let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
     let scale = tensor(vec![one.scale_end?], [1]);
     Some((softness, numbers(softness.widened(phi, scale))))
 }

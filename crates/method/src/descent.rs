@@ -40,7 +40,7 @@ impl<O: Optimizer> Descent<O> {
     ///
     /// # Errors
     ///
-    /// Those of `visit`, which end the descent.
+    /// Those of `visit` and of the device, which end the descent.
     pub fn run<B: Backend, const D: usize, S>(
         &self,
         start: Tensor<B, D>,
@@ -54,6 +54,8 @@ impl<O: Optimizer> Descent<O> {
             let clock = Instant::now();
             let leaf = Tensor::from_inner(theta.clone()).require_grad();
             let (loss, seen) = objective(step, leaf.clone());
+            // A GPU has only been asked so far, also for the end of the step before.
+            B::sync(&theta.device())?;
             let mut time = clock.elapsed();
             let inner = loss.clone().inner();
             visit(Moment { step, theta: theta.clone(), loss: inner, seen, seconds })?;

@@ -54,4 +54,4 @@ pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;
 pub use shipped::shipped;
 pub use silhouette_lesson::{LearnedSilhouette, SilhouetteLesson};
-pub use tensor::{numbers, tensor};
+pub use tensor::{numbers, on_host, read, tensor};

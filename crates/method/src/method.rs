@@ -1,5 +1,5 @@
-use softrast_raster::{DefaultBackend, set_up_default_backend};
-use softrast_runner::{Error, Schedule, Settings, SoftnessChoice};
+use softrast_raster::{BackendChoice, HostBackend};
+use softrast_runner::{Command, Error, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
 use crate::{Searched, numbers, shipped, tensor};
@@ -18,6 +18,8 @@ pub struct Defaults {
     pub fixed: f64,
     /// Width and height of the image where the command line does not say, in pixels.
     pub size: usize,
+    /// What the task was compiled for: `softrast_raster::compiled_backends!()` there.
+    pub backends: &'static [BackendChoice],
 }
 
 /// A softness and how its scale moves over the steps.
@@ -27,6 +29,7 @@ pub struct Method {
     name: String,
     path: Path,
     searched: Option<&'static Searched>,
+    backend: BackendChoice,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -49,11 +52,12 @@ impl Method {
     ///
     /// # Errors
     ///
-    /// If a softness file cannot be used, flags contradict each other, or the backend finds no
-    /// adapter.
+    /// If a softness file cannot be used, flags contradict each other, or there is no such backend or
+    /// no adapter for it.
     pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
         // Before the first tensor.
-        set_up_default_backend()?;
+        let backend = backend(settings, defaults.backends)?;
+        let size = settings.size.unwrap_or(defaults.size);
         let scaled = settings.scale.is_some() || settings.scale_end.is_some() || settings.squared;
         let asked = scaled || settings.schedule.is_some();
         let comes_with_it = match &settings.softness {
@@ -66,7 +70,7 @@ impl Method {
         if let Some((name, file)) = comes_with_it
             && let Some(learned) = shipped(&file)?
         {
-            return Ok(Self::of_file(learned, name.to_owned(), settings, defaults));
+            return Ok(Self::of_file(learned, name.to_owned(), size, backend));
         }
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
@@ -77,7 +81,7 @@ impl Method {
                     ));
                 }
                 let learned = SoftnessFile::load(file)?;
-                Ok(Self::of_file(learned, file.display().to_string(), settings, defaults))
+                Ok(Self::of_file(learned, file.display().to_string(), size, backend))
             }
             named => {
                 let name = match named {
@@ -89,19 +93,19 @@ impl Method {
                 let schedule = asked_schedule(settings);
                 let searched = Searched::of(defaults.task, family.name(), schedule);
                 let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
-                Ok(Self { softness, name: family.name().to_owned(), path, searched })
+                Ok(Self { softness, name: family.name().to_owned(), path, searched, backend })
             }
         }
     }
 
-    /// With the parameters of a file.
-    fn of_file(file: SoftnessFile, name: String, settings: &Settings, defaults: &Defaults) -> Self {
+    /// With the parameters of a file, on images of `size` × `size` pixels.
+    fn of_file(file: SoftnessFile, name: String, size: usize, backend: BackendChoice) -> Self {
         let SoftnessFile { softness, phi, path, .. } = file;
         let path = match path {
             None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
-            Some(path) => Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) },
+            Some(path) => Path::Learned { phi, path, size },
         };
-        Self { softness, name, path, searched: None }
+        Self { softness, name, path, searched: None, backend }
     }
 
     /// What was searched for this family on the task, under the same schedule.
@@ -117,6 +121,11 @@ impl Method {
     /// The softness whose parameters [`Method::phi`] gives.
     pub fn softness(&self) -> EdgeSoftness {
         self.softness
+    }
+
+    /// What it is drawn on.
+    pub fn backend(&self) -> BackendChoice {
+        self.backend
     }
 
     /// Whether the scale moves.
@@ -136,7 +145,7 @@ impl Method {
         match self.path {
             Path::Fixed { scale, .. } => scale,
             Path::Learned { ref path, size, .. } => {
-                let knots = tensor::<DefaultBackend, 1>(path.knots.clone(), [path.knots.len()]);
+                let knots = tensor::<HostBackend, 1>(path.knots.clone(), [path.knots.len()]);
                 let floor = path.floor(self.softness, size);
                 numbers(ScalePath::scale(&knots, floor, part(step, steps)))[0]
             }
@@ -149,7 +158,7 @@ impl Method {
         match &self.path {
             Path::Fixed { phi, .. } => phi.clone(),
             Path::Learned { phi, .. } => {
-                let phi = tensor::<DefaultBackend, 1>(phi.clone(), [phi.len()]);
+                let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
                 numbers(self.softness.widened(phi, tensor(vec![scale], [1])))
             }
             Path::Scale { .. } => self.softness.default_phi(scale),
@@ -212,10 +221,27 @@ fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     if softness.family != Family::Mlp {
         return phi[0].exp();
     }
-    let phi = tensor::<DefaultBackend, 1>(phi.to_vec(), [phi.len()]);
+    let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
     let slope = numbers(softness.family.density(phi, tensor(vec![0.0], [1])));
     // A flat one has no scale; any finite number will do.
     0.25 / slope[0].abs().max(1e-12)
+}
+
+/// The backend that the command line asks for, set up.
+fn backend(
+    settings: &Settings,
+    compiled: &'static [BackendChoice],
+) -> anyhow::Result<BackendChoice> {
+    let asked = settings.backend.as_deref();
+    let backend =
+        BackendChoice::among(compiled, asked).map_err(|error| usage(&error.to_string()))?;
+    if settings.command == Command::Learn && asked.is_some() && backend != BackendChoice::NdArray {
+        return Err(usage(&format!(
+            "learn computes on ndarray, not on {backend}: leave out --backend"
+        )));
+    }
+    backend.set_up()?;
+    Ok(backend)
 }
 
 fn usage(message: &str) -> anyhow::Error {
@@ -234,6 +260,7 @@ mod tests {
         decay: [0.03, 0.002],
         fixed: 0.002,
         size: 64,
+        backends: softrast_raster::compiled_backends!(),
     };
 
     /// First, middle and last scale of the method that a command line gives.
@@ -278,7 +305,8 @@ mod tests {
     fn a_run_of_one_step_has_the_first_scale() {
         let path = Path::Scale { first: 0.1, last: 0.001 };
         let softness = EdgeSoftness { family: Family::Gauss, squared: false };
-        let method = Method { softness, name: "gauss".into(), path };
+        let backend = BackendChoice::NdArray;
+        let method = Method { softness, name: "gauss".into(), path, searched: None, backend };
         assert_eq!(method.scale(0, 1), 0.1);
     }
 }

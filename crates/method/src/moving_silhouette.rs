@@ -1,10 +1,10 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
+use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use softrast_raster::{HostBackend, RasterBackend, Rasterizer, Silhouette};
 use softrast_softness::EdgeSoftness;
 
-use crate::{Method, tensor};
+use crate::{Method, numbers, tensor};
 
 /// A scale may fall by this factor before support and knots are chosen anew.
 const STALE: f64 = 0.95;
@@ -23,7 +23,7 @@ pub struct MovingSilhouette<B: Backend> {
     scale: f64,
 }
 
-impl<B: Backend> MovingSilhouette<B> {
+impl<B: RasterBackend> MovingSilhouette<B> {
     /// Silhouettes by `rasterizer` of meshes with these faces, at first at `scale` (as
     /// [`Method::scale`] gives it).
     ///
@@ -36,9 +36,9 @@ impl<B: Backend> MovingSilhouette<B> {
         faces: &Arc<[[u32; 3]]>,
         scale: f64,
     ) -> Self {
-        let phi = phi::<B>(method, scale);
-        let silhouette = rasterizer.prepare(faces, method.softness(), &phi);
-        let table = moved(silhouette.table(phi));
+        let phi = method.phi(scale);
+        let silhouette = rasterizer.prepare(faces, method.softness(), &on_host::<B>(&phi));
+        let table = table(&silhouette, phi);
         let (method, faces) = (method.clone(), faces.clone());
         Self { method, rasterizer, faces, silhouette, prepared: scale, table, scale }
     }
@@ -48,48 +48,37 @@ impl<B: Backend> MovingSilhouette<B> {
         if self.scale == scale {
             return;
         }
-        let phi = phi::<B>(&self.method, scale);
+        let phi = self.method.phi(scale);
         if !(STALE..=1.0).contains(&(scale / self.prepared)) {
-            self.silhouette = self.rasterizer.prepare(&self.faces, self.method.softness(), &phi);
+            let softness = self.method.softness();
+            self.silhouette = self.rasterizer.prepare(&self.faces, softness, &on_host::<B>(&phi));
             self.prepared = scale;
         }
-        (self.table, self.scale) = (moved(self.silhouette.table(phi)), scale);
+        (self.table, self.scale) = (table(&self.silhouette, phi), scale);
     }
-}
 
-impl<B: RasterBackend> MovingSilhouette<B> {
     /// Coverage `[views, size, size]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth).
     pub fn image(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
         self.silhouette.coverage_by_table(vertices, self.table.clone())
     }
 }
 
-/// Parameters at a scale, where supports, knots and tables are computed: on the backend itself.
-#[cfg(not(feature = "wgpu"))]
-fn phi<B: Backend>(method: &Method, scale: f64) -> Tensor<B, 1> {
-    let phi = method.phi(scale);
-    let shape = [phi.len()];
-    tensor(phi, shape)
-}
-
-#[cfg(not(feature = "wgpu"))]
-fn moved<B: Backend>(table: Tensor<B, 2>) -> Tensor<B, 2> {
-    table
-}
-
-/// Parameters at a scale, where supports, knots and tables are computed: on the CPU in f64. A GPU
-/// then gets a table in one piece, instead of some sixty small kernels over a few hundred numbers,
-/// and its curvature is not lost to rounding.
-#[cfg(feature = "wgpu")]
-fn phi<B: Backend>(method: &Method, scale: f64) -> Tensor<burn::backend::NdArray<f32>, 1> {
-    let phi = method.phi(scale);
-    let shape = [phi.len()];
-    let data = burn::tensor::TensorData::new(phi, shape);
-    Tensor::from_data(data, (&Default::default(), burn::tensor::DType::F64))
-}
-
-#[cfg(feature = "wgpu")]
-fn moved<B: Backend>(table: Tensor<burn::backend::NdArray<f32>, 2>) -> Tensor<B, 2> {
+/// The table of parameters.
+///
+/// For a GPU it is computed on the CPU in f64: the GPU then gets it in one piece, instead of some
+/// sixty small kernels over a few hundred numbers, and its curvature is not lost to rounding.
+fn table<B: RasterBackend>(silhouette: &Silhouette<EdgeSoftness>, phi: Vec<f64>) -> Tensor<B, 2> {
+    if B::ON_HOST {
+        let shape = [phi.len()];
+        return silhouette.table(tensor::<B, 1>(phi, shape));
+    }
+    let table = silhouette.table(on_host::<B>(&phi));
     let shape = table.dims();
-    tensor(crate::numbers(table), shape)
+    tensor(numbers(table), shape)
+}
+
+/// Parameters on the CPU; in f64 where they are not on the way to a CPU in f32 anyway.
+fn on_host<B: RasterBackend>(phi: &[f64]) -> Tensor<HostBackend, 1> {
+    let dtype = if B::ON_HOST { DType::F32 } else { DType::F64 };
+    Tensor::from_data(TensorData::new(phi.to_vec(), [phi.len()]), (&Default::default(), dtype))
 }

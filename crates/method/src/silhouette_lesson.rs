@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
-use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer};
+use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 use softrast_runner::{Figure, Plan};
 
 use crate::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, Method, PreparedRun, Step};
@@ -84,7 +84,7 @@ impl LearnedSilhouette {
         faces: Arc<[[u32; 3]]>,
     ) -> Self {
         let edge = LearnedEdge::new(method, plan, steps, size);
-        let judge = Judge::new::<DefaultBackend>(&faces, size);
+        let judge = Judge::new::<HostBackend>(&faces, size);
         Self { edge, judge, faces, size }
     }
 }
@@ -116,7 +116,7 @@ impl<L: SilhouetteLesson> Lesson for L {
     fn prepare(&self, phi: &[f64]) -> PreparedRun {
         let LearnedSilhouette { edge, faces, size, .. } = self.drawn();
         let rasterizer = Rasterizer { tolerance: LEARNING_TOLERANCE, ..Rasterizer::new(*size) };
-        edge.prepare::<DefaultBackend>(rasterizer, faces, phi)
+        edge.prepare::<HostBackend>(rasterizer, faces, phi)
     }
 
     fn prepared<B: RasterBackend>(
@@ -159,6 +159,6 @@ impl<L: SilhouetteLesson> Lesson for L {
     }
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {
-        self.drawn().edge.figures::<DefaultBackend>(phi)
+        self.drawn().edge.figures::<HostBackend>(phi)
     }
 }

@@ -69,6 +69,10 @@ impl ProfileSum {
 /// Shapes: `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units), `table`
 /// `[rows, 4]`, sums `[views, size, size]`, top row first.
 pub trait RasterBackend: Backend {
+    /// Whether the op and little tensors are as quick on the CPU anyway: false where a tensor lies
+    /// behind a queue, and what is computed of it in many little ops should come in one piece.
+    const ON_HOST: bool = true;
+
     /// The numbers of a tensor, row by row, for a kernel on the host.
     fn host_data(tensor: FloatTensor<Self>) -> TensorData {
         read::<Self>(tensor)
@@ -244,6 +248,8 @@ fn split<B: Backend, const N: usize>(
 }
 
 impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
+    const ON_HOST: bool = B::ON_HOST;
+
     fn profile_sum(
         op: &ProfileSum,
         vertices: FloatTensor<Self>,

@@ -7,10 +7,10 @@
 //! that hide one another take their colours from [`blend`].
 
 mod backend;
+#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
+mod backend_choice;
 mod camera;
 mod colour;
-#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
-mod default_backend;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod hard;
@@ -22,10 +22,10 @@ mod silhouette;
 mod t_conorm;
 
 pub use backend::{ProfileSum, RasterBackend, profile_sum};
+#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
+pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
 pub use camera::{NEAR, project, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
-#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
-pub use default_backend::{DEFAULT_BACKEND, DefaultBackend, NoAdapter, set_up_default_backend};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]

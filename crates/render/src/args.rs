@@ -69,6 +69,11 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE.png|disk:x,y,r", value_parser = target)]
     pub(crate) target: Option<Target>,
 
+    /// What to draw on: ndarray, flex or wgpu, if the program was built with it; the first of these by
+    /// default.
+    #[arg(long, value_name = "NAME", conflicts_with = "reference")]
+    pub(crate) backend: Option<String>,
+
     /// Timed repetitions, after one that is not timed [default: 5, or 1 with --reference].
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) repeat: Option<usize>,

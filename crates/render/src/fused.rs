@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use burn::{
     backend::Autodiff,
-    tensor::{DType, Tensor, backend::Backend},
+    tensor::{DType, ElementConversion, Tensor},
 };
-use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer, Silhouette, mse_loss, project};
+use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss, project};
 use softrast_runner::median;
 use softrast_softness::EdgeSoftness;
 
@@ -15,20 +15,17 @@ use crate::{
     scene::Scene,
 };
 
-type B = DefaultBackend;
-type A = Autodiff<B>;
-
 /// Draws the scene `repeat` times, after once to warm up.
-pub(crate) fn measure(scene: &Scene, repeat: usize) -> Measured {
-    let fused = Fused::new(scene);
+pub(crate) fn measure<B: RasterBackend>(scene: &Scene, repeat: usize) -> Measured {
+    let fused = Fused::<B>::new(scene);
     let mut last = fused.step();
-    let steps: Vec<Step> = (0..repeat)
+    let steps: Vec<Step<B>> = (0..repeat)
         .map(|_| {
             last = fused.step();
             last.clone()
         })
         .collect();
-    let times = |of: fn(&Step) -> f64| median(&steps.iter().map(of).collect::<Vec<_>>());
+    let times = |of: fn(&Step<B>) -> f64| median(&steps.iter().map(of).collect::<Vec<_>>());
     let pairs = fused.pairs(&fused.silhouette);
     Measured {
         alpha: last.image.to_data().iter().collect(),
@@ -43,7 +40,7 @@ pub(crate) fn measure(scene: &Scene, repeat: usize) -> Measured {
 }
 
 /// What stays the same from step to step.
-struct Fused {
+struct Fused<B: RasterBackend> {
     silhouette: Silhouette<EdgeSoftness>,
     prepare_ms: f64,
     table: Tensor<B, 2>,
@@ -54,14 +51,14 @@ struct Fused {
 
 /// One image, its loss and gradient norm if there is a target, and what they took.
 #[derive(Clone)]
-struct Step {
+struct Step<B: RasterBackend> {
     image: Tensor<B, 3>,
     loss: Option<[f64; 2]>,
     forward_ms: f64,
     backward_ms: f64,
 }
 
-impl Fused {
+impl<B: RasterBackend> Fused<B> {
     fn new(scene: &Scene) -> Self {
         let &Scene { size, tolerance, t_conorm, .. } = scene;
         let start = Instant::now();
@@ -69,7 +66,7 @@ impl Fused {
         let rasterizer = Rasterizer { size, tolerance, t_conorm };
         let silhouette = rasterizer.prepare(&scene.faces, scene.softness, &phi);
         let table = silhouette.table(phi);
-        let prepare_ms = milliseconds(start);
+        let prepare_ms = milliseconds::<B>(start);
         Self {
             silhouette,
             prepare_ms,
@@ -100,26 +97,26 @@ impl Fused {
         Knots { count: profile.knots(), support_ndc: profile.support(), prepare_ms }
     }
 
-    fn step(&self) -> Step {
+    fn step(&self) -> Step<B> {
         let [orbits, table] = [&self.orbits, &self.table].map(Clone::clone);
         let start = Instant::now();
         let Some(target) = &self.target else {
             let image = self.coverage(self.vertices.clone(), orbits, table);
-            let forward_ms = milliseconds(start);
+            let forward_ms = milliseconds::<B>(start);
             return Step { image, loss: None, forward_ms, backward_ms: 0.0 };
         };
-        let vertices = Tensor::<A, 3>::from_inner(self.vertices.clone()).require_grad();
+        let vertices = Tensor::<Autodiff<B>, 3>::from_inner(self.vertices.clone()).require_grad();
         let [orbits, table] = [orbits, table].map(Tensor::from_inner);
         let image = self.coverage(vertices.clone(), orbits, table);
-        let forward_ms = milliseconds(start);
+        let forward_ms = milliseconds::<B>(start);
 
         let start = Instant::now();
         let loss = mse_loss(image.clone(), Tensor::from_inner(target.clone())).mean();
         let grad = vertices.grad(&loss.backward()).expect("the image depends on the vertices");
-        let backward_ms = milliseconds(start);
+        let backward_ms = milliseconds::<B>(start);
         let norm = grad.to_data().iter::<f64>().map(|g| g * g).sum::<f64>().sqrt();
-        let loss = loss.into_scalar();
-        Step { image: image.inner(), loss: Some([loss.into(), norm]), forward_ms, backward_ms }
+        let loss = loss.into_scalar().elem();
+        Step { image: image.inner(), loss: Some([loss, norm]), forward_ms, backward_ms }
     }
 
     /// From world vertices to coverage.
@@ -134,7 +131,7 @@ impl Fused {
 }
 
 /// Time since `start`, once the device has done what it was asked.
-fn milliseconds(start: Instant) -> f64 {
+fn milliseconds<B: RasterBackend>(start: Instant) -> f64 {
     B::sync(&Default::default()).expect("the device finishes its work");
     start.elapsed().as_secs_f64() * 1e3
 }

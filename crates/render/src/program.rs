@@ -6,7 +6,8 @@ use std::{
 
 use anyhow::Context;
 use clap::Parser;
-use softrast_runner::{Failure, peak_rss_mib};
+use softrast_raster::{BackendChoice, compiled_backends, on_backend};
+use softrast_runner::{Error, Failure, peak_rss_mib};
 
 use crate::{
     args::Args,
@@ -66,17 +67,22 @@ fn work(args: &Args) -> anyhow::Result<Report> {
         // Fails where threads run already: a library user has chosen their number.
         let _ = pool.build_global();
     }
-    softrast_raster::set_up_default_backend()?;
+    let asked = args.backend.as_deref();
+    let backend = BackendChoice::among(compiled_backends!(), asked)
+        .map_err(|error| Error::Usage(error.to_string()))?;
+    if !args.reference {
+        backend.set_up()?;
+    }
     let scene = Scene::load(args)?;
     let output = Output::open(&args.out)?;
     let setting = Setting {
-        backend: if args.reference { dense::BACKEND } else { softrast_raster::DEFAULT_BACKEND },
+        backend: if args.reference { dense::BACKEND } else { backend.title() },
         repeat: args.repeat.unwrap_or(if args.reference { 1 } else { REPEAT }),
         base_rss_mib: peak_rss_mib(),
     };
     let measured = match args.reference {
         true => dense::measure(&scene, setting.repeat),
-        false => fused::measure(&scene, setting.repeat),
+        false => on_backend!(backend, B => fused::measure::<B>(&scene, setting.repeat)),
     };
     output.write(&output::picture(&measured.alpha, scene.size))?;
     Ok(Report::new(args, &scene, &setting, &measured))

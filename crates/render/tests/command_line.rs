@@ -90,7 +90,7 @@ fn bad_input_is_one_line_and_leaves_no_picture() {
     let blocked = folder.path().join("sphere.obj/out.png");
     let blocked = blocked.to_str().unwrap();
     let out = folder.path().join("out.png");
-    let cases: [(&[&str], u8, &str); 12] = [
+    let cases: [(&[&str], u8, &str); 13] = [
         (&["missing.obj"], 1, "missing.obj: cannot be read"),
         (&[&mesh, "--size", "0"], 2, "whole number of pixels"),
         (&[&mesh, "--scale", "-1"], 2, "expected a positive number"),
@@ -101,6 +101,7 @@ fn bad_input_is_one_line_and_leaves_no_picture() {
         (&[&mesh, "--softness", "missing.json"], 1, "missing.json"),
         (&[&mesh, "--softness", "a.json", "--squared"], 2, "a file has its own"),
         (&[&mesh, "--t-conorm", "max"], 2, "use probabilistic, einstein"),
+        (&[&mesh, "--backend", "cuda"], 2, "expected ndarray, flex or wgpu"),
         (&[&mesh, "--target", &mesh], 1, "cannot read the target"),
         (&[&mesh, "--out", blocked], 1, "choose another file with --out"),
     ];

@@ -85,6 +85,11 @@ pub struct Settings {
     #[arg(long)]
     pub squared: bool,
 
+    /// What to compute on: ndarray, flex or wgpu, if the program was built with it; the first of these by
+    /// default.
+    #[arg(long, value_name = "NAME")]
+    pub backend: Option<String>,
+
     /// Optimisation steps.
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub steps: Option<usize>,

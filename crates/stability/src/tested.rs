@@ -2,6 +2,7 @@ use std::{ffi::OsString, path::PathBuf};
 
 use clap::{Args, Parser};
 use softrast_method::{Defaults, Method};
+use softrast_raster::BackendChoice;
 use softrast_runner::{Batch, Command, Progress, Run, Schedule, Settings, Task};
 use softrast_softness::Family;
 
@@ -68,6 +69,7 @@ impl Tested {
             decay: [scale; 2],
             fixed: scale,
             size: 64,
+            backends: &[BackendChoice::NdArray],
         };
         let line = Line::<softrast_runner::NoArgs>::try_parse_from(self.words(&self.at(scale)))?;
         Method::new(&line.settings, &defaults)

@@ -1,5 +1,5 @@
 use softrast_method::{Searched, numbers, tensor};
-use softrast_raster::DefaultBackend;
+use softrast_raster::HostBackend;
 use softrast_runner::{Error, Settings, SoftnessChoice, Task};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
 
@@ -79,7 +79,7 @@ impl DepthMethod {
     /// program.
     fn log_weights(&self) -> Vec<f64> {
         const PLACES: usize = 65;
-        let phi = tensor::<DefaultBackend, 1>(self.phi.clone(), [self.phi.len()]);
+        let phi = tensor::<HostBackend, 1>(self.phi.clone(), [self.phi.len()]);
         let places = (0..PLACES).map(|k| k as f64 / (PLACES - 1) as f64).collect();
         numbers(self.softness.log_weight(phi, tensor(places, [PLACES])))
     }

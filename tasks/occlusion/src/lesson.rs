@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{LearnedEdge, Lesson, Step, numbers, tensor};
-use softrast_raster::{DefaultBackend, RasterBackend};
+use softrast_raster::{HostBackend, RasterBackend};
 use softrast_runner::{Curve, Figure, Plan};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, EdgeSoftness, Family};
 
@@ -37,7 +37,7 @@ impl OcclusionLesson {
     fn weights(&self, phi: &[f64]) -> Vec<[f64; 2]> {
         const PLACES: usize = 100;
         let softness = self.task.solver.depth.softness;
-        let phi = tensor::<DefaultBackend, 1>(phi.to_vec(), [phi.len()]);
+        let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
         let places: Vec<f64> = (0..=PLACES).map(|k| k as f64 / PLACES as f64).collect();
         let weights = softness.log_weight(phi, tensor(places.clone(), [PLACES + 1]));
         places.into_iter().zip(numbers(weights)).map(|(near, weight)| [near, weight]).collect()
@@ -114,7 +114,7 @@ impl Lesson for OcclusionLesson {
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {
         let (edge, depth) = phi.split_at(self.edge.parameters());
-        let mut figures = self.edge.figures::<DefaultBackend>(edge);
+        let mut figures = self.edge.figures::<HostBackend>(edge);
         let curve = |name: &str, phi| Curve { name: name.into(), points: self.weights(phi) };
         figures.push(Figure {
             caption:

@@ -1,9 +1,9 @@
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, TensorData, backend::Backend},
+    tensor::{Tensor, TensorData, Transaction, backend::Backend},
 };
 use softrast_meta::Adam;
-use softrast_method::{Descent, Method, numbers, tensor};
+use softrast_method::{Descent, Method, tensor};
 
 use crate::{Scene, depth_method::DepthMethod};
 
@@ -28,17 +28,19 @@ pub(crate) struct State {
     pub(crate) soft: Vec<f64>,
     /// Mean squared error of each hard image.
     pub(crate) hard: Vec<f64>,
-    /// Soft images, `[views, 3, pixels]`.
-    pub(crate) image: TensorData,
+    /// Soft images, `[views, 3, pixels]`, where pictures are wanted.
+    pub(crate) image: Option<TensorData>,
     /// Time of the step that ended here, in seconds; none before the first.
     pub(crate) seconds: Option<f64>,
 }
 
 impl Solver {
-    /// Solves all views of `scene`, and shows each state from the start to the end to `visit`.
+    /// Solves all views of `scene`, and shows each state from the start to the end to `visit`, with
+    /// images if `pictures`.
     pub(crate) fn run<B: Backend>(
         &self,
         scene: &Scene<Autodiff<B>>,
+        pictures: bool,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
@@ -60,14 +62,19 @@ impl Solver {
             |now| {
                 let (scale, image) = now.seen;
                 let hard = scene.loss(scene.hard(Tensor::from_inner(now.theta.clone())));
-                let depths = numbers(now.theta.clone());
+                let width = now.theta.dims()[1];
+                let read = Transaction::default().register(now.theta).register(now.loss);
+                let read = read.register(hard.inner());
+                let read = if pictures { read.register(image.inner()) } else { read };
+                let ([depths, soft, hard], image) = softrast_method::read(read);
+                let depths: Vec<f64> = depths.iter().collect();
                 visit(State {
                     step: now.step,
                     scale,
-                    depths: depths.chunks(now.theta.dims()[1]).map(<[_]>::to_vec).collect(),
-                    soft: numbers(now.loss),
-                    hard: numbers(hard),
-                    image: image.into_data(),
+                    depths: depths.chunks(width).map(<[_]>::to_vec).collect(),
+                    soft: soft.iter().collect(),
+                    hard: hard.iter().collect(),
+                    image,
                     seconds: now.seconds,
                 })
             },

@@ -1,6 +1,6 @@
 use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers, study};
-use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
+use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress, Run,
     Schedule, Score, Settings, Study, Task, Variant,
@@ -32,6 +32,7 @@ const SCALES: Defaults = Defaults {
     decay: [0.02, 0.0005],
     fixed: 0.0005,
     size: 64,
+    backends: compiled_backends!(),
 };
 
 /// Widths of the soft depth that a search tries.
@@ -96,7 +97,7 @@ impl Task for Occlusion {
         Description {
             softness,
             parameters: edge.softness().parameters() + depth.softness.parameters(),
-            backend: DEFAULT_BACKEND.to_owned(),
+            backend: edge.backend().title().to_owned(),
             steps: *steps,
             size: *size,
             faces: self.problem.quads,
@@ -127,49 +128,7 @@ impl Task for Occlusion {
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
-        let instances: Vec<Instance> =
-            batch.seeds.iter().map(|&seed| Instance::seeded(seed, &self.problem)).collect();
-        let Solver { size, steps, .. } = self.solver;
-        let scene = Scene::<Autodiff<DefaultBackend>>::new(&self.problem, &instances, size);
-        let values = 3 * size * size;
-        let targets = numbers(scene.target().inner());
-        let mut album = Album::new(&targets[..values], size);
-        let mut curves = vec![Vec::with_capacity(steps + 1); instances.len()];
-        // Where the hard image of each view is best: that is what is returned.
-        let mut best = vec![(f64::INFINITY, Vec::new()); instances.len()];
-        let mut ends = Vec::new();
-        let mut step_seconds = Vec::with_capacity(steps);
-        self.solver.run(&scene, |state: State| {
-            for (view, curve) in curves.iter_mut().enumerate() {
-                curve.push(point(&state, view, &instances[view]));
-            }
-            if batch.pictures {
-                let image: Vec<f64> = state.image.iter().take(values).collect();
-                let frame = batch.wants_frame(state.step, steps);
-                album.take(&image, state.step, state.hard[0], frame);
-            }
-            step_seconds.extend(state.seconds);
-            let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
-            let step = state.step;
-            for ((best, depths), &hard) in best.iter_mut().zip(&state.depths).zip(&state.hard) {
-                if hard <= best.0 || best.1.is_empty() {
-                    *best = (hard, depths.clone());
-                }
-            }
-            ends = state.depths;
-            if step == 0 { Ok(()) } else { progress.step(step, loss) }
-        })?;
-
-        let mut pictures = batch.pictures.then(|| album.pictures());
-        let runs = batch.seeds.iter().zip(curves).enumerate().map(|(view, (&seed, curve))| Run {
-            seed,
-            success: self.is_success(&DepthError::new(&best[view].1, &instances[view].target)),
-            warnings: self.warnings(seed, &instances[view], &ends[view]),
-            curve,
-            step_seconds: step_seconds.clone(),
-            pictures: pictures.take(),
-        });
-        Ok(runs.collect())
+        on_backend!(self.solver.edge.backend(), B => self.run_on::<B>(batch, progress))
     }
 
     fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
@@ -210,6 +169,56 @@ fn point(state: &State, view: usize, instance: &Instance) -> Point {
 }
 
 impl Occlusion {
+    fn run_on<B: RasterBackend>(
+        &self,
+        batch: &Batch,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Vec<Run>> {
+        let instances: Vec<Instance> =
+            batch.seeds.iter().map(|&seed| Instance::seeded(seed, &self.problem)).collect();
+        let Solver { size, steps, .. } = self.solver;
+        let scene = Scene::<Autodiff<B>>::new(&self.problem, &instances, size);
+        let values = 3 * size * size;
+        let targets = numbers(scene.target().inner());
+        let mut album = Album::new(&targets[..values], size);
+        let mut curves = vec![Vec::with_capacity(steps + 1); instances.len()];
+        // Where the hard image of each view is best: that is what is returned.
+        let mut best = vec![(f64::INFINITY, Vec::new()); instances.len()];
+        let mut ends = Vec::new();
+        let mut step_seconds = Vec::with_capacity(steps);
+        self.solver.run(&scene, batch.pictures, |state: State| {
+            for (view, curve) in curves.iter_mut().enumerate() {
+                curve.push(point(&state, view, &instances[view]));
+            }
+            if let Some(image) = &state.image {
+                let image: Vec<f64> = image.iter().take(values).collect();
+                let frame = batch.wants_frame(state.step, steps);
+                album.take(&image, state.step, state.hard[0], frame);
+            }
+            step_seconds.extend(state.seconds);
+            let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
+            let step = state.step;
+            for ((best, depths), &hard) in best.iter_mut().zip(&state.depths).zip(&state.hard) {
+                if hard <= best.0 || best.1.is_empty() {
+                    *best = (hard, depths.clone());
+                }
+            }
+            ends = state.depths;
+            if step == 0 { Ok(()) } else { progress.step(step, loss) }
+        })?;
+
+        let mut pictures = batch.pictures.then(|| album.pictures());
+        let runs = batch.seeds.iter().zip(curves).enumerate().map(|(view, (&seed, curve))| Run {
+            seed,
+            success: self.is_success(&DepthError::new(&best[view].1, &instances[view].target)),
+            warnings: self.warnings(seed, &instances[view], &ends[view]),
+            curve,
+            step_seconds: step_seconds.clone(),
+            pictures: pictures.take(),
+        });
+        Ok(runs.collect())
+    }
+
     fn is_success(&self, error: &DepthError) -> bool {
         if self.problem.front_only { error.right_front } else { error.wrong_pairs == 0.0 }
     }

@@ -1,10 +1,10 @@
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, TensorData},
+    tensor::{Tensor, TensorData, Transaction},
 };
 use softrast_meta::Adam;
-use softrast_method::{Descent, Method, MovingSilhouette, numbers};
-use softrast_raster::{RasterBackend, Rasterizer, iou_loss};
+use softrast_method::{Descent, Method, MovingSilhouette, numbers, on_host};
+use softrast_raster::{RasterBackend, Rasterizer, hard_silhouette, iou_loss};
 
 use crate::Scene;
 
@@ -27,21 +27,23 @@ pub(crate) struct State {
     pub(crate) soft: Vec<f64>,
     /// `IoU` loss of the hard silhouette of each view.
     pub(crate) hard: Vec<f64>,
-    /// Soft silhouettes, `[views, size, size]`.
-    pub(crate) image: TensorData,
+    /// Soft silhouettes, `[views, size, size]`, where pictures are wanted.
+    pub(crate) image: Option<TensorData>,
     /// Time of the step that ended here, in seconds; none before the first.
     pub(crate) seconds: Option<f64>,
 }
 
 impl Solver {
-    /// Solves all views of `scene`, and shows each state from the start to the end to `visit`.
+    /// Solves all views of `scene`, and shows each state from the start to the end to `visit`, with
+    /// images if `pictures`.
     pub(crate) fn run<B: RasterBackend>(
         &self,
         scene: &Scene<Autodiff<B>>,
+        pictures: bool,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
-        let target = scene.target().inner();
+        let target = on_host(scene.target().inner().into_data());
         let first = self.method.scale(0, self.steps);
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =
@@ -58,14 +60,20 @@ impl Solver {
             |theta| scene.allowed(Tensor::from_inner(theta)).inner(),
             |now| {
                 let (scale, projected, image) = now.seen;
-                let poses = numbers(now.theta.clone());
+                let width = now.theta.dims()[1];
+                let read = Transaction::default().register(now.theta).register(now.loss);
+                let read = read.register(projected.inner());
+                let read = if pictures { read.register(image.inner()) } else { read };
+                let ([poses, soft, projected], image) = softrast_method::read(read);
+                let poses: Vec<f64> = poses.iter().collect();
+                let hard = hard_silhouette(on_host(projected), scene.faces(), self.size);
                 visit(State {
                     step: now.step,
                     scale,
-                    theta: poses.chunks(now.theta.dims()[1]).map(<[_]>::to_vec).collect(),
-                    soft: numbers(now.loss),
-                    hard: numbers(iou_loss(scene.hard(projected).inner(), target.clone())),
-                    image: image.into_data(),
+                    theta: poses.chunks(width).map(<[_]>::to_vec).collect(),
+                    soft: soft.iter().collect(),
+                    hard: numbers(iou_loss(hard, target.clone())),
+                    image,
                     seconds: now.seconds,
                 })
             },

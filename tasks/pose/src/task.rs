@@ -2,7 +2,7 @@ use anyhow::ensure;
 use burn::backend::Autodiff;
 use softrast_mesh::{Mesh, fox};
 use softrast_method::{Defaults, Method, numbers, study};
-use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
+use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
     Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Plan, Point, Progress,
     Run, Schedule, Score, Settings, Study, Task, Variant, best_step,
@@ -41,6 +41,7 @@ const SCALES: Defaults = Defaults {
     decay: [0.03, 0.002],
     fixed: 0.002,
     size: 64,
+    backends: compiled_backends!(),
 };
 
 /// The prepared task.
@@ -106,7 +107,7 @@ impl Task for Pose {
         Description {
             softness: method.name().to_owned(),
             parameters: method.softness().parameters(),
-            backend: DEFAULT_BACKEND.to_owned(),
+            backend: method.backend().title().to_owned(),
             steps: *steps,
             size: *size,
             faces: self.mesh.faces().len(),
@@ -233,9 +234,18 @@ impl Pose {
         batch: &Batch,
         progress: &mut Progress,
     ) -> anyhow::Result<Vec<Solved>> {
+        let backend = self.solver.method.backend();
+        on_backend!(backend, B => self.solve_on::<B>(instances, batch, progress))
+    }
+
+    fn solve_on<B: RasterBackend>(
+        &self,
+        instances: &[Instance],
+        batch: &Batch,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Vec<Solved>> {
         let Solver { size, steps, .. } = self.solver;
-        let scene =
-            Scene::<Autodiff<DefaultBackend>>::new(&self.mesh, instances, size, self.optimise_fov);
+        let scene = Scene::<Autodiff<B>>::new(&self.mesh, instances, size, self.optimise_fov);
         let targets = numbers(scene.target().inner());
         let solved = |target: &[f64]| Solved {
             target: target.to_vec(),
@@ -244,12 +254,12 @@ impl Pose {
             album: batch.pictures.then(|| Album::new(target.to_vec(), size)),
         };
         let mut all: Vec<Solved> = targets.chunks(size * size).map(solved).collect();
-        self.solver.run(&scene, |state: State| {
-            let image: Vec<f64> = state.image.iter().collect();
+        self.solver.run(&scene, batch.pictures, |state: State| {
+            let image: Option<Vec<f64>> = state.image.as_ref().map(|image| image.iter().collect());
             for (view, solved) in all.iter_mut().enumerate() {
                 solved.curve.push(point(&state, view, &instances[view]));
                 solved.step_seconds.extend(state.seconds);
-                if let Some(album) = &mut solved.album {
+                if let (Some(album), Some(image)) = (&mut solved.album, &image) {
                     let image = &image[view * size * size..(view + 1) * size * size];
                     album.take(image, state.hard[view], batch.wants_frame(state.step, steps));
                 }

@@ -65,6 +65,13 @@ fn a_few_steps_lower_the_loss_and_write_every_file() {
 }
 
 #[test]
+fn the_defaults_find_the_camera_on_a_small_image() {
+    let json = run("--size 32 --steps 100").unwrap();
+    assert_eq!(json["success_rate"], 1.0, "{json}");
+    assert!(json["image_error"]["hard"]["best"].as_f64().unwrap() < 0.1, "{json}");
+}
+
+#[test]
 fn a_run_does_not_depend_on_its_batch() {
     let line = "--size 16 --steps 5 --range 15-35";
     let many = run(&format!("evaluate --runs 3 {line}")).unwrap();
@@ -156,6 +163,7 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--softness missing.json --scale 0.1", 2, "holds its own parameters"),
         ("--softness missing.json --schedule decay", 2, "holds its own parameters"),
         ("--softness missing.json", 1, "missing.json"),
+        ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
         ("--mesh missing.obj", 1, "missing.obj"),
     ] {
         let failure = run(line).unwrap_err();

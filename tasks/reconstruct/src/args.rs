@@ -13,6 +13,11 @@ use crate::{Data, Settings, Width};
 pub(crate) struct CommandLine {
     #[command(subcommand)]
     pub(crate) command: Command,
+
+    /// What to compute on: flex, ndarray or wgpu, if the program was built with it; the first of these by
+    /// default.
+    #[arg(long, global = true, value_name = "NAME")]
+    pub(crate) backend: Option<String>,
 }
 
 #[derive(Debug, Subcommand)]

@@ -61,10 +61,3 @@ pub use template::Template;
 pub use train::Training;
 pub use view::{SIZE, VIEWS, orbit};
 pub use voxels::Voxels;
-
-/// The backend of the binary, in floats of 32 bits.
-#[cfg(feature = "flex")]
-pub type Backend = burn::backend::Flex;
-/// The backend of the binary, in floats of 32 bits.
-#[cfg(not(feature = "flex"))]
-pub type Backend = softrast_raster::DefaultBackend;

@@ -4,7 +4,7 @@ use std::{io, process::ExitCode};
 
 fn main() -> ExitCode {
     let words = std::env::args_os();
-    match reconstruct::execute::<reconstruct::Backend>(words, &mut io::stdout().lock()) {
+    match reconstruct::execute(words, &mut io::stdout().lock()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("{failure}");

@@ -2,8 +2,8 @@ use std::{ffi::OsString, io::Write, path::Path};
 
 use anyhow::Context;
 use clap::Parser;
-use softrast_raster::RasterBackend;
-use softrast_runner::Failure;
+use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
+use softrast_runner::{Error, Failure};
 
 use crate::{
     Checkpoint, Network, Template, Training,
@@ -25,7 +25,7 @@ use crate::{
 /// # Errors
 ///
 /// Everything that should end the program with an error line.
-pub fn execute<B: RasterBackend>(
+pub fn execute(
     words: impl IntoIterator<Item = OsString>,
     stdout: &mut dyn Write,
 ) -> Result<(), Failure> {
@@ -38,18 +38,31 @@ pub fn execute<B: RasterBackend>(
         }
         Err(wrong) => return Err(wrong.into()),
     };
-    let device = B::Device::default();
     let again = repeat(&words);
-    let said = match line.command {
-        Command::Train(args) => train::<B>(&args, again, &device)?,
-        Command::Evaluate(args) => evaluate::<B>(&args, &device)?,
-        Command::Predict(args) => predict_mesh::<B>(&args, &device)?,
-        Command::Compare(args) => compare::<B>(&args, &again, &device)?,
-    };
+    let said = on_backend!(backend(line.backend.as_deref())?, B => work::<B>(line.command, again))?;
     Ok(writeln!(stdout, "{said}").context(STDOUT)?)
 }
 
 const STDOUT: &str = "cannot write to the standard output";
+
+/// The backend that was asked for, set up; of those there are flex is the quickest on a CPU.
+fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
+    let asked = asked.or(cfg!(feature = "flex").then_some("flex"));
+    let backend = BackendChoice::among(compiled_backends!(), asked)
+        .map_err(|error| Error::Usage(error.to_string()))?;
+    backend.set_up()?;
+    Ok(backend)
+}
+
+fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<String> {
+    let device = B::Device::default();
+    match command {
+        Command::Train(args) => train::<B>(&args, again, &device),
+        Command::Evaluate(args) => evaluate::<B>(&args, &device),
+        Command::Predict(args) => predict_mesh::<B>(&args, &device),
+        Command::Compare(args) => compare::<B>(&args, &again, &device),
+    }
+}
 
 fn train<B: RasterBackend>(
     args: &TrainArgs,

@@ -1,10 +1,10 @@
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, TensorData, backend::Backend},
+    tensor::{TensorData, Transaction},
 };
 use softrast_meta::Adam;
-use softrast_method::{Descent, Method, MovingSilhouette, numbers};
-use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_method::{Descent, Method, MovingSilhouette, on_host};
+use softrast_raster::{RasterBackend, Rasterizer, hard_silhouette, mse_loss};
 
 use crate::Scene;
 
@@ -27,21 +27,24 @@ pub(crate) struct State {
     pub(crate) soft: f64,
     /// Mean squared error of the hard silhouette.
     pub(crate) hard: f64,
-    /// Soft silhouette, `[1, size, size]`.
-    pub(crate) image: TensorData,
+    /// Soft silhouette, `[1, size, size]`, where pictures are wanted.
+    pub(crate) image: Option<TensorData>,
     /// Time of the step that ended here, in seconds; none before the first.
     pub(crate) seconds: Option<f64>,
 }
 
 impl Solver {
-    /// Solves `scene`, and shows each state from the start to the end to `visit`.
+    /// Solves `scene`, and shows each state from the start to the end to `visit`, with
+    /// images if `pictures`.
     pub(crate) fn run<B: RasterBackend>(
         &self,
         scene: &Scene<Autodiff<B>>,
+        pictures: bool,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
         let first = self.method.scale(0, self.steps);
+        let target = on_host(scene.target().inner().into_data());
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
@@ -58,13 +61,18 @@ impl Solver {
             |theta| theta,
             |now| {
                 let (scale, vertices, image, soft) = now.seen;
+                let read = Transaction::default().register(now.loss).register(soft.inner());
+                let read = read.register(vertices.inner());
+                let read = if pictures { read.register(image.inner()) } else { read };
+                let ([loss, soft, vertices], image) = softrast_method::read(read);
+                let hard = hard_silhouette(on_host(vertices), scene.faces(), self.size);
                 visit(State {
                     step: now.step,
                     scale,
-                    loss: number(now.loss),
-                    soft: number(soft),
-                    hard: number(scene.image_loss(scene.hard(vertices))),
-                    image: image.into_data(),
+                    loss: number(&loss),
+                    soft: number(&soft),
+                    hard: number(&mse_loss(hard, target.clone()).into_data()),
+                    image,
                     seconds: now.seconds,
                 })
             },
@@ -73,6 +81,6 @@ impl Solver {
 }
 
 /// The only number of a tensor.
-fn number<B: Backend>(tensor: Tensor<B, 1>) -> f64 {
-    numbers(tensor)[0]
+fn number(data: &TensorData) -> f64 {
+    data.iter().next().unwrap_or(f64::NAN)
 }

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, study};
-use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
+use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Plan, Point, Progress, Run,
     Schedule, Score, Settings, Study, Task, Variant, best_step, difference, rgb_from_gray,
@@ -31,6 +31,7 @@ const SCALES: Defaults = Defaults {
     decay: [0.02, 0.002],
     fixed: 0.002,
     size: 256,
+    backends: compiled_backends!(),
 };
 /// Largest move of a coordinate in a step, roughly, in NDC: about a pixel of the default size.
 ///
@@ -104,7 +105,7 @@ impl Task for Shape2d {
         Description {
             softness: method.name().to_owned(),
             parameters: method.softness().parameters(),
-            backend: DEFAULT_BACKEND.to_owned(),
+            backend: method.backend().title().to_owned(),
             steps: *steps,
             size: *size,
             faces: self.triangles,
@@ -126,7 +127,8 @@ impl Task for Shape2d {
         let first = batch.seeds.first().copied();
         let runs = batch.seeds.iter().map(|&seed| {
             let pictures = batch.pictures && Some(seed) == first;
-            self.one(&Batch { seeds: vec![seed], pictures }, seed, progress)
+            let batch = Batch { seeds: vec![seed], pictures };
+            on_backend!(self.solver.method.backend(), B => self.one::<B>(&batch, seed, progress))
         });
         runs.collect()
     }
@@ -145,15 +147,20 @@ const EXTRA: [ExtraError; 1] = [ExtraError {
 
 impl Shape2d {
     /// Solves the instance of `seed`, with pictures if the batch wants them.
-    fn one(&self, batch: &Batch, seed: u64, progress: &mut Progress) -> anyhow::Result<Run> {
+    fn one<B: RasterBackend>(
+        &self,
+        batch: &Batch,
+        seed: u64,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Run> {
         let Solver { size, steps, .. } = self.solver;
         let instance = Instance::seeded(seed, self.triangles);
-        let scene = Scene::<Autodiff<DefaultBackend>>::new(&self.target, &instance, size);
+        let scene = Scene::<Autodiff<B>>::new(&self.target, &instance, size);
         let mut curve: Vec<Point> = Vec::with_capacity(steps + 1);
         let mut step_seconds = Vec::with_capacity(steps);
         let mut shown = Vec::new();
         let (mut result, mut least) = (None, f64::INFINITY);
-        self.solver.run(&scene, |state: State| {
+        self.solver.run(&scene, batch.pictures, |state: State| {
             curve.push(Point {
                 step: state.step,
                 loss: state.loss,
@@ -163,8 +170,8 @@ impl Shape2d {
                 extra: vec![state.hard],
             });
             let (frame, best) = (batch.wants_frame(state.step, steps), state.hard <= least);
-            if batch.pictures && (frame || best) {
-                let image: Vec<f64> = state.image.iter().collect();
+            if let Some(image) = state.image.filter(|_| frame || best) {
+                let image: Vec<f64> = image.iter().collect();
                 let picture = rgb_from_gray(&image, size, size);
                 if best {
                     (result, least) = (Some(picture.clone()), state.hard);

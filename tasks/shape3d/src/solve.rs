@@ -1,10 +1,10 @@
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, TensorData, backend::Backend},
+    tensor::{TensorData, Transaction},
 };
 use softrast_meta::Adam;
-use softrast_method::{Descent, Method, MovingSilhouette, numbers};
-use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_method::{Descent, Method, MovingSilhouette, on_host};
+use softrast_raster::{RasterBackend, Rasterizer, hard_silhouette, iou_loss};
 
 use crate::Scene;
 
@@ -32,8 +32,8 @@ pub(crate) struct State {
     pub(crate) soft: f64,
     /// `IoU` loss of the hard silhouettes, mean over the views.
     pub(crate) hard: f64,
-    /// Soft silhouettes, `[views, size, size]`.
-    pub(crate) image: TensorData,
+    /// Soft silhouettes, `[views, size, size]`, where pictures are wanted.
+    pub(crate) image: Option<TensorData>,
     /// Time of the step that ended here, in seconds; none before the first.
     pub(crate) seconds: Option<f64>,
 }
@@ -45,14 +45,17 @@ impl Solver {
         Adam { beta1, beta2, ..Adam::new(self.learning_rate) }
     }
 
-    /// Solves `scene`, and shows each state from the start to the end to `visit`.
+    /// Solves `scene`, and shows each state from the start to the end to `visit`, with
+    /// images if `pictures`.
     pub(crate) fn run<B: RasterBackend>(
         &self,
         scene: &Scene<Autodiff<B>>,
+        pictures: bool,
         mut visit: impl FnMut(State) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let descent = Descent { optimizer: self.adam(), steps: self.steps };
         let first = self.method.scale(0, self.steps);
+        let target = on_host(scene.target().inner().into_data());
         let rasterizer = Rasterizer::new(self.size);
         let mut silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
@@ -71,14 +74,20 @@ impl Solver {
             |theta| theta,
             |now| {
                 let (scale, vertices, projected, image, soft) = now.seen;
+                let read = Transaction::default().register(vertices.inner()).register(now.loss);
+                let read = read.register(soft.inner()).register(projected.inner());
+                let read = if pictures { read.register(image.inner()) } else { read };
+                let ([vertices, loss, soft, projected], image) = softrast_method::read(read);
+                let vertices: Vec<f64> = vertices.iter().collect();
+                let hard = hard_silhouette(on_host(projected), scene.faces(), self.size);
                 visit(State {
                     step: now.step,
                     scale,
-                    vertices: numbers(vertices).chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
-                    loss: number(now.loss),
-                    soft: number(soft),
-                    hard: number(scene.image_loss(scene.hard(projected))),
-                    image: image.into_data(),
+                    vertices: vertices.chunks(3).map(|p| [p[0], p[1], p[2]]).collect(),
+                    loss: number(&loss),
+                    soft: number(&soft),
+                    hard: number(&iou_loss(hard, target.clone()).mean().into_data()),
+                    image,
                     seconds: now.seconds,
                 })
             },
@@ -87,6 +96,6 @@ impl Solver {
 }
 
 /// The only number of a tensor.
-fn number<B: Backend>(tensor: Tensor<B, 1>) -> f64 {
-    numbers(tensor)[0]
+fn number(data: &TensorData) -> f64 {
+    data.iter().next().unwrap_or(f64::NAN)
 }

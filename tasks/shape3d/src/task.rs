@@ -3,7 +3,7 @@ use std::path::Path;
 use burn::backend::Autodiff;
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
 use softrast_method::{Defaults, Method, numbers, study};
-use softrast_raster::{DEFAULT_BACKEND, DefaultBackend};
+use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run, Schedule,
     Score, Settings, Study, Task, Variant, best_step,
@@ -36,6 +36,7 @@ const SCALES: Defaults = Defaults {
     decay: [0.03, 0.003],
     fixed: 0.003,
     size: 64,
+    backends: compiled_backends!(),
 };
 
 /// Largest move of a parameter in a step, roughly.
@@ -97,7 +98,7 @@ impl Task for Shape3d {
         Description {
             softness: method.name().to_owned(),
             parameters: method.softness().parameters(),
-            backend: DEFAULT_BACKEND.to_owned(),
+            backend: method.backend().title().to_owned(),
             steps: *steps,
             size: *size,
             faces: self.template.faces().len(),
@@ -119,7 +120,8 @@ impl Task for Shape3d {
         let first = batch.seeds.first().copied();
         let runs = batch.seeds.iter().map(|&seed| {
             let pictures = batch.pictures && Some(seed) == first;
-            self.one(&Batch { seeds: vec![seed], pictures }, seed, progress)
+            let batch = Batch { seeds: vec![seed], pictures };
+            on_backend!(self.solver.method.backend(), B => self.one::<B>(&batch, seed, progress))
         });
         runs.collect()
     }
@@ -138,16 +140,20 @@ const EXTRA: [ExtraError; 1] = [ExtraError {
 
 impl Shape3d {
     /// Solves the instance of `seed`, with pictures if the batch wants them.
-    fn one(&self, batch: &Batch, seed: u64, progress: &mut Progress) -> anyhow::Result<Run> {
+    fn one<B: RasterBackend>(
+        &self,
+        batch: &Batch,
+        seed: u64,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Run> {
         let instance = Instance::seeded(seed, self.elevation_deg);
         let Solver { size, steps, .. } = self.solver;
-        let scene =
-            Scene::<Autodiff<DefaultBackend>>::new(&self.target, &self.template, &instance, size);
+        let scene = Scene::<Autodiff<B>>::new(&self.target, &self.template, &instance, size);
         let target = numbers(scene.target().inner());
         let mut album = batch.pictures.then(|| Album::new(&target, size));
         let mut curve: Vec<Point> = Vec::with_capacity(steps + 1);
         let mut step_seconds = Vec::with_capacity(steps);
-        self.solver.run(&scene, |state: State| {
+        self.solver.run(&scene, batch.pictures, |state: State| {
             curve.push(Point {
                 step: state.step,
                 loss: state.loss,
@@ -156,8 +162,8 @@ impl Shape3d {
                 scale: state.scale,
                 extra: vec![state.hard],
             });
-            if let Some(album) = &mut album {
-                let image: Vec<f64> = state.image.iter().collect();
+            if let (Some(album), Some(image)) = (&mut album, &state.image) {
+                let image: Vec<f64> = image.iter().collect();
                 album.take(&image, state.hard, batch.wants_frame(state.step, steps));
             }
             step_seconds.extend(state.seconds);

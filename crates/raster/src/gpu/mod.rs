@@ -41,6 +41,8 @@ const TILE: u32 = 8;
 pub type Wgpu = CubeBackend<WgpuRuntime, f32, i32, u32>;
 
 impl RasterBackend for Wgpu {
+    const ON_HOST: bool = false;
+
     fn profile_sum(
         op: &ProfileSum,
         vertices: FloatTensor<Self>,

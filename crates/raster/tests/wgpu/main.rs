@@ -7,6 +7,7 @@
 #[path = "../double/common/mod.rs"]
 mod common;
 mod products;
+mod workloads;
 
 use std::sync::Arc;
 
@@ -28,12 +29,18 @@ fn adapter() -> bool {
     adapter_name().is_ok()
 }
 
-/// A mesh seen from 2.732 away, at some azimuths in degrees.
-fn seen(mesh: &Mesh, azimuths: &[f64], size: usize, softness: EdgeSoftness, scale: f64) -> Scene {
+/// A mesh seen from 2.732 away at an elevation and some azimuths, all in degrees.
+fn seen(
+    mesh: &Mesh,
+    (elevation, azimuths): (f64, &[f64]),
+    size: usize,
+    softness: EdgeSoftness,
+    scale: f64,
+) -> Scene {
     let positions = mesh.positions();
     let world: Tensor<NdArray<f64>, 3> =
         tensor(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
-    let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, 17.3, a, 30.0]).collect();
+    let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, elevation, a, 30.0]).collect();
     let orbits: Tensor<NdArray<f64>, 2> = tensor(&orbits, [azimuths.len(), 4], DType::F64);
     Scene {
         vertices: project(world, orbits).into_data().iter().collect(),
@@ -99,8 +106,8 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
         return;
     }
     let squared = EdgeSoftness { family: Family::Logistic, squared: true };
-    let sphere = seen(&icosphere(2), &[4.1, 108.3, 211.9], 32, squared, 1e-3);
-    let fox = seen(&fox(), &[171.7], 50, squared, 1e-3);
+    let sphere = seen(&icosphere(2), (17.3, &[4.1, 108.3, 211.9]), 32, squared, 1e-3);
+    let fox = seen(&fox(), (17.3, &[171.7]), 50, squared, 1e-3);
     // A tail that is not 0 on the far side.
     let tail = random(EdgeSoftness { family: Family::Mlp, squared: false }, 0.05);
     for (name, scene) in [("a sphere", sphere), ("a fox", fox), ("a tail", tail)] {
@@ -140,7 +147,7 @@ fn the_same_numbers_come_out_every_time() {
         return;
     }
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let scene = seen(&icosphere(1), &[0.0, 30.0], 24, softness, 0.02);
+    let scene = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
     let [first, second] = [(); 2].map(|()| Products::new::<Wgpu>(&scene, DType::F32, Path::Fused));
     assert_eq!(first, second);
 }

@@ -14,6 +14,7 @@ use std::{path::Path, sync::Arc};
 
 use clap::Parser;
 use softrast_method::{Defaults, Method};
+use softrast_raster::BackendChoice;
 use softrast_runner::{Schedule, Settings};
 
 use crate::{
@@ -95,6 +96,7 @@ fn from_file(path: &Path) -> anyhow::Result<Method> {
         decay: [SCALE; 2],
         fixed: SCALE,
         size: SIZE,
+        backends: &[BackendChoice::NdArray],
     };
     Method::new(&Line::try_parse_from(words)?.settings, &defaults)
 }

@@ -3,14 +3,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use reconstruct::{Backend, Checkpoint, execute};
+use reconstruct::{Checkpoint, execute};
 use serde_json::Value;
 
 /// Runs the program; what it prints, or its error line.
 fn run(line: &str) -> Result<String, String> {
     let words = ["reconstruct"].into_iter().chain(line.split_whitespace()).map(Into::into);
     let mut printed = Vec::new();
-    match execute::<Backend>(words, &mut printed) {
+    match execute(words, &mut printed) {
         Ok(()) => Ok(String::from_utf8(printed).unwrap()),
         Err(failure) => Err(failure.to_string()),
     }
@@ -97,6 +97,7 @@ fn nothing_is_overwritten_and_every_refusal_says_why() {
     );
     refuse(train(&out, "--epochs 2 --resume --seed 9"), &["seed is 0 there, 9 here"]);
     refuse(train(&out, "--softness soft"), &["unknown softness", "logistic"]);
+    refuse(train(&out, "--backend cuda"), &["no backend", "expected ndarray, flex or wgpu"]);
     refuse(train(&out, "--t-conorm soft"), &["unknown T-conorm"]);
     refuse(train(&out, "--data /no/such/folder"), &["--data", "--shapes"]);
     let evaluate = || run(&format!("evaluate --checkpoint {} --shapes 1", path.display()));

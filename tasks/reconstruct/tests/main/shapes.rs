@@ -1,8 +1,6 @@
 use burn::tensor::{Tensor, TensorData};
-use reconstruct::{
-    Backend, Procedural, SIZE, Shapes, Smoothness, Split, Template, VIEWS, Voxels, orbit,
-};
-use softrast_raster::{hard_silhouette, project};
+use reconstruct::{Procedural, SIZE, Shapes, Smoothness, Split, Template, VIEWS, Voxels, orbit};
+use softrast_raster::{HostBackend as Backend, hard_silhouette, project};
 
 /// Corners of the full cells as a point cloud, in world units.
 fn centres(voxels: &Voxels) -> Vec<[f64; 3]> {

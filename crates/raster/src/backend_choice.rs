@@ -1,0 +1,196 @@
+//! Which backend a program computes on, chosen at run time; library code is generic.
+
+use std::fmt;
+
+/// Where little things are computed whatever backend draws: parameters, supports, figures. On the
+/// CPU, in floats of 32 bits; with `ndarray` or `wgpu` it also has floats of 64 bits.
+#[cfg(any(feature = "ndarray", feature = "wgpu"))]
+pub type HostBackend = burn::backend::NdArray<f32>;
+/// Where little things are computed whatever backend draws: parameters, supports, figures. On the
+/// CPU, in floats of 32 bits.
+#[cfg(not(any(feature = "ndarray", feature = "wgpu")))]
+pub type HostBackend = burn::backend::Flex;
+
+/// A backend that programs compute on, in floats of 32 bits.
+///
+/// [`compiled_backends!`](crate::compiled_backends) lists those of a program, and
+/// [`on_backend!`](crate::on_backend) goes from the choice to a type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BackendChoice {
+    /// `burn-ndarray`, on the CPU.
+    NdArray,
+    /// `burn-flex`, on the CPU.
+    Flex,
+    /// wgpu: Vulkan, Metal or `WebGPU`, whichever the system has.
+    Wgpu,
+}
+
+impl BackendChoice {
+    /// All that there are.
+    pub const ALL: [Self; 3] = [Self::NdArray, Self::Flex, Self::Wgpu];
+
+    /// Name on the command line, and of the feature that compiles it in.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NdArray => "ndarray",
+            Self::Flex => "flex",
+            Self::Wgpu => "wgpu",
+        }
+    }
+
+    /// Name and float type, for results.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::NdArray => "ndarray f32",
+            Self::Flex => "flex f32",
+            Self::Wgpu => "wgpu f32",
+        }
+    }
+
+    /// The backend that was asked for, or the first of those compiled in.
+    ///
+    /// # Errors
+    ///
+    /// If it does not exist or was not compiled in.
+    ///
+    /// # Panics
+    ///
+    /// If nothing was compiled in.
+    pub fn among(compiled: &'static [Self], asked: Option<&str>) -> Result<Self, NoBackend> {
+        let Some(asked) = asked else {
+            return Ok(*compiled.first().expect("a program has a backend"));
+        };
+        let Some(choice) = Self::ALL.into_iter().find(|choice| choice.name() == asked) else {
+            return Err(NoBackend::Unknown(asked.to_owned()));
+        };
+        if !compiled.contains(&choice) {
+            return Err(NoBackend::Missing { asked: choice, compiled });
+        }
+        Ok(choice)
+    }
+
+    /// Sets the backend up. Call it before the first tensor, which would panic where it cannot be. In a
+    /// browser, where that is asynchronous, the page does it with burn's `init_setup_async`.
+    ///
+    /// # Errors
+    ///
+    /// [`NoAdapter`] if it is wgpu and the system has no adapter.
+    pub fn set_up(self) -> Result<(), NoAdapter> {
+        #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
+        if self == Self::Wgpu {
+            crate::adapter_name()?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for BackendChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A program cannot compute on what was asked for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoBackend {
+    /// Nothing has this name.
+    #[error("there is no backend {0:?}: expected ndarray, flex or wgpu")]
+    Unknown(String),
+    /// Its feature was off when the program was built.
+    #[error(
+        "this program was built without {asked}, for {}: add --features {asked} to the cargo command",
+        names(compiled)
+    )]
+    Missing {
+        /// What was asked for.
+        asked: BackendChoice,
+        /// What there is.
+        compiled: &'static [BackendChoice],
+    },
+}
+
+fn names(choices: &[BackendChoice]) -> String {
+    choices.iter().map(|choice| choice.name()).collect::<Vec<_>>().join(" and ")
+}
+
+/// There is nothing that wgpu could run on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no adapter for wgpu found: install the Vulkan driver of your graphics card, or Mesa's software \
+     Vulkan (Debian, Ubuntu: apt install mesa-vulkan-drivers libvulkan1)"
+)]
+pub struct NoAdapter;
+
+/// The backends whose features (`ndarray`, `flex`, `wgpu`) are on in the crate that asks, as
+/// `&'static [BackendChoice]`.
+#[macro_export]
+macro_rules! compiled_backends {
+    () => {
+        &[
+            #[cfg(feature = "ndarray")]
+            $crate::BackendChoice::NdArray,
+            #[cfg(feature = "flex")]
+            $crate::BackendChoice::Flex,
+            #[cfg(feature = "wgpu")]
+            $crate::BackendChoice::Wgpu,
+        ]
+    };
+}
+
+/// Does `$work` with `$Backend` standing for the chosen backend: `on_backend!(choice, B => draw::<B>())`.
+///
+/// Compiled once for each of `ndarray`, `flex` and `wgpu` whose feature is on in the crate that asks,
+/// whatever features others have turned on in this one. That crate depends on burn.
+///
+/// # Panics
+///
+/// If the choice is not one of [`compiled_backends!`](crate::compiled_backends) there.
+#[macro_export]
+macro_rules! on_backend {
+    ($choice:expr, $Backend:ident => $work:expr) => {
+        match $choice {
+            #[cfg(feature = "ndarray")]
+            $crate::BackendChoice::NdArray => {
+                type $Backend = ::burn::backend::NdArray<f32>;
+                $work
+            }
+            #[cfg(feature = "flex")]
+            $crate::BackendChoice::Flex => {
+                type $Backend = ::burn::backend::Flex;
+                $work
+            }
+            #[cfg(feature = "wgpu")]
+            $crate::BackendChoice::Wgpu => {
+                type $Backend = $crate::Wgpu;
+                $work
+            }
+            #[allow(unreachable_patterns, reason = "all features may be on")]
+            other => unreachable!("{other} was not compiled in"),
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use BackendChoice::{Flex, NdArray, Wgpu};
+
+    use super::*;
+
+    #[test]
+    fn the_first_is_chosen_unless_another_is_asked_for() {
+        assert_eq!(BackendChoice::among(&[Flex, Wgpu], None), Ok(Flex));
+        assert_eq!(BackendChoice::among(&[Flex, Wgpu], Some("wgpu")), Ok(Wgpu));
+    }
+
+    #[test]
+    fn what_is_not_there_is_refused_in_a_line_that_helps() {
+        let missing = BackendChoice::among(&[NdArray, Flex], Some("wgpu")).unwrap_err();
+        assert_eq!(
+            missing.to_string(),
+            "this program was built without wgpu, for ndarray and flex: add --features wgpu to the \
+             cargo command"
+        );
+        let unknown = BackendChoice::among(&[NdArray], Some("cuda")).unwrap_err();
+        assert!(unknown.to_string().contains("flex"), "{unknown}");
+    }
+}
