@@ -3,10 +3,9 @@
 //! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
 //! there is none.
 
-#[allow(dead_code, reason = "shared with the tests in f64, which need more of it")]
-#[path = "../double/common/mod.rs"]
-mod common;
 mod products;
+#[path = "../triangles/mod.rs"]
+mod triangles;
 
 use std::sync::Arc;
 
@@ -47,7 +46,7 @@ fn seen(mesh: &Mesh, azimuths: &[f64], size: usize, softness: EdgeSoftness, scal
 
 /// Random triangles, with slivers, and faces beside the image and behind the camera.
 fn random(softness: EdgeSoftness, scale: f64) -> Scene {
-    let (mut vertices, faces) = common::triangles(7, 20);
+    let (mut vertices, faces) = triangles::triangles(7, 20);
     // Far beside the image.
     for corner in 0..3 {
         vertices[3 * corner] += 40.0;
