@@ -4,8 +4,10 @@ use clap::Parser;
 
 use crate::{Cell, TaskName};
 
-/// Softness families whose settings are searched for, and the MLP as it is before it has learned.
-const METHODS: &str = "logistic,gauss,exp,gamma,mlp";
+/// Softness families whose settings are searched for, static and decaying, and the MLP.
+const METHODS: &str = "logistic --schedule static,gauss --schedule static,exp --schedule static,\
+                       gamma --schedule static,mlp,logistic --schedule decay,\
+                       gauss --schedule decay,exp --schedule decay,gamma --schedule decay";
 
 /// Evaluates all methods on all tasks, original and transfer, and writes the tables.
 ///
@@ -17,7 +19,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "all")]
     pub tasks: Vec<String>,
 
-    /// Methods: softness families or softness files in JSON.
+    /// Methods: softness families or softness files in JSON; behind one may stand its schedule, or
+    /// other flags of the tasks.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS)]
     pub methods: Vec<String>,
 
@@ -84,8 +87,8 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 5);
-        assert_eq!((cells[0].task, cells[5].variant), (TaskName::Shape2d, "transfer"));
+        assert_eq!(cells.len(), 4 * 2 * 9);
+        assert_eq!((cells[0].task, cells[9].variant), (TaskName::Shape2d, "transfer"));
         let some = args("--tasks pose --methods gauss,a/b.json --runs 7").cells().unwrap();
         assert!(some.len() == 4 && some[3].runs == 7 && some[3].method_name() == "b");
         assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));

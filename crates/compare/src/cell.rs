@@ -1,4 +1,7 @@
-use std::{ffi::OsString, path::Path};
+use std::{
+    ffi::OsString,
+    path::{Path, PathBuf},
+};
 
 use anyhow::Context;
 use serde_json::Value;
@@ -13,17 +16,36 @@ pub struct Cell {
     pub task: TaskName,
     /// `original` or `transfer`.
     pub variant: &'static str,
-    /// Softness family or file, as the command line of the task has it.
+    /// Softness family or file and further flags, as the command line of the task has them.
     pub method: String,
     /// Seeds, from 0 on.
     pub runs: u32,
 }
 
 impl Cell {
-    /// Name of the method: that of its file without folder and ending, or of the family.
-    pub fn method_name(&self) -> &str {
-        let stem = Path::new(&self.method).file_stem().and_then(|stem| stem.to_str());
-        stem.unwrap_or(&self.method)
+    /// Family or file.
+    pub fn softness(&self) -> &str {
+        self.method.split_whitespace().next().unwrap_or_default()
+    }
+
+    /// Name of the softness: that of its file without folder and ending, or of the family.
+    pub fn softness_name(&self) -> &str {
+        let stem = Path::new(self.softness()).file_stem().and_then(|stem| stem.to_str());
+        stem.unwrap_or(self.softness())
+    }
+
+    /// Name of the method: the softness, and the flags without what every flag has.
+    pub fn method_name(&self) -> String {
+        let flags = self.method.split_whitespace().skip(1).filter(|word| *word != "--schedule");
+        let words = flags.map(|word| word.trim_start_matches("--"));
+        std::iter::once(self.softness_name()).chain(words).collect::<Vec<_>>().join(" ")
+    }
+
+    /// Folder of its results in `out`.
+    pub fn folder(&self, out: &Path) -> PathBuf {
+        let Self { task, variant, runs, .. } = self;
+        let method = self.method_name().replace([' ', '='], "-");
+        out.join(format!("{}-{variant}-{method}-{runs}", task.name()))
     }
 
     /// Evaluates the cell in a folder of its own in `out`; what is finished there is not done again.
@@ -33,7 +55,7 @@ impl Cell {
     /// Those of the task's program.
     pub fn evaluate(&self, out: &Path, quiet: bool) -> anyhow::Result<Measured> {
         let Self { task, variant, method, runs } = self;
-        let folder = out.join(format!("{}-{variant}-{}-{runs}", task.name(), self.method_name()));
+        let folder = self.folder(out);
         let runs = runs.to_string();
         let line = [
             task.name(),
@@ -41,12 +63,12 @@ impl Cell {
             "--json",
             "--variant",
             variant,
-            "--softness",
-            method,
             "--runs",
             &runs,
+            "--softness",
         ];
-        let mut words: Vec<OsString> = line.into_iter().map(OsString::from).collect();
+        let line = line.into_iter().chain(method.split_whitespace());
+        let mut words: Vec<OsString> = line.map(OsString::from).collect();
         words.extend(["--out".into(), folder.clone().into_os_string()]);
         words.extend(quiet.then(|| "--quiet".into()));
         words.extend(folder.join("evaluate.jsonl").exists().then(|| "--resume".into()));
@@ -65,6 +87,6 @@ impl Cell {
             )
         })?;
         let json: Value = serde_json::from_slice(&stdout).context("a result is no JSON")?;
-        Measured::new(self.clone(), &json)
+        Measured::new(self.clone(), &json)?.with_traces(&folder)
     }
 }

@@ -6,11 +6,17 @@
 
 mod args;
 mod cell;
+mod charts;
+mod functions;
 mod measured;
 mod paper;
+mod plot;
 mod program;
+mod records;
 mod results;
+mod table;
 mod task;
+mod trace;
 
 pub use args::Args;
 pub use cell::Cell;
@@ -19,3 +25,4 @@ pub use paper::Printed;
 pub use program::{compare, main};
 pub use results::markdown;
 pub use task::TaskName;
+pub use trace::Trace;

@@ -1,7 +1,9 @@
+use std::path::Path;
+
 use anyhow::Context;
 use serde_json::Value;
 
-use crate::Cell;
+use crate::{Cell, Trace};
 
 /// What a cell came to, at the last step.
 #[derive(Clone, Debug)]
@@ -18,14 +20,22 @@ pub struct Measured {
     pub released: Option<Error>,
     /// Share of runs that succeed.
     pub success_rate: f64,
-    /// Median time of a step of one batch, in seconds.
-    pub step_seconds: f64,
+    /// Time of the optimisation steps of a run, in seconds: its share of a batch.
+    pub seconds: f64,
+    /// Most memory that the program had used by the end of the cell, in MiB.
+    pub peak_mib: Option<f64>,
+    /// How each run went on, in the order of the seeds.
+    pub traces: Vec<Trace>,
     /// Steps, pixels along a side of the image, and faces.
     pub steps: u64,
     /// Width and height of the image, in pixels.
     pub size: u64,
     /// Faces of the scene.
     pub faces: u64,
+    /// Scale at the last step, where there is one, in NDC (NDC² if squared).
+    pub scale_end: Option<f64>,
+    /// Whether the softness sees the squared distance.
+    pub squared: bool,
     /// Scale before the first and at the last step, depth scale if there is one, learning rate.
     pub settings: String,
 }
@@ -73,13 +83,29 @@ impl Measured {
             parameter: Error::new(&json["parameter_error"])?,
             released: released.is_object().then(|| Error::new(released)).transpose()?,
             success_rate: number("/success_rate")?,
-            step_seconds: number("/seconds/step_median")?,
+            seconds: number("/seconds/per_run")?,
+            peak_mib: json["peak_memory_mib"].as_f64(),
+            traces: Vec::new(),
+            scale_end: settings["scale_end"].as_f64(),
+            squared: settings["squared"].as_bool() == Some(true),
             steps: whole("steps")?,
             size: whole("size")?,
             faces: whole("faces")?,
             settings: names.filter_map(named).collect::<Vec<_>>().join(", ").replace(", to", " to"),
             cell,
         })
+    }
+}
+
+impl Measured {
+    /// With the curves that `evaluate` has left in its folder.
+    ///
+    /// # Errors
+    ///
+    /// If they are not there or cannot be read.
+    pub fn with_traces(mut self, folder: &Path) -> anyhow::Result<Self> {
+        self.traces = Trace::load(&folder.join("curve.csv"))?;
+        Ok(self)
     }
 }
 

@@ -16,6 +16,8 @@ fn a_comparison_is_not_done_twice() {
         assert!(said.starts_with("2 cells, tables in"), "{said} {:?}", output.stderr);
         let journal = out.path().join("occlusion-transfer-exp-1/evaluate.jsonl");
         let tables = fs::read_to_string(out.path().join("results.md")).unwrap();
+        let report = fs::read_to_string(out.path().join("report.html")).unwrap();
+        assert!(report.contains("<svg") && out.path().join("charts/profile.csv").exists());
         (tables, fs::read(journal).unwrap())
     };
     let first = compare();

@@ -7,7 +7,7 @@
 //! moved so far that it must. A [`Descent`] goes down the gradient of a task's loss and shows every
 //! step.
 //!
-//! A task that implements [`Lesson`] can have a softness learned on it: `study` turns it into what the
+//! A task that implements [`Lesson`], or [`SilhouetteLesson`] if it sees silhouettes, can have a softness learned on it: `study` turns it into what the
 //! command `learn` drives.
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
@@ -38,6 +38,8 @@ mod lesson;
 mod method;
 mod moving_silhouette;
 mod searched;
+mod shipped;
+mod silhouette_lesson;
 mod tensor;
 
 pub use course::study;
@@ -50,4 +52,6 @@ pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;
+pub use shipped::shipped;
+pub use silhouette_lesson::{LearnedSilhouette, SilhouetteLesson};
 pub use tensor::{numbers, tensor};

@@ -2,7 +2,7 @@ use softrast_raster::{DefaultBackend, set_up_default_backend};
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
-use crate::{Searched, numbers, tensor};
+use crate::{Searched, numbers, shipped, tensor};
 
 /// Scales of a task that the command line does not name, as widths in NDC. A family that
 /// [`Searched`] knows has its own instead.
@@ -26,6 +26,7 @@ pub struct Method {
     softness: EdgeSoftness,
     name: String,
     path: Path,
+    searched: Option<&'static Searched>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +41,8 @@ enum Path {
 }
 
 impl Method {
-    /// The method that the command line asks for; by default a logistic.
+    /// The method that the command line asks for; by default what was learned for the task and
+    /// comes with the program ([`shipped`]), or else a logistic. The same holds for `mlp`.
     ///
     /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are
     /// squared, so that they mean the same widths.
@@ -52,23 +54,30 @@ impl Method {
     pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
         // Before the first tensor.
         set_up_default_backend()?;
+        let scaled = settings.scale.is_some() || settings.scale_end.is_some() || settings.squared;
+        let asked = scaled || settings.schedule.is_some();
+        let comes_with_it = match &settings.softness {
+            None if !asked => Some(("learned", defaults.task.to_owned())),
+            Some(SoftnessChoice::Named("mlp")) if !scaled => {
+                Some(("mlp", format!("{}_mlp", defaults.task)))
+            }
+            _ => None,
+        };
+        if let Some((name, file)) = comes_with_it
+            && let Some(learned) = shipped(&file)?
+        {
+            return Ok(Self::of_file(learned, name.to_owned(), settings, defaults));
+        }
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
-                let scaled = settings.scale.is_some() || settings.scale_end.is_some();
-                if scaled || settings.squared || settings.schedule == Some(Schedule::Decay) {
+                if scaled || settings.schedule == Some(Schedule::Decay) {
                     return Err(usage(
                         "a softness file holds its own parameters: leave out --scale, --scale-end, \
                          --squared and --schedule decay, or name a family",
                     ));
                 }
-                let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(file)?;
-                let path = match path {
-                    None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
-                    Some(path) => {
-                        Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) }
-                    }
-                };
-                Ok(Self { softness, name: file.display().to_string(), path })
+                let learned = SoftnessFile::load(file)?;
+                Ok(Self::of_file(learned, file.display().to_string(), settings, defaults))
             }
             named => {
                 let name = match named {
@@ -77,15 +86,27 @@ impl Method {
                 };
                 let family: Family = name.parse()?;
                 let softness = EdgeSoftness { family, squared: settings.squared };
-                let path = scale_path(settings, &defaults.searched(family));
-                Ok(Self { softness, name: family.name().to_owned(), path })
+                let schedule = asked_schedule(settings);
+                let searched = Searched::of(defaults.task, family.name(), schedule);
+                let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
+                Ok(Self { softness, name: family.name().to_owned(), path, searched })
             }
         }
     }
 
-    /// What was searched for this family on a task.
-    pub fn searched(&self, task: &str) -> Option<&'static Searched> {
-        Searched::of(task, &self.name)
+    /// With the parameters of a file.
+    fn of_file(file: SoftnessFile, name: String, settings: &Settings, defaults: &Defaults) -> Self {
+        let SoftnessFile { softness, phi, path, .. } = file;
+        let path = match path {
+            None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
+            Some(path) => Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) },
+        };
+        Self { softness, name, path, searched: None }
+    }
+
+    /// What was searched for this family on the task, under the same schedule.
+    pub fn searched(&self) -> Option<&'static Searched> {
+        self.searched
     }
 
     /// Name of the family, or of the file.
@@ -151,29 +172,28 @@ fn part(step: usize, steps: usize) -> f64 {
 }
 
 impl Defaults {
-    /// With the schedule and the scale that were searched for a family of this task.
-    fn searched(self, family: Family) -> Self {
-        match Searched::of(self.task, family.name()) {
-            None => self,
-            Some(&Searched { scale, scale_end: None, .. }) => {
+    /// With the schedule and the scale that were searched for.
+    fn with(self, found: &Searched) -> Self {
+        match *found {
+            Searched { scale, scale_end: None, .. } => {
                 Self { schedule: Schedule::Static, fixed: scale, ..self }
             }
-            Some(&Searched { scale, scale_end: Some(end), .. }) => {
+            Searched { scale, scale_end: Some(end), .. } => {
                 Self { schedule: Schedule::Decay, decay: [scale, end], ..self }
             }
         }
     }
 }
 
+/// The schedule that the flags ask for: a scale without one stays as it is.
+fn asked_schedule(settings: &Settings) -> Option<Schedule> {
+    settings.schedule.or(settings.scale.map(|_| Schedule::Static))
+}
+
 fn scale_path(settings: &Settings, defaults: &Defaults) -> Path {
     let unit = |scale: f64| if settings.squared { scale * scale } else { scale };
     let Settings { scale, scale_end, .. } = *settings;
-    let schedule = match (settings.schedule, scale) {
-        (Some(schedule), _) => schedule,
-        (None, Some(_)) => Schedule::Static,
-        (None, None) => defaults.schedule,
-    };
-    match schedule {
+    match asked_schedule(settings).unwrap_or(defaults.schedule) {
         Schedule::Static => {
             let scale = scale.unwrap_or(unit(defaults.fixed));
             Path::Scale { first: scale, last: scale }

@@ -1,11 +1,12 @@
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use serde::Deserialize;
+use softrast_runner::Schedule;
 
 /// What `search` found best for a softness family on a task's original variant, on training seeds.
 ///
 /// All that the tasks know of it stands in `searched.json` beside the manifest of this crate, with
-/// the command that made each entry: for every task, a setting for every family.
+/// the command that made each entry: for every task and family a static setting, a decay, or both.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Searched {
@@ -17,20 +18,43 @@ pub struct Searched {
     pub learning_rate: Option<f64>,
     /// Width of the soft depth, where the task has one.
     pub depth_scale: Option<f64>,
+    /// Mean over the training seeds of the error that the search went by.
+    pub error: f64,
     /// The flags of the search.
     pub command: String,
 }
 
-type Tasks = BTreeMap<String, BTreeMap<String, Searched>>;
+/// The settings of a family in a task.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Found {
+    #[serde(rename = "static")]
+    fixed: Option<Searched>,
+    decay: Option<Searched>,
+}
+
+type Tasks = BTreeMap<String, BTreeMap<String, Found>>;
+
+static TASKS: LazyLock<Tasks> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../searched.json"))
+        .expect("searched.json is part of the program and tested")
+});
 
 impl Searched {
-    /// The setting of a family in a task; none where nothing was searched for.
-    pub fn of(task: &str, family: &str) -> Option<&'static Self> {
-        static TASKS: LazyLock<Tasks> = LazyLock::new(|| {
-            serde_json::from_str(include_str!("../searched.json"))
-                .expect("searched.json is part of the program and tested")
-        });
-        TASKS.get(task)?.get(family)
+    /// The setting of a family in a task under a schedule, or under the better of the two; none where
+    /// nothing was searched for.
+    pub fn of(task: &str, family: &str, schedule: Option<Schedule>) -> Option<&'static Self> {
+        let Found { fixed, decay } = TASKS.get(task)?.get(family)?;
+        match schedule {
+            Some(Schedule::Static) => fixed.as_ref(),
+            Some(Schedule::Decay) => decay.as_ref(),
+            None => fixed.iter().chain(decay).min_by(|a, b| a.error.total_cmp(&b.error)),
+        }
+    }
+
+    /// Whether the scale moves.
+    pub fn schedule(&self) -> Schedule {
+        if self.scale_end.is_some() { Schedule::Decay } else { Schedule::Static }
     }
 }
 
@@ -40,17 +64,19 @@ mod tests {
 
     #[test]
     fn the_file_is_whole_and_its_numbers_are_positive() {
-        let text = include_str!("../searched.json");
-        let tasks: Tasks = serde_json::from_str(text).unwrap();
-        for (task, families) in &tasks {
-            for (family, found) in families {
+        let families = TASKS.iter().flat_map(|(task, found)| found.iter().map(move |f| (task, f)));
+        for (task, (family, Found { fixed, decay })) in families {
+            assert!(fixed.iter().all(|found| found.scale_end.is_none()), "{task} {family}");
+            assert!(decay.iter().all(|f| f.scale_end.is_some_and(|end| end < f.scale)), "{task}");
+            for found in fixed.iter().chain(decay) {
                 let Searched { scale, scale_end, learning_rate, depth_scale, .. } = found;
                 let numbers = [Some(*scale), *scale_end, *learning_rate, *depth_scale];
                 assert!(numbers.into_iter().flatten().all(|x| x > 0.0), "{task} {family}");
-                assert!(scale_end.is_none_or(|end| end < *scale), "{task} {family}");
-                assert_eq!(Searched::of(task, family), Some(found));
+                assert_eq!(Searched::of(task, family, Some(found.schedule())), Some(found));
+                let better = Searched::of(task, family, None).unwrap();
+                assert!(better.error <= found.error, "{task} {family}");
             }
         }
-        assert_eq!(Searched::of("teapot", "logistic"), None);
+        assert_eq!(Searched::of("teapot", "logistic", None), None);
     }
 }

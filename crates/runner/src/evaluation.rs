@@ -13,6 +13,8 @@ pub(crate) struct Evaluation {
     pub(crate) pictures: Option<Encoded>,
     /// Wall time of the runs, with metrics and pictures.
     pub(crate) seconds: f64,
+    /// Wall time of the optimisation steps alone.
+    pub(crate) step_seconds: f64,
 }
 
 /// Solves all seeds with each of the named methods, and says whether that was cut short.
@@ -69,6 +71,8 @@ fn batch<T: Task>(
         solved.runs.iter_mut().try_for_each(keep_finite)?;
         Ok(solved)
     })?;
+    // All runs of a batch carry the times of its steps.
+    evaluation.step_seconds += solved.runs.first().map_or(0.0, |run| run.step_seconds.iter().sum());
     evaluation.runs.extend(solved.runs);
     evaluation.seconds += solved.seconds;
     evaluation.pictures = evaluation.pictures.take().or(solved.pictures);

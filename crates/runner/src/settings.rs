@@ -64,7 +64,7 @@ pub struct Settings {
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,
 
-    /// Softness: logistic, gauss, exp, gamma, mlp, a softness file in JSON, or auto for what `choose`
+    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, or auto for what `choose`
     /// finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
@@ -157,7 +157,7 @@ pub enum SoftnessChoice {
 
 impl SoftnessChoice {
     /// The names that the command line knows.
-    pub const NAMES: [&'static str; 5] = ["logistic", "gauss", "exp", "gamma", "mlp"];
+    pub const NAMES: [&'static str; 6] = ["logistic", "gauss", "exp", "gamma", "bilogit", "mlp"];
 
     /// Stands for the method that `choose` finds; a task never sees it.
     pub(crate) const AUTO: Self = Self::Named("auto");

@@ -60,6 +60,8 @@ pub(crate) struct Seconds {
     pub(crate) total: f64,
     /// Wall time of one optimisation step of one batch.
     pub(crate) step_median: f64,
+    /// Wall time of the optimisation steps that a run takes, its share of a batch.
+    pub(crate) per_run: f64,
 }
 
 impl Summary {
@@ -95,7 +97,11 @@ impl Summary {
             success_rate: successes as f64 / runs.len() as f64,
             success_ci95: many.then(|| wilson_interval(successes, runs.len())),
             success_means: description.success.clone(),
-            seconds: Seconds { total: evaluation.seconds, step_median: median(&steps) },
+            seconds: Seconds {
+                total: evaluation.seconds,
+                step_median: median(&steps),
+                per_run: evaluation.step_seconds / runs.len().max(1) as f64,
+            },
             peak_memory_mib: peak_rss_mib(),
             settings: description.settings.clone(),
             warnings: distinct_warnings(runs),

@@ -56,7 +56,7 @@ fn solve_is_the_default_and_writes_every_file() {
     for key in ["parameters", "seed", "runs", "steps", "size", "faces", "success_rate"] {
         assert!(json[key].is_number(), "{key}");
     }
-    for key in ["total", "step_median"] {
+    for key in ["total", "step_median", "per_run"] {
         assert!(json["seconds"][key].is_number(), "{key}");
     }
     for error in [&json["image_error"], &json["parameter_error"], &json["image_error"]["square"]] {

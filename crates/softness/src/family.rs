@@ -4,8 +4,8 @@ use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Cauchy, CubicHermite, Exp, Forward, Gamma, Gauss, Gudermannian, GumbelMax, GumbelMin, Laplace,
-    Levy, Logistic, Mlp, Reciprocal, Reversed, Softness, Uniform, Wigner, initial_mlp,
+    BiLogit, Cauchy, CubicHermite, Exp, Forward, Gamma, Gauss, Gudermannian, GumbelMax, GumbelMin,
+    Laplace, Levy, Logistic, Mlp, Reciprocal, Reversed, Softness, Uniform, Wigner, initial_mlp,
 };
 
 /// The shape of the Gamma law that the paper uses.
@@ -20,6 +20,8 @@ const GAMMA_SHAPE: f64 = 0.5;
 pub enum Family {
     /// [`Logistic`].
     Logistic,
+    /// [`BiLogit`].
+    Bilogit,
     /// [`Gauss`].
     Gauss,
     /// [`Laplace`].
@@ -70,6 +72,10 @@ macro_rules! with_softness {
         match $family {
             Family::Logistic => {
                 let $softness = Logistic;
+                $body
+            }
+            Family::Bilogit => {
+                let $softness = BiLogit;
                 $body
             }
             Family::Gauss => {
@@ -146,8 +152,9 @@ macro_rules! with_softness {
 
 impl Family {
     /// Every family, in the order of the documentation.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Logistic,
+        Self::Bilogit,
         Self::Gauss,
         Self::Laplace,
         Self::Exp,
@@ -171,6 +178,7 @@ impl Family {
     pub fn name(self) -> &'static str {
         match self {
             Self::Logistic => "logistic",
+            Self::Bilogit => "bilogit",
             Self::Gauss => "gauss",
             Self::Laplace => "laplace",
             Self::Exp => "exp",
@@ -192,7 +200,8 @@ impl Family {
     }
 
     /// Parameters to start from: `scale` is in the unit of x, there is no shift, the Gamma shape is
-    /// 0.5 and the MLP is [`initial_mlp`] with seed 0.
+    /// 0.5, the MLP is [`initial_mlp`] with seed 0, and a bilogit is as steep at the edge as a
+    /// logistic of that scale: its own is twice as wide, height and ratio are 1.
     ///
     /// # Panics
     ///
@@ -201,16 +210,18 @@ impl Family {
         assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
         match self {
             Self::Gamma | Self::GammaForward => vec![scale.ln(), GAMMA_SHAPE.ln(), 0.0],
+            Self::Bilogit => vec![(2.0 * scale).ln(), 0.0, 0.0],
             Self::Exp | Self::ExpForward | Self::Levy | Self::LevyForward => vec![scale.ln(), 0.0],
             Self::Mlp => initial_mlp(0, scale),
             _ => vec![scale.ln()],
         }
     }
 
-    /// How many of the leading parameters are logarithms (of a scale, then of a shape).
+    /// How many of the leading parameters are logarithms (of a scale, then of shapes).
     pub(crate) fn logarithms(self) -> usize {
         match self {
             Self::Gamma | Self::GammaForward => 2,
+            Self::Bilogit => 3,
             Self::Mlp => 0,
             _ => 1,
         }
@@ -287,7 +298,7 @@ mod tests {
     #[test]
     fn an_unknown_name_is_answered_with_the_known_ones() {
         let message = "sigmoid".parse::<Family>().unwrap_err().to_string();
-        assert!(message.starts_with("unknown softness \"sigmoid\"; known are logistic, gauss,"));
+        assert!(message.starts_with("unknown softness \"sigmoid\"; known are logistic, bilogit,"));
         assert!(message.ends_with("gumbel_min, mlp"));
     }
 }

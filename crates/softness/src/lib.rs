@@ -25,6 +25,7 @@
 //! narrower than about 1e-7.
 
 mod atan_ratio;
+mod bilogit;
 mod cauchy;
 mod cubic_hermite;
 mod depth;
@@ -60,6 +61,7 @@ mod uniform;
 mod unit_step;
 mod wigner;
 
+pub use bilogit::BiLogit;
 pub use cauchy::Cauchy;
 pub use cubic_hermite::CubicHermite;
 pub use depth_file::DepthSoftnessFile;

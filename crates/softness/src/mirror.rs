@@ -18,6 +18,7 @@ impl Family {
             Self::GumbelMax => Self::GumbelMin,
             Self::GumbelMin => Self::GumbelMax,
             Self::Logistic
+            | Self::Bilogit
             | Self::Gauss
             | Self::Laplace
             | Self::Uniform

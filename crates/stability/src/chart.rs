@@ -1,17 +1,9 @@
 use anyhow::anyhow;
 use plotters::prelude::*;
+use softrast_runner::method_colour;
 
 use crate::{LevelOutcome, Outcome, Row};
 
-/// Colours of the methods, the same in every chart; told apart also by those who see no red.
-const COLOURS: [(&str, RGBColor); 6] = [
-    ("logistic", RGBColor(31, 96, 168)),
-    ("gauss", RGBColor(86, 180, 233)),
-    ("exp", RGBColor(0, 140, 100)),
-    ("gamma", RGBColor(204, 121, 167)),
-    ("mlp", RGBColor(196, 84, 24)),
-    ("decay", RGBColor(40, 40, 40)),
-];
 const GRID: RGBColor = RGBColor(225, 228, 232);
 const SIZE: (u32, u32) = (860, 300);
 /// Room for the names of the methods.
@@ -144,5 +136,6 @@ fn draw<DB: DrawingBackend>(
 }
 
 fn colour(method: &str) -> RGBColor {
-    COLOURS.iter().find(|(name, _)| *name == method).map_or(BLACK, |(_, colour)| *colour)
+    let [r, g, b] = method_colour(method);
+    RGBColor(r, g, b)
 }

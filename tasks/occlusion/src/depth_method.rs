@@ -51,7 +51,7 @@ impl DepthMethod {
             }
             return Ok(Self { softness, phi: softness.default_phi(1.0), name, scale: None });
         }
-        let searched = Searched::of(Occlusion::NAME, softness.name());
+        let searched = Searched::of(Occlusion::NAME, softness.name(), settings.schedule);
         let searched = searched.and_then(|found| found.depth_scale);
         let scale = args.depth_scale.or(settings.own).or(searched).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()

@@ -55,7 +55,7 @@ impl Task for Occlusion {
         // `evaluate --variant transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 %
         // at 0.7 and at 1.4.
         let edge = Method::new(settings, &SCALES)?;
-        let searched = edge.searched(Self::NAME).and_then(|found| found.learning_rate);
+        let searched = edge.searched().and_then(|found| found.learning_rate);
         let (steps, learning_rate) = match settings.variant {
             Variant::Original => (100, searched.unwrap_or(0.03)),
             Variant::Transfer => (10, 0.7),

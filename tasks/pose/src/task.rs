@@ -67,7 +67,7 @@ impl Task for Pose {
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let method = Method::new(settings, &SCALES)?;
-        let searched = method.searched(Self::NAME).and_then(|found| found.learning_rate);
+        let searched = method.searched().and_then(|found| found.learning_rate);
         let (steps, learning_rate) = match settings.variant {
             Variant::Original => (300, searched.unwrap_or(0.3)),
             Variant::Transfer => (150, 0.5),

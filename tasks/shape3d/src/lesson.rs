@@ -1,38 +1,31 @@
-use std::sync::Arc;
-
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
-use softrast_method::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, PreparedRun, Step};
-use softrast_raster::{DefaultBackend, RasterBackend, Rasterizer};
-use softrast_runner::{Figure, Plan};
+use softrast_method::{LearnedSilhouette, SilhouetteLesson};
+use softrast_raster::RasterBackend;
+use softrast_runner::Plan;
 
 use crate::{Instance, Scene, Shape3d};
 
 /// 3D SHAPE as something to learn a softness on.
 pub struct Shape3dLesson {
     task: Shape3d,
-    edge: LearnedEdge,
-    faces: Arc<[[u32; 3]]>,
-    judge: Judge,
+    drawn: LearnedSilhouette,
 }
 
 impl Shape3dLesson {
     /// Learns on `task` as `plan` says.
     pub fn new(task: Shape3d, plan: &Plan) -> Self {
-        let solver = &task.solver;
-        let edge = LearnedEdge::new(&solver.method, plan, solver.steps, solver.size);
-        let faces: Arc<[[u32; 3]]> = task.template.faces().into();
-        let judge = Judge::new::<DefaultBackend>(&faces, solver.size);
-        Self { task, edge, faces, judge }
+        let (solver, faces) = (&task.solver, task.template.faces().into());
+        let drawn = LearnedSilhouette::new(&solver.method, plan, solver.steps, solver.size, faces);
+        Self { task, drawn }
     }
 }
 
-impl Lesson for Shape3dLesson {
+impl SilhouetteLesson for Shape3dLesson {
     type Scene<B: RasterBackend> = Scene<B>;
-    type Drawing = PreparedRun;
 
-    fn start(&self) -> Vec<f64> {
-        self.edge.start()
+    fn drawn(&self) -> &LearnedSilhouette {
+        &self.drawn
     }
 
     fn inner(&self) -> InnerLoop<Adam> {
@@ -50,48 +43,19 @@ impl Lesson for Shape3dLesson {
         scene.start()
     }
 
-    fn prepare(&self, phi: &[f64]) -> PreparedRun {
-        let size = self.task.solver.size;
-        let rasterizer = Rasterizer { tolerance: LEARNING_TOLERANCE, ..Rasterizer::new(size) };
-        self.edge.prepare::<DefaultBackend>(rasterizer, &self.faces, phi)
+    fn vertices<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+        scene.project(scene.vertices(theta))
     }
 
-    fn prepared<B: RasterBackend>(
-        &self,
-        drawing: &PreparedRun,
-        phi: Tensor<B, 1>,
-        step: usize,
-    ) -> Tensor<B, 1> {
-        drawing.prepared(&self.edge, &phi, step)
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        scene.image_loss(image)
     }
 
-    fn stage(&self, step: usize) -> usize {
-        self.edge.stage(step)
-    }
-
-    fn loss<B: RasterBackend>(
+    fn smoothness_loss<B: RasterBackend>(
         &self,
         scene: &Scene<B>,
-        drawing: &PreparedRun,
         theta: Tensor<B, 1>,
-        phi: Tensor<B, 1>,
-        step: Step,
-    ) -> Tensor<B, 1> {
-        let vertices = scene.vertices(theta);
-        let image = drawing.image(&self.edge, scene.project(vertices.clone()), &phi, step);
-        scene.image_loss(image) + scene.smoothness_loss(vertices)
-    }
-
-    /// How well the image fits, without what keeps the scene smooth.
-    fn judge<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
-        scene.image_loss(self.judge.image(scene.project(scene.vertices(theta))))
-    }
-
-    fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
-        self.edge.files(phi, note)
-    }
-
-    fn figures(&self, phi: &[f64]) -> Vec<Figure> {
-        self.edge.figures::<DefaultBackend>(phi)
+    ) -> Option<Tensor<B, 1>> {
+        Some(scene.smoothness_loss(scene.vertices(theta)))
     }
 }

@@ -62,7 +62,7 @@ impl Task for Shape3d {
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let method = Method::new(settings, &SCALES)?;
-        let searched = method.searched(Self::NAME).and_then(|found| found.learning_rate);
+        let searched = method.searched().and_then(|found| found.learning_rate);
         let learning_rate = settings.learning_rate.or(searched).unwrap_or(LEARNING_RATE);
         let solver = Solver {
             method,

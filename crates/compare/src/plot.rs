@@ -1,0 +1,195 @@
+//! A chart as SVG: lines with bands, dashes and dots over axes that may be logarithmic.
+
+use std::fmt::Write;
+
+use anyhow::anyhow;
+use plotters::{coord::Shift, prelude::*};
+
+const SIZE: (u32, u32) = (900, 380);
+/// Room for the names of the methods, right of the axes.
+const LEGEND: u32 = 190;
+const ROW: i32 = 19;
+const GRID: RGBColor = RGBColor(225, 228, 232);
+const BEHIND: RGBColor = RGBColor(150, 150, 150);
+
+/// One pair of axes and what is drawn over them.
+#[derive(Clone, Debug)]
+pub(crate) struct Plot {
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) series: Vec<Series>,
+    /// Points joined by a line under the others.
+    pub(crate) front: Vec<[f64; 2]>,
+}
+
+/// Name with unit, and whether it is divided in decades.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    pub(crate) name: String,
+    pub(crate) logarithmic: bool,
+}
+
+/// What belongs to one method.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Series {
+    pub(crate) name: String,
+    pub(crate) colour: [u8; 3],
+    pub(crate) dashed: bool,
+    /// Drawn as a line; a single one as a dot.
+    pub(crate) points: Vec<[f64; 2]>,
+    /// Lower and upper end at every point, or nothing.
+    pub(crate) band: Vec<[f64; 2]>,
+    /// Whether a ring around its dots marks it.
+    pub(crate) marked: bool,
+}
+
+impl Axis {
+    pub(crate) fn linear(name: &str) -> Self {
+        Self { name: name.to_owned(), logarithmic: false }
+    }
+
+    pub(crate) fn logarithmic(name: &str) -> Self {
+        Self { name: name.to_owned(), logarithmic: true }
+    }
+
+    fn place(&self, value: f64) -> f64 {
+        if self.logarithmic { value.log10() } else { value }
+    }
+
+    fn label(&self, place: f64) -> String {
+        let value = if self.logarithmic { 10f64.powf(place) } else { place };
+        match value.abs() {
+            0.0 => "0".into(),
+            1e-3..1e5 => {
+                let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
+                let text = format!("{value:.digits$}");
+                match text.contains('.') {
+                    true => text.trim_end_matches('0').trim_end_matches('.').into(),
+                    false => text,
+                }
+            }
+            _ => format!("{value:.0e}"),
+        }
+    }
+
+    /// Least and largest place with some room.
+    fn range(&self, values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+        let places = values.map(|value| self.place(value)).filter(|place| place.is_finite());
+        let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+            [low.min(place), high.max(place)]
+        });
+        if low > high {
+            return 0.0..1.0;
+        }
+        let room = (0.04 * (high - low)).max(1e-3 * high.abs()).max(1e-9);
+        low - room..high + room
+    }
+}
+
+impl Plot {
+    /// The chart as SVG. Values that an axis cannot show are left out.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be drawn.
+    pub(crate) fn svg(&self) -> anyhow::Result<String> {
+        let mut text = String::new();
+        {
+            let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+            let drawn = root.fill(&WHITE).and_then(|()| self.draw(&root));
+            drawn.and_then(|()| root.present()).map_err(|e| anyhow!("cannot draw a chart: {e}"))?;
+        }
+        Ok(text)
+    }
+
+    /// The points behind it, one a line.
+    pub(crate) fn csv(&self) -> String {
+        let mut text = String::from("series,x,y,low,high\n");
+        for Series { name, points, band, .. } in &self.series {
+            for (k, [x, y]) in points.iter().enumerate() {
+                let ends = band.get(k).map(|[low, high]| format!("{low},{high}"));
+                // Writing to a string does not fail.
+                let _ = writeln!(text, "{name},{x},{y},{}", ends.unwrap_or(",".to_owned()));
+            }
+        }
+        text
+    }
+
+    fn draw<DB: DrawingBackend>(
+        &self,
+        root: &DrawingArea<DB, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let (panel, legend) = root.split_horizontally(SIZE.0 - LEGEND);
+        let points = || self.series.iter().flat_map(|series| &series.points);
+        let bands = self.series.iter().flat_map(|series| series.band.iter().flatten());
+        let heights = points().map(|point| point[1]).chain(bands.copied());
+        let (across, up) = (self.x.range(points().map(|point| point[0])), self.y.range(heights));
+        let mut chart = ChartBuilder::on(&panel)
+            .margin(14)
+            .x_label_area_size(46)
+            .y_label_area_size(78)
+            .build_cartesian_2d(across, up)?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x.name)
+            .y_desc(&self.y.name)
+            .x_labels(7)
+            .y_labels(6)
+            .x_label_formatter(&|place| self.x.label(*place))
+            .y_label_formatter(&|place| self.y.label(*place))
+            .label_style(("sans-serif", 14))
+            .axis_desc_style(("sans-serif", 15))
+            .bold_line_style(GRID)
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
+        let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        let front = self.front.iter().map(|point| place(*point)).filter(shown);
+        chart.draw_series(LineSeries::new(front, BEHIND.stroke_width(1)))?;
+        for series in &self.series {
+            let [r, g, b] = series.colour;
+            let colour = RGBColor(r, g, b);
+            let end = |k: usize| {
+                let pairs = series.points.iter().zip(&series.band);
+                pairs.map(move |(point, band)| place([point[0], band[k]])).filter(shown)
+            };
+            let band: Vec<_> = end(0).chain(end(1).collect::<Vec<_>>().into_iter().rev()).collect();
+            if band.len() > 2 {
+                chart.draw_series([Polygon::new(band, colour.mix(0.12))])?;
+            }
+            let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
+            if let [point] = points[..] {
+                let style = if series.dashed { colour.stroke_width(2) } else { colour.filled() };
+                chart.draw_series([Circle::new(point, 5, style)])?;
+                if series.marked {
+                    chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
+                }
+            } else if series.dashed {
+                let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
+                chart.draw_series(line)?;
+            } else {
+                chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
+            }
+        }
+        self.legend(&legend)
+    }
+
+    fn legend<DB: DrawingBackend>(
+        &self,
+        area: &DrawingArea<DB, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        for (row, series) in self.series.iter().enumerate() {
+            let [r, g, b] = series.colour;
+            let (colour, y) = (RGBColor(r, g, b), 26 + ROW * row as i32);
+            let style = colour.stroke_width(3);
+            // A dashed line as long as its name allows: two dashes.
+            let dashes = if series.dashed { vec![(0, 8), (13, 21)] } else { vec![(0, 21)] };
+            for (from, to) in dashes {
+                area.draw(&PathElement::new([(from, y), (to, y)], style))?;
+            }
+            let text = ("sans-serif", 14).into_font().color(&BLACK);
+            area.draw(&Text::new(series.name.clone(), (28, y - 7), text))?;
+        }
+        Ok(())
+    }
+}
