@@ -1,14 +1,19 @@
 //! Workloads W1 and W2 of DESIGN 5, whose exact results are known.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use burn::{
     backend::Autodiff,
-    tensor::{Element, Tensor, TensorData, backend::Backend},
+    tensor::{Tensor, backend::Backend},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, mse_loss, project, reference};
 use softrast_softness::{EdgeSoftness, Family};
+
+use crate::{numbers, tensor, vector};
 
 /// The logistic of the signed squared distance.
 const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
@@ -87,15 +92,20 @@ pub fn w2() -> Option<Workload> {
     Some(Workload { mesh: load("spot.obj")?, azimuths_deg: vec![180.0], size: 256 })
 }
 
-/// A mesh that is not part of the repository, from a folder beside it; prints that it was skipped where it is missing.
-fn load(name: &str) -> Option<Mesh> {
-    let places = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(2);
-    let mut places = places.map(|folder| folder.join("shared/data/meshes/paper").join(name));
-    let Some(path) = places.find(|path| path.exists()) else {
-        println!("skipped: there is no shared/data/meshes/paper/{name} beside the checkout");
+/// A mesh of the paper, which is not part of the repository; prints that it was skipped where it is
+/// missing.
+pub fn paper_mesh(name: &str) -> Option<PathBuf> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/meshes/paper");
+    let path = Path::new(folder).join(name);
+    if !path.exists() {
+        println!("skipped: there is no {}", path.display());
         return None;
-    };
-    Some(Mesh::load(path).expect("the meshes of the paper are valid"))
+    }
+    Some(path)
+}
+
+fn load(name: &str) -> Option<Mesh> {
+    Some(Mesh::load(paper_mesh(name)?).expect("the meshes of the paper are valid"))
 }
 
 impl Workload {
@@ -140,13 +150,13 @@ impl Workload {
     }
 
     fn phi<B: Backend>(&self) -> Tensor<B, 1> {
-        tensor(SOFTNESS.default_phi(SCALE), [1])
+        vector(&SOFTNESS.default_phi(SCALE))
     }
 
     /// Vertices in world units, `[1, vertices, 3]`.
     fn world<B: Backend>(&self) -> Tensor<B, 3> {
         let positions = self.mesh.positions();
-        tensor(positions.concat(), [1, positions.len(), 3])
+        tensor(&positions.concat(), [1, positions.len(), 3])
     }
 
     /// Vertices of all views on the screen, `[views, vertices, 3]`.
@@ -154,7 +164,7 @@ impl Workload {
         let [distance, elevation, half_angle] = CAMERA;
         let orbit = |&azimuth| [distance, elevation, azimuth, half_angle];
         let orbits: Vec<f64> = self.azimuths_deg.iter().flat_map(orbit).collect();
-        project(world, tensor(orbits, [self.azimuths_deg.len(), 4]))
+        project(world, tensor(&orbits, [self.azimuths_deg.len(), 4]))
     }
 
     /// Mean squared difference of `alpha` `[views, size, size]` to the disk, `[1]`.
@@ -169,22 +179,16 @@ impl Workload {
             f64::from(x * x + y * y <= radius * radius)
         };
         let disk: Vec<f64> = (0..self.size * self.size).map(inside).collect();
-        let disk = tensor(disk, [1, self.size, self.size]).expand(alpha.dims());
+        let disk = tensor(&disk, [1, self.size, self.size]).expand(alpha.dims());
         mse_loss(alpha, disk).mean()
     }
 }
 
-fn tensor<B: Backend, const D: usize>(values: Vec<f64>, shape: [usize; D]) -> Tensor<B, D> {
-    let dtype = <B::FloatElem as Element>::dtype();
-    Tensor::from_data(TensorData::new(values, shape), (&Default::default(), dtype))
-}
-
 fn row<B: Backend>(loss: Tensor<B, 1>, alpha: Tensor<B, 3>, gradient: Tensor<B, 3>) -> Row {
-    let numbers = |data: TensorData| -> Vec<f64> { data.iter().collect() };
-    let alpha = numbers(alpha.into_data());
+    let alpha = numbers(alpha);
     Row {
-        loss: numbers(loss.into_data())[0],
+        loss: numbers(loss)[0],
         mean_alpha: alpha.iter().sum::<f64>() / alpha.len() as f64,
-        gradient_norm: numbers(gradient.into_data()).iter().map(|g| g * g).sum::<f64>().sqrt(),
+        gradient_norm: numbers(gradient).iter().map(|g| g * g).sum::<f64>().sqrt(),
     }
 }

@@ -127,52 +127,7 @@ impl TryFrom<String> for DepthSoftness {
 
 #[cfg(test)]
 mod tests {
-    use burn::{
-        backend::NdArray,
-        tensor::{DType, TensorData},
-    };
-
     use super::*;
-
-    type B = NdArray<f64>;
-
-    fn tensor(values: Vec<f64>) -> Tensor<B, 1> {
-        let count = values.len();
-        let data = TensorData::new(values, [count]);
-        Tensor::from_data(data, (&Default::default(), DType::F64))
-    }
-
-    fn log_weights(softness: DepthSoftness, phi: Vec<f64>) -> Vec<f64> {
-        let nearness = (1..10).map(|k| 0.1 * f64::from(k)).collect();
-        softness.log_weight(tensor(phi), tensor(nearness)).into_data().iter().collect()
-    }
-
-    #[test]
-    fn every_default_favours_the_nearer_face() {
-        let families = Family::ALL.map(DepthSoftness::Family);
-        for softness in families.into_iter().chain([DepthSoftness::Mlp]) {
-            // Forward laws are 0 before their edge, and bounded ones beyond their reach.
-            let dull = [Family::ExpForward, Family::GammaForward, Family::LevyForward];
-            if dull.map(DepthSoftness::Family).contains(&softness) {
-                continue;
-            }
-            let weights = log_weights(softness, softness.default_phi(2.0));
-            assert!(weights.windows(2).all(|w| w[0] < w[1]), "{softness}: {weights:?}");
-        }
-    }
-
-    #[test]
-    fn exp_is_a_softmax_of_the_nearness() {
-        let softness = DepthSoftness::Family(Family::Exp);
-        let weights = log_weights(softness, softness.default_phi(0.05));
-        assert!(weights.windows(2).all(|w| (w[1] - w[0] - 2.0).abs() < 1e-12), "{weights:?}");
-    }
-
-    #[test]
-    fn a_network_that_is_off_gives_the_least_weight_everywhere() {
-        let phi = initial_mlp(0, 1.0).into_iter().map(|w| -w).collect();
-        assert!(log_weights(DepthSoftness::Mlp, phi).iter().all(|w| *w == OPAQUE.ln()));
-    }
 
     #[test]
     fn names_agree_between_files_and_the_command_line() {

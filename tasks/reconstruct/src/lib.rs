@@ -22,6 +22,7 @@ mod bar;
 mod chart;
 mod checkpoint;
 mod compare;
+mod convolution;
 mod data;
 mod epoch;
 mod kinds;

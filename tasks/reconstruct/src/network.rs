@@ -1,14 +1,14 @@
 use burn::{
     module::Module,
-    nn::{
-        BatchNorm, BatchNormConfig, Linear, LinearConfig, PaddingConfig2d,
-        conv::{Conv2d, Conv2dConfig},
-    },
+    nn::{BatchNorm, BatchNormConfig, Linear, LinearConfig, conv::Conv2d},
     tensor::{Tensor, activation::relu, backend::Backend},
 };
 use serde::{Deserialize, Serialize};
 
-use crate::SIZE;
+use crate::{
+    SIZE,
+    convolution::{convolution, convolved},
+};
 
 /// Widths of the layers of a [`Network`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -63,18 +63,15 @@ impl<B: Backend> Network<B> {
     pub fn new(width: Width, vertices: usize, device: &B::Device) -> Self {
         let mut channels = vec![4];
         channels.extend(CHANNELS.map(|channels| width.of(channels)));
-        let convolution = |ends: &[usize]| {
-            Conv2dConfig::new([ends[0], ends[1]], [5, 5])
-                .with_stride([2, 2])
-                .with_padding(PaddingConfig2d::Explicit(2, 2, 2, 2))
-                .init(device)
-        };
         let left = SIZE / 8;
         let mut ends = vec![channels[3] * left * left];
         ends.extend(CONNECTED.map(|outputs| width.of(outputs)));
         let last = ends[CONNECTED.len()];
         Self {
-            convolutions: channels.windows(2).map(convolution).collect(),
+            convolutions: channels
+                .windows(2)
+                .map(|ends| convolution([ends[0], ends[1]], device))
+                .collect(),
             norms: channels[1..].iter().map(|&c| BatchNormConfig::new(c).init(device)).collect(),
             connected: ends
                 .windows(2)
@@ -90,7 +87,8 @@ impl<B: Backend> Network<B> {
     pub fn forward(&self, pictures: Tensor<B, 4>) -> (Tensor<B, 2>, Tensor<B, 3>) {
         let [count, _, _, _] = pictures.dims();
         let layers = self.convolutions.iter().zip(&self.norms);
-        let seen = layers.fold(pictures, |x, (layer, norm)| relu(norm.forward(layer.forward(x))));
+        let seen =
+            layers.fold(pictures, |x, (layer, norm)| relu(norm.forward(convolved(layer, x))));
         let code =
             self.connected.iter().fold(seen.flatten(1, 3), |x, layer| relu(layer.forward(x)));
         let centre = self.centre.forward(code.clone()) * CENTRE;

@@ -4,7 +4,7 @@ use softrast_method::tensor;
 
 /// How far vertices are from the mean of their neighbours.
 #[derive(Clone, Debug)]
-pub(crate) struct Laplacian<B: Backend> {
+pub struct Laplacian<B: Backend> {
     /// Both ends of every edge, in both directions: `[2 edges]` each.
     from: Tensor<B, 1, Int>,
     to: Tensor<B, 1, Int>,
@@ -15,7 +15,8 @@ pub(crate) struct Laplacian<B: Backend> {
 }
 
 impl<B: Backend> Laplacian<B> {
-    pub(crate) fn new(edges: &Edges, vertices: usize) -> Self {
+    /// Of as many `vertices`, joined by these edges.
+    pub fn new(edges: &Edges, vertices: usize) -> Self {
         let forth = edges.ends.iter().copied();
         let back = edges.ends.iter().map(|&[a, b]| [b, a]);
         let pairs: Vec<[u32; 2]> = forth.chain(back).collect();
@@ -37,7 +38,7 @@ impl<B: Backend> Laplacian<B> {
     /// `Σ |v - mean of the neighbours of v|²` of `vertices` `[vertices, 3]`, `[1]`.
     ///
     /// A vertex without neighbours, which cannot be seen, does not count. Source: FACTS 4.1.
-    pub(crate) fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
+    pub fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let neighbours = vertices.clone().select(0, self.to.clone());
         let sums = vertices.zeros_like().select_assign(
             0,
@@ -55,29 +56,4 @@ pub(crate) fn indices<B: Backend>(numbers: impl Iterator<Item = u32>) -> Tensor<
     let numbers: Vec<i64> = numbers.map(i64::from).collect();
     let count = numbers.len();
     Tensor::from_data(TensorData::new(numbers, [count]), &Default::default())
-}
-
-#[cfg(test)]
-mod tests {
-    use burn::backend::NdArray;
-
-    use super::*;
-
-    fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {
-        let laplacian = Laplacian::<NdArray>::new(&Edges::new(faces), vertices.len());
-        laplacian.loss(tensor(vertices.concat(), [vertices.len(), 3])).into_scalar()
-    }
-
-    #[test]
-    fn each_corner_of_a_triangle_is_compared_with_the_middle_of_the_others() {
-        // A corner is off by one and a half times its distance from the centroid.
-        let corners = [[2.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0]];
-        assert!((loss(&[[0, 1, 2]], &corners) - 2.25 * 8.0).abs() < 1e-5);
-    }
-
-    #[test]
-    fn moving_everything_changes_nothing_and_unused_vertices_do_not_count() {
-        let corners = [[2.0, 5.0, 1.0], [-1.0, 6.0, 1.0], [-1.0, 4.0, 1.0], [9.0, 9.0, 9.0]];
-        assert!((loss(&[[0, 1, 2]], &corners) - 2.25 * 8.0).abs() < 1e-4);
-    }
 }

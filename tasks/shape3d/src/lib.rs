@@ -34,7 +34,9 @@ mod task;
 
 pub use args::Args;
 pub use chamfer::Chamfer;
+pub use flatness::Flatness;
 pub use instance::Instance;
+pub use laplacian::Laplacian;
 pub use lesson::Shape3dLesson;
 pub use scene::{Scene, VIEWS};
 pub use task::Shape3d;

@@ -3,10 +3,9 @@
 //! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
 //! there is none.
 
-#[allow(dead_code, reason = "shared with the tests in f64, which need more of it")]
-#[path = "../double/common/mod.rs"]
-mod common;
 mod products;
+#[path = "../triangles/mod.rs"]
+mod triangles;
 mod workloads;
 
 use std::sync::Arc;
@@ -54,7 +53,7 @@ fn seen(
 
 /// Random triangles, with slivers, and faces beside the image and behind the camera.
 fn random(softness: EdgeSoftness, scale: f64) -> Scene {
-    let (mut vertices, faces) = common::triangles(7, 20);
+    let (mut vertices, faces) = triangles::triangles(7, 20);
     // Far beside the image.
     for corner in 0..3 {
         vertices[3 * corner] += 40.0;

@@ -1,0 +1,3 @@
+//! The steps that every task takes.
+
+mod descent;

@@ -1,0 +1,5 @@
+//! OCCLUSION.
+
+mod bad_cases;
+mod golden;
+mod gradient;

@@ -1,0 +1,4 @@
+//! POSE.
+
+mod golden;
+mod gradient;

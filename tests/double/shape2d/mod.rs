@@ -1,0 +1,4 @@
+//! 2D SHAPE.
+
+mod golden;
+mod gradient;

@@ -1,0 +1,4 @@
+//! 3D SHAPE.
+
+mod golden;
+mod gradient;

@@ -1,0 +1,42 @@
+//! The logarithm of a softness, far into its tails.
+
+use burn::backend::NdArray;
+use softrast_softness::{EdgeSoftness, Family, OPAQUE, Softness};
+use softrast_tests::{numbers, vector};
+
+type B = NdArray<f64>;
+
+#[test]
+fn the_exponential_of_the_logarithm_is_the_value() {
+    let x = [-0.4, -0.11, -0.02, 0.0, 0.03, 0.2, 0.7];
+    for family in Family::ALL {
+        for squared in [false, true] {
+            let softness = EdgeSoftness { family, squared };
+            let phi = vector::<B>(&softness.default_phi(0.1));
+            let log = numbers(softness.log_value(phi.clone(), vector(&x)));
+            let value = numbers(softness.value(phi, vector(&x)));
+            for ((x, log), value) in x.iter().zip(log).zip(value) {
+                let off = (log.exp() - value).abs();
+                let name = format!("{family}, squared {squared}, x = {x}");
+                assert!(off <= 1.1 * OPAQUE, "{name}: exp({log}) and {value}");
+                assert!(log <= 0.0, "{name}: {log}");
+            }
+        }
+    }
+}
+
+#[test]
+fn tails_that_underflow_keep_their_logarithm() {
+    let log = |family: Family| -> f64 {
+        let phi = vector::<B>(&family.default_phi(1e-3));
+        let softness = EdgeSoftness { family, squared: false };
+        softness.log_value(phi, vector(&[-2.0])).into_scalar()
+    };
+    assert!((log(Family::Logistic) + 2000.0).abs() < 1e-9);
+    assert!((log(Family::Exp) + 2000.0).abs() < 1e-9);
+    // ln Φ(-u) = -u²/2 - ln(u sqrt(2π)) + O(u⁻²).
+    let u: f64 = 2000.0;
+    let expected = -0.5 * u * u - (u * (2.0 * std::f64::consts::PI).sqrt()).ln();
+    assert!((log(Family::Gauss) - expected).abs() < 1e-5);
+    assert!((log(Family::Uniform) - OPAQUE.ln()).abs() < 1e-12);
+}

@@ -1,0 +1,9 @@
+//! What is tested in f32, a file or folder for each crate; see the tests in f64.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod exact_rows;
+mod meta;
+mod raster;
+mod shape3d;
+mod softness;

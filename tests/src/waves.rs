@@ -1,0 +1,34 @@
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_meta::Objective;
+
+/// A loss in closed form: `Σ exp(φ0) log cosh(θ - 0.2) + φ1 sin(θ) θ_next`, at step t times
+/// `1 + 0.1 t`.
+///
+/// It is smooth, coupled, not convex, and different from step to step.
+#[derive(Clone, Copy, Debug)]
+pub struct Waves {
+    /// Whether the last parameter feels nothing.
+    pub dead: bool,
+}
+
+/// Every parameter feels something.
+pub const WAVES: Waves = Waves { dead: false };
+
+impl<B: Backend> Objective<B> for Waves {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+        let count = theta.dims()[0] - usize::from(self.dead);
+        let theta = theta.narrow(0, 0, count);
+        let next = Tensor::cat(
+            vec![theta.clone().narrow(0, 1, count - 1), theta.clone().narrow(0, 0, 1)],
+            0,
+        );
+        let off = theta.clone() - 0.2;
+        let valley = ((off.clone().exp() + off.neg().exp()) * 0.5).log().sum();
+        let [width, tilt] = [0, 1].map(|k| phi.clone().narrow(0, k, 1));
+        valley * width.exp() + (theta.sin() * next).sum() * tilt
+    }
+
+    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
+        self.loss(theta, phi) * (1.0 + 0.1 * step as f64)
+    }
+}
