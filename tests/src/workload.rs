@@ -7,13 +7,11 @@ use std::{
 
 use burn::{
     backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
+    tensor::{Element, Tensor, TensorData, backend::Backend},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, mse_loss, project, reference};
 use softrast_softness::{EdgeSoftness, Family};
-
-use crate::{numbers, tensor, vector};
 
 /// The logistic of the signed squared distance.
 const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
@@ -150,13 +148,13 @@ impl Workload {
     }
 
     fn phi<B: Backend>(&self) -> Tensor<B, 1> {
-        vector(&SOFTNESS.default_phi(SCALE))
+        tensor(SOFTNESS.default_phi(SCALE), [1])
     }
 
     /// Vertices in world units, `[1, vertices, 3]`.
     fn world<B: Backend>(&self) -> Tensor<B, 3> {
         let positions = self.mesh.positions();
-        tensor(&positions.concat(), [1, positions.len(), 3])
+        tensor(positions.concat(), [1, positions.len(), 3])
     }
 
     /// Vertices of all views on the screen, `[views, vertices, 3]`.
@@ -164,7 +162,7 @@ impl Workload {
         let [distance, elevation, half_angle] = CAMERA;
         let orbit = |&azimuth| [distance, elevation, azimuth, half_angle];
         let orbits: Vec<f64> = self.azimuths_deg.iter().flat_map(orbit).collect();
-        project(world, tensor(&orbits, [self.azimuths_deg.len(), 4]))
+        project(world, tensor(orbits, [self.azimuths_deg.len(), 4]))
     }
 
     /// Mean squared difference of `alpha` `[views, size, size]` to the disk, `[1]`.
@@ -179,16 +177,22 @@ impl Workload {
             f64::from(x * x + y * y <= radius * radius)
         };
         let disk: Vec<f64> = (0..self.size * self.size).map(inside).collect();
-        let disk = tensor(&disk, [1, self.size, self.size]).expand(alpha.dims());
+        let disk = tensor(disk, [1, self.size, self.size]).expand(alpha.dims());
         mse_loss(alpha, disk).mean()
     }
 }
 
+fn tensor<B: Backend, const D: usize>(values: Vec<f64>, shape: [usize; D]) -> Tensor<B, D> {
+    let dtype = <B::FloatElem as Element>::dtype();
+    Tensor::from_data(TensorData::new(values, shape), (&Default::default(), dtype))
+}
+
 fn row<B: Backend>(loss: Tensor<B, 1>, alpha: Tensor<B, 3>, gradient: Tensor<B, 3>) -> Row {
-    let alpha = numbers(alpha);
+    let numbers = |data: TensorData| -> Vec<f64> { data.iter().collect() };
+    let alpha = numbers(alpha.into_data());
     Row {
-        loss: numbers(loss)[0],
+        loss: numbers(loss.into_data())[0],
         mean_alpha: alpha.iter().sum::<f64>() / alpha.len() as f64,
-        gradient_norm: numbers(gradient).iter().map(|g| g * g).sum::<f64>().sqrt(),
+        gradient_norm: numbers(gradient.into_data()).iter().map(|g| g * g).sum::<f64>().sqrt(),
     }
 }

@@ -12,7 +12,7 @@ const STRIDE: usize = 2;
 const PADDING: usize = 2;
 
 /// A layer of 5×5 windows at every second pixel, with two zeros around the picture.
-pub(crate) fn convolution<B: Backend>(ends: [usize; 2], device: &B::Device) -> Conv2d<B> {
+pub fn convolution<B: Backend>(ends: [usize; 2], device: &B::Device) -> Conv2d<B> {
     Conv2dConfig::new(ends, [WINDOW; 2])
         .with_stride([STRIDE; 2])
         .with_padding(PaddingConfig2d::Explicit(PADDING, PADDING, PADDING, PADDING))
@@ -23,8 +23,8 @@ pub(crate) fn convolution<B: Backend>(ends: [usize; 2], device: &B::Device) -> C
 /// `[pictures, outputs, height / 2, width / 2]`, for an even height and width.
 ///
 /// Pixels at every second place are four pictures of a quarter; of these a window's 25 pixels are
-/// slices. burn-ndarray itself multiplies pixel by pixel, and burn-flex is slower than this too.
-pub(crate) fn convolved<B: Backend>(layer: &Conv2d<B>, pictures: Tensor<B, 4>) -> Tensor<B, 4> {
+/// slices. burn-ndarray itself multiplies pixel by pixel, which takes several times as long.
+pub fn convolved<B: Backend>(layer: &Conv2d<B>, pictures: Tensor<B, 4>) -> Tensor<B, 4> {
     let [count, channels, height, width] = pictures.dims();
     let [rows, columns] = [height, width].map(|size| size / STRIDE);
     let reach = PADDING * 2 / STRIDE;

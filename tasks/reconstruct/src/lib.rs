@@ -49,6 +49,7 @@ mod view;
 mod voxels;
 
 pub use checkpoint::{Checkpoint, Header};
+pub use convolution::{convolution, convolved};
 pub use epoch::{Epoch, Time};
 pub use network::{Network, Width};
 pub use npz_folder::NpzFolder;

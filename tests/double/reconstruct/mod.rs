@@ -1,0 +1,3 @@
+//! RECONSTRUCT.
+
+mod convolution;
