@@ -26,6 +26,7 @@ pub(super) fn sum_cubics(
     first_view: u32,
     #[comptime] second: bool,
 ) {
+    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
     let across = (size + TILE - 1u32) / TILE;
     let tiles = of_cells.views * across * across;
     let rows = 2u32 * (lookup.cells + 1u32);

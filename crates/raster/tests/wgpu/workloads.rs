@@ -1,6 +1,6 @@
 //! W1 and W2, the workloads whose exact results are known; skipped where their meshes are missing.
 
-#[allow(dead_code, reason = "the reference of all pairs is for the CPU")]
+#[allow(dead_code, unreachable_pub, reason = "a library elsewhere, with a reference for the CPU")]
 #[path = "../../../../tests/src/workload.rs"]
 mod workload;
 
