@@ -7,8 +7,17 @@ use crate::{TConorm, kernel::Grid};
 /// two) that it may use, coarsest first.
 const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 120];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
+/// Octaves of the distance to the end of the support that a table may resolve, coarsest first, where
+/// cells that are spaced from the edge of the face are not enough.
+const FAR: [u32; 4] = [8, 16, 26, 36];
+/// There, the terms of a second derivative all but cancel; this many bits more keep what is left.
+const SHARPER: u32 = 2;
 /// Stands in for a support that does not end, in NDC: no drawn face is farther from a pixel.
 const EVERYWHERE: f64 = 4e6;
+/// Tails have the value of a place this many times as far as the support. Any place beyond it is as
+/// good for the image; but where the profile ends with a steep slope, its parameters must not move
+/// all that lies in the tail.
+const BEYOND: f64 = 1.1;
 /// A side that is constant still needs a cell.
 const NARROWEST: f64 = 1e-9;
 
@@ -65,6 +74,20 @@ impl Profile {
         tolerance: f64,
         device: &B::Device,
     ) -> Self {
+        Self::chosen::<B>(softness, t_conorm, phi, faces, tolerance, &FAR, device)
+    }
+
+    /// [`Profile::new`] with the choice of octaves at the end of the support; none of them if `far`
+    /// is empty, for look-ups that know none.
+    pub(crate) fn chosen<B: Backend>(
+        softness: &impl Softness,
+        t_conorm: TConorm,
+        phi: &[f64],
+        faces: usize,
+        tolerance: f64,
+        far: &[u32],
+        device: &B::Device,
+    ) -> Self {
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         assert!(faces > 0, "a profile needs at least one face");
         let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
@@ -81,25 +104,43 @@ impl Profile {
             outer: radius(support.outer),
             inner: radius(support.inner.min(shallow)),
             octaves: OCTAVES[0],
+            far: 0,
             bits: *BITS.start(),
         };
         let error = |grid: Grid| {
             interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, faces, device)
         };
         // The innermost cell decides the octaves, all others the cells in an octave.
-        let mut reached = error(grid);
         for octaves in OCTAVES {
             grid.octaves = octaves;
-            reached = error(grid);
-            if reached.innermost <= 1.0 {
+            if error(grid).innermost <= 1.0 {
                 break;
             }
         }
-        for bits in BITS {
-            grid.bits = bits;
-            reached = error(grid);
-            if reached.rest <= 1.0 {
-                break;
+        let refined = |mut grid: Grid, enough: f64| {
+            let mut reached = Reached { innermost: f64::INFINITY, rest: f64::INFINITY };
+            for bits in BITS {
+                grid.bits = bits;
+                reached = error(grid);
+                if reached.rest <= enough {
+                    break;
+                }
+            }
+            (grid, reached)
+        };
+        let mut reached;
+        (grid, reached) = refined(grid, 1.0);
+        // Knots are left wanting where the profile rises without bound at the end of its support, or
+        // at a corner in the middle, where more of them at the end are of no use.
+        if let (true, Some(&most)) = (reached.rest > 1.0, far.last()) {
+            let best = error(Grid { far: most, ..grid }).rest;
+            if best < 0.5 * reached.rest {
+                let enough = best.max(1.0);
+                let suffices = |&&far: &&u32| error(Grid { far, ..grid }).rest <= enough;
+                grid.far = *far.iter().find(suffices).unwrap_or(&most);
+                (grid, reached) = refined(grid, enough);
+                grid.bits += SHARPER;
+                reached = error(grid);
             }
         }
         let error = reached.innermost.max(reached.rest) * tolerance / 2.0;
@@ -144,10 +185,12 @@ impl Profile {
             let shape = [values.len()];
             Tensor::<B, 1>::from_data(TensorData::new(values, shape), (&device, dtype))
         };
-        // The middles of all cells but the innermost stand behind the knots: their slopes count.
+        // Behind the knots stand the middles of all cells but the innermost, whose slopes count, and
+        // the tail.
         let middle = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
-        let places: Vec<f64> =
-            knots.iter().copied().chain(knots[1..].windows(2).map(middle)).collect();
+        let middles = knots[1..].windows(2).map(middle);
+        let places = knots.iter().copied().chain(middles).chain([BEYOND * BEYOND]);
+        let places: Vec<f64> = places.collect();
         // Both sides in one tensor: an op costs more than its few hundred numbers.
         let sides = [-self.grid.outer, self.grid.inner];
         // A distance of 0 has no side; this one has, and is next to nothing also in a wide support.
@@ -167,7 +210,7 @@ impl Profile {
         let mut rows = Vec::with_capacity(6);
         for start in [0, places.len()] {
             let at = |k: usize| value.clone().narrow(0, start + k, 1).reshape([1, 1]);
-            let (first, last) = (at(0), at(cells));
+            let (first, tail) = (at(0), at(places.len() - 1));
             let zero = first.clone() * 0.0;
             let rise = at(1) - first.clone();
             rows.push(Tensor::cat(vec![first, rise, zero.clone(), zero.clone()], 1));
@@ -178,7 +221,7 @@ impl Profile {
             let cube = (whole - half * 2.0) * (2.0 / 3.0);
             let values = value.clone().narrow(0, start + 1, cells - 1);
             rows.push(Tensor::stack(vec![values, left, square, cube], 1));
-            rows.push(Tensor::cat(vec![last, zero.clone(), zero.clone(), zero], 1));
+            rows.push(Tensor::cat(vec![tail, zero.clone(), zero.clone(), zero], 1));
         }
         Tensor::cat(rows, 0)
     }
