@@ -128,8 +128,7 @@ impl Profile {
             }
             (grid, reached)
         };
-        let mut reached;
-        (grid, reached) = refined(grid, 1.0);
+        let (mut grid, mut reached) = refined(grid, 1.0);
         // Knots are left wanting where the profile rises without bound at the end of its support, or
         // at a corner in the middle, where more of them at the end are of no use.
         if let (true, Some(&most)) = (reached.rest > 1.0, far.last()) {
@@ -138,7 +137,7 @@ impl Profile {
                 let enough = best.max(1.0);
                 let suffices = |&&far: &&u32| error(Grid { far, ..grid }).rest <= enough;
                 grid.far = *far.iter().find(suffices).unwrap_or(&most);
-                (grid, reached) = refined(grid, enough);
+                grid = refined(grid, enough).0;
                 grid.bits += SHARPER;
                 reached = error(grid);
             }
