@@ -1,21 +1,27 @@
 //! Times of the fused op: image, gradient, and gradient of the gradient.
 //!
 //! ```text
-//! cargo bench -p softrast-raster --bench profile_sum            # all, about five minutes
+//! cargo bench -p softrast-raster --bench profile_sum            # all, about four minutes
 //! cargo bench -p softrast-raster --bench profile_sum -- W1      # what has W1 in its name
 //! ```
 //!
-//! Everything goes through the public burn API in `f32` and starts at projected vertices: `forward`
-//! is the sum, `vjp` the backward pass of `Σ w · sum` to the vertices, `vjp_of_vjp` the backward
-//! pass of `Σ u · vjp`. `scalar` is the plain version in `scalar.rs`; the last lines give the ratio
-//! to it. Throughput counts pixel-face pairs that the op visits. Widths are those of a logistic of
-//! the squared distance, in NDC.
+//! Everything goes through the public burn API in `f32`. The first rows start at projected vertices:
+//! `forward` is the sum, `vjp` the backward pass of `Σ w · sum` to the vertices, `vjp_of_vjp` the
+//! backward pass of `Σ u · vjp`. `scalar` is the plain version in `scalar.rs`. A `step` is all that an
+//! optimisation does: projection, image, mean squared difference, gradient to the world vertices.
+//! Throughput counts pixel-face pairs that the op visits. Widths are those of a logistic of the squared
+//! distance, in NDC. A complete run writes the medians to `docs/speed.md`.
 
+mod machine;
+mod record;
 mod scalar;
 mod workload;
 
 use std::{
+    error::Error,
+    fmt::Write,
     hint::black_box,
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -23,51 +29,81 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor},
 };
-use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
+use criterion::{BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
+use machine::machine;
 use rayon::ThreadPool;
+use record::Record;
 use scalar::Scalar;
-use softrast_raster::{Rasterizer, Silhouette};
-use softrast_softness::EdgeSoftness;
-use workload::{Workload, tensor};
+use softrast_raster::{Rasterizer, Silhouette, mse_loss, project};
+use softrast_softness::{EdgeSoftness, Family};
+use workload::{Workload, disk, tensor};
 
 type B = NdArray<f32>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
-/// Cells with more pairs than this take seconds a pass, and are left out.
-const MOST_PAIRS: usize = 1_000_000_000;
+/// Cells with more pairs than this take seconds a pass, and are left out; the plain version is much
+/// earlier.
+const MOST_PAIRS: usize = 60_000_000;
+const MOST_PLAIN_PAIRS: usize = 4_000_000;
 
-fn main() {
+fn main() -> Result<(), Box<dyn Error>> {
     let mut criterion = Criterion::default()
         .sample_size(10)
-        .warm_up_time(Duration::from_millis(300))
-        .measurement_time(Duration::from_millis(700))
+        .warm_up_time(Duration::from_millis(150))
+        .measurement_time(Duration::from_millis(500))
         .configure_from_args();
+    let machine = machine();
+    let bench = Bench { record: Record::default(), pools: [1, 2].map(pool) };
     for (name, workload) in [("W1", Workload::w1()), ("W2", Workload::w2())] {
         println!("{name} is {}", workload.name);
         let mut group = criterion.benchmark_group(name);
-        passes(&mut group, "", &Op::new(&workload));
-        Plain::new(&workload).bench(&mut group);
+        bench.passes(&mut group, &workload.name, &workload);
+        let mlp = under_mlp(&workload);
+        bench.step(&mut group, &format!("{name}, logistic"), &workload);
+        bench.step(&mut group, &format!("{name}, MLP"), &mlp);
     }
     let sphere = softrast_mesh::icosphere(5);
     for size in [256, 1024] {
         let mut group = criterion.benchmark_group(format!("20k faces, {size} px"));
         for width in [1e-5, 1e-4, 1e-3, 1e-2, 1e-1] {
             let workload = Workload { width, ..Workload::new("", &sphere, &[30.0], size) };
-            let op = Op::new(&workload);
-            let pairs = op.pairs();
+            let pairs = Op::new(&workload).pairs();
+            let name = format!("20,480 faces, {size} px, width {width:e}");
             if pairs > MOST_PAIRS {
-                println!("left out: 20k faces, {size} px, width {width:e}: {pairs} pairs");
+                println!("left out: {name}: {pairs} pairs");
                 continue;
             }
-            passes(&mut group, &format!("width {width:e}, "), &op);
+            bench.passes(&mut group, &name, &workload);
         }
     }
     criterion.final_summary();
-    // Without this argument everything runs once, as a test.
-    if std::env::args().any(|word| word == "--bench") {
-        ratios();
+    // Without arguments, or with a filter, some rows are missing.
+    let words: Vec<_> = std::env::args().skip(1).collect();
+    if words == ["--bench"] {
+        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/speed.md");
+        record::write(&page, &bench.tables(&machine)?)?;
     }
+    Ok(())
+}
+
+/// The same scene under an MLP that reaches as far.
+fn under_mlp(workload: &Workload) -> Workload {
+    let softness = EdgeSoftness { family: Family::Mlp, ..workload.softness };
+    let reach = |workload: &Workload| {
+        let (silhouette, _) = workload.prepare::<B>(Rasterizer::TOLERANCE, DType::F32);
+        silhouette.profile().support()[0]
+    };
+    let mut mlp = Workload {
+        name: workload.name.clone(),
+        faces: workload.faces.clone(),
+        vertices: workload.vertices.clone(),
+        orbits: workload.orbits.clone(),
+        softness,
+        ..*workload
+    };
+    mlp.width *= reach(workload) / reach(&mlp);
+    mlp
 }
 
 /// One workload, ready for the op.
@@ -131,22 +167,166 @@ fn pool(threads: usize) -> ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started")
 }
 
-/// All three passes on one thread and on two.
-fn passes(group: &mut BenchmarkGroup<WallTime>, prefix: &str, op: &Op) {
-    group.throughput(Throughput::Elements(op.pairs() as u64));
-    for threads in [1, 2] {
-        let pool = pool(threads);
-        let plural = if threads == 1 { "" } else { "s" };
-        let name = |pass: &str| format!("{prefix}{pass}, {threads} thread{plural}");
-        group.bench_function(name("forward"), |b| b.iter(|| pool.install(|| op.forward())));
-        let backward = |tape| pool.install(|| backward(tape));
-        group.bench_function(name("vjp"), |b| {
-            b.iter_batched(|| pool.install(|| op.taped()), backward, BatchSize::PerIteration);
+/// What is measured on one thread and on two, and what was.
+struct Bench {
+    record: Record,
+    pools: [ThreadPool; 2],
+}
+
+/// Where a time goes on the page.
+struct Cell<'a> {
+    row: &'a str,
+    pairs: usize,
+    column: &'static str,
+}
+
+const COLUMNS: [[&str; 2]; 5] = [
+    ["forward, 1 thread", "forward, 2 threads"],
+    ["vjp, 1 thread", "vjp, 2 threads"],
+    ["vjp_of_vjp, 1 thread", "vjp_of_vjp, 2 threads"],
+    ["step, 1 thread", "step, 2 threads"],
+    ["step with its table, 1 thread", "step with its table, 2 threads"],
+];
+const PLAIN: [&str; 2] = ["scalar forward, 1 thread", "scalar vjp, 1 thread"];
+
+impl Bench {
+    /// Times `run` on what `prepare` makes, which is not timed.
+    fn time<I, O>(
+        &self,
+        group: &mut BenchmarkGroup<WallTime>,
+        cell: Cell,
+        prepare: impl Fn() -> I,
+        run: impl Fn(I) -> O,
+    ) {
+        let Cell { row, pairs, column } = cell;
+        group.throughput(Throughput::Elements(pairs as u64));
+        group.bench_function(format!("{row}, {column}"), |bencher| {
+            bencher.iter_custom(|iterations| {
+                let mut total = Duration::ZERO;
+                for _ in 0..iterations {
+                    let input = prepare();
+                    let start = Instant::now();
+                    let output = black_box(run(input));
+                    total += start.elapsed();
+                    drop(output);
+                }
+                self.record.note(row, pairs, column, total, iterations);
+                total
+            });
         });
-        group.bench_function(name("vjp_of_vjp"), |b| {
-            let tape = || pool.install(|| op.taped_gradient());
-            b.iter_batched(tape, backward, BatchSize::PerIteration);
-        });
+    }
+
+    /// All three passes, and the plain version with the same support.
+    fn passes(&self, group: &mut BenchmarkGroup<WallTime>, row: &str, workload: &Workload) {
+        let op = Op::new(workload);
+        let pairs = op.pairs();
+        let cell = |column| Cell { row, pairs, column };
+        for (k, pool) in self.pools.iter().enumerate() {
+            let [forward, vjp, vjp_of_vjp] = [0, 1, 2].map(|pass| cell(COLUMNS[pass][k]));
+            let backward = |tape| pool.install(|| backward(tape));
+            self.time(group, forward, || (), |()| pool.install(|| op.forward()));
+            self.time(group, vjp, || pool.install(|| op.taped()), backward);
+            self.time(group, vjp_of_vjp, || pool.install(|| op.taped_gradient()), backward);
+        }
+        if pairs <= MOST_PLAIN_PAIRS {
+            let plain = Plain::new(workload);
+            self.time(group, cell(PLAIN[0]), || (), |()| plain.forward());
+            self.time(group, cell(PLAIN[1]), || (), |()| plain.gradient());
+        }
+    }
+
+    /// Whole steps: with a table that is there, and with one that every step makes anew.
+    fn step(&self, group: &mut BenchmarkGroup<WallTime>, row: &str, workload: &Workload) {
+        let step = Step::new(workload);
+        let pairs = step.op.pairs();
+        for (k, pool) in self.pools.iter().enumerate() {
+            let cell = |pass: usize| Cell { row, pairs, column: COLUMNS[pass][k] };
+            let table = || step.op.table.clone();
+            self.time(group, cell(3), table, |table| pool.install(|| step.gradient(table)));
+            let made = || step.gradient(step.op.silhouette.table(step.phi.clone()));
+            self.time(group, cell(4), || (), |()| pool.install(made));
+        }
+    }
+
+    /// The page's tables.
+    fn tables(&self, machine: &str) -> Result<String, std::fmt::Error> {
+        let mut text = String::new();
+        writeln!(text, "Medians in ms on {machine}.\n")?;
+        writeln!(
+            text,
+            "| scene | pairs | forward, 1 and 2 threads | vjp | vjp of vjp | scalar forward + vjp, 1 thread | \
+             ratio to it, 1 and 2 threads | vjp of vjp / vjp, 1 thread |\n|---|---|---|---|---|---|---|---|"
+        )?;
+        let rows = self.record.rows();
+        for (row, pairs) in &rows {
+            let at = |column: &str| self.record.median(row, column);
+            let pass = |pass: usize| Some([at(COLUMNS[pass][0])?, at(COLUMNS[pass][1])?]);
+            let (Some(forward), Some(vjp), Some(second)) = (pass(0), pass(1), pass(2)) else {
+                continue;
+            };
+            let two = |[one, two]: [f64; 2]| format!("{one:.2}, {two:.2}");
+            let plain = at(PLAIN[0]).zip(at(PLAIN[1])).map(|(forward, vjp)| forward + vjp);
+            let ratio = |plain: f64| {
+                let [one, two] = [0, 1].map(|k| plain / (forward[k] + vjp[k]));
+                format!("{one:.1} x, {two:.1} x")
+            };
+            writeln!(
+                text,
+                "| {row} | {pairs} | {} | {} | {} | {} | {} | {:.1} |",
+                two(forward),
+                two(vjp),
+                two(second),
+                plain.map_or("not run".to_owned(), |ms| format!("{ms:.2}")),
+                plain.map_or(String::new(), ratio),
+                second[0] / vjp[0]
+            )?;
+        }
+        writeln!(
+            text,
+            "\n| step | pairs | table given, 1 and 2 threads | table made anew each step |\n|---|---|---|---|"
+        )?;
+        for (row, pairs) in &rows {
+            let at = |pass: usize| {
+                let cells = COLUMNS[pass].map(|column| self.record.median(row, column));
+                cells[0].zip(cells[1]).map(|(one, two)| format!("{one:.2}, {two:.2}"))
+            };
+            if let (Some(given), Some(made)) = (at(3), at(4)) {
+                writeln!(text, "| {row} | {pairs} | {given} | {made} |")?;
+            }
+        }
+        Ok(text)
+    }
+}
+
+/// A workload as an optimisation sees it.
+struct Step {
+    op: Op,
+    phi: Tensor<B, 1>,
+    world: Tensor<B, 3>,
+    cameras: Tensor<B, 2>,
+    target: Tensor<B, 3>,
+}
+
+impl Step {
+    fn new(workload: &Workload) -> Self {
+        let cameras = workload.cameras(DType::F32);
+        let size = workload.size;
+        let target = tensor(&disk(size), [1, size, size], DType::F32);
+        Self {
+            op: Op::new(workload),
+            phi: workload.phi(DType::F32),
+            world: workload.world(DType::F32),
+            target: target.expand([cameras.dims()[0], size, size]),
+            cameras,
+        }
+    }
+
+    fn gradient(&self, table: Tensor<B, 2>) -> Tensor<B, 3> {
+        let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
+        let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
+        let image = self.op.silhouette.coverage_by_table(vertices, Tensor::from_inner(table));
+        let loss = mse_loss(image, Tensor::from_inner(self.target.clone())).mean();
+        backward((loss, world))
     }
 }
 
@@ -179,42 +359,4 @@ impl<'a> Plain<'a> {
     fn gradient(&self) -> Vec<f32> {
         self.scalar.gradient(&self.vertices, self.count, &self.upstream)
     }
-
-    fn bench(&self, group: &mut BenchmarkGroup<WallTime>) {
-        group.bench_function("scalar forward, 1 thread", |b| b.iter(|| self.forward()));
-        group.bench_function("scalar vjp, 1 thread", |b| b.iter(|| self.gradient()));
-    }
-}
-
-/// Times of forward and gradient together against the plain version, by turns.
-fn ratios() {
-    const TURNS: usize = 31;
-    let pools = [1, 2].map(pool);
-    for workload in [Workload::w1(), Workload::w2()] {
-        let (plain, op) = (Plain::new(&workload), Op::new(&workload));
-        let mut times = [(); 3].map(|()| Vec::with_capacity(TURNS));
-        for _ in 0..TURNS {
-            times[0].push(milliseconds(|| (plain.forward(), plain.gradient())));
-            for (times, pool) in times[1..].iter_mut().zip(&pools) {
-                times.push(pool.install(|| milliseconds(|| backward(op.taped()))));
-            }
-        }
-        let [plain, one, two] = times.map(|mut times| {
-            times.sort_by(f64::total_cmp);
-            times[TURNS / 2]
-        });
-        println!(
-            "{}: forward and gradient, scalar {plain:.2} ms; fused on 1 thread {one:.2} ms \
-             ({:.1} x), on 2 threads {two:.2} ms ({:.1} x)",
-            workload.name,
-            plain / one,
-            plain / two
-        );
-    }
-}
-
-fn milliseconds<T>(work: impl FnOnce() -> T) -> f64 {
-    let start = Instant::now();
-    black_box(work());
-    start.elapsed().as_secs_f64() * 1e3
 }

@@ -20,6 +20,7 @@ pub(crate) struct Workload {
     pub(crate) orbits: Vec<f64>,
     pub(crate) size: usize,
     pub(crate) width: f64,
+    pub(crate) softness: EdgeSoftness,
 }
 
 impl Workload {
@@ -33,6 +34,7 @@ impl Workload {
             orbits: azimuths.iter().flat_map(orbit).collect(),
             size,
             width: 1e-2,
+            softness: SOFTNESS,
         }
     }
 
@@ -68,7 +70,7 @@ impl Workload {
 
     /// Parameters of the softness.
     pub(crate) fn phi<B: Backend>(&self, dtype: DType) -> Tensor<B, 1> {
-        let phi = SOFTNESS.default_phi(self.width * self.width);
+        let phi = self.softness.default_phi(self.width * self.width);
         tensor(&phi, [phi.len()], dtype)
     }
 
@@ -80,7 +82,7 @@ impl Workload {
     ) -> (Silhouette<EdgeSoftness>, Tensor<B, 2>) {
         let rasterizer =
             Rasterizer { size: self.size, tolerance, t_conorm: TConorm::Probabilistic };
-        let silhouette = rasterizer.prepare(&self.faces, SOFTNESS, &self.phi::<B>(dtype));
+        let silhouette = rasterizer.prepare(&self.faces, self.softness, &self.phi::<B>(dtype));
         let table = silhouette.table(self.phi(dtype));
         (silhouette, table)
     }
@@ -95,8 +97,22 @@ pub(crate) fn tensor<B: Backend, const D: usize>(
     Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), dtype))
 }
 
+/// A disk of radius 0.5 at (-0.1, 0.05), hard-edged at pixel centres.
+pub(crate) fn disk(size: usize) -> Vec<f64> {
+    let centre = |index: usize| (2.0 * index as f64 + 1.0 - size as f64) / size as f64;
+    let covered = |pixel: usize| {
+        let (x, y) = (centre(pixel % size) + 0.1, centre(size - 1 - pixel / size) - 0.05);
+        f64::from(u8::from(x * x + y * y <= 0.25))
+    };
+    (0..size * size).map(covered).collect()
+}
+
 /// A well-known mesh that is not part of this repository, from the folder beside it.
 fn known(file: &str) -> Option<Mesh> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/meshes/paper");
-    Mesh::load(folder.join(file)).ok()
+    let mesh = Mesh::load(folder.join(file)).ok();
+    if mesh.is_none() {
+        println!("skipped: {file} is not beside the checkout; a mesh like it stands in");
+    }
+    mesh
 }

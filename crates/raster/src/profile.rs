@@ -7,8 +7,17 @@ use crate::{TConorm, kernel::Grid};
 /// two) that it may use, coarsest first.
 const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 120];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
+/// Octaves of the distance to the end of the support that a table may resolve, coarsest first, where
+/// cells that are spaced from the edge of the face are not enough.
+const FAR: [u32; 4] = [8, 16, 26, 36];
+/// There, the terms of a second derivative all but cancel; this many bits more keep what is left.
+const SHARPER: u32 = 2;
 /// Stands in for a support that does not end, in NDC: no drawn face is farther from a pixel.
 const EVERYWHERE: f64 = 4e6;
+/// Tails have the value of a place this many times as far as the support. Any place beyond it is as
+/// good for the image; but where the profile ends with a steep slope, its parameters must not move
+/// all that lies in the tail.
+const BEYOND: f64 = 1.1;
 /// A side that is constant still needs a cell.
 const NARROWEST: f64 = 1e-9;
 
@@ -39,7 +48,7 @@ impl Profile {
     /// ([`TConorm::slack`]). Deeper inside than the inner radius one face alone covers the pixel to
     /// within `tolerance / 2`, and a T-conorm never falls below its largest argument.
     ///
-    /// The other half goes to interpolation: the cells are refined until, at three samples of each,
+    /// The other half goes to interpolation: the cells are refined until, at four samples of each,
     /// the error is below `tolerance / 4` times the value plus a share of `e / 2`; the value being
     /// the term or, where one face all but covers the pixel, the coverage that it alone makes. A
     /// relative error ρ of every term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= 0.37 ρ`; a
@@ -65,6 +74,20 @@ impl Profile {
         tolerance: f64,
         device: &B::Device,
     ) -> Self {
+        Self::chosen::<B>(softness, t_conorm, phi, faces, tolerance, &FAR, device)
+    }
+
+    /// [`Profile::new`] with the choice of octaves at the end of the support; none of them if `far`
+    /// is empty, for look-ups that know none.
+    pub(crate) fn chosen<B: Backend>(
+        softness: &impl Softness,
+        t_conorm: TConorm,
+        phi: &[f64],
+        faces: usize,
+        tolerance: f64,
+        far: &[u32],
+        device: &B::Device,
+    ) -> Self {
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         assert!(faces > 0, "a profile needs at least one face");
         let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
@@ -81,25 +104,42 @@ impl Profile {
             outer: radius(support.outer),
             inner: radius(support.inner.min(shallow)),
             octaves: OCTAVES[0],
+            far: 0,
             bits: *BITS.start(),
         };
         let error = |grid: Grid| {
             interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, faces, device)
         };
         // The innermost cell decides the octaves, all others the cells in an octave.
-        let mut reached = error(grid);
         for octaves in OCTAVES {
             grid.octaves = octaves;
-            reached = error(grid);
-            if reached.innermost <= 1.0 {
+            if error(grid).innermost <= 1.0 {
                 break;
             }
         }
-        for bits in BITS {
-            grid.bits = bits;
-            reached = error(grid);
-            if reached.rest <= 1.0 {
-                break;
+        let refined = |mut grid: Grid, enough: f64| {
+            let mut reached = Reached { innermost: f64::INFINITY, rest: f64::INFINITY };
+            for bits in BITS {
+                grid.bits = bits;
+                reached = error(grid);
+                if reached.rest <= enough {
+                    break;
+                }
+            }
+            (grid, reached)
+        };
+        let (mut grid, mut reached) = refined(grid, 1.0);
+        // Knots are left wanting where the profile rises without bound at the end of its support, or
+        // at a corner in the middle, where more of them at the end are of no use.
+        if let (true, Some(&most)) = (reached.rest > 1.0, far.last()) {
+            let best = error(Grid { far: most, ..grid }).rest;
+            if best < 0.5 * reached.rest {
+                let enough = best.max(1.0);
+                let suffices = |&&far: &&u32| error(Grid { far, ..grid }).rest <= enough;
+                grid.far = *far.iter().find(suffices).unwrap_or(&most);
+                grid = refined(grid, enough).0;
+                grid.bits += SHARPER;
+                reached = error(grid);
             }
         }
         let error = reached.innermost.max(reached.rest) * tolerance / 2.0;
@@ -129,6 +169,12 @@ impl Profile {
 
     /// Coefficients of the cubics, `[rows, 4]`, in the float type of `phi` `[parameters]`.
     ///
+    /// The cubic of a cell has the profile's value at the near end, and its slopes at both ends and
+    /// in the middle. Its error is that of the cubic with the values and slopes of both ends,
+    /// `t² (1 - t)²` times a 24th of the fourth derivative, to leading order. But differences of slopes
+    /// of neighbours keep their digits where differences of values do not, next to the edge above all:
+    /// in f32 these would leave the second derivative nothing.
+    ///
     /// `softness` may differ from the one the profile was chosen for only in its parameters.
     pub fn table<B: Backend>(&self, softness: &impl Softness, phi: Tensor<B, 1>) -> Tensor<B, 2> {
         let knots = self.grid.knots();
@@ -138,48 +184,43 @@ impl Profile {
             let shape = [values.len()];
             Tensor::<B, 1>::from_data(TensorData::new(values, shape), (&device, dtype))
         };
+        // Behind the knots stand the middles of all cells but the innermost, whose slopes count, and
+        // the tail.
+        let middle = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
+        let middles = knots[1..].windows(2).map(middle);
+        let places = knots.iter().copied().chain(middles).chain([BEYOND * BEYOND]);
+        let places: Vec<f64> = places.collect();
         // Both sides in one tensor: an op costs more than its few hundred numbers.
         let sides = [-self.grid.outer, self.grid.inner];
-        let distances = sides.iter().flat_map(|r| knots.iter().map(move |y| r * y.sqrt()));
-        let distances: Vec<_> = distances.collect();
+        // A distance of 0 has no side; this one has, and is next to nothing also in a wide support.
+        let nudged = |r: f64, y: f64| {
+            if y == 0.0 { r.clamp(-1.0, 1.0) * 1e-15 } else { r * y.sqrt() }
+        };
+        let distances = sides.iter().flat_map(|&r| places.iter().map(move |&y| nudged(r, y)));
         // dy/dd at the knots, to turn slopes by distance into slopes by cell. Where the distance is
         // 0 the slope by its square may be infinite; the innermost cell is linear and needs none.
         let rate = |r: f64, y: f64| if y == 0.0 { 0.0 } else { r / (2.0 * y.sqrt()) };
-        let rates = sides.iter().flat_map(|&r| knots.iter().map(move |&y| rate(r, y)));
-        let rates = constant(rates.collect());
-        let count = knots.len();
-        // A distance of 0 has no side; this one has, and is next to nothing also in a wide support.
-        let nudge = |(k, d): (usize, f64)| match k % count {
-            0 => sides[k / count].clamp(-1.0, 1.0) * 1e-15,
-            _ => d,
-        };
-        let distances = constant(distances.into_iter().enumerate().map(nudge).collect());
+        let rates = sides.iter().flat_map(|&r| places.iter().map(move |&y| rate(r, y)));
+        let (distances, rates) = (constant(distances.collect()), constant(rates.collect()));
         let (value, slope) = self.t_conorm.profile(softness, phi, distances);
         let slope = slope * rates;
 
+        let widths = constant(knots[1..].windows(2).map(|pair| pair[1] - pair[0]).collect());
         let mut rows = Vec::with_capacity(6);
-        let widths: Vec<_> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        for side in 0..2 {
-            let start = side * count;
-            let [first, second] =
-                [0, 1].map(|k| value.clone().narrow(0, start + k, 1).reshape([1, 1]));
+        for start in [0, places.len()] {
+            let at = |k: usize| value.clone().narrow(0, start + k, 1).reshape([1, 1]);
+            let (first, tail) = (at(0), at(places.len() - 1));
             let zero = first.clone() * 0.0;
-            rows.push(Tensor::cat(
-                vec![first.clone(), second - first, zero.clone(), zero.clone()],
-                1,
-            ));
-            let width = constant(widths[1..].to_vec());
-            let ends = |values: &Tensor<B, 1>| {
-                [1, 2].map(|k| values.clone().narrow(0, start + k, cells - 1))
-            };
-            let [v0, v1] = ends(&value);
-            let [m0, m1] = ends(&slope).map(|m| m * width.clone());
-            let rise = v1 - v0.clone();
-            let square = rise.clone() * 3.0 - m0.clone() * 2.0 - m1.clone();
-            let cube = rise * -2.0 + m0.clone() + m1;
-            rows.push(Tensor::stack(vec![v0, m0, square, cube], 1));
-            let last = value.clone().narrow(0, start + count - 1, 1).reshape([1, 1]);
-            rows.push(Tensor::cat(vec![last, zero.clone(), zero.clone(), zero], 1));
+            let rise = at(1) - first.clone();
+            rows.push(Tensor::cat(vec![first, rise, zero.clone(), zero.clone()], 1));
+            let inner = |k: usize| slope.clone().narrow(0, start + k, cells - 1) * widths.clone();
+            let [left, right, middle] = [1, 2, cells + 1].map(inner);
+            let (half, whole) = (middle - left.clone(), right - left.clone());
+            let square = half.clone() * 2.0 - whole.clone() * 0.5;
+            let cube = (whole - half * 2.0) * (2.0 / 3.0);
+            let values = value.clone().narrow(0, start + 1, cells - 1);
+            rows.push(Tensor::stack(vec![values, left, square, cube], 1));
+            rows.push(Tensor::cat(vec![tail, zero.clone(), zero.clone(), zero], 1));
         }
         Tensor::cat(rows, 0)
     }
@@ -191,7 +232,7 @@ struct Reached {
     rest: f64,
 }
 
-/// Compares the cubics of a grid with the profile itself at three places in each cell.
+/// Compares the cubics of a grid with the profile itself at four places in each cell.
 fn interpolation_error<B: Backend>(
     softness: &impl Softness,
     t_conorm: TConorm,
@@ -213,9 +254,9 @@ fn interpolation_error<B: Backend>(
     let table = profile.table(softness, tensor(phi.to_vec()));
     let table = numbers(table.reshape([4 * grid.rows() as i64]));
     let knots = grid.knots();
-    let places = [0.25, 0.5, 0.75];
-    let mut distances = Vec::with_capacity(6 * knots.len());
-    let mut interpolated = Vec::with_capacity(6 * knots.len());
+    let places = [0.25, 0.5, 0.75, 1.0];
+    let mut distances = Vec::with_capacity(2 * places.len() * knots.len());
+    let mut interpolated = Vec::with_capacity(2 * places.len() * knots.len());
     for (side, radius) in [-grid.outer, grid.inner].into_iter().enumerate() {
         for (cell, ends) in knots.windows(2).enumerate() {
             let row = 4 * (side * (grid.cells() + 1) + cell);

@@ -67,7 +67,16 @@ impl Rasterizer {
         if B::name(device).contains("wgpu") {
             type Host = burn::backend::NdArray<f32>;
             let device = Default::default();
-            return Profile::new::<Host>(softness, t_conorm, phi, faces, tolerance, &device);
+            // Its look-up knows no cells that are counted from the far end.
+            return Profile::chosen::<Host>(
+                softness,
+                t_conorm,
+                phi,
+                faces,
+                tolerance,
+                &[],
+                &device,
+            );
         }
         Profile::new::<B>(softness, t_conorm, phi, faces, tolerance, device)
     }

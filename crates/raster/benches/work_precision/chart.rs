@@ -125,5 +125,7 @@ fn range(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
 
 /// A number on an axis, without zeros that nobody counts.
 fn tick(value: f64) -> String {
+    // Powers of ten are a little off.
+    let value = format!("{value:.6e}").parse().unwrap_or(value);
     if (0.01..20_000.0).contains(&value) { format!("{value}") } else { format!("{value:.0e}") }
 }

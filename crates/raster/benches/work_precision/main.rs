@@ -8,6 +8,8 @@
 //! medians, from world vertices to the gradient of a mean squared difference to a disk.
 
 mod chart;
+#[path = "../machine.rs"]
+mod machine;
 #[path = "../scalar.rs"]
 mod scalar;
 #[path = "../workload.rs"]
@@ -20,18 +22,19 @@ use burn::{
     tensor::{DType, Tensor},
 };
 use chart::{Panel, Series};
+use machine::machine;
 use scalar::Scalar;
 use softrast_mesh::icosphere;
 use softrast_raster::{RasterBackend, Silhouette, TConorm, mse_loss, project, reference};
 use softrast_softness::EdgeSoftness;
-use workload::{SOFTNESS, Workload, tensor};
+use workload::{SOFTNESS, Workload, disk, tensor};
 
 type B32 = NdArray<f32>;
 type B64 = NdArray<f64>;
 
 /// Tolerance of the images that count as exact.
 const EXACT: f64 = 1e-12;
-const REPEATS: usize = 31;
+const REPEATS: usize = 15;
 /// A point of the scaling chart takes at least three runs, and about this long at most.
 const SECONDS: f64 = 2.0;
 
@@ -39,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
     fs::create_dir_all(&docs)?;
     let threads = rayon::current_num_threads();
-    let header = format!("# {threads} threads, load of the machine {}\n", load());
+    let header = format!("# {}\n", machine());
 
     let mut csv =
         format!("{header}workload,method,tolerance,knots,pairs,ms,image_error,gradient_error\n");
@@ -58,12 +61,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     chart::write(&docs.join("scaling.svg"), &title, &panels, 3)?;
     fs::write(docs.join("scaling.csv"), csv)?;
     Ok(())
-}
-
-/// Load averages as the system tells them.
-fn load() -> String {
-    let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    load.split_whitespace().take(3).collect::<Vec<_>>().join(" ")
 }
 
 /// An image and its gradient to the world vertices, flat, and the time they took.
@@ -108,16 +105,6 @@ impl<B: RasterBackend> Scene<B> {
     fn pairs(&self) -> usize {
         self.silhouette.pairs(project(self.world.clone(), self.cameras.clone()))
     }
-}
-
-/// A disk of radius 0.5 at (-0.1, 0.05), hard-edged at pixel centres.
-fn disk(size: usize) -> Vec<f64> {
-    let centre = |index: usize| (2.0 * index as f64 + 1.0 - size as f64) / size as f64;
-    let covered = |pixel: usize| {
-        let (x, y) = (centre(pixel % size) + 0.1, centre(size - 1 - pixel / size) - 0.05);
-        f64::from(u8::from(x * x + y * y <= 0.25))
-    };
-    (0..size * size).map(covered).collect()
 }
 
 /// Largest difference between what counts as exact and the reference, on the first 300 faces.
@@ -254,6 +241,18 @@ fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
 /// Width of an edge in the scaling chart, in pixels.
 const WIDTH_PX: f64 = 0.5;
 
+/// The slopes are fitted to this many points with the longest times, where fixed costs are small.
+const FITTED: usize = 4;
+
+/// Slope of a straight line through the logarithms, by least squares.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let logs = points.iter().map(|&(x, y)| [x.ln(), y.ln()]);
+    let mean = |k: usize| logs.clone().map(|log| log[k]).sum::<f64>() / points.len() as f64;
+    let (x, y) = (mean(0), mean(1));
+    let sum = |of: fn(f64, f64) -> f64| logs.clone().map(|[a, b]| of(a - x, b - y)).sum::<f64>();
+    sum(|x, y| x * y) / sum(|x, _| x * x)
+}
+
 /// Three panels: time against faces, pixels and views, the other two fixed.
 fn scaling(csv: &mut String) -> Vec<Panel> {
     let mut measure = |varied: &str, level: u32, size: usize, views: usize| {
@@ -279,7 +278,8 @@ fn scaling(csv: &mut String) -> Vec<Panel> {
         let line = points.iter().map(|&(x, _)| (x, y0 * x / x0)).collect::<Vec<_>>();
         let series = vec![Series::new("measured", points), Series::line("linear", &line)];
         let y = "time of image and gradient [ms]".to_owned();
-        Panel { title: title.to_owned(), x: x.to_owned(), y, series }
+        let title = format!("{title}: slope {:.2}", slope(&points[points.len() - FITTED..]));
+        Panel { title, x: x.to_owned(), y, series }
     };
     vec![
         panel("256 x 256 pixels, 1 view", "faces", &faces),

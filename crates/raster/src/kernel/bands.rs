@@ -57,8 +57,11 @@ impl Bands {
             let place = |((&x, &y), &z)| in_pixels([x, y, z], near, size);
             let places: Vec<_> = x.iter().zip(y).zip(z).map(place).collect();
             let mut drawn = 0;
+            let corners = |&[a, b, c]: &[u32; 3]| {
+                [places[a as usize], places[b as usize], places[c as usize]]
+            };
             let reach = |face: &[u32; 3]| {
-                let reach = Reach::around(face.map(|v| places[v as usize]), radius, size);
+                let reach = Reach::around(corners(face), radius, size);
                 drawn += usize::from(reach.is_some());
                 reach.unwrap_or(Reach::NOTHING)
             };

@@ -127,6 +127,19 @@ impl<T: Real> Batch<T> {
         face: &Face<T>,
         lookup: &Lookup<T::Float>,
     ) {
+        if lookup.has_far_cells() {
+            self.places_in::<GRADIENT, true>(face, lookup);
+        } else {
+            self.places_in::<GRADIENT, false>(face, lookup);
+        }
+    }
+
+    #[inline(always)]
+    fn places_in<const GRADIENT: bool, const FAR: bool>(
+        &mut self,
+        face: &Face<T>,
+        lookup: &Lookup<T::Float>,
+    ) {
         // Fills up the last chunk.
         let rest = self.len..self.chunks() * LANES;
         self.px.as_flattened_mut()[rest.clone()].fill(T::Float::from_f64(NOWHERE));
@@ -138,10 +151,12 @@ impl<T: Real> Batch<T> {
                 let inside = point.inside >= T::Float::ZERO;
                 let inverse = lookup.inverse(inside);
                 let y = point.distance2.scale(inverse);
-                let place = lookup.place(y.value(), inside);
+                let place = lookup.place::<FAR>(y.value(), inside);
                 self.row[c][i] = place.row;
                 // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
-                let t = (y - T::constant(place.start)).scale(place.rate);
+                let start = T::constant(place.start);
+                let along = if FAR && place.far { start - (T::ONE - y) } else { y - start };
+                let t = along.scale(place.rate);
                 self.t[c][i] = if y.value() < T::Float::ONE { t } else { T::ZERO };
                 if GRADIENT {
                     let rate = place.rate * inverse;

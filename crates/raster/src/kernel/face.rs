@@ -7,6 +7,26 @@ const POINT: f64 = 1e-30;
 /// Projected coordinates beyond this (NDC) are not drawn: a table reaches no farther.
 const FAR_AWAY: f64 = 1e6;
 
+/// Numbers of the edges, and one to fill a vector.
+const VECTOR: usize = 4;
+
+/// The numbers of three edges with the last one twice.
+#[inline(always)]
+fn filled<N: Copy>([a, b, c]: [N; 3]) -> [N; VECTOR] {
+    [a, b, c, c]
+}
+
+#[inline(always)]
+fn three<N>([a, b, c, _]: [N; VECTOR]) -> [N; 3] {
+    [a, b, c]
+}
+
+/// The numbers of three edges without their derivatives. Written out: `map` on an array is a call.
+#[inline(always)]
+fn values<T: Real>([a, b, c]: [T; 3]) -> [T::Float; VECTOR] {
+    filled([a.value(), b.value(), c.value()])
+}
+
 /// A projected triangle prepared for distances; corner k starts edge k.
 #[derive(Clone, Copy)]
 pub(crate) struct Face<T: Real> {
@@ -26,28 +46,24 @@ impl<T: Real> Face<T> {
     /// Prepares the triangle with the given corners (NDC).
     #[inline(always)]
     pub(crate) fn new(x: [T; 3], y: [T; 3]) -> Self {
-        let zero = T::Float::ZERO;
-        let one = T::Float::ONE;
-        let mut edge_x = [T::ZERO; 3];
-        let mut edge_y = [T::ZERO; 3];
-        let mut inverse = [T::ZERO; 3];
-        for k in 0..3 {
-            let next = (k + 1) % 3;
-            edge_x[k] = x[next] - x[k];
-            edge_y[k] = y[next] - y[k];
-            let length2 = edge_x[k] * edge_x[k] + edge_y[k] * edge_y[k];
-            if length2.value() > T::Float::from_f64(POINT) {
-                inverse[k] = length2.recip();
-            }
+        let (zero, one) = (T::Float::ZERO, T::Float::ONE);
+        // No branch and a fourth lane: one vector holds what is the same for all edges.
+        let from = [filled(x), filled(y)];
+        let to = [[x[1], x[2], x[0], x[0]], [y[1], y[2], y[0], y[0]]];
+        let mut edges = [[T::ZERO; VECTOR]; 2];
+        let mut inverses = [T::ZERO; VECTOR];
+        for k in 0..VECTOR {
+            let (ex, ey) = (to[0][k] - from[0][k], to[1][k] - from[1][k]);
+            let length2 = ex * ex + ey * ey;
+            let some = length2.value() > T::Float::from_f64(POINT);
+            let inverse = if some { length2 } else { T::ONE }.recip();
+            inverses[k] = if some { inverse } else { T::ZERO };
+            (edges[0][k], edges[1][k]) = (ex, ey);
         }
+        let [edge_x, edge_y, inverse] = [three(edges[0]), three(edges[1]), three(inverses)];
         let area = edge_x[0].value() * edge_y[1].value() - edge_y[0].value() * edge_x[1].value();
-        let orientation = if area > zero {
-            one
-        } else if area < zero {
-            -one
-        } else {
-            zero
-        };
+        let unit = |some: bool| if some { one } else { zero };
+        let orientation = unit(area > zero) - unit(area < zero);
         let threshold = if orientation == zero { one } else { zero };
         Self { x, y, edge_x, edge_y, inverse, orientation, threshold }
     }
@@ -109,9 +125,9 @@ impl Reach {
 pub(crate) struct Spans<F> {
     // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
     // out of reach.
-    low: [F; 3],
-    high: [F; 3],
-    tilt: [F; 3],
+    low: [F; VECTOR],
+    high: [F; VECTOR],
+    tilt: [F; VECTOR],
 }
 
 /// Rows that [`Spans::columns`] handles at once.
@@ -122,22 +138,21 @@ impl<F: Float> Spans<F> {
     #[inline(always)]
     pub(crate) fn new<T: Real<Float = F>>(face: &Face<T>, radius: F) -> Self {
         let never = F::from_f64(FAR_AWAY);
-        let mut spans = Self { low: [-never; 3], high: [never; 3], tilt: [F::ZERO; 3] };
-        for k in 0..3 {
-            let ex = face.edge_x[k].value() * face.orientation;
-            let ey = face.edge_y[k].value() * face.orientation;
-            let (x, y) = (face.x[k].value(), face.y[k].value());
-            // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for
-            // an edge that is all but horizontal, or for a face without area.
-            let flat = F::from_f64(1e-3);
+        // The bound is of no use for an edge that is all but horizontal, or for a face without area.
+        let flat = F::from_f64(1e-3);
+        let mut spans = Self { low: [F::ZERO; 4], high: [F::ZERO; 4], tilt: [F::ZERO; 4] };
+        let (edge_x, edge_y) = (values(face.edge_x), values(face.edge_y));
+        let (from_x, from_y) = (values(face.x), values(face.y));
+        for k in 0..VECTOR {
+            let (ex, ey) = (edge_x[k] * face.orientation, edge_y[k] * face.orientation);
+            // ex (py - y) - ey (px - x) >= -radius |e|, solved for px.
             let useless = ey * ey <= flat * flat * ex * ex;
-            let inverse = if useless { F::ZERO } else { ey.recip() };
-            let tilt = ex * inverse;
+            let tilt = ex * if useless { F::ONE } else { ey }.recip();
             let reach = radius * (F::ONE + tilt * tilt).sqrt();
-            let bound = x - tilt * y;
-            spans.tilt[k] = tilt;
-            spans.low[k] = if ey < F::ZERO && !useless { bound - reach } else { -never };
-            spans.high[k] = if ey > F::ZERO && !useless { bound + reach } else { never };
+            let bound = from_x[k] - tilt * from_y[k];
+            spans.tilt[k] = if useless { F::ZERO } else { tilt };
+            spans.low[k] = if (ey < F::ZERO) & !useless { bound - reach } else { -never };
+            spans.high[k] = if (ey > F::ZERO) & !useless { bound + reach } else { never };
         }
         spans
     }
@@ -156,7 +171,7 @@ impl<F: Float> Spans<F> {
         // A hundredth of a pixel makes up for rounding.
         let margin = F::from_f64(0.01);
         let point_five = F::from_f64(0.5);
-        let limits = [reach.left, reach.right].map(|column| F::from_f64(f64::from(column)));
+        let limits = [F::from_f64(f64::from(reach.left)), F::from_f64(f64::from(reach.right))];
         let mut starts = [0; SPANS];
         let mut ends = [0; SPANS];
         for i in 0..SPANS {

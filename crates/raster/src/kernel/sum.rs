@@ -12,14 +12,6 @@ use super::{
     },
 };
 
-/// Gradient of `Σ upstream S`.
-struct Gradient<T: Real> {
-    /// `[views, 3, vertices]`; the third row is 0, a silhouette does not see depth.
-    vertices: Vec<T>,
-    /// Like [`Scene::table`].
-    table: Vec<[T; 4]>,
-}
-
 /// Runs the image part of a walk over all bands; `[views, size, size]`.
 fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<T> {
     let size = scene.size;
@@ -62,20 +54,26 @@ fn drawn<F: Float>(view: &View) -> F {
     F::from_f64(view.drawn as f64)
 }
 
-/// Runs a walk with gradients over all bands. With `IMAGE` the sums come back as well.
+/// Runs a walk with gradients over all bands: gradient of `Σ upstream S` to vertices and table, flat
+/// and in this order, the third row of each view's vertices 0, because a silhouette does not see
+/// depth. With `IMAGE` the sums come back as well.
 fn gradient<T: Real, const IMAGE: bool>(
     scene: &Scene<T>,
     bands: &Bands,
     upstream: &[T::Float],
     wrt_table: bool,
-) -> (Gradient<T>, Vec<T>) {
+) -> (Vec<T>, Vec<T>) {
     let size = scene.size;
     let views = bands.views.len();
     let pixels = size * size;
     let table_rows = if wrt_table || IMAGE { scene.grid.rows() } else { 0 };
-    let per_view: Vec<_> = (0..views)
-        .into_par_iter()
-        .map(|index| {
+    let count = scene.vertices.len();
+    let mut flat = vec![T::ZERO; count + 4 * scene.grid.rows()];
+    let (vertices, table) = flat.split_at_mut(count);
+    let per_view: Vec<_> = vertices
+        .par_chunks_mut((count / views.max(1)).max(1))
+        .enumerate()
+        .map(|(index, total)| {
             let view = &bands.views[index];
             let vertices = scene.view(index, views);
             let upstream = &upstream[index * pixels..(index + 1) * pixels];
@@ -100,54 +98,46 @@ fn gradient<T: Real, const IMAGE: bool>(
                     (gradient, image)
                 })
                 .collect();
-            gather(scene, view, vertices.len(), upstream, walked)
+            gather(scene, view, upstream, walked, total)
         })
         .collect();
-    let mut total = Gradient {
-        vertices: Vec::with_capacity(scene.vertices.len()),
-        table: vec![[T::ZERO; 4]; scene.grid.rows()],
-    };
     let mut sums = Vec::with_capacity(if IMAGE { views * pixels } else { 0 });
-    for (gradient, image) in per_view {
-        total.vertices.extend(gradient.vertices);
-        add_rows(&mut total.table, &gradient.table);
+    for (part, image) in per_view {
+        table.iter_mut().zip(part.as_flattened()).for_each(|(total, &part)| *total += part);
         sums.extend(image);
     }
-    (total, sums)
+    (flat, sums)
 }
 
-/// Adds up the bands of a view in their order: corners to vertices, tables, image rows.
+/// Adds up the bands of a view in their order: corners to `vertices`, tables, image rows.
 fn gather<T: Real>(
     scene: &Scene<T>,
     view: &View,
-    length: usize,
     upstream: &[T::Float],
     walked: Vec<(BandGradient<T>, Vec<T>)>,
-) -> (Gradient<T>, Vec<T>) {
-    let mut total = Gradient {
-        vertices: vec![T::ZERO; length],
-        table: vec![[T::ZERO; 4]; walked.first().map_or(0, |(band, _)| band.table.len())],
-    };
+    vertices: &mut [T],
+) -> (Vec<[T; 4]>, Vec<T>) {
+    let mut table = vec![[T::ZERO; 4]; walked.first().map_or(0, |(band, _)| band.table.len())];
     let tail = scene.table[scene.grid.tail()][0].scale(drawn(view));
     let mut image = Vec::with_capacity(walked.iter().map(|(_, rows)| rows.len()).sum());
+    let (x, rest) = vertices.split_at_mut(vertices.len() / 3);
     for (band, (gradient, rows)) in walked.into_iter().enumerate() {
-        let (x, rest) = total.vertices.split_at_mut(length / 3);
         for (&face, corners) in view.faces(band).iter().zip(&gradient.corners) {
             for (corner, xy) in scene.faces[face as usize].iter().zip(corners.chunks_exact(2)) {
                 x[*corner as usize] += xy[0];
                 rest[*corner as usize] += xy[1];
             }
         }
-        add_rows(&mut total.table, &gradient.table);
+        add_rows(&mut table, &gradient.table);
         for row in rows.chunks(scene.stride()) {
             image.extend(row[..scene.size].iter().map(|&sum| sum + tail));
         }
     }
-    if !total.table.is_empty() {
+    if !table.is_empty() {
         let sum = upstream.iter().fold(T::Float::ZERO, |sum, &g| sum + g);
-        total.table[scene.grid.tail()][0] += T::constant(drawn::<T::Float>(view) * sum);
+        table[scene.grid.tail()][0] += T::constant(drawn::<T::Float>(view) * sum);
     }
-    (total, image)
+    (table, image)
 }
 
 fn add_rows<T: Real>(total: &mut [[T; 4]], part: &[[T; 4]]) {
@@ -193,8 +183,7 @@ pub(crate) fn forward<F: Float>(inputs: &Inputs<F>) -> Vec<F> {
 pub(crate) fn vjp<F: Float>(inputs: &Inputs<F>, upstream: &[F], wrt_table: bool) -> Vec<F> {
     let table = inputs.rows();
     let scene = Scene::new(inputs.vertices, inputs.faces, &table, inputs.grid, inputs.size);
-    let (gradient, _) = gradient::<F, false>(&scene, &inputs.bands(), upstream, wrt_table);
-    gradient.vertices.into_iter().chain(gradient.table.into_iter().flatten()).collect()
+    gradient::<F, false>(&scene, &inputs.bands(), upstream, wrt_table).0
 }
 
 /// Pullback of `direction` (like the result of [`vjp`]) through [`vjp`]: gradients to vertices,
@@ -215,6 +204,5 @@ pub(crate) fn vjp_of_vjp<F: Float>(inputs: &Inputs<F>, upstream: &[F], direction
         .collect();
     let scene = Scene::new(&vertices, inputs.faces, &table, inputs.grid, inputs.size);
     let (gradient, image) = gradient::<Dual<F>, true>(&scene, &inputs.bands(), upstream, true);
-    let gradient = gradient.vertices.into_iter().chain(gradient.table.into_iter().flatten());
-    gradient.chain(image).map(|dual| dual.tangent).collect()
+    gradient.iter().chain(&image).map(|dual| dual.tangent).collect()
 }

@@ -40,8 +40,9 @@ impl<T: Real> Place<'_, T> {
     #[inline(always)]
     pub(crate) fn face(&self, scene: &Scene<T>, index: u32) -> Face<T> {
         let (x, rest) = self.vertices.split_at(self.vertices.len() / 3);
-        let corners = scene.faces[index as usize].map(|v| v as usize);
-        Face::new(corners.map(|v| x[v]), corners.map(|v| rest[v]))
+        let [a, b, c] = scene.faces[index as usize];
+        let (a, b, c) = (a as usize, b as usize, c as usize);
+        Face::new([x[a], x[b], x[c]], [rest[a], rest[b], rest[c]])
     }
 }
 

@@ -1,0 +1,16 @@
+//! Where the numbers come from.
+
+use std::fs;
+
+/// Processor, threads in use and load averages, as the system tells them.
+pub(crate) fn machine() -> String {
+    let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
+    let cpuinfo = read("/proc/cpuinfo");
+    let model =
+        cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split(": ").nth(1));
+    let load = read("/proc/loadavg");
+    let load: Vec<_> = load.split_whitespace().take(3).collect();
+    let threads = rayon::current_num_threads();
+    let model = model.unwrap_or("an unknown processor");
+    format!("{threads} threads of {model}, load averages {}", load.join(" "))
+}
