@@ -27,6 +27,7 @@ impl<B: Backend> Flatness<B> {
     ///
     /// `α` is the angle between the heights of both faces on their common edge: half a turn where
     /// the surface is flat, so that it adds nothing. Source: FACTS 4.1.
+    #[allow(clippy::missing_panics_doc, reason = "four parts are four parts")]
     pub fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let Some(corners) = &self.corners else { return vertices.sum() * 0.0 };
         let corners = vertices.select(0, corners.clone());

@@ -1,0 +1,4 @@
+//! The fused op in f32.
+
+mod limits;
+mod second_order;
