@@ -91,7 +91,9 @@ impl Method {
                 let family: Family = name.parse()?;
                 let softness = EdgeSoftness { family, squared: settings.squared };
                 let schedule = asked_schedule(settings);
-                let searched = Searched::of(defaults.task, family.name(), schedule);
+                // Found together, so taken whole or not at all.
+                let known = Searched::of(defaults.task, family.name(), schedule);
+                let searched = known.filter(|_| !scaled);
                 let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
                 Ok(Self { softness, name: family.name().to_owned(), path, searched, backend })
             }
