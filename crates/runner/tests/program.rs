@@ -170,7 +170,7 @@ fn numbers_that_blow_up_end_the_results_before() {
 fn bad_input_gives_one_line_and_leaves_nothing_behind() {
     let cases = [
         ("frobnicate", 2, "invalid value 'frobnicate'"),
-        ("--softness sofft", 2, "expected one of logistic, gauss, exp, gamma, mlp"),
+        ("--softness sofft", 2, "expected one of logistic, gauss, exp, gamma, bilogit, mlp"),
         ("--softness gauss", 2, "no softness gauss"),
         ("--softness none.json", 1, "cannot read the softness"),
         ("--variant both", 2, "[possible values: original, transfer]"),
