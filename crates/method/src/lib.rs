@@ -38,7 +38,6 @@ mod lesson;
 mod method;
 mod moving_silhouette;
 mod searched;
-mod shipped;
 mod silhouette_lesson;
 mod tensor;
 
@@ -52,6 +51,5 @@ pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::{Defaults, Method};
 pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;
-pub use shipped::shipped;
 pub use silhouette_lesson::{LearnedSilhouette, SilhouetteLesson};
 pub use tensor::{numbers, on_host, read, tensor};

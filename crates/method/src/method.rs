@@ -2,7 +2,7 @@ use softrast_raster::{BackendChoice, HostBackend};
 use softrast_runner::{Command, Error, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
-use crate::{Searched, numbers, shipped, tensor};
+use crate::{Searched, numbers, tensor};
 
 /// Scales of a task that the command line does not name, as widths in NDC. A family that
 /// [`Searched`] knows has its own instead.
@@ -44,8 +44,7 @@ enum Path {
 }
 
 impl Method {
-    /// The method that the command line asks for; by default what was learned for the task and
-    /// comes with the program ([`shipped`]), or else a logistic. The same holds for `mlp`.
+    /// The method that the command line asks for; by default a logistic.
     ///
     /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are
     /// squared, so that they mean the same widths.
@@ -57,21 +56,7 @@ impl Method {
     pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(settings, defaults.backends)?;
-        let size = settings.size.unwrap_or(defaults.size);
         let scaled = settings.scale.is_some() || settings.scale_end.is_some() || settings.squared;
-        let asked = scaled || settings.schedule.is_some();
-        let comes_with_it = match &settings.softness {
-            None if !asked => Some(("learned", defaults.task.to_owned())),
-            Some(SoftnessChoice::Named("mlp")) if !scaled => {
-                Some(("mlp", format!("{}_mlp", defaults.task)))
-            }
-            _ => None,
-        };
-        if let Some((name, file)) = comes_with_it
-            && let Some(learned) = shipped(&file)?
-        {
-            return Ok(Self::of_file(learned, name.to_owned(), size, backend));
-        }
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 if scaled || settings.schedule == Some(Schedule::Decay) {
@@ -80,8 +65,15 @@ impl Method {
                          --squared and --schedule decay, or name a family",
                     ));
                 }
-                let learned = SoftnessFile::load(file)?;
-                Ok(Self::of_file(learned, file.display().to_string(), size, backend))
+                let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(file)?;
+                let path = match path {
+                    None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
+                    Some(path) => {
+                        Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) }
+                    }
+                };
+                let name = file.display().to_string();
+                Ok(Self { softness, name, path, searched: None, backend })
             }
             named => {
                 let name = match named {
@@ -98,16 +90,6 @@ impl Method {
                 Ok(Self { softness, name: family.name().to_owned(), path, searched, backend })
             }
         }
-    }
-
-    /// With the parameters of a file, on images of `size` × `size` pixels.
-    fn of_file(file: SoftnessFile, name: String, size: usize, backend: BackendChoice) -> Self {
-        let SoftnessFile { softness, phi, path, .. } = file;
-        let path = match path {
-            None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
-            Some(path) => Path::Learned { phi, path, size },
-        };
-        Self { softness, name, path, searched: None, backend }
     }
 
     /// What was searched for this family on the task, under the same schedule.

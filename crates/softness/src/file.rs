@@ -106,19 +106,7 @@ impl SoftnessFile {
     /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do not
     /// suit the family.
     pub fn load(path: &Path) -> Result<Self, SoftnessFileError> {
-        let text = fs::read_to_string(path)
-            .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })?;
-        Self::parse(path, &text)
-    }
-
-    /// Checks what the file at `path`, which errors will name, is known to hold.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`load`](SoftnessFile::load), but for reading.
-    pub fn parse(path: &Path, text: &str) -> Result<Self, SoftnessFileError> {
-        let file: Self = serde_json::from_str(text)
-            .map_err(|source| SoftnessFileError::Parse { path: path.to_owned(), source })?;
+        let file: Self = read(path)?;
         file.check(path)?;
         Ok(file)
     }
