@@ -22,8 +22,6 @@ pub struct Measured {
     pub success_rate: f64,
     /// Time of the optimisation steps of a run, in seconds: its share of a batch.
     pub seconds: f64,
-    /// Most memory that the program had used by the end of the cell, in MiB.
-    pub peak_mib: Option<f64>,
     /// How each run went on, in the order of the seeds.
     pub traces: Vec<Trace>,
     /// Steps, pixels along a side of the image, and faces.
@@ -84,7 +82,6 @@ impl Measured {
             released: released.is_object().then(|| Error::new(released)).transpose()?,
             success_rate: number("/success_rate")?,
             seconds: number("/seconds/per_run")?,
-            peak_mib: json["peak_memory_mib"].as_f64(),
             traces: Vec::new(),
             scale_end: settings["scale_end"].as_f64(),
             squared: settings["squared"].as_bool() == Some(true),

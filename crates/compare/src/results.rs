@@ -35,12 +35,12 @@ pub fn markdown(measured: &[Measured], command: &str, pictures: Option<&str>) ->
             text += &shown(&chart, pictures);
         }
     }
-    let _ = write!(text, "## Table 5: seconds\n\n{SECONDS}\n{}", seconds(measured).markdown());
+    let _ = write!(text, "\n## Table 5: seconds\n\n{SECONDS}\n{}", seconds(measured).markdown());
     if let Some(table) = crossed(measured) {
-        let _ = write!(text, "## Table 6: cross evaluation\n\n{CROSSED}\n{}", table.markdown());
+        let _ = write!(text, "\n## Table 6: cross evaluation\n\n{CROSSED}\n{}", table.markdown());
     }
     if let Some(chart) = charts::profile(&by_variant(measured)) {
-        text += "## Who is fast how often\n";
+        text += "\n## Who is fast how often\n";
         text += &shown(&chart, pictures);
     }
     text
@@ -127,8 +127,7 @@ what it prints. The paper's meshes and pictures are others, so its figures tell 
 
 const SECONDS: &str = "\
 Wall time of the optimisation steps of a run, its share of a batch where runs are solved together, without the errors that are
-measured beside; the memory is the most that the process had used by then. The paper's figures are from a V100: 3.24 to 4.36 seconds
-to evaluate 3D SHAPE and 0.053 to 0.088 to draw once.
+measured beside. The paper's figures are from a V100: 3.24 to 4.36 seconds to evaluate 3D SHAPE and 0.053 to 0.088 to draw once.
 ";
 
 const CROSSED: &str = "\
@@ -244,8 +243,7 @@ fn errors(group: &[&Measured]) -> Table {
 
 /// Table 5: what a run costs.
 fn seconds(measured: &[Measured]) -> Table {
-    let mut table =
-        Table::new(["task", "variant", "method", "seconds a run", "ms a step", "peak MiB"]);
+    let mut table = Table::new(["task", "variant", "method", "seconds a run", "ms a step"]);
     for one in by_variant(measured).into_iter().flatten() {
         table.rows.push(vec![
             one.cell.task.title().to_owned(),
@@ -253,7 +251,6 @@ fn seconds(measured: &[Measured]) -> Table {
             one.cell.method_name(),
             short(one.seconds),
             short(1e3 * one.seconds / one.steps.max(1) as f64),
-            one.peak_mib.map(|mib| format!("{mib:.0}")).unwrap_or_default(),
         ]);
     }
     table

@@ -97,7 +97,7 @@ fn bad_input_is_one_line_and_leaves_no_picture() {
         (&[&mesh, "--azimuths", "1,,2"], 2, "with commas between them"),
         (&[&mesh, "--fov", "180"], 2, "between 0 and 180"),
         (&[&mesh, "--tolerance", "1"], 2, "between 0 and 1"),
-        (&[&mesh, "--softness", "soft"], 2, "known are logistic, gauss"),
+        (&[&mesh, "--softness", "soft"], 2, "known are logistic, bilogit, gauss"),
         (&[&mesh, "--softness", "missing.json"], 1, "missing.json"),
         (&[&mesh, "--softness", "a.json", "--squared"], 2, "a file has its own"),
         (&[&mesh, "--t-conorm", "max"], 2, "use probabilistic, einstein"),
