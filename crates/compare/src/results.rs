@@ -293,8 +293,11 @@ fn chosen(cell: &Cell) -> bool {
         [_, "--schedule", "decay"] => Some(Schedule::Decay),
         _ => return true,
     };
-    let searched = Searched::of(cell.task.name(), cell.softness(), schedule);
-    searched.is_some() || Path::new(cell.softness()).exists()
+    let searched = [Schedule::Static, Schedule::Decay].into_iter().any(|usual| {
+        let searched = Searched::of(cell.task.name(), cell.softness(), schedule, usual);
+        searched.is_some()
+    });
+    searched || Path::new(cell.softness()).exists()
 }
 
 fn with_interval(error: &Error) -> String {

@@ -84,7 +84,8 @@ impl Method {
                 let softness = EdgeSoftness { family, squared: settings.squared };
                 let schedule = asked_schedule(settings);
                 // Found together, so taken whole or not at all.
-                let known = Searched::of(defaults.task, family.name(), schedule);
+                let usual = defaults.schedule;
+                let known = Searched::of(defaults.task, family.name(), schedule, usual);
                 let searched = known.filter(|_| !scaled);
                 let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
                 Ok(Self { softness, name: family.name().to_owned(), path, searched, backend })

@@ -41,14 +41,22 @@ static TASKS: LazyLock<Tasks> = LazyLock::new(|| {
 });
 
 impl Searched {
-    /// The setting of a family in a task under a schedule, or under the better of the two; none where
-    /// nothing was searched for.
-    pub fn of(task: &str, family: &str, schedule: Option<Schedule>) -> Option<&'static Self> {
+    /// The setting of a family in a task under the schedule that is asked for; else under the better of
+    /// the two, or under the `usual` one of the task as long as not both were searched for. None
+    /// where nothing was.
+    pub fn of(
+        task: &str,
+        family: &str,
+        asked: Option<Schedule>,
+        usual: Schedule,
+    ) -> Option<&'static Self> {
         let Found { fixed, decay } = TASKS.get(task)?.get(family)?;
-        match schedule {
-            Some(Schedule::Static) => fixed.as_ref(),
-            Some(Schedule::Decay) => decay.as_ref(),
-            None => fixed.iter().chain(decay).min_by(|a, b| a.error.total_cmp(&b.error)),
+        if let (None, Some(fixed), Some(decay)) = (asked, fixed, decay) {
+            return Some(if fixed.error <= decay.error { fixed } else { decay });
+        }
+        match asked.unwrap_or(usual) {
+            Schedule::Static => fixed.as_ref(),
+            Schedule::Decay => decay.as_ref(),
         }
     }
 
@@ -72,11 +80,15 @@ mod tests {
                 let Searched { scale, scale_end, learning_rate, depth_scale, .. } = found;
                 let numbers = [Some(*scale), *scale_end, *learning_rate, *depth_scale];
                 assert!(numbers.into_iter().flatten().all(|x| x > 0.0), "{task} {family}");
-                assert_eq!(Searched::of(task, family, Some(found.schedule())), Some(found));
-                let better = Searched::of(task, family, None).unwrap();
+                let schedule = found.schedule();
+                for usual in [Schedule::Static, Schedule::Decay] {
+                    let asked = Searched::of(task, family, Some(schedule), usual);
+                    assert_eq!(asked, Some(found));
+                }
+                let better = Searched::of(task, family, None, schedule).unwrap();
                 assert!(better.error <= found.error, "{task} {family}");
             }
         }
-        assert_eq!(Searched::of("teapot", "logistic", None), None);
+        assert_eq!(Searched::of("teapot", "logistic", None, Schedule::Static), None);
     }
 }

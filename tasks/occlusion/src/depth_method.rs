@@ -1,6 +1,6 @@
 use softrast_method::{Searched, numbers, tensor};
 use softrast_raster::HostBackend;
-use softrast_runner::{Error, Settings, SoftnessChoice, Task};
+use softrast_runner::{Error, Schedule, Settings, SoftnessChoice, Task};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
 
 use crate::{Args, Occlusion, args::DepthSoftnessChoice};
@@ -51,7 +51,8 @@ impl DepthMethod {
             }
             return Ok(Self { softness, phi: softness.default_phi(1.0), name, scale: None });
         }
-        let searched = Searched::of(Occlusion::NAME, softness.name(), settings.schedule);
+        let asked = settings.schedule;
+        let searched = Searched::of(Occlusion::NAME, softness.name(), asked, Schedule::Static);
         let searched = searched.and_then(|found| found.depth_scale);
         let scale = args.depth_scale.or(settings.own).or(searched).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()
