@@ -93,6 +93,9 @@ fn replace(path: &Path, text: &str) -> anyhow::Result<()> {
 
 /// The command line that the user gave.
 fn command() -> String {
-    let words = std::env::args().skip(1).map(|word| format!(" {word}"));
+    let words = std::env::args().skip(1).map(|word| match word.contains(' ') {
+        true => format!(" \"{word}\""),
+        false => format!(" {word}"),
+    });
     format!("cargo run --release -p compare --{}", words.collect::<String>())
 }
