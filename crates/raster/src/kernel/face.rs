@@ -7,27 +7,26 @@ const POINT: f64 = 1e-30;
 /// Projected coordinates beyond this (NDC) are not drawn: a table reaches no farther.
 const FAR_AWAY: f64 = 1e6;
 
-/// Numbers of the edges, and one to fill a vector.
-const VECTOR: usize = 4;
+/// Faces that are prepared together.
+pub(crate) const BLOCK: usize = 8;
 
-/// The numbers of three edges with the last one twice.
-#[inline(always)]
-fn filled<N: Copy>([a, b, c]: [N; 3]) -> [N; VECTOR] {
-    [a, b, c, c]
+type Lanes<N> = [N; BLOCK];
+
+/// Projected triangles prepared for distances, one a lane; corner k starts edge k.
+///
+/// Meshes have faces of a few pixels, so that what a face costs before its first pixel counts. Every
+/// loop runs over the faces of a block, which the compiler turns into straight vector code.
+pub(crate) struct Faces<T: Real> {
+    x: [Lanes<T>; 3],
+    y: [Lanes<T>; 3],
+    edge_x: [Lanes<T>; 3],
+    edge_y: [Lanes<T>; 3],
+    inverse: [Lanes<T>; 3],
+    orientation: Lanes<T::Float>,
+    spans: Spans<Lanes<T::Float>>,
 }
 
-#[inline(always)]
-fn three<N>([a, b, c, _]: [N; VECTOR]) -> [N; 3] {
-    [a, b, c]
-}
-
-/// The numbers of three edges without their derivatives. Written out: `map` on an array is a call.
-#[inline(always)]
-fn values<T: Real>([a, b, c]: [T; 3]) -> [T::Float; VECTOR] {
-    filled([a.value(), b.value(), c.value()])
-}
-
-/// A projected triangle prepared for distances; corner k starts edge k.
+/// One of them.
 #[derive(Clone, Copy)]
 pub(crate) struct Face<T: Real> {
     pub(crate) x: [T; 3],
@@ -42,31 +41,108 @@ pub(crate) struct Face<T: Real> {
     pub(crate) threshold: T::Float,
 }
 
-impl<T: Real> Face<T> {
-    /// Prepares the triangle with the given corners (NDC).
+/// The three edges of a face as limits on x in a given row.
+#[derive(Clone, Copy)]
+pub(crate) struct Spans<F> {
+    // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
+    // out of reach.
+    low: [F; 3],
+    high: [F; 3],
+    tilt: [F; 3],
+}
+
+impl<T: Real> Faces<T> {
+    /// Prepares triangles with the given corners (NDC) for pixels no farther than `radius` outside.
     #[inline(always)]
-    pub(crate) fn new(x: [T; 3], y: [T; 3]) -> Self {
+    pub(crate) fn new(x: [Lanes<T>; 3], y: [Lanes<T>; 3], radius: T::Float) -> Self {
         let (zero, one) = (T::Float::ZERO, T::Float::ONE);
-        // No branch and a fourth lane: one vector holds what is the same for all edges.
-        let from = [filled(x), filled(y)];
-        let to = [[x[1], x[2], x[0], x[0]], [y[1], y[2], y[0], y[0]]];
-        let mut edges = [[T::ZERO; VECTOR]; 2];
-        let mut inverses = [T::ZERO; VECTOR];
-        for k in 0..VECTOR {
-            let (ex, ey) = (to[0][k] - from[0][k], to[1][k] - from[1][k]);
-            let length2 = ex * ex + ey * ey;
-            let some = length2.value() > T::Float::from_f64(POINT);
-            let inverse = if some { length2 } else { T::ONE }.recip();
-            inverses[k] = if some { inverse } else { T::ZERO };
-            (edges[0][k], edges[1][k]) = (ex, ey);
+        let nothing = [[T::ZERO; BLOCK]; 3];
+        let (mut edge_x, mut edge_y, mut inverse) = (nothing, nothing, nothing);
+        for k in 0..3 {
+            for i in 0..BLOCK {
+                let (ex, ey) = (x[(k + 1) % 3][i] - x[k][i], y[(k + 1) % 3][i] - y[k][i]);
+                let length2 = ex * ex + ey * ey;
+                let some = length2.value() > T::Float::from_f64(POINT);
+                let recip = if some { length2 } else { T::ONE }.recip();
+                inverse[k][i] = if some { recip } else { T::ZERO };
+                (edge_x[k][i], edge_y[k][i]) = (ex, ey);
+            }
         }
-        let [edge_x, edge_y, inverse] = [three(edges[0]), three(edges[1]), three(inverses)];
-        let area = edge_x[0].value() * edge_y[1].value() - edge_y[0].value() * edge_x[1].value();
-        let unit = |some: bool| if some { one } else { zero };
-        let orientation = unit(area > zero) - unit(area < zero);
-        let threshold = if orientation == zero { one } else { zero };
-        Self { x, y, edge_x, edge_y, inverse, orientation, threshold }
+        let mut orientation = [zero; BLOCK];
+        for i in 0..BLOCK {
+            let unit = |some: bool| if some { one } else { zero };
+            let area = edge_x[0][i].value() * edge_y[1][i].value()
+                - edge_y[0][i].value() * edge_x[1][i].value();
+            orientation[i] = unit(area > zero) - unit(area < zero);
+        }
+        let mut faces = Self {
+            x,
+            y,
+            edge_x,
+            edge_y,
+            inverse,
+            orientation,
+            spans: Spans {
+                low: [[zero; BLOCK]; 3],
+                high: [[zero; BLOCK]; 3],
+                tilt: [[zero; BLOCK]; 3],
+            },
+        };
+        faces.limit(radius);
+        faces
     }
+
+    /// Finds the limits for pixels no farther than `radius` outside the faces.
+    #[inline(always)]
+    fn limit(&mut self, radius: T::Float) {
+        let (zero, one) = (T::Float::ZERO, T::Float::ONE);
+        let never = T::Float::from_f64(FAR_AWAY);
+        // The bound is of no use for an edge that is all but horizontal, or for a face without area.
+        let flat = T::Float::from_f64(1e-3);
+        for k in 0..3 {
+            for i in 0..BLOCK {
+                let ex = self.edge_x[k][i].value() * self.orientation[i];
+                let ey = self.edge_y[k][i].value() * self.orientation[i];
+                // ex (py - y) - ey (px - x) >= -radius |e|, solved for px.
+                let useless = ey * ey <= flat * flat * ex * ex;
+                let tilt = ex * if useless { one } else { ey }.recip();
+                let reach = radius * (one + tilt * tilt).sqrt();
+                let bound = self.x[k][i].value() - tilt * self.y[k][i].value();
+                self.spans.tilt[k][i] = if useless { zero } else { tilt };
+                self.spans.low[k][i] = if (ey < zero) & !useless { bound - reach } else { -never };
+                self.spans.high[k][i] = if (ey > zero) & !useless { bound + reach } else { never };
+            }
+        }
+    }
+
+    /// The face of a lane.
+    #[inline(always)]
+    pub(crate) fn face(&self, lane: usize) -> Face<T> {
+        let orientation = self.orientation[lane];
+        let never = orientation == T::Float::ZERO;
+        Face {
+            x: of_lane(&self.x, lane),
+            y: of_lane(&self.y, lane),
+            edge_x: of_lane(&self.edge_x, lane),
+            edge_y: of_lane(&self.edge_y, lane),
+            inverse: of_lane(&self.inverse, lane),
+            orientation,
+            threshold: if never { T::Float::ONE } else { T::Float::ZERO },
+        }
+    }
+
+    /// The limits of a lane.
+    #[inline(always)]
+    pub(crate) fn spans(&self, lane: usize) -> Spans<T::Float> {
+        let Spans { low, high, tilt } = &self.spans;
+        Spans { low: of_lane(low, lane), high: of_lane(high, lane), tilt: of_lane(tilt, lane) }
+    }
+}
+
+/// What three edges or corners have in a lane. Written out: `map` on an array is a call.
+#[inline(always)]
+fn of_lane<N: Copy>([a, b, c]: &[Lanes<N>; 3], lane: usize) -> [N; 3] {
+    [a[lane], b[lane], c[lane]]
 }
 
 /// Where a vertex lies in a `size` px image: column and row, whole numbers at the centres of
@@ -121,42 +197,10 @@ impl Reach {
     }
 }
 
-/// The three edges of a face as limits on x in a given row.
-pub(crate) struct Spans<F> {
-    // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
-    // out of reach.
-    low: [F; VECTOR],
-    high: [F; VECTOR],
-    tilt: [F; VECTOR],
-}
-
 /// Rows that [`Spans::columns`] handles at once.
 pub(crate) const SPANS: usize = 8;
 
 impl<F: Float> Spans<F> {
-    /// Limits for pixels no farther than `radius` outside the face.
-    #[inline(always)]
-    pub(crate) fn new<T: Real<Float = F>>(face: &Face<T>, radius: F) -> Self {
-        let never = F::from_f64(FAR_AWAY);
-        // The bound is of no use for an edge that is all but horizontal, or for a face without area.
-        let flat = F::from_f64(1e-3);
-        let mut spans = Self { low: [F::ZERO; 4], high: [F::ZERO; 4], tilt: [F::ZERO; 4] };
-        let (edge_x, edge_y) = (values(face.edge_x), values(face.edge_y));
-        let (from_x, from_y) = (values(face.x), values(face.y));
-        for k in 0..VECTOR {
-            let (ex, ey) = (edge_x[k] * face.orientation, edge_y[k] * face.orientation);
-            // ex (py - y) - ey (px - x) >= -radius |e|, solved for px.
-            let useless = ey * ey <= flat * flat * ex * ex;
-            let tilt = ex * if useless { F::ONE } else { ey }.recip();
-            let reach = radius * (F::ONE + tilt * tilt).sqrt();
-            let bound = from_x[k] - tilt * from_y[k];
-            spans.tilt[k] = if useless { F::ZERO } else { tilt };
-            spans.low[k] = if (ey < F::ZERO) & !useless { bound - reach } else { -never };
-            spans.high[k] = if (ey > F::ZERO) & !useless { bound + reach } else { never };
-        }
-        spans
-    }
-
     /// Columns that all three edges allow in the rows at heights `y`, within the columns of
     /// `reach`: first column and the one after the last.
     #[inline(always)]
@@ -209,19 +253,21 @@ pub(crate) fn inside_spans<F: Float>(
     let Some(reach) = Reach::around(corners.map(|at| in_pixels(at, near, size)), 0.0, size) else {
         return;
     };
-    let face = Face::<f64>::new(corners.map(|at| at[0]), corners.map(|at| at[1]));
-    if face.orientation == 0.0 {
+    let edges = [0, 1, 2].map(|k| {
+        let ([x, y, _], [to_x, to_y, _]) = (corners[k], corners[(k + 1) % 3]);
+        [x, y, to_x - x, to_y - y]
+    });
+    let area = edges[0][2] * edges[1][3] - edges[0][3] * edges[1][2];
+    if area == 0.0 {
         return;
     }
     let (left, right) = (reach.left as usize, reach.right as usize);
     for row in reach.top as usize..reach.bottom as usize {
-        let y = pixel_centre(size - 1 - row, size);
+        let py = pixel_centre(size - 1 - row, size);
         let covers = |column: &usize| {
-            let x = pixel_centre(*column, size);
-            (0..3).all(|k| {
-                let (wx, wy) = (x - face.x[k], y - face.y[k]);
-                face.orientation * (face.edge_x[k] * wy - face.edge_y[k] * wx) >= 0.0
-            })
+            let px = pixel_centre(*column, size);
+            let side = |&[x, y, ex, ey]: &[f64; 4]| ex * (py - y) - ey * (px - x);
+            edges.iter().all(|edge| area.signum() * side(edge) >= 0.0)
         };
         let Some(start) = (left..right).find(covers) else { continue };
         let end = (start..right).find(|column| !covers(column)).unwrap_or(right);

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::{
+    face::BLOCK,
     real::Float,
     sum::Inputs,
     walk::{Place, Runs, Scene},
@@ -18,12 +19,14 @@ pub(crate) fn pairs<F: Float>(inputs: &Inputs<F>) -> usize {
         let in_band = |band: usize| {
             let place = Place { vertices, view, band };
             let mut pairs = 0;
-            for &face in view.faces(band) {
-                let reach = view.reaches[face as usize];
-                let face = place.face(&scene, face);
-                let runs = Runs::new(&face, reach, scene.band_rows(band), &scene);
-                for (start, end) in runs.rows.clone().map(|row| runs.columns(row)) {
-                    pairs += end.saturating_sub(start);
+            for numbers in view.faces(band).chunks(BLOCK) {
+                let faces = place.faces(&scene, numbers);
+                for (lane, &number) in numbers.iter().enumerate() {
+                    let reach = view.reaches[number as usize];
+                    let runs = Runs::new(&faces.spans(lane), reach, scene.band_rows(band), &scene);
+                    for (start, end) in runs.rows.clone().map(|row| runs.columns(row)) {
+                        pairs += end.saturating_sub(start);
+                    }
                 }
             }
             pairs

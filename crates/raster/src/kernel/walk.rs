@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{
     bands::{ROWS, View},
     batch::{Batch, GROUP},
-    face::{Face, Reach, SPANS, Spans, pixel_centre},
+    face::{BLOCK, Face, Faces, Reach, SPANS, Spans, pixel_centre},
     real::{Float, Real},
     table::{Grid, Lookup},
 };
@@ -36,13 +36,21 @@ pub(crate) struct Place<'a, T> {
 }
 
 impl<T: Real> Place<'_, T> {
-    /// Face `index` of the scene as this view sees it.
+    /// A block of faces of the scene, given by their numbers, as this view sees them; the last one
+    /// fills it up.
     #[inline(always)]
-    pub(crate) fn face(&self, scene: &Scene<T>, index: u32) -> Face<T> {
-        let (x, rest) = self.vertices.split_at(self.vertices.len() / 3);
-        let [a, b, c] = scene.faces[index as usize];
-        let (a, b, c) = (a as usize, b as usize, c as usize);
-        Face::new([x[a], x[b], x[c]], [rest[a], rest[b], rest[c]])
+    pub(crate) fn faces(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T> {
+        let (xs, rest) = self.vertices.split_at(self.vertices.len() / 3);
+        let mut corners = [[[T::ZERO; BLOCK]; 3]; 2];
+        for lane in 0..BLOCK {
+            let face = scene.faces[numbers[lane.min(numbers.len() - 1)] as usize];
+            for k in 0..3 {
+                let vertex = face[k] as usize;
+                (corners[0][k][lane], corners[1][k][lane]) = (xs[vertex], rest[vertex]);
+            }
+        }
+        let [x, y] = corners;
+        Faces::new(x, y, T::Float::from_f64(scene.grid.outer))
     }
 }
 
@@ -103,31 +111,18 @@ fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
     let mut batch = Batch::new();
     let mut sink = Sink { image, gradient, visited: T::Float::ZERO };
     let rows = scene.band_rows(place.band);
-    for (slot, &index) in place.view.faces(place.band).iter().enumerate() {
-        let face = place.face(scene, index);
-        let reach = place.view.reaches[index as usize];
-        let runs = Runs::new(&face, reach, rows.clone(), scene);
-        let mut sums = [T::ZERO; 6];
-        for row in runs.rows.clone() {
-            let (mut start, end) = runs.columns(row);
-            let first = (row - rows.start) * scene.stride();
-            while start < end {
-                let (centres, height) = (&scene.centres[start..], scene.heights[row]);
-                batch.push::<GRADIENT>(centres, height, first + start, upstream);
-                start += GROUP;
-                if batch.is_full() {
-                    sink.take::<IMAGE, GRADIENT, TABLE>(scene, &face, &mut batch, &mut sums);
-                }
+    let listed = place.view.faces(place.band);
+    for (block, numbers) in listed.chunks(BLOCK).enumerate() {
+        let faces = place.faces(scene, numbers);
+        for (lane, &number) in numbers.iter().enumerate() {
+            let face = faces.face(lane);
+            let reach = place.view.reaches[number as usize];
+            let runs = Runs::new(&faces.spans(lane), reach, rows.clone(), scene);
+            let sums =
+                sink.visit::<IMAGE, GRADIENT, TABLE>(scene, &face, &runs, upstream, &mut batch);
+            if GRADIENT {
+                sink.gradient.corners[BLOCK * block + lane] = sums;
             }
-        }
-        if !batch.is_empty() {
-            sink.take::<IMAGE, GRADIENT, TABLE>(scene, &face, &mut batch, &mut sums);
-        }
-        if GRADIENT {
-            for sum in &mut sums {
-                *sum = sum.scale(T::Float::from_f64(-2.0));
-            }
-            sink.gradient.corners[slot] = sums;
         }
     }
     if TABLE {
@@ -139,23 +134,26 @@ fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
 pub(crate) struct Runs {
     /// Rows of the image.
     pub(crate) rows: Range<usize>,
+    /// First row of the band.
+    band: usize,
     starts: [[i32; SPANS]; ROWS / SPANS],
     ends: [[i32; SPANS]; ROWS / SPANS],
 }
 
 impl Runs {
-    /// Those of `face` among `rows`, which is a band.
+    /// Those of a face with these limits among `rows`, which is a band.
     #[inline(always)]
     pub(crate) fn new<T: Real>(
-        face: &Face<T>,
+        spans: &Spans<T::Float>,
         reach: Reach,
         rows: Range<usize>,
         scene: &Scene<T>,
     ) -> Self {
-        let spans = Spans::new(face, T::Float::from_f64(scene.grid.outer));
+        let band = rows.start;
         let rows = rows.start.max(reach.top as usize)..rows.end.min(reach.bottom as usize);
         let mut runs = Self {
             rows: rows.clone(),
+            band,
             starts: [[0; SPANS]; ROWS / SPANS],
             ends: [[0; SPANS]; ROWS / SPANS],
         };
@@ -183,6 +181,41 @@ struct Sink<'a, T: Real> {
 }
 
 impl<T: Real> Sink<'_, T> {
+    /// Takes all pixels of a face; gives the gradient to x and y of its corners.
+    #[inline(always)]
+    fn visit<const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
+        &mut self,
+        scene: &Scene<T>,
+        face: &Face<T>,
+        runs: &Runs,
+        upstream: &[T::Float],
+        batch: &mut Batch<T>,
+    ) -> [T; 6] {
+        let mut sums = [T::ZERO; 6];
+        let mut first = (runs.rows.start - runs.band) * scene.stride();
+        for row in runs.rows.clone() {
+            let (mut start, end) = runs.columns(row);
+            while start < end {
+                let (centres, height) = (&scene.centres[start..], scene.heights[row]);
+                batch.push::<GRADIENT>(centres, height, first + start, upstream);
+                start += GROUP;
+                if batch.is_full() {
+                    self.take::<IMAGE, GRADIENT, TABLE>(scene, face, batch, &mut sums);
+                }
+            }
+            first += scene.stride();
+        }
+        if !batch.is_empty() {
+            self.take::<IMAGE, GRADIENT, TABLE>(scene, face, batch, &mut sums);
+        }
+        if GRADIENT {
+            for sum in &mut sums {
+                *sum = sum.scale(T::Float::from_f64(-2.0));
+            }
+        }
+        sums
+    }
+
     #[inline(always)]
     fn take<const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
         &mut self,
