@@ -22,7 +22,10 @@ pub(crate) struct Faces<T: Real> {
     edge_x: [Lanes<T>; 3],
     edge_y: [Lanes<T>; 3],
     inverse: [Lanes<T>; 3],
+    /// Sign of the area; 0 for a triangle without area.
     orientation: Lanes<T::Float>,
+    side_x: [Lanes<T::Float>; 3],
+    side_y: [Lanes<T::Float>; 3],
     spans: Spans<Lanes<T::Float>>,
 }
 
@@ -35,10 +38,12 @@ pub(crate) struct Face<T: Real> {
     pub(crate) edge_y: [T; 3],
     /// One over the squared length of each edge; 0 for an edge that is a point.
     pub(crate) inverse: [T; 3],
-    /// Sign of the area; 0 for a triangle without area.
-    pub(crate) orientation: T::Float,
-    /// What `orientation * edge function` must reach inside: 0, or 1 to say never.
-    pub(crate) threshold: T::Float,
+    /// The edges as they run counterclockwise; 0 for a triangle without area.
+    pub(crate) side_x: [T::Float; 3],
+    pub(crate) side_y: [T::Float; 3],
+    /// What the least of the three edge functions may be at most: -1 for a triangle without area,
+    /// which has no inside.
+    pub(crate) most: T::Float,
 }
 
 /// The three edges of a face as limits on x in a given row.
@@ -82,6 +87,8 @@ impl<T: Real> Faces<T> {
             edge_y,
             inverse,
             orientation,
+            side_x: [[zero; BLOCK]; 3],
+            side_y: [[zero; BLOCK]; 3],
             spans: Spans {
                 low: [[zero; BLOCK]; 3],
                 high: [[zero; BLOCK]; 3],
@@ -103,6 +110,7 @@ impl<T: Real> Faces<T> {
             for i in 0..BLOCK {
                 let ex = self.edge_x[k][i].value() * self.orientation[i];
                 let ey = self.edge_y[k][i].value() * self.orientation[i];
+                (self.side_x[k][i], self.side_y[k][i]) = (ex, ey);
                 // ex (py - y) - ey (px - x) >= -radius |e|, solved for px.
                 let useless = ey * ey <= flat * flat * ex * ex;
                 let tilt = ex * if useless { one } else { ey }.recip();
@@ -118,16 +126,16 @@ impl<T: Real> Faces<T> {
     /// The face of a lane.
     #[inline(always)]
     pub(crate) fn face(&self, lane: usize) -> Face<T> {
-        let orientation = self.orientation[lane];
-        let never = orientation == T::Float::ZERO;
+        let flat = self.orientation[lane] == T::Float::ZERO;
         Face {
             x: of_lane(&self.x, lane),
             y: of_lane(&self.y, lane),
             edge_x: of_lane(&self.edge_x, lane),
             edge_y: of_lane(&self.edge_y, lane),
             inverse: of_lane(&self.inverse, lane),
-            orientation,
-            threshold: if never { T::Float::ONE } else { T::Float::ZERO },
+            side_x: of_lane(&self.side_x, lane),
+            side_y: of_lane(&self.side_y, lane),
+            most: if flat { -T::Float::ONE } else { T::Float::ONE },
         }
     }
 

@@ -24,7 +24,7 @@ pub(crate) fn closest<T: Real>(face: &Face<T>, px: T::Float, py: T::Float) -> Cl
     let mut best = [T::ZERO; 3];
     let mut along = T::ZERO;
     let mut from = [zero; 3];
-    let mut inside = one;
+    let mut inside = face.most;
     for k in 0..3 {
         let wx = T::constant(px) - face.x[k];
         let wy = T::constant(py) - face.y[k];
@@ -34,9 +34,7 @@ pub(crate) fn closest<T: Real>(face: &Face<T>, px: T::Float, py: T::Float) -> Cl
         let dx = wx - t * face.edge_x[k];
         let dy = wy - t * face.edge_y[k];
         let distance2 = dx * dx + dy * dy;
-        let edge_function =
-            face.edge_x[k].value() * wy.value() - face.edge_y[k].value() * wx.value();
-        let side = face.orientation * edge_function - face.threshold;
+        let side = face.side_x[k] * wy.value() - face.side_y[k] * wx.value();
         inside = if side < inside { side } else { inside };
         let nearer = k == 0 || distance2.value() < best[0].value();
         best = [
