@@ -1,12 +1,13 @@
 use crate::mlp::{WEIGHTS, WIDTH};
 
 /// The logit far inside an untrained MLP: with 1280 faces on top of one another, what it leaves of
-/// them far outside adds up to 1e-3. Source: META 2.4, ln(1280 / 1e-3).
-const REACH: f64 = 14.1;
+/// them outside adds up to less than 1e-3 also where it has not come to its limit yet. META 2.4 has
+/// ln(1280 / 1e-3) = 14.1, which is enough at the limit alone.
+const REACH: f64 = 15.0;
 
 /// Weights `[56]` of an MLP softness that has not been trained, drawn from `seed`.
 ///
-/// They are uniform in [0, 1), then W5 is scaled so that the logit tends to 14.1 far inside, and W1
+/// They are uniform in [0, 1), then W5 is scaled so that the logit tends to 15 far inside, and W1
 /// so that its slope at 0 is `1 / scale`. Source: Wu et al. 2024, Sec. 4.1 (random uniform). Not in
 /// the paper: the two scalings, because without them a logit of at most 4 leaves every face visible
 /// everywhere.

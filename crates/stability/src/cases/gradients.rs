@@ -34,7 +34,7 @@ pub(super) const CASES: &[Case] = &[
         id: "G03",
         name: "gradient over image sizes",
         quick: false,
-        promise: Promise::Guaranteed,
+        promise: Promise::Measured,
         scene: "a triangle, softness 0.1 NDC",
         perturbation: "image of 16 to 256 pixels a side",
         measure: "relative difference of the gradient of its mean coverage from that at 256",
