@@ -9,7 +9,8 @@ use crate::{Method, numbers, tensor};
 /// A scale may fall by this factor before support and knots are chosen anew.
 const STALE: f64 = 0.95;
 
-/// Soft silhouettes of one mesh topology at a scale that moves.
+/// Soft silhouettes of one mesh topology at a scale that moves, on as many pixels as the method asks
+/// for at that scale.
 #[derive(Clone, Debug)]
 pub struct MovingSilhouette<B: Backend> {
     method: Method,
@@ -24,8 +25,8 @@ pub struct MovingSilhouette<B: Backend> {
 }
 
 impl<B: RasterBackend> MovingSilhouette<B> {
-    /// Silhouettes by `rasterizer` of meshes with these faces, at first at `scale` (as
-    /// [`Method::scale`] gives it).
+    /// Silhouettes by `rasterizer`, whose size is that of the images that judge, of meshes with these
+    /// faces, at first at `scale` (as [`Method::scale`] gives it).
     ///
     /// # Panics
     ///
@@ -38,6 +39,7 @@ impl<B: RasterBackend> MovingSilhouette<B> {
     ) -> Self {
         let phi = method.phi(scale);
         let silhouette = rasterizer.prepare(faces, method.softness(), &on_host::<B>(&phi));
+        let silhouette = silhouette.sized(method.side(rasterizer.size, scale));
         let table = table(&silhouette, phi);
         let (method, faces) = (method.clone(), faces.clone());
         Self { method, rasterizer, faces, silhouette, prepared: scale, table, scale }
@@ -54,12 +56,24 @@ impl<B: RasterBackend> MovingSilhouette<B> {
             self.silhouette = self.rasterizer.prepare(&self.faces, softness, &on_host::<B>(&phi));
             self.prepared = scale;
         }
+        let side = self.method.side(self.rasterizer.size, scale);
+        self.silhouette = self.silhouette.clone().sized(side);
         (self.table, self.scale) = (table(&self.silhouette, phi), scale);
     }
 
-    /// Coverage `[views, size, size]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth).
+    /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with
+    /// [`Method::side`] at the scale.
     pub fn image(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
         self.silhouette.coverage_by_table(vertices, self.table.clone())
+    }
+
+    /// Coverage of `vertices` on as many pixels as the rasterizer has, which is what judges; none if
+    /// that is the image anyway.
+    pub fn judged(&self, vertices: Tensor<B, 3>) -> Option<Tensor<B, 3>> {
+        let size = self.rasterizer.size;
+        let differs = self.method.side(size, self.scale) != size;
+        let silhouette = differs.then(|| self.silhouette.clone().sized(size));
+        silhouette.map(|full| full.coverage_by_table(vertices, self.table.clone()))
     }
 }
 

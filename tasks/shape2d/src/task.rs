@@ -101,6 +101,8 @@ impl Task for Shape2d {
             "scale": method.scale(0, *steps),
             "scale_end": method.scale(*steps, *steps),
             "squared": method.softness().squared,
+            "resolution": method.resolution().to_string(),
+            "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
