@@ -56,7 +56,8 @@ mod tests {
 
     #[test]
     fn a_smaller_target_has_the_means_of_areas() {
-        let image = vec![0.0, 1.0, 0.5, 0.5, 1.0, 0.0, 0.5, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0];
+        let image =
+            vec![0.0, 1.0, 0.5, 0.5, 1.0, 0.0, 0.5, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0];
         let image = tensor::<HostBackend, 3>(image, [1, 4, 4]);
         let targets = Targets::new(image.clone());
         let at = |side| numbers(targets.of(&Tensor::zeros([1, side, side], &Default::default())));

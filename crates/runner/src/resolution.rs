@@ -87,8 +87,7 @@ mod tests {
 
     #[test]
     fn pixels_are_at_most_two_widths_wide_and_no_fewer_than_needed() {
-        let expected =
-            [(1.0, 8), (0.1, 16), (1.0 / 16.0, 16), (0.06, 32), (0.03, 64), (0.002, 64)];
+        let expected = [(1.0, 8), (0.1, 16), (1.0 / 16.0, 16), (0.06, 32), (0.03, 64), (0.002, 64)];
         for (width, side) in expected {
             assert_eq!(Resolution::Auto.side(64, width), side, "{width}");
         }
@@ -108,7 +107,8 @@ mod tests {
 
     #[test]
     fn only_what_halving_leaves_is_taken_and_read_as_it_is_written() {
-        for good in [Resolution::Full, Resolution::Auto, Resolution::Side(16), Resolution::Side(1)] {
+        for good in [Resolution::Full, Resolution::Auto, Resolution::Side(16), Resolution::Side(1)]
+        {
             assert!(good.check(64).is_ok(), "{good}");
             assert_eq!(resolution(&good.to_string()), Ok(good));
         }

@@ -2,8 +2,8 @@ use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
-    Batch, Description, Error, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress,
-    Resolution, Run, Schedule, Score, Settings, Study, Task, Variant,
+    Batch, Description, Error, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point,
+    Progress, Resolution, Run, Schedule, Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
