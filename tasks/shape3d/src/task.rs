@@ -77,7 +77,7 @@ impl Task for Shape3d {
         let (target, target_name) = target(settings.variant, args)?;
         let level = settings.detail.or(args.detail).unwrap_or(DETAIL);
         let (template, template_name) = match &args.template {
-            None => (icosphere(level), "sphere".to_owned()),
+            None => (icosphere(level as u32), "sphere".to_owned()),
             Some(path) => (Mesh::load(path)?, name(path)),
         };
         let chamfer = Chamfer::new(target.positions(), target.faces());
