@@ -33,6 +33,7 @@ mod course {
     }
 }
 mod backend;
+mod defaults;
 mod descent;
 mod judge;
 mod learned_edge;
@@ -47,11 +48,12 @@ mod tensor;
 pub use course::study;
 #[cfg(feature = "ndarray")]
 pub use course::{Class, Inner, Outer};
+pub use defaults::Defaults;
 pub use descent::{Descent, Moment};
 pub use judge::Judge;
 pub use learned_edge::{LearnedEdge, Of, PreparedRun, Step};
 pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
-pub use method::{Defaults, Method};
+pub use method::Method;
 pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;
 pub use silhouette_lesson::{LearnedSilhouette, SilhouetteLesson};
