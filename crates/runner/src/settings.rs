@@ -32,7 +32,8 @@ pub enum Command {
     Search,
     /// Learn the softness on training seeds, by the gradient of what a whole run ends with.
     Learn,
-    /// Find the least complex method that is as good as the best, on training seeds.
+    /// Find the simplest softness, the fewest pixels, the largest tolerance and the coarsest mesh that are
+    /// as good as the best, on training seeds.
     Choose,
 }
 
