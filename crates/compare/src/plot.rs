@@ -4,12 +4,14 @@ use std::fmt::Write;
 
 use anyhow::anyhow;
 use plotters::{coord::Shift, prelude::*};
+use softrast_runner::Ticks;
 
 const SIZE: (u32, u32) = (900, 380);
 /// Room for the names of the methods, right of the axes.
 const LEGEND: u32 = 190;
 const ROW: i32 = 19;
 const GRID: RGBColor = RGBColor(225, 228, 232);
+const LIGHT: RGBColor = RGBColor(243, 244, 246);
 const BEHIND: RGBColor = RGBColor(150, 150, 150);
 
 /// One pair of axes and what is drawn over them.
@@ -124,23 +126,23 @@ impl Plot {
         let bands = self.series.iter().flat_map(|series| series.band.iter().flatten());
         let heights = points().map(|point| point[1]).chain(bands.copied());
         let (across, up) = (self.x.range(points().map(|point| point[0])), self.y.range(heights));
+        let [x, y] = [(&self.x, across, 7), (&self.y, up, 6)]
+            .map(|(axis, range, most)| Ticks::new(range.clone(), axis.logarithmic, most).on(range));
         let mut chart = ChartBuilder::on(&panel)
             .margin(14)
             .x_label_area_size(46)
             .y_label_area_size(78)
-            .build_cartesian_2d(across, up)?;
+            .build_cartesian_2d(x, y)?;
         chart
             .configure_mesh()
             .x_desc(&self.x.name)
             .y_desc(&self.y.name)
-            .x_labels(7)
-            .y_labels(6)
             .x_label_formatter(&|place| self.x.label(*place))
             .y_label_formatter(&|place| self.y.label(*place))
             .label_style(("sans-serif", 14))
             .axis_desc_style(("sans-serif", 15))
             .bold_line_style(GRID)
-            .light_line_style(TRANSPARENT)
+            .light_line_style(LIGHT)
             .draw()?;
         let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
         let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();

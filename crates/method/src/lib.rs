@@ -4,7 +4,8 @@
 //! A [`Method`] is what the command line names: a softness family or file with a path of scales, where
 //! nobody says otherwise the one that [`Searched`] has for the task. A
 //! [`MovingSilhouette`] draws with it, and prepares support and knots anew only when the scale has
-//! moved so far that it must. A [`Descent`] goes down the gradient of a task's loss and shows every
+//! moved so far that it must; how many pixels it draws may follow the scale, and [`Targets`] has the
+//! target at each size. A [`Descent`] goes down the gradient of a task's loss and shows every
 //! step.
 //!
 //! A task that implements [`Lesson`], or [`SilhouetteLesson`] if it sees silhouettes, can have a softness learned on it: `study` turns it into what the
@@ -31,6 +32,8 @@ mod course {
         anyhow::bail!("learn needs a program that was built with the feature ndarray")
     }
 }
+mod backend;
+mod defaults;
 mod descent;
 mod judge;
 mod learned_edge;
@@ -39,17 +42,20 @@ mod method;
 mod moving_silhouette;
 mod searched;
 mod silhouette_lesson;
+mod targets;
 mod tensor;
 
 pub use course::study;
 #[cfg(feature = "ndarray")]
 pub use course::{Class, Inner, Outer};
+pub use defaults::Defaults;
 pub use descent::{Descent, Moment};
 pub use judge::Judge;
 pub use learned_edge::{LearnedEdge, Of, PreparedRun, Step};
 pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
-pub use method::{Defaults, Method};
+pub use method::Method;
 pub use moving_silhouette::MovingSilhouette;
 pub use searched::Searched;
 pub use silhouette_lesson::{LearnedSilhouette, SilhouetteLesson};
+pub use targets::Targets;
 pub use tensor::{numbers, on_host, read, tensor};

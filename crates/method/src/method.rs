@@ -1,26 +1,8 @@
-use softrast_raster::{BackendChoice, HostBackend};
-use softrast_runner::{Command, Error, Schedule, Settings, SoftnessChoice};
+use softrast_raster::{BackendChoice, HostBackend, Rasterizer};
+use softrast_runner::{Error, Resolution, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
-use crate::{Searched, numbers, tensor};
-
-/// Scales of a task that the command line does not name, as widths in NDC. A family that
-/// [`Searched`] knows has its own instead.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Defaults {
-    /// Name of the task.
-    pub task: &'static str,
-    /// How the scale moves if neither a schedule nor a scale is given.
-    pub schedule: Schedule,
-    /// First and last scale of a decay.
-    pub decay: [f64; 2],
-    /// Scale of a static softness.
-    pub fixed: f64,
-    /// Width and height of the image where the command line does not say, in pixels.
-    pub size: usize,
-    /// What the task was compiled for: `softrast_raster::compiled_backends!()` there.
-    pub backends: &'static [BackendChoice],
-}
+use crate::{Defaults, Searched, backend::backend, numbers, tensor};
 
 /// A softness and how its scale moves over the steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,15 +11,24 @@ pub struct Method {
     name: String,
     path: Path,
     searched: Option<&'static Searched>,
+    drawn: Drawn,
+}
+
+/// What it is drawn on, and how finely.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Drawn {
     backend: BackendChoice,
+    resolution: Resolution,
+    tolerance: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 enum Path {
     /// Parameters of a file, and a scale that stands for them.
     Fixed { phi: Vec<f64>, scale: f64 },
-    /// Parameters of a file at scale 1, and the scale over a run on images of this size.
-    Learned { phi: Vec<f64>, path: ScalePath, size: usize },
+    /// Parameters of a file at scale 1, the scale that stands for them alone, and the scale over a
+    /// run on images of this size.
+    Learned { phi: Vec<f64>, unit: f64, path: ScalePath, size: usize },
     /// The default parameters of the family at a scale that goes geometrically from the first to
     /// the last.
     Scale { first: f64, last: f64 },
@@ -51,29 +42,32 @@ impl Method {
     ///
     /// # Errors
     ///
-    /// If a softness file cannot be used, flags contradict each other, or there is no such backend or
-    /// no adapter for it.
+    /// If a softness file cannot be used, flags contradict each other, the image cannot have that
+    /// resolution, or there is no such backend or no adapter for it.
     pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(settings, defaults.backends)?;
+        let size = settings.size.unwrap_or(defaults.size);
+        let resolution = settings.resolution.unwrap_or_default();
+        resolution.check(size)?;
+        let tolerance = settings.tolerance.unwrap_or(Rasterizer::TOLERANCE);
+        let drawn = Drawn { backend, resolution, tolerance };
         let scaled = settings.scale.is_some() || settings.scale_end.is_some() || settings.squared;
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 if scaled || settings.schedule == Some(Schedule::Decay) {
-                    return Err(usage(
-                        "a softness file holds its own parameters: leave out --scale, --scale-end, \
-                         --squared and --schedule decay, or name a family",
-                    ));
+                    let message = "a softness file holds its own parameters: leave out --scale, \
+                                   --scale-end, --squared and --schedule decay, or name a family";
+                    return Err(Error::Usage(message.into()).into());
                 }
                 let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(file)?;
+                let unit = nominal_scale(softness, &phi);
                 let path = match path {
-                    None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
-                    Some(path) => {
-                        Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) }
-                    }
+                    None => Path::Fixed { scale: unit, phi },
+                    Some(path) => Path::Learned { phi, unit, path, size },
                 };
                 let name = file.display().to_string();
-                Ok(Self { softness, name, path, searched: None, backend })
+                Ok(Self { softness, name, path, searched: None, drawn })
             }
             named => {
                 let name = match named {
@@ -88,7 +82,7 @@ impl Method {
                 let known = Searched::of(defaults.task, family.name(), schedule, usual);
                 let searched = known.filter(|_| !scaled);
                 let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
-                Ok(Self { softness, name: family.name().to_owned(), path, searched, backend })
+                Ok(Self { softness, name: family.name().to_owned(), path, searched, drawn })
             }
         }
     }
@@ -110,7 +104,28 @@ impl Method {
 
     /// What it is drawn on.
     pub fn backend(&self) -> BackendChoice {
-        self.backend
+        self.drawn.backend
+    }
+
+    /// How many pixels a side the image has that is optimised on.
+    pub fn resolution(&self) -> Resolution {
+        self.drawn.resolution
+    }
+
+    /// What draws images of `size` × `size` pixels.
+    pub fn rasterizer(&self, size: usize) -> Rasterizer {
+        Rasterizer { tolerance: self.drawn.tolerance, ..Rasterizer::new(size) }
+    }
+
+    /// Pixels a side of the image that is optimised on at this scale, where that which judges has
+    /// `size`.
+    pub fn side(&self, size: usize, scale: f64) -> usize {
+        let scale = match self.path {
+            Path::Learned { unit, .. } => unit * scale,
+            Path::Fixed { .. } | Path::Scale { .. } => scale,
+        };
+        let width = if self.softness.squared { scale.sqrt() } else { scale };
+        self.drawn.resolution.side(size, width)
     }
 
     /// Whether the scale moves.
@@ -165,20 +180,6 @@ fn part(step: usize, steps: usize) -> f64 {
     step.min(last) as f64 / last as f64
 }
 
-impl Defaults {
-    /// With the schedule and the scale that were searched for.
-    fn with(self, found: &Searched) -> Self {
-        match *found {
-            Searched { scale, scale_end: None, .. } => {
-                Self { schedule: Schedule::Static, fixed: scale, ..self }
-            }
-            Searched { scale, scale_end: Some(end), .. } => {
-                Self { schedule: Schedule::Decay, decay: [scale, end], ..self }
-            }
-        }
-    }
-}
-
 /// The schedule that the flags ask for: a scale without one stays as it is.
 fn asked_schedule(settings: &Settings) -> Option<Schedule> {
     settings.schedule.or(settings.scale.map(|_| Schedule::Static))
@@ -210,27 +211,6 @@ fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     let slope = numbers(softness.family.density(phi, tensor(vec![0.0], [1])));
     // A flat one has no scale; any finite number will do.
     0.25 / slope[0].abs().max(1e-12)
-}
-
-/// The backend that the command line asks for, set up.
-fn backend(
-    settings: &Settings,
-    compiled: &'static [BackendChoice],
-) -> anyhow::Result<BackendChoice> {
-    let asked = settings.backend.as_deref();
-    let backend =
-        BackendChoice::among(compiled, asked).map_err(|error| usage(&error.to_string()))?;
-    if settings.command == Command::Learn && asked.is_some() && backend != BackendChoice::NdArray {
-        return Err(usage(&format!(
-            "learn computes on ndarray, not on {backend}: leave out --backend"
-        )));
-    }
-    backend.set_up()?;
-    Ok(backend)
-}
-
-fn usage(message: &str) -> anyhow::Error {
-    Error::Usage(message.to_owned()).into()
 }
 
 #[cfg(test)]
@@ -290,8 +270,12 @@ mod tests {
     fn a_run_of_one_step_has_the_first_scale() {
         let path = Path::Scale { first: 0.1, last: 0.001 };
         let softness = EdgeSoftness { family: Family::Gauss, squared: false };
-        let backend = BackendChoice::NdArray;
-        let method = Method { softness, name: "gauss".into(), path, searched: None, backend };
+        let drawn = Drawn {
+            backend: BackendChoice::NdArray,
+            resolution: Resolution::Full,
+            tolerance: Rasterizer::TOLERANCE,
+        };
+        let method = Method { softness, name: "gauss".into(), path, searched: None, drawn };
         assert_eq!(method.scale(0, 1), 0.1);
     }
 }

@@ -9,7 +9,8 @@ use crate::{Method, numbers, tensor};
 /// A scale may fall by this factor before support and knots are chosen anew.
 const STALE: f64 = 0.95;
 
-/// Soft silhouettes of one mesh topology at a scale that moves.
+/// Soft silhouettes of one mesh topology at a scale that moves, on as many pixels as the method asks
+/// for at that scale.
 #[derive(Clone, Debug)]
 pub struct MovingSilhouette<B: Backend> {
     method: Method,
@@ -24,8 +25,8 @@ pub struct MovingSilhouette<B: Backend> {
 }
 
 impl<B: RasterBackend> MovingSilhouette<B> {
-    /// Silhouettes by `rasterizer` of meshes with these faces, at first at `scale` (as
-    /// [`Method::scale`] gives it).
+    /// Silhouettes by `rasterizer`, whose size is that of the images that judge, of meshes with these
+    /// faces, at first at `scale` (as [`Method::scale`] gives it).
     ///
     /// # Panics
     ///
@@ -38,6 +39,7 @@ impl<B: RasterBackend> MovingSilhouette<B> {
     ) -> Self {
         let phi = method.phi(scale);
         let silhouette = rasterizer.prepare(faces, method.softness(), &on_host::<B>(&phi));
+        let silhouette = silhouette.sized(method.side(rasterizer.size, scale));
         let table = table(&silhouette, phi);
         let (method, faces) = (method.clone(), faces.clone());
         Self { method, rasterizer, faces, silhouette, prepared: scale, table, scale }
@@ -54,12 +56,24 @@ impl<B: RasterBackend> MovingSilhouette<B> {
             self.silhouette = self.rasterizer.prepare(&self.faces, softness, &on_host::<B>(&phi));
             self.prepared = scale;
         }
+        let side = self.method.side(self.rasterizer.size, scale);
+        self.silhouette = self.silhouette.clone().sized(side);
         (self.table, self.scale) = (table(&self.silhouette, phi), scale);
     }
 
-    /// Coverage `[views, size, size]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth).
+    /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with
+    /// [`Method::side`] at the scale.
     pub fn image(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
         self.silhouette.coverage_by_table(vertices, self.table.clone())
+    }
+
+    /// Coverage of `vertices` on as many pixels as the rasterizer has, which is what judges; none if
+    /// that is the image anyway.
+    pub fn judged(&self, vertices: Tensor<B, 3>) -> Option<Tensor<B, 3>> {
+        let size = self.rasterizer.size;
+        let differs = self.method.side(size, self.scale) != size;
+        let silhouette = differs.then(|| self.silhouette.clone().sized(size));
+        silhouette.map(|full| full.coverage_by_table(vertices, self.table.clone()))
     }
 }
 
@@ -81,4 +95,62 @@ fn table<B: RasterBackend>(silhouette: &Silhouette<EdgeSoftness>, phi: Vec<f64>)
 fn on_host<B: RasterBackend>(phi: &[f64]) -> Tensor<HostBackend, 1> {
     let dtype = if B::ON_HOST { DType::F32 } else { DType::F64 };
     Tensor::from_data(TensorData::new(phi.to_vec(), [phi.len()]), (&Default::default(), dtype))
+}
+
+#[cfg(test)]
+mod tests {
+    use softrast_runner::{Resolution, Schedule, Settings};
+
+    use super::*;
+    use crate::Defaults;
+
+    const SIZE: usize = 32;
+
+    fn silhouette(scale: f64, resolution: Resolution) -> MovingSilhouette<HostBackend> {
+        let defaults = Defaults {
+            task: "none",
+            schedule: Schedule::Decay,
+            decay: [0.3, 0.002],
+            fixed: 0.002,
+            size: SIZE,
+            backends: softrast_raster::compiled_backends!(),
+        };
+        let settings = Settings { resolution: Some(resolution), ..Settings::default() };
+        let method = Method::new(&settings, &defaults).unwrap();
+        MovingSilhouette::new(&method, method.rasterizer(SIZE), &[[0, 1, 2]].into(), scale)
+    }
+
+    fn triangle() -> Tensor<HostBackend, 3> {
+        tensor(vec![-0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.8, 1.0], [1, 3, 3])
+    }
+
+    #[test]
+    fn a_narrow_one_draws_all_pixels_to_the_bit() {
+        let [auto, full] = [Resolution::Auto, Resolution::Full].map(|r| silhouette(0.002, r));
+        assert_eq!(numbers(auto.image(triangle())), numbers(full.image(triangle())));
+        assert!(auto.judged(triangle()).is_none() && full.judged(triangle()).is_none());
+    }
+
+    #[test]
+    fn a_wide_one_draws_few_pixels_and_is_judged_on_all() {
+        let [mut auto, mut full] = [Resolution::Auto, Resolution::Full].map(|r| silhouette(0.2, r));
+        assert_eq!(auto.image(triangle()).dims(), [1, 8, 8]);
+        let judged = auto.judged(triangle()).map(numbers);
+        assert_eq!(judged, Some(numbers(full.image(triangle()))));
+        // The pixels grow in number with the scale, whether or not the support is chosen anew.
+        for (scale, side) in [(0.1, 16), (0.06, 32), (0.0599, 32)] {
+            auto.turn_to(scale);
+            full.turn_to(scale);
+            assert_eq!(auto.image(triangle()).dims(), [1, side, side]);
+        }
+        assert_eq!(numbers(auto.image(triangle())), numbers(full.image(triangle())));
+    }
+
+    #[test]
+    fn a_fixed_number_of_pixels_stays() {
+        let mut fixed = silhouette(0.2, Resolution::Side(16));
+        fixed.turn_to(0.002);
+        assert_eq!(fixed.image(triangle()).dims(), [1, 16, 16]);
+        assert_eq!(fixed.judged(triangle()).map(|image| image.dims()), Some([1, SIZE, SIZE]));
+    }
 }

@@ -128,6 +128,18 @@ impl<S: Softness> Silhouette<S> {
         profile_sum(&self.op, vertices, table)
     }
 
+    /// The same on images of `size` × `size` pixels: neither support nor knots depend on it.
+    ///
+    /// # Panics
+    ///
+    /// If `size` is 0.
+    #[must_use]
+    pub fn sized(mut self, size: usize) -> Self {
+        assert!(size > 0, "an image needs at least one pixel");
+        self.op.size = size;
+        self
+    }
+
     /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what
     /// one pass over all views visits, forward or backward.
     pub fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {

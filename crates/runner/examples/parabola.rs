@@ -6,8 +6,8 @@ use std::{process::ExitCode, time::Instant};
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Point, Progress, Run, Settings,
-    SoftnessChoice, Task, Variant, difference, rgb_from_gray,
+    Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Point, Progress, Resolution,
+    Run, Settings, SoftnessChoice, Task, Variant, difference, rgb_from_gray,
 };
 
 #[allow(dead_code, reason = "the tests include this file as a module")]
@@ -51,6 +51,12 @@ impl Task for Parabola {
             }
             Some(SoftnessChoice::File(path)) => anyhow::bail!("cannot read the softness {path:?}"),
         };
+        if settings.resolution.is_some_and(|asked| asked != Resolution::Full)
+            || settings.tolerance.is_some()
+        {
+            let message = "the parabola draws exactly: leave out --resolution and --tolerance";
+            return Err(softrast_runner::Error::Usage(message.into()).into());
+        }
         let steps = match settings.variant {
             Variant::Original => 60,
             Variant::Transfer => 90,

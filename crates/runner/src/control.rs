@@ -1,9 +1,10 @@
 use clap::{Args, Parser};
 
 use crate::{
-    Command, Error, Schedule, Settings, SoftnessChoice,
+    Command, Error, Resolution, Schedule, Settings, SoftnessChoice,
     error::found,
-    settings::{count, positive, softness},
+    resolution::resolution,
+    settings::{count, positive, share, softness},
 };
 
 /// Flags that say how to work, not what on: the task does not see them.
@@ -14,7 +15,8 @@ pub(crate) struct Control {
     pub(crate) resume: bool,
 
     /// Second method for `evaluate` to run on the same seeds; in quotes --scale, --scale-end,
-    /// --schedule, --squared and --learning-rate may follow: "gauss --scale 0.01".
+    /// --schedule, --squared, --learning-rate, --resolution and --tolerance may follow:
+    /// "gauss --scale 0.01".
     #[arg(long, value_name = "NAME|FILE.json", value_parser = rival)]
     pub(crate) against: Option<Rival>,
 
@@ -52,13 +54,17 @@ pub(crate) struct Rival {
     squared: bool,
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     learning_rate: Option<f64>,
+    #[arg(long, value_parser = resolution)]
+    resolution: Option<Resolution>,
+    #[arg(long, value_parser = share)]
+    tolerance: Option<f64>,
 }
 
 impl Rival {
     /// The settings of the first method with this one in its place.
     ///
     /// Its scales are its own or the task's, never those of the first method, whose scale may mean
-    /// another width; its learning rate is its own or that of the first method.
+    /// another width; its learning rate, resolution and tolerance are its own or those of the first.
     ///
     /// # Errors
     ///
@@ -71,6 +77,8 @@ impl Rival {
             schedule: self.schedule,
             squared: self.squared,
             learning_rate: self.learning_rate.or(first.learning_rate),
+            resolution: self.resolution.or(first.resolution),
+            tolerance: self.tolerance.or(first.tolerance),
             ..first.clone()
         };
         settings.reconcile(Command::Evaluate)?;

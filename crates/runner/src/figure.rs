@@ -1,7 +1,7 @@
 use anyhow::anyhow;
 use plotters::prelude::*;
 
-use crate::{Figure, chart::tick, study::Curve};
+use crate::{Figure, Ticks, chart::tick, study::Curve};
 
 const SIZE: (u32, u32) = (860, 380);
 const COLOURS: [RGBColor; 6] = [
@@ -13,6 +13,7 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(180, 140, 20),
 ];
 const GRID: RGBColor = RGBColor(225, 228, 232);
+const LIGHT: RGBColor = RGBColor(243, 244, 246);
 
 /// The curves of a figure as SVG.
 ///
@@ -41,22 +42,26 @@ fn draw<DB: DrawingBackend>(
     let lines: Vec<_> = figure.curves.iter().map(|curve| (&curve.name, points(curve))).collect();
     let all = || lines.iter().flat_map(|(_, points)| points);
     let [across, up] = [extent(all().map(|p| p.0), 0.0), extent(all().map(|p| p.1), 0.06)];
+    let [x, y] =
+        [(across, false, 10), (up, figure.logarithmic, 6)].map(|(ends, logarithmic, most)| {
+            let range = ends[0]..ends[1];
+            Ticks::new(range.clone(), logarithmic, most).on(range)
+        });
     let mut chart = ChartBuilder::on(root)
         .margin(14)
         .x_label_area_size(46)
         .y_label_area_size(78)
-        .build_cartesian_2d(across[0]..across[1], up[0]..up[1])?;
+        .build_cartesian_2d(x, y)?;
     chart
         .configure_mesh()
         .x_desc(&figure.axes[0])
         .y_desc(&figure.axes[1])
-        .y_labels(6)
         .x_label_formatter(&|x| tick(*x))
         .y_label_formatter(&|y| tick(if figure.logarithmic { 10f64.powf(*y) } else { *y }))
         .label_style(("sans-serif", 14))
         .axis_desc_style(("sans-serif", 15))
         .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
+        .light_line_style(LIGHT)
         .draw()?;
     let corner = corner(&lines, across, up);
     for ((name, points), colour) in lines.into_iter().zip(COLOURS) {

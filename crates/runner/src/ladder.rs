@@ -1,20 +1,10 @@
-use std::time::Instant;
-
-use serde::{Deserialize, Serialize};
-
-use crate::{
-    Batch, Error, Schedule, Settings, SoftnessChoice, Task, best_step,
-    job::{Part, Worker, first_not_finite, solve},
-    mean,
-    prepared::Prepared,
-    quantity::Quantity,
-};
+use crate::{Detail, Resolution, Schedule, Settings, SoftnessChoice, space::exact};
 
 /// Methods from the least complex one on: parameters of the family first, then whether the scale
 /// moves.
 ///
 /// Source: Wu et al. 2024, Table 1, for the numbers of parameters.
-const LADDER: [(&str, Schedule); 10] = [
+const METHODS: [(&str, Schedule); 10] = [
     ("logistic", Schedule::Static),
     ("gauss", Schedule::Static),
     ("logistic", Schedule::Decay),
@@ -27,122 +17,145 @@ const LADDER: [(&str, Schedule); 10] = [
     ("mlp", Schedule::Decay),
 ];
 
-/// A method and how it did on the training seeds.
-#[derive(Clone, Debug, Serialize)]
+/// Images are not tried below this many pixels a side.
+const FEWEST: usize = 8;
+
+/// Largest errors of a pixel, the last being what tasks take if nobody says otherwise.
+const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+
+/// One answer to a question of `choose`.
+#[derive(Clone, Debug)]
 pub(crate) struct Rung {
-    /// Name of the softness.
-    pub(crate) softness: &'static str,
-    /// Whether the scale moves.
-    pub(crate) schedule: &'static str,
-    /// Parameters of the softness, and one more for an end of the scale.
-    pub(crate) parameters: usize,
-    /// Error of what each seed returns; none where it is not finite.
-    pub(crate) errors: Vec<Option<f64>>,
-    /// Wall time of one run.
-    pub(crate) seconds: f64,
+    /// The flags that give it.
+    pub(crate) flags: String,
+    pub(crate) settings: Settings,
+    /// What it is to compute, as far as that is known before it is prepared.
+    pub(crate) with: With,
+    /// Whether the settings that the question started from mean the same.
+    pub(crate) usual: bool,
 }
 
-/// What becomes of a rung, as a journal keeps it.
-#[derive(Serialize, Deserialize)]
-struct Tried {
-    seconds: f64,
-    /// As text, which keeps all its digits.
-    errors: Vec<Option<String>>,
+/// What an answer makes more or less of.
+#[derive(Clone, Debug)]
+pub(crate) enum With {
+    /// Parameters of the softness, and so many more.
+    Parameters(usize),
+    /// Faces of the scene.
+    Faces,
+    /// In words.
+    Words(String),
 }
 
-/// Settings with this rung's softness and schedule, at the scales of the task.
-pub(crate) fn with(settings: &Settings, softness: &'static str, schedule: Schedule) -> Settings {
-    Settings {
-        softness: Some(SoftnessChoice::Named(softness)),
-        schedule: Some(schedule),
-        scale: None,
-        scale_end: None,
-        ..settings.clone()
-    }
-}
-
-/// Tries the methods of the ladder on `seeds`, for as long as `budget` seconds last, but the first
-/// one always; says whether all were tried that the task knows.
-///
-/// # Errors
-///
-/// Those of the task and of the journal.
-pub(crate) fn climb<T: Task>(
-    settings: &Settings,
-    args: &T::Args,
-    seeds: &[u64],
-    budget: Option<f64>,
-    worker: &mut Worker,
-) -> anyhow::Result<(Vec<Rung>, bool)> {
-    let (clock, mut rungs) = (Instant::now(), Vec::new());
-    for (softness, schedule) in LADDER {
-        let spent = clock.elapsed().as_secs_f64();
-        let next = spent * (rungs.len() + 1) as f64 / rungs.len().max(1) as f64;
-        if !rungs.is_empty() && budget.is_some_and(|budget| next > budget) {
-            return Ok((rungs, false));
+/// The softness families and how their scale moves, at the scales of the task.
+pub(crate) fn methods(settings: &Settings) -> Vec<Rung> {
+    let rung = |(softness, schedule)| {
+        let (name, ends) = match schedule {
+            Schedule::Static => ("static", 0),
+            Schedule::Decay => ("decay", 1),
+        };
+        Rung {
+            flags: format!("--softness {softness} --schedule {name}"),
+            settings: Settings {
+                softness: Some(SoftnessChoice::Named(softness)),
+                schedule: Some(schedule),
+                scale: None,
+                scale_end: None,
+                ..settings.clone()
+            },
+            with: With::Parameters(ends),
+            usual: false,
         }
-        let prepared = match Prepared::<T>::new(with(settings, softness, schedule), args) {
-            Ok(prepared) => prepared,
-            // A task need not know every family.
-            Err(error) if !rungs.is_empty() && is_usage(&error) => continue,
-            Err(error) => return Err(error),
-        };
-        rungs.push(rung(&prepared, softness, schedule, seeds, worker)?);
+    };
+    METHODS.into_iter().map(rung).collect()
+}
+
+/// Resolutions of images of `size`, the fewest pixels first; none if one was asked for.
+///
+/// Where the scale moves, so may the resolution.
+pub(crate) fn resolutions(settings: &Settings, size: usize) -> Vec<Rung> {
+    if settings.resolution.is_some() {
+        return Vec::new();
     }
-    Ok((rungs, true))
+    let smaller: Vec<usize> =
+        Resolution::sides(size).skip(1).take_while(|&side| side >= FEWEST).collect();
+    let moves = settings.schedule == Some(Schedule::Decay);
+    let auto = (moves && !smaller.is_empty()).then_some(Resolution::Auto);
+    let smaller = smaller.into_iter().rev().map(Resolution::Side);
+    let all = smaller.chain(auto).chain([Resolution::Full]).map(|resolution| Rung {
+        flags: format!("--resolution {resolution}"),
+        settings: Settings { resolution: Some(resolution), ..settings.clone() },
+        with: With::Words(match resolution {
+            Resolution::Full => format!("{size} pixels a side"),
+            Resolution::Auto => format!("at most {size} pixels a side"),
+            Resolution::Side(side) => format!("{side} pixels a side"),
+        }),
+        usual: resolution == Resolution::Full,
+    });
+    all.collect()
 }
 
-fn is_usage(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(Error::Usage(_)))
-}
-
-/// Steps of all runs of the ladder.
-pub(crate) fn steps(steps: usize, seeds: usize) -> usize {
-    LADDER.len() * steps * seeds
-}
-
-fn rung<T: Task>(
-    prepared: &Prepared<T>,
-    softness: &'static str,
-    schedule: Schedule,
-    seeds: &[u64],
-    worker: &mut Worker,
-) -> anyhow::Result<Rung> {
-    let moving = schedule == Schedule::Decay;
-    let schedule = if moving { "decay" } else { "static" };
-    let score = Quantity::score(&prepared.description, prepared.task.score());
-    let (mut errors, mut seconds) = (Vec::new(), 0.0);
-    for seeds in seeds.chunks(prepared.batch_size()) {
-        let part = Part {
-            name: format!("{softness} {schedule}, seeds from {}", seeds[0]),
-            label: format!("{softness}, {schedule}"),
-            runs: seeds.len(),
-            steps: prepared.description.steps,
-        };
-        let batch = Batch { seeds: seeds.to_vec(), pictures: false };
-        let tried = worker.part(part, |progress| {
-            let clock = Instant::now();
-            let runs = solve(prepared, &batch, progress)?.runs;
-            let error = |run: &crate::Run| {
-                let finite = first_not_finite(run).is_none();
-                let best = best_step(&run.curve, |point| score.of(point));
-                best.filter(|_| finite).map(|best| score.of(best).to_string())
-            };
-            let errors = runs.iter().map(error).collect();
-            Ok(Tried { seconds: clock.elapsed().as_secs_f64(), errors })
-        })?;
-        let number = |text: Option<String>| text.and_then(|text| text.parse().ok());
-        errors.extend(tried.errors.into_iter().map(number));
-        seconds += tried.seconds;
+/// Tolerances of culling, the largest first; none if one was asked for.
+pub(crate) fn tolerances(settings: &Settings) -> Vec<Rung> {
+    if settings.tolerance.is_some() {
+        return Vec::new();
     }
-    let parameters = prepared.description.parameters + usize::from(moving);
-    Ok(Rung { softness, schedule, parameters, seconds: seconds / seeds.len() as f64, errors })
+    let rung = |tolerance: f64| Rung {
+        flags: format!("--tolerance {}", exact(tolerance)),
+        settings: Settings { tolerance: Some(tolerance), ..settings.clone() },
+        with: With::Words(format!("pixels off by {tolerance:e}")),
+        usual: tolerance == TOLERANCES[3],
+    };
+    TOLERANCES.into_iter().map(rung).collect()
 }
 
-impl Rung {
-    /// Mean error; none if a run has no finite one.
-    pub(crate) fn mean(&self) -> Option<f64> {
-        let errors = self.errors.iter().copied().collect::<Option<Vec<f64>>>()?;
-        Some(mean(&errors))
+/// Details of the task's mesh, the coarsest first; none if it has none to choose.
+pub(crate) fn details(settings: &Settings, detail: Option<Detail>) -> Vec<Rung> {
+    let Some(Detail { flag, values, usual }) = detail else {
+        return Vec::new();
+    };
+    let rung = |value: usize| Rung {
+        flags: format!("--{flag} {value}"),
+        settings: Settings { detail: Some(value), ..settings.clone() },
+        with: With::Faces,
+        usual: value == usual,
+    };
+    values.into_iter().map(rung).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flags(rungs: &[Rung]) -> Vec<&str> {
+        rungs.iter().map(|rung| rung.flags.as_str()).collect()
+    }
+
+    #[test]
+    fn the_cheapest_comes_first_and_what_is_asked_for_is_not_asked() {
+        let mut settings = Settings::default();
+        let sides = resolutions(&settings, 64);
+        let names = ["8", "16", "32", "full"].map(|name| format!("--resolution {name}"));
+        assert_eq!(flags(&sides), names);
+        assert!(sides[3].usual && !sides[0].usual);
+        settings.schedule = Some(Schedule::Decay);
+        assert_eq!(
+            flags(&resolutions(&settings, 18)),
+            ["--resolution 9", "--resolution auto", "--resolution full"]
+        );
+        assert_eq!(flags(&resolutions(&settings, 15)), ["--resolution full"]);
+        settings.resolution = Some(Resolution::Auto);
+        assert!(resolutions(&settings, 64).is_empty());
+        let tolerances = tolerances(&settings);
+        assert_eq!(tolerances[3].flags, "--tolerance 1e-5");
+        assert!(tolerances[3].usual && tolerances[0].settings.tolerance == Some(0.01));
+    }
+
+    #[test]
+    fn details_are_those_of_the_task() {
+        let detail = Detail { flag: "level", values: vec![2, 3], usual: 3 };
+        let rungs = details(&Settings::default(), Some(detail));
+        assert_eq!(flags(&rungs), ["--level 2", "--level 3"]);
+        assert!(rungs[1].usual && rungs[0].settings.detail == Some(2));
+        assert!(details(&Settings::default(), None).is_empty());
     }
 }

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, ValueEnum};
 
-use crate::{Error, control::Control, plan::LearnFlags};
+use crate::{Error, Resolution, control::Control, plan::LearnFlags, resolution::resolution};
 
 /// Everything on the command line of a task.
 #[derive(Debug, Parser)]
@@ -32,7 +32,8 @@ pub enum Command {
     Search,
     /// Learn the softness on training seeds, by the gradient of what a whole run ends with.
     Learn,
-    /// Find the least complex method that is as good as the best, on training seeds.
+    /// Find the simplest softness, the fewest pixels, the largest tolerance and the coarsest mesh that are
+    /// as good as the best, on training seeds.
     Choose,
 }
 
@@ -59,6 +60,10 @@ pub struct Settings {
     /// The value that `search` tries for the flag of [`Grid::own`](crate::Grid::own).
     #[arg(skip)]
     pub own: Option<f64>,
+
+    /// The value that `choose` tries for the flag of [`Task::detail`](crate::Task::detail).
+    #[arg(skip)]
+    pub detail: Option<usize>,
 
     /// Variant of the task: the one a softness is tuned on, or the one it is transferred to.
     #[arg(long, value_enum, default_value = "original")]
@@ -101,6 +106,16 @@ pub struct Settings {
     /// Width and height of the image, in pixels.
     #[arg(long, value_name = "N", value_parser = size, allow_negative_numbers = true)]
     pub size: Option<usize>,
+
+    /// Pixels a side of the image that is optimised on: full for --size, --size halved any number of
+    /// times, or auto for as few as the softness can tell apart at each step. Errors and pictures are
+    /// always those of --size [default: full].
+    #[arg(long, value_name = "full|auto|N", value_parser = resolution)]
+    pub resolution: Option<Resolution>,
+
+    /// Largest error of a pixel by leaving out faces that are far from it, below 1 [default: 1e-5].
+    #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
+    pub tolerance: Option<f64>,
 
     /// Seed of the run; `evaluate` and `search` take this one and those that follow.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
@@ -168,6 +183,18 @@ impl SoftnessChoice {
     pub(crate) const AUTO: Self = Self::Named("auto");
 }
 
+impl Default for Settings {
+    /// What a command line without flags asks for.
+    fn default() -> Self {
+        #[derive(Parser)]
+        struct Line {
+            #[command(flatten)]
+            settings: Settings,
+        }
+        Line::parse_from(["task"]).settings
+    }
+}
+
 impl Settings {
     /// Checks what concerns several flags at once, and fills in what one flag says about another.
     pub(crate) fn reconcile(&mut self, command: Command) -> Result<(), Error> {
@@ -189,6 +216,13 @@ impl Settings {
                 "learn has no --runs: say --batch and --validation-runs, then evaluate what it learned"
                     .into(),
             )),
+            (Command::Learn, _) if self.resolution.is_some() || self.tolerance.is_some() => {
+                Err(Error::Usage(
+                    "learn draws at --size with a tolerance of its own: leave out --resolution and \
+                     --tolerance"
+                        .into(),
+                ))
+            }
             _ => Ok(()),
         }
     }
@@ -228,9 +262,14 @@ pub(crate) fn count(text: &str) -> Result<usize, String> {
 /// Larger images would not fit into memory.
 const LARGEST: usize = 4096;
 
-fn size(text: &str) -> Result<usize, String> {
+pub(crate) fn size(text: &str) -> Result<usize, String> {
     let size = text.parse().ok().filter(|n| (1..=LARGEST).contains(n));
     size.ok_or_else(|| format!("expected a whole number of pixels from 1 to {LARGEST}"))
+}
+
+pub(crate) fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|&x| x > 0.0 && x < 1.0);
+    share.ok_or_else(|| "expected a number above 0 and below 1".into())
 }
 
 fn seed(text: &str) -> Result<u64, String> {

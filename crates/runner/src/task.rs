@@ -43,6 +43,11 @@ pub trait Task: Sized {
         Grid::around(&self.describe().settings)
     }
 
+    /// How finely the mesh may be divided, for `choose` to try; none if that is not free, as by default.
+    fn detail(&self) -> Option<Detail> {
+        None
+    }
+
     /// Solves one instance for every seed of the batch, and returns them in the order of the seeds.
     ///
     /// A run depends on its seed alone, not on the others in its batch. Call
@@ -68,6 +73,17 @@ pub trait Task: Sized {
 /// A [`Task::Args`] without flags.
 #[derive(clap::Args, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoArgs {}
+
+/// Values of a flag of the task that say how finely its mesh is divided.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Detail {
+    /// The flag without dashes, such as `triangles`.
+    pub flag: &'static str,
+    /// Values to try, the coarsest mesh first. The task finds the one to take in [`Settings::detail`].
+    pub values: Vec<usize>,
+    /// The one of them that it takes if nobody says.
+    pub usual: usize,
+}
 
 /// Instances to solve together.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -110,7 +110,9 @@ fn the_least_complex_method_is_chosen_where_it_is_enough() {
     // The parabola knows the logistic alone; the others are passed over.
     let (out, json) = solved::<Parabola>("choose --size 16 --steps 3 --search-runs 3");
     assert_eq!(json["flags"], "--softness logistic --schedule static");
-    let reasons = json["choice"]["reasons"].as_array().unwrap();
+    let stages = json["choice"]["stages"].as_array().unwrap();
+    assert_eq!((stages.len(), &stages[0]["of"]), (1, &"softness".into()));
+    let reasons = stages[0]["reasons"].as_array().unwrap();
     assert_eq!((reasons.len(), &reasons[0]["verdict"]), (2, &"chosen".into()));
     assert_eq!(numbers(&reasons[0]["errors"]).len(), 3);
     assert_eq!(file(out.path(), "choose.json")["choice"], json["choice"]);

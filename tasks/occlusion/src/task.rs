@@ -2,8 +2,8 @@ use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress, Run,
-    Schedule, Score, Settings, Study, Task, Variant,
+    Batch, Description, Error, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point,
+    Progress, Resolution, Run, Schedule, Score, Settings, Study, Task, Variant,
 };
 use softrast_softness::Softness;
 
@@ -55,6 +55,13 @@ impl Task for Occlusion {
         // The transfer has to cross 3.5 world units in ten steps. Front quads found of 50 with
         // `evaluate --variant transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 %
         // at 0.7 and at 1.4.
+        if settings.resolution.is_some_and(|asked| asked != Resolution::Full)
+            || settings.tolerance.is_some()
+        {
+            let message = "edges stay where they are here, and every pixel sees every quad: leave out \
+                           --resolution and --tolerance";
+            return Err(Error::Usage(message.into()).into());
+        }
         let edge = Method::new(settings, &SCALES)?;
         let searched = edge.searched().and_then(|found| found.learning_rate);
         let (steps, learning_rate) = match settings.variant {

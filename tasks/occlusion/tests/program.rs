@@ -149,6 +149,15 @@ fn a_search_chooses_the_width_of_the_soft_depth_unless_it_is_named() {
 }
 
 #[test]
+fn where_any_softness_finds_the_order_a_logistic_is_chosen() {
+    let line = "choose --size 24 --search-runs 3";
+    let chosen = run(line).unwrap();
+    assert_eq!(chosen["flags"], "--softness logistic --schedule static", "{chosen}");
+    // There is no image to draw on fewer pixels, and no mesh.
+    assert_eq!(chosen["choice"]["stages"].as_array().unwrap().len(), 1);
+}
+
+#[test]
 fn one_pixel_ends_with_finite_numbers_and_a_warning() {
     for variant in ["original", "transfer"] {
         assert_finite(&run(&format!("--size 1 --steps 5 --variant {variant}")).unwrap());
@@ -172,6 +181,8 @@ fn contradictions_are_usage_errors_and_broken_files_are_not() {
         ("--depth-softness missing.json", 1, "missing.json"),
         ("--depth-scale inf", 2, "positive number"),
         ("--depth-scale NaN", 2, "positive number"),
+        ("--resolution auto", 2, "leave out --resolution"),
+        ("--tolerance 1e-3", 2, "leave out --resolution"),
         (&huge, 1, "not finite"),
     ] {
         let failure = run(line).unwrap_err();

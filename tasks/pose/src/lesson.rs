@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{LearnedSilhouette, SilhouetteLesson};
-use softrast_raster::{RasterBackend, iou_loss};
+use softrast_raster::RasterBackend;
 use softrast_runner::Plan;
 
 use crate::{Pose, Scene};
@@ -52,6 +52,6 @@ impl SilhouetteLesson for PoseLesson {
     }
 
     fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        iou_loss(image, scene.target())
+        scene.image_loss(image)
     }
 }

@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
 use softrast_mesh::Mesh;
-use softrast_method::tensor;
-use softrast_raster::{hard_silhouette, project, view_rotation};
+use softrast_method::{Targets, tensor};
+use softrast_raster::{hard_silhouette, iou_loss, project, view_rotation};
 
 use crate::Instance;
 
@@ -26,7 +26,7 @@ pub struct Scene<B: Backend> {
     /// Nearest distance of each view, `[views, 1]`.
     nearest: Tensor<B, 2>,
     faces: Arc<[[u32; 3]]>,
-    target: Tensor<B, 3>,
+    targets: Targets<B>,
     size: usize,
 }
 
@@ -63,7 +63,7 @@ impl<B: Backend> Scene<B> {
         let half_fov = (!optimise_fov).then(|| starts.narrow(1, 3, 1));
         let given = column(|instance| instance.start.distance.min(instance.target.distance));
         let nearest = given.clamp_max(nearest_distance(mesh));
-        Self { turned, half_fov, start, nearest, faces, target, size }
+        Self { turned, half_fov, start, nearest, faces, targets: Targets::new(target), size }
     }
 
     /// θ before the first step.
@@ -73,7 +73,7 @@ impl<B: Backend> Scene<B> {
 
     /// Hard silhouettes to arrive at, `[views, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
-        self.target.clone()
+        self.targets.full()
     }
 
     /// Faces of the mesh.
@@ -93,6 +93,13 @@ impl<B: Backend> Scene<B> {
     /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
     pub fn hard(&self, projected: Tensor<B, 3>) -> Tensor<B, 3> {
         hard_silhouette(projected, &self.faces, self.size)
+    }
+
+    /// `IoU` loss of each `image` `[views, side, side]`, `[views]`; the side is the size of the scene, or
+    /// that halved some times.
+    pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        let target = self.targets.of(&image);
+        iou_loss(image, target)
     }
 
     /// θ moved to the nearest pose that is allowed.

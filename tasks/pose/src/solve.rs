@@ -1,10 +1,12 @@
+use std::cell::RefCell;
+
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData, Transaction},
 };
 use softrast_meta::Adam;
 use softrast_method::{Descent, Method, MovingSilhouette, numbers, on_host};
-use softrast_raster::{RasterBackend, Rasterizer, hard_silhouette, iou_loss};
+use softrast_raster::{RasterBackend, hard_silhouette, iou_loss};
 
 use crate::Scene;
 
@@ -23,7 +25,9 @@ pub(crate) struct State {
     pub(crate) scale: f64,
     /// θ of each view.
     pub(crate) theta: Vec<Vec<f64>>,
-    /// Soft `IoU` loss of each view, what the optimiser lowers.
+    /// What the optimiser lowers, of each view: the soft `IoU` loss of the image it sees.
+    pub(crate) loss: Vec<f64>,
+    /// Soft `IoU` loss of each view at full size.
     pub(crate) soft: Vec<f64>,
     /// `IoU` loss of the hard silhouette of each view.
     pub(crate) hard: Vec<f64>,
@@ -45,32 +49,40 @@ impl Solver {
         let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
         let target = on_host(scene.target().inner().into_data());
         let first = self.method.scale(0, self.steps);
-        let rasterizer = Rasterizer::new(self.size);
-        let mut silhouette =
+        let rasterizer = self.method.rasterizer(self.size);
+        let silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
+        // It moves in every step, and judges what the step has led to.
+        let silhouette = RefCell::new(silhouette);
         descent.run(
             scene.start().inner(),
             |step, theta| {
                 let scale = self.method.scale(step, self.steps);
-                silhouette.turn_to(scale);
+                silhouette.borrow_mut().turn_to(scale);
                 let projected = scene.project(theta);
-                let image = silhouette.image(projected.clone());
-                (iou_loss(image.clone(), scene.target()), (scale, projected, image))
+                let image = silhouette.borrow().image(projected.clone());
+                (scene.image_loss(image.clone()), (scale, projected, image))
             },
             |theta| scene.allowed(Tensor::from_inner(theta)).inner(),
             |now| {
                 let (scale, projected, image) = now.seen;
+                let projected = projected.detach();
+                let (image, soft) = match silhouette.borrow().judged(projected.clone()) {
+                    None => (image, now.loss.clone()),
+                    Some(full) => (full.clone(), scene.image_loss(full).inner()),
+                };
                 let width = now.theta.dims()[1];
                 let read = Transaction::default().register(now.theta).register(now.loss);
-                let read = read.register(projected.inner());
+                let read = read.register(soft).register(projected.inner());
                 let read = if pictures { read.register(image.inner()) } else { read };
-                let ([poses, soft, projected], image) = softrast_method::read(read);
+                let ([poses, loss, soft, projected], image) = softrast_method::read(read);
                 let poses: Vec<f64> = poses.iter().collect();
                 let hard = hard_silhouette(on_host(projected), scene.faces(), self.size);
                 visit(State {
                     step: now.step,
                     scale,
                     theta: poses.chunks(width).map(<[_]>::to_vec).collect(),
+                    loss: loss.iter().collect(),
                     soft: soft.iter().collect(),
                     hard: numbers(iou_loss(hard, target.clone())),
                     image,

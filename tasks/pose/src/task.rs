@@ -103,6 +103,8 @@ impl Task for Pose {
             "scale": method.scale(0, *steps),
             "scale_end": method.scale(*steps, *steps),
             "squared": method.softness().squared,
+            "resolution": method.resolution().to_string(),
+            "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
@@ -218,7 +220,7 @@ fn point(state: &State, view: usize, instance: &Instance) -> Point {
     let error = PoseError::new([theta[0], theta[1], theta[2]], instance.target.distance);
     Point {
         step: state.step,
-        loss: state.soft[view],
+        loss: state.loss[view],
         image_error: state.soft[view],
         parameter_error: error.angle_deg,
         scale: state.scale,
@@ -264,7 +266,7 @@ impl Pose {
                     album.take(image, state.hard[view], batch.wants_frame(state.step, steps));
                 }
             }
-            let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
+            let loss = state.loss.iter().sum::<f64>() / state.loss.len() as f64;
             if state.step == 0 { Ok(()) } else { progress.step(state.step, loss) }
         })?;
         Ok(all)

@@ -73,6 +73,20 @@ fn a_camera_is_found_in_a_few_steps_on_a_small_image() {
 }
 
 #[test]
+fn a_narrow_softness_takes_all_pixels_and_a_wide_one_few_and_is_judged_on_all() {
+    let of = |line: &str| run(&format!("evaluate --runs 2 --size 32 --steps 3 {line}")).unwrap();
+    let both = |scale: &str| ["full", "auto"].map(|r| of(&format!("{scale} --resolution {r}")));
+    let [full, auto] = both("--scale 0.002");
+    assert_eq!(full["image_error"], auto["image_error"]);
+    assert_eq!(full["parameter_error"], auto["parameter_error"]);
+    let [full, auto] = both("--scale 0.2");
+    assert_eq!(auto["settings"]["resolution"], "auto");
+    assert_eq!(full["image_error"]["initial"], auto["image_error"]["initial"]);
+    assert_ne!(full["image_error"]["final"], auto["image_error"]["final"]);
+    assert_eq!(of("--scale 0.2 --resolution 8")["image_error"], auto["image_error"]);
+}
+
+#[test]
 fn a_run_does_not_depend_on_its_batch() {
     let line = "--size 16 --steps 5 --range 15-35";
     let many = run(&format!("evaluate --runs 3 {line}")).unwrap();
@@ -164,6 +178,10 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--softness missing.json --scale 0.1", 2, "holds its own parameters"),
         ("--softness missing.json --schedule decay", 2, "holds its own parameters"),
         ("--softness missing.json", 1, "missing.json"),
+        ("--resolution 20", 2, "one of 64, 32"),
+        ("--resolution none", 2, "expected full, auto"),
+        ("--tolerance 1", 2, "below 1"),
+        ("learn --resolution 32", 2, "learn draws at --size"),
         ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
         ("--mesh missing.obj", 1, "missing.obj"),
     ] {

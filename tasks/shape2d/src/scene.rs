@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
-use softrast_method::tensor;
+use softrast_method::{Targets, tensor};
 use softrast_raster::{hard_silhouette, mse_loss};
 
 use crate::Instance;
@@ -21,7 +21,7 @@ const FROM_CENTROID: f64 = 1.5;
 #[derive(Clone, Debug)]
 pub struct Scene<B: Backend> {
     start: Tensor<B, 1>,
-    target: Tensor<B, 3>,
+    targets: Targets<B>,
     faces: Arc<[[u32; 3]]>,
     size: usize,
 }
@@ -38,7 +38,7 @@ impl<B: Backend> Scene<B> {
         let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
         Self {
             start: tensor(corners.concat(), [2 * corners.len()]),
-            target: tensor(target.to_vec(), [1, size, size]),
+            targets: Targets::new(tensor(target.to_vec(), [1, size, size])),
             faces: faces.collect(),
             size,
         }
@@ -51,7 +51,7 @@ impl<B: Backend> Scene<B> {
 
     /// The picture to cover, `[1, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
-        self.target.clone()
+        self.targets.full()
     }
 
     /// The triangles, as corner numbers.
@@ -71,9 +71,11 @@ impl<B: Backend> Scene<B> {
         hard_silhouette(vertices, &self.faces, self.size)
     }
 
-    /// Mean squared difference of `image` `[1, size, size]` to the picture, `[1]`.
+    /// Mean squared difference of `image` `[1, side, side]` to the picture, `[1]`; the side is the size
+    /// of the scene, or that halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        mse_loss(image, self.target.clone())
+        let target = self.targets.of(&image);
+        mse_loss(image, target)
     }
 
     /// What keeps triangles small: the Laplacian loss of each by itself, weighted, `[1]`.

@@ -1,10 +1,12 @@
+use std::cell::RefCell;
+
 use burn::{
     backend::Autodiff,
     tensor::{TensorData, Transaction},
 };
 use softrast_meta::Adam;
 use softrast_method::{Descent, Method, MovingSilhouette, on_host};
-use softrast_raster::{RasterBackend, Rasterizer, hard_silhouette, mse_loss};
+use softrast_raster::{RasterBackend, hard_silhouette, mse_loss};
 
 use crate::Scene;
 
@@ -23,7 +25,7 @@ pub(crate) struct State {
     pub(crate) scale: f64,
     /// What the optimiser lowers.
     pub(crate) loss: f64,
-    /// Mean squared error of the soft silhouette.
+    /// Mean squared error of the soft silhouette at full size.
     pub(crate) soft: f64,
     /// Mean squared error of the hard silhouette.
     pub(crate) hard: f64,
@@ -45,22 +47,29 @@ impl Solver {
         let descent = Descent { optimizer: Adam::new(self.learning_rate), steps: self.steps };
         let first = self.method.scale(0, self.steps);
         let target = on_host(scene.target().inner().into_data());
-        let rasterizer = Rasterizer::new(self.size);
-        let mut silhouette =
+        let rasterizer = self.method.rasterizer(self.size);
+        let silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
+        // It moves in every step, and judges what the step has led to.
+        let silhouette = RefCell::new(silhouette);
         descent.run(
             scene.start().inner(),
             |step, theta| {
                 let scale = self.method.scale(step, self.steps);
-                silhouette.turn_to(scale);
+                silhouette.borrow_mut().turn_to(scale);
                 let vertices = scene.vertices(theta.clone());
-                let image = silhouette.image(vertices.clone());
+                let image = silhouette.borrow().image(vertices.clone());
                 let soft = scene.image_loss(image.clone());
                 (soft.clone() + scene.smoothness_loss(theta), (scale, vertices, image, soft))
             },
             |theta| theta,
             |now| {
                 let (scale, vertices, image, soft) = now.seen;
+                let vertices = vertices.detach();
+                let (image, soft) = match silhouette.borrow().judged(vertices.clone()) {
+                    None => (image, soft),
+                    Some(full) => (full.clone(), scene.image_loss(full)),
+                };
                 let read = Transaction::default().register(now.loss).register(soft.inner());
                 let read = read.register(vertices.inner());
                 let read = if pictures { read.register(image.inner()) } else { read };

@@ -4,8 +4,8 @@ use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, study};
 use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Pictures, Plan, Point, Progress, Run,
-    Schedule, Score, Settings, Study, Task, Variant, best_step, difference, rgb_from_gray,
+    Batch, Description, Detail, ErrorGroup, ExtraError, Measure, Pictures, Plan, Point, Progress,
+    Run, Schedule, Score, Settings, Study, Task, Variant, best_step, difference, rgb_from_gray,
 };
 use softrast_softness::Softness;
 
@@ -44,6 +44,8 @@ pub struct Shape2d {
     pub(crate) target: Vec<f64>,
     target_name: String,
     pub(crate) triangles: usize,
+    /// Numbers of triangles to choose from, if none was asked for.
+    detail: Option<Detail>,
     pub(crate) source: Source,
     pub(crate) solver: Solver,
 }
@@ -88,8 +90,13 @@ impl Task for Shape2d {
             Some(path) => (Source::File(path.clone()), path.display().to_string()),
         };
         let target = source.image(solver.size)?;
-        let triangles = args.triangles.unwrap_or(triangles);
-        Ok(Self { target, target_name, triangles, source, solver })
+        let detail = args.triangles.is_none().then(|| Detail {
+            flag: "triangles",
+            values: vec![triangles / 4, triangles / 2, triangles],
+            usual: triangles,
+        });
+        let triangles = settings.detail.or(args.triangles).unwrap_or(triangles);
+        Ok(Self { target, target_name, triangles, detail, source, solver })
     }
 
     fn describe(&self) -> Description {
@@ -101,6 +108,8 @@ impl Task for Shape2d {
             "scale": method.scale(0, *steps),
             "scale_end": method.scale(*steps, *steps),
             "squared": method.softness().squared,
+            "resolution": method.resolution().to_string(),
+            "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
@@ -121,6 +130,10 @@ impl Task for Shape2d {
     /// What can be seen of the result; the soft error of a method falls with its scale.
     fn score(&self) -> Score {
         Score::Extra("hard")
+    }
+
+    fn detail(&self) -> Option<Detail> {
+        self.detail.clone()
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {

@@ -12,15 +12,28 @@ pub struct Args {
     #[arg(long)]
     pub normalize: bool,
 
-    /// Mesh that is deformed, centred and with the longest side of its box scaled to 1; a sphere of
-    /// 642 vertices by default.
-    #[arg(long, value_name = "FILE.obj")]
+    /// Mesh that is deformed, centred and with the longest side of its box scaled to 1; a sphere by
+    /// default.
+    #[arg(long, value_name = "FILE.obj", conflicts_with = "detail")]
     pub template: Option<PathBuf>,
+
+    /// How finely the sphere is divided: 162, 642 or 2,562 vertices [default: 3].
+    #[arg(long, value_name = "2|3|4", value_parser = detail)]
+    pub detail: Option<usize>,
 
     /// Elevation of all 24 cameras in degrees, -90 to 90; without it, seeds 0 to 4 stand for 30, 60,
     /// 0, -30 and -60.
     #[arg(long, value_name = "DEGREES", value_parser = elevation, allow_negative_numbers = true)]
     pub elevation: Option<f64>,
+}
+
+/// Levels of the icosphere, the coarsest first, and the one that is taken if nobody says.
+pub(crate) const DETAILS: [usize; 3] = [2, 3, 4];
+pub(crate) const DETAIL: usize = 3;
+
+fn detail(text: &str) -> Result<usize, String> {
+    let detail = text.parse().ok().filter(|level| DETAILS.contains(level));
+    detail.ok_or_else(|| "expected 2, 3 or 4".into())
 }
 
 fn elevation(text: &str) -> Result<f64, String> {

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
 use softrast_mesh::{Edges, Mesh};
-use softrast_method::tensor;
+use softrast_method::{Targets, tensor};
 use softrast_raster::{hard_silhouette, iou_loss, project};
 
 use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
@@ -39,7 +39,7 @@ pub struct Scene<B: Backend> {
     faces: Arc<[[u32; 3]]>,
     laplacian: Laplacian<B>,
     flatness: Flatness<B>,
-    target: Tensor<B, 3>,
+    targets: Targets<B>,
     size: usize,
 }
 
@@ -70,7 +70,7 @@ impl<B: Backend> Scene<B> {
             laplacian: Laplacian::new(&edges, count),
             flatness: Flatness::new(&edges),
             faces: template.faces().into(),
-            target,
+            targets: Targets::new(target),
             size,
         }
     }
@@ -83,7 +83,7 @@ impl<B: Backend> Scene<B> {
 
     /// Hard silhouettes to arrive at, `[views, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
-        self.target.clone()
+        self.targets.full()
     }
 
     /// Faces of the template.
@@ -113,9 +113,11 @@ impl<B: Backend> Scene<B> {
         hard_silhouette(projected, &self.faces, self.size)
     }
 
-    /// `IoU` loss of `image` `[views, size, size]`, mean over the views, `[1]`.
+    /// `IoU` loss of `image` `[views, side, side]`, mean over the views, `[1]`; the side is the size of
+    /// the scene, or that halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        iou_loss(image, self.target.clone()).mean()
+        let target = self.targets.of(&image);
+        iou_loss(image, target).mean()
     }
 
     /// What keeps the surface of `vertices` `[vertices, 3]` smooth: 0.03 times the Laplacian loss

@@ -1,10 +1,12 @@
+use std::cell::RefCell;
+
 use burn::{
     backend::Autodiff,
     tensor::{TensorData, Transaction},
 };
 use softrast_meta::Adam;
 use softrast_method::{Descent, Method, MovingSilhouette, on_host};
-use softrast_raster::{RasterBackend, Rasterizer, hard_silhouette, iou_loss};
+use softrast_raster::{RasterBackend, hard_silhouette, iou_loss};
 
 use crate::Scene;
 
@@ -28,7 +30,7 @@ pub(crate) struct State {
     pub(crate) vertices: Vec<[f64; 3]>,
     /// What the optimiser lowers.
     pub(crate) loss: f64,
-    /// Soft `IoU` loss, mean over the views.
+    /// Soft `IoU` loss at full size, mean over the views.
     pub(crate) soft: f64,
     /// `IoU` loss of the hard silhouettes, mean over the views.
     pub(crate) hard: f64,
@@ -56,17 +58,19 @@ impl Solver {
         let descent = Descent { optimizer: self.adam(), steps: self.steps };
         let first = self.method.scale(0, self.steps);
         let target = on_host(scene.target().inner().into_data());
-        let rasterizer = Rasterizer::new(self.size);
-        let mut silhouette =
+        let rasterizer = self.method.rasterizer(self.size);
+        let silhouette =
             MovingSilhouette::<Autodiff<B>>::new(&self.method, rasterizer, scene.faces(), first);
+        // It moves in every step, and judges what the step has led to.
+        let silhouette = RefCell::new(silhouette);
         descent.run(
             scene.start().inner(),
             |step, theta| {
                 let scale = self.method.scale(step, self.steps);
-                silhouette.turn_to(scale);
+                silhouette.borrow_mut().turn_to(scale);
                 let vertices = scene.vertices(theta);
                 let projected = scene.project(vertices.clone());
-                let image = silhouette.image(projected.clone());
+                let image = silhouette.borrow().image(projected.clone());
                 let soft = scene.image_loss(image.clone());
                 let loss = soft.clone() + scene.smoothness_loss(vertices.clone());
                 (loss, (scale, vertices, projected, image, soft))
@@ -74,6 +78,11 @@ impl Solver {
             |theta| theta,
             |now| {
                 let (scale, vertices, projected, image, soft) = now.seen;
+                let projected = projected.detach();
+                let (image, soft) = match silhouette.borrow().judged(projected.clone()) {
+                    None => (image, soft),
+                    Some(full) => (full.clone(), scene.image_loss(full)),
+                };
                 let read = Transaction::default().register(vertices.inner()).register(now.loss);
                 let read = read.register(soft.inner()).register(projected.inner());
                 let read = if pictures { read.register(image.inner()) } else { read };

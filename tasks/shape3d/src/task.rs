@@ -5,13 +5,14 @@ use softrast_mesh::{Mesh, airplane, chair, icosphere};
 use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run, Schedule,
-    Score, Settings, Study, Task, Variant, best_step,
+    Batch, Description, Detail, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run,
+    Schedule, Score, Settings, Study, Task, Variant, best_step,
 };
 use softrast_softness::Softness;
 
 use crate::{
     Args, Chamfer, Instance, Scene,
+    args::{DETAIL, DETAILS},
     instance::ELEVATIONS_DEG,
     lesson,
     picture::Album,
@@ -51,6 +52,8 @@ pub struct Shape3d {
     target_name: String,
     pub(crate) template: Mesh,
     template_name: String,
+    /// The template was not asked for, but is there to be chosen.
+    detail_is_free: bool,
     pub(crate) elevation_deg: Option<f64>,
     chamfer: Chamfer,
     pub(crate) solver: Solver,
@@ -72,13 +75,22 @@ impl Task for Shape3d {
             learning_rate,
         };
         let (target, target_name) = target(settings.variant, args)?;
+        let level = settings.detail.or(args.detail).unwrap_or(DETAIL);
         let (template, template_name) = match &args.template {
-            None => (icosphere(3), "sphere".to_owned()),
+            None => (icosphere(level as u32), "sphere".to_owned()),
             Some(path) => (Mesh::load(path)?, name(path)),
         };
         let chamfer = Chamfer::new(target.positions(), target.faces());
-        let elevation_deg = args.elevation;
-        Ok(Self { target, target_name, template, template_name, elevation_deg, chamfer, solver })
+        Ok(Self {
+            target,
+            target_name,
+            template,
+            template_name,
+            detail_is_free: args.template.is_none() && args.detail.is_none(),
+            elevation_deg: args.elevation,
+            chamfer,
+            solver,
+        })
     }
 
     fn describe(&self) -> Description {
@@ -94,6 +106,8 @@ impl Task for Shape3d {
             "scale": method.scale(0, *steps),
             "scale_end": method.scale(*steps, *steps),
             "squared": method.softness().squared,
+            "resolution": method.resolution().to_string(),
+            "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
@@ -114,6 +128,11 @@ impl Task for Shape3d {
     /// What can be seen of the result; the soft error of a method falls with its scale.
     fn score(&self) -> Score {
         Score::Extra("hard")
+    }
+
+    fn detail(&self) -> Option<Detail> {
+        let detail = Detail { flag: "detail", values: DETAILS.to_vec(), usual: DETAIL };
+        self.detail_is_free.then_some(detail)
     }
 
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {

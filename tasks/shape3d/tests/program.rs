@@ -79,6 +79,17 @@ fn seeds_are_elevations_unless_one_is_named() {
 }
 
 #[test]
+fn a_coarser_sphere_has_fewer_faces_and_few_pixels_are_judged_on_all() {
+    let line = "--size 16 --steps 2 --scale 0.2 --detail 2";
+    let full = run(line).unwrap();
+    assert_eq!((&full["faces"], &full["settings"]["vertices"]), (&320.into(), &162.into()));
+    let fewer = run(&format!("{line} --resolution 8 --tolerance 1e-3")).unwrap();
+    assert_eq!((&fewer["size"], &fewer["settings"]["tolerance"]), (&16.into(), &0.001.into()));
+    let hard = |json: &Value| json["image_error"]["hard"]["initial"].clone();
+    assert_eq!(hard(&full), hard(&fewer));
+}
+
+#[test]
 fn a_mesh_out_of_view_is_said_to_be_so() {
     let far = "v 0 90 0\nv 1 90 0\nv 0 91 0\nf 1 2 3\n";
     let json = with_file("--mesh", far, "--steps 3 --size 8").unwrap();
@@ -143,6 +154,8 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--softness missing.json", 1, "missing.json"),
         ("--mesh missing.obj", 1, "missing.obj"),
         ("--template missing.obj", 1, "missing.obj"),
+        ("--template missing.obj --detail 2", 2, "cannot be used with"),
+        ("--detail 5", 2, "expected 2, 3 or 4"),
     ] {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");
