@@ -108,7 +108,8 @@ impl LearnedEdge {
         PreparedRun { silhouettes, of_step, tables: RefCell::default() }
     }
 
-    /// The file `softness.json` of a learned vector: name and text.
+    /// The file `softness.json` of a vector that was learned at a learning rate of the inner loops:
+    /// name and text.
     ///
     /// # Errors
     ///
@@ -116,12 +117,15 @@ impl LearnedEdge {
     pub fn files(
         &self,
         learned: &[f64],
+        learning_rate: f64,
         note: &str,
     ) -> anyhow::Result<Vec<(&'static str, String)>> {
         let (knots, own) = learned.split_at(self.knots());
         let phi = self.phi[..self.fixed()].iter().chain(own).copied().collect();
         let path = self.path.as_ref().map(|path| ScalePath { knots: knots.to_vec(), ..*path });
-        let file = SoftnessFile { softness: self.softness, phi, path, note: Some(note.to_owned()) };
+        let (softness, note) = (self.softness, Some(note.to_owned()));
+        let learning_rate = Some(learning_rate);
+        let file = SoftnessFile { softness, phi, path, learning_rate, note };
         let name = "softness.json";
         Ok(vec![(name, file.text(name.as_ref())?)])
     }

@@ -13,6 +13,7 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-method needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod backend;
 #[cfg(feature = "ndarray")]
 mod course;
 #[cfg(not(feature = "ndarray"))]
@@ -38,6 +39,7 @@ mod lesson;
 mod method;
 mod moving_silhouette;
 mod searched;
+pub mod shipped;
 mod silhouette_lesson;
 mod tensor;
 

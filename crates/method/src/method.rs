@@ -1,8 +1,9 @@
+use serde_json::{Map, Value};
 use softrast_raster::{BackendChoice, HostBackend};
-use softrast_runner::{Command, Error, Schedule, Settings, SoftnessChoice};
+use softrast_runner::{Error, Schedule, Settings, SoftnessChoice, Variant};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
 
-use crate::{Searched, numbers, tensor};
+use crate::{Searched, backend::backend, numbers, shipped, tensor};
 
 /// Scales of a task that the command line does not name, as widths in NDC. A family that
 /// [`Searched`] knows has its own instead.
@@ -28,7 +29,8 @@ pub struct Method {
     softness: EdgeSoftness,
     name: String,
     path: Path,
-    searched: Option<&'static Searched>,
+    learning_rate: Option<f64>,
+    note: Option<String>,
     backend: BackendChoice,
 }
 
@@ -44,58 +46,102 @@ enum Path {
 }
 
 impl Method {
-    /// The method that the command line asks for; by default a logistic.
+    /// The method that the command line asks for. Where it says nothing of the softness, `solve` and
+    /// `evaluate` take the one that is shipped for the task; else it is a logistic.
     ///
     /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are
     /// squared, so that they mean the same widths.
     ///
     /// # Errors
     ///
-    /// If a softness file cannot be used, flags contradict each other, or there is no such backend or
-    /// no adapter for it.
+    /// If a softness file cannot be used or none is shipped that is asked for, flags contradict each
+    /// other, or there is no such backend or no adapter for it.
     pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(settings, defaults.backends)?;
-        let scaled = settings.scale.is_some() || settings.scale_end.is_some() || settings.squared;
         match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
-                if scaled || settings.schedule == Some(Schedule::Decay) {
-                    return Err(usage(
-                        "a softness file holds its own parameters: leave out --scale, --scale-end, \
-                         --squared and --schedule decay, or name a family",
-                    ));
-                }
-                let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(file)?;
-                let path = match path {
-                    None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
-                    Some(path) => {
-                        Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) }
-                    }
-                };
-                let name = file.display().to_string();
-                Ok(Self { softness, name, path, searched: None, backend })
+                check_alone(settings)?;
+                let (name, file) = (file.display().to_string(), SoftnessFile::load(file)?);
+                Ok(Self::of_file(name, file, settings, defaults, backend))
             }
-            named => {
-                let name = match named {
-                    Some(SoftnessChoice::Named(name)) => name,
-                    _ => "logistic",
-                };
-                let family: Family = name.parse()?;
-                let softness = EdgeSoftness { family, squared: settings.squared };
-                let schedule = asked_schedule(settings);
-                // Found together, so taken whole or not at all.
-                let usual = defaults.schedule;
-                let known = Searched::of(defaults.task, family.name(), schedule, usual);
-                let searched = known.filter(|_| !scaled);
-                let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
-                Ok(Self { softness, name: family.name().to_owned(), path, searched, backend })
+            Some(SoftnessChoice::Named(name)) => {
+                Self::of_family(name.parse()?, settings, defaults, backend)
+            }
+            None if !shipped::is_asked_for(settings, defaults.task) => {
+                Self::of_family(Family::Logistic, settings, defaults, backend)
+            }
+            Some(SoftnessChoice::Learned) | None => {
+                check_alone(settings)?;
+                let file = shipped::softness(defaults.task)?.ok_or_else(|| {
+                    usage(&format!(
+                        "no softness learned on {} comes with the program: name a family or a file",
+                        defaults.task
+                    ))
+                })?;
+                Ok(Self::of_file("learned".to_owned(), file, settings, defaults, backend))
             }
         }
     }
 
-    /// What was searched for this family on the task, under the same schedule.
-    pub fn searched(&self) -> Option<&'static Searched> {
-        self.searched
+    fn of_file(
+        name: String,
+        file: SoftnessFile,
+        settings: &Settings,
+        defaults: &Defaults,
+        backend: BackendChoice,
+    ) -> Self {
+        let SoftnessFile { softness, phi, path, learning_rate, note } = file;
+        let path = match path {
+            None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
+            Some(path) => Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) },
+        };
+        // Learned on the original.
+        let learning_rate = learning_rate.filter(|_| settings.variant == Variant::Original);
+        Self { softness, name, path, learning_rate, note, backend }
+    }
+
+    fn of_family(
+        family: Family,
+        settings: &Settings,
+        defaults: &Defaults,
+        backend: BackendChoice,
+    ) -> anyhow::Result<Self> {
+        let softness = EdgeSoftness { family, squared: settings.squared };
+        let schedule = asked_schedule(settings);
+        // Found together, so taken whole or not at all.
+        let known = Searched::of(defaults.task, family.name(), schedule, defaults.schedule);
+        let searched = known.filter(|_| !is_scaled(settings));
+        let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
+        let learning_rate = searched.and_then(|found| found.learning_rate);
+        let name = family.name().to_owned();
+        Ok(Self { softness, name, path, learning_rate, note: None, backend })
+    }
+
+    /// The learning rate that belongs to the softness: the one it was searched for with, or learned
+    /// at in the original variant.
+    pub fn learning_rate(&self) -> Option<f64> {
+        self.learning_rate
+    }
+
+    /// Length of the parameter vector.
+    pub fn parameters(&self) -> usize {
+        self.softness.parameters()
+    }
+
+    /// The settings of a task, and with them how the softness moves over `steps` steps and where it
+    /// comes from, for [`Description::settings`](softrast_runner::Description::settings).
+    pub fn settings(&self, steps: usize, of_task: Value) -> Map<String, Value> {
+        let mut settings = of_task.as_object().cloned().unwrap_or_default();
+        let schedule = if self.is_static() { "static" } else { "decay" };
+        settings.insert("schedule".into(), schedule.into());
+        settings.insert("scale".into(), self.scale(0, steps).into());
+        settings.insert("scale_end".into(), self.scale(steps, steps).into());
+        settings.insert("squared".into(), self.softness.squared.into());
+        if let Some(note) = &self.note {
+            settings.insert("softness_note".into(), note.as_str().into());
+        }
+        settings
     }
 
     /// Name of the family, or of the file.
@@ -179,6 +225,22 @@ impl Defaults {
     }
 }
 
+/// Whether the flags say what a file says itself.
+pub(crate) fn is_scaled(settings: &Settings) -> bool {
+    settings.scale.is_some() || settings.scale_end.is_some() || settings.squared
+}
+
+/// Refuses flags that contradict a softness file.
+fn check_alone(settings: &Settings) -> anyhow::Result<()> {
+    if is_scaled(settings) || settings.schedule == Some(Schedule::Decay) {
+        return Err(usage(
+            "a softness file holds its own parameters: leave out --scale, --scale-end, --squared and \
+             --schedule decay, or name a family",
+        ));
+    }
+    Ok(())
+}
+
 /// The schedule that the flags ask for: a scale without one stays as it is.
 fn asked_schedule(settings: &Settings) -> Option<Schedule> {
     settings.schedule.or(settings.scale.map(|_| Schedule::Static))
@@ -212,30 +274,15 @@ fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     0.25 / slope[0].abs().max(1e-12)
 }
 
-/// The backend that the command line asks for, set up.
-fn backend(
-    settings: &Settings,
-    compiled: &'static [BackendChoice],
-) -> anyhow::Result<BackendChoice> {
-    let asked = settings.backend.as_deref();
-    let backend =
-        BackendChoice::among(compiled, asked).map_err(|error| usage(&error.to_string()))?;
-    if settings.command == Command::Learn && asked.is_some() && backend != BackendChoice::NdArray {
-        return Err(usage(&format!(
-            "learn computes on ndarray, not on {backend}: leave out --backend"
-        )));
-    }
-    backend.set_up()?;
-    Ok(backend)
-}
-
-fn usage(message: &str) -> anyhow::Error {
+/// A mistake on the command line.
+pub(crate) fn usage(message: &str) -> anyhow::Error {
     Error::Usage(message.to_owned()).into()
 }
 
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use softrast_runner::Command;
 
     use super::*;
 
@@ -248,16 +295,26 @@ mod tests {
         backends: softrast_raster::compiled_backends!(),
     };
 
-    /// First, middle and last scale of the method that a command line gives.
-    fn scales(line: &str) -> [f64; 3] {
+    fn settings(line: &str) -> Settings {
         #[derive(Parser)]
         struct Line {
             #[command(flatten)]
             settings: Settings,
         }
-        let words = ["task"].into_iter().chain(line.split_whitespace());
-        let method = Method::new(&Line::parse_from(words).settings, &DEFAULTS).unwrap();
+        Line::parse_from(["task"].into_iter().chain(line.split_whitespace())).settings
+    }
+
+    /// First, middle and last scale of the method that a command line gives.
+    fn scales(line: &str) -> [f64; 3] {
+        let method = Method::new(&settings(line), &DEFAULTS).unwrap();
         [0, 50, 101].map(|step| method.scale(step, 101))
+    }
+
+    /// Name and learning rate of the method of a command line, on a task with a shipped softness.
+    fn shipped(command: Command, line: &str) -> (String, Option<f64>) {
+        let defaults = Defaults { task: "example", ..DEFAULTS };
+        let method = Method::new(&Settings { command, ..settings(line) }, &defaults).unwrap();
+        (method.name().to_owned(), method.learning_rate())
     }
 
     fn assert_scales(line: &str, expected: [f64; 3]) {
@@ -287,11 +344,50 @@ mod tests {
     }
 
     #[test]
+    fn what_is_shipped_is_used_where_nothing_is_said_and_something_is_solved() {
+        let learned = ("learned".to_owned(), Some(0.7));
+        for (command, line) in [
+            (Command::Solve, ""),
+            (Command::Evaluate, "--steps 7 --size 32"),
+            (Command::Search, "--softness learned"),
+            (Command::Learn, "--softness learned --schedule static"),
+        ] {
+            assert_eq!(shipped(command, line), learned, "{command:?} {line}");
+        }
+        assert_eq!(shipped(Command::Solve, "--variant transfer"), ("learned".into(), None));
+        for (command, line) in [
+            (Command::Solve, "--scale 0.1"),
+            (Command::Solve, "--softness logistic"),
+            (Command::Evaluate, "--schedule static"),
+            (Command::Evaluate, "--squared"),
+            (Command::Search, ""),
+            (Command::Choose, ""),
+            (Command::Learn, ""),
+        ] {
+            assert_eq!(shipped(command, line), ("logistic".into(), None), "{command:?} {line}");
+        }
+    }
+
+    #[test]
+    fn a_learned_softness_that_is_not_there_or_not_alone_is_refused() {
+        for (task, line, part) in [
+            ("none", "--softness learned", "no softness learned on none comes with the program"),
+            ("example", "--softness learned --scale 0.1", "holds its own parameters"),
+        ] {
+            let defaults = Defaults { task, ..DEFAULTS };
+            let error = Method::new(&settings(line), &defaults).unwrap_err();
+            assert!(matches!(error.downcast_ref(), Some(Error::Usage(_))));
+            assert!(error.to_string().contains(part), "{error}");
+        }
+    }
+
+    #[test]
     fn a_run_of_one_step_has_the_first_scale() {
         let path = Path::Scale { first: 0.1, last: 0.001 };
         let softness = EdgeSoftness { family: Family::Gauss, squared: false };
         let backend = BackendChoice::NdArray;
-        let method = Method { softness, name: "gauss".into(), path, searched: None, backend };
+        let name = "gauss".to_owned();
+        let method = Method { softness, name, path, learning_rate: None, note: None, backend };
         assert_eq!(method.scale(0, 1), 0.1);
     }
 }

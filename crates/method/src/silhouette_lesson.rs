@@ -155,7 +155,8 @@ impl<L: SilhouetteLesson> Lesson for L {
     }
 
     fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
-        self.drawn().edge.files(phi, note)
+        let learning_rate = SilhouetteLesson::inner(self).optimizer.learning_rate;
+        self.drawn().edge.files(phi, learning_rate, note)
     }
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {

@@ -176,6 +176,7 @@ fn flags(settings: &Settings, setting: Setting) -> String {
     match &settings.softness {
         Some(SoftnessChoice::Named(name)) => flags.push(format!("--softness {name}")),
         Some(SoftnessChoice::File(path)) => flags.push(format!("--softness {}", path.display())),
+        Some(SoftnessChoice::Learned) => flags.push("--softness learned".into()),
         None => {}
     }
     if settings.squared {

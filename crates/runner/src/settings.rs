@@ -64,8 +64,8 @@ pub struct Settings {
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,
 
-    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, or auto for what `choose`
-    /// finds.
+    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, learned for the one that
+    /// comes with the program, or auto for what `choose` finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
 
@@ -158,10 +158,12 @@ pub enum SoftnessChoice {
     Named(&'static str),
     /// A file, not opened yet.
     File(PathBuf),
+    /// The one that was learned on the task and comes with the program.
+    Learned,
 }
 
 impl SoftnessChoice {
-    /// The names that the command line knows.
+    /// The families that the command line knows.
     pub const NAMES: [&'static str; 6] = ["logistic", "gauss", "exp", "gamma", "bilogit", "mlp"];
 
     /// Stands for the method that `choose` finds; a task never sees it.
@@ -198,6 +200,9 @@ pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
     if text == "auto" {
         return Ok(SoftnessChoice::AUTO);
     }
+    if text == "learned" {
+        return Ok(SoftnessChoice::Learned);
+    }
     if let Some(name) = SoftnessChoice::NAMES.into_iter().find(|&name| name == text) {
         return Ok(SoftnessChoice::Named(name));
     }
@@ -205,7 +210,7 @@ pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
         return Ok(SoftnessChoice::File(text.into()));
     }
     Err(format!(
-        "expected one of {}, auto or a file that ends in .json",
+        "expected one of {}, learned, auto or a file that ends in .json",
         SoftnessChoice::NAMES.join(", ")
     ))
 }

@@ -5,7 +5,6 @@ use softrast_runner::{
     Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress, Run,
     Schedule, Score, Settings, Study, Task, Variant,
 };
-use softrast_softness::Softness;
 
 use crate::{
     Args, DepthError, Instance, Problem, Scene,
@@ -56,9 +55,9 @@ impl Task for Occlusion {
         // `evaluate --variant transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 %
         // at 0.7 and at 1.4.
         let edge = Method::new(settings, &SCALES)?;
-        let searched = edge.searched().and_then(|found| found.learning_rate);
+        let suited = edge.learning_rate();
         let (steps, learning_rate) = match settings.variant {
-            Variant::Original => (100, searched.unwrap_or(0.03)),
+            Variant::Original => (100, suited.unwrap_or(0.03)),
             Variant::Transfer => (10, 0.7),
         };
         let solver = Solver {
@@ -77,10 +76,6 @@ impl Task for Occlusion {
         let mut settings = serde_json::json!({
             "depth_softness": depth.name,
             "learning_rate": learning_rate,
-            "schedule": if edge.is_static() { "static" } else { "decay" },
-            "scale": edge.scale(0, *steps),
-            "scale_end": edge.scale(*steps, *steps),
-            "squared": edge.softness().squared,
             "background_weight": crate::BACKGROUND,
         });
         if let Some(scale) = depth.scale {
@@ -96,7 +91,7 @@ impl Task for Occlusion {
         };
         Description {
             softness,
-            parameters: edge.softness().parameters() + depth.softness.parameters(),
+            parameters: edge.parameters() + depth.phi.len(),
             backend: edge.backend().title().to_owned(),
             steps: *steps,
             size: *size,
@@ -106,7 +101,7 @@ impl Task for Occlusion {
             parameter_error: Measure { name: "wrong depth order", unit: "of pairs" },
             extra: EXTRA.to_vec(),
             success: success.to_owned(),
-            settings: settings.as_object().cloned().unwrap_or_default(),
+            settings: edge.settings(*steps, settings),
         }
     }
 

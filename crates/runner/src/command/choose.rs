@@ -120,12 +120,13 @@ fn chosen<T: Task>(
     Ok((choice, whole))
 }
 
-/// The settings with a softness that a task can prepare.
+/// The settings with a softness that a task can prepare; not the learned one, which none of the
+/// methods is that there are to choose from.
 fn plain(settings: &Settings) -> Settings {
     let auto = settings.softness == Some(SoftnessChoice::AUTO);
     Settings {
         softness: settings.softness.clone().filter(|_| !auto),
-        command: Command::Evaluate,
+        command: Command::Choose,
         ..settings.clone()
     }
 }
