@@ -33,6 +33,7 @@ const VALIDATIONS: usize = 10;
 ///
 /// If an instance cannot be made.
 pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+    lesson.suits(plan)?;
     // What would fail later fails here, where an error can be told.
     let seeds = (0..(plan.outer * plan.batch) as u64).map(|k| plan.seed + k);
     let last = seeds.max().into_iter().chain([plan.validation_seed]);

@@ -1,7 +1,7 @@
 use serde_json::{Map, Value};
 use softrast_raster::{BackendChoice, HostBackend};
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice, Variant};
-use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
+use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile, Surrogate};
 
 use crate::{Searched, backend::backend, numbers, shipped, tensor};
 
@@ -29,6 +29,7 @@ pub struct Method {
     softness: EdgeSoftness,
     name: String,
     path: Path,
+    surrogate: Option<Surrogate>,
     learning_rate: Option<f64>,
     note: Option<String>,
     backend: BackendChoice,
@@ -91,14 +92,14 @@ impl Method {
         defaults: &Defaults,
         backend: BackendChoice,
     ) -> Self {
-        let SoftnessFile { softness, phi, path, learning_rate, note } = file;
+        let SoftnessFile { softness, phi, path, surrogate, learning_rate, note } = file;
         let path = match path {
             None => Path::Fixed { scale: nominal_scale(softness, &phi), phi },
             Some(path) => Path::Learned { phi, path, size: settings.size.unwrap_or(defaults.size) },
         };
         // Learned on the original.
         let learning_rate = learning_rate.filter(|_| settings.variant == Variant::Original);
-        Self { softness, name, path, learning_rate, note, backend }
+        Self { softness, name, path, surrogate, learning_rate, note, backend }
     }
 
     fn of_family(
@@ -114,8 +115,13 @@ impl Method {
         let searched = known.filter(|_| !is_scaled(settings));
         let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
         let learning_rate = searched.and_then(|found| found.learning_rate);
-        let name = family.name().to_owned();
-        Ok(Self { softness, name, path, learning_rate, note: None, backend })
+        let phi = |scale| softness.default_phi(scale);
+        let surrogate = settings.surrogate_scale.map(|x| Surrogate { softness, phi: phi(x) });
+        let name = match surrogate {
+            None => family.name().to_owned(),
+            Some(_) => format!("{family} with surrogate"),
+        };
+        Ok(Self { softness, name, path, surrogate, learning_rate, note: None, backend })
     }
 
     /// The learning rate that belongs to the softness: the one it was searched for with, or learned
@@ -124,9 +130,15 @@ impl Method {
         self.learning_rate
     }
 
-    /// Length of the parameter vector.
+    /// What the gradient is taken of, where that is not the softness itself.
+    pub fn surrogate(&self) -> Option<&Surrogate> {
+        self.surrogate.as_ref()
+    }
+
+    /// How many parameters the softness and its surrogate have.
     pub fn parameters(&self) -> usize {
-        self.softness.parameters()
+        let felt = self.surrogate.as_ref().map_or(0, |felt| felt.phi.len());
+        self.softness.parameters() + felt
     }
 
     /// The settings of a task, and with them how the softness moves over `steps` steps and where it
@@ -138,6 +150,10 @@ impl Method {
         settings.insert("scale".into(), self.scale(0, steps).into());
         settings.insert("scale_end".into(), self.scale(steps, steps).into());
         settings.insert("squared".into(), self.softness.squared.into());
+        if let Some(Surrogate { softness, phi }) = &self.surrogate {
+            settings.insert("surrogate".into(), softness.family.name().into());
+            settings.insert("surrogate_scale".into(), nominal_scale(*softness, phi).into());
+        }
         if let Some(note) = &self.note {
             settings.insert("softness_note".into(), note.as_str().into());
         }
@@ -232,10 +248,11 @@ pub(crate) fn is_scaled(settings: &Settings) -> bool {
 
 /// Refuses flags that contradict a softness file.
 fn check_alone(settings: &Settings) -> anyhow::Result<()> {
-    if is_scaled(settings) || settings.schedule == Some(Schedule::Decay) {
+    let moved = settings.schedule == Some(Schedule::Decay);
+    if is_scaled(settings) || moved || settings.surrogate_scale.is_some() {
         return Err(usage(
-            "a softness file holds its own parameters: leave out --scale, --scale-end, --squared and \
-             --schedule decay, or name a family",
+            "a softness file holds its own parameters: leave out --scale, --scale-end, --squared, \
+             --surrogate-scale and --schedule decay, or name a family",
         ));
     }
     Ok(())
@@ -369,6 +386,18 @@ mod tests {
     }
 
     #[test]
+    fn a_surrogate_is_the_same_family_at_its_own_scale() {
+        let settings = settings("--softness gauss --scale 0.01 --surrogate-scale 0.1");
+        let method = Method::new(&settings, &DEFAULTS).unwrap();
+        let Surrogate { softness, phi } = method.surrogate().unwrap();
+        assert_eq!((softness.family, &phi[..]), (Family::Gauss, &[0.1f64.ln()][..]));
+        assert_eq!((method.name(), method.parameters()), ("gauss with surrogate", 2));
+        let settings = method.settings(10, serde_json::json!({ "mesh": "fox" }));
+        assert!((settings["surrogate_scale"].as_f64().unwrap() - 0.1).abs() < 1e-12);
+        assert_eq!((&settings["surrogate"], &settings["mesh"]), (&"gauss".into(), &"fox".into()));
+    }
+
+    #[test]
     fn a_learned_softness_that_is_not_there_or_not_alone_is_refused() {
         for (task, line, part) in [
             ("none", "--softness learned", "no softness learned on none comes with the program"),
@@ -387,7 +416,8 @@ mod tests {
         let softness = EdgeSoftness { family: Family::Gauss, squared: false };
         let backend = BackendChoice::NdArray;
         let name = "gauss".to_owned();
-        let method = Method { softness, name, path, learning_rate: None, note: None, backend };
+        let (surrogate, learning_rate, note) = (None, None, None);
+        let method = Method { softness, name, path, surrogate, learning_rate, note, backend };
         assert_eq!(method.scale(0, 1), 0.1);
     }
 }

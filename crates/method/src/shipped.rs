@@ -57,7 +57,9 @@ pub fn is_asked_for(settings: &Settings, task: &str) -> bool {
         None => {
             // A search, a choice and learning begin with a family.
             let solves = matches!(settings.command, Command::Solve | Command::Evaluate);
-            let silent = settings.schedule.is_none() && !is_scaled(settings);
+            let silent = settings.schedule.is_none()
+                && settings.surrogate_scale.is_none()
+                && !is_scaled(settings);
             solves && silent && text(task).is_some()
         }
     }

@@ -97,6 +97,10 @@ impl<L: SilhouetteLesson> Lesson for L {
         self.drawn().edge.start()
     }
 
+    fn suits(&self, plan: &Plan) -> anyhow::Result<()> {
+        self.drawn().edge.suits(plan)
+    }
+
     fn inner(&self) -> InnerLoop<Adam> {
         SilhouetteLesson::inner(self)
     }

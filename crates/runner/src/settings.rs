@@ -85,6 +85,11 @@ pub struct Settings {
     #[arg(long)]
     pub squared: bool,
 
+    /// Take the gradient of the same softness at this scale instead, in the unit of --scale: a sharp
+    /// image with a wide gradient, which is not the derivative of the image.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    pub surrogate_scale: Option<f64>,
+
     /// What to compute on: ndarray, flex or wgpu, if the program was built with it; the first of these by
     /// default.
     #[arg(long, value_name = "NAME")]
@@ -182,6 +187,13 @@ impl Settings {
             }
             (None, Some(_)) => self.schedule = Some(Schedule::Decay),
             _ => {}
+        }
+        let chooses = command == Command::Choose || self.softness == Some(SoftnessChoice::AUTO);
+        if chooses && self.surrogate_scale.is_some() {
+            return Err(Error::Usage(
+                "--surrogate-scale does not go with choose or --softness auto, whose methods have none"
+                    .into(),
+            ));
         }
         match (command, self.runs) {
             (Command::Solve, Some(2..)) => Err(Error::Usage(

@@ -2,7 +2,7 @@ use std::{fs, io, path::Path};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::{EdgeSoftness, ScalePath, Softness, SoftnessFileError, path::MOST_KNOTS};
+use crate::{EdgeSoftness, ScalePath, Softness, SoftnessFileError, Surrogate, path::MOST_KNOTS};
 
 /// The largest size of a parameter that is a logarithm: its exponential must fit an f32.
 pub(crate) const LARGEST_LOGARITHM: f64 = 80.0;
@@ -18,6 +18,9 @@ pub struct SoftnessFile {
     /// How its width moves over a run; a softness without one stays as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<ScalePath>,
+    /// What the gradient is taken of, where that is not the softness itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surrogate: Option<Surrogate>,
     /// The learning rate of the optimisations that it was learned on, which suits it best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate: Option<f64>,
@@ -72,8 +75,10 @@ impl SoftnessFile {
     }
 
     fn check(&self, path: &Path) -> Result<(), SoftnessFileError> {
-        let family = self.softness.family;
-        check(path, family.name(), [family.parameters(), family.logarithms()], &self.phi)?;
+        let felt = self.surrogate.iter().map(|felt| (felt.softness.family, &felt.phi));
+        for (family, phi) in [(self.softness.family, &self.phi)].into_iter().chain(felt) {
+            check(path, family.name(), [family.parameters(), family.logarithms()], phi)?;
+        }
         if let Some(found) = self.learning_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
             return Err(SoftnessFileError::LearningRate { path: path.to_owned(), found });
         }
@@ -159,6 +164,7 @@ mod tests {
             softness,
             phi: softness.default_phi(1e-4),
             path: Some(path),
+            surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
             learning_rate: Some(0.3),
             note: Some("a start".into()),
         }
@@ -226,6 +232,15 @@ mod tests {
             ));
             assert!(message.contains(&format!("the learning rate is {rate}")), "{message}");
         }
+    }
+
+    #[test]
+    fn a_surrogate_is_checked_like_the_softness() {
+        let softness = r#"{"family": "gauss", "squared": false}"#;
+        let felt = r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#;
+        let message =
+            error(&format!(r#"{{"softness": {softness}, "phi": [0], "surrogate": {felt}}}"#));
+        assert!(message.ends_with("has 1 parameters, but exp has 2"), "{message}");
     }
 
     #[test]

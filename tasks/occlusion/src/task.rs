@@ -2,8 +2,8 @@ use burn::backend::Autodiff;
 use softrast_method::{Defaults, Method, numbers, study};
 use softrast_raster::{RasterBackend, compiled_backends, on_backend};
 use softrast_runner::{
-    Batch, Description, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point, Progress, Run,
-    Schedule, Score, Settings, Study, Task, Variant,
+    Batch, Description, Error, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point,
+    Progress, Run, Schedule, Score, Settings, Study, Task, Variant,
 };
 
 use crate::{
@@ -55,6 +55,11 @@ impl Task for Occlusion {
         // `evaluate --variant transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 %
         // at 0.7 and at 1.4.
         let edge = Method::new(settings, &SCALES)?;
+        if edge.surrogate().is_some() {
+            let message = "edges of occlusion stay where they are, so that no gradient goes through a \
+                           surrogate: leave out --surrogate-scale, or use another file";
+            return Err(Error::Usage(message.into()).into());
+        }
         let suited = edge.learning_rate();
         let (steps, learning_rate) = match settings.variant {
             Variant::Original => (100, suited.unwrap_or(0.03)),

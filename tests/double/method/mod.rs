@@ -1,3 +1,4 @@
 //! The steps that every task takes.
 
 mod descent;
+mod surrogate;
