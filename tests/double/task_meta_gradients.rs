@@ -10,7 +10,7 @@ use shape2d::{Shape2d, Shape2dLesson};
 use shape3d::{Shape3d, Shape3dLesson};
 use softrast_meta::{MetaGradient, Tasks};
 use softrast_method::{Class, Lesson};
-use softrast_runner::{Judged, Order, Plan, Referee, Settings, Task};
+use softrast_runner::{Input, Judged, Order, Plan, Referee, Settings, Task};
 use softrast_tests::{numbers, vector};
 
 use crate::differences::relative_error;
@@ -50,6 +50,7 @@ fn plan(referee: Referee) -> Plan {
         referee,
         judged: Judged::End,
         knots: 3,
+        input: Input::Ndc,
         floor_px: 0.03,
     }
 }

@@ -1,7 +1,7 @@
 use softrast_raster::BackendChoice;
 use softrast_runner::{Command, Settings};
 
-use crate::method::usage;
+use crate::method_of_flags::usage;
 
 /// The backend that the command line asks for, set up.
 pub(crate) fn backend(

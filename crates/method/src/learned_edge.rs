@@ -2,10 +2,10 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
-use softrast_runner::{Order, Plan, Referee};
+use softrast_runner::{Input, Order, Plan, Referee};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, SoftnessFile, Surrogate};
 
-use crate::{Method, PreparedRun, method::usage, numbers, tensor};
+use crate::{Method, PreparedRun, method_of_flags::usage, numbers, tensor};
 
 /// A scale may fall by this factor before support and knots are chosen anew, which costs as much here
 /// as drawing several images.
@@ -16,7 +16,7 @@ const ABOVE_FLOOR: f64 = 0.05;
 /// The softness of edges as something to learn.
 ///
 /// What is learned is one vector: the parameters of a softness that stays as it is; or, where its
-/// scale moves, first the knots of a [`ScalePath`], then the parameters at scale 1 without the
+/// scale moves or is learned apart ([`Input::Relative`]), first the knots of a [`ScalePath`], then the parameters at scale 1 without the
 /// logarithm of the scale, which the path replaces. Those of a [`Surrogate`] come last.
 #[derive(Clone, Debug)]
 pub struct LearnedEdge {
@@ -33,14 +33,15 @@ impl LearnedEdge {
     /// Begins with what `method` does on runs of `steps` steps and images of `size` × `size` pixels.
     pub fn new(method: &Method, plan: &Plan, steps: usize, size: usize) -> Self {
         let (softness, surrogate) = (method.softness(), method.surrogate().cloned());
-        if method.is_static() {
+        if method.is_static() && plan.input == Input::Ndc {
             let phi = method.phi(method.scale(0, steps));
             return Self { softness, phi, path: None, surrogate, steps, size };
         }
         let mut path = ScalePath { knots: Vec::new(), floor_px: plan.floor_px };
         let floor = path.floor(softness, size);
-        let last = plan.knots.max(2) - 1;
-        path.knots = (0..plan.knots)
+        let knots = if method.is_static() { 1 } else { plan.knots };
+        let last = knots.max(2) - 1;
+        path.knots = (0..knots)
             .map(|k| {
                 let step = (steps.saturating_sub(1) * k).div_ceil(last);
                 let scale = method.scale(step, steps);
@@ -185,7 +186,7 @@ impl LearnedEdge {
 
     /// Steps with the same number have the same softness.
     pub fn stage(&self, step: usize) -> usize {
-        if self.path.is_some() { step } else { 0 }
+        if self.knots() > 1 { step } else { 0 }
     }
 
     fn knots(&self) -> usize {

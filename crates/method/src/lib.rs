@@ -32,12 +32,15 @@ mod course {
         anyhow::bail!("learn needs a program that was built with the feature ndarray")
     }
 }
+mod defaults;
 mod descent;
+mod fitted_mlp;
 mod judge;
 mod learned_edge;
 mod learned_figures;
 mod lesson;
 mod method;
+mod method_of_flags;
 mod moving_silhouette;
 mod prepared_run;
 mod searched;
@@ -47,12 +50,13 @@ mod tensor;
 
 pub use course::study;
 #[cfg(feature = "ndarray")]
-pub use course::{Class, Inner, Outer};
+pub use course::{Class, Inner, Outer, meta_gradient};
+pub use defaults::Defaults;
 pub use descent::{Descent, Moment};
 pub use judge::Judge;
 pub use learned_edge::LearnedEdge;
 pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
-pub use method::{Defaults, Method};
+pub use method::Method;
 pub use moving_silhouette::MovingSilhouette;
 pub use prepared_run::{Of, PreparedRun, Step};
 pub use searched::Searched;

@@ -5,7 +5,7 @@ use std::path::Path;
 use softrast_runner::{Command, Settings, SoftnessChoice};
 use softrast_softness::{DepthSoftnessFile, SoftnessFile};
 
-use crate::method::is_scaled;
+use crate::defaults::is_scaled;
 
 /// Name and text of every file in `data/softness`; a line here makes a file part of the program.
 ///
@@ -59,6 +59,7 @@ pub fn is_asked_for(settings: &Settings, task: &str) -> bool {
             let solves = matches!(settings.command, Command::Solve | Command::Evaluate);
             let silent = settings.schedule.is_none()
                 && settings.surrogate_scale.is_none()
+                && settings.init.is_none()
                 && !is_scaled(settings);
             solves && silent && text(task).is_some()
         }

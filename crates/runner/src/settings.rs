@@ -90,6 +90,11 @@ pub struct Settings {
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub surrogate_scale: Option<f64>,
 
+    /// What an mlp starts from: weights drawn at random, or fitted to the logistic that the other flags
+    /// would give [default: uniform].
+    #[arg(long, value_enum)]
+    pub init: Option<Init>,
+
     /// What to compute on: ndarray, flex or wgpu, if the program was built with it; the first of these by
     /// default.
     #[arg(long, value_name = "NAME")]
@@ -154,6 +159,15 @@ pub enum Schedule {
     Static,
     /// Geometrically from `--scale` to `--scale-end`.
     Decay,
+}
+
+/// What the weights of an untrained MLP softness are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Init {
+    /// Random, as in the paper.
+    Uniform,
+    /// Such that it is a logistic.
+    Fitted,
 }
 
 /// A softness as named on the command line.
