@@ -7,7 +7,8 @@ use softrast_softness::{DepthSoftnessFile, SoftnessFile};
 
 use crate::defaults::is_scaled;
 
-/// Name and text of every file in `data/softness`; a line here makes a file part of the program.
+/// Name and text of every file in `data/softness`; a line here makes a file part of the program, such as
+/// `("pose", include_str!("../../../data/softness/pose.json")),`.
 ///
 /// The name is that of the task, with `_depth` behind it for a softness of depths.
 const SHIPPED: &[(&str, &str)] = &[
