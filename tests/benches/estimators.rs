@@ -191,22 +191,22 @@ fn add_table<T: Task>(
         };
         let ratio = |n: usize| spread(at(n).map(|setting| setting.orders[k].0.over_error()));
         let loops = |n: usize| spread(at(n).map(|setting| setting.orders[k].1));
-        let row: Vec<String> = [
+        let row: [String; 3] = [
             steps.iter().map(|&n| sign(n)).collect(),
             steps.iter().map(|&n| ratio(n)).collect(),
             steps.iter().map(|&n| loops(n)).collect(),
-        ]
-        .to_vec();
+        ];
         writeln!(page, "| {name} |{}", row.concat())?;
     }
     let ratio = |n: &usize| spread(at(*n).map(|setting| setting.slope.over_error()));
     let truth: String = steps.iter().map(ratio).collect();
-    writeln!(
-        page,
-        "| the slope itself |{}{truth}{}\n",
-        " |".repeat(steps.len()),
-        " |".repeat(steps.len())
-    )
+    let none = " |".repeat(steps.len());
+    writeln!(page, "| the slope itself |{none}{truth}{none}\n")?;
+    for &n in steps {
+        let slopes = at(n).map(|s| format!("{:.1e} ± {:.0e}", s.slope.mean, s.slope.error));
+        writeln!(page, "- slopes at {n} steps: {}", slopes.collect::<Vec<_>>().join(", "))?;
+    }
+    writeln!(page)
 }
 
 /// A cell with the least and the largest value.

@@ -16,8 +16,9 @@ const ABOVE_FLOOR: f64 = 0.05;
 /// The softness of edges as something to learn.
 ///
 /// What is learned is one vector: the parameters of a softness that stays as it is; or, where its
-/// scale moves or is learned apart ([`Input::Relative`]), first the knots of a [`ScalePath`], then the parameters at scale 1 without the
-/// logarithm of the scale, which the path replaces. Those of a [`Surrogate`] come last.
+/// scale moves or is learned apart ([`Input::Relative`]), first the knots of a [`ScalePath`], then the
+/// parameters at scale 1 without the logarithm of the scale, which the path replaces. Those of a
+/// [`Surrogate`] come last.
 #[derive(Clone, Debug)]
 pub struct LearnedEdge {
     pub(crate) softness: EdgeSoftness,
