@@ -19,8 +19,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "all")]
     pub tasks: Vec<String>,
 
-    /// Methods: softness families or softness files in JSON; behind one may stand its schedule, or
-    /// other flags of the tasks.
+    /// Methods: softness families, softness files in JSON, or learned for what comes with the program;
+    /// behind one may stand its schedule, or other flags of the tasks.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS)]
     pub methods: Vec<String>,
 

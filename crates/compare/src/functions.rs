@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use softrast_method::{numbers, tensor};
+use softrast_method::{numbers, shipped, tensor};
 use softrast_raster::HostBackend;
 use softrast_runner::method_colour;
 use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
@@ -68,7 +68,11 @@ fn at_the_end(one: &Measured) -> Option<(EdgeSoftness, Vec<f64>)> {
         let softness = EdgeSoftness { family, squared: one.squared };
         return Some((softness, softness.default_phi(one.scale_end?)));
     }
-    let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(Path::new(name)).ok()?;
+    let file = match name {
+        "learned" => shipped::softness(one.cell.task.name()).ok()??,
+        file => SoftnessFile::load(Path::new(file)).ok()?,
+    };
+    let SoftnessFile { softness, phi, path, .. } = file;
     if path.is_none() {
         return Some((softness, phi));
     }

@@ -73,7 +73,11 @@ impl Measured {
         let end =
             [("scale_end", "to")].into_iter().filter(|_| first != settings["scale_end"].as_f64());
         let names = [("scale", "scale")].into_iter().chain(end);
-        let names = names.chain([("depth_scale", "depth"), ("learning_rate", "rate")]);
+        let names = names.chain([
+            ("surrogate_scale", "surrogate"),
+            ("depth_scale", "depth"),
+            ("learning_rate", "rate"),
+        ]);
         let released = &json["parameter_error"]["released"];
         Ok(Self {
             hard: Error::new(&json["image_error"]["hard"])?,

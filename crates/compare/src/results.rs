@@ -297,7 +297,7 @@ fn chosen(cell: &Cell) -> bool {
         let searched = Searched::of(cell.task.name(), cell.softness(), schedule, usual);
         searched.is_some()
     });
-    searched || Path::new(cell.softness()).exists()
+    searched || cell.softness() == "learned" || Path::new(cell.softness()).exists()
 }
 
 fn with_interval(error: &Error) -> String {

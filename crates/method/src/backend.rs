@@ -1,5 +1,7 @@
 use softrast_raster::BackendChoice;
-use softrast_runner::{Command, Error, Settings};
+use softrast_runner::{Command, Settings};
+
+use crate::method_of_flags::usage;
 
 /// The backend that the command line asks for, set up.
 pub(crate) fn backend(
@@ -8,10 +10,11 @@ pub(crate) fn backend(
 ) -> anyhow::Result<BackendChoice> {
     let asked = settings.backend.as_deref();
     let backend =
-        BackendChoice::among(compiled, asked).map_err(|error| Error::Usage(error.to_string()))?;
+        BackendChoice::among(compiled, asked).map_err(|error| usage(&error.to_string()))?;
     if settings.command == Command::Learn && asked.is_some() && backend != BackendChoice::NdArray {
-        let message = format!("learn computes on ndarray, not on {backend}: leave out --backend");
-        return Err(Error::Usage(message).into());
+        return Err(usage(&format!(
+            "learn computes on ndarray, not on {backend}: leave out --backend"
+        )));
     }
     backend.set_up()?;
     Ok(backend)

@@ -33,17 +33,11 @@ const VALIDATIONS: usize = 10;
 ///
 /// If an instance cannot be made.
 pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
+    lesson.suits(plan)?;
     // What would fail later fails here, where an error can be told.
     let seeds = (0..(plan.outer * plan.batch) as u64).map(|k| plan.seed + k);
     let last = seeds.max().into_iter().chain([plan.validation_seed]);
     last.map(|seed| lesson.scene::<B>(seed, 1)).collect::<Result<Vec<_>, _>>()?;
-    let mode = match plan.order {
-        Order::Unrolled => MetaGradient::default(),
-        Order::Truncated(steps) => MetaGradient::Truncated { steps, clip: Some(1.0) },
-        Order::Direct => MetaGradient::Direct,
-        Order::Joint => MetaGradient::Joint { learning_rate: plan.outer_rate },
-        Order::Es => MetaGradient::Es { sigma: SIGMA, pairs: 1 },
-    };
     let validation = Validation {
         seed: plan.validation_seed,
         count: plan.validation_runs,
@@ -51,7 +45,7 @@ pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>>
         patience: plan.patience,
     };
     let learner = Learner {
-        mode,
+        mode: meta_gradient(plan),
         optimizer: Adam::new(plan.outer_rate),
         clip: CLIP,
         steps: plan.outer,
@@ -62,6 +56,17 @@ pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>>
     let progress = Progress::new(lesson.start());
     let class = Class::new(lesson, plan);
     Ok(Box::new(Course { class, learner, progress }))
+}
+
+/// How `learn` takes the gradient that a plan asks for.
+pub fn meta_gradient(plan: &Plan) -> MetaGradient {
+    match plan.order {
+        Order::Unrolled => MetaGradient::default(),
+        Order::Truncated(steps) => MetaGradient::Truncated { steps, clip: Some(1.0) },
+        Order::Direct => MetaGradient::Direct,
+        Order::Joint => MetaGradient::Joint { learning_rate: plan.outer_rate },
+        Order::Es => MetaGradient::Es { sigma: SIGMA, pairs: 1 },
+    }
 }
 
 struct Course<L: Lesson> {

@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_raster::RasterBackend;
-use softrast_runner::Figure;
+use softrast_runner::{Figure, Plan};
 
 use crate::Step;
 
@@ -19,6 +19,15 @@ pub trait Lesson: 'static {
 
     /// φ that learning starts from.
     fn start(&self) -> Vec<f64>;
+
+    /// Refuses a plan that the softness cannot be learned by.
+    ///
+    /// # Errors
+    ///
+    /// A usage error.
+    fn suits(&self, _plan: &Plan) -> anyhow::Result<()> {
+        Ok(())
+    }
 
     /// How an instance is solved.
     fn inner(&self) -> InnerLoop<Adam>;

@@ -14,6 +14,7 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-method needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod backend;
 #[cfg(feature = "ndarray")]
 mod course;
 #[cfg(not(feature = "ndarray"))]
@@ -32,29 +33,34 @@ mod course {
         anyhow::bail!("learn needs a program that was built with the feature ndarray")
     }
 }
-mod backend;
 mod defaults;
 mod descent;
+mod fitted_mlp;
 mod judge;
 mod learned_edge;
+mod learned_figures;
 mod lesson;
 mod method;
+mod method_of_flags;
 mod moving_silhouette;
+mod prepared_run;
 mod searched;
+pub mod shipped;
 mod silhouette_lesson;
 mod targets;
 mod tensor;
 
 pub use course::study;
 #[cfg(feature = "ndarray")]
-pub use course::{Class, Inner, Outer};
+pub use course::{Class, Inner, Outer, meta_gradient};
 pub use defaults::Defaults;
 pub use descent::{Descent, Moment};
 pub use judge::Judge;
-pub use learned_edge::{LearnedEdge, Of, PreparedRun, Step};
+pub use learned_edge::LearnedEdge;
 pub use lesson::{FINER, LEARNING_TOLERANCE, Lesson};
 pub use method::Method;
 pub use moving_silhouette::MovingSilhouette;
+pub use prepared_run::{Of, PreparedRun, Step};
 pub use searched::Searched;
 pub use silhouette_lesson::{LearnedSilhouette, SilhouetteLesson};
 pub use targets::Targets;

@@ -1,95 +1,77 @@
+use serde_json::{Map, Value};
 use softrast_raster::{BackendChoice, HostBackend, Rasterizer};
-use softrast_runner::{Error, Resolution, Schedule, Settings, SoftnessChoice};
-use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, SoftnessFile};
+use softrast_runner::Resolution;
+use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, Surrogate};
 
-use crate::{Defaults, Searched, backend::backend, numbers, tensor};
+use crate::{numbers, tensor};
 
 /// A softness and how its scale moves over the steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Method {
-    softness: EdgeSoftness,
-    name: String,
-    path: Path,
-    searched: Option<&'static Searched>,
-    drawn: Drawn,
+    pub(crate) softness: EdgeSoftness,
+    pub(crate) name: String,
+    pub(crate) path: Path,
+    pub(crate) surrogate: Option<Surrogate>,
+    pub(crate) learning_rate: Option<f64>,
+    pub(crate) note: Option<String>,
+    pub(crate) drawn: Drawn,
 }
 
 /// What it is drawn on, and how finely.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Drawn {
-    backend: BackendChoice,
-    resolution: Resolution,
-    tolerance: f64,
+pub(crate) struct Drawn {
+    pub(crate) backend: BackendChoice,
+    pub(crate) resolution: Resolution,
+    pub(crate) tolerance: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Path {
+pub(crate) enum Path {
     /// Parameters of a file, and a scale that stands for them.
     Fixed { phi: Vec<f64>, scale: f64 },
     /// Parameters of a file at scale 1, the scale that stands for them alone, and the scale over a
     /// run on images of this size.
     Learned { phi: Vec<f64>, unit: f64, path: ScalePath, size: usize },
-    /// The default parameters of the family at a scale that goes geometrically from the first to
-    /// the last.
-    Scale { first: f64, last: f64 },
+    /// A scale that goes geometrically from the first to the last, and parameters at scale 1 where they
+    /// are not the family's default.
+    Scale { first: f64, last: f64, unit: Option<Vec<f64>> },
 }
 
 impl Method {
-    /// The method that the command line asks for; by default a logistic.
-    ///
-    /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are
-    /// squared, so that they mean the same widths.
-    ///
-    /// # Errors
-    ///
-    /// If a softness file cannot be used, flags contradict each other, the image cannot have that
-    /// resolution, or there is no such backend or no adapter for it.
-    pub fn new(settings: &Settings, defaults: &Defaults) -> anyhow::Result<Self> {
-        // Before the first tensor.
-        let backend = backend(settings, defaults.backends)?;
-        let size = settings.size.unwrap_or(defaults.size);
-        let resolution = settings.resolution.unwrap_or_default();
-        resolution.check(size)?;
-        let tolerance = settings.tolerance.unwrap_or(Rasterizer::TOLERANCE);
-        let drawn = Drawn { backend, resolution, tolerance };
-        let scaled = settings.scale.is_some() || settings.scale_end.is_some() || settings.squared;
-        match &settings.softness {
-            Some(SoftnessChoice::File(file)) => {
-                if scaled || settings.schedule == Some(Schedule::Decay) {
-                    let message = "a softness file holds its own parameters: leave out --scale, \
-                                   --scale-end, --squared and --schedule decay, or name a family";
-                    return Err(Error::Usage(message.into()).into());
-                }
-                let SoftnessFile { softness, phi, path, .. } = SoftnessFile::load(file)?;
-                let unit = nominal_scale(softness, &phi);
-                let path = match path {
-                    None => Path::Fixed { scale: unit, phi },
-                    Some(path) => Path::Learned { phi, unit, path, size },
-                };
-                let name = file.display().to_string();
-                Ok(Self { softness, name, path, searched: None, drawn })
-            }
-            named => {
-                let name = match named {
-                    Some(SoftnessChoice::Named(name)) => name,
-                    _ => "logistic",
-                };
-                let family: Family = name.parse()?;
-                let softness = EdgeSoftness { family, squared: settings.squared };
-                let schedule = asked_schedule(settings);
-                // Found together, so taken whole or not at all.
-                let usual = defaults.schedule;
-                let known = Searched::of(defaults.task, family.name(), schedule, usual);
-                let searched = known.filter(|_| !scaled);
-                let path = scale_path(settings, &searched.map_or(*defaults, |s| defaults.with(s)));
-                Ok(Self { softness, name: family.name().to_owned(), path, searched, drawn })
-            }
-        }
+    /// The learning rate that belongs to the softness: the one it was searched for with, or learned
+    /// at in the original variant.
+    pub fn learning_rate(&self) -> Option<f64> {
+        self.learning_rate
     }
 
-    /// What was searched for this family on the task, under the same schedule.
-    pub fn searched(&self) -> Option<&'static Searched> {
-        self.searched
+    /// What the gradient is taken of, where that is not the softness itself.
+    pub fn surrogate(&self) -> Option<&Surrogate> {
+        self.surrogate.as_ref()
+    }
+
+    /// How many parameters the softness and its surrogate have.
+    pub fn parameters(&self) -> usize {
+        let felt = self.surrogate.as_ref().map_or(0, |felt| felt.phi.len());
+        self.softness.parameters() + felt
+    }
+
+    /// The settings of a task, and with them how the softness moves over `steps` steps and where it
+    /// comes from, for [`Description::settings`](softrast_runner::Description::settings).
+    pub fn settings(&self, steps: usize, of_task: Value) -> Map<String, Value> {
+        let mut settings = of_task.as_object().cloned().unwrap_or_default();
+        let schedule = if self.is_static() { "static" } else { "decay" };
+        settings.insert("schedule".into(), schedule.into());
+        settings.insert("scale".into(), self.scale(0, steps).into());
+        settings.insert("scale_end".into(), self.scale(steps, steps).into());
+        settings.insert("squared".into(), self.softness.squared.into());
+        if let Some(Surrogate { softness, phi }) = &self.surrogate {
+            settings.insert("surrogate".into(), softness.family.name().into());
+            settings.insert("surrogate_scale".into(), nominal_scale(*softness, phi).into());
+        }
+        if let Some(note) = &self.note {
+            settings.insert("softness_note".into(), note.as_str().into());
+        }
+        settings
     }
 
     /// Name of the family, or of the file.
@@ -133,7 +115,7 @@ impl Method {
         match &self.path {
             Path::Fixed { .. } => true,
             Path::Learned { path, .. } => path.knots.len() == 1,
-            Path::Scale { first, last } => first == last,
+            Path::Scale { first, last, .. } => first == last,
         }
     }
 
@@ -149,28 +131,33 @@ impl Method {
                 let floor = path.floor(self.softness, size);
                 numbers(ScalePath::scale(&knots, floor, part(step, steps)))[0]
             }
-            Path::Scale { first, last } => first * (last / first).powf(part(step, steps)),
+            Path::Scale { first, last, .. } => first * (last / first).powf(part(step, steps)),
         }
     }
 
-    /// Parameters of the softness at this scale; a file's are its own whatever the scale.
+    /// Parameters of the softness at this scale; a file's without a path are its own whatever the scale.
     pub fn phi(&self, scale: f64) -> Vec<f64> {
         match &self.path {
             Path::Fixed { phi, .. } => phi.clone(),
-            Path::Learned { phi, .. } => {
-                let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
-                numbers(self.softness.widened(phi, tensor(vec![scale], [1])))
+            Path::Learned { phi, .. } | Path::Scale { unit: Some(phi), .. } => {
+                self.widened(phi, scale)
             }
-            Path::Scale { .. } => self.softness.default_phi(scale),
+            Path::Scale { unit: None, .. } => self.softness.default_phi(scale),
         }
     }
 
     /// Parameters at scale 1, for a path of scales.
     pub(crate) fn unit_phi(&self) -> Vec<f64> {
         match &self.path {
-            Path::Fixed { phi, .. } | Path::Learned { phi, .. } => phi.clone(),
-            Path::Scale { .. } => self.softness.default_phi(1.0),
+            Path::Fixed { phi, scale } => self.widened(phi, scale.recip()),
+            Path::Learned { phi, .. } | Path::Scale { unit: Some(phi), .. } => phi.clone(),
+            Path::Scale { unit: None, .. } => self.softness.default_phi(1.0),
         }
+    }
+
+    fn widened(&self, phi: &[f64], scale: f64) -> Vec<f64> {
+        let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
+        numbers(self.softness.widened(phi, tensor(vec![scale], [1])))
     }
 }
 
@@ -180,30 +167,9 @@ fn part(step: usize, steps: usize) -> f64 {
     step.min(last) as f64 / last as f64
 }
 
-/// The schedule that the flags ask for: a scale without one stays as it is.
-fn asked_schedule(settings: &Settings) -> Option<Schedule> {
-    settings.schedule.or(settings.scale.map(|_| Schedule::Static))
-}
-
-fn scale_path(settings: &Settings, defaults: &Defaults) -> Path {
-    let unit = |scale: f64| if settings.squared { scale * scale } else { scale };
-    let Settings { scale, scale_end, .. } = *settings;
-    match asked_schedule(settings).unwrap_or(defaults.schedule) {
-        Schedule::Static => {
-            let scale = scale.unwrap_or(unit(defaults.fixed));
-            Path::Scale { first: scale, last: scale }
-        }
-        Schedule::Decay => {
-            let [first, last] = defaults.decay.map(unit);
-            let first = scale.unwrap_or(first.max(scale_end.unwrap_or(0.0)));
-            Path::Scale { first, last: scale_end.unwrap_or(last.min(first)) }
-        }
-    }
-}
-
 /// The scale of a logistic with the same slope at the edge, for families without a scale of their
 /// own; else the family's.
-fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
+pub(crate) fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     if softness.family != Family::Mlp {
         return phi[0].exp();
     }
@@ -215,67 +181,20 @@ fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
-
-    const DEFAULTS: Defaults = Defaults {
-        task: "none",
-        schedule: Schedule::Decay,
-        decay: [0.03, 0.002],
-        fixed: 0.002,
-        size: 64,
-        backends: softrast_raster::compiled_backends!(),
-    };
-
-    /// First, middle and last scale of the method that a command line gives.
-    fn scales(line: &str) -> [f64; 3] {
-        #[derive(Parser)]
-        struct Line {
-            #[command(flatten)]
-            settings: Settings,
-        }
-        let words = ["task"].into_iter().chain(line.split_whitespace());
-        let method = Method::new(&Line::parse_from(words).settings, &DEFAULTS).unwrap();
-        [0, 50, 101].map(|step| method.scale(step, 101))
-    }
-
-    fn assert_scales(line: &str, expected: [f64; 3]) {
-        for (found, expected) in scales(line).into_iter().zip(expected) {
-            assert!((found / expected - 1.0).abs() < 1e-12, "{line}: {found}, not {expected}");
-        }
-    }
-
-    #[test]
-    fn a_decay_is_a_straight_line_in_the_logarithm() {
-        assert_scales("--schedule decay --scale 0.1 --scale-end 0.001", [0.1, 0.01, 0.001]);
-        let middle = (0.03f64 * 0.002).sqrt();
-        assert_scales("", [0.03, middle, 0.002]);
-        assert_scales("--squared", [0.03, middle, 0.002].map(|scale| scale * scale));
-    }
-
-    #[test]
-    fn a_scale_alone_stays_as_it_is() {
-        assert_scales("--scale 0.1", [0.1; 3]);
-        assert_scales("--schedule static", [0.002; 3]);
-    }
-
-    #[test]
-    fn a_decay_never_widens_by_default() {
-        assert_scales("--schedule decay --scale 0.001", [0.001; 3]);
-        assert_scales("--schedule decay --scale-end 0.1", [0.1; 3]);
-    }
 
     #[test]
     fn a_run_of_one_step_has_the_first_scale() {
-        let path = Path::Scale { first: 0.1, last: 0.001 };
+        let path = Path::Scale { first: 0.1, last: 0.001, unit: None };
         let softness = EdgeSoftness { family: Family::Gauss, squared: false };
         let drawn = Drawn {
             backend: BackendChoice::NdArray,
             resolution: Resolution::Full,
             tolerance: Rasterizer::TOLERANCE,
         };
-        let method = Method { softness, name: "gauss".into(), path, searched: None, drawn };
+        let name = "gauss".to_owned();
+        let (surrogate, learning_rate, note) = (None, None, None);
+        let method = Method { softness, name, path, surrogate, learning_rate, note, drawn };
         assert_eq!(method.scale(0, 1), 0.1);
     }
 }

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer, Silhouette};
-use softrast_softness::EdgeSoftness;
+use softrast_softness::{EdgeSoftness, Surrogate};
 
 use crate::{Method, numbers, tensor};
 
@@ -22,6 +22,15 @@ pub struct MovingSilhouette<B: Backend> {
     table: Tensor<B, 2>,
     /// The scale of `table`.
     scale: f64,
+    /// What the gradient is taken of, where that is not the image.
+    felt: Option<Felt<B>>,
+}
+
+/// Silhouettes whose gradient stands for that of others, and their table; they do not move.
+#[derive(Clone, Debug)]
+struct Felt<B: Backend> {
+    silhouette: Silhouette<EdgeSoftness>,
+    table: Tensor<B, 2>,
 }
 
 impl<B: RasterBackend> MovingSilhouette<B> {
@@ -40,9 +49,13 @@ impl<B: RasterBackend> MovingSilhouette<B> {
         let phi = method.phi(scale);
         let silhouette = rasterizer.prepare(faces, method.softness(), &on_host::<B>(&phi));
         let silhouette = silhouette.sized(method.side(rasterizer.size, scale));
+        let felt = method.surrogate().map(|Surrogate { softness, phi }| {
+            let silhouette = rasterizer.prepare(faces, *softness, &on_host::<B>(phi));
+            Felt { table: table(&silhouette, phi.clone()), silhouette }
+        });
         let table = table(&silhouette, phi);
         let (method, faces) = (method.clone(), faces.clone());
-        Self { method, rasterizer, faces, silhouette, prepared: scale, table, scale }
+        Self { method, rasterizer, faces, silhouette, prepared: scale, table, scale, felt }
     }
 
     /// Makes the next images at `scale`, with as little work as that takes.
@@ -63,8 +76,21 @@ impl<B: RasterBackend> MovingSilhouette<B> {
 
     /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with
     /// [`Method::side`] at the scale.
+    ///
+    /// Where the method has a surrogate, the gradient is that of
+    /// [`Silhouette::coverage_with_surrogate`].
     pub fn image(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
-        self.silhouette.coverage_by_table(vertices, self.table.clone())
+        let table = self.table.clone();
+        let side = self.method.side(self.rasterizer.size, self.scale);
+        match &self.felt {
+            None => self.silhouette.coverage_by_table(vertices, table),
+            Some(felt) => self.silhouette.coverage_with_surrogate(
+                vertices,
+                table,
+                &felt.silhouette.clone().sized(side),
+                felt.table.clone(),
+            ),
+        }
     }
 
     /// Coverage of `vertices` on as many pixels as the rasterizer has, which is what judges; none if

@@ -97,6 +97,10 @@ impl<L: SilhouetteLesson> Lesson for L {
         self.drawn().edge.start()
     }
 
+    fn suits(&self, plan: &Plan) -> anyhow::Result<()> {
+        self.drawn().edge.suits(plan)
+    }
+
     fn inner(&self) -> InnerLoop<Adam> {
         SilhouetteLesson::inner(self)
     }
@@ -155,7 +159,8 @@ impl<L: SilhouetteLesson> Lesson for L {
     }
 
     fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
-        self.drawn().edge.files(phi, note)
+        let learning_rate = SilhouetteLesson::inner(self).optimizer.learning_rate;
+        self.drawn().edge.files(phi, learning_rate, note)
     }
 
     fn figures(&self, phi: &[f64]) -> Vec<Figure> {

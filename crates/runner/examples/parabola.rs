@@ -49,6 +49,10 @@ impl Task for Parabola {
                 let message = format!("the parabola has no softness {name}, only logistic");
                 return Err(softrast_runner::Error::Usage(message).into());
             }
+            Some(SoftnessChoice::Learned) => {
+                let message = "there is no softness that was learned on the parabola".to_owned();
+                return Err(softrast_runner::Error::Usage(message).into());
+            }
             Some(SoftnessChoice::File(path)) => anyhow::bail!("cannot read the softness {path:?}"),
         };
         if settings.resolution.is_some_and(|asked| asked != Resolution::Full)

@@ -93,13 +93,13 @@ pub(crate) fn choose_with<T: Task>(
     Ok(Choice { stages, whole, settings })
 }
 
-/// The settings as trials start from them: with a softness that a task can prepare, under the
-/// protocol of `evaluate`.
+/// The settings as trials start from them: with a softness that a task can prepare. Not the learned
+/// one, which is none of the methods that there are to choose from.
 pub(crate) fn tried(settings: &Settings) -> Settings {
     let auto = settings.softness == Some(SoftnessChoice::AUTO);
     Settings {
         softness: settings.softness.clone().filter(|_| !auto),
-        command: Command::Evaluate,
+        command: Command::Choose,
         ..settings.clone()
     }
 }

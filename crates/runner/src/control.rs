@@ -15,7 +15,7 @@ pub(crate) struct Control {
     pub(crate) resume: bool,
 
     /// Second method for `evaluate` to run on the same seeds; in quotes --scale, --scale-end,
-    /// --schedule, --squared, --learning-rate, --resolution and --tolerance may follow:
+    /// --schedule, --squared, --surrogate-scale, --learning-rate, --resolution and --tolerance may follow:
     /// "gauss --scale 0.01".
     #[arg(long, value_name = "NAME|FILE.json", value_parser = rival)]
     pub(crate) against: Option<Rival>,
@@ -53,6 +53,8 @@ pub(crate) struct Rival {
     #[arg(long)]
     squared: bool,
     #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    surrogate_scale: Option<f64>,
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     learning_rate: Option<f64>,
     #[arg(long, value_parser = resolution)]
     resolution: Option<Resolution>,
@@ -76,6 +78,7 @@ impl Rival {
             scale_end: self.scale_end,
             schedule: self.schedule,
             squared: self.squared,
+            surrogate_scale: self.surrogate_scale,
             learning_rate: self.learning_rate.or(first.learning_rate),
             resolution: self.resolution.or(first.resolution),
             tolerance: self.tolerance.or(first.tolerance),
@@ -137,10 +140,20 @@ mod tests {
 
     #[test]
     fn a_rival_has_its_own_scales_and_shares_the_rest() {
-        let first = Line::parse_from(["task", "--scale", "0.1", "--learning-rate", "0.3"]).settings;
+        let first = Line::parse_from([
+            "task",
+            "--scale",
+            "0.1",
+            "--surrogate-scale",
+            "1",
+            "--learning-rate",
+            "0.3",
+        ])
+        .settings;
         let second = rival("gauss").unwrap().settings(&first).unwrap();
         assert_eq!(second.softness, Some(SoftnessChoice::Named("gauss")));
         assert_eq!((second.scale, second.learning_rate), (None, Some(0.3)));
+        assert_eq!(second.surrogate_scale, None);
         let second = rival("mlp --scale-end 1e-3 --learning-rate 2").unwrap();
         let second = second.settings(&first).unwrap();
         assert_eq!((second.scale_end, second.learning_rate), (Some(1e-3), Some(2.0)));

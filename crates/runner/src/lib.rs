@@ -69,12 +69,12 @@ pub use grid::{Grid, OwnAxis};
 pub use memory::peak_rss_mib;
 pub use palette::method_colour;
 pub use picture::{contact_sheet, difference, rgb_from_gray, rgb_from_planes};
-pub use plan::{Judged, Order, Plan, Referee};
+pub use plan::{Input, Judged, Order, Plan, Referee};
 pub use program::{execute, main};
 pub use progress::Progress;
 pub use report::{escape, page};
 pub use resolution::Resolution;
-pub use settings::{Command, Schedule, Settings, SoftnessChoice, Variant};
+pub use settings::{Command, Init, Schedule, Settings, SoftnessChoice, Variant};
 pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
 pub use study::{Curve, Figure, Learned, OuterStep, Study};
 pub use task::{

@@ -51,7 +51,12 @@ pub(crate) struct LearnFlags {
     #[arg(long, value_name = "N", value_parser = knots, allow_negative_numbers = true)]
     knots: Option<usize>,
 
-    /// Pixels that a moving scale stays above [default: 0.03].
+    /// What a softness whose scale stays sees: the distance as it is, or divided by a width that is
+    /// learned along with it [default: ndc].
+    #[arg(long, value_enum)]
+    input: Option<Input>,
+
+    /// Pixels that a learned width or a moving scale stays above [default: 0.03].
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     floor: Option<f64>,
 }
@@ -81,6 +86,8 @@ pub struct Plan {
     pub judged: Judged,
     /// Knots of a scale that moves.
     pub knots: usize,
+    /// What a softness sees whose scale does not.
+    pub input: Input,
     /// What it stays above, in pixels.
     pub floor_px: f64,
 }
@@ -109,6 +116,16 @@ pub enum Referee {
     Fixed,
     /// The loss that was optimised, under the learned softness itself, as in the paper.
     Own,
+}
+
+/// What a softness whose scale stays is a function of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Input {
+    /// The distance in NDC, as in the paper.
+    Ndc,
+    /// The distance over a learned width: a path of one knot.
+    Relative,
 }
 
 /// After which inner steps results are judged.
@@ -157,6 +174,7 @@ impl LearnFlags {
             referee: self.referee.unwrap_or(if direct { Referee::Own } else { Referee::Fixed }),
             judged: self.judged.unwrap_or(Judged::End),
             knots: self.knots.unwrap_or(3),
+            input: self.input.unwrap_or(Input::Ndc),
             floor_px: self.floor.unwrap_or(0.03),
         })
     }
@@ -178,6 +196,7 @@ impl LearnFlags {
             (self.referee.is_some(), "--referee"),
             (self.judged.is_some(), "--judged"),
             (self.knots.is_some(), "--knots"),
+            (self.input.is_some(), "--input"),
             (self.floor.is_some(), "--floor"),
         ];
         match given.into_iter().find(|(given, _)| *given && command != Command::Learn) {

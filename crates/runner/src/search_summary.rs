@@ -176,11 +176,13 @@ fn flags(settings: &Settings, setting: Setting) -> String {
     match &settings.softness {
         Some(SoftnessChoice::Named(name)) => flags.push(format!("--softness {name}")),
         Some(SoftnessChoice::File(path)) => flags.push(format!("--softness {}", path.display())),
+        Some(SoftnessChoice::Learned) => flags.push("--softness learned".into()),
         None => {}
     }
     if settings.squared {
         flags.push("--squared".into());
     }
+    flags.extend(settings.surrogate_scale.map(|x| format!("--surrogate-scale {}", exact(x))));
     // Nobody should have to know what a scale alone means to a task that decays by default.
     if setting.scale.is_some() && setting.scale_end.is_none() {
         flags.push("--schedule static".into());

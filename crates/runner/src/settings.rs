@@ -69,8 +69,8 @@ pub struct Settings {
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,
 
-    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, or auto for what `choose`
-    /// finds.
+    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, learned for the one that
+    /// comes with the program, or auto for what `choose` finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
 
@@ -89,6 +89,16 @@ pub struct Settings {
     /// Feed the softness the squared distance.
     #[arg(long)]
     pub squared: bool,
+
+    /// Take the gradient of the same softness at this scale instead, in the unit of --scale: a sharp
+    /// image with a wide gradient, which is not the derivative of the image.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    pub surrogate_scale: Option<f64>,
+
+    /// What an mlp starts from: weights drawn at random, or fitted to the logistic that the other flags
+    /// would give [default: uniform].
+    #[arg(long, value_enum)]
+    pub init: Option<Init>,
 
     /// What to compute on: ndarray, flex or wgpu, if the program was built with it; the first of these by
     /// default.
@@ -166,6 +176,15 @@ pub enum Schedule {
     Decay,
 }
 
+/// What the weights of an untrained MLP softness are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Init {
+    /// Random, as in the paper.
+    Uniform,
+    /// Such that it is a logistic.
+    Fitted,
+}
+
 /// A softness as named on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SoftnessChoice {
@@ -173,10 +192,12 @@ pub enum SoftnessChoice {
     Named(&'static str),
     /// A file, not opened yet.
     File(PathBuf),
+    /// The one that was learned on the task and comes with the program.
+    Learned,
 }
 
 impl SoftnessChoice {
-    /// The names that the command line knows.
+    /// The families that the command line knows.
     pub const NAMES: [&'static str; 6] = ["logistic", "gauss", "exp", "gamma", "bilogit", "mlp"];
 
     /// Stands for the method that `choose` finds; a task never sees it.
@@ -208,6 +229,13 @@ impl Settings {
             (None, Some(_)) => self.schedule = Some(Schedule::Decay),
             _ => {}
         }
+        let chooses = command == Command::Choose || self.softness == Some(SoftnessChoice::AUTO);
+        if chooses && self.surrogate_scale.is_some() {
+            return Err(Error::Usage(
+                "--surrogate-scale does not go with choose or --softness auto, whose methods have none"
+                    .into(),
+            ));
+        }
         match (command, self.runs) {
             (Command::Solve, Some(2..)) => Err(Error::Usage(
                 "solve makes one run: ask for more with the command evaluate".into(),
@@ -232,6 +260,9 @@ pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
     if text == "auto" {
         return Ok(SoftnessChoice::AUTO);
     }
+    if text == "learned" {
+        return Ok(SoftnessChoice::Learned);
+    }
     if let Some(name) = SoftnessChoice::NAMES.into_iter().find(|&name| name == text) {
         return Ok(SoftnessChoice::Named(name));
     }
@@ -239,7 +270,7 @@ pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
         return Ok(SoftnessChoice::File(text.into()));
     }
     Err(format!(
-        "expected one of {}, auto or a file that ends in .json",
+        "expected one of {}, learned, auto or a file that ends in .json",
         SoftnessChoice::NAMES.join(", ")
     ))
 }

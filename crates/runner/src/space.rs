@@ -62,7 +62,10 @@ impl Space {
     ///
     /// [`Error::Usage`] if that leaves nothing to choose from, or scales for a softness file.
     pub(crate) fn new(settings: &Settings, control: &Control, grid: &Grid) -> Result<Self, Error> {
-        let file = matches!(settings.softness, Some(SoftnessChoice::File(_)));
+        let file = match settings.softness {
+            Some(SoftnessChoice::File(_) | SoftnessChoice::Learned) => true,
+            Some(SoftnessChoice::Named(_)) | None => false,
+        };
         if file && !control.scales.is_empty() {
             let message = "a softness file holds its own scale: leave out --scales";
             return Err(Error::Usage(message.into()));
@@ -219,6 +222,7 @@ mod tests {
         assert_eq!(sizes("--schedule decay --scale-end 0.05"), 2 * 2);
         assert_eq!(sizes("--scales 1e-3,1e-2,1e-1,1 --learning-rates 1"), 4 + 6);
         assert_eq!(sizes("--softness mlp.json"), 2);
+        assert_eq!(sizes("--softness learned"), 2);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     DepthSoftness, SoftnessFileError,
-    file::{check, read, text, write},
+    file::{check, parse, read, text, write},
 };
 
 /// A depth softness and its parameters, as kept in a JSON file.
@@ -28,7 +28,16 @@ impl DepthSoftnessFile {
     /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do not
     /// suit the softness.
     pub fn load(path: &Path) -> Result<Self, SoftnessFileError> {
-        let file: Self = read(path)?;
+        Self::parse(&read(path)?, path)
+    }
+
+    /// Parses and checks the text of a file; `path` names it in errors.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`load`](DepthSoftnessFile::load) but for reading.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, SoftnessFileError> {
+        let file: Self = parse(text, path)?;
         file.check(path)?;
         Ok(file)
     }

@@ -1,14 +1,11 @@
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::{fs, io, path::Path};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::{EdgeSoftness, ScalePath, Softness, path::MOST_KNOTS};
+use crate::{EdgeSoftness, ScalePath, Softness, SoftnessFileError, Surrogate, path::MOST_KNOTS};
 
 /// The largest size of a parameter that is a logarithm: its exponential must fit an f32.
-const LARGEST_LOGARITHM: f64 = 80.0;
+pub(crate) const LARGEST_LOGARITHM: f64 = 80.0;
 
 /// A softness and its parameters, as kept in a JSON file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,81 +18,15 @@ pub struct SoftnessFile {
     /// How its width moves over a run; a softness without one stays as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<ScalePath>,
+    /// What the gradient is taken of, where that is not the softness itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surrogate: Option<Surrogate>,
+    /// The learning rate of the optimisations that it was learned on, which suits it best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learning_rate: Option<f64>,
     /// Where the parameters come from, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
-}
-
-/// A softness file could not be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum SoftnessFileError {
-    /// The file could not be read.
-    #[error("cannot read softness {path:?}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The file, or the temporary one beside it, could not be written.
-    #[error("cannot write softness {path:?}: {source}")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// The text is not what a softness file holds.
-    #[error("softness {path:?} is not valid: {source}")]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, and where.
-        source: serde_json::Error,
-    },
-    /// φ has the wrong length.
-    #[error("softness {path:?} has {found} parameters, but {family} has {expected}")]
-    Length {
-        /// The file.
-        path: PathBuf,
-        /// The family's name.
-        family: &'static str,
-        /// Parameters found.
-        found: usize,
-        /// Parameters of the family.
-        expected: usize,
-    },
-    /// A parameter is not a number.
-    #[error("softness {path:?}: phi[{index}] is {found}, expected a finite number")]
-    NotFinite {
-        /// The file.
-        path: PathBuf,
-        /// Which parameter.
-        index: usize,
-        /// Its value.
-        found: f64,
-    },
-    /// The exponential of a parameter is not a positive number in f32.
-    #[error(
-        "softness {path:?}: phi[{index}] is the logarithm {found}, expected -{limit} to {limit}",
-        limit = LARGEST_LOGARITHM
-    )]
-    Logarithm {
-        /// The file.
-        path: PathBuf,
-        /// Which parameter.
-        index: usize,
-        /// Its value.
-        found: f64,
-    },
-    /// The path of scales cannot be used.
-    #[error("softness {path:?} has a path with {what}")]
-    Path {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        what: String,
-    },
 }
 
 impl SoftnessFile {
@@ -106,7 +37,16 @@ impl SoftnessFile {
     /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do not
     /// suit the family.
     pub fn load(path: &Path) -> Result<Self, SoftnessFileError> {
-        let file: Self = read(path)?;
+        Self::parse(&read(path)?, path)
+    }
+
+    /// Parses and checks the text of a file; `path` names it in errors.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`load`](SoftnessFile::load) but for reading.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, SoftnessFileError> {
+        let file: Self = parse(text, path)?;
         file.check(path)?;
         Ok(file)
     }
@@ -135,8 +75,13 @@ impl SoftnessFile {
     }
 
     fn check(&self, path: &Path) -> Result<(), SoftnessFileError> {
-        let family = self.softness.family;
-        check(path, family.name(), [family.parameters(), family.logarithms()], &self.phi)?;
+        let felt = self.surrogate.iter().map(|felt| (felt.softness.family, &felt.phi));
+        for (family, phi) in [(self.softness.family, &self.phi)].into_iter().chain(felt) {
+            check(path, family.name(), [family.parameters(), family.logarithms()], phi)?;
+        }
+        if let Some(found) = self.learning_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
+            return Err(SoftnessFileError::LearningRate { path: path.to_owned(), found });
+        }
         let wrong = |what: String| SoftnessFileError::Path { path: path.to_owned(), what };
         let Some(ScalePath { knots, floor_px }) = &self.path else { return Ok(()) };
         if !(1..=MOST_KNOTS).contains(&knots.len()) {
@@ -153,11 +98,15 @@ impl SoftnessFile {
     }
 }
 
-/// Parses the JSON file at `path`.
-pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SoftnessFileError> {
-    let text = fs::read_to_string(path)
-        .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })?;
-    serde_json::from_str(&text)
+/// The text of the file at `path`.
+pub(crate) fn read(path: &Path) -> Result<String, SoftnessFileError> {
+    fs::read_to_string(path)
+        .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })
+}
+
+/// Parses the text of the JSON file at `path`.
+pub(crate) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, SoftnessFileError> {
+    serde_json::from_str(text)
         .map_err(|source| SoftnessFileError::Parse { path: path.to_owned(), source })
 }
 
@@ -211,8 +160,14 @@ mod tests {
     fn example(family: Family) -> SoftnessFile {
         let softness = EdgeSoftness { family, squared: true };
         let path = ScalePath { knots: vec![-3.5, -6.2], floor_px: 0.05 };
-        let note = Some("a start".into());
-        SoftnessFile { softness, phi: softness.default_phi(1e-4), path: Some(path), note }
+        SoftnessFile {
+            softness,
+            phi: softness.default_phi(1e-4),
+            path: Some(path),
+            surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
+            learning_rate: Some(0.3),
+            note: Some("a start".into()),
+        }
     }
 
     fn error(text: &str) -> String {
@@ -267,6 +222,25 @@ mod tests {
                 error(&format!(r#"{{"softness": {softness}, "phi": [0], "path": {path}}}"#));
             assert!(message.ends_with(part), "{message}");
         }
+    }
+
+    #[test]
+    fn a_learning_rate_that_leads_nowhere_is_refused() {
+        for rate in ["0", "-1"] {
+            let message = error(&format!(
+                r#"{{"softness": {{"family": "gauss", "squared": false}}, "phi": [0], "learning_rate": {rate}}}"#
+            ));
+            assert!(message.contains(&format!("the learning rate is {rate}")), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_surrogate_is_checked_like_the_softness() {
+        let softness = r#"{"family": "gauss", "squared": false}"#;
+        let felt = r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#;
+        let message =
+            error(&format!(r#"{{"softness": {softness}, "phi": [0], "surrogate": {felt}}}"#));
+        assert!(message.ends_with("has 1 parameters, but exp has 2"), "{message}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-use softrast_method::{Searched, numbers, tensor};
+use softrast_method::{Searched, numbers, shipped, tensor};
 use softrast_raster::HostBackend;
 use softrast_runner::{Error, Schedule, Settings, SoftnessChoice, Task};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
@@ -25,8 +25,8 @@ pub(crate) struct DepthMethod {
 }
 
 impl DepthMethod {
-    /// The depth softness that the command line asks for; by default of the family that
-    /// `--softness` names, and the network of Eq. 3 where that is the network of Eq. 2.
+    /// The depth softness that the command line asks for; by default the shipped one along with shipped
+    /// edges, else of the family that `--softness` names, and the network of Eq. 3 where that is the network of Eq. 2.
     ///
     /// # Errors
     ///
@@ -37,12 +37,14 @@ impl DepthMethod {
                 if args.depth_scale.is_some() {
                     return Err(usage("a depth softness file holds its own parameters"));
                 }
-                let DepthSoftnessFile { depth_softness, phi, .. } = DepthSoftnessFile::load(path)?;
-                let name = path.display().to_string();
-                return Self { softness: depth_softness, phi, name, scale: None }.checked();
+                let file = DepthSoftnessFile::load(path)?;
+                return Self::of_file(path.display().to_string(), file);
             }
             Some(DepthSoftnessChoice::Named(softness)) => *softness,
-            None => like_edge(settings)?,
+            None => match shipped(settings, args)? {
+                Some(file) => return Self::of_file("learned".to_owned(), file),
+                None => like_edge(settings)?,
+            },
         };
         let name = softness.name().to_owned();
         if softness == DepthSoftness::Mlp {
@@ -56,6 +58,11 @@ impl DepthMethod {
         let searched = searched.and_then(|found| found.depth_scale);
         let scale = args.depth_scale.or(settings.own).or(searched).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()
+    }
+
+    fn of_file(name: String, file: DepthSoftnessFile) -> anyhow::Result<Self> {
+        let DepthSoftnessFile { depth_softness, phi, .. } = file;
+        Self { softness: depth_softness, phi, name, scale: None }.checked()
     }
 
     /// The largest ratio of two depth weights, as a logarithm: 0 where no depth is told from
@@ -83,6 +90,14 @@ impl DepthMethod {
         let phi = tensor::<HostBackend, 1>(self.phi.clone(), [self.phi.len()]);
         let places = (0..PLACES).map(|k| k as f64 / (PLACES - 1) as f64).collect();
         numbers(self.softness.log_weight(phi, tensor(places, [PLACES])))
+    }
+}
+
+/// The depth softness that was learned along with the shipped one of the edges, where that is used.
+fn shipped(settings: &Settings, args: &Args) -> anyhow::Result<Option<DepthSoftnessFile>> {
+    match args.depth_scale.is_none() && shipped::is_asked_for(settings, Occlusion::NAME) {
+        true => shipped::depth_softness(Occlusion::NAME),
+        false => Ok(None),
     }
 }
 

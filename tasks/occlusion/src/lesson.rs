@@ -101,7 +101,7 @@ impl Lesson for OcclusionLesson {
 
     fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
         let (edge, depth) = phi.split_at(self.edge.parameters());
-        let mut files = self.edge.files(edge, note)?;
+        let mut files = self.edge.files(edge, self.task.solver.learning_rate, note)?;
         let name = "depth_softness.json";
         let file = DepthSoftnessFile {
             depth_softness: self.task.solver.depth.softness,

@@ -5,7 +5,6 @@ use softrast_runner::{
     Batch, Description, Error, ErrorGroup, ExtraError, Grid, Measure, OwnAxis, Plan, Point,
     Progress, Resolution, Run, Schedule, Score, Settings, Study, Task, Variant,
 };
-use softrast_softness::Softness;
 
 use crate::{
     Args, DepthError, Instance, Problem, Scene,
@@ -63,9 +62,14 @@ impl Task for Occlusion {
             return Err(Error::Usage(message.into()).into());
         }
         let edge = Method::new(settings, &SCALES)?;
-        let searched = edge.searched().and_then(|found| found.learning_rate);
+        if edge.surrogate().is_some() {
+            let message = "edges of occlusion stay where they are, so that no gradient goes through a \
+                           surrogate: leave out --surrogate-scale, or use another file";
+            return Err(Error::Usage(message.into()).into());
+        }
+        let suited = edge.learning_rate();
         let (steps, learning_rate) = match settings.variant {
-            Variant::Original => (100, searched.unwrap_or(0.03)),
+            Variant::Original => (100, suited.unwrap_or(0.03)),
             Variant::Transfer => (10, 0.7),
         };
         let solver = Solver {
@@ -84,10 +88,6 @@ impl Task for Occlusion {
         let mut settings = serde_json::json!({
             "depth_softness": depth.name,
             "learning_rate": learning_rate,
-            "schedule": if edge.is_static() { "static" } else { "decay" },
-            "scale": edge.scale(0, *steps),
-            "scale_end": edge.scale(*steps, *steps),
-            "squared": edge.softness().squared,
             "background_weight": crate::BACKGROUND,
         });
         if let Some(scale) = depth.scale {
@@ -103,7 +103,7 @@ impl Task for Occlusion {
         };
         Description {
             softness,
-            parameters: edge.softness().parameters() + depth.softness.parameters(),
+            parameters: edge.parameters() + depth.phi.len(),
             backend: edge.backend().title().to_owned(),
             steps: *steps,
             size: *size,
@@ -113,7 +113,7 @@ impl Task for Occlusion {
             parameter_error: Measure { name: "wrong depth order", unit: "of pairs" },
             extra: EXTRA.to_vec(),
             success: success.to_owned(),
-            settings: settings.as_object().cloned().unwrap_or_default(),
+            settings: edge.settings(*steps, settings),
         }
     }
 

@@ -179,6 +179,8 @@ fn contradictions_are_usage_errors_and_broken_files_are_not() {
         ("--depth-softness depth_mlp --depth-scale 0.1", 2, "depth_mlp has no scale"),
         ("--depth-softness missing.json --depth-scale 0.1", 2, "holds its own parameters"),
         ("--depth-softness missing.json", 1, "missing.json"),
+        ("--surrogate-scale 0.1", 2, "stay where they are"),
+        ("--softness learned --scale 0.1", 2, "holds its own parameters"),
         ("--depth-scale inf", 2, "positive number"),
         ("--depth-scale NaN", 2, "positive number"),
         ("--resolution auto", 2, "leave out --resolution"),

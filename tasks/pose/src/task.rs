@@ -7,7 +7,6 @@ use softrast_runner::{
     Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Plan, Point, Progress,
     Run, Schedule, Score, Settings, Study, Task, Variant, best_step,
 };
-use softrast_softness::Softness;
 
 use crate::{
     Args, Instance, Instances, PoseError, Range, Scene,
@@ -68,9 +67,9 @@ impl Task for Pose {
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let method = Method::new(settings, &SCALES)?;
-        let searched = method.searched().and_then(|found| found.learning_rate);
+        let suited = method.learning_rate();
         let (steps, learning_rate) = match settings.variant {
-            Variant::Original => (300, searched.unwrap_or(0.3)),
+            Variant::Original => (300, suited.unwrap_or(0.3)),
             Variant::Transfer => (150, 0.5),
         };
         let solver = Solver {
@@ -99,16 +98,12 @@ impl Task for Pose {
             "optimise_fov": self.optimise_fov,
             "starts": self.starts,
             "learning_rate": learning_rate,
-            "schedule": if method.is_static() { "static" } else { "decay" },
-            "scale": method.scale(0, *steps),
-            "scale_end": method.scale(*steps, *steps),
-            "squared": method.softness().squared,
             "resolution": method.resolution().to_string(),
             "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
-            parameters: method.softness().parameters(),
+            parameters: method.parameters(),
             backend: method.backend().title().to_owned(),
             steps: *steps,
             size: *size,
@@ -121,7 +116,7 @@ impl Task for Pose {
             parameter_error: Measure { name: "camera angle", unit: "degrees" },
             extra: EXTRA.to_vec(),
             success: format!("the camera ends within {SUCCESS_DEG} degrees"),
-            settings: settings.as_object().cloned().unwrap_or_default(),
+            settings: method.settings(*steps, settings),
         }
     }
 

@@ -176,6 +176,10 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--instances released24 --seed 24", 2, "24 pairs"),
         ("--instances released24 --range 35-55", 2, "--range does not go with"),
         ("--softness missing.json --scale 0.1", 2, "holds its own parameters"),
+        ("--softness missing.json --surrogate-scale 0.1", 2, "holds its own parameters"),
+        ("choose --surrogate-scale 0.1", 2, "does not go with choose"),
+        ("learn --surrogate-scale 0.1 --order joint", 2, "--order unrolled, truncated:K or es"),
+        ("learn --surrogate-scale 0.1 --referee own", 2, "--order unrolled, truncated:K or es"),
         ("--softness missing.json --schedule decay", 2, "holds its own parameters"),
         ("--softness missing.json", 1, "missing.json"),
         ("--resolution 20", 2, "one of 64, 32"),
@@ -189,6 +193,29 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         assert_eq!(failure.code, code, "{line}: {failure}");
         assert!(failure.message.contains(part), "{line}: {failure}");
     }
+}
+
+#[test]
+fn a_surrogate_is_learned_kept_and_named() {
+    let out = tempfile::tempdir().unwrap();
+    let line = "learn --outer 1 --inner 2 --batch 1 --validation-runs 1 --size 8 --order es \
+                --softness gauss --scale 0.02 --surrogate-scale 0.2 --learning-rate 0.2";
+    let json = run_in(out.path(), line).unwrap();
+    assert_eq!(
+        (&json["parameters"], &json["softness"]),
+        (&2.into(), &"gauss with surrogate".into())
+    );
+    let path = out.path().join("softness.json");
+    let file: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    assert_eq!(file["surrogate"]["softness"]["family"], "gauss");
+    assert_eq!(file["learning_rate"], 0.2);
+    let json = run(&format!("--size 8 --steps 2 --softness {}", path.display())).unwrap();
+    assert_finite(&json);
+    assert_eq!((&json["parameters"], &json["settings"]["surrogate"]), (&2.into(), &"gauss".into()));
+    assert_eq!(json["settings"]["learning_rate"], 0.2);
+    assert!(
+        json["settings"]["softness_note"].as_str().unwrap().contains("learned in 1 outer steps")
+    );
 }
 
 /// Source: FACTS 8.1. The mesh belongs to others and is not part of this repository.

@@ -7,7 +7,6 @@ use softrast_runner::{
     Batch, Description, Detail, ErrorGroup, ExtraError, Measure, Pictures, Plan, Point, Progress,
     Run, Schedule, Score, Settings, Study, Task, Variant, best_step, difference, rgb_from_gray,
 };
-use softrast_softness::Softness;
 
 use crate::{
     Args, Instance, Logo, Scene, lesson,
@@ -73,8 +72,8 @@ impl Task for Shape2d {
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let method = Method::new(settings, &SCALES)?;
-        let searched = method.searched().and_then(|found| found.learning_rate);
-        let learning_rate = settings.learning_rate.or(searched).unwrap_or(LEARNING_RATE);
+        let suited = method.learning_rate();
+        let learning_rate = settings.learning_rate.or(suited).unwrap_or(LEARNING_RATE);
         let solver = Solver {
             method,
             size: settings.size.unwrap_or(SCALES.size),
@@ -104,16 +103,12 @@ impl Task for Shape2d {
         let settings = serde_json::json!({
             "target": self.target_name,
             "learning_rate": learning_rate,
-            "schedule": if method.is_static() { "static" } else { "decay" },
-            "scale": method.scale(0, *steps),
-            "scale_end": method.scale(*steps, *steps),
-            "squared": method.softness().squared,
             "resolution": method.resolution().to_string(),
             "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
-            parameters: method.softness().parameters(),
+            parameters: method.parameters(),
             backend: method.backend().title().to_owned(),
             steps: *steps,
             size: *size,
@@ -123,7 +118,7 @@ impl Task for Shape2d {
             parameter_error: Measure { name: "hard MSE (stands in)", unit: "" },
             extra: EXTRA.to_vec(),
             success: format!("the hard MSE ends below {SUCCESS}"),
-            settings: settings.as_object().cloned().unwrap_or_default(),
+            settings: method.settings(*steps, settings),
         }
     }
 

@@ -8,7 +8,6 @@ use softrast_runner::{
     Batch, Description, Detail, ErrorGroup, ExtraError, Measure, Plan, Point, Progress, Run,
     Schedule, Score, Settings, Study, Task, Variant, best_step,
 };
-use softrast_softness::Softness;
 
 use crate::{
     Args, Chamfer, Instance, Scene,
@@ -66,8 +65,8 @@ impl Task for Shape3d {
 
     fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
         let method = Method::new(settings, &SCALES)?;
-        let searched = method.searched().and_then(|found| found.learning_rate);
-        let learning_rate = settings.learning_rate.or(searched).unwrap_or(LEARNING_RATE);
+        let suited = method.learning_rate();
+        let learning_rate = settings.learning_rate.or(suited).unwrap_or(LEARNING_RATE);
         let solver = Solver {
             method,
             size: settings.size.unwrap_or(SCALES.size),
@@ -102,16 +101,12 @@ impl Task for Shape3d {
             "views": VIEWS,
             "elevations": self.elevation_deg.map_or(ELEVATIONS_DEG.to_vec(), |one| vec![one]),
             "learning_rate": learning_rate,
-            "schedule": if method.is_static() { "static" } else { "decay" },
-            "scale": method.scale(0, *steps),
-            "scale_end": method.scale(*steps, *steps),
-            "squared": method.softness().squared,
             "resolution": method.resolution().to_string(),
             "tolerance": method.rasterizer(*size).tolerance,
         });
         Description {
             softness: method.name().to_owned(),
-            parameters: method.softness().parameters(),
+            parameters: method.parameters(),
             backend: method.backend().title().to_owned(),
             steps: *steps,
             size: *size,
@@ -121,7 +116,7 @@ impl Task for Shape3d {
             parameter_error: Measure { name: "Chamfer distance", unit: "1e-3 squared units" },
             extra: EXTRA.to_vec(),
             success: format!("the hard IoU loss ends below {SUCCESS}"),
-            settings: settings.as_object().cloned().unwrap_or_default(),
+            settings: method.settings(*steps, settings),
         }
     }
 

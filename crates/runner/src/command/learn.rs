@@ -54,7 +54,7 @@ pub(crate) fn learn<T: Task>(line: &CommandLine<T::Args>, again: &str) -> anyhow
 
     let done = log.updates();
     let start = log.validations().first().map(|point| point[1]);
-    let learned = study.learned(&note(again, done, start))?;
+    let learned = study.learned(&note(again, plan.seed, done, start))?;
     let partial =
         stopped.then(|| format!("{done} of {} outer steps are done and kept", plan.outer));
     let result = json!({
@@ -192,9 +192,10 @@ fn point(record: &Value) -> Option<Point> {
 }
 
 /// Where a softness comes from, for its file.
-fn note(again: &str, updates: usize, start: Option<f64>) -> String {
+fn note(again: &str, seed: u64, updates: usize, start: Option<f64>) -> String {
     let from = start.map(|loss| format!(", from a validation loss of {}", short(loss)));
-    format!("learned in {updates} outer steps{} by: {again}", from.unwrap_or_default())
+    let from = from.unwrap_or_default();
+    format!("learned in {updates} outer steps on seeds from {seed}{from} by: {again}")
 }
 
 fn text<T: Task>(result: &Value, learned: &Learned, out: &Path) -> Vec<String> {

@@ -1,0 +1,77 @@
+use std::sync::LazyLock;
+
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
+use softrast_meta::{Adam, Optimizer};
+use softrast_raster::HostBackend;
+use softrast_softness::{Mlp, Softness, initial_mlp};
+
+use crate::{numbers, tensor};
+
+/// The fit reaches so many scales from the edge. That is far above the logit of 14.1 which an MLP needs
+/// far outside, so that many faces are not seen there: see [`initial_mlp`].
+const REACH: f64 = 24.0;
+/// Places on one side of the edge; the MLP is odd.
+const PLACES: usize = 48;
+/// How much denser places are at the edge than at the end, as the argument of a hyperbolic sine.
+const DENSER: f64 = 3.0;
+/// Steps of the fit, and first and last learning rate.
+const STEPS: usize = 3000;
+const RATES: [f64; 2] = [0.1, 3e-4];
+
+/// Weights `[56]` of an MLP softness that is a logistic of scale 1, to 3e-3.
+///
+/// Found by least squares on the logit, always from the same random weights. The error of a place counts
+/// over one scale more than its distance: at the edge the logit decides the image, and far from it only has to
+/// be large.
+pub(crate) fn fitted_mlp() -> Vec<f64> {
+    static FITTED: LazyLock<Vec<f64>> = LazyLock::new(fit);
+    FITTED.clone()
+}
+
+fn fit() -> Vec<f64> {
+    type A = Autodiff<HostBackend>;
+    let place = |k: usize| {
+        let share = (k + 1) as f64 / PLACES as f64;
+        REACH * (DENSER * share).sinh() / DENSER.sinh()
+    };
+    let places: Vec<f64> = (0..PLACES).map(place).collect();
+    let counts = places.iter().map(|x| 1.0 / (1.0 + x)).collect();
+    let (places, counts) = (tensor::<A, 1>(places, [PLACES]), tensor::<A, 1>(counts, [PLACES]));
+    let start = initial_mlp(0, 1.0);
+    let mut theta = tensor::<HostBackend, 1>(start.clone(), [start.len()]);
+    let mut state = Adam::new(RATES[0]).init(&theta);
+    for step in 0..STEPS {
+        let part = step as f64 / STEPS as f64;
+        let adam = Adam::new(RATES[0] * (RATES[1] / RATES[0]).powf(part));
+        let leaf = Tensor::<A, 1>::from_inner(theta.clone()).require_grad();
+        let off = (logit(&leaf, places.clone()) - places.clone()) * counts.clone();
+        let grads = (off.clone() * off).mean().backward();
+        let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
+        (theta, state) = adam.step(theta, grad, state);
+    }
+    numbers(theta)
+}
+
+/// The argument of the sigmoid: `-ln(1 - s)` is its softplus, and it is odd.
+fn logit<B: Backend>(phi: &Tensor<B, 1>, x: Tensor<B, 1>) -> Tensor<B, 1> {
+    Mlp.optical_depth(phi.clone(), x.clone()) - Mlp.optical_depth(phi.clone(), x.neg())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fitted_mlp_has_the_logit_of_a_logistic_and_stays_large_beyond() {
+        let phi = fitted_mlp();
+        let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
+        let at = |x: f64| numbers(logit(&phi, tensor(vec![x], [1])))[0];
+        for x in [0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 24.0] {
+            assert!((at(x) / x - 1.0).abs() < 0.04, "at {x}: {}", at(x));
+        }
+        assert!(at(100.0) > 20.0, "far: {}", at(100.0));
+    }
+}

@@ -1,0 +1,135 @@
+//! What learning starts from, as one vector.
+
+use burn::backend::NdArray;
+use clap::Parser;
+use softrast_method::{Defaults, LearnedEdge, Method};
+use softrast_raster::BackendChoice;
+use softrast_runner::{Input, Judged, Order, Plan, Referee, Schedule, Settings};
+use softrast_softness::SoftnessFile;
+use softrast_tests::{numbers, vector};
+
+type B = NdArray<f64>;
+
+const SIZE: usize = 64;
+
+fn plan(input: Input, order: Order, referee: Referee) -> Plan {
+    Plan {
+        order,
+        outer: 1,
+        batch: 1,
+        outer_rate: 0.03,
+        seed: 5,
+        validation_seed: 6,
+        validation_runs: 1,
+        patience: None,
+        referee,
+        judged: Judged::End,
+        knots: 3,
+        input,
+        floor_px: 0.03,
+    }
+}
+
+fn method(line: &str) -> Method {
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: Settings,
+    }
+    let defaults = Defaults {
+        task: "none",
+        schedule: Schedule::Static,
+        decay: [0.1, 0.01],
+        fixed: 0.1,
+        size: SIZE,
+        backends: &[BackendChoice::NdArray],
+    };
+    let words = ["task"].into_iter().chain(line.split_whitespace());
+    Method::new(&Line::parse_from(words).settings, &defaults).unwrap()
+}
+
+fn edge(line: &str, input: Input) -> LearnedEdge {
+    LearnedEdge::new(&method(line), &plan(input, Order::Unrolled, Referee::Fixed), 10, SIZE)
+}
+
+fn assert_near(found: &[f64], expected: &[f64]) {
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(expected) {
+        assert!((a - b).abs() <= 1e-5 * b.abs().max(1.0), "{found:?}, not {expected:?}");
+    }
+}
+
+#[test]
+fn a_learned_width_begins_with_the_softness_as_it_is() {
+    for line in ["--softness mlp --scale 0.05", "--softness mlp --init fitted --scale 0.05"] {
+        let (ndc, relative) = (edge(line, Input::Ndc), edge(line, Input::Relative));
+        assert_eq!((ndc.parameters(), relative.parameters()), (56, 57));
+        let learned = vector::<B>(&relative.start());
+        assert_near(&numbers(relative.phi(&learned, 0)), &ndc.start());
+        assert_eq!(relative.stage(7), 0);
+    }
+    // The scale of a family takes the place of its first parameter.
+    assert_eq!(edge("--softness exp --scale 0.05", Input::Relative).parameters(), 2);
+}
+
+#[test]
+fn a_file_without_a_path_can_have_one_put_in_front() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("softness.json");
+    for line in ["--softness mlp --scale 0.05", "--softness exp --scale 0.05"] {
+        let whole = edge(line, Input::Ndc);
+        let (_, text) = whole.files(&whole.start(), 0.3, "a test").unwrap().remove(0);
+        std::fs::write(&path, text).unwrap();
+        let relative = edge(&format!("--softness {}", path.display()), Input::Relative);
+        let learned = vector::<B>(&relative.start());
+        assert_near(&numbers(relative.phi(&learned, 0)), &whole.start());
+    }
+}
+
+#[test]
+fn a_learned_vector_comes_back_from_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("softness.json");
+    for line in [
+        "--softness mlp",
+        "--softness gauss --schedule decay",
+        "--softness exp --schedule decay --surrogate-scale 0.2",
+        "--softness logistic --surrogate-scale 0.2",
+    ] {
+        for input in [Input::Ndc, Input::Relative] {
+            let edge = edge(line, input);
+            let learned: Vec<f64> = edge.start().iter().map(|x| 0.9 * x - 0.1).collect();
+            assert_eq!(edge.parameters(), learned.len());
+            let (_, text) = edge.files(&learned, 0.3, "a test").unwrap().remove(0);
+            std::fs::write(&path, text).unwrap();
+            let read = method(&format!("--softness {}", path.display()));
+            let at = vector::<B>(&learned);
+            for step in [0, 4, 9] {
+                let phi = read.phi(read.scale(step, 10));
+                assert_near(&phi, &numbers(edge.phi(&at, step)));
+            }
+            let felt = read.surrogate().map_or(&[][..], |felt| &felt.phi);
+            assert_near(felt, &learned[learned.len() - felt.len()..]);
+            assert_eq!(read.learning_rate(), Some(0.3));
+            assert_eq!(SoftnessFile::load(&path).unwrap().note.as_deref(), Some("a test"));
+        }
+    }
+}
+
+#[test]
+fn a_surrogate_goes_only_with_orders_that_follow_what_replaces_the_derivative() {
+    let both = edge("--softness logistic --surrogate-scale 0.2", Input::Ndc);
+    let plain = edge("--softness logistic", Input::Ndc);
+    for (order, referee, learns) in [
+        (Order::Unrolled, Referee::Fixed, true),
+        (Order::Truncated(3), Referee::Fixed, true),
+        (Order::Es, Referee::Fixed, true),
+        (Order::Joint, Referee::Fixed, false),
+        (Order::Direct, Referee::Own, false),
+        (Order::Unrolled, Referee::Own, false),
+    ] {
+        let plan = plan(Input::Ndc, order, referee);
+        assert_eq!(both.suits(&plan).is_ok(), learns, "{order:?} {referee:?}");
+        assert!(plain.suits(&plan).is_ok());
+    }
+}
