@@ -102,7 +102,8 @@ fn linear(range: Range<f64>, most: usize) -> Vec<f64> {
     if size.is_nan() || size <= 0.0 {
         return vec![range.start];
     }
-    let least = size / most.max(1) as f64;
+    // A little less, so that rounding does not ask for the next step.
+    let least = size / most.max(1) as f64 * (1.0 - ROUNDING);
     let power = 10f64.powf(least.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|&step| step >= least);
     let step = step.unwrap_or(10.0 * power);
