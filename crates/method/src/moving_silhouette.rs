@@ -93,13 +93,14 @@ impl<B: RasterBackend> MovingSilhouette<B> {
         }
     }
 
-    /// Coverage of `vertices` on as many pixels as the rasterizer has, which is what judges; none if
-    /// that is the image anyway.
-    pub fn judged(&self, vertices: Tensor<B, 3>) -> Option<Tensor<B, 3>> {
+    /// `image` as a picture, on as many pixels as the rasterizer has: drawn again from `vertices` if it has
+    /// fewer.
+    pub fn picture(&self, image: Tensor<B, 3>, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
         let size = self.rasterizer.size;
-        let differs = self.method.side(size, self.scale) != size;
-        let silhouette = differs.then(|| self.silhouette.clone().sized(size));
-        silhouette.map(|full| full.coverage_by_table(vertices, self.table.clone()))
+        if self.method.side(size, self.scale) == size {
+            return image;
+        }
+        self.silhouette.clone().sized(size).coverage_by_table(vertices, self.table.clone())
     }
 }
 
@@ -154,15 +155,14 @@ mod tests {
     fn a_narrow_one_draws_all_pixels_to_the_bit() {
         let [auto, full] = [Resolution::Auto, Resolution::Full].map(|r| silhouette(0.002, r));
         assert_eq!(numbers(auto.image(triangle())), numbers(full.image(triangle())));
-        assert!(auto.judged(triangle()).is_none() && full.judged(triangle()).is_none());
     }
 
     #[test]
-    fn a_wide_one_draws_few_pixels_and_is_judged_on_all() {
+    fn a_wide_one_draws_few_pixels_and_its_picture_has_all() {
         let [mut auto, mut full] = [Resolution::Auto, Resolution::Full].map(|r| silhouette(0.2, r));
         assert_eq!(auto.image(triangle()).dims(), [1, 8, 8]);
-        let judged = auto.judged(triangle()).map(numbers);
-        assert_eq!(judged, Some(numbers(full.image(triangle()))));
+        let picture = auto.picture(auto.image(triangle()), triangle());
+        assert_eq!(numbers(picture), numbers(full.image(triangle())));
         // The pixels grow in number with the scale, whether or not the support is chosen anew.
         for (scale, side) in [(0.1, 16), (0.06, 32), (0.0599, 32)] {
             auto.turn_to(scale);
@@ -177,6 +177,7 @@ mod tests {
         let mut fixed = silhouette(0.2, Resolution::Side(16));
         fixed.turn_to(0.002);
         assert_eq!(fixed.image(triangle()).dims(), [1, 16, 16]);
-        assert_eq!(fixed.judged(triangle()).map(|image| image.dims()), Some([1, SIZE, SIZE]));
+        let picture = fixed.picture(fixed.image(triangle()), triangle());
+        assert_eq!(picture.dims(), [1, SIZE, SIZE]);
     }
 }

@@ -26,8 +26,6 @@ pub(crate) struct State {
     /// θ of each view.
     pub(crate) theta: Vec<Vec<f64>>,
     /// What the optimiser lowers, of each view: the soft `IoU` loss of the image it sees.
-    pub(crate) loss: Vec<f64>,
-    /// Soft `IoU` loss of each view at full size.
     pub(crate) soft: Vec<f64>,
     /// `IoU` loss of the hard silhouette of each view.
     pub(crate) hard: Vec<f64>,
@@ -67,22 +65,19 @@ impl Solver {
             |now| {
                 let (scale, projected, image) = now.seen;
                 let projected = projected.detach();
-                let (image, soft) = match silhouette.borrow().judged(projected.clone()) {
-                    None => (image, now.loss.clone()),
-                    Some(full) => (full.clone(), scene.image_loss(full).inner()),
-                };
                 let width = now.theta.dims()[1];
                 let read = Transaction::default().register(now.theta).register(now.loss);
-                let read = read.register(soft).register(projected.inner());
-                let read = if pictures { read.register(image.inner()) } else { read };
-                let ([poses, loss, soft, projected], image) = softrast_method::read(read);
+                let read = read.register(projected.clone().inner());
+                let picture = pictures.then(|| silhouette.borrow().picture(image, projected));
+                let read =
+                    picture.into_iter().fold(read, |read, image| read.register(image.inner()));
+                let ([poses, soft, projected], image) = softrast_method::read(read);
                 let poses: Vec<f64> = poses.iter().collect();
                 let hard = hard_silhouette(on_host(projected), scene.faces(), self.size);
                 visit(State {
                     step: now.step,
                     scale,
                     theta: poses.chunks(width).map(<[_]>::to_vec).collect(),
-                    loss: loss.iter().collect(),
                     soft: soft.iter().collect(),
                     hard: numbers(iou_loss(hard, target.clone())),
                     image,

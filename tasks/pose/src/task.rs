@@ -215,7 +215,7 @@ fn point(state: &State, view: usize, instance: &Instance) -> Point {
     let error = PoseError::new([theta[0], theta[1], theta[2]], instance.target.distance);
     Point {
         step: state.step,
-        loss: state.loss[view],
+        loss: state.soft[view],
         image_error: state.soft[view],
         parameter_error: error.angle_deg,
         scale: state.scale,
@@ -261,7 +261,7 @@ impl Pose {
                     album.take(image, state.hard[view], batch.wants_frame(state.step, steps));
                 }
             }
-            let loss = state.loss.iter().sum::<f64>() / state.loss.len() as f64;
+            let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
             if state.step == 0 { Ok(()) } else { progress.step(state.step, loss) }
         })?;
         Ok(all)

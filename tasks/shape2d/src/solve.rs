@@ -66,13 +66,11 @@ impl Solver {
             |now| {
                 let (scale, vertices, image, soft) = now.seen;
                 let vertices = vertices.detach();
-                let (image, soft) = match silhouette.borrow().judged(vertices.clone()) {
-                    None => (image, soft),
-                    Some(full) => (full.clone(), scene.image_loss(full)),
-                };
                 let read = Transaction::default().register(now.loss).register(soft.inner());
-                let read = read.register(vertices.inner());
-                let read = if pictures { read.register(image.inner()) } else { read };
+                let read = read.register(vertices.clone().inner());
+                let picture = pictures.then(|| silhouette.borrow().picture(image, vertices));
+                let read =
+                    picture.into_iter().fold(read, |read, image| read.register(image.inner()));
                 let ([loss, soft, vertices], image) = softrast_method::read(read);
                 let hard = hard_silhouette(on_host(vertices), scene.faces(), self.size);
                 visit(State {

@@ -79,13 +79,11 @@ impl Solver {
             |now| {
                 let (scale, vertices, projected, image, soft) = now.seen;
                 let projected = projected.detach();
-                let (image, soft) = match silhouette.borrow().judged(projected.clone()) {
-                    None => (image, soft),
-                    Some(full) => (full.clone(), scene.image_loss(full)),
-                };
                 let read = Transaction::default().register(vertices.inner()).register(now.loss);
-                let read = read.register(soft.inner()).register(projected.inner());
-                let read = if pictures { read.register(image.inner()) } else { read };
+                let read = read.register(soft.inner()).register(projected.clone().inner());
+                let picture = pictures.then(|| silhouette.borrow().picture(image, projected));
+                let read =
+                    picture.into_iter().fold(read, |read, image| read.register(image.inner()));
                 let ([vertices, loss, soft, projected], image) = softrast_method::read(read);
                 let vertices: Vec<f64> = vertices.iter().collect();
                 let hard = hard_silhouette(on_host(projected), scene.faces(), self.size);
