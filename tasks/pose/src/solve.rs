@@ -64,11 +64,10 @@ impl Solver {
             |theta| scene.allowed(Tensor::from_inner(theta)).inner(),
             |now| {
                 let (scale, projected, image) = now.seen;
-                let projected = projected.detach();
                 let width = now.theta.dims()[1];
                 let read = Transaction::default().register(now.theta).register(now.loss);
-                let read = read.register(projected.clone().inner());
-                let picture = pictures.then(|| silhouette.borrow().picture(image, projected));
+                let read = read.register(projected.inner());
+                let picture = pictures.then(|| silhouette.borrow().picture(image));
                 let read =
                     picture.into_iter().fold(read, |read, image| read.register(image.inner()));
                 let ([poses, soft, projected], image) = softrast_method::read(read);

@@ -65,10 +65,9 @@ impl Solver {
             |theta| theta,
             |now| {
                 let (scale, vertices, image, soft) = now.seen;
-                let vertices = vertices.detach();
                 let read = Transaction::default().register(now.loss).register(soft.inner());
-                let read = read.register(vertices.clone().inner());
-                let picture = pictures.then(|| silhouette.borrow().picture(image, vertices));
+                let read = read.register(vertices.inner());
+                let picture = pictures.then(|| silhouette.borrow().picture(image));
                 let read =
                     picture.into_iter().fold(read, |read, image| read.register(image.inner()));
                 let ([loss, soft, vertices], image) = softrast_method::read(read);

@@ -78,10 +78,9 @@ impl Solver {
             |theta| theta,
             |now| {
                 let (scale, vertices, projected, image, soft) = now.seen;
-                let projected = projected.detach();
                 let read = Transaction::default().register(vertices.inner()).register(now.loss);
-                let read = read.register(soft.inner()).register(projected.clone().inner());
-                let picture = pictures.then(|| silhouette.borrow().picture(image, projected));
+                let read = read.register(soft.inner()).register(projected.inner());
+                let picture = pictures.then(|| silhouette.borrow().picture(image));
                 let read =
                     picture.into_iter().fold(read, |read, image| read.register(image.inner()));
                 let ([vertices, loss, soft, projected], image) = softrast_method::read(read);
