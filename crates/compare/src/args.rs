@@ -6,10 +6,13 @@ use crate::{Cell, TaskName};
 
 /// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start
 /// reaches the whole image, which takes over twenty times as long as a logistic; the fitted one does not.
-const METHODS: &str = "logistic --schedule static,gauss --schedule static,exp --schedule static,\
+const METHODS: &str = "learned,learned-mlp,logistic --schedule static,gauss --schedule static,exp --schedule static,\
                        gamma --schedule static,mlp --init fitted --schedule static,\
                        logistic --schedule decay,\
                        gauss --schedule decay,exp --schedule decay,gamma --schedule decay";
+
+/// What is varied unless said otherwise: the default of the tasks and the simplest method.
+const VARIED: &str = "learned,logistic --schedule static";
 
 /// Evaluates all methods on all tasks, original and transfer, and writes the tables.
 ///
@@ -25,6 +28,11 @@ pub struct Args {
     /// behind one may stand its schedule, or other flags of the tasks.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS)]
     pub methods: Vec<String>,
+
+    /// Those of the methods, or others, that the charts of error against seconds also show with half the pixels a
+    /// side and with pixels that are off by up to 1e-2. OCCLUSION knows neither.
+    #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
+    pub varied: Vec<String>,
 
     /// Seeds of every cell, instead of the number that its task asks for.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -73,9 +81,13 @@ impl Args {
                 (None, false) => task.runs(),
             };
             ["original", "transfer"].into_iter().flat_map(move |variant| {
-                let cell =
-                    move |method: &String| Cell { task, variant, method: method.clone(), runs };
-                self.methods.iter().map(cell)
+                let cell = move |varies| move |method| Cell { task, variant, method, runs, varies };
+                let varied = self.varied.iter().filter(move |_| task.draws_freely());
+                let varied = varied.flat_map(move |method| {
+                    let side = format!("{method} --resolution {}", task.size() / 2);
+                    [side, format!("{method} --tolerance 1e-2")]
+                });
+                self.methods.iter().cloned().map(cell(false)).chain(varied.map(cell(true)))
             })
         });
         Ok(cells.collect())
@@ -93,10 +105,14 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 9);
-        assert_eq!((cells[0].task, cells[9].variant), (TaskName::Shape2d, "transfer"));
-        let some = args("--tasks pose --methods gauss,a/b.json --runs 7").cells().unwrap();
-        assert!(some.len() == 4 && some[3].runs == 7 && some[3].method_name() == "b");
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * 4);
+        assert_eq!((cells[0].task, cells[15].variant), (TaskName::Shape2d, "transfer"));
+        assert_eq!(cells[11].method, "learned --resolution 128");
+        assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 4);
+        let some =
+            args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();
+        assert!(some.len() == 8 && some[3].runs == 7 && some[5].method_name() == "b");
+        assert_eq!(some[2].method_name(), "exp resolution 32");
         assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));
     }
 }

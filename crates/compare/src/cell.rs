@@ -20,6 +20,8 @@ pub struct Cell {
     pub method: String,
     /// Seeds, from 0 on.
     pub runs: u32,
+    /// Whether it only varies another cell, and is a dot on the charts of error against seconds but no curve.
+    pub varies: bool,
 }
 
 impl Cell {
@@ -32,6 +34,12 @@ impl Cell {
     pub fn softness_name(&self) -> &str {
         let stem = Path::new(self.softness()).file_stem().and_then(|stem| stem.to_str());
         stem.unwrap_or(self.softness())
+    }
+
+    /// Whether the softness was learned and comes with the programs.
+    pub fn is_shipped(&self) -> bool {
+        let name = self.softness();
+        name.starts_with("learned") && !name.ends_with(".json")
     }
 
     /// Name of the method: the softness, and the flags without what every flag has.
@@ -60,7 +68,7 @@ impl Cell {
         backend: Option<&str>,
         quiet: bool,
     ) -> anyhow::Result<Measured> {
-        let Self { task, variant, method, runs } = self;
+        let Self { task, variant, method, runs, .. } = self;
         let folder = self.folder(out);
         let runs = runs.to_string();
         let line = [

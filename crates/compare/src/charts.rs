@@ -20,6 +20,8 @@ pub(crate) struct Chart {
 
 /// The charts of the cells of one task in one variant.
 pub(crate) fn of_variant(cells: &[&Measured]) -> Vec<Chart> {
+    let all = cells;
+    let cells: Vec<&Measured> = all.iter().filter(|one| !one.cell.varies).copied().collect();
     let Some(first) = cells.first() else { return Vec::new() };
     let stem = format!("{}-{}", first.cell.task.name(), first.cell.variant);
     let of = format!("{}, {}", first.cell.task.title(), first.cell.variant);
@@ -64,10 +66,10 @@ pub(crate) fn of_variant(cells: &[&Measured]) -> Vec<Chart> {
                 front: Vec::new(),
             },
         },
-        pareto(cells, &stem, &of),
+        pareto(all, &stem, &of),
     ]
     .into_iter()
-    .chain(functions::chart(cells))
+    .chain(functions::chart(&cells))
     .collect()
 }
 
@@ -86,7 +88,7 @@ enum Curve {
 
 fn named(one: &Measured) -> Series {
     let name = one.cell.method_name();
-    let dashed = name.contains(" decay");
+    let dashed = one.moves();
     Series { colour: method_colour(&name), name, dashed, ..Series::default() }
 }
 
@@ -135,14 +137,21 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     let series = cells.iter().zip(&prices).enumerate().map(|(k, (one, price))| Series {
         points: vec![*price],
         marked: best.contains(&k),
+        boxed: is_default(one),
         ..named(one)
     });
     let names: Vec<String> = best.iter().map(|&k| cells[k].cell.method_name()).collect();
+    let default = cells.iter().position(|one| is_default(one));
+    let default = default.map(|k| match best.contains(&k) {
+        true => " In the box: the default of the task, which is on the front.",
+        false => " In the box: the default of the task, which is not on the front.",
+    });
     Chart {
         name: format!("{stem}-pareto"),
         caption: format!(
             "{of}: error of the step that a run returns against its seconds, means over the seeds; \
-             filled dots are static, open ones decay. On the front, ringed and joined: {}.",
+             filled dots are static, open ones move.{} On the front, ringed and joined: {}.",
+            default.unwrap_or_default(),
             names.join(", ")
         ),
         plot: Plot {
@@ -154,11 +163,16 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     }
 }
 
+/// Whether it is what the task's program does without flags.
+fn is_default(one: &Measured) -> bool {
+    one.cell.method == "learned"
+}
+
 /// The share of all problems, a problem being a seed of a task in a variant, that a method solves
 /// within a factor of the time of the fastest one on that problem.
 pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     let mut methods: Vec<String> = Vec::new();
-    for one in groups.iter().flatten() {
+    for one in groups.iter().flatten().filter(|one| !one.cell.varies) {
         let name = one.cell.method_name();
         if !methods.contains(&name) {
             methods.push(name);
@@ -168,7 +182,8 @@ pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     let mut ratios = vec![Vec::new(); methods.len()];
     let mut problems = 0;
     for group in groups {
-        let seeds = group.iter().map(|one| one.traces.len()).min().unwrap_or(0);
+        let group = || group.iter().filter(|one| !one.cell.varies);
+        let seeds = group().map(|one| one.traces.len()).min().unwrap_or(0);
         for k in 0..seeds {
             let time = |one: &&Measured| {
                 let trace = &one.traces[k];
@@ -176,10 +191,10 @@ pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
                 // A target that holds from the start takes no time: the least that is told apart.
                 Some(one.seconds * share.max(1.0 / last(one)))
             };
-            let times: Vec<Option<f64>> = group.iter().map(time).collect();
+            let times: Vec<Option<f64>> = group().map(time).collect();
             let best = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
             problems += 1;
-            for (one, time) in group.iter().zip(times) {
+            for (one, time) in group().zip(times) {
                 let method = methods.iter().position(|name| *name == one.cell.method_name())?;
                 ratios[method].extend(time.map(|time| time / best));
             }

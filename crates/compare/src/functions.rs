@@ -34,7 +34,7 @@ pub(crate) fn chart(cells: &[&Measured]) -> Option<Chart> {
         let name = one.cell.method_name();
         Some(Series {
             colour: method_colour(&name),
-            dashed: name.contains(" decay"),
+            dashed: one.moves(),
             points: offsets.iter().zip(covered).map(|(&x, y)| [x, y]).collect(),
             name,
             ..Series::default()
@@ -69,7 +69,10 @@ fn at_the_end(one: &Measured) -> Option<(EdgeSoftness, Vec<f64>)> {
         return Some((softness, softness.default_phi(one.scale_end?)));
     }
     let file = match name {
-        "learned" => shipped::softness(one.cell.task.name()).ok()??,
+        name if one.cell.is_shipped() => {
+            let kind = name.strip_prefix("learned").unwrap_or_default();
+            shipped::softness(&format!("{}{kind}", one.cell.task.name())).ok()??
+        }
         file => SoftnessFile::load(Path::new(file)).ok()?,
     };
     let SoftnessFile { softness, phi, path, .. } = file;

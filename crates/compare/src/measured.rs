@@ -99,6 +99,11 @@ impl Measured {
 }
 
 impl Measured {
+    /// Whether the scale moves during a run.
+    pub(crate) fn moves(&self) -> bool {
+        self.settings.contains(" to ")
+    }
+
     /// With the curves that `evaluate` has left in its folder.
     ///
     /// # Errors

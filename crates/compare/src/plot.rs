@@ -6,9 +6,10 @@ use anyhow::anyhow;
 use plotters::{coord::Shift, prelude::*};
 use softrast_runner::Ticks;
 
-const SIZE: (u32, u32) = (900, 380);
+const WIDTH: u32 = 900;
+const HEIGHT: u32 = 380;
 /// Room for the names of the methods, right of the axes.
-const LEGEND: u32 = 190;
+const LEGEND: u32 = 230;
 const ROW: i32 = 19;
 const GRID: RGBColor = RGBColor(225, 228, 232);
 const LIGHT: RGBColor = RGBColor(243, 244, 246);
@@ -43,6 +44,8 @@ pub(crate) struct Series {
     pub(crate) band: Vec<[f64; 2]>,
     /// Whether a ring around its dots marks it.
     pub(crate) marked: bool,
+    /// Whether a box around its dots marks it.
+    pub(crate) boxed: bool,
 }
 
 impl Axis {
@@ -97,7 +100,8 @@ impl Plot {
     pub(crate) fn svg(&self) -> anyhow::Result<String> {
         let mut text = String::new();
         {
-            let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+            let root =
+                SVGBackend::with_string(&mut text, (WIDTH, self.height())).into_drawing_area();
             let drawn = root.fill(&WHITE).and_then(|()| self.draw(&root));
             drawn.and_then(|()| root.present()).map_err(|e| anyhow!("cannot draw a chart: {e}"))?;
         }
@@ -121,7 +125,7 @@ impl Plot {
         &self,
         root: &DrawingArea<DB, Shift>,
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
-        let (panel, legend) = root.split_horizontally(SIZE.0 - LEGEND);
+        let (panel, legend) = root.split_horizontally(WIDTH - LEGEND);
         let points = || self.series.iter().flat_map(|series| &series.points);
         let bands = self.series.iter().flat_map(|series| series.band.iter().flatten());
         let heights = points().map(|point| point[1]).chain(bands.copied());
@@ -166,6 +170,11 @@ impl Plot {
                 if series.marked {
                     chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
                 }
+                if series.boxed {
+                    let corners = [(-14, -14), (14, 14)];
+                    let frame = Rectangle::new(corners, BLACK.stroke_width(1));
+                    chart.draw_series([EmptyElement::at(point) + frame])?;
+                }
             } else if series.dashed {
                 let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
                 chart.draw_series(line)?;
@@ -174,6 +183,11 @@ impl Plot {
             }
         }
         self.legend(&legend)
+    }
+
+    /// As much as the names of all methods need.
+    fn height(&self) -> u32 {
+        HEIGHT.max((ROW as u32) * (self.series.len() as u32 + 3))
     }
 
     fn legend<DB: DrawingBackend>(

@@ -298,7 +298,7 @@ fn chosen(cell: &Cell) -> bool {
         let searched = Searched::of(cell.task.name(), cell.softness(), schedule, usual);
         searched.is_some()
     });
-    searched || cell.softness() == "learned" || Path::new(cell.softness()).exists()
+    searched || cell.is_shipped() || Path::new(cell.softness()).exists()
 }
 
 fn with_interval(error: &Error) -> String {
@@ -354,7 +354,8 @@ mod tests {
     /// A cell whose hard errors by seed are these.
     fn measured(method: &str, per_run: [f64; 3]) -> Measured {
         let task = TaskName::Pose;
-        let cell = Cell { task, variant: "original", method: method.to_owned(), runs: 3 };
+        let cell =
+            Cell { task, variant: "original", method: method.to_owned(), runs: 3, varies: false };
         let mean = per_run.iter().sum::<f64>() / 3.0;
         let error = json!({"name": "hard", "unit": "", "final": mean, "ci95": [0.0, 1.0], "per_run": per_run});
         let with = |key: &str| {

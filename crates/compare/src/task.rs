@@ -37,6 +37,19 @@ impl TaskName {
         }
     }
 
+    /// Width and height of its images, in pixels.
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::Shape2d => 256,
+            Self::Shape3d | Self::Pose | Self::Occlusion => 64,
+        }
+    }
+
+    /// Whether its images can be drawn on fewer pixels, and less exactly.
+    pub(crate) fn draws_freely(self) -> bool {
+        self != Self::Occlusion
+    }
+
     /// Seeds of a full comparison.
     ///
     /// Source: FACTS 4.3 and 4.4 (200 pairs of POSE, 20 runs of 2D SHAPE) and 4.2 (five elevations);

@@ -29,29 +29,27 @@ impl Method {
         resolution.check(settings.size.unwrap_or(defaults.size))?;
         let tolerance = settings.tolerance.unwrap_or(Rasterizer::TOLERANCE);
         let drawn = Drawn { backend, resolution, tolerance };
-        match &settings.softness {
+        if let Some(name) = shipped::asked_for(settings, defaults.task) {
+            check_alone(settings)?;
+            let called = settings.softness.clone().unwrap_or(SoftnessChoice::Learned(None));
+            let file = shipped::softness(&name)?.ok_or_else(|| {
+                usage(&format!(
+                    "no softness {called} comes with the program for {}: name a family or a file",
+                    defaults.task
+                ))
+            })?;
+            return Ok(Self::of_file(called.to_string(), file, settings, defaults, drawn));
+        }
+        let family = match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 check_alone(settings)?;
                 let (name, file) = (file.display().to_string(), SoftnessFile::load(file)?);
-                Ok(Self::of_file(name, file, settings, defaults, drawn))
+                return Ok(Self::of_file(name, file, settings, defaults, drawn));
             }
-            Some(SoftnessChoice::Named(name)) => {
-                Self::of_family(name.parse()?, settings, defaults, drawn)
-            }
-            None if !shipped::is_asked_for(settings, defaults.task) => {
-                Self::of_family(Family::Logistic, settings, defaults, drawn)
-            }
-            Some(SoftnessChoice::Learned) | None => {
-                check_alone(settings)?;
-                let file = shipped::softness(defaults.task)?.ok_or_else(|| {
-                    usage(&format!(
-                        "no softness learned on {} comes with the program: name a family or a file",
-                        defaults.task
-                    ))
-                })?;
-                Ok(Self::of_file("learned".to_owned(), file, settings, defaults, drawn))
-            }
-        }
+            Some(SoftnessChoice::Named(name)) => name.parse()?,
+            Some(SoftnessChoice::Learned(_)) | None => Family::Logistic,
+        };
+        Self::of_family(family, settings, defaults, drawn)
     }
 
     fn of_file(
@@ -250,7 +248,8 @@ mod tests {
     #[test]
     fn a_learned_softness_that_is_not_there_or_not_alone_is_refused() {
         for (task, line, part) in [
-            ("none", "--softness learned", "no softness learned on none comes with the program"),
+            ("none", "--softness learned", "no softness learned comes with the program for none"),
+            ("example", "--softness learned-mlp", "no softness learned-mlp comes"),
             ("example", "--softness learned --scale 0.1", "holds its own parameters"),
         ] {
             let defaults = Defaults { task, ..DEFAULTS };

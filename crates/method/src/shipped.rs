@@ -10,7 +10,8 @@ use crate::defaults::is_scaled;
 /// Name and text of every file in `data/softness`; a line here makes a file part of the program, such as
 /// `("pose", include_str!("../../../data/softness/pose.json")),`.
 ///
-/// The name is that of the task, with `_depth` behind it for a softness of depths.
+/// The name is that of the task, with `-mlp` or the like behind it for what is not the best one, and at the end `_depth`
+/// for a softness of depths.
 const SHIPPED: &[(&str, &str)] = &[
     #[cfg(test)]
     (
@@ -28,33 +29,34 @@ fn path(name: &str) -> String {
     format!("data/softness/{name}.json")
 }
 
-/// The softness that is shipped for a task.
+/// The softness that is shipped under a name of [`asked_for`].
 ///
 /// # Errors
 ///
 /// If the file that is part of the program is broken.
-pub fn softness(task: &str) -> anyhow::Result<Option<SoftnessFile>> {
-    let parse = |text| SoftnessFile::parse(text, Path::new(&path(task)));
-    Ok(text(task).map(parse).transpose()?)
+pub fn softness(name: &str) -> anyhow::Result<Option<SoftnessFile>> {
+    let parse = |text| SoftnessFile::parse(text, Path::new(&path(name)));
+    Ok(text(name).map(parse).transpose()?)
 }
 
-/// The softness of depths that is shipped for a task.
+/// The softness of depths that is shipped beside that of edges under a name of [`asked_for`].
 ///
 /// # Errors
 ///
 /// If the file that is part of the program is broken.
-pub fn depth_softness(task: &str) -> anyhow::Result<Option<DepthSoftnessFile>> {
-    let name = format!("{task}_depth");
+pub fn depth_softness(edge: &str) -> anyhow::Result<Option<DepthSoftnessFile>> {
+    let name = format!("{edge}_depth");
     let parse = |text| DepthSoftnessFile::parse(text, Path::new(&path(&name)));
     Ok(text(&name).map(parse).transpose()?)
 }
 
-/// Whether a command line means what is shipped for a task: by name, or because it has something to
-/// solve and says nothing of the softness, and there is one.
-pub fn is_asked_for(settings: &Settings, task: &str) -> bool {
-    match settings.softness {
-        Some(SoftnessChoice::Learned) => true,
-        Some(SoftnessChoice::Named(_) | SoftnessChoice::File(_)) => false,
+/// The name of what a command line means among what is shipped, whether it is there or not: it says so, or it has something
+/// to solve, says nothing of the softness, and there is one for the task.
+pub fn asked_for(settings: &Settings, task: &str) -> Option<String> {
+    match &settings.softness {
+        Some(SoftnessChoice::Learned(None)) => Some(task.to_owned()),
+        Some(SoftnessChoice::Learned(Some(kind))) => Some(format!("{task}-{kind}")),
+        Some(SoftnessChoice::Named(_) | SoftnessChoice::File(_)) => None,
         None => {
             // A search, a choice and learning begin with a family.
             let solves = matches!(settings.command, Command::Solve | Command::Evaluate);
@@ -62,7 +64,7 @@ pub fn is_asked_for(settings: &Settings, task: &str) -> bool {
                 && settings.surrogate_scale.is_none()
                 && settings.init.is_none()
                 && !is_scaled(settings);
-            solves && silent && text(task).is_some()
+            (solves && silent && text(task).is_some()).then(|| task.to_owned())
         }
     }
 }

@@ -49,7 +49,7 @@ impl Task for Parabola {
                 let message = format!("the parabola has no softness {name}, only logistic");
                 return Err(softrast_runner::Error::Usage(message).into());
             }
-            Some(SoftnessChoice::Learned) => {
+            Some(SoftnessChoice::Learned(_)) => {
                 let message = "there is no softness that was learned on the parabola".to_owned();
                 return Err(softrast_runner::Error::Usage(message).into());
             }

@@ -4,6 +4,7 @@
 /// Methods that are no softness family share one dark colour.
 pub fn method_colour(method: &str) -> [u8; 3] {
     match method.split([' ', '-', '.']).next() {
+        Some("learned") if method.starts_with("learned-mlp") => [170, 20, 60],
         Some("logistic") => [31, 96, 168],
         Some("gauss") => [86, 180, 233],
         Some("exp") => [0, 140, 100],

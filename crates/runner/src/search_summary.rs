@@ -3,7 +3,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::{
-    Measure, Run, Settings, SoftnessChoice, bootstrap_mean_interval,
+    Measure, Run, Settings, bootstrap_mean_interval,
     error_summary::{RESAMPLES, RESAMPLING_SEED},
     mean,
     search::{Cell, Stage, best},
@@ -173,12 +173,7 @@ fn flags(settings: &Settings, setting: Setting) -> String {
     if settings.variant != crate::Variant::Original {
         flags.push(format!("--variant {}", settings.variant.name()));
     }
-    match &settings.softness {
-        Some(SoftnessChoice::Named(name)) => flags.push(format!("--softness {name}")),
-        Some(SoftnessChoice::File(path)) => flags.push(format!("--softness {}", path.display())),
-        Some(SoftnessChoice::Learned) => flags.push("--softness learned".into()),
-        None => {}
-    }
+    flags.extend(settings.softness.iter().map(|softness| format!("--softness {softness}")));
     if settings.squared {
         flags.push("--squared".into());
     }

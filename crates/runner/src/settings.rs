@@ -1,6 +1,7 @@
-use std::path::PathBuf;
+use std::{fmt, path::PathBuf};
 
 use clap::{Args, Parser, ValueEnum};
+use serde::Serialize;
 
 use crate::{Error, Resolution, control::Control, plan::LearnFlags, resolution::resolution};
 
@@ -69,8 +70,8 @@ pub struct Settings {
     #[arg(long, value_enum, default_value = "original")]
     pub variant: Variant,
 
-    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, learned for the one that
-    /// comes with the program, or auto for what `choose` finds.
+    /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, learned for the best that
+    /// comes with the program and learned-mlp for its network, or auto for what `choose` finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
 
@@ -149,7 +150,8 @@ pub struct Settings {
 }
 
 /// The two variants of every task.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum Variant {
     /// The one a softness is tuned on.
     Original,
@@ -192,8 +194,9 @@ pub enum SoftnessChoice {
     Named(&'static str),
     /// A file, not opened yet.
     File(PathBuf),
-    /// The one that was learned on the task and comes with the program.
-    Learned,
+    /// One that was learned on the task and comes with the program: the best one, or the one of this
+    /// name.
+    Learned(Option<String>),
 }
 
 impl SoftnessChoice {
@@ -256,18 +259,36 @@ impl Settings {
     }
 }
 
+/// What a softness that comes with the program is called, and with what its name begins.
+const LEARNED: &str = "learned";
+
+impl fmt::Display for SoftnessChoice {
+    /// As on the command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Named(name) => f.write_str(name),
+            Self::File(path) => path.display().fmt(f),
+            Self::Learned(None) => f.write_str(LEARNED),
+            Self::Learned(Some(kind)) => write!(f, "{LEARNED}-{kind}"),
+        }
+    }
+}
+
 pub(crate) fn softness(text: &str) -> Result<SoftnessChoice, String> {
     if text == "auto" {
         return Ok(SoftnessChoice::AUTO);
     }
-    if text == "learned" {
-        return Ok(SoftnessChoice::Learned);
+    if text == LEARNED {
+        return Ok(SoftnessChoice::Learned(None));
     }
     if let Some(name) = SoftnessChoice::NAMES.into_iter().find(|&name| name == text) {
         return Ok(SoftnessChoice::Named(name));
     }
     if text.to_ascii_lowercase().ends_with(".json") {
         return Ok(SoftnessChoice::File(text.into()));
+    }
+    if let Some(kind) = text.strip_prefix(LEARNED).and_then(|kind| kind.strip_prefix('-')) {
+        return Ok(SoftnessChoice::Learned(Some(kind.to_owned())));
     }
     Err(format!(
         "expected one of {}, learned, auto or a file that ends in .json",

@@ -63,7 +63,7 @@ impl Space {
     /// [`Error::Usage`] if that leaves nothing to choose from, or scales for a softness file.
     pub(crate) fn new(settings: &Settings, control: &Control, grid: &Grid) -> Result<Self, Error> {
         let file = match settings.softness {
-            Some(SoftnessChoice::File(_) | SoftnessChoice::Learned) => true,
+            Some(SoftnessChoice::File(_) | SoftnessChoice::Learned(_)) => true,
             Some(SoftnessChoice::Named(_)) | None => false,
         };
         if file && !control.scales.is_empty() {

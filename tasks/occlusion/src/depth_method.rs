@@ -95,9 +95,10 @@ impl DepthMethod {
 
 /// The depth softness that was learned along with the shipped one of the edges, where that is used.
 fn shipped(settings: &Settings, args: &Args) -> anyhow::Result<Option<DepthSoftnessFile>> {
-    match args.depth_scale.is_none() && shipped::is_asked_for(settings, Occlusion::NAME) {
-        true => shipped::depth_softness(Occlusion::NAME),
-        false => Ok(None),
+    let edge = shipped::asked_for(settings, Occlusion::NAME);
+    match edge.filter(|_| args.depth_scale.is_none()) {
+        Some(edge) => shipped::depth_softness(&edge),
+        None => Ok(None),
     }
 }
 
