@@ -42,7 +42,7 @@ const ORDERS: [(&str, Order, bool, Referee); 5] = [
     ("unrolled, adjoint clip", Order::Unrolled, false, Referee::Fixed),
     ("truncated:10", Order::Truncated(10), false, Referee::Fixed),
     ("direct (referee own)", Order::Direct, false, Referee::Own),
-    ("es", Order::Es, false, Referee::Fixed),
+    ("es", Order::Es(0.05), false, Referee::Fixed),
 ];
 
 /// What was found at one number of steps and one scale.

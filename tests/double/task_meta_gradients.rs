@@ -10,7 +10,7 @@ use shape2d::{Shape2d, Shape2dLesson};
 use shape3d::{Shape3d, Shape3dLesson};
 use softrast_meta::{MetaGradient, Tasks};
 use softrast_method::{Class, Lesson};
-use softrast_runner::{Input, Judged, Order, Plan, Referee, Settings, Task};
+use softrast_runner::{Input, Judged, Order, Plan, Referee, Settings, Task, Variant};
 use softrast_tests::{numbers, vector};
 
 use crate::differences::relative_error;
@@ -39,6 +39,7 @@ struct Line<A: Args> {
 
 fn plan(referee: Referee) -> Plan {
     Plan {
+        variant: Variant::Original,
         order: Order::Unrolled,
         outer: 1,
         batch: 1,

@@ -1,34 +1,26 @@
 use std::f64::consts::TAU;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use burn::tensor::{Tensor, backend::Backend};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::{
-    MetaEstimate, Objective, Optimizer, Problem,
+    MetaEstimate,
     vector::{numbers, tensor},
 };
 
 /// The mean of `(L(φ + σ ε) - L(φ - σ ε)) / 2σ · ε` over `pairs` normal ε drawn from `seed`.
 ///
-/// Both runs of a pair solve the same instance, so that what they have in common cancels.
+/// `run` gives the loss of a whole run. Both runs of a pair solve the same instance, so that what they have in common
+/// cancels.
 ///
 /// Source: META 2.3; Salimans et al. 2017 for the estimator.
-pub(crate) fn evolution<B, P, R, O>(
-    problem: &Problem<B, P, R, O>,
+pub(crate) fn evolution<B: Backend>(
+    run: impl Fn(&Tensor<B, 1>) -> f64,
     phi: &Tensor<B, 1>,
     sigma: f64,
     pairs: usize,
     seed: u64,
-) -> MetaEstimate<B>
-where
-    B: Backend,
-    P: Objective<Autodiff<B>>,
-    R: Objective<B>,
-    O: Optimizer,
-{
+) -> MetaEstimate<B> {
     assert!(sigma > 0.0 && pairs > 0, "an evolution strategy needs a sigma and a pair");
     let mut random = StdRng::seed_from_u64(seed);
     let middle = numbers(phi.clone());
@@ -37,7 +29,7 @@ where
         let noise: Vec<f64> = middle.iter().map(|_| normal(&mut random)).collect();
         let [low, high] = [-sigma, sigma].map(|sigma| {
             let moved: Vec<f64> = middle.iter().zip(&noise).map(|(x, e)| x + sigma * e).collect();
-            problem.loss(&tensor(&moved))
+            run(&tensor(&moved))
         });
         loss += (low + high) / (2 * pairs) as f64;
         let slope = (high - low) / (2.0 * sigma * pairs as f64);

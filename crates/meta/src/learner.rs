@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::{
     Adam, MetaEstimate, MetaGradient, Optimizer, Progress, Record, Tasks,
+    evolution::evolution,
     progress::{Best, Moment},
     vector::{norm, numbers, tensor},
 };
@@ -114,7 +115,12 @@ impl Learner {
         let step = progress.step;
         let estimates = (0..self.batch).map(|k| {
             let seed = self.seed.wrapping_add((step * self.batch + k) as u64);
-            self.mode.estimate(&tasks.problem(seed, &phi), &phi, seed)
+            match self.mode {
+                MetaGradient::Es { sigma, pairs } => {
+                    evolution(|phi| tasks.loss(seed, phi), &phi, sigma, pairs, seed)
+                }
+                mode => mode.estimate(&tasks.problem(seed, &phi), &phi, seed),
+            }
         });
         let estimates: Vec<_> = estimates.filter(MetaEstimate::is_finite).collect();
         if estimates.is_empty() {

@@ -80,7 +80,9 @@ impl MetaGradient {
             Self::Unrolled { clip } => unrolled(problem, phi, problem.inner.steps, clip),
             Self::Truncated { steps, clip } => unrolled(problem, phi, steps, clip),
             Self::Direct => unrolled(problem, phi, 0, None),
-            Self::Es { sigma, pairs } => evolution(problem, phi, sigma, pairs, seed),
+            Self::Es { sigma, pairs } => {
+                evolution(|phi| problem.loss(phi), phi, sigma, pairs, seed)
+            }
             Self::Joint { learning_rate } => joint(problem, phi, learning_rate),
         }
     }

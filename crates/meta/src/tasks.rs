@@ -21,10 +21,15 @@ pub trait Tasks<B: Backend> {
         phi: &Tensor<B, 1>,
     ) -> Problem<B, Self::Objective, Self::Referee, Self::Optimizer>;
 
+    /// The outer loss of `phi` `[P]` on the instance with this seed, for what needs no derivative of it.
+    fn loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
+        self.problem(seed, phi).loss(phi)
+    }
+
     /// The loss by which `phi` `[P]` is judged on the instance with this seed, in validation.
     ///
     /// It is the outer loss unless that may flatter some softnesses.
     fn judged(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
-        self.problem(seed, phi).loss(phi)
+        self.loss(seed, phi)
     }
 }

@@ -12,16 +12,15 @@ use softrast_meta::{
 };
 use softrast_runner::{Judged, Learned, Order, OuterStep, Plan, Referee, Study};
 
-use crate::{FINER, Lesson, Of, Step, numbers};
+use crate::{FINER, Lesson, Of, Step, numbers, tensor};
 
 /// Learning runs in doubles: rounding grows with every step that is walked back (META 2.5, V9).
 type B = NdArray<f64>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
+/// What takes no derivative of a run does without: that run is as `evaluate` makes it.
+type Single = NdArray<f32>;
 
-/// Standard deviation of an evolution strategy's steps in φ, whose entries are mostly logarithms;
-/// larger ones straddle kinks that Adam's steps fall on either side of.
-const SIGMA: f64 = 0.05;
 /// Largest norm of the mean meta-gradient. Source: META 2.4.
 const CLIP: f64 = 1.0;
 /// Validations during a run, beside that of the start.
@@ -65,7 +64,7 @@ pub fn meta_gradient(plan: &Plan) -> MetaGradient {
         Order::Truncated(steps) => MetaGradient::Truncated { steps, clip: Some(1.0) },
         Order::Direct => MetaGradient::Direct,
         Order::Joint => MetaGradient::Joint { learning_rate: plan.outer_rate },
-        Order::Es => MetaGradient::Es { sigma: SIGMA, pairs: 1 },
+        Order::Es(sigma) => MetaGradient::Es { sigma, pairs: 1 },
     }
 }
 
@@ -153,6 +152,27 @@ impl<L: Lesson> Class<L> {
         }
     }
 
+    /// The outer loss of a run in single precision.
+    fn quick(&self, seed: u64, phi: &[f64], own_referee: bool) -> f64 {
+        let (lesson, drawing) = (&self.lesson, self.drawing(phi));
+        let made = "its neighbours could be made";
+        let objective = QuickInner {
+            lesson: lesson.clone(),
+            drawing: drawing.clone(),
+            one: lesson.scene::<Autodiff<Single>>(seed, 1).expect(made),
+        };
+        let finer = if own_referee { 1 } else { FINER };
+        let referee = QuickOuter {
+            lesson: lesson.clone(),
+            own: own_referee.then_some(drawing),
+            zero: lesson.scene::<Single>(seed, finer).expect(made),
+        };
+        let start = lesson.theta(&referee.zero);
+        let (inner, measured) = (lesson.inner(), self.measured);
+        let problem = Problem { objective, referee, inner, start, measured };
+        problem.loss(&tensor(phi.to_vec(), [phi.len()]))
+    }
+
     fn made(
         &self,
         seed: u64,
@@ -191,9 +211,13 @@ impl<L: Lesson> Tasks<B> for Class<L> {
         self.made(seed, phi, self.own_referee)
     }
 
+    fn loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
+        self.quick(seed, &numbers(phi.clone()), self.own_referee)
+    }
+
     /// Always by the fixed referee.
     fn judged(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
-        self.made(seed, phi, false).loss(phi)
+        self.quick(seed, &numbers(phi.clone()), false)
     }
 }
 
@@ -213,10 +237,24 @@ pub struct Outer<L: Lesson> {
     one: L::Scene<A>,
 }
 
-/// One objective on two backends, each with its own scene.
+/// [`Inner`] for runs without a derivative.
+struct QuickInner<L: Lesson> {
+    lesson: Arc<L>,
+    drawing: Arc<L::Drawing>,
+    one: L::Scene<Autodiff<Single>>,
+}
+
+/// [`Outer`] for runs without a derivative.
+struct QuickOuter<L: Lesson> {
+    lesson: Arc<L>,
+    own: Option<Arc<L::Drawing>>,
+    zero: L::Scene<Single>,
+}
+
+/// One objective on several backends, each with its own scene.
 macro_rules! objectives {
-    ($backend:ty, $scene:ident, $tracked:expr) => {
-        impl<L: Lesson> Objective<$backend> for Inner<L> {
+    ($of:ident, $backend:ty, $scene:ident, $tracked:expr) => {
+        impl<L: Lesson> Objective<$backend> for $of<L> {
             fn loss(
                 &self,
                 theta: Tensor<$backend, 1>,
@@ -261,10 +299,10 @@ macro_rules! objectives {
     };
 }
 
-/// One judge on two backends, each with its own scene.
+/// One judge on several backends, each with its own scene.
 macro_rules! judges {
-    ($backend:ty, $scene:ident) => {
-        impl<L: Lesson> Objective<$backend> for Outer<L> {
+    ($of:ident, $backend:ty, $scene:ident) => {
+        impl<L: Lesson> Objective<$backend> for $of<L> {
             fn loss(
                 &self,
                 theta: Tensor<$backend, 1>,
@@ -286,7 +324,9 @@ macro_rules! judges {
 
 // On the lower level a joint loop alone asks for the derivative by φ; on the higher one φ belongs to a
 // tape below.
-objectives!(A, one, Tensor::is_require_grad);
-objectives!(AA, two, |_| true);
-judges!(B, zero);
-judges!(A, one);
+objectives!(Inner, A, one, Tensor::is_require_grad);
+objectives!(Inner, AA, two, |_| true);
+objectives!(QuickInner, Autodiff<Single>, one, Tensor::is_require_grad);
+judges!(Outer, B, zero);
+judges!(Outer, A, one);
+judges!(QuickOuter, Single, zero);

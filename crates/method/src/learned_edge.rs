@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
-use softrast_runner::{Input, Order, Plan, Referee};
+use softrast_runner::{Input, Order, Plan, Referee, Variant};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, SoftnessFile, Surrogate};
 
 use crate::{Method, PreparedRun, method_of_flags::usage, numbers, tensor};
@@ -28,15 +28,17 @@ pub struct LearnedEdge {
     pub(crate) surrogate: Option<Surrogate>,
     pub(crate) steps: usize,
     pub(crate) size: usize,
+    variant: Variant,
 }
 
 impl LearnedEdge {
     /// Begins with what `method` does on runs of `steps` steps and images of `size` × `size` pixels.
     pub fn new(method: &Method, plan: &Plan, steps: usize, size: usize) -> Self {
         let (softness, surrogate) = (method.softness(), method.surrogate().cloned());
+        let variant = plan.variant;
         if method.is_static() && plan.input == Input::Ndc {
             let phi = method.phi(method.scale(0, steps));
-            return Self { softness, phi, path: None, surrogate, steps, size };
+            return Self { softness, phi, path: None, surrogate, steps, size, variant };
         }
         let mut path = ScalePath { knots: Vec::new(), floor_px: plan.floor_px };
         let floor = path.floor(softness, size);
@@ -49,7 +51,8 @@ impl LearnedEdge {
                 (scale - floor).max(ABOVE_FLOOR * scale).ln()
             })
             .collect();
-        Self { softness, phi: method.unit_phi(), path: Some(path), surrogate, steps, size }
+        let (phi, path) = (method.unit_phi(), Some(path));
+        Self { softness, phi, path, surrogate, steps, size, variant }
     }
 
     /// Refuses a plan that this softness cannot be learned by.
@@ -148,7 +151,7 @@ impl LearnedEdge {
     }
 
     /// The file `softness.json` of a vector that was learned at a learning rate of the inner loops:
-    /// name and text.
+    /// name and text. It has the rate if that is one for the original variant.
     ///
     /// # Errors
     ///
@@ -164,7 +167,7 @@ impl LearnedEdge {
         let phi = self.phi[..self.fixed()].iter().chain(own).copied().collect();
         let path = self.path.as_ref().map(|path| ScalePath { knots: knots.to_vec(), ..*path });
         let (softness, note) = (self.softness, Some(note.to_owned()));
-        let learning_rate = Some(learning_rate);
+        let learning_rate = Some(learning_rate).filter(|_| self.variant == Variant::Original);
         let surrogate = self.surrogate.as_ref();
         let surrogate = surrogate.map(|s| Surrogate { softness: s.softness, phi: felt.to_vec() });
         let file = SoftnessFile { softness, phi, path, surrogate, learning_rate, note };

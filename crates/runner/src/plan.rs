@@ -2,7 +2,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use crate::{
-    Command, Error,
+    Command, Error, Variant,
     settings::{count, positive},
 };
 
@@ -10,7 +10,8 @@ use crate::{
 #[derive(Args, Clone, Debug, Default)]
 pub(crate) struct LearnFlags {
     /// How `learn` gets its gradient: unrolled (exact, through all inner steps), truncated:K (the last
-    /// K), direct (at the end alone), joint (down the inner loss), es (differences) [default: unrolled].
+    /// K), direct (at the end alone), joint (down the inner loss), es or es:S (differences of whole runs whose
+    /// parameters are S apart, 0.05 if not said) [default: unrolled].
     #[arg(long, value_name = "ORDER", value_parser = order)]
     order: Option<Order>,
 
@@ -64,6 +65,8 @@ pub(crate) struct LearnFlags {
 /// What a task has to know to have a softness learned on it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
+    /// What it is learned on.
+    pub variant: Variant,
     /// How the gradient is taken.
     pub order: Order,
     /// Updates of the softness.
@@ -93,7 +96,7 @@ pub struct Plan {
 }
 
 /// How the derivative of the outer loss is taken; see `MetaGradient` of `softrast-meta`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
     /// Exactly, through every inner step.
@@ -104,8 +107,8 @@ pub enum Order {
     Direct,
     /// Not at all: the softness goes down the inner loss, as in the released pose code.
     Joint,
-    /// By differences.
-    Es,
+    /// By differences, from runs whose parameters are so far off, on average.
+    Es(f64),
 }
 
 /// What judges the result of an inner loop.
@@ -154,7 +157,7 @@ impl LearnFlags {
     /// # Errors
     ///
     /// If flags contradict each other.
-    pub(crate) fn plan(&self, seed: u64) -> Result<Plan, Error> {
+    pub(crate) fn plan(&self, variant: Variant, seed: u64) -> Result<Plan, Error> {
         let order = self.order.unwrap_or(Order::Unrolled);
         let direct = order == Order::Direct;
         if direct && self.referee == Some(Referee::Fixed) {
@@ -163,6 +166,7 @@ impl LearnFlags {
             return Err(Error::Usage(message.into()));
         }
         Ok(Plan {
+            variant,
             order,
             outer: self.outer.unwrap_or(50),
             batch: self.batch.unwrap_or(8),
@@ -209,17 +213,22 @@ impl LearnFlags {
     }
 }
 
+/// What `es` alone means. The entries of φ are mostly logarithms.
+const SIGMA: f64 = 0.05;
+const ORDERS: &str = "expected unrolled, truncated:K, direct, joint, es or es:S";
+
 fn order(text: &str) -> Result<Order, String> {
     match text.split_once(':') {
         None => match text {
             "unrolled" => Ok(Order::Unrolled),
             "direct" => Ok(Order::Direct),
             "joint" => Ok(Order::Joint),
-            "es" => Ok(Order::Es),
-            _ => Err("expected unrolled, truncated:K, direct, joint or es".into()),
+            "es" => Ok(Order::Es(SIGMA)),
+            _ => Err(ORDERS.into()),
         },
         Some(("truncated", steps)) => count(steps).map(Order::Truncated),
-        Some(_) => Err("expected unrolled, truncated:K, direct, joint or es".into()),
+        Some(("es", sigma)) => positive(sigma).map(Order::Es),
+        Some(_) => Err(ORDERS.into()),
     }
 }
 
@@ -238,8 +247,8 @@ mod tests {
     #[test]
     fn orders_have_the_names_of_the_documentation() {
         assert_eq!(order("truncated:5"), Ok(Order::Truncated(5)));
-        assert_eq!(order("es"), Ok(Order::Es));
-        for wrong in ["truncated", "truncated:0", "unrolled:3", "second"] {
+        assert_eq!([order("es"), order("es:0.3")], [0.05, 0.3].map(|s| Ok(Order::Es(s))));
+        for wrong in ["truncated", "truncated:0", "unrolled:3", "second", "es:0", "es:x"] {
             assert!(order(wrong).is_err(), "{wrong}");
         }
     }
@@ -247,9 +256,13 @@ mod tests {
     #[test]
     fn a_direct_gradient_needs_a_referee_that_sees_the_softness() {
         let direct = LearnFlags { order: Some(Order::Direct), ..LearnFlags::default() };
-        assert_eq!(direct.plan(0).unwrap().referee, Referee::Own);
-        assert!(LearnFlags { referee: Some(Referee::Fixed), ..direct }.plan(0).is_err());
-        let seeds = LearnFlags::default().plan(3).unwrap();
+        assert_eq!(direct.plan(Variant::Original, 0).unwrap().referee, Referee::Own);
+        assert!(
+            LearnFlags { referee: Some(Referee::Fixed), ..direct }
+                .plan(Variant::Original, 0)
+                .is_err()
+        );
+        let seeds = LearnFlags::default().plan(Variant::Original, 3).unwrap();
         assert_eq!((seeds.seed, seeds.validation_seed), (1_000_003, 2_000_003));
     }
 }

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use anyhow::Context;
 use clap::{Args, Parser};
-use softrast_runner::{Input, Judged, Order, Plan, Referee, Settings, Task};
+use softrast_runner::{Input, Judged, Order, Plan, Referee, Settings, Task, Variant};
 
 #[derive(Parser)]
 struct Line<A: Args> {
@@ -24,6 +24,7 @@ pub(crate) fn task<T: Task>(flags: &str) -> anyhow::Result<T> {
 /// What `learn` does by default, in this order and judged like this.
 pub(crate) fn plan(order: Order, referee: Referee) -> Plan {
     Plan {
+        variant: Variant::Original,
         order,
         outer: 1,
         batch: 1,

@@ -4,7 +4,7 @@ use burn::backend::NdArray;
 use clap::Parser;
 use softrast_method::{Defaults, LearnedEdge, Method};
 use softrast_raster::BackendChoice;
-use softrast_runner::{Input, Judged, Order, Plan, Referee, Schedule, Settings};
+use softrast_runner::{Input, Judged, Order, Plan, Referee, Schedule, Settings, Variant};
 use softrast_softness::SoftnessFile;
 use softrast_tests::{numbers, vector};
 
@@ -14,6 +14,7 @@ const SIZE: usize = 64;
 
 fn plan(input: Input, order: Order, referee: Referee) -> Plan {
     Plan {
+        variant: Variant::Original,
         order,
         outer: 1,
         batch: 1,
@@ -123,7 +124,7 @@ fn a_surrogate_goes_only_with_orders_that_follow_what_replaces_the_derivative() 
     for (order, referee, learns) in [
         (Order::Unrolled, Referee::Fixed, true),
         (Order::Truncated(3), Referee::Fixed, true),
-        (Order::Es, Referee::Fixed, true),
+        (Order::Es(0.05), Referee::Fixed, true),
         (Order::Joint, Referee::Fixed, false),
         (Order::Direct, Referee::Own, false),
         (Order::Unrolled, Referee::Own, false),

@@ -30,7 +30,7 @@ use crate::{
 pub(crate) fn learn<T: Task>(line: &CommandLine<T::Args>, again: &str) -> anyhow::Result<Results> {
     let mut settings = line.settings.clone();
     settings.steps = line.learning.inner().or(settings.steps);
-    let plan = line.learning.plan(settings.seed)?;
+    let plan = line.learning.plan(settings.variant, settings.seed)?;
     let prepared = Prepared::<T>::new(settings, &line.args)?;
     let identity = prepared.identity();
     let Prepared { task, settings, description } = prepared;
