@@ -12,7 +12,7 @@ use softrast_meta::{
 };
 use softrast_runner::{Judged, Learned, Order, OuterStep, Plan, Referee, Study};
 
-use crate::{FINER, Lesson, Of, Step, numbers, tensor};
+use crate::{Lesson, Of, Step, finer, numbers, tensor};
 
 /// Learning runs in doubles: rounding grows with every step that is walked back (META 2.5, V9).
 type B = NdArray<f64>;
@@ -121,6 +121,7 @@ impl<L: Lesson> Study for Course<L> {
 pub struct Class<L: Lesson> {
     lesson: Arc<L>,
     own_referee: bool,
+    finer: usize,
     measured: Measured,
     /// The latest φ and what was prepared for it.
     prepared: RefCell<Option<Prepared<L>>>,
@@ -136,8 +137,9 @@ impl<L: Lesson> Class<L> {
             Judged::End => Measured::End,
             Judged::Quarters => Measured::Quarters,
         };
-        let own_referee = plan.referee == Referee::Own;
-        Self { lesson: Arc::new(lesson), own_referee, measured, prepared: RefCell::new(None) }
+        let (own_referee, finer) = (plan.referee == Referee::Own, finer(plan));
+        let (lesson, prepared) = (Arc::new(lesson), RefCell::new(None));
+        Self { lesson, own_referee, finer, measured, prepared }
     }
 
     fn drawing(&self, phi: &[f64]) -> Arc<L::Drawing> {
@@ -161,7 +163,7 @@ impl<L: Lesson> Class<L> {
             drawing: drawing.clone(),
             one: lesson.scene::<Autodiff<Single>>(seed, 1).expect(made),
         };
-        let finer = if own_referee { 1 } else { FINER };
+        let finer = if own_referee { 1 } else { self.finer };
         let referee = QuickOuter {
             lesson: lesson.clone(),
             own: own_referee.then_some(drawing),
@@ -189,7 +191,7 @@ impl<L: Lesson> Class<L> {
             one: lesson.scene::<A>(seed, 1).expect(made),
             two: at_two,
         };
-        let finer = if own_referee { 1 } else { FINER };
+        let finer = if own_referee { 1 } else { self.finer };
         let outer = Outer {
             lesson: lesson.clone(),
             own: own_referee.then_some(drawing),

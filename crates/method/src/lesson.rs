@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_raster::RasterBackend;
-use softrast_runner::{Figure, Plan};
+use softrast_runner::{Figure, Plan, Referee};
 
 use crate::Step;
 
@@ -80,7 +80,7 @@ pub trait Lesson: 'static {
     }
 
     /// What is wrong with the image at θ under a fixed softness so narrow that no other can flatter
-    /// itself, `[1]`; the scene is one with [`FINER`] times as many pixels a side.
+    /// itself, `[1]`; the scene is one with [`finer`] times as many pixels a side.
     fn judge<B: RasterBackend>(&self, scene: &Self::Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1>;
 
     /// Files for the command line: name and text.
@@ -97,7 +97,12 @@ pub trait Lesson: 'static {
 /// Pixels a side of the image that judges, over those of the image that is optimised.
 ///
 /// Source: META 2.4.
-pub const FINER: usize = 2;
+pub fn finer(plan: &Plan) -> usize {
+    match plan.referee {
+        Referee::Fixed | Referee::Own => 2,
+        Referee::Pixels => 1,
+    }
+}
 
 /// Largest error of a pixel while learning.
 ///

@@ -39,8 +39,9 @@ pub(crate) struct LearnFlags {
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     patience: Option<usize>,
 
-    /// What judges a result: a fixed narrow softness on a finer image, or the loss that was
-    /// optimised [default: fixed; own for direct, which sees nothing else].
+    /// What judges a result: a fixed narrow softness on a finer image (fixed) or on the image's own
+    /// pixels (pixels), or the loss that was optimised (own) [default: fixed; own for direct, which
+    /// sees nothing else].
     #[arg(long, value_enum)]
     referee: Option<Referee>,
 
@@ -117,6 +118,8 @@ pub enum Order {
 pub enum Referee {
     /// A fixed narrow softness on a finer image, which no learned softness can flatter.
     Fixed,
+    /// The same on the image's own pixels, on which the hard errors of tables are taken as well.
+    Pixels,
     /// The loss that was optimised, under the learned softness itself, as in the paper.
     Own,
 }
@@ -160,9 +163,9 @@ impl LearnFlags {
     pub(crate) fn plan(&self, variant: Variant, seed: u64) -> Result<Plan, Error> {
         let order = self.order.unwrap_or(Order::Unrolled);
         let direct = order == Order::Direct;
-        if direct && self.referee == Some(Referee::Fixed) {
+        if direct && !matches!(self.referee, None | Some(Referee::Own)) {
             let message = "--order direct sees how the loss depends on the softness where a run ends, \
-                           and a fixed referee does not: leave out --referee fixed";
+                           and a fixed referee does not: leave out --referee";
             return Err(Error::Usage(message.into()));
         }
         Ok(Plan {

@@ -1,6 +1,6 @@
 use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
-use softrast_method::{FINER, LearnedSilhouette, SilhouetteLesson};
+use softrast_method::{LearnedSilhouette, SilhouetteLesson, finer};
 use softrast_raster::RasterBackend;
 use softrast_runner::Plan;
 
@@ -24,7 +24,7 @@ impl Shape2dLesson {
         let solver = &task.solver;
         let faces = (0..task.triangles as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let drawn = LearnedSilhouette::new(&solver.method, plan, solver.steps, solver.size, faces);
-        let finer = task.source.image(FINER * solver.size)?;
+        let finer = task.source.image(finer(plan) * solver.size)?;
         Ok(Self { task, drawn, finer })
     }
 }
