@@ -80,7 +80,7 @@ pub trait Lesson: 'static {
     }
 
     /// What is wrong with the image at θ under a fixed softness so narrow that no other can flatter
-    /// itself, `[1]`; the scene is one with [`finer`] times as many pixels a side.
+    /// itself, or with the hard image, `[1]`; the scene is one with [`finer`] times as many pixels a side.
     fn judge<B: RasterBackend>(&self, scene: &Self::Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1>;
 
     /// Files for the command line: name and text.
@@ -100,7 +100,7 @@ pub trait Lesson: 'static {
 pub fn finer(plan: &Plan) -> usize {
     match plan.referee {
         Referee::Fixed | Referee::Own => 2,
-        Referee::Pixels => 1,
+        Referee::Pixels | Referee::Hard => 1,
     }
 }
 

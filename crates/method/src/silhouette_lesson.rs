@@ -5,7 +5,7 @@ use softrast_meta::{Adam, InnerLoop};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 use softrast_runner::{Figure, Plan};
 
-use crate::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, Method, PreparedRun, Step, finer};
+use crate::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, Method, PreparedRun, Step};
 
 /// A [`Lesson`] about scenes that are seen as silhouettes.
 pub trait SilhouetteLesson: 'static {
@@ -84,7 +84,7 @@ impl LearnedSilhouette {
         faces: Arc<[[u32; 3]]>,
     ) -> Self {
         let edge = LearnedEdge::new(method, plan, steps, size);
-        let judge = Judge::new::<HostBackend>(&faces, finer(plan) * size);
+        let judge = Judge::new(plan, &faces, size);
         Self { edge, judge, faces, size }
     }
 }

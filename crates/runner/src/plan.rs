@@ -40,8 +40,8 @@ pub(crate) struct LearnFlags {
     patience: Option<usize>,
 
     /// What judges a result: a fixed narrow softness on a finer image (fixed) or on the image's own
-    /// pixels (pixels), or the loss that was optimised (own) [default: fixed; own for direct, which
-    /// sees nothing else].
+    /// pixels (pixels), the hard image (hard), or the loss that was optimised (own) [default: fixed; own
+    /// for direct, which sees nothing else].
     #[arg(long, value_enum)]
     referee: Option<Referee>,
 
@@ -120,6 +120,8 @@ pub enum Referee {
     Fixed,
     /// The same on the image's own pixels, on which the hard errors of tables are taken as well.
     Pixels,
+    /// The hard image, by which tables compare. It has no gradient, so only differences can follow it.
+    Hard,
     /// The loss that was optimised, under the learned softness itself, as in the paper.
     Own,
 }
@@ -166,6 +168,10 @@ impl LearnFlags {
         if direct && !matches!(self.referee, None | Some(Referee::Own)) {
             let message = "--order direct sees how the loss depends on the softness where a run ends, \
                            and a fixed referee does not: leave out --referee";
+            return Err(Error::Usage(message.into()));
+        }
+        if self.referee == Some(Referee::Hard) && !matches!(order, Order::Es(_)) {
+            let message = "a hard image has no gradient: --referee hard needs --order es";
             return Err(Error::Usage(message.into()));
         }
         Ok(Plan {
@@ -265,6 +271,10 @@ mod tests {
                 .plan(Variant::Original, 0)
                 .is_err()
         );
+        let hard =
+            |order| LearnFlags { referee: Some(Referee::Hard), order, ..LearnFlags::default() };
+        assert!(hard(None).plan(Variant::Original, 0).is_err());
+        assert!(hard(Some(Order::Es(0.1))).plan(Variant::Original, 0).is_ok());
         let seeds = LearnFlags::default().plan(Variant::Original, 3).unwrap();
         assert_eq!((seeds.seed, seeds.validation_seed), (1_000_003, 2_000_003));
     }

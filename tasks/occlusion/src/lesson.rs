@@ -2,7 +2,7 @@ use burn::tensor::Tensor;
 use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{LearnedEdge, Lesson, Step, numbers, tensor};
 use softrast_raster::{HostBackend, RasterBackend};
-use softrast_runner::{Curve, Figure, Plan};
+use softrast_runner::{Curve, Figure, Plan, Referee};
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, EdgeSoftness, Family};
 
 use crate::{Instance, Occlusion, Scene};
@@ -16,6 +16,8 @@ const JUDGE: [f64; 2] = [0.0005, 0.02];
 pub struct OcclusionLesson {
     task: Occlusion,
     edge: LearnedEdge,
+    /// Whether the hard image judges.
+    hard: bool,
 }
 
 impl OcclusionLesson {
@@ -23,7 +25,7 @@ impl OcclusionLesson {
     pub fn new(task: Occlusion, plan: &Plan) -> Self {
         let solver = &task.solver;
         let edge = LearnedEdge::new(&solver.edge, plan, solver.steps, solver.size);
-        Self { task, edge }
+        Self { task, edge, hard: plan.referee == Referee::Hard }
     }
 
     /// The depth part of φ, `[P]`.
@@ -89,6 +91,9 @@ impl Lesson for OcclusionLesson {
     }
 
     fn judge<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        if self.hard {
+            return scene.loss(scene.hard(theta.unsqueeze()));
+        }
         let [edge, depth] = JUDGE.map(|scale| {
             let phi = Family::Logistic.default_phi(scale);
             tensor::<B, 1>(phi.clone(), [phi.len()])
