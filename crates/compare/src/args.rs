@@ -34,9 +34,11 @@ pub struct Args {
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
     pub varied: Vec<String>,
 
-    /// Seeds of every cell, instead of the number that its task asks for.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub runs: Option<u32>,
+    /// Seeds of every cell, instead of the number that its task asks for: one number, or one for each of
+    /// the tasks in their order.
+    #[arg(long, value_name = "N,...", value_delimiter = ',',
+          value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub runs: Vec<u32>,
 
     /// Few seeds, for a table in minutes instead of hours.
     #[arg(long, conflicts_with = "runs")]
@@ -64,7 +66,7 @@ impl Args {
     ///
     /// # Errors
     ///
-    /// If there is no task of that name.
+    /// If there is no task of that name, or the numbers of seeds are neither one nor one for each task.
     pub fn cells(&self) -> anyhow::Result<Vec<Cell>> {
         let mut tasks = Vec::new();
         for name in &self.tasks {
@@ -74,12 +76,15 @@ impl Args {
             }
         }
         tasks.dedup();
-        let cells = tasks.into_iter().flat_map(|task| {
-            let runs = match (self.runs, self.quick) {
-                (Some(runs), _) => runs,
-                (None, true) => task.quick_runs(),
-                (None, false) => task.runs(),
-            };
+        anyhow::ensure!(
+            self.runs.len() <= 1 || self.runs.len() == tasks.len(),
+            "--runs has {} numbers for {} tasks: say one, or one for each",
+            self.runs.len(),
+            tasks.len()
+        );
+        let cells = tasks.into_iter().enumerate().flat_map(|(k, task)| {
+            let usual = if self.quick { task.quick_runs() } else { task.runs() };
+            let runs = self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual);
             ["original", "transfer"].into_iter().flat_map(move |variant| {
                 let cell = move |varies| move |method| Cell { task, variant, method, runs, varies };
                 let varied = self.varied.iter().filter(move |_| task.draws_freely());
@@ -113,6 +118,13 @@ mod tests {
             args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();
         assert!(some.len() == 8 && some[3].runs == 7 && some[5].method_name() == "b");
         assert_eq!(some[2].method_name(), "exp resolution 32");
+        let runs = |line| {
+            let cells = args(line).cells().unwrap();
+            TaskName::ALL.map(|task| cells.iter().find(|cell| cell.task == task).unwrap().runs)
+        };
+        assert_eq!(runs("--runs 3"), [3; 4]);
+        assert_eq!(runs("--runs 20,5,60,50"), [20, 5, 60, 50]);
+        assert!(args("--runs 20,5").cells().is_err());
         assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));
     }
 }

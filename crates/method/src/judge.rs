@@ -10,6 +10,9 @@ use crate::{finer, tensor};
 /// Scale of the softness that judges, in pixels of the image that judges: the least one whose gradient
 /// does not depend on where between the pixels an edge lies. Source: META 6.6.
 const JUDGE_PX: f64 = 0.25;
+/// The same for [`Referee::Pixels`], nearly hard: at a quarter of a pixel, edges that run through the middle of
+/// pixels cost half of what they cost the hard image, and 2D SHAPE learns to leave them there.
+const NEARLY_HARD_PX: f64 = 0.05;
 
 /// Silhouettes by which results are judged: hard, or under a fixed narrow logistic.
 ///
@@ -31,7 +34,11 @@ impl Judge {
     pub fn new(plan: &Plan, faces: &Arc<[[u32; 3]]>, size: usize) -> Self {
         let size = finer(plan) * size;
         let soft = (plan.referee != Referee::Hard).then(|| {
-            let phi = Family::Logistic.default_phi(JUDGE_PX * 2.0 / size as f64);
+            let pixels = match plan.referee {
+                Referee::Pixels => NEARLY_HARD_PX,
+                Referee::Fixed | Referee::Hard | Referee::Own => JUDGE_PX,
+            };
+            let phi = Family::Logistic.default_phi(pixels * 2.0 / size as f64);
             let prepared = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
             (Rasterizer::new(size).prepare(faces, Logistic, &prepared), phi)
         });
