@@ -30,7 +30,7 @@ pub struct Args {
     pub methods: Vec<String>,
 
     /// Those of the methods, or others, that the charts of error against seconds also show with half the pixels a
-    /// side and with pixels that are off by up to 1e-2. OCCLUSION knows neither.
+    /// side and with pixels that are off by up to 1e-2; "" for none. OCCLUSION knows neither.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
     pub varied: Vec<String>,
 
@@ -87,7 +87,10 @@ impl Args {
             let runs = self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual);
             ["original", "transfer"].into_iter().flat_map(move |variant| {
                 let cell = move |varies| move |method| Cell { task, variant, method, runs, varies };
-                let varied = self.varied.iter().filter(move |_| task.draws_freely());
+                let varied = self
+                    .varied
+                    .iter()
+                    .filter(move |method| task.draws_freely() && !method.is_empty());
                 let varied = varied.flat_map(move |method| {
                     let side = format!("{method} --resolution {}", task.size() / 2);
                     [side, format!("{method} --tolerance 1e-2")]
@@ -122,6 +125,7 @@ mod tests {
             let cells = args(line).cells().unwrap();
             TaskName::ALL.map(|task| cells.iter().find(|cell| cell.task == task).unwrap().runs)
         };
+        assert_eq!(args("--tasks pose --methods exp --varied=").cells().unwrap().len(), 2);
         assert_eq!(runs("--runs 3"), [3; 4]);
         assert_eq!(runs("--runs 20,5,60,50"), [20, 5, 60, 50]);
         assert!(args("--runs 20,5").cells().is_err());

@@ -13,6 +13,16 @@ use crate::defaults::is_scaled;
 /// The name is that of the task, with `-mlp` or the like behind it for what is not the best one, and at the end `_depth`
 /// for a softness of depths.
 const SHIPPED: &[(&str, &str)] = &[
+    ("shape2d", include_str!("../../../data/softness/shape2d.json")),
+    ("shape2d-mlp", include_str!("../../../data/softness/shape2d-mlp.json")),
+    ("shape3d", include_str!("../../../data/softness/shape3d.json")),
+    ("shape3d-mlp", include_str!("../../../data/softness/shape3d-mlp.json")),
+    ("pose", include_str!("../../../data/softness/pose.json")),
+    ("pose-mlp", include_str!("../../../data/softness/pose-mlp.json")),
+    ("occlusion", include_str!("../../../data/softness/occlusion.json")),
+    ("occlusion_depth", include_str!("../../../data/softness/occlusion_depth.json")),
+    ("occlusion-mlp", include_str!("../../../data/softness/occlusion-mlp.json")),
+    ("occlusion-mlp_depth", include_str!("../../../data/softness/occlusion-mlp_depth.json")),
     #[cfg(test)]
     (
         "example",
