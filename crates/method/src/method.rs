@@ -49,10 +49,17 @@ impl Method {
         self.surrogate.as_ref()
     }
 
-    /// How many parameters the softness and its surrogate have.
+    /// How many parameters the softness and its surrogate have, a learned path of its scale included.
     pub fn parameters(&self) -> usize {
         let felt = self.surrogate.as_ref().map_or(0, |felt| felt.phi.len());
-        self.softness.parameters() + felt
+        let path = match &self.path {
+            // It replaces the scale of a family.
+            Path::Learned { path, .. } => {
+                path.knots.len() - usize::from(self.softness.family != Family::Mlp)
+            }
+            Path::Fixed { .. } | Path::Scale { .. } => 0,
+        };
+        self.softness.parameters() + path + felt
     }
 
     /// The settings of a task, and with them how the softness moves over `steps` steps and where it

@@ -88,12 +88,13 @@ fn the_depth_softness_is_that_of_the_edges_unless_named() {
         (json["softness"].as_str().unwrap().to_owned(), depth, json["parameters"].as_u64().unwrap())
     };
     let named = |softness: &str, depth: &str, n| (softness.to_owned(), depth.to_owned(), n);
-    assert_eq!(softness(""), named("logistic", "logistic", 2));
+    assert_eq!(softness(""), named("learned", "learned", 4));
+    assert_eq!(softness("--softness logistic"), named("logistic", "logistic", 2));
     assert_eq!(softness("--softness exp"), named("exp", "exp", 4));
     let mlp = named("mlp edges and depth_mlp depths", "depth_mlp", 112);
     assert_eq!(softness("--softness mlp"), mlp);
     let gauss = named("logistic edges and gauss depths", "gauss", 2);
-    assert_eq!(softness("--depth-softness gauss"), gauss);
+    assert_eq!(softness("--softness logistic --depth-softness gauss"), gauss);
 }
 
 #[test]
@@ -247,7 +248,8 @@ fn flags_of_learning_that_make_no_sense_are_refused() {
         ("solve --outer 3", "--outer goes with learn, not with solve"),
         ("learn --runs 3", "learn has no --runs"),
         ("learn --order truncated:0", "expected a whole number"),
-        ("learn --order direct --referee fixed", "leave out --referee fixed"),
+        ("learn --order direct --referee fixed", "leave out --referee"),
+        ("learn --referee hard", "--referee hard needs --order es"),
         ("learn --knots 6", "expected a whole number from 1 to 5"),
         ("learn --scales 0.1", "--scales goes with search"),
     ] {

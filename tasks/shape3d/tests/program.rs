@@ -55,7 +55,7 @@ fn assert_finite(json: &Value) {
 #[test]
 fn a_few_steps_lower_all_errors_and_write_every_file() {
     let out = tempfile::tempdir().unwrap();
-    let json = run_in(out.path(), "--size 24 --steps 15").unwrap();
+    let json = run_in(out.path(), "--size 24 --steps 20").unwrap();
     let [image, parameter] = [&json["image_error"], &json["parameter_error"]];
     for error in [image, &image["hard"], parameter] {
         let of = |key: &str| error[key].as_f64().unwrap();
