@@ -4,7 +4,7 @@ use softrast_runner::{median, method_colour, quantile};
 
 use crate::{
     Measured, functions,
-    plot::{Axis, Plot, Series},
+    plot::{Axis, Mark, Plot, Series},
 };
 
 /// A run is solved where its hard error has fallen to this share of what it began with. Fixed before
@@ -138,6 +138,7 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
         points: vec![*price],
         marked: best.contains(&k),
         boxed: is_default(one),
+        mark: mark(one),
         ..named(one)
     });
     let names: Vec<String> = best.iter().map(|&k| cells[k].cell.method_name()).collect();
@@ -150,7 +151,8 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
         name: format!("{stem}-pareto"),
         caption: format!(
             "{of}: error of the step that a run returns against its seconds, means over the seeds; \
-             filled dots are static, open ones move.{} On the front, ringed and joined: {}.",
+             filled marks are static, open ones move; triangles are methods on half the pixels a side, crosses with \
+             pixels that are off by up to 1e-2.{} On the front, ringed and joined: {}.",
             default.unwrap_or_default(),
             names.join(", ")
         ),
@@ -160,6 +162,16 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
             series: series.collect(),
             front: best.iter().map(|&k| prices[k]).collect(),
         },
+    }
+}
+
+/// Variations are told from the method that they vary.
+fn mark(one: &Measured) -> Mark {
+    let flag = |name| one.cell.varies && one.cell.method.contains(name);
+    match (flag("--resolution"), flag("--tolerance")) {
+        (true, _) => Mark::Triangle,
+        (_, true) => Mark::Cross,
+        _ => Mark::Dot,
     }
 }
 

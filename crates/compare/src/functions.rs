@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Farthest distance from the edge that is shown, in pixels, and points on either side.
-const REACH_PX: f64 = 3.0;
+const REACH_PX: f64 = 1.0;
 const HALF: i32 = 120;
 
 /// What each method of one task takes for the step at an edge, at the last step of a run.

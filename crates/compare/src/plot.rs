@@ -38,14 +38,24 @@ pub(crate) struct Series {
     pub(crate) name: String,
     pub(crate) colour: [u8; 3],
     pub(crate) dashed: bool,
-    /// Drawn as a line; a single one as a dot.
+    /// Drawn as a line; a single one as a mark.
     pub(crate) points: Vec<[f64; 2]>,
+    pub(crate) mark: Mark,
     /// Lower and upper end at every point, or nothing.
     pub(crate) band: Vec<[f64; 2]>,
     /// Whether a ring around its dots marks it.
     pub(crate) marked: bool,
     /// Whether a box around its dots marks it.
     pub(crate) boxed: bool,
+}
+
+/// What a single point is drawn as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Mark {
+    #[default]
+    Dot,
+    Triangle,
+    Cross,
 }
 
 impl Axis {
@@ -88,6 +98,20 @@ impl Axis {
         }
         let room = (0.04 * (high - low)).max(1e-3 * high.abs()).max(1e-9);
         low - room..high + room
+    }
+}
+
+impl Series {
+    /// Its mark around a place in pixels: filled where nothing moves, open where the scale does.
+    fn mark_at<DB: DrawingBackend>(&self, at: (i32, i32)) -> DynElement<'static, DB, (i32, i32)> {
+        let [r, g, b] = self.colour;
+        let colour = RGBColor(r, g, b);
+        let style = if self.dashed { colour.stroke_width(2) } else { colour.filled() };
+        match self.mark {
+            Mark::Dot => Circle::new(at, 5, style).into_dyn(),
+            Mark::Triangle => TriangleMarker::new(at, 6, style).into_dyn(),
+            Mark::Cross => Cross::new(at, 5, colour.stroke_width(2)).into_dyn(),
+        }
     }
 }
 
@@ -165,8 +189,8 @@ impl Plot {
             }
             let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
             if let [point] = points[..] {
-                let style = if series.dashed { colour.stroke_width(2) } else { colour.filled() };
-                chart.draw_series([Circle::new(point, 5, style)])?;
+                let mark = EmptyElement::at(point) + series.mark_at((0, 0));
+                chart.draw_series([mark])?;
                 if series.marked {
                     chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
                 }
@@ -200,8 +224,13 @@ impl Plot {
             let style = colour.stroke_width(3);
             // A dashed line as long as its name allows: two dashes.
             let dashes = if series.dashed { vec![(0, 8), (13, 21)] } else { vec![(0, 21)] };
-            for (from, to) in dashes {
-                area.draw(&PathElement::new([(from, y), (to, y)], style))?;
+            match series.points.len() {
+                1 => area.draw(&series.mark_at((10, y)))?,
+                _ => {
+                    for (from, to) in dashes {
+                        area.draw(&PathElement::new([(from, y), (to, y)], style))?;
+                    }
+                }
             }
             let text = ("sans-serif", 14).into_font().color(&BLACK);
             area.draw(&Text::new(series.name.clone(), (28, y - 7), text))?;
