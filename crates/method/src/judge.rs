@@ -11,7 +11,7 @@ use crate::{finer, tensor};
 /// does not depend on where between the pixels an edge lies. Source: META 6.6.
 const JUDGE_PX: f64 = 0.25;
 /// The same for [`Referee::Pixels`], nearly hard: at a quarter of a pixel, edges that run through the middle of
-/// pixels cost half of what they cost the hard image, and 2D SHAPE learns to leave them there.
+/// pixels cost half of what they cost the hard image.
 const NEARLY_HARD_PX: f64 = 0.05;
 
 /// Silhouettes by which results are judged: hard, or under a fixed narrow logistic.
