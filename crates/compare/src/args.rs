@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use softrast_raster::compiled_backends;
 
 use crate::{Cell, TaskName};
 
@@ -30,7 +31,8 @@ pub struct Args {
     pub methods: Vec<String>,
 
     /// Those of the methods, or others, that the charts of error against seconds also show with half the pixels a
-    /// side and with pixels that are off by up to 1e-2; "" for none. OCCLUSION knows neither.
+    /// side, with pixels that are off by up to 1e-2, neither of which OCCLUSION knows, and on every other backend
+    /// that the program was built with; "" for none.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
     pub varied: Vec<String>,
 
@@ -76,6 +78,7 @@ impl Args {
             }
         }
         tasks.dedup();
+        let others = self.other_backends();
         anyhow::ensure!(
             self.runs.len() <= 1 || self.runs.len() == tasks.len(),
             "--runs has {} numbers for {} tasks: say one, or one for each",
@@ -85,20 +88,32 @@ impl Args {
         let cells = tasks.into_iter().enumerate().flat_map(|(k, task)| {
             let usual = if self.quick { task.quick_runs() } else { task.runs() };
             let runs = self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual);
+            let others = &others;
             ["original", "transfer"].into_iter().flat_map(move |variant| {
                 let cell = move |varies| move |method| Cell { task, variant, method, runs, varies };
-                let varied = self
-                    .varied
-                    .iter()
-                    .filter(move |method| task.draws_freely() && !method.is_empty());
+                let varied = self.varied.iter().filter(|method| !method.is_empty());
                 let varied = varied.flat_map(move |method| {
-                    let side = format!("{method} --resolution {}", task.size() / 2);
-                    [side, format!("{method} --tolerance 1e-2")]
+                    let freely = [
+                        format!("{method} --resolution {}", task.size() / 2),
+                        format!("{method} --tolerance 1e-2"),
+                    ];
+                    let freely = freely.into_iter().filter(move |_| task.draws_freely());
+                    let on = |name: &&str| format!("{method} --backend {name}");
+                    freely.chain(others.iter().map(on).collect::<Vec<_>>())
                 });
                 self.methods.iter().cloned().map(cell(false)).chain(varied.map(cell(true)))
             })
         });
         Ok(cells.collect())
+    }
+
+    /// Backends that the program was built with and the system has, beside the one that is computed on.
+    fn other_backends(&self) -> Vec<&'static str> {
+        let all = compiled_backends!();
+        let first = all.first().map(|backend| backend.name());
+        let used = self.backend.as_deref().or(first);
+        let others = all.iter().filter(|backend| Some(backend.name()) != used);
+        others.filter(|backend| backend.set_up().is_ok()).map(|backend| backend.name()).collect()
     }
 }
 

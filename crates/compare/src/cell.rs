@@ -84,6 +84,7 @@ impl Cell {
         let line = line.into_iter().chain(method.split_whitespace());
         let mut words: Vec<OsString> = line.map(OsString::from).collect();
         words.extend(["--out".into(), folder.clone().into_os_string()]);
+        let backend = backend.filter(|_| !method.contains("--backend"));
         words.extend(backend.into_iter().flat_map(|name| ["--backend".into(), name.into()]));
         words.extend(quiet.then(|| "--quiet".into()));
         words.extend(folder.join("evaluate.jsonl").exists().then(|| "--resume".into()));

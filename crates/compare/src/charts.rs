@@ -147,12 +147,15 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
         true => " In the box: the default of the task, which is on the front.",
         false => " In the box: the default of the task, which is not on the front.",
     });
+    let elsewhere = cells.iter().any(|one| mark(one) == Mark::Square);
+    let squares = if elsewhere { ", squares on another backend" } else { "" };
     Chart {
         name: format!("{stem}-pareto"),
         caption: format!(
             "{of}: error of the step that a run returns against its seconds, means over the seeds; \
              filled marks are static, open ones move; triangles are methods on half the pixels a side, crosses with \
-             pixels that are off by up to 1e-2.{} On the front, ringed and joined: {}.",
+             pixels that are off by up to 1e-2{}.{} On the front, ringed and joined: {}.",
+            squares,
             default.unwrap_or_default(),
             names.join(", ")
         ),
@@ -168,9 +171,10 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
 /// Variations are told from the method that they vary.
 fn mark(one: &Measured) -> Mark {
     let flag = |name| one.cell.varies && one.cell.method.contains(name);
-    match (flag("--resolution"), flag("--tolerance")) {
-        (true, _) => Mark::Triangle,
-        (_, true) => Mark::Cross,
+    match (flag("--resolution"), flag("--tolerance"), flag("--backend")) {
+        (true, ..) => Mark::Triangle,
+        (_, true, _) => Mark::Cross,
+        (_, _, true) => Mark::Square,
         _ => Mark::Dot,
     }
 }

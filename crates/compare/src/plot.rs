@@ -56,6 +56,7 @@ pub(crate) enum Mark {
     Dot,
     Triangle,
     Cross,
+    Square,
 }
 
 impl Axis {
@@ -110,6 +111,10 @@ impl Series {
         match self.mark {
             Mark::Dot => Circle::new(at, 5, style).into_dyn(),
             Mark::Triangle => TriangleMarker::new(at, 6, style).into_dyn(),
+            Mark::Square => {
+                let corners = [(at.0 - 4, at.1 - 4), (at.0 + 4, at.1 + 4)];
+                Rectangle::new(corners, style).into_dyn()
+            }
             Mark::Cross => Cross::new(at, 5, colour.stroke_width(2)).into_dyn(),
         }
     }

@@ -119,8 +119,8 @@ What `search` found for a family on training seeds of the original variant stand
 keeps it (POSE and OCCLUSION have a learning rate of their own there). Settings with a * were not searched for: they are the
 task's own, found with a logistic. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it
 (`data/softness`, where a note in each file says how it was learned); their seeds were others too. `mlp` is the network before it has
-learned anything, with `init fitted` after a fit to the searched logistic. Rows with a resolution or a tolerance optimise on that many pixels a
-side, or let a pixel be off by that much; they are on the charts of error against seconds alone. Methods are compared by the error of the **hard** image, because a method's own
+learned anything, with `init fitted` after a fit to the searched logistic. Rows with a resolution, a tolerance or a backend optimise on that many pixels a
+side, let a pixel be off by that much, or compute there; they are on the charts of error against seconds alone. Methods are compared by the error of the **hard** image, because a method's own
 soft error falls with its scale. \"Less NAME\" is the mean of the
 differences in that error to the first method, seed by seed: below 0 is better, and in bold where its interval leaves out 0. Under
 \"best step\" stands the mean over the runs of the lowest that each has reached, which is what a run returns. Under

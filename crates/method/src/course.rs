@@ -7,8 +7,8 @@ use burn::{
 };
 use serde_json::{Value, json};
 use softrast_meta::{
-    Adam, Checkpoint, Learner, Measured, MetaGradient, Objective, Problem, Progress, Tasks,
-    Validation,
+    Adam, Checkpoint, InnerLoop, Learner, Measured, MetaGradient, Objective, Problem, Progress,
+    Tasks, Validation,
 };
 use softrast_runner::{Judged, Learned, Order, OuterStep, Plan, Referee, Study};
 
@@ -52,8 +52,8 @@ pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>>
         seed: plan.seed,
         validation,
     };
-    let progress = Progress::new(lesson.start());
     let class = Class::new(lesson, plan);
+    let progress = Progress::new(class.start());
     Ok(Box::new(Course { class, learner, progress }))
 }
 
@@ -76,7 +76,7 @@ struct Course<L: Lesson> {
 
 impl<L: Lesson> Study for Course<L> {
     fn identity(&self) -> Value {
-        json!({ "learner": self.learner, "start": self.class.lesson.start() })
+        json!({ "learner": self.learner, "start": self.class.start() })
     }
 
     fn advance(&mut self) -> anyhow::Result<Option<OuterStep>> {
@@ -106,9 +106,11 @@ impl<L: Lesson> Study for Course<L> {
         let note = format!("{note}{}; {seconds:.0} s", loss.unwrap_or_default());
         let phi = self.progress.best_phi();
         let lesson = &self.class.lesson;
+        let (softness, optimizer) = self.class.parted(phi);
+        let files = lesson.files(softness, optimizer.learning_rate, &note);
         Ok(Learned {
-            files: lesson.files(phi, &note).context("the learned softness")?,
-            figures: lesson.figures(phi),
+            files: files.context("the learned softness")?,
+            figures: lesson.figures(softness),
             parameters: phi.len(),
             best,
             seconds: *seconds,
@@ -121,6 +123,8 @@ impl<L: Lesson> Study for Course<L> {
 pub struct Class<L: Lesson> {
     lesson: Arc<L>,
     own_referee: bool,
+    /// Whether the last entry of φ is the logarithm of the inner learning rate.
+    learns_rate: bool,
     finer: usize,
     measured: Measured,
     /// The latest φ and what was prepared for it.
@@ -139,7 +143,22 @@ impl<L: Lesson> Class<L> {
         };
         let (own_referee, finer) = (plan.referee == Referee::Own, finer(plan));
         let (lesson, prepared) = (Arc::new(lesson), RefCell::new(None));
-        Self { lesson, own_referee, finer, measured, prepared }
+        Self { lesson, own_referee, learns_rate: plan.learn_rate, finer, measured, prepared }
+    }
+
+    /// φ that learning starts from.
+    fn start(&self) -> Vec<f64> {
+        let rate = self.learns_rate.then(|| self.lesson.inner().optimizer.learning_rate.ln());
+        self.lesson.start().into_iter().chain(rate).collect()
+    }
+
+    /// The part of φ that is the softness, and what steps the inner loop.
+    fn parted<'a>(&self, phi: &'a [f64]) -> (&'a [f64], Adam) {
+        let usual = self.lesson.inner().optimizer;
+        match phi.split_last().filter(|_| self.learns_rate) {
+            Some((rate, softness)) => (softness, Adam { learning_rate: rate.exp(), ..usual }),
+            None => (phi, usual),
+        }
     }
 
     fn drawing(&self, phi: &[f64]) -> Arc<L::Drawing> {
@@ -156,6 +175,7 @@ impl<L: Lesson> Class<L> {
 
     /// The outer loss of a run in single precision.
     fn quick(&self, seed: u64, phi: &[f64], own_referee: bool) -> f64 {
+        let (phi, optimizer) = self.parted(phi);
         let (lesson, drawing) = (&self.lesson, self.drawing(phi));
         let made = "its neighbours could be made";
         let objective = QuickInner {
@@ -170,7 +190,8 @@ impl<L: Lesson> Class<L> {
             zero: lesson.scene::<Single>(seed, finer).expect(made),
         };
         let start = lesson.theta(&referee.zero);
-        let (inner, measured) = (lesson.inner(), self.measured);
+        let inner = InnerLoop { optimizer, ..lesson.inner() };
+        let measured = self.measured;
         let problem = Problem { objective, referee, inner, start, measured };
         problem.loss(&tensor(phi.to_vec(), [phi.len()]))
     }

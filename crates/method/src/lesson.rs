@@ -83,12 +83,18 @@ pub trait Lesson: 'static {
     /// itself, or with the hard image, `[1]`; the scene is one with [`finer`] times as many pixels a side.
     fn judge<B: RasterBackend>(&self, scene: &Self::Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1>;
 
-    /// Files for the command line: name and text.
+    /// Files for the command line, of a softness that was learned at a learning rate of the inner loops: name and
+    /// text.
     ///
     /// # Errors
     ///
     /// If φ is not what a file may hold.
-    fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>>;
+    fn files(
+        &self,
+        phi: &[f64],
+        learning_rate: f64,
+        note: &str,
+    ) -> anyhow::Result<Vec<(&'static str, String)>>;
 
     /// The learned functions beside those of the start.
     fn figures(&self, phi: &[f64]) -> Vec<Figure>;

@@ -1,4 +1,4 @@
-use softrast_raster::Rasterizer;
+use softrast_raster::{HostBackend, Rasterizer};
 use softrast_runner::{Error, Init, Schedule, Settings, SoftnessChoice, Variant};
 use softrast_softness::{EdgeSoftness, Family, SoftnessFile, Surrogate};
 
@@ -6,9 +6,9 @@ use crate::{
     Defaults, Method, Searched,
     backend::backend,
     defaults::{asked_schedule, is_scaled, scales},
-    fitted_mlp::fitted_mlp,
+    fitted_mlp::{fitted_mlp, mlp_like},
     method::{Drawn, Path, nominal_scale},
-    shipped,
+    numbers, shipped, tensor,
 };
 
 impl Method {
@@ -38,13 +38,13 @@ impl Method {
                     defaults.task
                 ))
             })?;
-            return Ok(Self::of_file(called.to_string(), file, settings, defaults, drawn));
+            return Self::of_file(called.to_string(), file, settings, defaults, drawn);
         }
         let family = match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 check_alone(settings)?;
                 let (name, file) = (file.display().to_string(), SoftnessFile::load(file)?);
-                return Ok(Self::of_file(name, file, settings, defaults, drawn));
+                return Self::of_file(name, file, settings, defaults, drawn);
             }
             Some(SoftnessChoice::Named(name)) => name.parse()?,
             Some(SoftnessChoice::Learned(_)) | None => Family::Logistic,
@@ -58,8 +58,11 @@ impl Method {
         settings: &Settings,
         defaults: &Defaults,
         drawn: Drawn,
-    ) -> Self {
-        let SoftnessFile { softness, phi, path, surrogate, learning_rate, note } = file;
+    ) -> anyhow::Result<Self> {
+        let SoftnessFile { mut softness, mut phi, path, surrogate, learning_rate, note } = file;
+        if settings.init == Some(Init::Fitted) {
+            (softness, phi) = network_like(softness, &phi)?;
+        }
         let unit = nominal_scale(softness, &phi);
         let size = settings.size.unwrap_or(defaults.size);
         let path = match path {
@@ -68,7 +71,7 @@ impl Method {
         };
         // Learned on the original.
         let learning_rate = learning_rate.filter(|_| settings.variant == Variant::Original);
-        Self { softness, name, path, surrogate, learning_rate, note, drawn }
+        Ok(Self { softness, name, path, surrogate, learning_rate, note, drawn })
     }
 
     fn of_family(
@@ -100,14 +103,33 @@ impl Method {
     }
 }
 
+/// A network, and its weights, in the place of a softness.
+fn network_like(softness: EdgeSoftness, phi: &[f64]) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
+    let scale = nominal_scale(softness, phi);
+    let resized = |softness: EdgeSoftness, phi: &[f64], factor: f64| {
+        let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
+        numbers(softness.widened(phi, tensor(vec![factor], [1])))
+    };
+    let network = EdgeSoftness { family: Family::Mlp, ..softness };
+    let seen = |softness: EdgeSoftness| EdgeSoftness { squared: false, ..softness };
+    let weights = mlp_like(seen(softness), &resized(softness, phi, scale.recip()));
+    let weights = weights.ok_or_else(|| {
+        usage(
+            "--init fitted: a network treats both sides of an edge alike and cannot be like this softness, \
+             which does not",
+        )
+    })?;
+    Ok((network, resized(network, &weights, scale)))
+}
+
 /// Refuses flags that contradict a softness file.
 fn check_alone(settings: &Settings) -> anyhow::Result<()> {
     let moved = settings.schedule == Some(Schedule::Decay);
-    if is_scaled(settings) || moved || settings.surrogate_scale.is_some() || settings.init.is_some()
-    {
+    let begun = settings.init == Some(Init::Uniform);
+    if is_scaled(settings) || moved || settings.surrogate_scale.is_some() || begun {
         return Err(usage(
             "a softness file holds its own parameters: leave out --scale, --scale-end, --squared, \
-             --surrogate-scale, --init and --schedule decay, or name a family",
+             --surrogate-scale, --init uniform and --schedule decay, or name a family",
         ));
     }
     Ok(())
@@ -121,12 +143,10 @@ pub(crate) fn usage(message: &str) -> anyhow::Error {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
-    use softrast_raster::HostBackend;
     use softrast_runner::Command;
     use softrast_softness::Softness;
 
     use super::*;
-    use crate::{numbers, tensor};
 
     const DEFAULTS: Defaults = Defaults {
         task: "none",

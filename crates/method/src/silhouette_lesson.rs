@@ -158,8 +158,12 @@ impl<L: SilhouetteLesson> Lesson for L {
         self.image_loss(scene, self.drawn().judge.image(self.vertices(scene, theta)))
     }
 
-    fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
-        let learning_rate = SilhouetteLesson::inner(self).optimizer.learning_rate;
+    fn files(
+        &self,
+        phi: &[f64],
+        learning_rate: f64,
+        note: &str,
+    ) -> anyhow::Result<Vec<(&'static str, String)>> {
         self.drawn().edge.files(phi, learning_rate, note)
     }
 

@@ -4,30 +4,35 @@ use plotters::prelude::*;
 use crate::{Figure, Ticks, chart::tick, study::Curve};
 
 const SIZE: (u32, u32) = (860, 380);
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 8] = [
     RGBColor(130, 138, 148),
     RGBColor(31, 96, 168),
     RGBColor(196, 84, 24),
     RGBColor(46, 139, 87),
     RGBColor(128, 62, 158),
     RGBColor(180, 140, 20),
+    RGBColor(86, 180, 233),
+    RGBColor(40, 40, 40),
 ];
 const GRID: RGBColor = RGBColor(225, 228, 232);
 const LIGHT: RGBColor = RGBColor(243, 244, 246);
 
-/// The curves of a figure as SVG.
-///
-/// # Errors
-///
-/// If the chart cannot be drawn.
-pub(crate) fn svg(figure: &Figure) -> anyhow::Result<String> {
-    let mut text = String::new();
-    {
-        let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-        let drawn = root.fill(&WHITE).and_then(|()| draw(&root, figure));
-        drawn.and_then(|()| root.present()).map_err(|e| anyhow!("cannot draw the chart: {e}"))?;
+impl Figure {
+    /// The curves as SVG.
+    ///
+    /// # Errors
+    ///
+    /// If the chart cannot be drawn.
+    pub fn svg(&self) -> anyhow::Result<String> {
+        let mut text = String::new();
+        {
+            let root = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+            let drawn = root.fill(&WHITE).and_then(|()| draw(&root, self));
+            let drawn = drawn.and_then(|()| root.present());
+            drawn.map_err(|e| anyhow!("cannot draw the chart: {e}"))?;
+        }
+        Ok(text)
     }
-    Ok(text)
 }
 
 fn draw<DB: DrawingBackend>(

@@ -31,6 +31,10 @@ pub(crate) struct LearnFlags {
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     outer_rate: Option<f64>,
 
+    /// Learn the logarithm of the inner learning rate along with the softness; with --order es.
+    #[arg(long)]
+    learn_rate: bool,
+
     /// Instances that decide which softness is kept [default: 8].
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     validation_runs: Option<usize>,
@@ -76,6 +80,8 @@ pub struct Plan {
     pub batch: usize,
     /// Learning rate of the updates.
     pub outer_rate: f64,
+    /// Whether the learning rate of the inner loop is learned too.
+    pub learn_rate: bool,
     /// Seed of the first training instance.
     pub seed: u64,
     /// Seed of the first validation instance.
@@ -174,12 +180,18 @@ impl LearnFlags {
             let message = "a hard image has no gradient: --referee hard needs --order es";
             return Err(Error::Usage(message.into()));
         }
+        if self.learn_rate && !matches!(order, Order::Es(_)) {
+            let message =
+                "--learn-rate needs --order es: the others differentiate by the softness alone";
+            return Err(Error::Usage(message.into()));
+        }
         Ok(Plan {
             variant,
             order,
             outer: self.outer.unwrap_or(50),
             batch: self.batch.unwrap_or(8),
             outer_rate: self.outer_rate.unwrap_or(0.03),
+            learn_rate: self.learn_rate,
             seed: TRAINING_SEED.saturating_add(seed),
             validation_seed: VALIDATION_SEED.saturating_add(seed),
             validation_runs: self.validation_runs.unwrap_or(8),
@@ -204,6 +216,7 @@ impl LearnFlags {
             (self.inner.is_some(), "--inner"),
             (self.batch.is_some(), "--batch"),
             (self.outer_rate.is_some(), "--outer-rate"),
+            (self.learn_rate, "--learn-rate"),
             (self.validation_runs.is_some(), "--validation-runs"),
             (self.patience.is_some(), "--patience"),
             (self.referee.is_some(), "--referee"),
@@ -275,6 +288,8 @@ mod tests {
             |order| LearnFlags { referee: Some(Referee::Hard), order, ..LearnFlags::default() };
         assert!(hard(None).plan(Variant::Original, 0).is_err());
         assert!(hard(Some(Order::Es(0.1))).plan(Variant::Original, 0).is_ok());
+        let rate = LearnFlags { learn_rate: true, ..LearnFlags::default() };
+        assert!(rate.plan(Variant::Original, 0).is_err());
         let seeds = LearnFlags::default().plan(Variant::Original, 3).unwrap();
         assert_eq!((seeds.seed, seeds.validation_seed), (1_000_003, 2_000_003));
     }

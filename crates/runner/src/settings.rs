@@ -97,7 +97,7 @@ pub struct Settings {
     pub surrogate_scale: Option<f64>,
 
     /// What an mlp starts from: weights drawn at random, or fitted to the logistic that the other flags
-    /// would give [default: uniform].
+    /// would give [default: uniform]; with a softness file or learned, fitted puts a network like it in its place.
     #[arg(long, value_enum)]
     pub init: Option<Init>,
 

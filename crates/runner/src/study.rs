@@ -76,7 +76,7 @@ pub struct Figure {
     pub axes: [String; 2],
     /// Whether the second axis is logarithmic; values must be positive then.
     pub logarithmic: bool,
-    /// At most six.
+    /// At most eight.
     pub curves: Vec<Curve>,
 }
 

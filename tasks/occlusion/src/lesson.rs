@@ -104,9 +104,14 @@ impl Lesson for OcclusionLesson {
         scene.loss(scene.image(theta.unsqueeze(), edges, judge, depth))
     }
 
-    fn files(&self, phi: &[f64], note: &str) -> anyhow::Result<Vec<(&'static str, String)>> {
+    fn files(
+        &self,
+        phi: &[f64],
+        learning_rate: f64,
+        note: &str,
+    ) -> anyhow::Result<Vec<(&'static str, String)>> {
         let (edge, depth) = phi.split_at(self.edge.parameters());
-        let mut files = self.edge.files(edge, self.task.solver.learning_rate, note)?;
+        let mut files = self.edge.files(edge, learning_rate, note)?;
         let name = "depth_softness.json";
         let file = DepthSoftnessFile {
             depth_softness: self.task.solver.depth.softness,

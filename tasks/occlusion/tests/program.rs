@@ -199,9 +199,12 @@ const LEARN: &str = "learn --outer 3 --inner 6 --batch 2 --validation-runs 2 --s
 
 #[test]
 fn a_learned_softness_is_one_that_the_task_accepts() {
-    for flags in
-        ["", "--softness mlp --order direct", "--schedule decay --order es", "--order joint"]
-    {
+    for flags in [
+        "",
+        "--softness mlp --order direct",
+        "--schedule decay --order es --learn-rate",
+        "--order joint",
+    ] {
         let out = tempfile::tempdir().unwrap();
         let json = run_in(out.path(), &format!("{LEARN} {flags}")).unwrap();
         assert!(json["best"]["validation_loss"].as_f64().is_some_and(f64::is_finite), "{json}");
@@ -250,6 +253,7 @@ fn flags_of_learning_that_make_no_sense_are_refused() {
         ("learn --order truncated:0", "expected a whole number"),
         ("learn --order direct --referee fixed", "leave out --referee"),
         ("learn --referee hard", "--referee hard needs --order es"),
+        ("learn --learn-rate", "--learn-rate needs --order es"),
         ("learn --knots 6", "expected a whole number from 1 to 5"),
         ("learn --scales 0.1", "--scales goes with search"),
     ] {

@@ -196,6 +196,23 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
 }
 
 #[test]
+fn the_inner_learning_rate_is_learned_too_if_asked_for() {
+    let out = tempfile::tempdir().unwrap();
+    let line = "learn --outer 1 --inner 2 --batch 1 --validation-runs 1 --size 8 --order es \
+                --softness gauss --scale 0.02 --learning-rate 0.2 --learn-rate";
+    run_in(out.path(), line).unwrap();
+    let steps = fs::read_to_string(out.path().join("learn.jsonl")).unwrap();
+    let rate = |line: &str| {
+        let step: Value = serde_json::from_str(line).unwrap();
+        let phi = step["phi"].as_array().unwrap();
+        assert_eq!(phi.len(), 2);
+        phi[1].as_f64().unwrap()
+    };
+    let rates: Vec<f64> = steps.lines().map(rate).collect();
+    assert!((rates[0] - 0.2f64.ln()).abs() < 1e-12 && rates[1] != rates[0], "{rates:?}");
+}
+
+#[test]
 fn a_surrogate_is_learned_kept_and_named() {
     let out = tempfile::tempdir().unwrap();
     let line = "learn --outer 1 --inner 2 --batch 1 --validation-runs 1 --size 8 --order es \

@@ -1,6 +1,9 @@
 //! What the benchmarks of learning share: tasks from a command line, plans, and their page.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::Context;
 use clap::{Args, Parser};
@@ -29,6 +32,7 @@ pub(crate) fn plan(order: Order, referee: Referee) -> Plan {
         outer: 1,
         batch: 1,
         outer_rate: 0.03,
+        learn_rate: false,
         seed: 1_000_000,
         validation_seed: 2_000_000,
         validation_runs: 1,
@@ -41,13 +45,18 @@ pub(crate) fn plan(order: Order, referee: Referee) -> Plan {
     }
 }
 
+/// A file among the documents.
+pub(crate) fn docs(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name)
+}
+
 /// Puts `text` between the two marks that `docs/estimators.md` has for a benchmark.
 ///
 /// # Errors
 ///
 /// If the page is not there or has no such marks.
 pub(crate) fn write(benchmark: &str, text: &str) -> anyhow::Result<()> {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/estimators.md");
+    let page = docs("estimators.md");
     let start = format!("<!-- what follows is written by the benchmark {benchmark} -->\n");
     let end = format!("<!-- end of what the benchmark {benchmark} writes -->");
     let old = fs::read_to_string(&page)?;

@@ -19,6 +19,7 @@ fn plan(input: Input, order: Order, referee: Referee) -> Plan {
         outer: 1,
         batch: 1,
         outer_rate: 0.03,
+        learn_rate: false,
         seed: 5,
         validation_seed: 6,
         validation_runs: 1,

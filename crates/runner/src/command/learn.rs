@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::{Results, ended_learning, out};
 use crate::{
-    Command, Curve, Figure, Learned, OuterStep, Progress, Study, Task, figure,
+    Command, Curve, Figure, Learned, OuterStep, Progress, Study, Task,
     folder::{self, Folder},
     interrupt,
     memory::peak_rss_mib,
@@ -254,5 +254,5 @@ fn charts(log: &Log, learned: &Learned) -> anyhow::Result<Vec<(String, String)>>
         curves: vec![curve("batch", log.losses()), curve("validation", log.validations())],
     };
     let figures = std::iter::once(&losses).chain(&learned.figures);
-    figures.map(|figure| Ok((figure::svg(figure)?, figure.caption.clone()))).collect()
+    figures.map(|figure| Ok((figure.svg()?, figure.caption.clone()))).collect()
 }
