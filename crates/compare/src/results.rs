@@ -130,7 +130,8 @@ what it prints. The paper's meshes and pictures are others, so its figures tell 
 
 const SECONDS: &str = "\
 Wall time of the optimisation steps of a run, its share of a batch where runs are solved together, without the errors that are
-measured beside. The paper's figures are from a V100: 3.24 to 4.36 seconds to evaluate 3D SHAPE and 0.053 to 0.088 to draw once.
+measured beside; a step draws once and takes one gradient. The paper's figures are from a V100: 3.24 to 4.36 seconds to evaluate 3D SHAPE and
+0.053 to 0.088 to draw once. How long learning took stands in the note of each file in `data/softness`.
 ";
 
 const CROSSED: &str = "\

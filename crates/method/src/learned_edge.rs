@@ -29,16 +29,17 @@ pub struct LearnedEdge {
     pub(crate) steps: usize,
     pub(crate) size: usize,
     variant: Variant,
+    task: &'static str,
 }
 
 impl LearnedEdge {
     /// Begins with what `method` does on runs of `steps` steps and images of `size` × `size` pixels.
     pub fn new(method: &Method, plan: &Plan, steps: usize, size: usize) -> Self {
         let (softness, surrogate) = (method.softness(), method.surrogate().cloned());
-        let variant = plan.variant;
+        let (variant, task) = (plan.variant, method.task);
         if method.is_static() && plan.input == Input::Ndc {
             let phi = method.phi(method.scale(0, steps));
-            return Self { softness, phi, path: None, surrogate, steps, size, variant };
+            return Self { softness, phi, path: None, surrogate, steps, size, variant, task };
         }
         let mut path = ScalePath { knots: Vec::new(), floor_px: plan.floor_px };
         let floor = path.floor(softness, size);
@@ -52,7 +53,7 @@ impl LearnedEdge {
             })
             .collect();
         let (phi, path) = (method.unit_phi(), Some(path));
-        Self { softness, phi, path, surrogate, steps, size, variant }
+        Self { softness, phi, path, surrogate, steps, size, variant, task }
     }
 
     /// Refuses a plan that this softness cannot be learned by.
@@ -170,7 +171,8 @@ impl LearnedEdge {
         let learning_rate = Some(learning_rate).filter(|_| self.variant == Variant::Original);
         let surrogate = self.surrogate.as_ref();
         let surrogate = surrogate.map(|s| Surrogate { softness: s.softness, phi: felt.to_vec() });
-        let file = SoftnessFile { softness, phi, path, surrogate, learning_rate, note };
+        let task = Some(self.task.to_owned());
+        let file = SoftnessFile { softness, phi, path, surrogate, learning_rate, task, note };
         let name = "softness.json";
         Ok(vec![(name, file.text(name.as_ref())?)])
     }

@@ -13,6 +13,8 @@ pub struct Method {
     pub(crate) path: Path,
     pub(crate) surrogate: Option<Surrogate>,
     pub(crate) learning_rate: Option<f64>,
+    /// The task that it was made for.
+    pub(crate) task: &'static str,
     pub(crate) note: Option<String>,
     pub(crate) drawn: Drawn,
 }
@@ -200,8 +202,8 @@ mod tests {
             tolerance: Rasterizer::TOLERANCE,
         };
         let name = "gauss".to_owned();
-        let (surrogate, learning_rate, note) = (None, None, None);
-        let method = Method { softness, name, path, surrogate, learning_rate, note, drawn };
+        let (surrogate, learning_rate, task, note) = (None, None, "none", None);
+        let method = Method { softness, name, path, surrogate, learning_rate, task, note, drawn };
         assert_eq!(method.scale(0, 1), 0.1);
     }
 }

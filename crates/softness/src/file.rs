@@ -24,6 +24,9 @@ pub struct SoftnessFile {
     /// The learning rate of the optimisations that it was learned on, which suits it best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate: Option<f64>,
+    /// The task that it was learned on; without one, the rate is for any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<String>,
     /// Where the parameters come from, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
@@ -166,6 +169,7 @@ mod tests {
             path: Some(path),
             surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
             learning_rate: Some(0.3),
+            task: Some("pose".into()),
             note: Some("a start".into()),
         }
     }

@@ -5,7 +5,7 @@ use clap::Parser;
 use softrast_method::{Defaults, LearnedEdge, Method};
 use softrast_raster::BackendChoice;
 use softrast_runner::{Input, Judged, Order, Plan, Referee, Schedule, Settings, Variant};
-use softrast_softness::SoftnessFile;
+use softrast_softness::{Family, Softness, SoftnessFile};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;
@@ -33,6 +33,10 @@ fn plan(input: Input, order: Order, referee: Referee) -> Plan {
 }
 
 fn method(line: &str) -> Method {
+    made(line).unwrap()
+}
+
+fn made(line: &str) -> anyhow::Result<Method> {
     #[derive(Parser)]
     struct Line {
         #[command(flatten)]
@@ -47,7 +51,7 @@ fn method(line: &str) -> Method {
         backends: &[BackendChoice::NdArray],
     };
     let words = ["task"].into_iter().chain(line.split_whitespace());
-    Method::new(&Line::parse_from(words).settings, &defaults).unwrap()
+    Method::new(&Line::parse_from(words).settings, &defaults)
 }
 
 fn edge(line: &str, input: Input) -> LearnedEdge {
@@ -113,9 +117,47 @@ fn a_learned_vector_comes_back_from_its_file() {
             let felt = read.surrogate().map_or(&[][..], |felt| &felt.phi);
             assert_near(felt, &learned[learned.len() - felt.len()..]);
             assert_eq!(read.learning_rate(), Some(0.3));
-            assert_eq!(SoftnessFile::load(&path).unwrap().note.as_deref(), Some("a test"));
+            let file = SoftnessFile::load(&path).unwrap();
+            assert_eq!(file.note.as_deref(), Some("a test"));
+            // The rate is for the task that it was learned on.
+            SoftnessFile { task: Some("another".into()), ..file }.save(&path).unwrap();
+            assert_eq!(method(&format!("--softness {}", path.display())).learning_rate(), None);
         }
     }
+}
+
+#[test]
+fn a_network_takes_the_place_of_a_symmetric_softness_and_keeps_its_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("softness.json");
+    let saved = |line: &str| {
+        let edge = edge(line, Input::Ndc);
+        let (_, text) = edge.files(&edge.start(), 0.3, "a test").unwrap().remove(0);
+        std::fs::write(&path, text).unwrap();
+        let line = format!("--softness {}", path.display());
+        [method(&line), method(&format!("{line} --init fitted"))]
+    };
+    for line in ["--softness gauss --schedule decay", "--softness logistic --scale 0.02"] {
+        let [family, network] = saved(line);
+        assert_eq!(network.softness().family, Family::Mlp);
+        for step in [0, 9] {
+            let values = |method: &Method| {
+                let phi = vector::<B>(&method.phi(method.scale(step, 10)));
+                let width = family.scale(step, 10);
+                let places: Vec<f64> = (-40..=40).map(|k| 0.1 * f64::from(k) * width).collect();
+                numbers(method.softness().value(phi, vector(&places)))
+            };
+            let off = values(&family).into_iter().zip(values(&network));
+            let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off < 0.01, "{line}, step {step}: {off}");
+        }
+    }
+    let exp = edge("--softness exp --scale 0.02", Input::Ndc);
+    let (_, text) = exp.files(&exp.start(), 0.3, "a test").unwrap().remove(0);
+    std::fs::write(&path, text).unwrap();
+    let line = format!("--softness {} --init fitted", path.display());
+    let error = made(&line).unwrap_err().to_string();
+    assert!(error.contains("treats both sides of an edge alike"), "{error}");
 }
 
 #[test]

@@ -178,9 +178,16 @@ fn parameters(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     ];
     let level = |(name, sign, size): Weights| {
         let phi = (0..edge.parameters()).map(|k| sign(k) * size).collect();
-        let (path_of_scales, surrogate, learning_rate, note) = (None, None, None, None);
-        SoftnessFile { softness: edge, phi, path: path_of_scales, surrogate, learning_rate, note }
-            .save(&path)?;
+        SoftnessFile {
+            softness: edge,
+            phi,
+            path: None,
+            surrogate: None,
+            learning_rate: None,
+            task: None,
+            note: None,
+        }
+        .save(&path)?;
         let method = super::from_file(&path)?;
         let single = Drawing::new(&method, &flat, SIZE).fused::<Single>();
         let outside = single.image.iter().filter(|a| !(0.0..=1.0).contains(*a)).count();
