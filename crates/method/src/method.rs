@@ -40,8 +40,8 @@ pub(crate) enum Path {
 }
 
 impl Method {
-    /// The learning rate that belongs to the softness: the one it was searched for with, or learned
-    /// at in the original variant.
+    /// The learning rate that belongs to the softness: the one it was searched for with or learned at, on the
+    /// original variant.
     pub fn learning_rate(&self) -> Option<f64> {
         self.learning_rate
     }

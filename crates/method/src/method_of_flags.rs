@@ -1,5 +1,5 @@
 use softrast_raster::HostBackend;
-use softrast_runner::{Error, Init, Schedule, Settings, SoftnessChoice, Variant};
+use softrast_runner::{Error, Init, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, SoftnessFile, Surrogate};
 
 use crate::{
@@ -74,9 +74,7 @@ impl Method {
             Some(path) => Path::Learned { phi, unit, path, size },
         };
         let task = defaults.task;
-        // Learned on the original.
-        let suits = settings.variant == Variant::Original;
-        let suits = suits && file.task.is_none_or(|learned_on| learned_on == task);
+        let suits = file.task.is_none_or(|learned_on| learned_on == task);
         let (learning_rate, note) = (file.learning_rate.filter(|_| suits), file.note);
         Ok(Self { softness, name, path, surrogate, learning_rate, task, note, drawn })
     }
@@ -221,10 +219,10 @@ mod tests {
             (Command::Evaluate, "--steps 7 --size 32"),
             (Command::Search, "--softness learned"),
             (Command::Learn, "--softness learned --schedule static"),
+            (Command::Solve, "--variant transfer"),
         ] {
             assert_eq!(shipped(command, line), learned, "{command:?} {line}");
         }
-        assert_eq!(shipped(Command::Solve, "--variant transfer"), ("learned".into(), None));
         for (command, line) in [
             (Command::Solve, "--scale 0.1"),
             (Command::Solve, "--softness logistic"),
