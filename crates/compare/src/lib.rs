@@ -8,6 +8,7 @@ mod args;
 mod cell;
 mod charts;
 mod functions;
+mod machine;
 mod measured;
 mod paper;
 mod plot;

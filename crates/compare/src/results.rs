@@ -9,6 +9,7 @@ use softrast_runner::{Schedule, bootstrap_mean_interval, escape, mean, page};
 use crate::{
     Cell, Error, Measured, Printed, TaskName,
     charts::{self, Chart},
+    machine::machine,
     measured::short,
     table::Table,
 };
@@ -20,7 +21,10 @@ const RESAMPLING_SEED: u64 = 0;
 /// The tables of the paper with our figures, as Markdown. `command` made them; `pictures` is where
 /// the charts are, seen from the file, if they are to be shown.
 pub fn markdown(measured: &[Measured], command: &str, pictures: Option<&str>) -> String {
-    let mut text = format!("{HEAD}\n```\n{command}\n```\n\n{READING}\n## Table 2: tasks\n");
+    let mut text = format!(
+        "{HEAD}\n```\n{command}\n```\n\non {}.\n\n{READING}\n## Table 2: tasks\n",
+        machine()
+    );
     text += &tasks(measured).markdown();
     text += "## Table 3: errors\n";
     for group in by_variant(measured) {
@@ -55,7 +59,7 @@ fn shown(chart: &Chart, pictures: Option<&str>) -> String {
 /// folder in `out`.
 pub(crate) fn html(measured: &[Measured], command: &str, out: &Path) -> anyhow::Result<String> {
     let paragraph = |text: &str| format!("<p>{}</p>\n", escape(&text.replace("**", "")));
-    let mut body = paragraph(READING);
+    let mut body = paragraph(&format!("On {}. {READING}", machine()));
     body += "<h2>Tasks</h2>\n";
     body += &tasks(measured).html();
     for group in by_variant(measured) {

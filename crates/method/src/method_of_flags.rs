@@ -12,7 +12,8 @@ use crate::{
 };
 
 /// Largest error of a pixel while a task optimises, unless the command line says otherwise: a quarter of a step of an
-/// 8-bit picture. No error of a task tells it from less, and steps take up to a tenth less time than at the rasterizer's own.
+/// 8-bit picture. It moves errors of the tasks by less than they scatter, and steps take up to a tenth less time than at
+/// the rasterizer's own.
 const TOLERANCE: f64 = 1e-3;
 
 impl Method {
