@@ -15,6 +15,10 @@ const METHODS: &str = "learned,learned-mlp,logistic --schedule static,gauss --sc
 /// What is varied unless said otherwise: the default of the tasks and the simplest method.
 const VARIED: &str = "learned,logistic --schedule static";
 
+/// What may be varied; the last is that of the tasks.
+const TOLERANCES: [&str; 3] = ["1e-2", "1e-3", USUAL_TOLERANCE];
+const USUAL_TOLERANCE: &str = "1e-5";
+
 /// Evaluates all methods on all tasks, original and transfer, and writes the tables.
 ///
 /// After a kill the same command goes on from what is finished.
@@ -31,7 +35,7 @@ pub struct Args {
     pub methods: Vec<String>,
 
     /// Those of the methods, or others, that the charts of error against seconds also show with half the pixels a
-    /// side, with pixels that are off by up to 1e-2, neither of which OCCLUSION knows, and on every other backend
+    /// side, with pixels that are off by more or less, neither of which OCCLUSION knows, and on every other backend
     /// that the program was built with; "" for none.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
     pub varied: Vec<String>,
@@ -49,6 +53,11 @@ pub struct Args {
     /// What to compute on: ndarray, flex or wgpu, if the program was built with it.
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
+
+    /// Largest error of a pixel while optimising, for all methods that do not say it themselves: 1e-2, 1e-3 or
+    /// 1e-5. OCCLUSION knows none.
+    #[arg(long, value_name = "X", default_value = USUAL_TOLERANCE, value_parser = TOLERANCES)]
+    pub tolerance: String,
 
     /// Folder for the results of every cell.
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
@@ -88,18 +97,18 @@ impl Args {
         let cells = tasks.into_iter().enumerate().flat_map(|(k, task)| {
             let usual = if self.quick { task.quick_runs() } else { task.runs() };
             let runs = self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual);
-            let others = &others;
+            let backends = &others;
             ["original", "transfer"].into_iter().flat_map(move |variant| {
                 let cell = move |varies| move |method| Cell { task, variant, method, runs, varies };
                 let varied = self.varied.iter().filter(|method| !method.is_empty());
                 let varied = varied.flat_map(move |method| {
-                    let freely = [
-                        format!("{method} --resolution {}", task.size() / 2),
-                        format!("{method} --tolerance 1e-2"),
-                    ];
-                    let freely = freely.into_iter().filter(move |_| task.draws_freely());
+                    let side = format!("{method} --resolution {}", task.size() / 2);
+                    let others = TOLERANCES.into_iter().filter(|other| *other != self.tolerance);
+                    let off = others.map(move |other| format!("{method} --tolerance {other}"));
+                    let freely = std::iter::once(side).chain(off);
+                    let freely = freely.filter(move |_| task.draws_freely());
                     let on = |name: &&str| format!("{method} --backend {name}");
-                    freely.chain(others.iter().map(on).collect::<Vec<_>>())
+                    freely.chain(backends.iter().map(on).collect::<Vec<_>>())
                 });
                 self.methods.iter().cloned().map(cell(false)).chain(varied.map(cell(true)))
             })
@@ -128,13 +137,13 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * 4);
-        assert_eq!((cells[0].task, cells[15].variant), (TaskName::Shape2d, "transfer"));
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * 6);
+        assert_eq!((cells[0].task, cells[17].variant), (TaskName::Shape2d, "transfer"));
         assert_eq!(cells[11].method, "learned --resolution 128");
-        assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 4);
+        assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 6);
         let some =
             args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();
-        assert!(some.len() == 8 && some[3].runs == 7 && some[5].method_name() == "b");
+        assert!(some.len() == 10 && some[3].runs == 7 && some[6].method_name() == "b");
         assert_eq!(some[2].method_name(), "exp resolution 32");
         let runs = |line| {
             let cells = args(line).cells().unwrap();

@@ -153,8 +153,8 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
         name: format!("{stem}-pareto"),
         caption: format!(
             "{of}: error of the step that a run returns against its seconds, means over the seeds; \
-             filled marks are static, open ones move; triangles are methods on half the pixels a side, crosses with \
-             pixels that are off by up to 1e-2{}.{} On the front, ringed and joined: {}.",
+             filled marks are static, open ones move; triangles are methods on half the pixels a side, crosses at \
+             another tolerance{}.{} On the front, ringed and joined: {}.",
             squares,
             default.unwrap_or_default(),
             names.join(", ")

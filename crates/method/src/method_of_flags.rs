@@ -1,4 +1,4 @@
-use softrast_raster::HostBackend;
+use softrast_raster::{HostBackend, Rasterizer};
 use softrast_runner::{Error, Init, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, SoftnessFile, Surrogate};
 
@@ -10,11 +10,6 @@ use crate::{
     method::{Drawn, Path, nominal_scale},
     numbers, shipped, tensor,
 };
-
-/// Largest error of a pixel while a task optimises, unless the command line says otherwise: a quarter of a step of an
-/// 8-bit picture. It moves errors of the tasks by less than they scatter, and steps take up to a tenth less time than at
-/// the rasterizer's own.
-const TOLERANCE: f64 = 1e-3;
 
 impl Method {
     /// The method that the command line asks for. Where it says nothing of the softness, `solve` and
@@ -32,7 +27,7 @@ impl Method {
         let backend = backend(settings, defaults.backends)?;
         let resolution = settings.resolution.unwrap_or_default();
         resolution.check(settings.size.unwrap_or(defaults.size))?;
-        let tolerance = settings.tolerance.unwrap_or(TOLERANCE);
+        let tolerance = settings.tolerance.unwrap_or(Rasterizer::TOLERANCE);
         let drawn = Drawn { backend, resolution, tolerance };
         if let Some(name) = shipped::asked_for(settings, defaults.task) {
             check_alone(settings)?;

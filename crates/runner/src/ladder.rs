@@ -20,9 +20,8 @@ const METHODS: [(&str, Schedule); 10] = [
 /// Images are not tried below this many pixels a side.
 const FEWEST: usize = 8;
 
-/// Largest errors of a pixel, and what tasks take if nobody says otherwise.
+/// Largest errors of a pixel, the last being what tasks take if nobody says otherwise.
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
-const USUAL_TOLERANCE: f64 = 1e-3;
 
 /// One answer to a question of `choose`.
 #[derive(Clone, Debug)]
@@ -108,7 +107,7 @@ pub(crate) fn tolerances(settings: &Settings) -> Vec<Rung> {
         flags: format!("--tolerance {}", exact(tolerance)),
         settings: Settings { tolerance: Some(tolerance), ..settings.clone() },
         with: With::Words(format!("pixels off by {tolerance:e}")),
-        usual: tolerance == USUAL_TOLERANCE,
+        usual: tolerance == TOLERANCES[3],
     };
     TOLERANCES.into_iter().map(rung).collect()
 }
@@ -152,7 +151,7 @@ mod tests {
         assert!(resolutions(&settings, 64).is_empty());
         let tolerances = tolerances(&settings);
         assert_eq!(tolerances[3].flags, "--tolerance 1e-5");
-        assert!(tolerances[1].usual && tolerances[0].settings.tolerance == Some(0.01));
+        assert!(tolerances[3].usual && tolerances[0].settings.tolerance == Some(0.01));
     }
 
     #[test]

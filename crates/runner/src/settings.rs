@@ -124,7 +124,7 @@ pub struct Settings {
     #[arg(long, value_name = "full|auto|N", value_parser = resolution)]
     pub resolution: Option<Resolution>,
 
-    /// Largest error of a pixel by leaving out faces that are far from it, below 1 [default: 1e-3].
+    /// Largest error of a pixel by leaving out faces that are far from it, below 1 [default: 1e-5].
     #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
 

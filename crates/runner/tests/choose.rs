@@ -8,7 +8,7 @@ use softrast_runner::{
 };
 
 /// A task that draws nothing: its error is the sum of what each setting costs. In the original variant
-/// a logistic is enough, on half of the pixels, at the usual tolerance and level 2.
+/// a logistic is enough, on half of the pixels, at a hundred times the tolerance and level 2.
 struct Known {
     settings: Settings,
     softness: &'static str,
