@@ -18,6 +18,8 @@ const EVERYWHERE: f64 = 4e6;
 /// good for the image; but where the profile ends with a steep slope, its parameters must not move
 /// all that lies in the tail.
 const BEYOND: f64 = 1.1;
+/// Where coverage is begun to be asked how fast it rises with the sum.
+const LEAST_SUM: f64 = 1e-5;
 /// A side that is constant still needs a cell.
 const NARROWEST: f64 = 1e-9;
 
@@ -53,8 +55,9 @@ impl Profile {
     /// the term or, where one face all but covers the pixel, the coverage that it alone makes. A
     /// relative error ρ of every term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= 0.37 ρ`; a
     /// relative error ρ of every coverage moves it by at most ρ times the probability that exactly
-    /// one face covers the pixel. [`Profile::error`] tells what was reached: for a kink away from
-    /// the edge that no knot meets it can be more.
+    /// one face covers the pixel. Under a T-conorm whose coverage steepens with the sum, the coverage
+    /// is taken beside faces that bring the sum to where it is steepest. [`Profile::error`] tells what
+    /// was reached: for a kink away from the edge that no knot meets it can be more.
     ///
     /// **Gradients.** A culled face gives no gradient, and Adam would have moved it however small
     /// its gradient was. At the default tolerance of 1e-5 the gradient of a face that lies wholly in
@@ -271,20 +274,40 @@ fn interpolation_error<B: Backend>(
     let exact = numbers(exact);
     let mut reached = Reached { innermost: 0.0, rest: 0.0 };
     let per_side = places.len() * grid.cells();
+    let steepest = steepest(t_conorm);
     // What rounding alone makes of a value.
     let rounding = if dtype == DType::F64 { 1e-14 } else { 1e-6 };
     for (i, (exact, interpolated)) in exact.into_iter().zip(interpolated).enumerate() {
         // Either the term itself is right, or the coverage that it alone makes.
         let relative = tolerance / 4.0 + rounding;
         let term = (exact - interpolated).abs() / (relative * exact.abs() + excess / 2.0);
-        let [shown, wanted] = [interpolated, exact].map(|sum| t_conorm.coverage_of(sum.max(0.0)));
-        let alone = (shown - wanted).abs() / (relative * wanted + tolerance / (4.0 * faces));
+        // Beside other faces an error of the term counts for more where coverage steepens with the sum.
+        let company = (steepest - exact).max(0.0);
+        let covered = |sum: f64| t_conorm.coverage_of(sum.max(0.0));
+        let moved = covered(interpolated + company) - covered(exact + company);
+        let alone = moved.abs() / (relative * covered(exact) + tolerance / (4.0 * faces));
         let error = term.min(alone);
         let place =
             if i % per_side < places.len() { &mut reached.innermost } else { &mut reached.rest };
         *place = place.max(error);
     }
     reached
+}
+
+/// The sum, to a fifth, at which the coverage of a pixel rises fastest: 0 for T-conorms under which it only flattens,
+/// as under the probabilistic sum.
+fn steepest(t_conorm: TConorm) -> f64 {
+    let slope = |sum: f64| (t_conorm.coverage_of(1.01 * sum) - t_conorm.coverage_of(sum)) / sum;
+    let (mut at, mut most) = (0.0, slope(LEAST_SUM));
+    for k in 1..80 {
+        let sum = LEAST_SUM * (0.25 * f64::from(k)).exp2();
+        let found = slope(sum);
+        // By more than rounding makes of a straight line.
+        if found > most * (1.0 + 1e-6) {
+            (at, most) = (sum, found);
+        }
+    }
+    at
 }
 
 /// The optical depth above `left` that makes up `excess` of the generator's sum.

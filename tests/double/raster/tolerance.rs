@@ -99,6 +99,18 @@ fn heavy_tails_under_a_steep_t_conorm_get_the_knots_that_they_need() {
 }
 
 #[test]
+fn a_face_counts_for_more_beside_another_where_coverage_steepens() {
+    let softness = EdgeSoftness { family: Family::CubicHermite, squared: false };
+    let (phi, tolerance) = (softness.default_phi(1.0), 10f64.powf(-5.166_573_731_664_093));
+    let yager = TConorm::Yager(0.545_809_260_379_082_7);
+    let (culled, exact, error) = images(&triangles(0, 2), softness, yager, &phi, tolerance);
+    assert!(error <= tolerance / 2.0, "interpolation error {error:e}");
+    for (culled, exact) in culled.iter().zip(&exact) {
+        assert!((culled - exact).abs() <= tolerance, "{culled} instead of {exact}");
+    }
+}
+
+#[test]
 fn permuting_the_faces_changes_nothing_above_rounding() {
     let (vertices, faces) = triangles(3, 40);
     let mut shuffled = faces.to_vec();
