@@ -12,8 +12,8 @@ const EPSILON: f64 = 1e-6;
 /// How sharply faces bend at their common edges.
 #[derive(Clone, Debug)]
 pub struct Flatness<B: Backend> {
-    /// Four vertices of each hinge, all first ones before all second ones: `[4 hinges]`.
-    corners: Option<Tensor<B, 1, Int>>,
+    /// Four vertices of each hinge, all first ones before all second ones: `[3, 4 hinges]`.
+    corners: Option<Tensor<B, 2, Int>>,
 }
 
 impl<B: Backend> Flatness<B> {
@@ -23,15 +23,15 @@ impl<B: Backend> Flatness<B> {
         Self { corners: (!edges.hinges.is_empty()).then(|| indices(corners)) }
     }
 
-    /// `Σ (cos α + 1)²` over all edges between two faces of `vertices` `[vertices, 3]`, `[1]`.
+    /// `Σ (cos α + 1)²` over all edges between two faces of `vertices` `[3, vertices]`, `[1]`.
     ///
     /// `α` is the angle between the heights of both faces on their common edge: half a turn where
     /// the surface is flat, so that it adds nothing. Source: FACTS 4.1.
     #[allow(clippy::missing_panics_doc, reason = "four parts are four parts")]
     pub fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let Some(corners) = &self.corners else { return vertices.sum() * 0.0 };
-        let corners = vertices.select(0, corners.clone());
-        let [from, to, one, other] = corners.chunk(4, 0).try_into().expect("four equal parts");
+        let corners = vertices.gather(1, corners.clone());
+        let [from, to, one, other] = corners.chunk(4, 1).try_into().expect("four equal parts");
         let edge = to - from.clone();
         let inverse = (dot(&edge, &edge) + EPSILON).recip();
         let heights = [one, other].map(|corner| {
@@ -45,7 +45,7 @@ impl<B: Backend> Flatness<B> {
     }
 }
 
-/// Row by row, `[rows, 3]` twice to `[rows, 1]`.
+/// Column by column, `[3, columns]` twice to `[1, columns]`.
 fn dot<B: Backend>(a: &Tensor<B, 2>, b: &Tensor<B, 2>) -> Tensor<B, 2> {
-    (a.clone() * b.clone()).sum_dim(1)
+    (a.clone() * b.clone()).sum_dim(0)
 }

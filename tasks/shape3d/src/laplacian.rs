@@ -5,12 +5,12 @@ use softrast_method::tensor;
 /// How far vertices are from the mean of their neighbours.
 #[derive(Clone, Debug)]
 pub struct Laplacian<B: Backend> {
-    /// Both ends of every edge, in both directions: `[2 edges]` each.
-    from: Tensor<B, 1, Int>,
-    to: Tensor<B, 1, Int>,
-    /// One over the number of neighbours, `[vertices, 1]`; 0 without any.
+    /// Both ends of every edge, in both directions: `[3, 2 edges]` each, the same for every axis.
+    from: Tensor<B, 2, Int>,
+    to: Tensor<B, 2, Int>,
+    /// One over the number of neighbours, `[1, vertices]`; 0 without any.
     share: Tensor<B, 2>,
-    /// 1 for vertices with neighbours, `[vertices, 1]`, else 0.
+    /// 1 for vertices with neighbours, `[1, vertices]`, else 0.
     used: Tensor<B, 2>,
 }
 
@@ -30,30 +30,28 @@ impl<B: Backend> Laplacian<B> {
         Self {
             from: ends(0),
             to: ends(1),
-            share: tensor(share, [vertices, 1]),
-            used: tensor(used, [vertices, 1]),
+            share: tensor(share, [1, vertices]),
+            used: tensor(used, [1, vertices]),
         }
     }
 
-    /// `Σ |v - mean of the neighbours of v|²` of `vertices` `[vertices, 3]`, `[1]`.
+    /// `Σ |v - mean of the neighbours of v|²` of `vertices` `[3, vertices]`, `[1]`.
     ///
     /// A vertex without neighbours, which cannot be seen, does not count. Source: FACTS 4.1.
     pub fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
-        let neighbours = vertices.clone().select(0, self.to.clone());
-        let sums = vertices.zeros_like().select_assign(
-            0,
-            self.from.clone(),
-            neighbours,
-            IndexingUpdateOp::Add,
-        );
+        let neighbours = vertices.clone().gather(1, self.to.clone());
+        let sums =
+            vertices.zeros_like().scatter(1, self.from.clone(), neighbours, IndexingUpdateOp::Add);
         let away = vertices * self.used.clone() - sums * self.share.clone();
         (away.clone() * away).sum()
     }
 }
 
-/// Vertex numbers as a tensor.
-pub(crate) fn indices<B: Backend>(numbers: impl Iterator<Item = u32>) -> Tensor<B, 1, Int> {
+/// Vertex numbers as a tensor `[3, numbers]`, the same for every axis.
+///
+/// Numbers for each coordinate, with the axes first, are many times faster to gather by on the CPU than rows of three.
+pub(crate) fn indices<B: Backend>(numbers: impl Iterator<Item = u32>) -> Tensor<B, 2, Int> {
     let numbers: Vec<i64> = numbers.map(i64::from).collect();
-    let count = numbers.len();
-    Tensor::from_data(TensorData::new(numbers, [count]), &Default::default())
+    let shape = [3, numbers.len()];
+    Tensor::from_data(TensorData::new(numbers.repeat(3), shape), &Default::default())
 }

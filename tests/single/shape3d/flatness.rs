@@ -9,7 +9,7 @@ use softrast_tests::tensor;
 fn loss([y, z]: [f64; 2]) -> f32 {
     let vertices = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.3, -1.0, 0.0, 0.6, y, z];
     let flatness = Flatness::<NdArray>::new(&Edges::new(&[[0, 1, 2], [1, 0, 3]]));
-    flatness.loss(tensor(&vertices, [4, 3])).into_scalar()
+    flatness.loss(tensor(&vertices, [4, 3]).transpose()).into_scalar()
 }
 
 #[test]

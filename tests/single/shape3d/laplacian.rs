@@ -7,7 +7,7 @@ use softrast_tests::tensor;
 
 fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {
     let laplacian = Laplacian::<NdArray>::new(&Edges::new(faces), vertices.len());
-    laplacian.loss(tensor(&vertices.concat(), [vertices.len(), 3])).into_scalar()
+    laplacian.loss(tensor(&vertices.concat(), [vertices.len(), 3]).transpose()).into_scalar()
 }
 
 #[test]
