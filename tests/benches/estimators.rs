@@ -25,7 +25,7 @@ use softrast_method::{Class, Lesson, meta_gradient};
 use softrast_runner::{Order, Plan, Referee, Task};
 use softrast_tests::{numbers, vector};
 
-type B = NdArray<f64>;
+type B = NdArray<f32>;
 
 /// Half the distance of the differences, in the natural logarithm: a tenth of a decade.
 const HALF: f64 = 0.1 * std::f64::consts::LN_10;
@@ -78,11 +78,11 @@ fn main() -> anyhow::Result<()> {
     let pose = measured::<Pose, _>((POSE, &POSE_SCALES), &steps, scenes, pose)?;
     add_table::<Pose>(&mut page, (POSE, &POSE_SCALES), &steps, &pose)?;
     let head = format!(
-        "{scenes} scenes, f64, {} s on {}.\n\n",
+        "{scenes} scenes, f32, {} s on {}.\n\n",
         clock.elapsed().as_secs(),
         machine::machine()
     );
-    learning::write("estimators", &(head + &page))
+    learning::write("estimators.md", "estimators", &(head + &page))
 }
 
 /// All settings of a task, in the order of steps, then scales.
@@ -96,7 +96,7 @@ fn measured<T: Task, L: Lesson>(
     for &steps in steps {
         for &scale in scales {
             let softness = format!("--softness logistic --schedule static --scale {scale}");
-            let class = |referee| -> anyhow::Result<Class<L>> {
+            let class = |referee| -> anyhow::Result<Class<L, B>> {
                 let plan = plan(Order::Unrolled, referee);
                 let task = task::<T>(&format!("{flags} {softness} --steps {steps}"))?;
                 Ok(Class::new(lesson(task, &plan)?, &plan))
@@ -115,7 +115,7 @@ fn measured<T: Task, L: Lesson>(
 }
 
 fn setting<L: Lesson>(
-    [fixed, own]: &[Class<L>; 2],
+    [fixed, own]: &[Class<L, B>; 2],
     phi: f64,
     steps: usize,
     scenes: u64,

@@ -5,8 +5,9 @@
 //! cargo bench -p softrast-tests --bench memory -- 10          # fewer
 //! ```
 //!
-//! 24 views of a sphere of 1,280 faces on 64 × 64 pixels in f64, exact with the adjoint clipped; every
-//! measurement in a process of its own. Fails above 1 GiB. Writes `docs/estimators.md`.
+//! 24 views of a sphere of 1,280 faces on 64 × 64 pixels, exact with the adjoint clipped, as `learn` takes it and in
+//! f64 with an error of 1e-5 a pixel; every measurement in a process of its own. Fails above 1 GiB. Writes
+//! `docs/estimators.md`.
 
 mod learning;
 #[path = "../../crates/raster/benches/machine.rs"]
@@ -26,52 +27,78 @@ use shape3d::{Shape3d, Shape3dLesson};
 use softrast_mesh::icosphere;
 use softrast_meta::{MetaGradient, Tasks};
 use softrast_method::Class;
+use softrast_raster::RasterBackend;
 use softrast_runner::{Order, Referee, peak_rss_mib};
 use softrast_tests::vector;
-
-type B = NdArray<f64>;
 
 /// What the peak has to stay below, in MiB.
 const LIMIT: f64 = 1024.0;
 /// Word that makes the program measure one setting.
 const CHILD: &str = "one";
-/// Subdivisions of the sphere that is deformed, and pixels of a side.
-const USUAL: [usize; 2] = [3, 64];
+
+/// What is measured at once.
+#[derive(Clone, Copy, Debug)]
+struct Setting {
+    /// 32 or 64.
+    bits: usize,
+    tolerance: f64,
+    /// Subdivisions of the sphere that is deformed.
+    sphere: usize,
+    /// Pixels of a side.
+    size: usize,
+    steps: usize,
+}
+
+/// As `learn` takes it, but for the tolerance.
+const USUAL: Setting = Setting { bits: 32, tolerance: 1e-5, sphere: 3, size: 64, steps: 100 };
 
 fn main() -> anyhow::Result<()> {
     // Cargo adds a flag of its own.
     let words: Vec<String> = env::args().skip(1).filter(|word| word != "--bench").collect();
-    if let [child, numbers @ ..] = &words[..]
+    if let [child, words @ ..] = &words[..]
         && child == CHILD
     {
-        let numbers = numbers.iter().map(|word| word.parse()).collect::<Result<Vec<usize>, _>>()?;
-        let [subdivisions, size, steps] = numbers[..] else { bail!("three numbers") };
-        return one([subdivisions, size], steps);
+        let [bits, tolerance, sphere, size, steps] = words else { bail!("five numbers") };
+        let (bits, tolerance) = (bits.parse()?, tolerance.parse()?);
+        let [sphere, size, steps] = [sphere.parse()?, size.parse()?, steps.parse()?];
+        let setting = Setting { bits, tolerance, sphere, size, steps };
+        return match bits {
+            32 => one::<NdArray<f32>>(setting),
+            _ => one::<NdArray<f64>>(setting),
+        };
     }
     let steps = words.first().map_or("10,30,100", String::as_str);
     let steps = steps.split(',').map(str::parse).collect::<Result<Vec<usize>, _>>()?;
-    let [sphere, size] = USUAL;
-    let usual = steps.iter().map(|&steps| (USUAL, steps));
-    let grown = [[sphere - 1, size], [sphere + 1, size], [sphere, size / 2], [sphere, 2 * size]];
-    let grown = grown.map(|setting| (setting, steps[0]));
-    let mut page = format!("f64, on {}.\n\n", machine::machine());
-    page += "| steps | vertices | faces | pixels | numbers kept | peak memory | of that before the loop | seconds |\n";
-    page += "|---|---|---|---|---|---|---|---|\n";
-    for (setting, steps) in usual.chain(grown) {
-        let measured = Measured::of(setting, steps)?;
-        println!("{setting:?}, {steps} steps: {measured:?}");
-        let ([subdivisions, size], mesh) = (setting, icosphere(setting[0] as u32));
+    let drawn = [1e-5, 1e-3, 1e-2].map(|tolerance| Setting { tolerance, ..USUAL });
+    let drawn = drawn.into_iter().chain([Setting { bits: 64, ..USUAL }]);
+    let usual =
+        drawn.flat_map(|setting| steps.iter().map(move |&steps| Setting { steps, ..setting }));
+    let few = Setting { steps: steps[0], ..USUAL };
+    let grown = [
+        Setting { sphere: few.sphere - 1, ..few },
+        Setting { sphere: few.sphere + 1, ..few },
+        Setting { size: few.size / 2, ..few },
+        Setting { size: few.size * 2, ..few },
+    ];
+    let mut page = format!("On {}.\n\n", machine::machine());
+    page += "| floats | tolerance | steps | vertices | faces | pixels | numbers kept | peak memory | of that before the loop | seconds |\n";
+    page += "|---|---|---|---|---|---|---|---|---|---|\n";
+    for setting in usual.chain(grown) {
+        let measured = Measured::of(setting)?;
+        println!("{setting:?}: {measured:?}");
+        let Setting { bits, tolerance, sphere, size, steps } = setting;
         let Measured { kept, before, peak, seconds } = measured;
+        let mesh = icosphere(sphere as u32);
         writeln!(
             page,
-            "| {steps} | {} | {} | 24 x {size}² | {kept} | {peak:.0} MiB | {before:.0} MiB | {seconds:.1} |",
+            "| f{bits} | {tolerance:e} | {steps} | {} | {} | 24 x {size}² | {kept} | {peak:.0} MiB | {before:.0} MiB | {seconds:.1} |",
             mesh.positions().len(),
             mesh.faces().len(),
         )?;
-        let usual = [subdivisions, size] == USUAL;
+        let usual = (sphere, size) == (USUAL.sphere, USUAL.size);
         ensure!(!usual || peak < LIMIT, "{steps} steps: {peak:.0} MiB, not below {LIMIT} MiB");
     }
-    learning::write("memory", &page)
+    learning::write("estimators.md", "memory", &page)
 }
 
 /// What one process found.
@@ -87,10 +114,11 @@ struct Measured {
 
 impl Measured {
     /// Measures in a process of its own, because a peak never falls.
-    fn of([subdivisions, size]: [usize; 2], steps: usize) -> anyhow::Result<Self> {
+    fn of(setting: Setting) -> anyhow::Result<Self> {
+        let Setting { bits, tolerance, sphere, size, steps } = setting;
         let child = Command::new(env::current_exe()?)
-            .arg(CHILD)
-            .args([subdivisions, size, steps].map(|number| number.to_string()))
+            .args([CHILD, &bits.to_string(), &tolerance.to_string()])
+            .args([sphere, size, steps].map(|number| number.to_string()))
             .stderr(Stdio::inherit())
             .output()?;
         ensure!(child.status.success(), "a measurement failed");
@@ -105,12 +133,13 @@ impl Measured {
 }
 
 /// Prints what [`Measured`] holds.
-fn one([subdivisions, size]: [usize; 2], steps: usize) -> anyhow::Result<()> {
+fn one<B: RasterBackend>(setting: Setting) -> anyhow::Result<()> {
+    let Setting { tolerance, sphere, size, steps, .. } = setting;
     let folder = tempfile::tempdir()?;
     let template = folder.path().join("sphere.obj");
-    icosphere(subdivisions as u32).write_obj(&template)?;
+    icosphere(sphere as u32).write_obj(&template)?;
     let flags = format!(
-        "--softness logistic --schedule static --size {size} --steps {steps} --template {}",
+        "--softness logistic --schedule static --tolerance {tolerance} --size {size} --steps {steps} --template {}",
         template.display()
     );
     let plan = plan(Order::Unrolled, Referee::Fixed);
@@ -123,6 +152,7 @@ fn one([subdivisions, size]: [usize; 2], steps: usize) -> anyhow::Result<()> {
     let estimate = MetaGradient::default().estimate(&problem, &phi, 0);
     let seconds = clock.elapsed().as_secs_f64();
     ensure!(estimate.is_finite(), "the gradient is not finite");
+    eprintln!("loss {} gradient {:?}", estimate.loss, estimate.gradient.to_data());
     println!("{} {before} {} {seconds}", estimate.stored, peak()?);
     Ok(())
 }

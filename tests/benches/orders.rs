@@ -23,7 +23,7 @@ use softrast_method::{Class, Lesson, study};
 use softrast_runner::{Curve, Figure, Order, Plan, Referee, mean};
 use softrast_tests::vector;
 
-type B = NdArray<f64>;
+type B = NdArray<f32>;
 
 const SCENE: &str = "--size 64 --triangles 100 --steps 100 --schedule static";
 /// Four times as wide as is best.
@@ -75,7 +75,7 @@ fn main() -> anyhow::Result<()> {
         fs::write(docs(&format!("orders-{subject}.svg")), figure.svg()?)?;
         fs::write(docs(&format!("orders-{subject}.csv")), csv)?;
     }
-    learning::write("orders", &page)
+    learning::write("estimators.md", "orders", &page)
 }
 
 fn measured(flags: &str, rate: f64, budget: usize) -> anyhow::Result<Vec<Found>> {

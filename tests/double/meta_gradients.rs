@@ -161,7 +161,9 @@ fn fused_errors<S: Softness>(softness: S, phi: &[f64], tolerance: f64) -> [f64; 
 // Of the errors of a table of cubics that of the second derivative is the largest.
 #[test]
 fn both_ways_to_draw_have_the_same_meta_gradient() {
-    for (tolerance, bound) in [(FINE, 1e-4), (Rasterizer::TOLERANCE, 1e-2)] {
+    for (tolerance, bound) in
+        [(FINE, 1e-4), (Rasterizer::TOLERANCE, 1e-2), (1e-3, 9.0), (1e-2, 9.0)]
+    {
         let logistic = fused_errors(Logistic, &logistic(), tolerance);
         let mlp = fused_errors(Mlp, &mlp(), tolerance);
         assert!(

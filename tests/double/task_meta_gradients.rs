@@ -16,9 +16,14 @@ use softrast_tests::{numbers, vector};
 use crate::differences::relative_error;
 
 type B = NdArray<f64>;
+/// What `learn` computes on.
+type Single = NdArray<f32>;
 
 /// Relative to central differences.
 const BOUND: f64 = 1e-5;
+/// The same gradient in floats of 32 bits, relative to it: Adam's first steps turn on the sign of coordinates whose
+/// gradient is nearly rounding.
+const SINGLE_BOUND: f64 = 2e-2;
 /// Half the distance of a difference, as a share of the parameter's size; see the tests of the 2-D problem.
 const SHARES: [f64; 6] = [1e-6, 3e-6, 3e-7, 1e-5, 1e-7, 1e-4];
 const SOFTNESSES: [&str; 3] = [
@@ -70,9 +75,9 @@ fn check<T: Task, L: Lesson>(line: &str, lesson: impl Fn(T, &Plan) -> L) {
     for (softness, referees) in plain.into_iter().chain(felt) {
         for &referee in referees {
             let plan = plan(referee);
-            let lesson = lesson(prepared::<T>(&format!("{line} --steps 3 {softness}")), &plan);
-            let phi = lesson.start();
-            let class = Class::new(lesson, &plan);
+            let made = || lesson(prepared::<T>(&format!("{line} --steps 3 {softness}")), &plan);
+            let phi = made().start();
+            let class = Class::new(made(), &plan);
             let at = vector::<B>;
             let problem = class.problem(plan.seed, &at(&phi));
             let exact = MetaGradient::Unrolled { clip: None }.estimate(&problem, &at(&phi), 0);
@@ -93,6 +98,12 @@ fn check<T: Task, L: Lesson>(line: &str, lesson: impl Fn(T, &Plan) -> L) {
                 error
             };
             assert!(exact.iter().any(|&g| g != 0.0), "{softness} {referee:?}: no gradient");
+            let in_single = Class::<_, Single>::new(made(), &plan);
+            let problem = in_single.problem(plan.seed, &vector(&phi));
+            let found = MetaGradient::Unrolled { clip: None }.estimate(&problem, &vector(&phi), 0);
+            let off = relative_error(&numbers(found.gradient), &exact);
+            println!("{} {softness} {referee:?}, in single precision: {off:.1e}", T::NAME);
+            assert!(off <= SINGLE_BOUND, "{} {softness} {referee:?}: {off:e}", T::NAME);
             let agrees = SHARES.into_iter().any(|share| error(share) <= BOUND);
             assert!(agrees, "{} {softness} {referee:?}", T::NAME);
         }

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use softrast_raster::compiled_backends;
+use softrast_runner::usual_tolerance;
 
 use crate::{Cell, TaskName};
 
@@ -14,10 +15,6 @@ const METHODS: &str = "learned,learned-mlp,logistic --schedule static,gauss --sc
 
 /// What is varied unless said otherwise: the default of the tasks and the simplest method.
 const VARIED: &str = "learned,logistic --schedule static";
-
-/// What may be varied; the last is that of the tasks.
-const TOLERANCES: [&str; 3] = ["1e-2", "1e-3", USUAL_TOLERANCE];
-const USUAL_TOLERANCE: &str = "1e-5";
 
 /// Evaluates all methods on all tasks, original and transfer, and writes the tables.
 ///
@@ -35,7 +32,7 @@ pub struct Args {
     pub methods: Vec<String>,
 
     /// Those of the methods, or others, that the charts of error against seconds also show with half the pixels a
-    /// side, with pixels that are off by more or less, neither of which OCCLUSION knows, and on every other backend
+    /// side, with pixels that may be off by more or less, neither of which OCCLUSION knows, and on every other backend
     /// that the program was built with; "" for none.
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
     pub varied: Vec<String>,
@@ -53,11 +50,6 @@ pub struct Args {
     /// What to compute on: ndarray, flex or wgpu, if the program was built with it.
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
-
-    /// Largest error of a pixel while optimising, for all methods that do not say it themselves: 1e-2, 1e-3 or
-    /// 1e-5. OCCLUSION knows none.
-    #[arg(long, value_name = "X", default_value = USUAL_TOLERANCE, value_parser = TOLERANCES)]
-    pub tolerance: String,
 
     /// Folder for the results of every cell.
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
@@ -103,10 +95,11 @@ impl Args {
                 let varied = self.varied.iter().filter(|method| !method.is_empty());
                 let varied = varied.flat_map(move |method| {
                     let side = format!("{method} --resolution {}", task.size() / 2);
-                    let others = TOLERANCES.into_iter().filter(|other| *other != self.tolerance);
-                    let off = others.map(move |other| format!("{method} --tolerance {other}"));
-                    let freely = std::iter::once(side).chain(off);
-                    let freely = freely.filter(move |_| task.draws_freely());
+                    // What is usual where the scale moves, where it stays, and the other way round.
+                    let stays = method.contains("--schedule static");
+                    let other = usual_tolerance(stays);
+                    let off = format!("{method} --tolerance {other:e}");
+                    let freely = [side, off].into_iter().filter(move |_| task.draws_freely());
                     let on = |name: &&str| format!("{method} --backend {name}");
                     freely.chain(backends.iter().map(on).collect::<Vec<_>>())
                 });
@@ -137,13 +130,13 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * 6);
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * 4);
         assert_eq!((cells[0].task, cells[17].variant), (TaskName::Shape2d, "transfer"));
         assert_eq!(cells[11].method, "learned --resolution 128");
-        assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 6);
+        assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 4);
         let some =
             args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();
-        assert!(some.len() == 10 && some[3].runs == 7 && some[6].method_name() == "b");
+        assert!(some.len() == 8 && some[3].runs == 7 && some[5].method_name() == "b");
         assert_eq!(some[2].method_name(), "exp resolution 32");
         let runs = |line| {
             let cells = args(line).cells().unwrap();

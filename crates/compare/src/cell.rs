@@ -56,8 +56,8 @@ impl Cell {
         out.join(format!("{}-{variant}-{method}-{runs}", task.name()))
     }
 
-    /// Evaluates the cell in a folder of its own in `out`, on a backend that the task's program names and at a tolerance,
-    /// unless the method has its own; what is finished there is not done again.
+    /// Evaluates the cell in a folder of its own in `out`, on a backend that the task's program names unless the
+    /// method has its own; what is finished there is not done again.
     ///
     /// # Errors
     ///
@@ -66,7 +66,6 @@ impl Cell {
         &self,
         out: &Path,
         backend: Option<&str>,
-        tolerance: &str,
         quiet: bool,
     ) -> anyhow::Result<Measured> {
         let Self { task, variant, method, runs, .. } = self;
@@ -87,9 +86,6 @@ impl Cell {
         words.extend(["--out".into(), folder.clone().into_os_string()]);
         let backend = backend.filter(|_| !method.contains("--backend"));
         words.extend(backend.into_iter().flat_map(|name| ["--backend".into(), name.into()]));
-        if task.draws_freely() && !method.contains("--tolerance") {
-            words.extend(["--tolerance".into(), tolerance.into()]);
-        }
         words.extend(quiet.then(|| "--quiet".into()));
         words.extend(folder.join("evaluate.jsonl").exists().then(|| "--resume".into()));
         let mut stdout = Vec::new();

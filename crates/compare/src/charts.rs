@@ -1,6 +1,5 @@
 //! Charts of speed against accuracy, for one task in one variant or over all of them.
 
-use softrast_raster::Rasterizer;
 use softrast_runner::{median, method_colour, quantile};
 
 use crate::{
@@ -182,9 +181,7 @@ fn mark(one: &Measured) -> Mark {
 
 /// Whether it is what the task's program does without flags.
 fn is_default(one: &Measured) -> bool {
-    let words: Vec<&str> = one.cell.method.split_whitespace().collect();
-    let usual = one.tolerance.is_none_or(|tolerance| tolerance == Rasterizer::TOLERANCE);
-    usual && matches!(words[..], ["learned"] | ["learned", "--tolerance", _])
+    one.cell.method == "learned"
 }
 
 /// The share of all problems, a problem being a seed of a task in a variant, that a method solves

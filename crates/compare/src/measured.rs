@@ -32,8 +32,6 @@ pub struct Measured {
     pub faces: u64,
     /// Scale at the last step, where there is one, in NDC (NDC² if squared).
     pub scale_end: Option<f64>,
-    /// Largest error of a pixel while it was optimised, where the task knows one.
-    pub tolerance: Option<f64>,
     /// Whether the softness sees the squared distance.
     pub squared: bool,
     /// Scale before the first and at the last step, depth scale if there is one, learning rate.
@@ -90,7 +88,6 @@ impl Measured {
             seconds: number("/seconds/per_run")?,
             traces: Vec::new(),
             scale_end: settings["scale_end"].as_f64(),
-            tolerance: settings["tolerance"].as_f64(),
             squared: settings["squared"].as_bool() == Some(true),
             steps: whole("steps")?,
             size: whole("size")?,

@@ -44,12 +44,7 @@ pub fn compare(args: &Args, command: &str) -> anyhow::Result<String> {
             let (task, variant, method) = (cell.task.name(), cell.variant, cell.method_name());
             eprintln!("cell {} of {}: {task}, {variant}, {method}", k + 1, cells.len());
         }
-        measured.push(cell.evaluate(
-            &args.out,
-            args.backend.as_deref(),
-            &args.tolerance,
-            args.quiet,
-        )?);
+        measured.push(cell.evaluate(&args.out, args.backend.as_deref(), args.quiet)?);
         // After every cell: whoever stops a long comparison has tables of what is finished.
         write(args, &measured, command)?;
     }

@@ -118,7 +118,8 @@ const HEAD: &str = "# Results\n\nTables 2, 3 and 5 of the paper (Wu et al. 2024)
 
 const READING: &str = "\
 Errors are means over runs at the last step, in brackets the 95 % interval of the mean (bootstrap). All methods start from the
-same seeds, 0 and those that follow, which no setting was chosen on, and share everything but softness, scale and learning rate.
+same seeds, 0 and those that follow, which no setting was chosen on, and share everything but softness, scale, learning rate and what
+goes with the scale: a pixel may be off by 1e-5 where it stays, by 1e-2 where it moves.
 What `search` found for a family on training seeds of the original variant stands in `crates/method/searched.json`; the transfer
 keeps it (POSE and OCCLUSION have a learning rate of their own there). Settings with a * were not searched for: they are the
 task's own, found with a logistic. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it

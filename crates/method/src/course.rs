@@ -1,4 +1,4 @@
-use std::{cell::RefCell, path::Path, sync::Arc};
+use std::{cell::RefCell, marker::PhantomData, path::Path, sync::Arc};
 
 use anyhow::Context;
 use burn::{
@@ -10,16 +10,13 @@ use softrast_meta::{
     Adam, Checkpoint, InnerLoop, Learner, Measured, MetaGradient, Objective, Problem, Progress,
     Tasks, Validation,
 };
+use softrast_raster::RasterBackend;
 use softrast_runner::{Judged, Learned, Order, OuterStep, Plan, Referee, Study};
 
 use crate::{Lesson, Of, Step, finer, numbers, tensor};
 
-/// Learning runs in doubles: rounding grows with every step that is walked back (META 2.5, V9).
-type B = NdArray<f64>;
-type A = Autodiff<B>;
-type AA = Autodiff<A>;
-/// What takes no derivative of a run does without: that run is as `evaluate` makes it.
-type Single = NdArray<f32>;
+/// What learning computes on: floats of 32 bits, as in the runs that `evaluate` makes.
+type Learning = NdArray<f32>;
 
 /// Largest norm of the mean meta-gradient. Source: META 2.4.
 const CLIP: f64 = 1.0;
@@ -36,7 +33,7 @@ pub fn study(lesson: impl Lesson, plan: &Plan) -> anyhow::Result<Box<dyn Study>>
     // What would fail later fails here, where an error can be told.
     let seeds = (0..(plan.outer * plan.batch) as u64).map(|k| plan.seed + k);
     let last = seeds.max().into_iter().chain([plan.validation_seed]);
-    last.map(|seed| lesson.scene::<B>(seed, 1)).collect::<Result<Vec<_>, _>>()?;
+    last.map(|seed| lesson.scene::<Learning>(seed, 1)).collect::<Result<Vec<_>, _>>()?;
     let validation = Validation {
         seed: plan.validation_seed,
         count: plan.validation_runs,
@@ -69,7 +66,7 @@ pub fn meta_gradient(plan: &Plan) -> MetaGradient {
 }
 
 struct Course<L: Lesson> {
-    class: Class<L>,
+    class: Class<L, Learning>,
     learner: Learner,
     progress: Progress,
 }
@@ -80,7 +77,7 @@ impl<L: Lesson> Study for Course<L> {
     }
 
     fn advance(&mut self) -> anyhow::Result<Option<OuterStep>> {
-        let Some(record) = self.learner.advance::<B>(&self.class, &mut self.progress)? else {
+        let Some(record) = self.learner.advance(&self.class, &mut self.progress)? else {
             return Ok(None);
         };
         let (loss, validation) = (record.loss, record.validation_loss);
@@ -119,8 +116,8 @@ impl<L: Lesson> Study for Course<L> {
     }
 }
 
-/// Instances of a lesson by seed, for a learner or a meta-gradient.
-pub struct Class<L: Lesson> {
+/// Instances of a lesson by seed, for a learner or a meta-gradient on a backend.
+pub struct Class<L: Lesson, B: RasterBackend> {
     lesson: Arc<L>,
     own_referee: bool,
     /// Whether the last entry of φ is the logarithm of the inner learning rate.
@@ -129,12 +126,13 @@ pub struct Class<L: Lesson> {
     measured: Measured,
     /// The latest φ and what was prepared for it.
     prepared: RefCell<Option<Prepared<L>>>,
+    backend: PhantomData<B>,
 }
 
 /// A vector φ and what was prepared for it.
 type Prepared<L> = (Vec<f64>, Arc<<L as Lesson>::Drawing>);
 
-impl<L: Lesson> Class<L> {
+impl<L: Lesson, B: RasterBackend> Class<L, B> {
     /// The lesson with the referee that `plan` asks for.
     pub fn new(lesson: L, plan: &Plan) -> Self {
         let measured = match plan.judged {
@@ -143,7 +141,8 @@ impl<L: Lesson> Class<L> {
         };
         let (own_referee, finer) = (plan.referee == Referee::Own, finer(plan));
         let (lesson, prepared) = (Arc::new(lesson), RefCell::new(None));
-        Self { lesson, own_referee, learns_rate: plan.learn_rate, finer, measured, prepared }
+        let (learns_rate, backend) = (plan.learn_rate, PhantomData);
+        Self { lesson, own_referee, learns_rate, finer, measured, prepared, backend }
     }
 
     /// φ that learning starts from.
@@ -173,111 +172,79 @@ impl<L: Lesson> Class<L> {
         }
     }
 
-    /// The outer loss of a run in single precision.
-    fn quick(&self, seed: u64, phi: &[f64], own_referee: bool) -> f64 {
-        let (phi, optimizer) = self.parted(phi);
-        let (lesson, drawing) = (&self.lesson, self.drawing(phi));
+    fn made(&self, seed: u64, phi: &[f64], own_referee: bool) -> ProblemOf<L, B> {
+        let (softness, optimizer) = self.parted(phi);
+        let (lesson, drawing) = (&self.lesson, self.drawing(softness));
         let made = "its neighbours could be made";
-        let objective = QuickInner {
+        let objective = Inner {
             lesson: lesson.clone(),
             drawing: drawing.clone(),
-            one: lesson.scene::<Autodiff<Single>>(seed, 1).expect(made),
+            one: lesson.scene(seed, 1).expect(made),
+            two: lesson.scene(seed, 1).expect(made),
         };
         let finer = if own_referee { 1 } else { self.finer };
-        let referee = QuickOuter {
+        let referee = Outer {
             lesson: lesson.clone(),
             own: own_referee.then_some(drawing),
-            zero: lesson.scene::<Single>(seed, finer).expect(made),
+            zero: lesson.scene(seed, finer).expect(made),
+            one: lesson.scene(seed, finer).expect(made),
         };
         let start = lesson.theta(&referee.zero);
         let inner = InnerLoop { optimizer, ..lesson.inner() };
-        let measured = self.measured;
-        let problem = Problem { objective, referee, inner, start, measured };
-        problem.loss(&tensor(phi.to_vec(), [phi.len()]))
+        Problem { objective, referee, inner, start, measured: self.measured }
     }
 
-    fn made(
-        &self,
-        seed: u64,
-        phi: &Tensor<B, 1>,
-        own_referee: bool,
-    ) -> Problem<B, Inner<L>, Outer<L>, Adam> {
-        let lesson = &self.lesson;
-        let drawing = self.drawing(&numbers(phi.clone()));
-        let made = "its neighbours could be made";
-        let at_two = lesson.scene::<AA>(seed, 1).expect(made);
-        let inner = Inner {
-            lesson: lesson.clone(),
-            drawing: drawing.clone(),
-            one: lesson.scene::<A>(seed, 1).expect(made),
-            two: at_two,
-        };
-        let finer = if own_referee { 1 } else { self.finer };
-        let outer = Outer {
-            lesson: lesson.clone(),
-            own: own_referee.then_some(drawing),
-            zero: lesson.scene::<B>(seed, finer).expect(made),
-            one: lesson.scene::<A>(seed, finer).expect(made),
-        };
-        let start = lesson.theta(&outer.zero);
-        let (inner_loop, measured) = (lesson.inner(), self.measured);
-        Problem { objective: inner, referee: outer, inner: inner_loop, start, measured }
+    /// The outer loss of a whole run.
+    fn lost(&self, seed: u64, phi: &Tensor<B, 1>, own_referee: bool) -> f64 {
+        let phi = numbers(phi.clone());
+        let (softness, _) = self.parted(&phi);
+        let softness = tensor(softness.to_vec(), [softness.len()]);
+        self.made(seed, &phi, own_referee).loss(&softness)
     }
 }
 
-impl<L: Lesson> Tasks<B> for Class<L> {
-    type Objective = Inner<L>;
-    type Referee = Outer<L>;
+/// An instance of a lesson.
+type ProblemOf<L, B> = Problem<B, Inner<L, B>, Outer<L, B>, Adam>;
+
+impl<L: Lesson, B: RasterBackend> Tasks<B> for Class<L, B> {
+    type Objective = Inner<L, B>;
+    type Referee = Outer<L, B>;
     type Optimizer = Adam;
 
-    fn problem(&self, seed: u64, phi: &Tensor<B, 1>) -> Problem<B, Inner<L>, Outer<L>, Adam> {
-        self.made(seed, phi, self.own_referee)
+    fn problem(&self, seed: u64, phi: &Tensor<B, 1>) -> ProblemOf<L, B> {
+        self.made(seed, &numbers(phi.clone()), self.own_referee)
     }
 
     fn loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
-        self.quick(seed, &numbers(phi.clone()), self.own_referee)
+        self.lost(seed, phi, self.own_referee)
     }
 
     /// Always by the fixed referee.
     fn judged(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
-        self.quick(seed, &numbers(phi.clone()), false)
+        self.lost(seed, phi, false)
     }
 }
 
 /// What the inner loop lowers.
-pub struct Inner<L: Lesson> {
+pub struct Inner<L: Lesson, B: RasterBackend> {
     lesson: Arc<L>,
     drawing: Arc<L::Drawing>,
-    one: L::Scene<A>,
-    two: L::Scene<AA>,
+    one: L::Scene<Autodiff<B>>,
+    two: L::Scene<Autodiff<Autodiff<B>>>,
 }
 
 /// What judges the result: the lesson's judge, or its own loss at the last step.
-pub struct Outer<L: Lesson> {
+pub struct Outer<L: Lesson, B: RasterBackend> {
     lesson: Arc<L>,
     own: Option<Arc<L::Drawing>>,
     zero: L::Scene<B>,
-    one: L::Scene<A>,
-}
-
-/// [`Inner`] for runs without a derivative.
-struct QuickInner<L: Lesson> {
-    lesson: Arc<L>,
-    drawing: Arc<L::Drawing>,
-    one: L::Scene<Autodiff<Single>>,
-}
-
-/// [`Outer`] for runs without a derivative.
-struct QuickOuter<L: Lesson> {
-    lesson: Arc<L>,
-    own: Option<Arc<L::Drawing>>,
-    zero: L::Scene<Single>,
+    one: L::Scene<Autodiff<B>>,
 }
 
 /// One objective on several backends, each with its own scene.
 macro_rules! objectives {
-    ($of:ident, $backend:ty, $scene:ident, $tracked:expr) => {
-        impl<L: Lesson> Objective<$backend> for $of<L> {
+    ($backend:ty, $scene:ident, $tracked:expr) => {
+        impl<L: Lesson, B: RasterBackend> Objective<$backend> for Inner<L, B> {
             fn loss(
                 &self,
                 theta: Tensor<$backend, 1>,
@@ -324,8 +291,8 @@ macro_rules! objectives {
 
 /// One judge on several backends, each with its own scene.
 macro_rules! judges {
-    ($of:ident, $backend:ty, $scene:ident) => {
-        impl<L: Lesson> Objective<$backend> for $of<L> {
+    ($backend:ty, $scene:ident) => {
+        impl<L: Lesson, B: RasterBackend> Objective<$backend> for Outer<L, B> {
             fn loss(
                 &self,
                 theta: Tensor<$backend, 1>,
@@ -347,9 +314,7 @@ macro_rules! judges {
 
 // On the lower level a joint loop alone asks for the derivative by φ; on the higher one φ belongs to a
 // tape below.
-objectives!(Inner, A, one, Tensor::is_require_grad);
-objectives!(Inner, AA, two, |_| true);
-objectives!(QuickInner, Autodiff<Single>, one, Tensor::is_require_grad);
-judges!(Outer, B, zero);
-judges!(Outer, A, one);
-judges!(QuickOuter, Single, zero);
+objectives!(Autodiff<B>, one, Tensor::is_require_grad);
+objectives!(Autodiff<Autodiff<B>>, two, |_| true);
+judges!(B, zero);
+judges!(Autodiff<B>, one);

@@ -28,6 +28,7 @@ pub struct LearnedEdge {
     pub(crate) surrogate: Option<Surrogate>,
     pub(crate) steps: usize,
     pub(crate) size: usize,
+    pub(crate) tolerance: f64,
     variant: Variant,
     task: &'static str,
 }
@@ -36,10 +37,11 @@ impl LearnedEdge {
     /// Begins with what `method` does on runs of `steps` steps and images of `size` × `size` pixels.
     pub fn new(method: &Method, plan: &Plan, steps: usize, size: usize) -> Self {
         let (softness, surrogate) = (method.softness(), method.surrogate().cloned());
-        let (variant, task) = (plan.variant, method.task);
+        let (tolerance, variant, task) = (method.tolerance(), plan.variant, method.task);
         if method.is_static() && plan.input == Input::Ndc {
             let phi = method.phi(method.scale(0, steps));
-            return Self { softness, phi, path: None, surrogate, steps, size, variant, task };
+            let path = None;
+            return Self { softness, phi, path, surrogate, steps, size, tolerance, variant, task };
         }
         let mut path = ScalePath { knots: Vec::new(), floor_px: plan.floor_px };
         let floor = path.floor(softness, size);
@@ -53,7 +55,7 @@ impl LearnedEdge {
             })
             .collect();
         let (phi, path) = (method.unit_phi(), Some(path));
-        Self { softness, phi, path, surrogate, steps, size, variant, task }
+        Self { softness, phi, path, surrogate, steps, size, tolerance, variant, task }
     }
 
     /// Refuses a plan that this softness cannot be learned by.

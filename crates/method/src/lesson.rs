@@ -109,10 +109,3 @@ pub fn finer(plan: &Plan) -> usize {
         Referee::Pixels | Referee::Hard => 1,
     }
 }
-
-/// Largest error of a pixel while learning.
-///
-/// The second derivative of a table of cubics is its least exact one, so that meta-gradients are off
-/// by up to a hundredth here (`both_ways_to_draw_have_the_same_meta_gradient`), far below the noise of
-/// a batch; at 1e-6 a table has so many knots that preparing it takes most of the time.
-pub const LEARNING_TOLERANCE: f64 = 1e-5;

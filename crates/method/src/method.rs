@@ -1,6 +1,6 @@
 use serde_json::{Map, Value};
 use softrast_raster::{BackendChoice, HostBackend, Rasterizer};
-use softrast_runner::Resolution;
+use softrast_runner::{Resolution, usual_tolerance};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, Surrogate};
 
 use crate::{numbers, tensor};
@@ -24,7 +24,8 @@ pub struct Method {
 pub(crate) struct Drawn {
     pub(crate) backend: BackendChoice,
     pub(crate) resolution: Resolution,
-    pub(crate) tolerance: f64,
+    /// If one was asked for.
+    pub(crate) tolerance: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -105,7 +106,12 @@ impl Method {
 
     /// What draws images of `size` × `size` pixels.
     pub fn rasterizer(&self, size: usize) -> Rasterizer {
-        Rasterizer { tolerance: self.drawn.tolerance, ..Rasterizer::new(size) }
+        Rasterizer { tolerance: self.tolerance(), ..Rasterizer::new(size) }
+    }
+
+    /// The largest error of a pixel by leaving out faces that are far from it.
+    pub fn tolerance(&self) -> f64 {
+        self.drawn.tolerance.unwrap_or(usual_tolerance(!self.is_static()))
     }
 
     /// Pixels a side of the image that is optimised on at this scale, where that which judges has
@@ -199,11 +205,15 @@ mod tests {
         let drawn = Drawn {
             backend: BackendChoice::NdArray,
             resolution: Resolution::Full,
-            tolerance: Rasterizer::TOLERANCE,
+            tolerance: None,
         };
         let name = "gauss".to_owned();
         let (surrogate, learning_rate, task, note) = (None, None, "none", None);
         let method = Method { softness, name, path, surrogate, learning_rate, task, note, drawn };
         assert_eq!(method.scale(0, 1), 0.1);
+        assert_eq!(method.rasterizer(8).tolerance, 1e-2);
+        let path = Path::Scale { first: 0.1, last: 0.1, unit: None };
+        let method = Method { path, ..method };
+        assert_eq!(method.rasterizer(8).tolerance, Rasterizer::TOLERANCE);
     }
 }

@@ -1,4 +1,4 @@
-use softrast_raster::{HostBackend, Rasterizer};
+use softrast_raster::HostBackend;
 use softrast_runner::{Error, Init, Schedule, Settings, SoftnessChoice};
 use softrast_softness::{EdgeSoftness, Family, SoftnessFile, Surrogate};
 
@@ -27,8 +27,7 @@ impl Method {
         let backend = backend(settings, defaults.backends)?;
         let resolution = settings.resolution.unwrap_or_default();
         resolution.check(settings.size.unwrap_or(defaults.size))?;
-        let tolerance = settings.tolerance.unwrap_or(Rasterizer::TOLERANCE);
-        let drawn = Drawn { backend, resolution, tolerance };
+        let drawn = Drawn { backend, resolution, tolerance: settings.tolerance };
         if let Some(name) = shipped::asked_for(settings, defaults.task) {
             check_alone(settings)?;
             let called = settings.softness.clone().unwrap_or(SoftnessChoice::Learned(None));

@@ -5,7 +5,7 @@ use softrast_meta::{Adam, InnerLoop};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 use softrast_runner::{Figure, Plan};
 
-use crate::{Judge, LEARNING_TOLERANCE, LearnedEdge, Lesson, Method, PreparedRun, Step};
+use crate::{Judge, LearnedEdge, Lesson, Method, PreparedRun, Step};
 
 /// A [`Lesson`] about scenes that are seen as silhouettes.
 pub trait SilhouetteLesson: 'static {
@@ -119,7 +119,7 @@ impl<L: SilhouetteLesson> Lesson for L {
 
     fn prepare(&self, phi: &[f64]) -> PreparedRun {
         let LearnedSilhouette { edge, faces, size, .. } = self.drawn();
-        let rasterizer = Rasterizer { tolerance: LEARNING_TOLERANCE, ..Rasterizer::new(*size) };
+        let rasterizer = Rasterizer { tolerance: edge.tolerance, ..Rasterizer::new(*size) };
         edge.prepare::<HostBackend>(rasterizer, faces, phi)
     }
 

@@ -1,4 +1,6 @@
-use crate::{Detail, Init, Resolution, Schedule, Settings, SoftnessChoice, space::exact};
+use crate::{
+    Detail, Init, Resolution, Schedule, Settings, SoftnessChoice, space::exact, usual_tolerance,
+};
 
 /// Methods from the least complex one on: parameters of the family first, then whether the scale
 /// moves.
@@ -82,8 +84,7 @@ pub(crate) fn resolutions(settings: &Settings, size: usize) -> Vec<Rung> {
     }
     let smaller: Vec<usize> =
         Resolution::sides(size).skip(1).take_while(|&side| side >= FEWEST).collect();
-    let moves = settings.schedule == Some(Schedule::Decay);
-    let auto = (moves && !smaller.is_empty()).then_some(Resolution::Auto);
+    let auto = (moves(settings) && !smaller.is_empty()).then_some(Resolution::Auto);
     let smaller = smaller.into_iter().rev().map(Resolution::Side);
     let all = smaller.chain(auto).chain([Resolution::Full]).map(|resolution| Rung {
         flags: format!("--resolution {resolution}"),
@@ -98,6 +99,10 @@ pub(crate) fn resolutions(settings: &Settings, size: usize) -> Vec<Rung> {
     all.collect()
 }
 
+fn moves(settings: &Settings) -> bool {
+    settings.schedule == Some(Schedule::Decay)
+}
+
 /// Tolerances of culling, the largest first; none if one was asked for.
 pub(crate) fn tolerances(settings: &Settings) -> Vec<Rung> {
     if settings.tolerance.is_some() {
@@ -107,7 +112,7 @@ pub(crate) fn tolerances(settings: &Settings) -> Vec<Rung> {
         flags: format!("--tolerance {}", exact(tolerance)),
         settings: Settings { tolerance: Some(tolerance), ..settings.clone() },
         with: With::Words(format!("pixels off by {tolerance:e}")),
-        usual: tolerance == TOLERANCES[3],
+        usual: tolerance == usual_tolerance(moves(settings)),
     };
     TOLERANCES.into_iter().map(rung).collect()
 }
@@ -149,9 +154,10 @@ mod tests {
         assert_eq!(flags(&resolutions(&settings, 15)), ["--resolution full"]);
         settings.resolution = Some(Resolution::Auto);
         assert!(resolutions(&settings, 64).is_empty());
-        let tolerances = tolerances(&settings);
-        assert_eq!(tolerances[3].flags, "--tolerance 1e-5");
-        assert!(tolerances[3].usual && tolerances[0].settings.tolerance == Some(0.01));
+        let moving = tolerances(&settings);
+        assert_eq!(moving[3].flags, "--tolerance 1e-5");
+        assert!(moving[0].usual && moving[0].settings.tolerance == Some(0.01) && !moving[3].usual);
+        assert!(tolerances(&Settings::default())[3].usual);
     }
 
     #[test]

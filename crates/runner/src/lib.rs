@@ -74,7 +74,7 @@ pub use program::{execute, main};
 pub use progress::Progress;
 pub use report::{escape, page};
 pub use resolution::Resolution;
-pub use settings::{Command, Init, Schedule, Settings, SoftnessChoice, Variant};
+pub use settings::{Command, Init, Schedule, Settings, SoftnessChoice, Variant, usual_tolerance};
 pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
 pub use study::{Curve, Figure, Learned, OuterStep, Study};
 pub use task::{

@@ -126,7 +126,7 @@ pub enum Referee {
     Fixed,
     /// The same on the image's own pixels, on which the hard errors of tables are taken as well.
     Pixels,
-    /// The hard image, by which tables compare. It has no gradient, so only differences can follow it.
+    /// The hard image, by which tables compare. It has no gradient, so it goes with what takes none of it.
     Hard,
     /// The loss that was optimised, under the learned softness itself, as in the paper.
     Own,
@@ -176,8 +176,8 @@ impl LearnFlags {
                            and a fixed referee does not: leave out --referee";
             return Err(Error::Usage(message.into()));
         }
-        if self.referee == Some(Referee::Hard) && !matches!(order, Order::Es(_)) {
-            let message = "a hard image has no gradient: --referee hard needs --order es";
+        if self.referee == Some(Referee::Hard) && !matches!(order, Order::Es(_) | Order::Joint) {
+            let message = "a hard image has no gradient: --referee hard needs --order es or joint";
             return Err(Error::Usage(message.into()));
         }
         if self.learn_rate && !matches!(order, Order::Es(_)) {

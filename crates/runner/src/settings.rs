@@ -124,7 +124,8 @@ pub struct Settings {
     #[arg(long, value_name = "full|auto|N", value_parser = resolution)]
     pub resolution: Option<Resolution>,
 
-    /// Largest error of a pixel by leaving out faces that are far from it, below 1 [default: 1e-5].
+    /// Largest error of a pixel by leaving out faces that are far from it, below 1 [default: 1e-5 where the scale
+    /// stays, 1e-2 where it moves].
     #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
 
@@ -247,16 +248,20 @@ impl Settings {
                 "learn has no --runs: say --batch and --validation-runs, then evaluate what it learned"
                     .into(),
             )),
-            (Command::Learn, _) if self.resolution.is_some() || self.tolerance.is_some() => {
-                Err(Error::Usage(
-                    "learn draws at --size with a tolerance of its own: leave out --resolution and \
-                     --tolerance"
-                        .into(),
-                ))
-            }
+            (Command::Learn, _) if self.resolution.is_some() => Err(Error::Usage(
+                "learn draws at --size: leave out --resolution".into(),
+            )),
             _ => Ok(()),
         }
     }
+}
+
+/// Largest error of a pixel unless asked for another, where the scale stays or `moves`.
+///
+/// A scale that stays is narrow, and what reaches the pixels far from an edge is a gradient that nobody sees in the image
+/// but that an optimiser follows. One that moves is wide first, when its near pixels tell as much, and is costly then.
+pub const fn usual_tolerance(moves: bool) -> f64 {
+    if moves { 1e-2 } else { 1e-5 }
 }
 
 /// What a softness that comes with the program is called, and with what its name begins.

@@ -50,13 +50,13 @@ pub(crate) fn docs(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name)
 }
 
-/// Puts `text` between the two marks that `docs/estimators.md` has for a benchmark.
+/// Puts `text` between the two marks that a page among the documents has for a benchmark.
 ///
 /// # Errors
 ///
 /// If the page is not there or has no such marks.
-pub(crate) fn write(benchmark: &str, text: &str) -> anyhow::Result<()> {
-    let page = docs("estimators.md");
+pub(crate) fn write(page: &str, benchmark: &str, text: &str) -> anyhow::Result<()> {
+    let page = docs(page);
     let start = format!("<!-- what follows is written by the benchmark {benchmark} -->\n");
     let end = format!("<!-- end of what the benchmark {benchmark} writes -->");
     let old = fs::read_to_string(&page)?;
