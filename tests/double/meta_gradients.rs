@@ -8,6 +8,7 @@ use burn::{
     tensor::{Tensor, backend::Backend},
 };
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
+use softrast_method::LEARNING_TOLERANCE;
 use softrast_raster::Rasterizer;
 use softrast_softness::{Family, Logistic, Mlp, Softness};
 use softrast_tests::{Shape2d, numbers, shape2d_start, vector};
@@ -162,7 +163,7 @@ fn fused_errors<S: Softness>(softness: S, phi: &[f64], tolerance: f64) -> [f64; 
 #[test]
 fn both_ways_to_draw_have_the_same_meta_gradient() {
     for (tolerance, bound) in
-        [(FINE, 1e-4), (Rasterizer::TOLERANCE, 1e-2), (1e-3, 9.0), (1e-2, 9.0)]
+        [(FINE, 1e-4), (Rasterizer::TOLERANCE, 1e-2), (LEARNING_TOLERANCE, 0.1)]
     {
         let logistic = fused_errors(Logistic, &logistic(), tolerance);
         let mlp = fused_errors(Mlp, &mlp(), tolerance);

@@ -109,3 +109,9 @@ pub fn finer(plan: &Plan) -> usize {
         Referee::Pixels | Referee::Hard => 1,
     }
 }
+
+/// Largest error of a pixel while learning, unless another is asked for.
+///
+/// The second derivative of a table of cubics is its least exact one, so that meta-gradients are off by up to a tenth
+/// here, and by their own size at 1e-2 (`both_ways_to_draw_have_the_same_meta_gradient`).
+pub const LEARNING_TOLERANCE: f64 = 1e-3;

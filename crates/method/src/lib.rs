@@ -57,7 +57,7 @@ pub use defaults::Defaults;
 pub use descent::{Descent, Moment};
 pub use judge::Judge;
 pub use learned_edge::LearnedEdge;
-pub use lesson::{Lesson, finer};
+pub use lesson::{LEARNING_TOLERANCE, Lesson, finer};
 pub use method::Method;
 pub use moving_silhouette::MovingSilhouette;
 pub use prepared_run::{Of, PreparedRun, Step};

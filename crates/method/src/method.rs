@@ -3,7 +3,7 @@ use softrast_raster::{BackendChoice, HostBackend, Rasterizer};
 use softrast_runner::{Resolution, usual_tolerance};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, Surrogate};
 
-use crate::{numbers, tensor};
+use crate::{LEARNING_TOLERANCE, numbers, tensor};
 
 /// A softness and how its scale moves over the steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -150,6 +150,12 @@ impl Method {
         }
     }
 
+    /// [`Method::tolerance`] while the softness is learned: unless asked for, at most
+    /// [`LEARNING_TOLERANCE`](crate::LEARNING_TOLERANCE).
+    pub(crate) fn learning_tolerance(&self) -> f64 {
+        self.drawn.tolerance.unwrap_or(self.tolerance().min(LEARNING_TOLERANCE))
+    }
+
     /// Parameters of the softness at this scale; a file's without a path are its own whatever the scale.
     pub fn phi(&self, scale: f64) -> Vec<f64> {
         match &self.path {
@@ -212,8 +218,10 @@ mod tests {
         let method = Method { softness, name, path, surrogate, learning_rate, task, note, drawn };
         assert_eq!(method.scale(0, 1), 0.1);
         assert_eq!(method.rasterizer(8).tolerance, 1e-2);
+        assert_eq!(method.learning_tolerance(), LEARNING_TOLERANCE);
         let path = Path::Scale { first: 0.1, last: 0.1, unit: None };
         let method = Method { path, ..method };
         assert_eq!(method.rasterizer(8).tolerance, Rasterizer::TOLERANCE);
+        assert_eq!(method.learning_tolerance(), Rasterizer::TOLERANCE);
     }
 }
