@@ -66,7 +66,7 @@ fn main() -> anyhow::Result<()> {
         let figure = Figure {
             caption: String::new(),
             axes: ["seconds".into(), "lowest validation loss so far".into()],
-            logarithmic: true,
+            logarithmic: [true; 2],
             curves: all
                 .into_iter()
                 .map(|Found { name, points }| Curve { name: name.into(), points: stairs(points) })

@@ -41,7 +41,7 @@ impl LearnedEdge {
                  it has a surrogate, that is what the gradient is taken of."
                     .into(),
             axes: ["signed distance (pixels)".into(), "coverage".into()],
-            logarithmic: false,
+            logarithmic: [false; 2],
             curves: curves.collect(),
         }];
         if self.path.is_some() {
@@ -54,7 +54,7 @@ impl LearnedEdge {
             figures.push(Figure {
                 caption: "The scale of the softness over the inner steps.".into(),
                 axes: ["inner step".into(), "scale (pixels)".into()],
-                logarithmic: true,
+                logarithmic: [false, true],
                 curves: curves.into(),
             });
         }

@@ -10,7 +10,10 @@ pub(crate) fn machine() -> String {
         cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split(": ").nth(1));
     let load = read("/proc/loadavg");
     let load: Vec<_> = load.split_whitespace().take(3).collect();
-    let threads = rayon::current_num_threads();
+    let threads = match rayon::current_num_threads() {
+        1 => "1 thread".to_owned(),
+        many => format!("{many} threads"),
+    };
     let model = model.unwrap_or("an unknown processor");
-    format!("{threads} threads of {model}, load averages {}", load.join(" "))
+    format!("{threads} of {model}, load averages {}", load.join(" "))
 }

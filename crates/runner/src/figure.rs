@@ -39,19 +39,19 @@ fn draw<DB: DrawingBackend>(
     root: &DrawingArea<DB, plotters::coord::Shift>,
     figure: &Figure,
 ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
-    let height = |y: f64| if figure.logarithmic { y.log10() } else { y };
+    let place = |axis: usize, z: f64| if figure.logarithmic[axis] { z.log10() } else { z };
+    let value = |axis: usize, z: f64| if figure.logarithmic[axis] { 10f64.powf(z) } else { z };
     let points = |curve: &Curve| -> Vec<(f64, f64)> {
-        let points = curve.points.iter().map(|&[x, y]| (x, height(y)));
+        let points = curve.points.iter().map(|&[x, y]| (place(0, x), place(1, y)));
         points.filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
     };
     let lines: Vec<_> = figure.curves.iter().map(|curve| (&curve.name, points(curve))).collect();
     let all = || lines.iter().flat_map(|(_, points)| points);
     let [across, up] = [extent(all().map(|p| p.0), 0.0), extent(all().map(|p| p.1), 0.06)];
-    let [x, y] =
-        [(across, false, 10), (up, figure.logarithmic, 6)].map(|(ends, logarithmic, most)| {
-            let range = ends[0]..ends[1];
-            Ticks::new(range.clone(), logarithmic, most).on(range)
-        });
+    let [x, y] = [(across, 0, 10), (up, 1, 6)].map(|(ends, axis, most): (_, usize, _)| {
+        let range = ends[0]..ends[1];
+        Ticks::new(range.clone(), figure.logarithmic[axis], most).on(range)
+    });
     let mut chart = ChartBuilder::on(root)
         .margin(14)
         .x_label_area_size(46)
@@ -61,8 +61,8 @@ fn draw<DB: DrawingBackend>(
         .configure_mesh()
         .x_desc(&figure.axes[0])
         .y_desc(&figure.axes[1])
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(if figure.logarithmic { 10f64.powf(*y) } else { *y }))
+        .x_label_formatter(&|x| tick(value(0, *x)))
+        .y_label_formatter(&|y| tick(value(1, *y)))
         .label_style(("sans-serif", 14))
         .axis_desc_style(("sans-serif", 15))
         .bold_line_style(GRID)

@@ -11,7 +11,7 @@ use crate::{
 pub(crate) struct LearnFlags {
     /// How `learn` gets its gradient: unrolled (exact, through all inner steps), truncated:K (the last
     /// K), direct (at the end alone), joint (down the inner loss), es or es:S (differences of whole runs whose
-    /// parameters are S apart, 0.05 if not said) [default: unrolled].
+    /// parameters are S apart, 0.2 if not said) [default: es for a softness of few parameters, unrolled for an mlp].
     #[arg(long, value_name = "ORDER", value_parser = order)]
     order: Option<Order>,
 
@@ -163,13 +163,21 @@ impl LearnFlags {
         self.inner
     }
 
-    /// The plan that the flags make; `seed` is added to the seeds of training and validation.
+    /// The plan that the flags make for a softness of so many parameters; `seed` is added to the seeds of training and
+    /// validation.
     ///
     /// # Errors
     ///
     /// If flags contradict each other.
-    pub(crate) fn plan(&self, variant: Variant, seed: u64) -> Result<Plan, Error> {
-        let order = self.order.unwrap_or(Order::Unrolled);
+    pub(crate) fn plan(
+        &self,
+        variant: Variant,
+        seed: u64,
+        parameters: usize,
+    ) -> Result<Plan, Error> {
+        // As good as an exact gradient where there are few, and cheaper (docs/estimators.md).
+        let usual = if parameters <= FEW { Order::Es(SIGMA) } else { Order::Unrolled };
+        let order = self.order.unwrap_or(usual);
         let direct = order == Order::Direct;
         if direct && !matches!(self.referee, None | Some(Referee::Own)) {
             let message = "--order direct sees how the loss depends on the softness where a run ends, \
@@ -236,7 +244,9 @@ impl LearnFlags {
 }
 
 /// What `es` alone means. The entries of φ are mostly logarithms.
-const SIGMA: f64 = 0.05;
+const SIGMA: f64 = 0.2;
+/// A softness of no more parameters is learned by `es` unless the command line says otherwise.
+const FEW: usize = 10;
 const ORDERS: &str = "expected unrolled, truncated:K, direct, joint, es or es:S";
 
 fn order(text: &str) -> Result<Order, String> {
@@ -269,7 +279,7 @@ mod tests {
     #[test]
     fn orders_have_the_names_of_the_documentation() {
         assert_eq!(order("truncated:5"), Ok(Order::Truncated(5)));
-        assert_eq!([order("es"), order("es:0.3")], [0.05, 0.3].map(|s| Ok(Order::Es(s))));
+        assert_eq!([order("es"), order("es:0.3")], [0.2, 0.3].map(|s| Ok(Order::Es(s))));
         for wrong in ["truncated", "truncated:0", "unrolled:3", "second", "es:0", "es:x"] {
             assert!(order(wrong).is_err(), "{wrong}");
         }
@@ -278,19 +288,28 @@ mod tests {
     #[test]
     fn a_direct_gradient_needs_a_referee_that_sees_the_softness() {
         let direct = LearnFlags { order: Some(Order::Direct), ..LearnFlags::default() };
-        assert_eq!(direct.plan(Variant::Original, 0).unwrap().referee, Referee::Own);
-        assert!(
-            LearnFlags { referee: Some(Referee::Fixed), ..direct }
-                .plan(Variant::Original, 0)
-                .is_err()
-        );
-        let hard =
-            |order| LearnFlags { referee: Some(Referee::Hard), order, ..LearnFlags::default() };
-        assert!(hard(None).plan(Variant::Original, 0).is_err());
-        assert!(hard(Some(Order::Es(0.1))).plan(Variant::Original, 0).is_ok());
-        let rate = LearnFlags { learn_rate: true, ..LearnFlags::default() };
-        assert!(rate.plan(Variant::Original, 0).is_err());
-        let seeds = LearnFlags::default().plan(Variant::Original, 3).unwrap();
+        assert_eq!(direct.plan(Variant::Original, 0, 1).unwrap().referee, Referee::Own);
+        let fixed = LearnFlags { referee: Some(Referee::Fixed), ..direct };
+        assert!(fixed.plan(Variant::Original, 0, 1).is_err());
+        let seeds = LearnFlags::default().plan(Variant::Original, 3, 1).unwrap();
         assert_eq!((seeds.seed, seeds.validation_seed), (1_000_003, 2_000_003));
     }
+
+    #[test]
+    fn few_parameters_are_learned_by_differences_and_many_by_derivatives() {
+        let hard =
+            |order| LearnFlags { referee: Some(Referee::Hard), order, ..LearnFlags::default() };
+        let rate = LearnFlags { learn_rate: true, ..LearnFlags::default() };
+        for flags in [hard(None), hard(Some(Order::Es(0.1))), rate] {
+            assert!(flags.plan(Variant::Original, 0, 1).is_ok());
+            assert!(flags.order.is_some() || flags.plan(Variant::Original, 0, MLP).is_err());
+        }
+        let order = |parameters| {
+            LearnFlags::default().plan(Variant::Original, 0, parameters).unwrap().order
+        };
+        assert_eq!([order(4), order(MLP)], [Order::Es(SIGMA), Order::Unrolled]);
+    }
+
+    /// Weights of the network.
+    const MLP: usize = 56;
 }

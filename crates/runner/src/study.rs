@@ -74,8 +74,8 @@ pub struct Figure {
     pub caption: String,
     /// Names of the axes.
     pub axes: [String; 2],
-    /// Whether the second axis is logarithmic; values must be positive then.
-    pub logarithmic: bool,
+    /// Whether each axis is logarithmic; its values must be positive then.
+    pub logarithmic: [bool; 2],
     /// At most eight.
     pub curves: Vec<Curve>,
 }

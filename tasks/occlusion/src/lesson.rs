@@ -132,7 +132,7 @@ impl Lesson for OcclusionLesson {
                       the near one. Only differences matter."
                     .into(),
             axes: ["nearness".into(), "logarithm of the weight".into()],
-            logarithmic: false,
+            logarithmic: [false; 2],
             curves: vec![curve("start", &self.task.solver.depth.phi), curve("learned", depth)],
         });
         figures

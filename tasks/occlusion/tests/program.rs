@@ -200,7 +200,7 @@ const LEARN: &str = "learn --outer 3 --inner 6 --batch 2 --validation-runs 2 --s
 #[test]
 fn a_learned_softness_is_one_that_the_task_accepts() {
     for flags in [
-        "",
+        "--order unrolled",
         "--softness mlp --order direct",
         "--schedule decay --order es --learn-rate",
         "--order joint",
@@ -252,8 +252,8 @@ fn flags_of_learning_that_make_no_sense_are_refused() {
         ("learn --runs 3", "learn has no --runs"),
         ("learn --order truncated:0", "expected a whole number"),
         ("learn --order direct --referee fixed", "leave out --referee"),
-        ("learn --referee hard", "--referee hard needs --order es"),
-        ("learn --learn-rate", "--learn-rate needs --order es"),
+        ("learn --referee hard --order unrolled", "--referee hard needs --order es"),
+        ("learn --learn-rate --softness mlp", "--learn-rate needs --order es"),
         ("learn --knots 6", "expected a whole number from 1 to 5"),
         ("learn --scales 0.1", "--scales goes with search"),
     ] {

@@ -30,10 +30,10 @@ use crate::{
 pub(crate) fn learn<T: Task>(line: &CommandLine<T::Args>, again: &str) -> anyhow::Result<Results> {
     let mut settings = line.settings.clone();
     settings.steps = line.learning.inner().or(settings.steps);
-    let plan = line.learning.plan(settings.variant, settings.seed)?;
     let prepared = Prepared::<T>::new(settings, &line.args)?;
     let identity = prepared.identity();
     let Prepared { task, settings, description } = prepared;
+    let plan = line.learning.plan(settings.variant, settings.seed, description.parameters)?;
     let mut study = task.study(&plan)?;
     let job = json!({
         "task": T::NAME,
@@ -250,7 +250,7 @@ fn charts(log: &Log, learned: &Learned) -> anyhow::Result<Vec<(String, String)>>
                   the lowest validation loss is kept."
             .into(),
         axes: ["outer step".into(), "outer loss".into()],
-        logarithmic: false,
+        logarithmic: [false; 2],
         curves: vec![curve("batch", log.losses()), curve("validation", log.validations())],
     };
     let figures = std::iter::once(&losses).chain(&learned.figures);
