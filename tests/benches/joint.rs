@@ -3,6 +3,7 @@
 //! ```text
 //! cargo bench -p softrast-tests --bench joint                # as many seeds as in docs/results.md
 //! cargo bench -p softrast-tests --bench joint -- 2           # fewer: so many of each task
+//! cargo bench -p softrast-tests --bench joint -- shape2d     # one task, printed and not written
 //! ```
 //!
 //! The strongest baseline without learning: φ goes down the inner loss along with the scene, from the searched static
@@ -43,16 +44,31 @@ const VARIANTS: [&str; 2] = ["original", "transfer"];
 fn main() -> anyhow::Result<()> {
     // Cargo adds a flag of its own.
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
-    let fewer: Option<u64> = words.first().map(|word| word.parse()).transpose()?;
+    let fewer = words.iter().find_map(|word| word.parse::<u64>().ok());
     let seeds = |usual| fewer.unwrap_or(usual);
+    let only: Vec<&String> = words.iter().filter(|word| word.parse::<u64>().is_err()).collect();
+    let asked = |name: &str| only.is_empty() || only.iter().any(|word| *word == name);
     let mut page = format!("On {}.\n\n", machine::machine());
     page += "| task | softness | seeds | stays | adapts, at its rate | adapts less stays | `learned` | adapts less `learned` |\n";
     page += "|---|---|--:|--:|--:|--:|--:|--:|\n";
-    rows::<Pose, _>(&mut page, seeds(48), |task, plan| Ok(PoseLesson::new(task, plan)))?;
-    rows::<Occlusion, _>(&mut page, seeds(50), |task, plan| Ok(OcclusionLesson::new(task, plan)))?;
-    rows::<Shape3d, _>(&mut page, seeds(6), |task, plan| Ok(Shape3dLesson::new(task, plan)))?;
-    rows::<Shape2d, _>(&mut page, seeds(10), Shape2dLesson::new)?;
-    learning::write("learning.md", "joint", &page)
+    if asked(Pose::NAME) {
+        rows::<Pose, _>(&mut page, seeds(48), |task, plan| Ok(PoseLesson::new(task, plan)))?;
+    }
+    if asked(Occlusion::NAME) {
+        rows::<Occlusion, _>(&mut page, seeds(50), |task, plan| {
+            Ok(OcclusionLesson::new(task, plan))
+        })?;
+    }
+    if asked(Shape3d::NAME) {
+        rows::<Shape3d, _>(&mut page, seeds(12), |task, plan| Ok(Shape3dLesson::new(task, plan)))?;
+    }
+    if asked(Shape2d::NAME) {
+        rows::<Shape2d, _>(&mut page, seeds(20), Shape2dLesson::new)?;
+    }
+    if only.is_empty() {
+        learning::write("learning.md", "joint", &page)?;
+    }
+    Ok(())
 }
 
 /// Rows of a task: for each start, both variants.
