@@ -7,8 +7,9 @@ use softrast_runner::usual_tolerance;
 use crate::{Cell, TaskName};
 
 /// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start
-/// reaches the whole image, which takes over twenty times as long as a logistic; the fitted one does not.
-const METHODS: &str = "learned,learned-mlp,logistic --schedule static,gauss --schedule static,exp --schedule static,\
+/// reaches the whole image, which takes over twenty times as long as a logistic; the fitted one does not. A surrogate is
+/// left out where no edge moves.
+const METHODS: &str = "learned,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
                        gamma --schedule static,mlp --init fitted --schedule static,\
                        logistic --schedule decay,\
                        gauss --schedule decay,exp --schedule decay,gamma --schedule decay";
@@ -99,11 +100,14 @@ impl Args {
                     let stays = method.contains("--schedule static");
                     let other = usual_tolerance(stays);
                     let off = format!("{method} --tolerance {other:e}");
-                    let freely = [side, off].into_iter().filter(move |_| task.draws_freely());
+                    let freely = [side, off].into_iter().filter(move |_| task.moves_edges());
                     let on = |name: &&str| format!("{method} --backend {name}");
                     freely.chain(backends.iter().map(on).collect::<Vec<_>>())
                 });
-                self.methods.iter().cloned().map(cell(false)).chain(varied.map(cell(true)))
+                let known =
+                    move |method: &&String| task.moves_edges() || *method != "learned-surrogate";
+                let methods = self.methods.iter().filter(known).cloned();
+                methods.map(cell(false)).chain(varied.map(cell(true)))
             })
         });
         Ok(cells.collect())
@@ -130,9 +134,9 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * 4);
-        assert_eq!((cells[0].task, cells[17].variant), (TaskName::Shape2d, "transfer"));
-        assert_eq!(cells[11].method, "learned --resolution 128");
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4));
+        assert_eq!((cells[0].task, cells[18].variant), (TaskName::Shape2d, "transfer"));
+        assert_eq!(cells[12].method, "learned --resolution 128");
         assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 4);
         let some =
             args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();

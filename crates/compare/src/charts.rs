@@ -4,6 +4,7 @@ use softrast_runner::{median, method_colour, quantile};
 
 use crate::{
     Measured, functions,
+    measured::{paired, short},
     plot::{Axis, Mark, Plot, Series},
 };
 
@@ -115,17 +116,17 @@ fn over(one: &Measured, curve: Curve, across: impl Fn(&Measured, usize) -> f64) 
 
 /// Seconds of a run and the hard error that it returns, mean over the seeds.
 pub(crate) fn price(one: &Measured) -> [f64; 2] {
-    let lowest = one.traces.iter().filter_map(|trace| trace.lowest().last());
-    let lowest: Vec<f64> = lowest.collect();
-    [one.seconds, softrast_runner::mean(&lowest)]
+    [one.seconds, softrast_runner::mean(&one.returned())]
 }
 
-/// Places of the points that no other one is at least as good as in both numbers.
+/// Whether one point is at least as good as another in both numbers and not the same.
+fn beats(one: [f64; 2], other: [f64; 2]) -> bool {
+    one[0] <= other[0] && one[1] <= other[1] && one != other
+}
+
+/// Places of the points that no other one beats.
 pub(crate) fn front(points: &[[f64; 2]]) -> Vec<usize> {
-    let beaten = |a: [f64; 2]| {
-        let better = |b: &[f64; 2]| b[0] <= a[0] && b[1] <= a[1] && *b != a;
-        points.iter().any(better)
-    };
+    let beaten = |a: [f64; 2]| points.iter().any(|&b| beats(b, a));
     let mut front: Vec<usize> = (0..points.len()).filter(|&k| !beaten(points[k])).collect();
     front.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
     front
@@ -144,8 +145,12 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     let names: Vec<String> = best.iter().map(|&k| cells[k].cell.method_name()).collect();
     let default = cells.iter().position(|one| is_default(one));
     let default = default.map(|k| match best.contains(&k) {
-        true => " In the box: the default of the task, which is on the front.",
-        false => " In the box: the default of the task, which is not on the front.",
+        true => " In the box: the default of the task, which is on the front.".to_owned(),
+        false => format!(
+            " In the box: the default of the task, which is not on the front. Before it, with the seconds as a share \
+             of its own and what the error is higher by, seed by seed: {}.",
+            beaten_by(cells, &prices, k)
+        ),
     });
     let elsewhere = cells.iter().any(|one| mark(one) == Mark::Square);
     let squares = if elsewhere { ", squares on another backend" } else { "" };
@@ -166,6 +171,23 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
             front: best.iter().map(|&k| prices[k]).collect(),
         },
     }
+}
+
+/// What beats a method, and by how much.
+fn beaten_by(cells: &[&Measured], prices: &[[f64; 2]], k: usize) -> String {
+    let better = cells.iter().zip(prices).filter(|(_, price)| beats(**price, prices[k]));
+    let by = better.map(|(one, price)| {
+        let (mean, [low, high]) = paired(&one.returned(), &cells[k].returned());
+        format!(
+            "{} ({:.2}; {}, 95 % interval {} to {})",
+            one.cell.method_name(),
+            price[0] / prices[k][0],
+            short(mean),
+            short(low),
+            short(high)
+        )
+    });
+    by.collect::<Vec<_>>().join(", ")
 }
 
 /// Variations are told from the method that they vary.

@@ -2,8 +2,13 @@ use std::path::Path;
 
 use anyhow::Context;
 use serde_json::Value;
+use softrast_runner::{bootstrap_mean_interval, mean};
 
 use crate::{Cell, Trace};
+
+/// Samples behind the interval of a difference, and their seed.
+const RESAMPLES: usize = 10_000;
+const RESAMPLING_SEED: u64 = 0;
 
 /// What a cell came to, at the last step.
 #[derive(Clone, Debug)]
@@ -104,6 +109,11 @@ impl Measured {
         self.settings.contains(" to ")
     }
 
+    /// Hard errors of the steps that the runs return, in the order of the seeds.
+    pub(crate) fn returned(&self) -> Vec<f64> {
+        self.traces.iter().filter_map(|trace| trace.lowest().last()).collect()
+    }
+
     /// With the curves that `evaluate` has left in its folder.
     ///
     /// # Errors
@@ -129,6 +139,13 @@ impl Error {
         let mean = json["final"].as_f64().context("an error has no mean")?;
         Ok(Self { name, mean, ci95, per_run: numbers("per_run")? })
     }
+}
+
+/// Mean and 95 % interval of the differences on the seeds that both have.
+pub(crate) fn paired(errors: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
+    let differences: Vec<f64> = errors.iter().zip(reference).map(|(a, b)| a - b).collect();
+    let interval = bootstrap_mean_interval(&differences, RESAMPLES, RESAMPLING_SEED);
+    (mean(&differences), interval)
 }
 
 /// A number with three digits that count.

@@ -34,7 +34,6 @@ pub(crate) fn csv(measured: &[Measured]) -> String {
 /// The same with the settings and the values of every run.
 pub(crate) fn json(measured: &[Measured]) -> String {
     let record = |one: &Measured| -> Value {
-        let best = one.traces.iter().filter_map(|trace| trace.lowest().last());
         json!({
             "task": one.cell.task.name(),
             "variant": one.cell.variant,
@@ -44,7 +43,7 @@ pub(crate) fn json(measured: &[Measured]) -> String {
             "hard_error": {
                 "name": one.hard.name,
                 "last": one.hard.per_run,
-                "best_step": best.collect::<Vec<_>>(),
+                "best_step": one.returned(),
             },
             "parameter_error": {"name": one.parameter.name, "last": one.parameter.per_run},
             "success_rate": one.success_rate,

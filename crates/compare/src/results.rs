@@ -4,19 +4,15 @@ use std::{fmt::Write, fs, path::Path};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use softrast_method::Searched;
-use softrast_runner::{Schedule, bootstrap_mean_interval, escape, mean, page};
+use softrast_runner::{Schedule, escape, mean, page};
 
 use crate::{
     Cell, Error, Measured, Printed, TaskName,
     charts::{self, Chart},
     machine::machine,
-    measured::short,
+    measured::{paired, short},
     table::Table,
 };
-
-/// Samples behind the interval of a difference, and their seed.
-const RESAMPLES: usize = 10_000;
-const RESAMPLING_SEED: u64 = 0;
 
 /// The tables of the paper with our figures, as Markdown. `command` made them; `pictures` is where
 /// the charts are, seen from the file, if they are to be shown.
@@ -123,12 +119,13 @@ goes with the scale: a pixel may be off by 1e-5 where it stays, by 1e-2 where it
 What `search` found for a family on training seeds of the original variant stands in `crates/method/searched.json`; the transfer
 keeps it (POSE and OCCLUSION have a learning rate of their own there). Settings with a * were not searched for: they are the
 task's own, found with a logistic. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it
-(`data/softness`, where a note in each file says how it was learned); their seeds were others too. `mlp` is the network before it has
+(`data/softness`, where a note in each file says how it was learned), `learned-surrogate` a sharp image with a learned wider gradient, which
+OCCLUSION, whose edges stay, has no use for; their seeds were others too. `mlp` is the network before it has
 learned anything, with `init fitted` after a fit to the searched logistic. Rows with a resolution, a tolerance or a backend optimise on that many pixels a
 side, let a pixel be off by that much, or compute there; they are on the charts of error against seconds alone. Methods are compared by the error of the **hard** image, because a method's own
 soft error falls with its scale. \"Less NAME\" is the mean of the
 differences in that error to the first method, seed by seed: below 0 is better, and in bold where its interval leaves out 0. Under
-\"best step\" stands the mean over the runs of the lowest that each has reached, which is what a run returns. Under
+\"best step\" stands the mean over the runs of the lowest that each has reached, which is what a run returns, and behind it the difference of that. Under
 \"in the paper's unit\" stand image and parameter error as the paper has them, as far as its definitions are known, and beside them
 what it prints. The paper's meshes and pictures are others, so its figures tell the order of size and no more.
 ";
@@ -220,6 +217,7 @@ fn errors(group: &[&Measured]) -> Table {
         &first.hard.name,
         &less,
         "best step",
+        &less,
         &first.parameter.name,
         "success",
         "in the paper's unit",
@@ -227,10 +225,13 @@ fn errors(group: &[&Measured]) -> Table {
     ]);
     for one in group {
         let name = one.cell.method_name();
-        let difference = match name == reference {
+        let less = |errors: &[f64], of_first: &[f64]| match name == reference {
             true => String::new(),
-            false => difference(&one.hard, &first.hard),
+            false => difference(errors, of_first),
         };
+        let (returned, of_first) = (one.returned(), first.returned());
+        let (last, best) =
+            (less(&one.hard.per_run, &first.hard.per_run), less(&returned, &of_first));
         let printed = Printed::of(one.cell.task, one.cell.variant, one.cell.softness_name());
         let printed = printed.map(|printed| pair(printed.image, printed.parameter));
         let (image, parameter) = in_papers_unit(one);
@@ -239,8 +240,9 @@ fn errors(group: &[&Measured]) -> Table {
             name,
             format!("{}{star}", one.settings),
             with_interval(&one.hard),
-            difference,
-            short(charts::price(one)[1]),
+            last,
+            short(mean(&returned)),
+            best,
             with_interval(&one.parameter),
             format!("{:.0} %", 100.0 * one.success_rate),
             pair(image, parameter),
@@ -314,16 +316,13 @@ fn with_interval(error: &Error) -> String {
     if error.per_run.len() == 1 { mean } else { format!("{mean} ({low} to {high})") }
 }
 
-/// Mean and interval of the differences on the seeds that both have.
-fn difference(one: &Error, reference: &Error) -> String {
-    let pairs = one.per_run.iter().zip(&reference.per_run);
-    let differences: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
-    let mean = short(mean(&differences));
-    if differences.len() == 1 {
-        return mean;
+/// Mean and interval of the differences on the seeds that both have; in bold where one is clear.
+fn difference(errors: &[f64], reference: &[f64]) -> String {
+    let (mean, [low, high]) = paired(errors, reference);
+    if errors.len() == 1 {
+        return short(mean);
     }
-    let [low, high] = bootstrap_mean_interval(&differences, RESAMPLES, RESAMPLING_SEED);
-    let shown = format!("{mean} ({} to {})", short(low), short(high));
+    let shown = format!("{} ({} to {})", short(mean), short(low), short(high));
     if high < 0.0 || low > 0.0 { format!("**{shown}**") } else { shown }
 }
 

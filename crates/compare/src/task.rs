@@ -45,8 +45,8 @@ impl TaskName {
         }
     }
 
-    /// Whether its images can be drawn on fewer pixels, and less exactly.
-    pub(crate) fn draws_freely(self) -> bool {
+    /// Whether edges move: only then can its images be drawn on fewer pixels and less exactly, and a surrogate be felt.
+    pub(crate) fn moves_edges(self) -> bool {
         self != Self::Occlusion
     }
 

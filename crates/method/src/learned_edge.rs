@@ -37,7 +37,8 @@ impl LearnedEdge {
     /// Begins with what `method` does on runs of `steps` steps and images of `size` × `size` pixels.
     pub fn new(method: &Method, plan: &Plan, steps: usize, size: usize) -> Self {
         let (softness, surrogate) = (method.softness(), method.surrogate().cloned());
-        let (tolerance, variant, task) = (method.learning_tolerance(), plan.variant, method.task);
+        let (tolerance, variant, task) =
+            (method.learning_tolerance(plan.order), plan.variant, method.task);
         if method.is_static() && plan.input == Input::Ndc {
             let phi = method.phi(method.scale(0, steps));
             let path = None;

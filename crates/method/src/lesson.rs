@@ -110,7 +110,7 @@ pub fn finer(plan: &Plan) -> usize {
     }
 }
 
-/// Largest error of a pixel while learning, unless another is asked for.
+/// Largest error of a pixel while learning by derivatives, unless another is asked for.
 ///
 /// The second derivative of a table of cubics is its least exact one, so that meta-gradients are off by up to a tenth
 /// here, and by their own size at 1e-2 (`both_ways_to_draw_have_the_same_meta_gradient`).

@@ -1,6 +1,6 @@
 use serde_json::{Map, Value};
 use softrast_raster::{BackendChoice, HostBackend, Rasterizer};
-use softrast_runner::{Resolution, usual_tolerance};
+use softrast_runner::{Order, Resolution, usual_tolerance};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, Surrogate};
 
 use crate::{LEARNING_TOLERANCE, numbers, tensor};
@@ -151,9 +151,12 @@ impl Method {
     }
 
     /// [`Method::tolerance`] while the softness is learned: unless asked for, at most
-    /// [`LEARNING_TOLERANCE`](crate::LEARNING_TOLERANCE).
-    pub(crate) fn learning_tolerance(&self) -> f64 {
-        self.drawn.tolerance.unwrap_or(self.tolerance().min(LEARNING_TOLERANCE))
+    /// [`LEARNING_TOLERANCE`](crate::LEARNING_TOLERANCE) where the order takes derivatives.
+    pub(crate) fn learning_tolerance(&self, order: Order) -> f64 {
+        match order {
+            Order::Es(_) => self.tolerance(),
+            _ => self.drawn.tolerance.unwrap_or(self.tolerance().min(LEARNING_TOLERANCE)),
+        }
     }
 
     /// Parameters of the softness at this scale; a file's without a path are its own whatever the scale.
@@ -218,10 +221,11 @@ mod tests {
         let method = Method { softness, name, path, surrogate, learning_rate, task, note, drawn };
         assert_eq!(method.scale(0, 1), 0.1);
         assert_eq!(method.rasterizer(8).tolerance, 1e-2);
-        assert_eq!(method.learning_tolerance(), LEARNING_TOLERANCE);
+        assert_eq!(method.learning_tolerance(Order::Unrolled), LEARNING_TOLERANCE);
+        assert_eq!(method.learning_tolerance(Order::Es(0.2)), 1e-2);
         let path = Path::Scale { first: 0.1, last: 0.1, unit: None };
         let method = Method { path, ..method };
         assert_eq!(method.rasterizer(8).tolerance, Rasterizer::TOLERANCE);
-        assert_eq!(method.learning_tolerance(), Rasterizer::TOLERANCE);
+        assert_eq!(method.learning_tolerance(Order::Unrolled), Rasterizer::TOLERANCE);
     }
 }

@@ -5,6 +5,7 @@
 pub fn method_colour(method: &str) -> [u8; 3] {
     match method.split([' ', '-', '.']).next() {
         Some("learned") if method.starts_with("learned-mlp") => [170, 20, 60],
+        Some("learned") if method.starts_with("learned-surrogate") => [110, 80, 190],
         Some("logistic") => [31, 96, 168],
         Some("gauss") => [86, 180, 233],
         Some("exp") => [0, 140, 100],
