@@ -1,6 +1,6 @@
 //! Charts of speed against accuracy, for one task in one variant or over all of them.
 
-use softrast_runner::{median, method_colour, quantile};
+use softrast_runner::{mean, median, method_colour, quantile};
 
 use crate::{
     Measured, functions,
@@ -114,29 +114,49 @@ fn over(one: &Measured, curve: Curve, across: impl Fn(&Measured, usize) -> f64) 
     series
 }
 
-/// Seconds of a run and the hard error that it returns, mean over the seeds.
-pub(crate) fn price(one: &Measured) -> [f64; 2] {
-    [one.seconds, softrast_runner::mean(&one.returned())]
+/// What a method costs and gives.
+struct Price {
+    /// Of a run.
+    seconds: f64,
+    /// Hard errors of what the runs return, in the order of the seeds.
+    errors: Vec<f64>,
 }
 
-/// Whether one point is at least as good as another in both numbers and not the same.
-fn beats(one: [f64; 2], other: [f64; 2]) -> bool {
-    one[0] <= other[0] && one[1] <= other[1] && one != other
+/// Seconds of one cell in two comparisons differ by such a share and more.
+const SCATTER: f64 = 0.1;
+
+impl Price {
+    fn of(one: &&Measured) -> Self {
+        Self { seconds: one.seconds, errors: one.returned() }
+    }
+
+    fn point(&self) -> [f64; 2] {
+        [self.seconds, mean(&self.errors)]
+    }
+
+    /// Whether it is at least as good as the other and clearly better in one of the two: by [`SCATTER`] of the seconds, or
+    /// in the error beyond the 95 % interval of the differences.
+    fn beats(&self, other: &Self) -> bool {
+        let ([seconds, error], [others, others_error]) = (self.point(), other.point());
+        let faster = seconds <= (1.0 - SCATTER) * others;
+        let no_worse = seconds <= others && error <= others_error;
+        no_worse && (faster || paired(&self.errors, &other.errors).1[1] < 0.0)
+    }
 }
 
-/// Places of the points that no other one beats.
-pub(crate) fn front(points: &[[f64; 2]]) -> Vec<usize> {
-    let beaten = |a: [f64; 2]| points.iter().any(|&b| beats(b, a));
-    let mut front: Vec<usize> = (0..points.len()).filter(|&k| !beaten(points[k])).collect();
-    front.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
+/// Places of the methods that no other one beats, the fastest first.
+fn front(prices: &[Price]) -> Vec<usize> {
+    let beaten = |one: &Price| prices.iter().any(|other| other.beats(one));
+    let mut front: Vec<usize> = (0..prices.len()).filter(|&k| !beaten(&prices[k])).collect();
+    front.sort_by(|&a, &b| prices[a].seconds.total_cmp(&prices[b].seconds));
     front
 }
 
 fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
-    let prices: Vec<[f64; 2]> = cells.iter().map(|one| price(one)).collect();
+    let prices: Vec<Price> = cells.iter().map(Price::of).collect();
     let best = front(&prices);
     let series = cells.iter().zip(&prices).enumerate().map(|(k, (one, price))| Series {
-        points: vec![*price],
+        points: vec![price.point()],
         marked: best.contains(&k),
         boxed: is_default(one),
         mark: mark(one),
@@ -159,7 +179,8 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
         caption: format!(
             "{of}: error of the step that a run returns against its seconds, means over the seeds; \
              filled marks are static, open ones move; triangles are methods on half the pixels a side, crosses at \
-             another tolerance{}.{} On the front, ringed and joined: {}.",
+             another tolerance{}.{} On the front, ringed and joined, is what nothing beats, being no worse in both and \
+             better in one by a tenth of the seconds or beyond the 95 % interval of the error's differences: {}.",
             squares,
             default.unwrap_or_default(),
             names.join(", ")
@@ -168,20 +189,20 @@ fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
             x: Axis::logarithmic("seconds of optimisation in a run"),
             y: Axis::logarithmic(&format!("lowest {}", cells[0].hard.name)),
             series: series.collect(),
-            front: best.iter().map(|&k| prices[k]).collect(),
+            front: best.iter().map(|&k| prices[k].point()).collect(),
         },
     }
 }
 
 /// What beats a method, and by how much.
-fn beaten_by(cells: &[&Measured], prices: &[[f64; 2]], k: usize) -> String {
-    let better = cells.iter().zip(prices).filter(|(_, price)| beats(**price, prices[k]));
-    let by = better.map(|(one, price)| {
-        let (mean, [low, high]) = paired(&one.returned(), &cells[k].returned());
+fn beaten_by(cells: &[&Measured], prices: &[Price], k: usize) -> String {
+    let better = cells.iter().zip(prices).filter(|(_, other)| other.beats(&prices[k]));
+    let by = better.map(|(one, Price { seconds, errors })| {
+        let (mean, [low, high]) = paired(errors, &prices[k].errors);
         format!(
             "{} ({:.2}; {}, 95 % interval {} to {})",
             one.cell.method_name(),
-            price[0] / prices[k][0],
+            seconds / prices[k].seconds,
             short(mean),
             short(low),
             short(high)
@@ -273,11 +294,19 @@ pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
 
 #[cfg(test)]
 mod tests {
-    use super::front;
+    use super::{Price, front};
 
     #[test]
-    fn the_front_holds_what_nothing_beats() {
-        let points = [[1.0, 5.0], [2.0, 5.0], [3.0, 1.0], [0.5, 9.0], [3.0, 2.0]];
-        assert_eq!(front(&points), [3, 0, 2]);
+    fn the_front_holds_what_nothing_clearly_beats() {
+        let price = |seconds, mean: f64, spread: f64| Price {
+            seconds,
+            errors: [1.0, -1.0, 0.9, -0.9].map(|x| mean + spread * x).to_vec(),
+        };
+        let clear = [(1.0, 5.0), (2.0, 5.0), (3.0, 1.0), (0.5, 9.0), (3.0, 2.0)];
+        let mut prices: Vec<Price> = clear.map(|(seconds, mean)| price(seconds, mean, 0.0)).into();
+        assert_eq!(front(&prices), [3, 0, 2]);
+        // A little slower than the first, and worse by less than it scatters.
+        prices.push(price(1.05, 5.1, 1.0));
+        assert_eq!(front(&prices), [3, 0, 5, 2]);
     }
 }

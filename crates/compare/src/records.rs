@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use serde_json::{Value, json};
+use softrast_runner::mean;
 
-use crate::{Measured, charts::price};
+use crate::Measured;
 
 /// One line for every cell.
 pub(crate) fn csv(measured: &[Measured]) -> String {
@@ -24,7 +25,7 @@ pub(crate) fn csv(measured: &[Measured]) -> String {
             cell.method_name(),
             cell.runs,
             hard.mean,
-            price(one)[1],
+            mean(&one.returned()),
             parameter.mean
         );
     }

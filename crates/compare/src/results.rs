@@ -116,9 +116,10 @@ const READING: &str = "\
 Errors are means over runs at the last step, in brackets the 95 % interval of the mean (bootstrap). All methods start from the
 same seeds, 0 and those that follow, which no setting was chosen on, and share everything but softness, scale, learning rate and what
 goes with the scale: a pixel may be off by 1e-5 where it stays, by 1e-2 where it moves.
-What `search` found for a family on training seeds of the original variant stands in `crates/method/searched.json`; the transfer
-keeps it (POSE and OCCLUSION have a learning rate of their own there). Settings with a * were not searched for: they are the
-task's own, found with a logistic. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it
+What `search` found for a family on training seeds of the original variant stands in `crates/method/searched.json`, with the command; the
+transfer keeps it (POSE and OCCLUSION have a learning rate of their own there). OCCLUSION's original, which most settings solve without an error,
+tells nothing, so families were searched on the transfer there, as `learned` was learned on it. Settings with a * were not searched for: they are the
+task's own. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it
 (`data/softness`, where a note in each file says how it was learned), `learned-surrogate` a sharp image with a learned wider gradient, which
 OCCLUSION, whose edges stay, has no use for; their seeds were others too. `mlp` is the network before it has
 learned anything, with `init fitted` after a fit to the searched logistic. Rows with a resolution, a tolerance or a backend optimise on that many pixels a

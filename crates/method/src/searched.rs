@@ -3,7 +3,8 @@ use std::{collections::BTreeMap, sync::LazyLock};
 use serde::Deserialize;
 use softrast_runner::Schedule;
 
-/// What `search` found best for a softness family on a task's original variant, on training seeds.
+/// What `search` found best for a softness family on a task's original variant, on training seeds; in OCCLUSION, where
+/// most settings solve the original without an error, on the transfer.
 ///
 /// All that the tasks know of it stands in `searched.json` beside the manifest of this crate, with
 /// the command that made each entry: for every task and family a static setting, a decay, or both.

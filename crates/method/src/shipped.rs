@@ -15,10 +15,13 @@ use crate::defaults::is_scaled;
 const SHIPPED: &[(&str, &str)] = &[
     ("shape2d", include_str!("../../../data/softness/shape2d.json")),
     ("shape2d-mlp", include_str!("../../../data/softness/shape2d-mlp.json")),
+    ("shape2d-surrogate", include_str!("../../../data/softness/shape2d-surrogate.json")),
     ("shape3d", include_str!("../../../data/softness/shape3d.json")),
     ("shape3d-mlp", include_str!("../../../data/softness/shape3d-mlp.json")),
+    ("shape3d-surrogate", include_str!("../../../data/softness/shape3d-surrogate.json")),
     ("pose", include_str!("../../../data/softness/pose.json")),
     ("pose-mlp", include_str!("../../../data/softness/pose-mlp.json")),
+    ("pose-surrogate", include_str!("../../../data/softness/pose-surrogate.json")),
     ("occlusion", include_str!("../../../data/softness/occlusion.json")),
     ("occlusion_depth", include_str!("../../../data/softness/occlusion_depth.json")),
     ("occlusion-mlp", include_str!("../../../data/softness/occlusion-mlp.json")),

@@ -71,7 +71,8 @@ pub struct Settings {
     pub variant: Variant,
 
     /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, learned for the best that
-    /// comes with the program and learned-mlp for its network, or auto for what `choose` finds.
+    /// comes with the program, learned-mlp for its network and learned-surrogate for a sharp image with a gradient of
+    /// its own, or auto for what `choose` finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
 
