@@ -389,8 +389,8 @@ mod tests {
         );
         let row = table.lines().find(|line| line.starts_with("| gauss")).unwrap();
         let expected = "| gauss | scale 0.03 to 0.002, rate 0.3 | 0.300 (0 to 1.00) | \
-                        **0.100 (0.100 to 0.100)** | 0.300 | 0.300 (0 to 1.00) | 50 % | 7.20 / 7.20 | \
-                        15.3 / 0.190 |";
+                        **0.100 (0.100 to 0.100)** | 0.300 | **0.100 (0.100 to 0.100)** | \
+                        0.300 (0 to 1.00) | 50 % | 7.20 / 7.20 | 15.3 / 0.190 |";
         assert_eq!(row, expected);
     }
 }
