@@ -1,11 +1,13 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
+use softrast_raster::{RasterBackend, Rasterizer};
 use softrast_runner::{Input, Order, Plan, Referee, Variant};
 use softrast_softness::{EdgeSoftness, Family, ScalePath, SoftnessFile, Surrogate};
 
-use crate::{Method, PreparedRun, method_of_flags::usage, numbers, tensor};
+use crate::{
+    Method, PreparedRun, method_of_flags::usage, numbers, prepared_run::DrawnAndFelt, tensor,
+};
 
 /// A scale may fall by this factor before support and knots are chosen anew, which costs as much here
 /// as drawing several images.
@@ -18,13 +20,14 @@ const ABOVE_FLOOR: f64 = 0.05;
 /// What is learned is one vector: the parameters of a softness that stays as it is; or, where its
 /// scale moves or is learned apart ([`Input::Relative`]), first the knots of a [`ScalePath`], then the
 /// parameters at scale 1 without the logarithm of the scale, which the path replaces. Those of a
-/// [`Surrogate`] come last.
+/// [`Surrogate`] come last, whole, as it keeps a ratio to the path that is its own.
 #[derive(Clone, Debug)]
 pub struct LearnedEdge {
     pub(crate) softness: EdgeSoftness,
     /// Parameters to start from; at scale 1 where there is a path.
     phi: Vec<f64>,
     pub(crate) path: Option<ScalePath>,
+    /// At scale 1 where there is a path.
     pub(crate) surrogate: Option<Surrogate>,
     pub(crate) steps: usize,
     pub(crate) size: usize,
@@ -36,12 +39,12 @@ pub struct LearnedEdge {
 impl LearnedEdge {
     /// Begins with what `method` does on runs of `steps` steps and images of `size` × `size` pixels.
     pub fn new(method: &Method, plan: &Plan, steps: usize, size: usize) -> Self {
-        let (softness, surrogate) = (method.softness(), method.surrogate().cloned());
+        let softness = method.softness();
         let (tolerance, variant, task) =
             (method.learning_tolerance(plan.order), plan.variant, method.task);
         if method.is_static() && plan.input == Input::Ndc {
-            let phi = method.phi(method.scale(0, steps));
-            let path = None;
+            let scale = method.scale(0, steps);
+            let (phi, surrogate, path) = (method.phi(scale), method.surrogate(scale), None);
             return Self { softness, phi, path, surrogate, steps, size, tolerance, variant, task };
         }
         let mut path = ScalePath { knots: Vec::new(), floor_px: plan.floor_px };
@@ -55,7 +58,7 @@ impl LearnedEdge {
                 (scale - floor).max(ABOVE_FLOOR * scale).ln()
             })
             .collect();
-        let (phi, path) = (method.unit_phi(), Some(path));
+        let (phi, surrogate, path) = (method.unit_phi(), method.unit_surrogate(), Some(path));
         Self { softness, phi, path, surrogate, steps, size, tolerance, variant, task }
     }
 
@@ -97,13 +100,10 @@ impl LearnedEdge {
 
     /// Softness and parameters `[P]` at an inner step, from the learned vector.
     pub fn phi<B: RasterBackend>(&self, learned: &Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
-        let Some(path) = &self.path else { return learned.clone().narrow(0, 0, self.shown()) };
+        let Some(scale) = self.scale_tensor(learned, step) else {
+            return learned.clone().narrow(0, 0, self.shown());
+        };
         let (knots, fixed) = (self.knots(), self.fixed());
-        let scale = ScalePath::scale(
-            &learned.clone().narrow(0, 0, knots),
-            path.floor(self.softness, self.size),
-            self.part(step),
-        );
         let mut parts = vec![tensor(self.phi[..fixed].to_vec(), [fixed])];
         if self.phi.len() > fixed {
             parts.push(learned.clone().narrow(0, knots, self.phi.len() - fixed));
@@ -112,13 +112,19 @@ impl LearnedEdge {
         self.softness.widened(Tensor::cat(parts, 0), scale)
     }
 
-    /// The surrogate and its parameters `[P]`, from the learned vector.
+    /// The surrogate and its parameters `[P]` at an inner step, from the learned vector.
     pub(crate) fn felt<B: RasterBackend>(
         &self,
         learned: &Tensor<B, 1>,
+        step: usize,
     ) -> Option<(EdgeSoftness, Tensor<B, 1>)> {
         let Surrogate { softness, phi } = self.surrogate.as_ref()?;
-        Some((*softness, learned.clone().narrow(0, self.shown(), phi.len())))
+        let own = learned.clone().narrow(0, self.shown(), phi.len());
+        let phi = match self.scale_tensor(learned, step) {
+            None => own,
+            Some(scale) => softness.widened(own, scale),
+        };
+        Some((*softness, phi))
     }
 
     /// Which softness the parameters belong to.
@@ -134,24 +140,22 @@ impl LearnedEdge {
         learned: &[f64],
     ) -> PreparedRun {
         let learned = tensor::<B, 1>(learned.to_vec(), [learned.len()]);
-        let mut silhouettes: Vec<Silhouette<EdgeSoftness>> = Vec::new();
+        let mut silhouettes: Vec<DrawnAndFelt> = Vec::new();
         let (mut of_step, mut prepared) = (Vec::new(), f64::NAN);
         for step in 0..=self.steps {
-            let scale = match &self.path {
-                None => 1.0,
-                Some(_) => self.scale(&learned, step),
-            };
+            let scale = self.scale(&learned, step);
             // Not a number at first, which is in no range.
             if !(STALE..=1.0).contains(&(scale / prepared)) {
                 let phi = self.phi(&learned, step);
-                silhouettes.push(rasterizer.prepare(faces, self.softness, &phi));
+                let drawn = rasterizer.prepare(faces, self.softness, &phi);
+                let felt = self.felt(&learned, step);
+                let felt = felt.map(|(softness, phi)| rasterizer.prepare(faces, softness, &phi));
+                silhouettes.push(DrawnAndFelt { drawn, felt });
                 prepared = scale;
             }
             of_step.push(silhouettes.len() - 1);
         }
-        let felt = self.felt(&learned);
-        let felt = felt.map(|(softness, phi)| rasterizer.prepare(faces, softness, &phi));
-        PreparedRun::new(silhouettes, of_step, felt)
+        PreparedRun::new(silhouettes, of_step)
     }
 
     /// The file `softness.json` of a vector that was learned at a learning rate of the inner loops:
@@ -181,10 +185,19 @@ impl LearnedEdge {
     }
 
     pub(crate) fn scale<B: RasterBackend>(&self, learned: &Tensor<B, 1>, step: usize) -> f64 {
-        let Some(path) = &self.path else { return 1.0 };
+        self.scale_tensor(learned, step).map_or(1.0, |scale| numbers(scale)[0])
+    }
+
+    /// The scale `[1]` at an inner step, if there is a path.
+    fn scale_tensor<B: RasterBackend>(
+        &self,
+        learned: &Tensor<B, 1>,
+        step: usize,
+    ) -> Option<Tensor<B, 1>> {
+        let path = self.path.as_ref()?;
         let floor = path.floor(self.softness, self.size);
         let knots = learned.clone().narrow(0, 0, self.knots());
-        numbers(ScalePath::scale(&knots, floor, self.part(step)))[0]
+        Some(ScalePath::scale(&knots, floor, self.part(step)))
     }
 
     /// Which part of the run is over; the last gradient is taken at the last scale, as in [`Method`].

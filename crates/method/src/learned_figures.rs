@@ -24,9 +24,12 @@ impl LearnedEdge {
             at.iter().map(move |&(when, step)| (format!("{name}{when}"), phi, step))
         });
         let shown = wanted.map(|(name, phi, step)| (name, self.softness, self.phi(phi, step)));
-        let felt = named.iter().filter_map(|&(name, phi)| {
-            let (softness, phi) = self.felt(phi)?;
-            Some((format!("{name}, surrogate"), softness, phi))
+        let wanted = named.iter().flat_map(|&(name, phi)| {
+            at.iter().map(move |&(when, step)| (format!("{name}{when}, surrogate"), phi, step))
+        });
+        let felt = wanted.filter_map(|(name, phi, step)| {
+            let (softness, phi) = self.felt(phi, step)?;
+            Some((name, softness, phi))
         });
         let steps: Vec<Step<B>> = shown.chain(felt).collect();
         let reach =

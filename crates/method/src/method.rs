@@ -11,6 +11,7 @@ pub struct Method {
     pub(crate) softness: EdgeSoftness,
     pub(crate) name: String,
     pub(crate) path: Path,
+    /// At scale 1, unless the parameters are fixed.
     pub(crate) surrogate: Option<Surrogate>,
     pub(crate) learning_rate: Option<f64>,
     /// The task that it was made for.
@@ -47,9 +48,30 @@ impl Method {
         self.learning_rate
     }
 
-    /// What the gradient is taken of, where that is not the softness itself.
-    pub fn surrogate(&self) -> Option<&Surrogate> {
-        self.surrogate.as_ref()
+    /// What the gradient is taken of at `scale`, where that is not the softness itself: it keeps its
+    /// ratio to it.
+    pub fn surrogate(&self, scale: f64) -> Option<Surrogate> {
+        let Surrogate { softness, phi } = self.surrogate.clone()?;
+        let phi = match self.path {
+            Path::Fixed { .. } => phi,
+            Path::Learned { .. } | Path::Scale { .. } => widened(softness, &phi, scale),
+        };
+        Some(Surrogate { softness, phi })
+    }
+
+    /// The same without a surrogate, for scenes in which no edge moves, so that no gradient goes through one.
+    pub fn without_surrogate(self) -> Self {
+        Self { surrogate: None, ..self }
+    }
+
+    /// The surrogate at scale 1, for a path of scales.
+    pub(crate) fn unit_surrogate(&self) -> Option<Surrogate> {
+        let Surrogate { softness, phi } = self.surrogate.clone()?;
+        let phi = match self.path {
+            Path::Fixed { scale, .. } => widened(softness, &phi, scale.recip()),
+            Path::Learned { .. } | Path::Scale { .. } => phi,
+        };
+        Some(Surrogate { softness, phi })
     }
 
     /// How many parameters the softness and its surrogate have, a learned path of its scale included.
@@ -71,12 +93,15 @@ impl Method {
         let mut settings = of_task.as_object().cloned().unwrap_or_default();
         let schedule = if self.is_static() { "static" } else { "decay" };
         settings.insert("schedule".into(), schedule.into());
-        settings.insert("scale".into(), self.scale(0, steps).into());
-        settings.insert("scale_end".into(), self.scale(steps, steps).into());
+        let ends = [self.scale(0, steps), self.scale(steps, steps)];
+        settings.insert("scale".into(), ends[0].into());
+        settings.insert("scale_end".into(), ends[1].into());
         settings.insert("squared".into(), self.softness.squared.into());
-        if let Some(Surrogate { softness, phi }) = &self.surrogate {
+        let names = ["surrogate_scale", "surrogate_scale_end"];
+        for (name, felt) in names.into_iter().zip(ends.map(|scale| self.surrogate(scale))) {
+            let Some(Surrogate { softness, phi }) = felt else { continue };
             settings.insert("surrogate".into(), softness.family.name().into());
-            settings.insert("surrogate_scale".into(), nominal_scale(*softness, phi).into());
+            settings.insert(name.into(), nominal_scale(softness, &phi).into());
         }
         if let Some(note) = &self.note {
             settings.insert("softness_note".into(), note.as_str().into());
@@ -180,9 +205,13 @@ impl Method {
     }
 
     fn widened(&self, phi: &[f64], scale: f64) -> Vec<f64> {
-        let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
-        numbers(self.softness.widened(phi, tensor(vec![scale], [1])))
+        widened(self.softness, phi, scale)
     }
+}
+
+fn widened(softness: EdgeSoftness, phi: &[f64], scale: f64) -> Vec<f64> {
+    let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
+    numbers(softness.widened(phi, tensor(vec![scale], [1])))
 }
 
 /// Which part of a run is over, 0 to 1: the last gradient is taken at the end.

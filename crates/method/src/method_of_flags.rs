@@ -58,9 +58,12 @@ impl Method {
         defaults: &Defaults,
         drawn: Drawn,
     ) -> anyhow::Result<Self> {
-        let SoftnessFile { mut softness, mut phi, path, surrogate, .. } = file;
+        let SoftnessFile { mut softness, mut phi, path, mut surrogate, .. } = file;
         if settings.init == Some(Init::Fitted) {
             (softness, phi) = network_like(softness, &phi)?;
+            if let Some(felt) = &mut surrogate {
+                (felt.softness, felt.phi) = network_like(felt.softness, &felt.phi)?;
+            }
         }
         let unit = nominal_scale(softness, &phi);
         let size = settings.size.unwrap_or(defaults.size);
@@ -94,7 +97,8 @@ impl Method {
         let path = Path::Scale { first, last, unit: fitted.then(fitted_mlp) };
         let learning_rate = searched.and_then(|found| found.learning_rate);
         let phi = |scale| softness.default_phi(scale);
-        let surrogate = settings.surrogate_scale.map(|x| Surrogate { softness, phi: phi(x) });
+        let surrogate =
+            settings.surrogate_scale.map(|x| Surrogate { softness, phi: phi(x / first) });
         let name = match surrogate {
             None => family.name().to_owned(),
             Some(_) => format!("{family} with surrogate"),
@@ -235,12 +239,28 @@ mod tests {
     fn a_surrogate_is_the_same_family_at_its_own_scale() {
         let settings = settings("--softness gauss --scale 0.01 --surrogate-scale 0.1");
         let method = Method::new(&settings, &DEFAULTS).unwrap();
-        let Surrogate { softness, phi } = method.surrogate().unwrap();
-        assert_eq!((softness.family, &phi[..]), (Family::Gauss, &[0.1f64.ln()][..]));
+        let Surrogate { softness, phi } = method.surrogate(0.01).unwrap();
+        assert_eq!(softness.family, Family::Gauss);
+        assert!((phi[0] - 0.1f64.ln()).abs() < 1e-6);
         assert_eq!((method.name(), method.parameters()), ("gauss with surrogate", 2));
         let settings = method.settings(10, serde_json::json!({ "mesh": "fox" }));
-        assert!((settings["surrogate_scale"].as_f64().unwrap() - 0.1).abs() < 1e-12);
         assert_eq!((&settings["surrogate"], &settings["mesh"]), (&"gauss".into(), &"fox".into()));
+        assert_near(&settings, 0.1, 0.1);
+    }
+
+    fn assert_near(settings: &serde_json::Map<String, serde_json::Value>, first: f64, last: f64) {
+        for (name, expected) in [("surrogate_scale", first), ("surrogate_scale_end", last)] {
+            let found = settings[name].as_f64().unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-6, "{name}: {found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn a_surrogate_keeps_its_ratio_to_a_scale_that_moves() {
+        let settings =
+            settings("--softness exp --scale 0.1 --scale-end 0.001 --surrogate-scale 0.3");
+        let method = Method::new(&settings, &DEFAULTS).unwrap();
+        assert_near(&method.settings(10, serde_json::json!({})), 0.3, 0.003);
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub struct MovingSilhouette<B: Backend> {
     felt: Option<Felt<B>>,
 }
 
-/// Silhouettes whose gradient stands for that of others, and their table; they do not move.
+/// Silhouettes whose gradient stands for that of others, and their table.
 #[derive(Clone, Debug)]
 struct Felt<B: Backend> {
     silhouette: Silhouette<EdgeSoftness>,
@@ -49,9 +49,9 @@ impl<B: RasterBackend> MovingSilhouette<B> {
         let phi = method.phi(scale);
         let silhouette = rasterizer.prepare(faces, method.softness(), &on_host::<B>(&phi));
         let silhouette = silhouette.sized(method.side(rasterizer.size, scale));
-        let felt = method.surrogate().map(|Surrogate { softness, phi }| {
-            let silhouette = rasterizer.prepare(faces, *softness, &on_host::<B>(phi));
-            Felt { table: table(&silhouette, phi.clone()), silhouette }
+        let felt = method.surrogate(scale).map(|Surrogate { softness, phi }| {
+            let silhouette = rasterizer.prepare(faces, softness, &on_host::<B>(&phi));
+            Felt { table: table(&silhouette, phi), silhouette }
         });
         let table = table(&silhouette, phi);
         let (method, faces) = (method.clone(), faces.clone());
@@ -63,11 +63,19 @@ impl<B: RasterBackend> MovingSilhouette<B> {
         if self.scale == scale {
             return;
         }
-        let phi = self.method.phi(scale);
+        let (phi, surrogate) = (self.method.phi(scale), self.method.surrogate(scale));
         if !(STALE..=1.0).contains(&(scale / self.prepared)) {
-            let softness = self.method.softness();
-            self.silhouette = self.rasterizer.prepare(&self.faces, softness, &on_host::<B>(&phi));
+            let prepared = |softness, phi: &[f64]| {
+                self.rasterizer.prepare(&self.faces, softness, &on_host::<B>(phi))
+            };
+            self.silhouette = prepared(self.method.softness(), &phi);
+            for (felt, to) in self.felt.iter_mut().zip(&surrogate) {
+                felt.silhouette = prepared(to.softness, &to.phi);
+            }
             self.prepared = scale;
+        }
+        for (felt, to) in self.felt.iter_mut().zip(surrogate) {
+            felt.table = table(&felt.silhouette, to.phi);
         }
         let side = self.method.side(self.rasterizer.size, scale);
         self.silhouette = self.silhouette.clone().sized(side);

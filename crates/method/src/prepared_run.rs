@@ -29,12 +29,17 @@ pub enum Of {
 /// Silhouettes for every step of a run, whose support and knots suit the scale there.
 #[derive(Clone, Debug)]
 pub struct PreparedRun {
-    silhouettes: Vec<Silhouette<EdgeSoftness>>,
+    silhouettes: Vec<DrawnAndFelt>,
     of_step: Vec<usize>,
-    /// What the gradient is taken of, where that is not the image.
-    felt: Option<Silhouette<EdgeSoftness>>,
     /// A learned vector, and tables of the steps that were drawn under it without a gradient to it.
     tables: RefCell<Tables>,
+}
+
+/// Silhouettes as they are drawn, and what the gradient is taken of, where that is not the image.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawnAndFelt {
+    pub(crate) drawn: Silhouette<EdgeSoftness>,
+    pub(crate) felt: Option<Silhouette<EdgeSoftness>>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -45,12 +50,8 @@ struct Tables {
 
 impl PreparedRun {
     /// The silhouette of step k is `silhouettes[of_step[k]]`.
-    pub(crate) fn new(
-        silhouettes: Vec<Silhouette<EdgeSoftness>>,
-        of_step: Vec<usize>,
-        felt: Option<Silhouette<EdgeSoftness>>,
-    ) -> Self {
-        Self { silhouettes, of_step, felt, tables: RefCell::default() }
+    pub(crate) fn new(silhouettes: Vec<DrawnAndFelt>, of_step: Vec<usize>) -> Self {
+        Self { silhouettes, of_step, tables: RefCell::default() }
     }
 
     /// Coverage `[views, size, size]` of `vertices` `[views, vertices, 3]` at an inner step, the
@@ -80,11 +81,11 @@ impl PreparedRun {
                 Tensor::from_data(table.clone(), (&learned.device(), dtype))
             }
         };
-        let silhouette = &self.silhouettes[self.of_step[number]];
-        let Some(felt) = &self.felt else { return silhouette.coverage_by_table(vertices, table) };
-        let ([rows, _], own) = (table.dims(), silhouette.profile().knots());
+        let DrawnAndFelt { drawn, felt } = &self.silhouettes[self.of_step[number]];
+        let Some(felt) = felt else { return drawn.coverage_by_table(vertices, table) };
+        let ([rows, _], own) = (table.dims(), drawn.profile().knots());
         let felt_table = table.clone().narrow(0, own, rows - own);
-        silhouette.coverage_with_surrogate(vertices, table.narrow(0, 0, own), felt, felt_table)
+        drawn.coverage_with_surrogate(vertices, table.narrow(0, 0, own), felt, felt_table)
     }
 
     /// The table of a step, flat: all that [`image`](PreparedRun::image) needs of the softness.
@@ -105,8 +106,9 @@ impl PreparedRun {
         learned: &Tensor<B, 1>,
         number: usize,
     ) -> Tensor<B, 2> {
-        let table = self.silhouettes[self.of_step[number]].table(edge.phi(learned, number));
-        match self.felt.iter().zip(edge.felt(learned)).next() {
+        let DrawnAndFelt { drawn, felt } = &self.silhouettes[self.of_step[number]];
+        let table = drawn.table(edge.phi(learned, number));
+        match felt.iter().zip(edge.felt(learned, number)).next() {
             None => table,
             Some((felt, (_, phi))) => Tensor::cat(vec![table, felt.table(phi)], 0),
         }

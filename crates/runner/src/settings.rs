@@ -93,7 +93,8 @@ pub struct Settings {
     pub squared: bool,
 
     /// Take the gradient of the same softness at this scale instead, in the unit of --scale: a sharp
-    /// image with a wide gradient, which is not the derivative of the image.
+    /// image with a wide gradient, which is not the derivative of the image. Where the scale moves, this
+    /// is its first, and keeps its ratio to it.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub surrogate_scale: Option<f64>,
 

@@ -18,7 +18,7 @@ pub struct SoftnessFile {
     /// How its width moves over a run; a softness without one stays as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<ScalePath>,
-    /// What the gradient is taken of, where that is not the softness itself.
+    /// What the gradient is taken of, where that is not the softness itself; it moves along the same path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surrogate: Option<Surrogate>,
     /// The learning rate of the optimisations that it was learned on, which suits it best.

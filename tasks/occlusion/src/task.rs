@@ -61,12 +61,12 @@ impl Task for Occlusion {
                            --resolution and --tolerance";
             return Err(Error::Usage(message.into()).into());
         }
-        let edge = Method::new(settings, &SCALES)?;
-        if edge.surrogate().is_some() {
+        if settings.surrogate_scale.is_some() {
             let message = "edges of occlusion stay where they are, so that no gradient goes through a \
-                           surrogate: leave out --surrogate-scale, or use another file";
+                           surrogate: leave out --surrogate-scale";
             return Err(Error::Usage(message.into()).into());
         }
+        let edge = Method::new(settings, &SCALES)?.without_surrogate();
         let suited = edge.learning_rate();
         let (steps, learning_rate) = match settings.variant {
             Variant::Original => (100, suited.unwrap_or(0.03)),

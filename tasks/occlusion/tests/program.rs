@@ -194,6 +194,22 @@ fn contradictions_are_usage_errors_and_broken_files_are_not() {
     }
 }
 
+#[test]
+fn a_file_with_a_surrogate_does_what_it_does_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let solved = |rest: &str| {
+        let path = folder.path().join("softness.json");
+        let softness = r#"{"family": "gauss", "squared": false}"#;
+        let text = format!(r#"{{"softness": {softness}, "phi": [-6.5]{rest}}}"#);
+        fs::write(&path, text).unwrap();
+        run(&format!("--size 8 --steps 3 --softness {}", path.display())).unwrap()
+    };
+    let felt = r#", "surrogate": {"softness": {"family": "gauss", "squared": false}, "phi": [-5]}"#;
+    let [plain, both] = ["", felt].map(solved);
+    assert_eq!(plain["image_error"], both["image_error"]);
+    assert_eq!(plain["parameters"], both["parameters"]);
+}
+
 /// A few outer steps on small scenes.
 const LEARN: &str = "learn --outer 3 --inner 6 --batch 2 --validation-runs 2 --size 10";
 

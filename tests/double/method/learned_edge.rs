@@ -5,7 +5,7 @@ use clap::Parser;
 use softrast_method::{Defaults, LearnedEdge, Method};
 use softrast_raster::BackendChoice;
 use softrast_runner::{Input, Judged, Order, Plan, Referee, Schedule, Settings, Variant};
-use softrast_softness::{Family, Softness, SoftnessFile};
+use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;
@@ -114,10 +114,10 @@ fn a_learned_vector_comes_back_from_its_file() {
                 let phi = read.phi(read.scale(step, 10));
                 assert_near(&phi, &numbers(edge.phi(&at, step)));
             }
-            let felt = read.surrogate().map_or(&[][..], |felt| &felt.phi);
+            let file = SoftnessFile::load(&path).unwrap();
+            let felt = file.surrogate.as_ref().map_or(&[][..], |felt| &felt.phi);
             assert_near(felt, &learned[learned.len() - felt.len()..]);
             assert_eq!(read.learning_rate(), Some(0.3));
-            let file = SoftnessFile::load(&path).unwrap();
             assert_eq!(file.note.as_deref(), Some("a test"));
             // The rate is for the task that it was learned on.
             SoftnessFile { task: Some("another".into()), ..file }.save(&path).unwrap();
@@ -137,19 +137,31 @@ fn a_network_takes_the_place_of_a_symmetric_softness_and_keeps_its_path() {
         let line = format!("--softness {}", path.display());
         [method(&line), method(&format!("{line} --init fitted"))]
     };
-    for line in ["--softness gauss --schedule decay", "--softness logistic --scale 0.02"] {
+    for line in [
+        "--softness gauss --schedule decay",
+        "--softness logistic --scale 0.02",
+        "--softness gauss --schedule decay --surrogate-scale 0.3",
+    ] {
         let [family, network] = saved(line);
         assert_eq!(network.softness().family, Family::Mlp);
         for step in [0, 9] {
-            let values = |method: &Method| {
-                let phi = vector::<B>(&method.phi(method.scale(step, 10)));
-                let width = family.scale(step, 10);
-                let places: Vec<f64> = (-40..=40).map(|k| 0.1 * f64::from(k) * width).collect();
-                numbers(method.softness().value(phi, vector(&places)))
+            let width = family.scale(step, 10);
+            let off = |of: fn(&Method, f64) -> Option<(EdgeSoftness, Vec<f64>)>| {
+                let [a, b] = [&family, &network].map(|method| {
+                    let (softness, phi) = of(method, method.scale(step, 10))?;
+                    let places: Vec<f64> = (-40..=40).map(|k| 0.1 * f64::from(k) * width).collect();
+                    Some(numbers(softness.value(vector::<B>(&phi), vector(&places))))
+                });
+                assert_eq!(a.is_some(), b.is_some());
+                a.into_iter()
+                    .flatten()
+                    .zip(b.into_iter().flatten())
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max)
             };
-            let off = values(&family).into_iter().zip(values(&network));
-            let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(off < 0.01, "{line}, step {step}: {off}");
+            let shown = off(|method, scale| Some((method.softness(), method.phi(scale))));
+            let felt = off(|method, scale| method.surrogate(scale).map(|s| (s.softness, s.phi)));
+            assert!(shown < 0.01 && felt < 0.01, "{line}, step {step}: {shown}, {felt}");
         }
     }
     let exp = edge("--softness exp --scale 0.02", Input::Ndc);

@@ -93,3 +93,20 @@ fn the_gradient_is_the_wide_one_through_the_slope_of_the_narrow_image() {
     assert!(off(&found) < 3e-3 * size, "{found:?}, not {expected:?}");
     assert!(off(&narrow) > 0.1 * size, "{narrow:?} is the gradient of the image itself");
 }
+
+#[test]
+fn both_move_together() {
+    let line = "--softness logistic --scale 0.02 --scale-end 0.005 --surrogate-scale 0.2";
+    let mut moving: MovingSilhouette<A> =
+        MovingSilhouette::new(&method(line), Rasterizer::new(SIZE), &faces(), 0.02);
+    moving.turn_to(0.01);
+    let of = |silhouette: &MovingSilhouette<A>| {
+        gradient(|corners| (silhouette.image(corners) * weights()).sum())
+    };
+    let (found, expected) = (of(&moving), of(&silhouette(BOTH)));
+    let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a - b).abs() < 1e-5 * size, "{found:?}, not {expected:?}");
+    }
+    assert_eq!(numbers(moving.image(tensor(&CORNERS, [1, 6, 3]))), image(NARROW));
+}
