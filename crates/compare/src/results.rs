@@ -121,7 +121,8 @@ transfer keeps it (POSE and OCCLUSION have a learning rate of their own there). 
 tells nothing, so families were searched on the transfer there, as `learned` was learned on it. Settings with a * were not searched for: they are the
 task's own. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it
 (`data/softness`, where a note in each file says how it was learned), `learned-surrogate` a sharp image with a learned wider gradient, which
-OCCLUSION, whose edges stay, has no use for; their seeds were others too. `mlp` is the network before it has
+OCCLUSION, whose edges stay, has no use for; their seeds were others too. On 3D SHAPE `learned` and `learned-mlp` have a surrogate as well, one that
+narrows with the image, and the families have none. `mlp` is the network before it has
 learned anything, with `init fitted` after a fit to the searched logistic. Rows with a resolution, a tolerance or a backend optimise on that many pixels a
 side, let a pixel be off by that much, or compute there; they are on the charts of error against seconds alone. Methods are compared by the error of the **hard** image, because a method's own
 soft error falls with its scale. \"Less NAME\" is the mean of the

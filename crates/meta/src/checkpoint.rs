@@ -33,20 +33,20 @@ struct File {
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     /// The file could not be read.
-    #[error("cannot read checkpoint {path:?}: {source}")]
+    #[error("cannot read checkpoint {path:?}: {reason}")]
     Read {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        reason: io::Error,
     },
     /// The file could not be written.
-    #[error("cannot write checkpoint {path:?}: {source}")]
+    #[error("cannot write checkpoint {path:?}: {reason}")]
     Write {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        reason: io::Error,
     },
     /// The text is not that of a checkpoint.
     #[error("{path:?} is no checkpoint, or a damaged one: {reason}; remove it to start over")]
@@ -82,7 +82,7 @@ impl Checkpoint {
             file.as_file().sync_all()?;
             file.persist(path).map_err(|failed| failed.error)
         });
-        let failed = |source| CheckpointError::Write { path: path.to_owned(), source };
+        let failed = |reason| CheckpointError::Write { path: path.to_owned(), reason };
         written.map(drop).map_err(failed)
     }
 
@@ -92,7 +92,7 @@ impl Checkpoint {
     ///
     /// If it cannot be read, is not a whole checkpoint as it was written, or is of another job.
     pub fn load(path: &Path, job: &str) -> Result<Progress, CheckpointError> {
-        let read = |source| CheckpointError::Read { path: path.to_owned(), source };
+        let read = |reason| CheckpointError::Read { path: path.to_owned(), reason };
         let damaged = |reason| CheckpointError::Damaged { path: path.to_owned(), reason };
         let bytes = fs::read(path).map_err(read)?;
         let file: File =

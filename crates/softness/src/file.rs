@@ -104,32 +104,32 @@ impl SoftnessFile {
 /// The text of the file at `path`.
 pub(crate) fn read(path: &Path) -> Result<String, SoftnessFileError> {
     fs::read_to_string(path)
-        .map_err(|source| SoftnessFileError::Read { path: path.to_owned(), source })
+        .map_err(|reason| SoftnessFileError::Read { path: path.to_owned(), reason })
 }
 
 /// Parses the text of the JSON file at `path`.
 pub(crate) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, SoftnessFileError> {
     serde_json::from_str(text)
-        .map_err(|source| SoftnessFileError::Parse { path: path.to_owned(), source })
+        .map_err(|reason| SoftnessFileError::Parse { path: path.to_owned(), reason })
 }
 
 /// Writes a JSON file at `path`, by way of a temporary one beside it.
 pub(crate) fn write(path: &Path, content: &impl Serialize) -> Result<(), SoftnessFileError> {
-    let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
+    let failed = |reason| SoftnessFileError::Write { path: path.to_owned(), reason };
     let text = text(path, content)?;
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}.tmp", std::process::id()));
-    fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|source| {
+    fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|reason| {
         // What is left of it is of no use; that it may not exist is no second error.
         let _ = fs::remove_file(&beside);
-        failed(source)
+        failed(reason)
     })
 }
 
 /// The text of a JSON file for `path`.
 pub(crate) fn text(path: &Path, content: &impl Serialize) -> Result<String, SoftnessFileError> {
     let text = serde_json::to_string_pretty(content).map_err(io::Error::from);
-    let failed = |source| SoftnessFileError::Write { path: path.to_owned(), source };
+    let failed = |reason| SoftnessFileError::Write { path: path.to_owned(), reason };
     text.map(|text| text + "\n").map_err(failed)
 }
 
@@ -191,6 +191,13 @@ mod tests {
             assert_eq!(SoftnessFile::load(&path).unwrap(), file);
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let error = SoftnessFile::load(Path::new("none.json")).unwrap_err();
+        assert!(error.to_string().starts_with("cannot read softness \"none.json\": "), "{error}");
+        assert!(std::error::Error::source(&error).is_none());
     }
 
     #[test]

@@ -6,28 +6,28 @@ use crate::file::LARGEST_LOGARITHM;
 #[derive(Debug, thiserror::Error)]
 pub enum SoftnessFileError {
     /// The file could not be read.
-    #[error("cannot read softness {path:?}: {source}")]
+    #[error("cannot read softness {path:?}: {reason}")]
     Read {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        reason: io::Error,
     },
     /// The file, or the temporary one beside it, could not be written.
-    #[error("cannot write softness {path:?}: {source}")]
+    #[error("cannot write softness {path:?}: {reason}")]
     Write {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        reason: io::Error,
     },
     /// The text is not what a softness file holds.
-    #[error("softness {path:?} is not valid: {source}")]
+    #[error("softness {path:?} is not valid: {reason}")]
     Parse {
         /// The file.
         path: PathBuf,
         /// What is wrong, and where.
-        source: serde_json::Error,
+        reason: serde_json::Error,
     },
     /// φ has the wrong length.
     #[error("softness {path:?} has {found} parameters, but {family} has {expected}")]
