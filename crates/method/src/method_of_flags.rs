@@ -257,8 +257,9 @@ mod tests {
 
     #[test]
     fn a_surrogate_keeps_its_ratio_to_a_scale_that_moves() {
-        let settings =
-            settings("--softness exp --scale 0.1 --scale-end 0.001 --surrogate-scale 0.3");
+        let settings = settings(
+            "--softness exp --schedule decay --scale 0.1 --scale-end 0.001 --surrogate-scale 0.3",
+        );
         let method = Method::new(&settings, &DEFAULTS).unwrap();
         assert_near(&method.settings(10, serde_json::json!({})), 0.3, 0.003);
     }

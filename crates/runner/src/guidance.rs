@@ -46,21 +46,24 @@ fn too_narrow(description: &Description, score: Quantity, runs: &[Run]) -> Optio
     if hard.key != "hard" || hard.group != ErrorGroup::Image {
         return None;
     }
-    let still = runs.iter().filter(|run| has_no_band(score, &run.curve)).count();
+    // With a surrogate an image without a band has a gradient.
+    let felt = description.settings.get("surrogate_scale").and_then(serde_json::Value::as_f64);
+    let still = runs.iter().filter(|run| has_no_band(score, &run.curve, felt.is_some())).count();
     let first = runs.first()?.curve.first()?;
+    let (flag, scale) = felt.map_or(("scale", first.scale), |scale| ("surrogate-scale", scale));
     (still > 0).then(|| {
         format!(
             "no pixel lies in the soft band{}: the soft image is the hard one, and has no gradient. The \
-             scale {:.3e} is too narrow for pixels that are {:.3} wide: try a larger --scale",
+             scale {scale:.3e} is too narrow for pixels that are {:.3} wide: try a larger --{flag}",
             of_runs(still, runs.len()),
-            first.scale,
             IMAGE / description.size as f64
         )
     })
 }
 
-/// Whether the soft image is the hard one at the start, or at most steps.
-fn has_no_band(score: Quantity, curve: &[Point]) -> bool {
+/// Whether the soft image is the hard one at the start, or at most steps, and so nothing can move; with a
+/// surrogate, whether nothing does.
+fn has_no_band(score: Quantity, curve: &[Point], has_surrogate: bool) -> bool {
     let sharp = |place: &usize| {
         let point = &curve[*place];
         let (soft, hard) = (point.image_error, score.of(point));
@@ -68,7 +71,7 @@ fn has_no_band(score: Quantity, curve: &[Point]) -> bool {
         // Images that do not meet their target have the same error too, but may still move.
         let stays =
             curve.get(place + 1).is_none_or(|next| next.parameter_error == point.parameter_error);
-        same && (hard < 1.0 || stays)
+        same && (hard < 1.0 && !has_surrogate || stays)
     };
     let steps = curve.len().saturating_sub(1);
     let count = (0..steps).filter(sharp).count();
@@ -137,18 +140,23 @@ mod tests {
 
     /// What is said of a run with these soft errors, hard errors and scales.
     fn said(points: [[f64; 3]; 3]) -> Vec<String> {
+        said_of(&description(), points, 0.0)
+    }
+
+    /// Likewise, where the parameter error falls by this much at each step.
+    fn said_of(description: &Description, points: [[f64; 3]; 3], falls: f64) -> Vec<String> {
         let point = |(step, [soft, hard, scale]): (usize, [f64; 3])| Point {
             step,
             loss: soft,
             image_error: soft,
-            parameter_error: 5.0,
+            parameter_error: 5.0 - falls * step as f64,
             scale,
             extra: vec![hard],
         };
         let curve = points.into_iter().enumerate().map(point).collect();
         let (seed, success, step_seconds) = (0, true, Vec::new());
         let run = Run { seed, curve, success, step_seconds, pictures: None, warnings: Vec::new() };
-        guidance(&description(), Quantity::Extra(0), &[run])
+        guidance(description, Quantity::Extra(0), &[run])
     }
 
     #[test]
@@ -170,6 +178,17 @@ mod tests {
         // Nothing is drawn where the target is, and nothing moves.
         let lines = said([[1.0, 1.0, 1e-9]; 3]);
         assert!(lines.len() == 1 && lines[0].contains("no pixel lies"), "{lines:?}");
+    }
+
+    #[test]
+    fn with_a_surrogate_an_image_may_be_hard_as_long_as_something_moves() {
+        let mut both = description();
+        both.settings.insert("surrogate_scale".into(), 1e-8.into());
+        let points = [[0.4, 0.4, 1e-9]; 3];
+        assert_eq!(said_of(&both, points, 1.0), [""; 0]);
+        let lines = said_of(&both, points, 0.0);
+        assert!(lines.len() == 1 && lines[0].contains("larger --surrogate-scale"), "{lines:?}");
+        assert_eq!(said_of(&description(), points, 1.0).len(), 1);
     }
 
     #[test]

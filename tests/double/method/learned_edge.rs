@@ -126,6 +126,9 @@ fn a_learned_vector_comes_back_from_its_file() {
     }
 }
 
+/// A softness and its parameters.
+type Step = (EdgeSoftness, Vec<f64>);
+
 #[test]
 fn a_network_takes_the_place_of_a_symmetric_softness_and_keeps_its_path() {
     let folder = tempfile::tempdir().unwrap();
@@ -146,7 +149,7 @@ fn a_network_takes_the_place_of_a_symmetric_softness_and_keeps_its_path() {
         assert_eq!(network.softness().family, Family::Mlp);
         for step in [0, 9] {
             let width = family.scale(step, 10);
-            let off = |of: fn(&Method, f64) -> Option<(EdgeSoftness, Vec<f64>)>| {
+            let off = |of: fn(&Method, f64) -> Option<Step>| {
                 let [a, b] = [&family, &network].map(|method| {
                     let (softness, phi) = of(method, method.scale(step, 10))?;
                     let places: Vec<f64> = (-40..=40).map(|k| 0.1 * f64::from(k) * width).collect();
