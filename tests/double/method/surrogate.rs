@@ -96,7 +96,8 @@ fn the_gradient_is_the_wide_one_through_the_slope_of_the_narrow_image() {
 
 #[test]
 fn both_move_together() {
-    let line = "--softness logistic --scale 0.02 --scale-end 0.005 --surrogate-scale 0.2";
+    let line =
+        "--softness logistic --schedule decay --scale 0.02 --scale-end 0.005 --surrogate-scale 0.2";
     let mut moving: MovingSilhouette<A> =
         MovingSilhouette::new(&method(line), Rasterizer::new(SIZE), &faces(), 0.02);
     moving.turn_to(0.01);
