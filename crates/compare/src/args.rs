@@ -4,7 +4,7 @@ use clap::Parser;
 use softrast_raster::compiled_backends;
 use softrast_runner::usual_tolerance;
 
-use crate::{Cell, TaskName};
+use crate::{Cell, Purpose, TaskName};
 
 /// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start
 /// reaches the whole image, which takes over twenty times as long as a logistic; the fitted one does not. A surrogate is
@@ -38,6 +38,12 @@ pub struct Args {
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
     pub varied: Vec<String>,
 
+    /// What comes with the program for a task and is also tried on all other tasks that are compared, for Table 6; "" for
+    /// none.
+    #[arg(long, value_name = "learned|learned-mlp,...", value_delimiter = ',', default_value = "learned",
+          value_parser = crossing)]
+    pub crossed: Vec<String>,
+
     /// Seeds of every cell, instead of the number that its task asks for: one number, or one for each of
     /// the tasks in their order.
     #[arg(long, value_name = "N,...", value_delimiter = ',',
@@ -66,7 +72,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// All cells in the order of the tables: by task, variant and method.
+    /// All cells in the order of the tables: by task, variant and method, and at the end what is tried on other tasks.
     ///
     /// # Errors
     ///
@@ -87,12 +93,16 @@ impl Args {
             self.runs.len(),
             tasks.len()
         );
-        let cells = tasks.into_iter().enumerate().flat_map(|(k, task)| {
+        let runs = |(k, task): (usize, &TaskName)| {
             let usual = if self.quick { task.quick_runs() } else { task.runs() };
-            let runs = self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual);
+            (*task, self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual))
+        };
+        let tasks: Vec<(TaskName, u32)> = tasks.iter().enumerate().map(runs).collect();
+        let compared = tasks.iter().flat_map(|&(task, runs)| {
             let backends = &others;
-            ["original", "transfer"].into_iter().flat_map(move |variant| {
-                let cell = move |varies| move |method| Cell { task, variant, method, runs, varies };
+            VARIANTS.into_iter().flat_map(move |variant| {
+                let cell =
+                    move |purpose| move |method| Cell { task, variant, method, runs, purpose };
                 let varied = self.varied.iter().filter(|method| !method.is_empty());
                 let varied = varied.flat_map(move |method| {
                     let side = format!("{method} --resolution {}", task.size() / 2);
@@ -107,10 +117,24 @@ impl Args {
                 let known =
                     move |method: &&String| task.moves_edges() || *method != "learned-surrogate";
                 let methods = self.methods.iter().filter(known).cloned();
-                methods.map(cell(false)).chain(varied.map(cell(true)))
+                methods.map(cell(Purpose::Compared)).chain(varied.map(cell(Purpose::Varied)))
             })
         });
-        Ok(cells.collect())
+        Ok(compared.chain(self.crossed(&tasks)).collect())
+    }
+
+    /// What was learned on each of the tasks on all others.
+    fn crossed(&self, tasks: &[(TaskName, u32)]) -> impl Iterator<Item = Cell> {
+        let names = self.crossed.iter().filter(|name| !name.is_empty() && tasks.len() > 1);
+        names.flat_map(move |name| {
+            let places = tasks.iter().flat_map(|to| VARIANTS.map(|variant| (*to, variant)));
+            places.flat_map(move |((task, runs), variant)| {
+                let methods = tasks.iter().map(move |(from, _)| from.learned_there(name, task));
+                let new = methods.filter(|method| !self.methods.contains(method));
+                let purpose = Purpose::Crossed;
+                new.map(move |method| Cell { task, variant, method, runs, purpose })
+            })
+        })
     }
 
     /// Backends that the program was built with and the system has, beside the one that is computed on.
@@ -120,6 +144,16 @@ impl Args {
         let used = self.backend.as_deref().or(first);
         let others = all.iter().filter(|backend| Some(backend.name()) != used);
         others.filter(|backend| backend.set_up().is_ok()).map(|backend| backend.name()).collect()
+    }
+}
+
+const VARIANTS: [&str; 2] = ["original", "transfer"];
+
+fn crossing(text: &str) -> Result<String, String> {
+    match text {
+        "" | "learned" => Ok(text.to_owned()),
+        text if text.starts_with("learned-") => Ok(text.to_owned()),
+        _ => Err("expected what was learned on every task: learned or learned-mlp".into()),
     }
 }
 
@@ -134,10 +168,14 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4));
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + 4 * 2 * 3);
         assert_eq!((cells[0].task, cells[18].variant), (TaskName::Shape2d, "transfer"));
         assert_eq!(cells[12].method, "learned --resolution 128");
-        assert_eq!(cells.iter().filter(|cell| cell.varies).count(), 3 * 2 * 4);
+        let of = |purpose| cells.iter().filter(move |cell| cell.purpose == purpose);
+        assert_eq!(of(Purpose::Varied).count(), 3 * 2 * 4);
+        let crossed: Vec<_> = of(Purpose::Crossed).map(|cell| cell.method.as_str()).collect();
+        assert_eq!(crossed[..3], ["learned-shape3d", "learned-pose", "learned-occlusion"]);
+        assert_eq!(crossed[21..], ["learned-shape2d", "learned-shape3d", "learned-pose"]);
         let some =
             args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();
         assert!(some.len() == 8 && some[3].runs == 7 && some[5].method_name() == "b");
@@ -147,6 +185,10 @@ mod tests {
             TaskName::ALL.map(|task| cells.iter().find(|cell| cell.task == task).unwrap().runs)
         };
         assert_eq!(args("--tasks pose --methods exp --varied=").cells().unwrap().len(), 2);
+        let two = "--tasks pose,occlusion --methods exp --varied= --crossed learned-mlp";
+        assert_eq!(args(two).cells().unwrap()[4].method, "learned-mlp");
+        assert_eq!(args(two).cells().unwrap()[5].method, "learned-occlusion-mlp");
+        assert_eq!(args(two).cells().unwrap().len(), 2 * 2 + 2 * 2 * 2);
         assert_eq!(runs("--runs 3"), [3; 4]);
         assert_eq!(runs("--runs 20,5,60,50"), [20, 5, 60, 50]);
         assert!(args("--runs 20,5").cells().is_err());

@@ -20,8 +20,19 @@ pub struct Cell {
     pub method: String,
     /// Seeds, from 0 on.
     pub runs: u32,
-    /// Whether it only varies another cell, and is a dot on the charts of error against seconds but no curve.
-    pub varies: bool,
+    /// What it is for.
+    pub purpose: Purpose,
+}
+
+/// Where a cell is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// In all tables and charts but Table 6.
+    Compared,
+    /// As one that only varies another: a dot on the charts of error against seconds, but no curve.
+    Varied,
+    /// In Table 6 alone.
+    Crossed,
 }
 
 impl Cell {
@@ -40,6 +51,17 @@ impl Cell {
     pub fn is_shipped(&self) -> bool {
         let name = self.softness();
         name.starts_with("learned") && !name.ends_with(".json")
+    }
+
+    /// The task that what comes with the programs was learned on, and what it is called there.
+    pub(crate) fn learned_on(&self) -> Option<(TaskName, String)> {
+        let kind = self.method.strip_prefix("learned")?;
+        let on = |from: TaskName| {
+            let kind = kind.strip_prefix('-')?.strip_prefix(from.name())?;
+            (kind.is_empty() || kind.starts_with('-')).then(|| (from, format!("learned{kind}")))
+        };
+        let other = TaskName::ALL.into_iter().find_map(on);
+        other.or_else(|| Some((self.task, self.method.clone())))
     }
 
     /// Name of the method: the softness, and the flags without what every flag has.

@@ -3,7 +3,7 @@
 use softrast_runner::{mean, median, method_colour, quantile};
 
 use crate::{
-    Measured, functions,
+    Measured, Purpose, functions,
     measured::{paired, short},
     plot::{Axis, Mark, Plot, Series},
 };
@@ -22,7 +22,8 @@ pub(crate) struct Chart {
 /// The charts of the cells of one task in one variant.
 pub(crate) fn of_variant(cells: &[&Measured]) -> Vec<Chart> {
     let all = cells;
-    let cells: Vec<&Measured> = all.iter().filter(|one| !one.cell.varies).copied().collect();
+    let cells: Vec<&Measured> =
+        all.iter().filter(|one| one.cell.purpose == Purpose::Compared).copied().collect();
     let Some(first) = cells.first() else { return Vec::new() };
     let stem = format!("{}-{}", first.cell.task.name(), first.cell.variant);
     let of = format!("{}, {}", first.cell.task.title(), first.cell.variant);
@@ -213,7 +214,7 @@ fn beaten_by(cells: &[&Measured], prices: &[Price], k: usize) -> String {
 
 /// Variations are told from the method that they vary.
 fn mark(one: &Measured) -> Mark {
-    let flag = |name| one.cell.varies && one.cell.method.contains(name);
+    let flag = |name| one.cell.purpose == Purpose::Varied && one.cell.method.contains(name);
     match (flag("--resolution"), flag("--tolerance"), flag("--backend")) {
         (true, ..) => Mark::Triangle,
         (_, true, _) => Mark::Cross,
@@ -231,7 +232,7 @@ fn is_default(one: &Measured) -> bool {
 /// within a factor of the time of the fastest one on that problem.
 pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     let mut methods: Vec<String> = Vec::new();
-    for one in groups.iter().flatten().filter(|one| !one.cell.varies) {
+    for one in groups.iter().flatten().filter(|one| one.cell.purpose == Purpose::Compared) {
         let name = one.cell.method_name();
         if !methods.contains(&name) {
             methods.push(name);
@@ -241,7 +242,7 @@ pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     let mut ratios = vec![Vec::new(); methods.len()];
     let mut problems = 0;
     for group in groups {
-        let group = || group.iter().filter(|one| !one.cell.varies);
+        let group = || group.iter().filter(|one| one.cell.purpose == Purpose::Compared);
         let seeds = group().map(|one| one.traces.len()).min().unwrap_or(0);
         for k in 0..seeds {
             let time = |one: &&Measured| {

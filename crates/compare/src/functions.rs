@@ -70,8 +70,12 @@ fn at_the_end(one: &Measured) -> Option<(EdgeSoftness, Vec<f64>)> {
     }
     let file = match name {
         name if one.cell.is_shipped() => {
-            let kind = name.strip_prefix("learned").unwrap_or_default();
-            shipped::softness(&format!("{}{kind}", one.cell.task.name())).ok()??
+            let task = one.cell.task.name();
+            let called = match name.strip_prefix("learned-") {
+                Some(kind) => shipped::called(task, kind),
+                None => task.to_owned(),
+            };
+            shipped::softness(&called).ok()??
         }
         file => SoftnessFile::load(Path::new(file)).ok()?,
     };

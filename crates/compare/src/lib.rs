@@ -20,7 +20,7 @@ mod task;
 mod trace;
 
 pub use args::Args;
-pub use cell::Cell;
+pub use cell::{Cell, Purpose};
 pub use measured::{Error, Measured};
 pub use paper::Printed;
 pub use program::{compare, main};

@@ -1,4 +1,4 @@
-//! Tables 2 and 3 as Markdown.
+//! The tables of the paper as Markdown, and as one HTML page.
 
 use std::{fmt::Write, fs, path::Path};
 
@@ -7,7 +7,7 @@ use softrast_method::Searched;
 use softrast_runner::{Schedule, escape, mean, page};
 
 use crate::{
-    Cell, Error, Measured, Printed, TaskName,
+    Cell, Error, Measured, Printed, Purpose, TaskName,
     charts::{self, Chart},
     machine::machine,
     measured::{paired, short},
@@ -99,17 +99,18 @@ fn pictures(group: &[&Measured], out: &Path) -> String {
     text
 }
 
-/// The cells of each task in each variant, in the order of the tables.
+/// The cells of each task in each variant, in the order of the tables, without those of Table 6 alone.
 pub(crate) fn by_variant(measured: &[Measured]) -> Vec<Vec<&Measured>> {
     let places = TaskName::ALL.iter().flat_map(|task| ["original", "transfer"].map(|v| (*task, v)));
     let group = |(task, variant)| {
         let of = |one: &&Measured| one.cell.task == task && one.cell.variant == variant;
-        measured.iter().filter(of).collect::<Vec<_>>()
+        let crossed = |one: &&Measured| one.cell.purpose == Purpose::Crossed;
+        measured.iter().filter(of).filter(|one| !crossed(one)).collect::<Vec<_>>()
     };
     places.map(group).filter(|group| !group.is_empty()).collect()
 }
 
-const HEAD: &str = "# Results\n\nTables 2, 3 and 5 of the paper (Wu et al. 2024) with our figures, made \
+const HEAD: &str = "# Results\n\nTables 2, 3, 5 and 6 of the paper (Wu et al. 2024) with our figures, made \
                     by\n";
 
 const READING: &str = "\
@@ -139,8 +140,9 @@ measured beside; a step draws once and takes one gradient. The paper's figures a
 ";
 
 const CROSSED: &str = "\
-What was learned on one task, used on another: the error of the hard image at the last step, mean and 95 % interval. The columns
-have the units of their tasks; compare within a column.
+What comes with the program for one task, used on another at that task's own learning rate: the error of the hard image at the last step, mean and
+95 % interval, the lowest of a column in bold. The columns have the units of their tasks; compare within a column. Only the softness of edges is
+carried over: OCCLUSION's depths are the task's own logistic where the edges are another task's, and what was learned there is used elsewhere without its depths.
 ";
 
 fn note(task: TaskName) -> &'static str {
@@ -269,33 +271,46 @@ fn seconds(measured: &[Measured]) -> Table {
     table
 }
 
-/// Table 6: every softness file on every task, where there are several of them.
+/// Table 6: what was learned on each task, on all of them; the lowest of a column in bold.
 fn crossed(measured: &[Measured]) -> Option<Table> {
-    let mut files: Vec<&str> = Vec::new();
-    for one in measured {
-        let file = one.cell.softness();
-        if file.ends_with(".json") && !files.contains(&file) {
-            files.push(file);
-        }
+    let mut learned: Vec<(TaskName, String)> = Vec::new();
+    for one in measured.iter().filter(|one| one.cell.purpose == Purpose::Crossed) {
+        learned.extend(one.cell.learned_on().filter(|row| !learned.contains(row)));
     }
+    learned.sort_by_key(|(task, name)| {
+        (name.clone(), TaskName::ALL.iter().position(|one| one == task))
+    });
     let groups = by_variant(measured);
-    let column = |group: &&Vec<&Measured>| {
+    let column = |group: &Vec<&Measured>| {
         let Measured { cell, hard, .. } = group[0];
         format!("{} {}, {}", cell.task.title(), cell.variant, hard.name)
     };
-    let head = std::iter::once("softness".to_owned()).chain(groups.iter().map(|g| column(&g)));
-    let mut table = Table { head: head.collect(), rows: Vec::new() };
-    for &file in &files {
-        let of = |group| of_file(group, file);
-        let name = groups.iter().find_map(of)?.cell.method_name();
-        let error = |group| of(group).map_or(String::new(), |one| with_interval(&one.hard));
-        table.rows.push(std::iter::once(name).chain(groups.iter().map(error)).collect());
+    let head = std::iter::once("learned on".to_owned()).chain(groups.iter().map(column)).collect();
+    let mut table = Table { head, rows: Vec::new() };
+    for row in &learned {
+        let called = match row.1.strip_prefix("learned-") {
+            Some(kind) => format!("{}, {kind}", row.0.title()),
+            None => row.0.title().to_owned(),
+        };
+        table.rows.push(vec![called]);
     }
-    (files.len() > 1).then_some(table)
-}
-
-fn of_file<'a>(group: &Vec<&'a Measured>, file: &str) -> Option<&'a Measured> {
-    group.iter().find(|one| one.cell.softness() == file).copied()
+    for group in &groups {
+        let Cell { task, variant, .. } = group[0].cell;
+        let here = |one: &&Measured| (one.cell.task, one.cell.variant) == (task, variant);
+        let of = |row: &(TaskName, String)| {
+            let mut there = measured.iter().filter(here);
+            there.find(|one| one.cell.learned_on().as_ref() == Some(row)).map(|one| &one.hard)
+        };
+        let errors: Vec<Option<&Error>> = learned.iter().map(of).collect();
+        let lowest = errors.iter().flatten().map(|error| error.mean).fold(f64::INFINITY, f64::min);
+        for (row, error) in table.rows.iter_mut().zip(errors) {
+            row.push(error.map_or(String::new(), |error| match error.mean == lowest {
+                true => format!("**{}**", with_interval(error)),
+                false => with_interval(error),
+            }));
+        }
+    }
+    (!learned.is_empty()).then_some(table)
 }
 
 /// Whether the setting of a cell was searched for, learned, or named by its flags.
@@ -363,8 +378,9 @@ mod tests {
     /// A cell whose hard errors by seed are these.
     fn measured(method: &str, per_run: [f64; 3]) -> Measured {
         let task = TaskName::Pose;
-        let cell =
-            Cell { task, variant: "original", method: method.to_owned(), runs: 3, varies: false };
+        let purpose =
+            if method == "learned-shape3d" { Purpose::Crossed } else { Purpose::Compared };
+        let cell = Cell { task, variant: "original", method: method.to_owned(), runs: 3, purpose };
         let mean = per_run.iter().sum::<f64>() / 3.0;
         let error = json!({"name": "hard", "unit": "", "final": mean, "ci95": [0.0, 1.0], "per_run": per_run});
         let with = |key: &str| {
@@ -393,5 +409,18 @@ mod tests {
                         **0.100 (0.100 to 0.100)** | 0.300 | **0.100 (0.100 to 0.100)** | \
                         0.300 (0 to 1.00) | 50 % | 7.20 / 7.20 | 15.3 / 0.190 |";
         assert_eq!(row, expected);
+    }
+
+    #[test]
+    fn what_was_learned_elsewhere_stands_in_table_6_alone() {
+        let all = [("learned", 0.1), ("learned-mlp", 0.3), ("learned-shape3d", 0.2)];
+        let text = markdown(&all.map(|(name, x)| measured(name, [x; 3])), "x", None);
+        let (others, table) = text.split_once("## Table 6").unwrap();
+        assert!(!others.contains("learned-shape3d"), "{others}");
+        let rows: Vec<&str> = table.lines().filter(|line| line.starts_with("| ")).collect();
+        assert_eq!(
+            rows,
+            ["| learned on | POSE original, hard |", "| 3D SHAPE | **0.200 (0 to 1.00)** |"]
+        );
     }
 }

@@ -37,6 +37,14 @@ impl TaskName {
         }
     }
 
+    /// What `learned` or `learned-KIND` of this task is called on another, or on itself.
+    pub(crate) fn learned_there(self, name: &str, task: Self) -> String {
+        match name.strip_prefix("learned") {
+            Some(kind) if task != self => format!("learned-{}{kind}", self.name()),
+            _ => name.to_owned(),
+        }
+    }
+
     /// Width and height of its images, in pixels.
     pub(crate) fn size(self) -> usize {
         match self {

@@ -63,12 +63,20 @@ pub fn depth_softness(edge: &str) -> anyhow::Result<Option<DepthSoftnessFile>> {
     Ok(text(&name).map(parse).transpose()?)
 }
 
+/// The name of what `learned-KIND` means on a task: that of this kind for the task, or else what was learned on the task of
+/// that name.
+pub fn called(task: &str, kind: &str) -> String {
+    let own = format!("{task}-{kind}");
+    let others = text(&own).is_none() && text(kind).is_some() && !kind.ends_with("_depth");
+    if others { kind.to_owned() } else { own }
+}
+
 /// The name of what a command line means among what is shipped, whether it is there or not: it says so, or it has something
 /// to solve, says nothing of the softness, and there is one for the task.
 pub fn asked_for(settings: &Settings, task: &str) -> Option<String> {
     match &settings.softness {
         Some(SoftnessChoice::Learned(None)) => Some(task.to_owned()),
-        Some(SoftnessChoice::Learned(Some(kind))) => Some(format!("{task}-{kind}")),
+        Some(SoftnessChoice::Learned(Some(kind))) => Some(called(task, kind)),
         Some(SoftnessChoice::Named(_) | SoftnessChoice::File(_)) => None,
         None => {
             // A search, a choice and learning begin with a family.
@@ -85,6 +93,14 @@ pub fn asked_for(settings: &Settings, task: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_learned_on_another_task_goes_by_its_name() {
+        let names = [("pose", "mlp"), ("pose", "shape3d"), ("pose", "shape3d-mlp"), ("pose", "x")];
+        let called = names.map(|(task, kind)| called(task, kind));
+        assert_eq!(called, ["pose-mlp", "shape3d", "shape3d-mlp", "pose-x"]);
+        assert_eq!(super::called("pose", "occlusion_depth"), "pose-occlusion_depth");
+    }
 
     #[test]
     fn every_shipped_file_is_valid_and_says_where_it_comes_from() {

@@ -72,7 +72,7 @@ pub struct Settings {
 
     /// Softness: logistic, gauss, exp, gamma, bilogit, mlp, a softness file in JSON, learned for the best that
     /// comes with the program, learned-mlp for its network and learned-surrogate for a sharp image with a gradient of
-    /// its own, or auto for what `choose` finds.
+    /// its own, learned-pose and the like for what was learned on another task, or auto for what `choose` finds.
     #[arg(long, value_name = "NAME|FILE.json", value_parser = softness)]
     pub softness: Option<SoftnessChoice>,
 
