@@ -151,9 +151,11 @@ const VARIANTS: [&str; 2] = ["original", "transfer"];
 
 fn crossing(text: &str) -> Result<String, String> {
     match text {
-        "" | "learned" => Ok(text.to_owned()),
-        text if text.starts_with("learned-") => Ok(text.to_owned()),
-        _ => Err("expected what was learned on every task: learned or learned-mlp".into()),
+        "" | "learned" | "learned-mlp" => Ok(text.to_owned()),
+        _ => {
+            Err("expected what comes with the program for every task: learned or learned-mlp"
+                .into())
+        }
     }
 }
 
@@ -192,6 +194,8 @@ mod tests {
         assert_eq!(runs("--runs 3"), [3; 4]);
         assert_eq!(runs("--runs 20,5,60,50"), [20, 5, 60, 50]);
         assert!(args("--runs 20,5").cells().is_err());
+        let line = ["compare", "--crossed", "learned-surrogate"];
+        assert!(Args::try_parse_from(line).unwrap_err().to_string().contains("every task"));
         assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));
     }
 }
