@@ -7,6 +7,7 @@
 mod args;
 mod cell;
 mod charts;
+mod crossed;
 mod functions;
 mod machine;
 mod measured;
