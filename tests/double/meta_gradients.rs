@@ -10,7 +10,10 @@ use burn::{
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
 use softrast_method::LEARNING_TOLERANCE;
 use softrast_raster::Rasterizer;
-use softrast_softness::{Family, Logistic, Mlp, Softness};
+use softrast_softness::{
+    Family, Softness,
+    families::{Logistic, Mlp},
+};
 use softrast_tests::{Shape2d, numbers, shape2d_start, vector};
 
 use crate::differences::relative_error;

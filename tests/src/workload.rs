@@ -11,7 +11,7 @@ use burn::{
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, mse_loss, project, reference};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 /// The logistic of the signed squared distance.
 const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };

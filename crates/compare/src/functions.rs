@@ -5,7 +5,7 @@ use std::path::Path;
 use softrast_method::{numbers, shipped, tensor};
 use softrast_raster::HostBackend;
 use softrast_runner::method_colour;
-use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
 
 use crate::{
     Measured,
@@ -77,13 +77,13 @@ fn at_the_end(one: &Measured) -> Option<(EdgeSoftness, Vec<f64>)> {
             };
             shipped::softness(&called).ok()??
         }
-        file => SoftnessFile::load(Path::new(file)).ok()?,
+        file => ScheduledSoftness::load(Path::new(file)).ok()?,
     };
-    let SoftnessFile { softness, phi, path, .. } = file;
-    if path.is_none() {
+    let ScheduledSoftness { softness, phi, schedule, .. } = file;
+    if schedule.is_none() {
         return Some((softness, phi));
     }
     let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
     let scale = tensor(vec![one.scale_end?], [1]);
-    Some((softness, numbers(softness.widened(phi, scale))))
+    Some((softness, numbers(softness.with_scale(phi, scale))))
 }

@@ -122,7 +122,7 @@ What `search` found for a family on training seeds of the original variant stand
 transfer keeps it (POSE and OCCLUSION have a learning rate of their own there). OCCLUSION's original, which most settings solve without an error,
 tells nothing, so families were searched on the transfer there, as `learned` was learned on it. Settings with a * were not searched for: they are the
 task's own. `learned` is what comes with the programs and is their default, `learned-mlp` the network beside it
-(`data/softness`, where a note in each file says how it was learned), `learned-surrogate` a sharp image with a learned wider gradient, which
+(`crates/softness/learned`, where a note in each file says how it was learned), `learned-surrogate` a sharp image with a learned wider gradient, which
 OCCLUSION, whose edges stay, has no use for; their seeds were others too. On 3D SHAPE `learned` and `learned-mlp` have a surrogate as well, one that
 narrows with the image, and the families have none. `mlp` is the network before it has
 learned anything, with `init fitted` after a fit to the searched logistic. Rows with a resolution, a tolerance or a backend optimise on that many pixels a
@@ -137,7 +137,7 @@ what it prints. The paper's meshes and pictures are others, so its figures tell 
 const SECONDS: &str = "\
 Wall time of the optimisation steps of a run, its share of a batch where runs are solved together, without the errors that are
 measured beside; a step draws once and takes one gradient. The paper's figures are from a V100: 3.24 to 4.36 seconds to evaluate 3D SHAPE and
-0.053 to 0.088 to draw once. How long learning took stands in the note of each file in `data/softness`.
+0.053 to 0.088 to draw once. How long learning took stands in the note of each file in `crates/softness/learned`.
 ";
 
 fn note(task: TaskName) -> &'static str {

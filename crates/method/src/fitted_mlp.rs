@@ -6,7 +6,7 @@ use burn::{
 };
 use softrast_meta::{Adam, Optimizer};
 use softrast_raster::HostBackend;
-use softrast_softness::{EdgeSoftness, Family, Mlp, Softness, initial_mlp};
+use softrast_softness::{EdgeSoftness, Family, Softness, families::Mlp, initial_mlp};
 
 use crate::{numbers, tensor};
 

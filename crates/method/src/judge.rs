@@ -3,7 +3,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer, Silhouette, hard_silhouette};
 use softrast_runner::{Plan, Referee};
-use softrast_softness::{Family, Logistic};
+use softrast_softness::{Family, Softness, families::Logistic};
 
 use crate::{finer, tensor};
 

@@ -3,7 +3,9 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_raster::{RasterBackend, Rasterizer};
 use softrast_runner::{Input, Order, Plan, Referee, Variant};
-use softrast_softness::{EdgeSoftness, Family, ScalePath, SoftnessFile, Surrogate};
+use softrast_softness::{
+    EdgeSoftness, Family, ScaleSchedule, ScheduledSoftness, Softness, Surrogate,
+};
 
 use crate::{
     Method, PreparedRun, method_of_flags::usage, numbers, prepared_run::DrawnAndFelt, tensor,
@@ -18,7 +20,7 @@ const ABOVE_FLOOR: f64 = 0.05;
 /// The softness of edges as something to learn.
 ///
 /// What is learned is one vector: the parameters of a softness that stays as it is; or, where its
-/// scale moves or is learned apart ([`Input::Relative`]), first the knots of a [`ScalePath`], then the
+/// scale moves or is learned apart ([`Input::Relative`]), first the knots of a [`ScaleSchedule`], then the
 /// parameters at scale 1 without the logarithm of the scale, which the path replaces. Those of a
 /// [`Surrogate`] come last, whole, as it keeps a ratio to the path that is its own.
 #[derive(Clone, Debug)]
@@ -26,7 +28,7 @@ pub struct LearnedEdge {
     pub(crate) softness: EdgeSoftness,
     /// Parameters to start from; at scale 1 where there is a path.
     phi: Vec<f64>,
-    pub(crate) path: Option<ScalePath>,
+    pub(crate) path: Option<ScaleSchedule>,
     /// At scale 1 where there is a path.
     pub(crate) surrogate: Option<Surrogate>,
     pub(crate) steps: usize,
@@ -47,7 +49,7 @@ impl LearnedEdge {
             let (phi, surrogate, path) = (method.phi(scale), method.surrogate(scale), None);
             return Self { softness, phi, path, surrogate, steps, size, tolerance, variant, task };
         }
-        let mut path = ScalePath { knots: Vec::new(), floor_px: plan.floor_px };
+        let mut path = ScaleSchedule { knots: Vec::new(), floor_px: plan.floor_px };
         let floor = path.floor(softness, size);
         let knots = if method.is_static() { 1 } else { plan.knots };
         let last = knots.max(2) - 1;
@@ -109,7 +111,7 @@ impl LearnedEdge {
             parts.push(learned.clone().narrow(0, knots, self.phi.len() - fixed));
         }
         parts.retain(|part| part.dims() != [0]);
-        self.softness.widened(Tensor::cat(parts, 0), scale)
+        self.softness.with_scale(Tensor::cat(parts, 0), scale)
     }
 
     /// The surrogate and its parameters `[P]` at an inner step, from the learned vector.
@@ -122,7 +124,7 @@ impl LearnedEdge {
         let own = learned.clone().narrow(0, self.shown(), phi.len());
         let phi = match self.scale_tensor(learned, step) {
             None => own,
-            Some(scale) => softness.widened(own, scale),
+            Some(scale) => softness.with_scale(own, scale),
         };
         Some((*softness, phi))
     }
@@ -173,13 +175,21 @@ impl LearnedEdge {
         let (shown, felt) = learned.split_at(self.shown());
         let (knots, own) = shown.split_at(self.knots());
         let phi = self.phi[..self.fixed()].iter().chain(own).copied().collect();
-        let path = self.path.as_ref().map(|path| ScalePath { knots: knots.to_vec(), ..*path });
+        let path = self.path.as_ref().map(|path| ScaleSchedule { knots: knots.to_vec(), ..*path });
         let (softness, note) = (self.softness, Some(note.to_owned()));
         let learning_rate = Some(learning_rate).filter(|_| self.variant == Variant::Original);
         let surrogate = self.surrogate.as_ref();
         let surrogate = surrogate.map(|s| Surrogate { softness: s.softness, phi: felt.to_vec() });
         let task = Some(self.task.to_owned());
-        let file = SoftnessFile { softness, phi, path, surrogate, learning_rate, task, note };
+        let file = ScheduledSoftness {
+            softness,
+            phi,
+            schedule: path,
+            surrogate,
+            learning_rate,
+            task,
+            note,
+        };
         let name = "softness.json";
         Ok(vec![(name, file.text(name.as_ref())?)])
     }
@@ -197,13 +207,7 @@ impl LearnedEdge {
         let path = self.path.as_ref()?;
         let floor = path.floor(self.softness, self.size);
         let knots = learned.clone().narrow(0, 0, self.knots());
-        Some(ScalePath::scale(&knots, floor, self.part(step)))
-    }
-
-    /// Which part of the run is over; the last gradient is taken at the last scale, as in [`Method`].
-    fn part(&self, step: usize) -> f64 {
-        let last = self.steps.saturating_sub(1).max(1);
-        step.min(last) as f64 / last as f64
+        Some(ScaleSchedule::scale(&knots, floor, ScaleSchedule::part(step, self.steps)))
     }
 
     /// Steps with the same number have the same softness.

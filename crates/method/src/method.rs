@@ -1,7 +1,7 @@
 use serde_json::{Map, Value};
 use softrast_raster::{BackendChoice, HostBackend, Rasterizer};
 use softrast_runner::{Order, Resolution, usual_tolerance};
-use softrast_softness::{EdgeSoftness, Family, ScalePath, Softness, Surrogate};
+use softrast_softness::{EdgeSoftness, Family, ScaleSchedule, Softness, Surrogate};
 
 use crate::{LEARNING_TOLERANCE, numbers, tensor};
 
@@ -35,7 +35,7 @@ pub(crate) enum Path {
     Fixed { phi: Vec<f64>, scale: f64 },
     /// Parameters of a file at scale 1, the scale that stands for them alone, and the scale over a
     /// run on images of this size.
-    Learned { phi: Vec<f64>, unit: f64, path: ScalePath, size: usize },
+    Learned { phi: Vec<f64>, unit: f64, path: ScaleSchedule, size: usize },
     /// A scale that goes geometrically from the first to the last, and parameters at scale 1 where they
     /// are not the family's default.
     Scale { first: f64, last: f64, unit: Option<Vec<f64>> },
@@ -101,7 +101,7 @@ impl Method {
         for (name, felt) in names.into_iter().zip(ends.map(|scale| self.surrogate(scale))) {
             let Some(Surrogate { softness, phi }) = felt else { continue };
             settings.insert("surrogate".into(), softness.family.name().into());
-            settings.insert(name.into(), nominal_scale(softness, &phi).into());
+            settings.insert(name.into(), softness.scale(&phi).into());
         }
         if let Some(note) = &self.note {
             settings.insert("softness_note".into(), note.as_str().into());
@@ -169,9 +169,11 @@ impl Method {
             Path::Learned { ref path, size, .. } => {
                 let knots = tensor::<HostBackend, 1>(path.knots.clone(), [path.knots.len()]);
                 let floor = path.floor(self.softness, size);
-                numbers(ScalePath::scale(&knots, floor, part(step, steps)))[0]
+                numbers(ScaleSchedule::scale(&knots, floor, ScaleSchedule::part(step, steps)))[0]
             }
-            Path::Scale { first, last, .. } => first * (last / first).powf(part(step, steps)),
+            Path::Scale { first, last, .. } => {
+                first * (last / first).powf(ScaleSchedule::part(step, steps))
+            }
         }
     }
 
@@ -211,25 +213,7 @@ impl Method {
 
 fn widened(softness: EdgeSoftness, phi: &[f64], scale: f64) -> Vec<f64> {
     let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
-    numbers(softness.widened(phi, tensor(vec![scale], [1])))
-}
-
-/// Which part of a run is over, 0 to 1: the last gradient is taken at the end.
-fn part(step: usize, steps: usize) -> f64 {
-    let last = steps.saturating_sub(1).max(1);
-    step.min(last) as f64 / last as f64
-}
-
-/// The scale of a logistic with the same slope at the edge, for families without a scale of their
-/// own; else the family's.
-pub(crate) fn nominal_scale(softness: EdgeSoftness, phi: &[f64]) -> f64 {
-    if softness.family != Family::Mlp {
-        return phi[0].exp();
-    }
-    let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
-    let slope = numbers(softness.family.density(phi, tensor(vec![0.0], [1])));
-    // A flat one has no scale; any finite number will do.
-    0.25 / slope[0].abs().max(1e-12)
+    numbers(softness.with_scale(phi, tensor(vec![scale], [1])))
 }
 
 #[cfg(test)]

@@ -1,13 +1,13 @@
 use softrast_raster::HostBackend;
 use softrast_runner::{Error, Init, Schedule, Settings, SoftnessChoice};
-use softrast_softness::{EdgeSoftness, Family, SoftnessFile, Surrogate};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness, Surrogate};
 
 use crate::{
     Defaults, Method, Searched,
     backend::backend,
     defaults::{asked_schedule, is_scaled, scales},
     fitted_mlp::{fitted_mlp, mlp_like},
-    method::{Drawn, Path, nominal_scale},
+    method::{Drawn, Path},
     numbers, shipped, tensor,
 };
 
@@ -42,7 +42,7 @@ impl Method {
         let family = match &settings.softness {
             Some(SoftnessChoice::File(file)) => {
                 check_alone(settings)?;
-                let (name, file) = (file.display().to_string(), SoftnessFile::load(file)?);
+                let (name, file) = (file.display().to_string(), ScheduledSoftness::load(file)?);
                 return Self::of_file(name, file, settings, defaults, drawn);
             }
             Some(SoftnessChoice::Named(name)) => name.parse()?,
@@ -53,21 +53,21 @@ impl Method {
 
     fn of_file(
         name: String,
-        file: SoftnessFile,
+        file: ScheduledSoftness,
         settings: &Settings,
         defaults: &Defaults,
         drawn: Drawn,
     ) -> anyhow::Result<Self> {
-        let SoftnessFile { mut softness, mut phi, path, mut surrogate, .. } = file;
+        let ScheduledSoftness { mut softness, mut phi, schedule, mut surrogate, .. } = file;
         if settings.init == Some(Init::Fitted) {
             (softness, phi) = network_like(softness, &phi)?;
             if let Some(felt) = &mut surrogate {
                 (felt.softness, felt.phi) = network_like(felt.softness, &felt.phi)?;
             }
         }
-        let unit = nominal_scale(softness, &phi);
+        let unit = softness.scale(&phi);
         let size = settings.size.unwrap_or(defaults.size);
-        let path = match path {
+        let path = match schedule {
             None => Path::Fixed { scale: unit, phi },
             Some(path) => Path::Learned { phi, unit, path, size },
         };
@@ -110,10 +110,10 @@ impl Method {
 
 /// A network, and its weights, in the place of a softness.
 fn network_like(softness: EdgeSoftness, phi: &[f64]) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
-    let scale = nominal_scale(softness, phi);
+    let scale = softness.scale(phi);
     let resized = |softness: EdgeSoftness, phi: &[f64], factor: f64| {
         let phi = tensor::<HostBackend, 1>(phi.to_vec(), [phi.len()]);
-        numbers(softness.widened(phi, tensor(vec![factor], [1])))
+        numbers(softness.with_scale(phi, tensor(vec![factor], [1])))
     };
     let network = EdgeSoftness { family: Family::Mlp, ..softness };
     let seen = |softness: EdgeSoftness| EdgeSoftness { squared: false, ..softness };
@@ -149,7 +149,6 @@ pub(crate) fn usage(message: &str) -> anyhow::Error {
 mod tests {
     use clap::Parser;
     use softrast_runner::Command;
-    use softrast_softness::Softness;
 
     use super::*;
 

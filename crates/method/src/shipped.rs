@@ -1,45 +1,16 @@
 //! Softnesses that were learned on the tasks and come with the program.
 
-use std::path::Path;
-
 use softrast_runner::{Command, Settings, SoftnessChoice};
-use softrast_softness::{DepthSoftnessFile, SoftnessFile};
+use softrast_softness::{DepthSoftnessFile, ScheduledSoftness};
 
 use crate::defaults::is_scaled;
 
-/// Name and text of every file in `data/softness`; a line here makes a file part of the program, such as
-/// `("pose", include_str!("../../../data/softness/pose.json")),`.
-///
-/// The name is that of the task, with `-mlp` or the like behind it for what is not the best one, and at the end `_depth`
-/// for a softness of depths.
-const SHIPPED: &[(&str, &str)] = &[
-    ("shape2d", include_str!("../../../data/softness/shape2d.json")),
-    ("shape2d-mlp", include_str!("../../../data/softness/shape2d-mlp.json")),
-    ("shape2d-surrogate", include_str!("../../../data/softness/shape2d-surrogate.json")),
-    ("shape3d", include_str!("../../../data/softness/shape3d.json")),
-    ("shape3d-mlp", include_str!("../../../data/softness/shape3d-mlp.json")),
-    ("shape3d-surrogate", include_str!("../../../data/softness/shape3d-surrogate.json")),
-    ("pose", include_str!("../../../data/softness/pose.json")),
-    ("pose-mlp", include_str!("../../../data/softness/pose-mlp.json")),
-    ("pose-surrogate", include_str!("../../../data/softness/pose-surrogate.json")),
-    ("occlusion", include_str!("../../../data/softness/occlusion.json")),
-    ("occlusion_depth", include_str!("../../../data/softness/occlusion_depth.json")),
-    ("occlusion-mlp", include_str!("../../../data/softness/occlusion-mlp.json")),
-    ("occlusion-mlp_depth", include_str!("../../../data/softness/occlusion-mlp_depth.json")),
-    #[cfg(test)]
-    (
-        "example",
-        r#"{"softness": {"family": "gauss", "squared": false}, "phi": [0],
-            "path": {"knots": [-3, -5], "floor_px": 0.03}, "learning_rate": 0.7, "note": "by hand"}"#,
-    ),
-];
+#[cfg(test)]
+const EXAMPLE: &str = r#"{"softness": {"family": "gauss", "squared": false}, "phi": [0],
+    "path": {"knots": [-3, -5], "floor_px": 0.03}, "learning_rate": 0.7, "note": "by hand"}"#;
 
-fn text(name: &str) -> Option<&'static str> {
-    SHIPPED.iter().find(|(of, _)| *of == name).map(|(_, text)| *text)
-}
-
-fn path(name: &str) -> String {
-    format!("data/softness/{name}.json")
+fn is_there(name: &str) -> bool {
+    ScheduledSoftness::learned_names().any(|known| known == name) || cfg!(test) && name == "example"
 }
 
 /// The softness that is shipped under a name of [`asked_for`].
@@ -47,9 +18,13 @@ fn path(name: &str) -> String {
 /// # Errors
 ///
 /// If the file that is part of the program is broken.
-pub fn softness(name: &str) -> anyhow::Result<Option<SoftnessFile>> {
-    let parse = |text| SoftnessFile::parse(text, Path::new(&path(name)));
-    Ok(text(name).map(parse).transpose()?)
+pub fn softness(name: &str) -> anyhow::Result<Option<ScheduledSoftness>> {
+    #[cfg(test)]
+    if name == "example" {
+        return Ok(Some(ScheduledSoftness::parse(EXAMPLE, "example".as_ref())?));
+    }
+    let learned = is_there(name).then(|| ScheduledSoftness::learned(name));
+    Ok(learned.transpose()?)
 }
 
 /// The softness of depths that is shipped beside that of edges under a name of [`asked_for`].
@@ -58,16 +33,15 @@ pub fn softness(name: &str) -> anyhow::Result<Option<SoftnessFile>> {
 ///
 /// If the file that is part of the program is broken.
 pub fn depth_softness(edge: &str) -> anyhow::Result<Option<DepthSoftnessFile>> {
-    let name = format!("{edge}_depth");
-    let parse = |text| DepthSoftnessFile::parse(text, Path::new(&path(&name)));
-    Ok(text(&name).map(parse).transpose()?)
+    let known = DepthSoftnessFile::learned_names().any(|name| name == edge);
+    Ok(known.then(|| DepthSoftnessFile::learned(edge)).transpose()?)
 }
 
 /// The name of what `learned-KIND` means on a task: that of this kind for the task, or else what was learned on the task of
 /// that name.
 pub fn called(task: &str, kind: &str) -> String {
     let own = format!("{task}-{kind}");
-    let others = text(&own).is_none() && text(kind).is_some() && !kind.ends_with("_depth");
+    let others = !is_there(&own) && is_there(kind);
     if others { kind.to_owned() } else { own }
 }
 
@@ -85,7 +59,7 @@ pub fn asked_for(settings: &Settings, task: &str) -> Option<String> {
                 && settings.surrogate_scale.is_none()
                 && settings.init.is_none()
                 && !is_scaled(settings);
-            (solves && silent && text(task).is_some()).then(|| task.to_owned())
+            (solves && silent && is_there(task)).then(|| task.to_owned())
         }
     }
 }
@@ -100,16 +74,5 @@ mod tests {
         let called = names.map(|(task, kind)| called(task, kind));
         assert_eq!(called, ["pose-mlp", "shape3d", "shape3d-mlp", "pose-x"]);
         assert_eq!(super::called("pose", "occlusion_depth"), "pose-occlusion_depth");
-    }
-
-    #[test]
-    fn every_shipped_file_is_valid_and_says_where_it_comes_from() {
-        for (name, _) in SHIPPED {
-            let note = match name.strip_suffix("_depth") {
-                Some(task) => depth_softness(task).unwrap().unwrap().note,
-                None => softness(name).unwrap().unwrap().note,
-            };
-            assert!(note.is_some(), "{name}");
-        }
     }
 }

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_mesh::{Mesh, fox, icosphere};
 use softrast_raster::{Rasterizer, Silhouette, TConorm, project};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 /// A logistic of the signed squared distance: `width` is the root of its scale, in NDC.
 pub(crate) const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };

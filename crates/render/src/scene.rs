@@ -5,7 +5,7 @@ use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_mesh::Mesh;
 use softrast_raster::TConorm;
 use softrast_runner::Error;
-use softrast_softness::{EdgeSoftness, SoftnessFile};
+use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness};
 
 use crate::args::{Args, Choice};
 
@@ -91,7 +91,7 @@ fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
         )
         .into()),
         Choice::File(path) => {
-            let file = SoftnessFile::load(path).context("--softness")?;
+            let file = ScheduledSoftness::load(path).context("--softness")?;
             Ok((file.softness, file.phi))
         }
         &Choice::Named(family) => {

@@ -1,25 +1,34 @@
-use std::{fmt, str::FromStr};
+use std::{fmt, path::Path, str::FromStr};
 
 use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
 
-use crate::{DepthMlp, EdgeSoftness, Family, OPAQUE, Softness, initial_mlp};
+use crate::{
+    EdgeSoftness, Family, OPAQUE, Softness, SoftnessFileError,
+    file::{Stored, check_phi, learned, stored},
+    initial_mlp,
+    network::{WEIGHTS, weights},
+};
 
-/// How much a face counts by its depth: a family, or the network of [`DepthMlp`].
+/// How much a face counts by its depth: a family, or a network.
 ///
 /// It sees the nearness of a face, which is 1 at the near plane and 0 at the far plane. A family
 /// sees it from the near plane on, as `x = nearness - 1`: there it falls off behind the plane as it
-/// falls off outside an edge. [`DepthMlp`] sees the nearness itself.
+/// falls off outside an edge. The network sees the nearness itself.
 ///
 /// Source: Wu et al. 2024, Eq. 3 and 4. Not in the paper: where a family has its edge. The released
 /// code leaves it at nearness 0, where the reversed families are 1 for every face and narrow ones
-/// saturate, so that no depth is told from another (FACTS 0.11, S28).
+/// saturate, so that no depth is told from another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum DepthSoftness {
     /// A family, in units of the distance between the planes.
     Family(Family),
-    /// [`DepthMlp`].
+    /// `f(z) = W5 relu(h + W4 relu(W3 relu(W2 h)))` with `h = relu(W1 z)`; φ `[56]` is laid out as
+    /// for [`Mlp`](crate::families::Mlp).
+    ///
+    /// Without biases it is a straight line on each side of 0, `f(z) = f(1) z` for z >= 0: 56
+    /// weights, one degree of freedom. It is flat where all units of a layer are off.
     Mlp,
 }
 
@@ -48,7 +57,7 @@ impl DepthSoftness {
     pub fn parameters(self) -> usize {
         match self {
             Self::Family(family) => family.parameters(),
-            Self::Mlp => DepthMlp.parameters(),
+            Self::Mlp => WEIGHTS,
         }
     }
 
@@ -80,17 +89,32 @@ impl DepthSoftness {
                 let softness = EdgeSoftness { family, squared: false };
                 softness.log_value(phi, nearness - 1.0)
             }
-            Self::Mlp => DepthMlp.value(phi, nearness).clamp_min(OPAQUE).log(),
+            Self::Mlp => network(&phi, nearness).clamp_min(OPAQUE).log(),
         }
     }
 
     /// How many of the leading parameters are logarithms.
-    pub(crate) fn logarithms(self) -> usize {
+    fn logarithms(self) -> usize {
         match self {
             Self::Family(family) => family.logarithms(),
             Self::Mlp => 0,
         }
     }
+}
+
+/// The network of [`DepthSoftness::Mlp`], same shape as `z`.
+fn network<B: Backend, const D: usize>(phi: &Tensor<B, 1>, z: Tensor<B, D>) -> Tensor<B, D> {
+    // With slope 0 at 0.
+    fn relu<B: Backend>(h: Tensor<B, 2>) -> Tensor<B, 2> {
+        let off = h.clone().lower_equal_elem(0.0);
+        h.mask_fill(off, 0.0)
+    }
+    let shape = z.dims();
+    let [w1, w2, w3, w4, w5] = weights(phi);
+    let h1 = relu(z.reshape([-1, 1]) * w1);
+    let h2 = relu(h1.clone().matmul(w2));
+    let h3 = relu(h2.matmul(w3));
+    relu(h1 + h3.matmul(w4)).matmul(w5).reshape(shape)
 }
 
 impl fmt::Display for DepthSoftness {
@@ -125,6 +149,31 @@ impl TryFrom<String> for DepthSoftness {
     }
 }
 
+/// A depth softness and its parameters, as kept in a JSON file; they stay as they are over a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DepthSoftnessFile {
+    /// Which depth softness.
+    pub depth_softness: DepthSoftness,
+    /// Its parameters φ, as many as [`DepthSoftness::parameters`] says.
+    pub phi: Vec<f64>,
+    /// Where the parameters come from, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+stored!(DepthSoftnessFile);
+
+impl Stored for DepthSoftnessFile {
+    const LEARNED: &'static [(&'static str, &'static str)] =
+        learned!["_depth.json": "occlusion", "occlusion-mlp"];
+
+    fn check(&self) -> Result<(), String> {
+        let softness = self.depth_softness;
+        check_phi(softness.name(), [softness.parameters(), softness.logarithms()], &self.phi)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -138,6 +187,37 @@ mod tests {
             assert_eq!(softness.default_phi(0.1).len(), softness.parameters());
         }
         let message = "deep".parse::<DepthSoftness>().unwrap_err().to_string();
-        assert!(message.ends_with("gumbel_min, mlp and depth_mlp"), "{message}");
+        assert!(message.contains("known are logistic, bilogit, "), "{message}");
+        assert!(message.ends_with(" and depth_mlp"), "{message}");
+    }
+
+    #[test]
+    fn a_saved_depth_softness_comes_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("depth.json");
+        for depth_softness in [DepthSoftness::Family(Family::Exp), DepthSoftness::Mlp] {
+            let phi = depth_softness.default_phi(0.1);
+            let file = DepthSoftnessFile { depth_softness, phi, note: Some("a start".into()) };
+            file.save(&path).unwrap();
+            assert_eq!(DepthSoftnessFile::load(&path).unwrap(), file);
+        }
+    }
+
+    #[test]
+    fn parameters_that_do_not_suit_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("depth.json");
+        for (text, part) in [
+            (
+                r#"{"depth_softness": "depth_mlp", "phi": [0]}"#,
+                "1 parameters, but depth_mlp has 56",
+            ),
+            (r#"{"depth_softness": "gauss", "phi": [99]}"#, "phi[0] is the logarithm 99"),
+            (r#"{"depth_softness": "deep", "phi": [99]}"#, "unknown depth softness \"deep\""),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let message = DepthSoftnessFile::load(&path).unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
 
-use crate::{Family, Softness};
+use crate::{Family, Softness, softness::curve};
 
 /// A family applied to the signed distance of an edge, or to its signed square.
 ///
@@ -19,14 +19,17 @@ pub struct EdgeSoftness {
 }
 
 impl EdgeSoftness {
-    /// Parameters to start from, see [`Family::default_phi`]; `scale` is in NDC, or NDC² if
-    /// `squared`.
+    /// `ln s(x)`, same shape as `x`; at most 0, and finite where `s` underflows.
     ///
-    /// # Panics
-    ///
-    /// If `scale` is not positive.
-    pub fn default_phi(&self, scale: f64) -> Vec<f64> {
-        self.family.default_phi(scale)
+    /// It is minus the optical depth of the mirrored step at `-x`, so it keeps the digits of tails.
+    /// Where `s` reaches 0 exactly, the logarithm stops at that of [`OPAQUE`](crate::OPAQUE).
+    pub fn log_value<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> Tensor<B, D> {
+        let mirrored = Self { family: self.family.mirrored(), ..*self };
+        mirrored.optical_depth(phi, x.neg()).neg()
     }
 
     /// What the family sees of the distance `d`.
@@ -45,41 +48,40 @@ impl EdgeSoftness {
 }
 
 impl Softness for EdgeSoftness {
+    curve!(self.value(phi, x) => self.family.value(phi, self.argument(x)));
+    curve!(self.density(phi, x) => {
+        let density = self.family.density(phi, self.argument(x.clone()));
+        self.by_distance(density, x)
+    });
+
+    curve!(self.optical_depth(phi, x) => self.family.optical_depth(phi, self.argument(x)));
+    curve!(self.hazard(phi, x) => {
+        let hazard = self.family.hazard(phi, self.argument(x.clone()));
+        self.by_distance(hazard, x)
+    });
+
     fn parameters(&self) -> usize {
         self.family.parameters()
     }
 
-    fn value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        self.family.value(phi, self.argument(x))
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        self.family.default_phi(scale)
     }
 
-    fn density<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        let density = self.family.density(phi, self.argument(x.clone()));
-        self.by_distance(density, x)
+    fn logarithms(&self) -> usize {
+        self.family.logarithms()
     }
 
-    fn optical_depth<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        self.family.optical_depth(phi, self.argument(x))
+    /// In NDC, or NDC² if `squared`.
+    fn scale(&self, phi: &[f64]) -> f64 {
+        self.family.scale(phi)
     }
 
-    fn hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        let hazard = self.family.hazard(phi, self.argument(x.clone()));
-        self.by_distance(hazard, x)
+    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
+        self.family.with_scale(phi, factor)
+    }
+
+    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
+        self.family.with_scale_values(phi, factor)
     }
 }

@@ -1,11 +1,12 @@
 //! Soft step functions for differentiable rasterizers, as burn tensor ops.
 //!
-//! A [`Softness`] says how much a face covers a pixel at a signed distance, and how deep the face
+//! A [`Softness`] gives how much a face covers a pixel at a signed distance, and how deep the face
 //! is optically. Its parameters are one explicit vector φ, so that an optimiser sees nothing else.
-//! A [`Family`] is one chosen by name; an [`EdgeSoftness`] applies it to the distance or to its
-//! signed square; [`support`] says how far from the edge it still changes; a [`SoftnessFile`] keeps
-//! it; a [`SoftStep`] puts it into a network. A [`DepthSoftness`] says how much a face counts by its
-//! depth.
+//! One of your own has one method; the ones that come with the crate are in [`families`], and a
+//! [`Family`] is one chosen by name. An [`EdgeSoftness`] applies it to the distance or to its signed
+//! square; [`support`] gives how far from the edge it still changes; a [`ScheduledSoftness`] has its
+//! parameters and how its scale moves over a run, also in a file; a [`SoftStep`] puts it into a
+//! network. A [`DepthSoftness`] gives how much a face counts by its depth.
 //!
 //! ```
 //! use burn::{backend::NdArray, tensor::{DType, Tensor}};
@@ -24,71 +25,27 @@
 //! 1e15 scales count as 1e15 scales, and f32 cannot hold the second derivatives of a step that is
 //! narrower than about 1e-7.
 
-mod atan_ratio;
-mod bilogit;
-mod cauchy;
-mod cubic_hermite;
-mod depth;
-mod depth_file;
-mod depth_mlp;
 mod depth_softness;
 mod edge;
 mod error_function;
-mod exp;
+pub mod families;
 mod family;
 mod file;
-mod file_error;
-mod gamma;
-mod gauss;
-mod gudermannian;
-mod gumbel;
-mod half_line;
-mod initial_mlp;
-mod laplace;
-mod levy;
-mod ln_gamma;
-mod logistic;
-mod mirror;
-mod mlp;
-mod parameter;
-mod path;
-mod polynomial;
-mod reciprocal;
-mod rise;
+mod math;
+mod network;
+mod schedule;
+mod scheduled;
 mod soft_step;
 mod softness;
 mod support;
-mod surrogate;
-mod uniform;
-mod unit_step;
-mod wigner;
 
-pub use bilogit::BiLogit;
-pub use cauchy::Cauchy;
-pub use cubic_hermite::CubicHermite;
-pub use depth_file::DepthSoftnessFile;
-pub use depth_mlp::DepthMlp;
-pub use depth_softness::{DepthSoftness, UnknownDepthSoftness};
+pub use depth_softness::{DepthSoftness, DepthSoftnessFile, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
-pub use exp::Exp;
 pub use family::{Family, UnknownFamily};
-pub use file::SoftnessFile;
-pub use file_error::SoftnessFileError;
-pub use gamma::Gamma;
-pub use gauss::Gauss;
-pub use gudermannian::Gudermannian;
-pub use gumbel::{GumbelMax, GumbelMin};
-pub use half_line::{Forward, Reversed};
-pub use initial_mlp::initial_mlp;
-pub use laplace::Laplace;
-pub use levy::Levy;
-pub use logistic::Logistic;
-pub use mlp::Mlp;
-pub use path::ScalePath;
-pub use reciprocal::Reciprocal;
+pub use file::SoftnessFileError;
+pub use network::initial_mlp;
+pub use schedule::ScaleSchedule;
+pub use scheduled::{ScheduledSoftness, Surrogate};
 pub use soft_step::SoftStep;
 pub use softness::{OPAQUE, Softness};
 pub use support::{Support, support};
-pub use surrogate::Surrogate;
-pub use uniform::Uniform;
-pub use wigner::Wigner;

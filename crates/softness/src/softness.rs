@@ -1,6 +1,11 @@
 use std::fmt::Debug;
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
+
+use crate::math::{bounded_depth, ln_scale, with_first};
 
 /// What is left of the light behind a face that the formula calls fully opaque.
 ///
@@ -13,35 +18,137 @@ pub const OPAQUE: f64 = 1e-7;
 ///
 /// `x` is positive inside the face; its unit is NDC, or NDC² for a softness of the squared
 /// distance. All parameters sit in one vector `phi` `[parameters]`; those that must be positive are
-/// kept as logarithms. `phi` and `x` must have the same float type. Every method is made of tracked
-/// tensor ops, so that gradients of any order reach `phi` and `x`.
+/// kept as logarithms. `phi` and `x` must have the same float type.
+///
+/// Only [`value`](Softness::value) is required, made of tracked tensor ops; then gradients of any
+/// order reach `phi` and `x` through every method. All else follows from it, for a softness whose
+/// first parameter is the logarithm of its scale. Whatever a formula of its own makes more exact or
+/// faster can be overridden.
+///
+/// ```
+/// use std::f64::consts::FRAC_1_PI;
+///
+/// use burn::tensor::{Tensor, backend::Backend};
+/// use softrast_softness::Softness;
+///
+/// #[derive(Clone, Debug)]
+/// struct Arctan;
+///
+/// impl Softness for Arctan {
+///     fn value<B: Backend, const D: usize>(&self, phi: Tensor<B, 1>, x: Tensor<B, D>) -> Tensor<B, D> {
+///         (x / phi.exp().reshape([1; D])).atan() * FRAC_1_PI + 0.5
+///     }
+/// }
+///
+/// assert_eq!(Arctan.default_phi(0.02), [0.02_f64.ln()]);
+/// ```
 pub trait Softness: Clone + Debug + Send + Sync + 'static {
-    /// Length of `phi`.
-    fn parameters(&self) -> usize;
-
-    /// Coverage `s(x)` in [0, 1], same shape as `x`.
+    /// Coverage `s(x)` in [0, 1], same shape as `x`; `phi` is `[parameters]`.
     fn value<B: Backend, const D: usize>(&self, phi: Tensor<B, 1>, x: Tensor<B, D>)
     -> Tensor<B, D>;
 
+    /// Length of `phi`, at least 1. Provided: 1.
+    fn parameters(&self) -> usize {
+        1
+    }
+
     /// Derivative `ds/dx`, in 1 / (unit of x), same shape as `x`.
+    ///
+    /// Provided: by automatic differentiation of [`value`](Softness::value), which must not call
+    /// this method.
     fn density<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
         x: Tensor<B, D>,
-    ) -> Tensor<B, D>;
+    ) -> Tensor<B, D> {
+        slope(x, |x| self.value::<Autodiff<B>, D>(Tensor::from_inner(phi), x))
+    }
 
-    /// Optical depth `q = -ln(1 - s)`, at least 0, computed without forming `1 - s` where that
-    /// would lose digits; see [`OPAQUE`] for families that reach 1. Source: META 2.6.
+    /// Optical depth `q = -ln(1 - s)`, at least 0, same shape as `x`.
+    ///
+    /// Silhouettes are sums of it: `1 - Π (1 - sⱼ) = 1 - exp(-Σ qⱼ)` (Wu et al. 2024, Sec. 4.4).
+    /// Provided: `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`, see [`OPAQUE`]. Override it where `1 - s` loses
+    /// digits that matter and s does not reach 1.
     fn optical_depth<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
         x: Tensor<B, D>,
-    ) -> Tensor<B, D>;
+    ) -> Tensor<B, D> {
+        let covered = self.value(phi, x);
+        bounded_depth(covered.clone(), covered.neg() + 1.0)
+    }
 
-    /// Hazard `dq/dx`, the derivative of the optical depth; finite wherever `density` is.
+    /// Hazard `dq/dx`, the derivative of the optical depth, same shape as `x`; finite wherever
+    /// `density` is.
+    ///
+    /// Provided: by automatic differentiation of [`optical_depth`](Softness::optical_depth), which
+    /// must not call this method.
     fn hazard<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
         x: Tensor<B, D>,
-    ) -> Tensor<B, D>;
+    ) -> Tensor<B, D> {
+        slope(x, |x| self.optical_depth::<Autodiff<B>, D>(Tensor::from_inner(phi), x))
+    }
+
+    /// Parameters to start from; `scale` is in the unit of x. Provided: its logarithm, then 0.
+    ///
+    /// # Panics
+    ///
+    /// If `scale` is not positive.
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        let mut phi = vec![0.0; self.parameters()];
+        phi[0] = ln_scale(scale);
+        phi
+    }
+
+    /// How many of the leading parameters are logarithms, first that of the scale; 0 for a softness
+    /// without a scale of its own. Provided: 1.
+    fn logarithms(&self) -> usize {
+        1
+    }
+
+    /// The scale of these parameters, in the unit of x. Provided: `exp(phi[0])`.
+    fn scale(&self, phi: &[f64]) -> f64 {
+        phi[0].exp()
+    }
+
+    /// Parameters of `s(x / factor)`, where `phi` are those of s and `factor` is `[1]`. Provided: the
+    /// logarithm of the factor is added to the first.
+    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
+        let first = phi.clone().narrow(0, 0, 1) + factor.log();
+        with_first(first, phi)
+    }
+
+    /// [`with_scale`](Softness::with_scale) on plain numbers.
+    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
+        let mut phi = phi.to_vec();
+        phi[0] += factor.ln();
+        phi
+    }
+}
+
+/// A method of [`Softness`] on distances: the trait's signature, with this body.
+macro_rules! curve {
+    ($self:ident.$method:ident($phi:ident, $x:ident) => $body:expr) => {
+        fn $method<B: Backend, const D: usize>(
+            &$self,
+            $phi: Tensor<B, 1>,
+            $x: Tensor<B, D>,
+        ) -> Tensor<B, D> {
+            $body
+        }
+    };
+}
+pub(crate) use curve;
+
+/// The derivative of every entry of `of(x)` by its own `x`, one level of autodiff further in; ops on
+/// `B` are still tracked by the levels of `B`.
+fn slope<B: Backend, const D: usize>(
+    x: Tensor<B, D>,
+    of: impl FnOnce(Tensor<Autodiff<B>, D>) -> Tensor<Autodiff<B>, D>,
+) -> Tensor<B, D> {
+    let x = Tensor::<Autodiff<B>, D>::from_inner(x).require_grad();
+    let gradients = of(x.clone()).sum().backward();
+    x.grad(&gradients).unwrap_or_else(|| x.inner().zeros_like())
 }

@@ -38,8 +38,7 @@ pub struct Support {
 /// refined to 2e-10 relative; the side that is settled is returned. It need not be monotone, but a
 /// bump narrower than 4 % of its distance can be missed. A settled side gives 0.
 ///
-/// Source: META 6.1: with at most F faces culled at a pixel, an excess of `E / F` changes its
-/// coverage by at most E.
+/// With at most F faces culled at a pixel, an excess of `E / F` changes its coverage by at most E.
 ///
 /// # Panics
 ///

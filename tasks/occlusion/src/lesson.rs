@@ -3,7 +3,7 @@ use softrast_meta::{Adam, InnerLoop};
 use softrast_method::{LearnedEdge, Lesson, Step, numbers, tensor};
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_runner::{Curve, Figure, Plan, Referee};
-use softrast_softness::{DepthSoftness, DepthSoftnessFile, EdgeSoftness, Family};
+use softrast_softness::{DepthSoftness, DepthSoftnessFile, EdgeSoftness, Family, Softness};
 
 use crate::{Instance, Occlusion, Scene};
 

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 use softrast_raster::TConorm;
 use softrast_runner::Error;
-use softrast_softness::{EdgeSoftness, Family, SoftnessFile};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
 
 use crate::{Data, Settings, Width};
 
@@ -226,7 +226,7 @@ pub(crate) fn softness(
                 "a softness file holds its own parameters: leave out --scale and --squared";
             return Err(Error::Usage(message.into()).into());
         }
-        let file = SoftnessFile::load(text.as_ref())?;
+        let file = ScheduledSoftness::load(text.as_ref())?;
         return Ok((file.softness, file.phi));
     }
     let family: Family = text.parse().map_err(|error| Error::Usage(format!("{error}")))?;

@@ -5,7 +5,7 @@ use clap::Parser;
 use softrast_method::{Defaults, LearnedEdge, Method};
 use softrast_raster::BackendChoice;
 use softrast_runner::{Input, Judged, Order, Plan, Referee, Schedule, Settings, Variant};
-use softrast_softness::{EdgeSoftness, Family, Softness, SoftnessFile};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;
@@ -114,13 +114,13 @@ fn a_learned_vector_comes_back_from_its_file() {
                 let phi = read.phi(read.scale(step, 10));
                 assert_near(&phi, &numbers(edge.phi(&at, step)));
             }
-            let file = SoftnessFile::load(&path).unwrap();
+            let file = ScheduledSoftness::load(&path).unwrap();
             let felt = file.surrogate.as_ref().map_or(&[][..], |felt| &felt.phi);
             assert_near(felt, &learned[learned.len() - felt.len()..]);
             assert_eq!(read.learning_rate(), Some(0.3));
             assert_eq!(file.note.as_deref(), Some("a test"));
             // The rate is for the task that it was learned on.
-            SoftnessFile { task: Some("another".into()), ..file }.save(&path).unwrap();
+            ScheduledSoftness { task: Some("another".into()), ..file }.save(&path).unwrap();
             assert_eq!(method(&format!("--softness {}", path.display())).learning_rate(), None);
         }
     }

@@ -2,7 +2,7 @@
 
 use burn::backend::NdArray;
 use occlusion::{Instance, Problem, Scene};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, tensor, vector};
 
 type B = NdArray<f64>;

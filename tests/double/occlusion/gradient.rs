@@ -6,7 +6,7 @@ use burn::{
     tensor::{Tensor, backend::Backend},
 };
 use occlusion::{Instance, Problem, Scene};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;

@@ -6,7 +6,7 @@ use burn::{backend::NdArray, tensor::Tensor};
 use pose::{Instance, PoseError, Scene};
 use softrast_mesh::Mesh;
 use softrast_raster::{Rasterizer, iou_loss};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{paper_mesh, vector};
 
 type B = NdArray<f64>;

@@ -7,7 +7,7 @@ use burn::{
 use pose::{Instance, Range, Scene};
 use softrast_mesh::fox;
 use softrast_raster::{Rasterizer, Silhouette, iou_loss};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, tensor, vector};
 
 type B = NdArray<f64>;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use burn::backend::{Autodiff, NdArray};
 use softrast_raster::{NEAR, Rasterizer, TConorm, reference};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

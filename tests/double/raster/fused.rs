@@ -7,7 +7,7 @@ use burn::{
     tensor::{Tensor, backend::Backend},
 };
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::vector;
 
 use super::triangles::triangles;

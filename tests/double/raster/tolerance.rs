@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::backend::NdArray;
 use proptest::prelude::*;
 use softrast_raster::{Rasterizer, TConorm, reference};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, vector};
 
 use super::triangles::triangles;

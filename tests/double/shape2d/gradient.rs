@@ -5,7 +5,7 @@ use shape2d::{Instance, Logo, Scene};
 use softrast_meta::Objective;
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
 use softrast_runner::Variant;
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::vector;
 
 use crate::differences::{check_gradient, check_meta_gradient};

@@ -5,7 +5,7 @@ use shape3d::{Instance, Scene};
 use softrast_mesh::{airplane, icosphere};
 use softrast_meta::Objective;
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::vector;
 
 use crate::differences::{check_gradient, check_meta_gradient};

@@ -1,6 +1,6 @@
 //! The network of the paper against its formula, and what its weights make of it.
 
-use softrast_softness::{Mlp, Softness, initial_mlp};
+use softrast_softness::{Softness, families::Mlp, initial_mlp};
 
 use super::{assert_relative, numbers, vector};
 

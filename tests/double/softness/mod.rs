@@ -1,13 +1,14 @@
 //! Families: their values, derivatives and supports.
 
-mod depth_mlp;
+mod depth_network;
 mod depth_softness;
 mod families;
 mod gamma;
 mod hand_worked;
 mod mirror;
 mod mlp;
-mod path;
+mod provided;
+mod schedule;
 mod soft_step;
 mod support;
 mod tails;

@@ -5,7 +5,7 @@ use burn::{
     module::{AutodiffModule, Module},
     tensor::{DType, Tensor},
 };
-use softrast_softness::{EdgeSoftness, Family, SoftStep};
+use softrast_softness::{EdgeSoftness, Family, SoftStep, Softness};
 
 type B = Autodiff<NdArray<f64>>;
 

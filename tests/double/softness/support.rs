@@ -1,6 +1,6 @@
 //! Supports against closed forms.
 
-use softrast_softness::{Family, Mlp, Softness, Support, support};
+use softrast_softness::{Family, Softness, Support, families::Mlp, support};
 
 use super::{B, assert_relative, numbers, vector};
 

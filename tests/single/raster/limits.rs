@@ -8,7 +8,7 @@ use burn::{
 };
 use softrast_mesh::{Mesh, fox};
 use softrast_raster::{RasterBackend, Rasterizer, project};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 const SIZE: usize = 16;
 

@@ -8,7 +8,7 @@ use burn::{
 };
 use softrast_mesh::icosphere;
 use softrast_raster::{Rasterizer, project};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 type A = Autodiff<NdArray<f32>>;
 type AA = Autodiff<A>;

@@ -17,7 +17,7 @@ use burn::{
 use products::{Path, Products, Scene, tensor};
 use softrast_mesh::{Mesh, fox, icosphere};
 use softrast_raster::{Rasterizer, Wgpu, adapter_name, project};
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 /// Says which adapter the test runs on, or that it does not.
 fn adapter() -> bool {

@@ -7,7 +7,7 @@ use burn::{
     tensor::{DType, Tensor, TensorData, backend::Backend},
 };
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
-use softrast_softness::EdgeSoftness;
+use softrast_softness::{EdgeSoftness, Softness};
 
 /// What is drawn, and how softly.
 pub(crate) struct Scene {

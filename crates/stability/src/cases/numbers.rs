@@ -3,7 +3,7 @@
 use softrast_mesh::{Mesh, icosphere};
 use softrast_method::{Method, MovingSilhouette, numbers, tensor};
 use softrast_raster::{RasterBackend, Rasterizer, project};
-use softrast_softness::{Softness, SoftnessFile};
+use softrast_softness::{ScheduledSoftness, Softness};
 
 use super::{SCALE, SIZE};
 use crate::{
@@ -144,7 +144,7 @@ fn files(tested: &Tested) -> anyhow::Result<Vec<Level>> {
             words.join(", ")
         );
         std::fs::write(&path, text)?;
-        let refused = SoftnessFile::load(&path).is_err();
+        let refused = ScheduledSoftness::load(&path).is_err();
         Ok(Level::named(word, vec![Trial::holds(refused)]))
     };
     ["NaN", "Infinity", "1e999", "\"wide\"", "null"].map(level).into_iter().collect()
@@ -178,10 +178,10 @@ fn parameters(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     ];
     let level = |(name, sign, size): Weights| {
         let phi = (0..edge.parameters()).map(|k| sign(k) * size).collect();
-        SoftnessFile {
+        ScheduledSoftness {
             softness: edge,
             phi,
-            path: None,
+            schedule: None,
             surrogate: None,
             learning_rate: None,
             task: None,

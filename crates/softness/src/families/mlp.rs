@@ -1,12 +1,15 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{Softness, logistic::Logistic, parameter::magnitude, unit_step::UnitStep};
+use super::{logistic::Logistic, unit_step::UnitStep};
+use crate::{
+    Softness, initial_mlp,
+    math::{magnitude, with_first},
+    network::{WEIGHTS, WIDTH, edge_slope, weights},
+    softness::curve,
+};
 
-/// Width of the hidden layers.
-pub(crate) const WIDTH: usize = 4;
-
-/// Number of weights: `W1 [4, 1]`, `W2`, `W3`, `W4 [4, 4]`, `W5 [1, 4]`.
-pub(crate) const WEIGHTS: usize = 2 * WIDTH + 3 * WIDTH * WIDTH;
+/// The least slope of the logit that counts: a flat network has no scale, any finite one will do.
+const FLATTEST: f64 = 4e-12;
 
 /// A small network: `s(x) = sigmoid(W5 tanh(h + W4 tanh(W3 tanh(W2 h))))` with `h = tanh(W1 x)`.
 ///
@@ -19,27 +22,11 @@ pub(crate) const WEIGHTS: usize = 2 * WIDTH + 3 * WIDTH * WIDTH;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mlp;
 
-/// The five weight matrices of `phi`, transposed: `[in, out]`, ready to multiply rows from the left.
-pub(crate) fn weights<B: Backend>(phi: &Tensor<B, 1>) -> [Tensor<B, 2>; 5] {
-    assert_eq!(phi.dims(), [WEIGHTS], "an MLP softness has {WEIGHTS} weights");
-    let block = |from: usize, rows: usize, columns: usize| {
-        phi.clone().narrow(0, from, rows * columns).reshape([rows, columns]).transpose()
-    };
-    let square = WIDTH * WIDTH;
-    [
-        block(0, WIDTH, 1),
-        block(WIDTH, WIDTH, WIDTH),
-        block(WIDTH + square, WIDTH, WIDTH),
-        block(WIDTH + 2 * square, WIDTH, WIDTH),
-        block(WIDTH + 3 * square, 1, WIDTH),
-    ]
-}
-
 /// A layer's output `[points, units]` and its derivative by the input of the network.
-pub(crate) type Dual<B> = (Tensor<B, 2>, Tensor<B, 2>);
+type Dual<B> = (Tensor<B, 2>, Tensor<B, 2>);
 
 /// A layer without its activation.
-pub(crate) fn linear<B: Backend>((h, dh): Dual<B>, weight: Tensor<B, 2>) -> Dual<B> {
+fn linear<B: Backend>((h, dh): Dual<B>, weight: Tensor<B, 2>) -> Dual<B> {
     (h.matmul(weight.clone()), dh.matmul(weight))
 }
 
@@ -83,37 +70,40 @@ impl Softness for Mlp {
         WEIGHTS
     }
 
-    fn value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        Logistic::step(Self::logit(&phi, x))
+    fn logarithms(&self) -> usize {
+        0
     }
 
-    fn density<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    /// [`initial_mlp`] with seed 0.
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        initial_mlp(0, scale)
+    }
+
+    /// The scale of a logistic with the same slope at the edge.
+    fn scale(&self, phi: &[f64]) -> f64 {
+        edge_slope(phi).abs().max(FLATTEST).recip()
+    }
+
+    /// The first layer multiplies the distance, so its weights are divided.
+    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
+        with_first(phi.clone().narrow(0, 0, WIDTH) * factor.recip(), phi)
+    }
+
+    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
+        let mut phi = phi.to_vec();
+        phi[..WIDTH].iter_mut().for_each(|weight| *weight *= factor.recip());
+        phi
+    }
+
+    curve!(self.value(phi, x) => Logistic::step(Self::logit(&phi, x)));
+    curve!(self.density(phi, x) => {
         let (logit, slope) = Self::logit_and_slope(&phi, x);
         Logistic::slope(logit) * slope
-    }
+    });
 
-    fn optical_depth<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        Logistic::depth(Self::logit(&phi, x))
-    }
-
-    fn hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.optical_depth(phi, x) => Logistic::depth(Self::logit(&phi, x)));
+    curve!(self.hazard(phi, x) => {
         let (logit, slope) = Self::logit_and_slope(&phi, x);
         Logistic::depth_slope(logit) * slope
-    }
+    });
 }

@@ -2,10 +2,10 @@ use std::f64::consts::{FRAC_1_SQRT_2, LN_2, PI};
 
 use burn::tensor::{Tensor, backend::Backend};
 
+use super::unit_step::UnitStep;
 use crate::{
     error_function::{erfc, ln_erfcx, per_erfcx},
-    parameter::magnitude,
-    unit_step::UnitStep,
+    math::magnitude,
 };
 
 /// `s(x) = Φ(x / scale)`, the normal distribution; φ `[1]` is the logarithm of the scale, which is

@@ -1,10 +1,10 @@
 use burn::tensor::{Tensor, backend::Backend};
 
+use super::{logistic::Logistic, unit_step::UnitStep};
 use crate::{
     Softness,
-    logistic::Logistic,
-    parameter::{in_scales, magnitude, parameter, per_scale},
-    unit_step::UnitStep,
+    math::{in_scales, ln_scale, magnitude, parameter, per_scale},
+    softness::curve,
 };
 
 /// A logistic whose argument has two slopes: `s = sigmoid(a tanh(y) + y / r)` with `y = x / scale`.
@@ -12,7 +12,7 @@ use crate::{
 /// φ `[3]` holds the logarithms of the scale, in the unit of x, of the height a and of the ratio r.
 /// Near the edge the argument rises by a + 1/r for a scale, far from it by 1/r: a steep edge with wide
 /// tails, or the other way round. With three parameters it follows the learned networks that were
-/// released with the paper to 5e-5 (META 3B).
+/// released with the paper to 5e-5.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BiLogit;
 
@@ -45,37 +45,28 @@ impl Softness for BiLogit {
         3
     }
 
-    fn value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        Logistic::step(Self::logit(&phi, in_scales(&phi, x)))
+    fn logarithms(&self) -> usize {
+        3
     }
 
-    fn density<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    /// As steep at the edge as a logistic of that scale: its own is twice as wide, height and ratio
+    /// are 1.
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        vec![ln_scale(2.0 * scale), 0.0, 0.0]
+    }
+
+    curve!(self.value(phi, x) => Logistic::step(Self::logit(&phi, in_scales(&phi, x))));
+    curve!(self.density(phi, x) => {
         let y = in_scales(&phi, x);
         Logistic::slope(Self::logit(&phi, y.clone())) * Self::logit_slope(&phi, y)
-    }
+    });
 
-    fn optical_depth<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.optical_depth(phi, x) => {
         Logistic::depth(Self::logit(&phi, in_scales(&phi, x)))
-    }
+    });
 
-    fn hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.hazard(phi, x) => {
         let y = in_scales(&phi, x);
         Logistic::depth_slope(Self::logit(&phi, y.clone())) * Self::logit_slope(&phi, y)
-    }
+    });
 }

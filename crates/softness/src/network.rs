@@ -1,8 +1,32 @@
-use crate::mlp::{WEIGHTS, WIDTH};
+//! What the two networks of the paper share: their weights, and those to start from.
+
+use burn::tensor::{Tensor, backend::Backend};
+
+/// Width of the hidden layers.
+pub(crate) const WIDTH: usize = 4;
+
+/// Number of weights: `W1 [4, 1]`, `W2`, `W3`, `W4 [4, 4]`, `W5 [1, 4]`.
+pub(crate) const WEIGHTS: usize = 2 * WIDTH + 3 * WIDTH * WIDTH;
+
+/// The five weight matrices of `phi`, transposed: `[in, out]`, ready to multiply rows from the left.
+pub(crate) fn weights<B: Backend>(phi: &Tensor<B, 1>) -> [Tensor<B, 2>; 5] {
+    assert_eq!(phi.dims(), [WEIGHTS], "an MLP softness has {WEIGHTS} weights");
+    let block = |from: usize, rows: usize, columns: usize| {
+        phi.clone().narrow(0, from, rows * columns).reshape([rows, columns]).transpose()
+    };
+    let square = WIDTH * WIDTH;
+    [
+        block(0, WIDTH, 1),
+        block(WIDTH, WIDTH, WIDTH),
+        block(WIDTH + square, WIDTH, WIDTH),
+        block(WIDTH + 2 * square, WIDTH, WIDTH),
+        block(WIDTH + 3 * square, 1, WIDTH),
+    ]
+}
 
 /// The logit far inside an untrained MLP: with 1280 faces on top of one another, what it leaves of
-/// them outside adds up to less than 1e-3 also where it has not come to its limit yet. META 2.4 has
-/// ln(1280 / 1e-3) = 14.1, which is enough at the limit alone.
+/// them outside adds up to less than 1e-3 also where it has not come to its limit yet. At the limit
+/// alone, ln(1280 / 1e-3) = 14.1 is enough.
 const REACH: f64 = 15.0;
 
 /// Weights `[56]` of an MLP softness that has not been trained, drawn from `seed`.
@@ -22,10 +46,14 @@ pub fn initial_mlp(seed: u64, scale: f64) -> Vec<f64> {
 
     let (limit, _) = response(&weights, [1.0; WIDTH]);
     weights[WEIGHTS - WIDTH..].iter_mut().for_each(|w| *w *= REACH / limit);
-    let first: [f64; WIDTH] = std::array::from_fn(|k| weights[k]);
-    let (_, slope) = response(&weights, first);
+    let slope = edge_slope(&weights);
     weights[..WIDTH].iter_mut().for_each(|w| *w /= slope * scale);
     weights
+}
+
+/// The slope of the logit at the edge.
+pub(crate) fn edge_slope(weights: &[f64]) -> f64 {
+    response(weights, std::array::from_fn(|k| weights[k])).1
 }
 
 /// The logit for a first hidden layer `h`, and its linear part in `h` (the slope at 0).

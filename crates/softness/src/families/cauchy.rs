@@ -2,7 +2,8 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{atan_ratio::atan_ratio, parameter::magnitude, unit_step::UnitStep};
+use super::unit_step::UnitStep;
+use crate::math::{atan_ratio, magnitude};
 
 /// `s(x) = 1/2 + atan(x / scale) / π`; φ `[1]` is the logarithm of the scale, in the unit of x.
 ///

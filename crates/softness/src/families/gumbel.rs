@@ -1,6 +1,7 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{rise::rise, unit_step::UnitStep};
+use super::unit_step::UnitStep;
+use crate::math::rise;
 
 /// Where the double exponential has long settled: `exp(-exp(20))` is 0.
 const SETTLED: f64 = 20.0;

@@ -1,18 +1,17 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{half_line::HalfLine, rise::rise};
+use super::half_line::HalfLine;
+use crate::math::rise;
 
 /// The exponential law, `F(y) = 1 - exp(-y)`; φ `[2]` is the logarithm of the scale, in the unit
-/// of x, and the shift in scales. Use it as [`Reversed`](crate::Reversed) or
-/// [`Forward`](crate::Forward).
+/// of x, and the shift in scales. Use it as [`Reversed`](super::Reversed) or
+/// [`Forward`](super::Forward).
 ///
 /// Source: Wu et al. 2024, Sec. 4.2 (Exp); Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exp;
 
 impl HalfLine for Exp {
-    const PARAMETERS: usize = 2;
-
     fn split<B: Backend, const D: usize>(
         _phi: &Tensor<B, 1>,
         y: Tensor<B, D>,

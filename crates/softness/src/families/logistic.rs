@@ -1,6 +1,7 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{parameter::magnitude, unit_step::UnitStep};
+use super::unit_step::UnitStep;
+use crate::math::magnitude;
 
 /// `s(x) = 1 / (1 + exp(-x / scale))`; φ `[1]` is the logarithm of the scale, in the unit of x.
 ///

@@ -1,9 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{
-    depth::{bounded_depth, bounded_hazard},
-    unit_step::UnitStep,
-};
+use super::unit_step::UnitStep;
 
 /// `s(x) = (1 + x / scale) / 2`, kept within [0, 1]; φ `[1]` is the logarithm of the scale, in the
 /// unit of x.
@@ -21,13 +18,5 @@ impl UnitStep for Uniform {
         // Made of u, so that a backward pass finds a tape also where the slope is constant.
         let outside = u.clone().abs().greater_equal_elem(1.0);
         (u.clamp(-1.0, 1.0) * 0.0 + 0.5).mask_fill(outside, 0.0)
-    }
-
-    fn depth<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        bounded_depth(Self::step(u.clone()), Self::step(u.neg()))
-    }
-
-    fn depth_slope<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        bounded_hazard(Self::slope(u.clone()), Self::step(u.neg()))
     }
 }

@@ -2,7 +2,8 @@ use std::ops::RangeInclusive;
 
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{half_line::HalfLine, ln_gamma::ln_gamma, parameter::parameter};
+use super::half_line::HalfLine;
+use crate::math::{ln_gamma, parameter};
 
 /// The shapes that the fixed numbers of terms below are good for; others count as the nearest end.
 const SHAPES: RangeInclusive<f64> = 0.02..=20.0;
@@ -21,7 +22,7 @@ const FLOOR: f64 = 1e-8;
 
 /// The Gamma law, `F(y) = P(p, y)`, the regularised incomplete gamma function; φ `[3]` is the
 /// logarithm of the scale, in the unit of x, the logarithm of the shape p, and the shift in scales.
-/// Use it as [`Reversed`](crate::Reversed) or [`Forward`](crate::Forward).
+/// Use it as [`Reversed`](super::Reversed) or [`Forward`](super::Forward).
 ///
 /// Reversed with p = 0.5, `s = erfc(sqrt(-x / scale))` outside. Shapes lie in [0.02, 20]; closer
 /// than 1e-8 scales to the edge, s runs straight, so that the density stays finite for p < 1.
@@ -86,7 +87,8 @@ fn fraction<B: Backend, const D: usize>(p: Tensor<B, D>, y: Tensor<B, D>) -> Ten
 }
 
 impl HalfLine for Gamma {
-    const PARAMETERS: usize = 3;
+    // The shape that the paper uses.
+    const SHAPES: &'static [f64] = &[0.5];
 
     fn split<B: Backend, const D: usize>(
         phi: &Tensor<B, 1>,

@@ -1,9 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{
-    depth::{bounded_depth, bounded_hazard},
-    unit_step::UnitStep,
-};
+use super::unit_step::UnitStep;
 
 /// `s(x) = 3 y² - 2 y³` with `y = (1 + x / scale) / 2` kept within [0, 1]; φ `[1]` is the logarithm
 /// of the scale, in the unit of x.
@@ -25,13 +22,5 @@ impl UnitStep for CubicHermite {
 
     fn slope<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
         way(u.clone()) * way(u.neg()) * 3.0
-    }
-
-    fn depth<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        bounded_depth(Self::step(u.clone()), Self::step(u.neg()))
-    }
-
-    fn depth_slope<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        bounded_hazard(Self::slope(u.clone()), Self::step(u.neg()))
     }
 }

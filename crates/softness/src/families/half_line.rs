@@ -4,17 +4,17 @@ use burn::tensor::{Tensor, backend::Backend};
 
 use crate::{
     Softness,
-    depth::{bounded_depth, bounded_hazard},
-    parameter::{FAR, parameter, per_scale},
+    math::{FAR, bounded_depth, bounded_hazard, ln_scale, optical_depth_of, parameter, per_scale},
+    softness::curve,
 };
 
 /// A distribution on the half line `y >= 0`, in units of the scale.
 ///
-/// φ begins with the logarithm of the scale and ends with the shift; what lies between is the
-/// law's own. Every method sees `0 <= y <= FAR` and must stay finite there.
+/// φ begins with the logarithm of the scale and ends with the shift in scales; between them are the
+/// logarithms of the shapes. Every method sees `0 <= y <= FAR` and must stay finite there.
 pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
-    /// Length of φ, scale and shift included.
-    const PARAMETERS: usize;
+    /// Positive parameters of the law, to start from; φ holds their logarithms.
+    const SHAPES: &'static [f64] = &[];
 
     /// The distribution function `F(y)` and its complement `1 - F(y)`, each with its own digits.
     fn split<B: Backend, const D: usize>(
@@ -26,11 +26,25 @@ pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
     fn slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D>;
 
     /// `-ln(1 - F(y))`.
-    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D>;
+    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
+        let (below, above) = Self::split(phi, y);
+        optical_depth_of(below, above)
+    }
 
     /// The derivative of [`HalfLine::depth`].
-    fn depth_slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>)
-    -> Tensor<B, D>;
+    fn depth_slope<B: Backend, const D: usize>(
+        phi: &Tensor<B, 1>,
+        y: Tensor<B, D>,
+    ) -> Tensor<B, D> {
+        let (_, above) = Self::split(phi, y.clone());
+        Self::slope(phi, y) / above
+    }
+
+    /// Parameters to start from: no shift.
+    fn default_phi(scale: f64) -> Vec<f64> {
+        let shapes = Self::SHAPES.iter().map(|shape| shape.ln());
+        [ln_scale(scale)].into_iter().chain(shapes).chain([0.0]).collect()
+    }
 }
 
 /// A one-sided law as it stands: `s = F(x / scale + shift)`, which is 0 outside and rises inside.
@@ -41,7 +55,7 @@ pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
 /// Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Forward<L>(
-    /// The law, for example [`Exp`](crate::Exp).
+    /// The law, for example [`Exp`](super::Exp).
     pub L,
 );
 
@@ -53,7 +67,7 @@ pub struct Forward<L>(
 /// Source: Wu et al. 2024, Sec. 4.2: the rows Exp and Gamma of shape and pose are these.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reversed<L>(
-    /// The law, for example [`Exp`](crate::Exp).
+    /// The law, for example [`Exp`](super::Exp).
     pub L,
 );
 
@@ -63,7 +77,7 @@ fn law_distance<L: HalfLine, B: Backend, const D: usize>(
     x: Tensor<B, D>,
     sign: f64,
 ) -> Tensor<B, D> {
-    x * (per_scale(phi) * sign) + parameter(phi, L::PARAMETERS - 1)
+    x * (per_scale(phi) * sign) + parameter(phi, L::SHAPES.len() + 1)
 }
 
 /// `f(max(y, 0))` where the law has begun, 0 before.
@@ -77,87 +91,71 @@ fn where_begun<B: Backend, const D: usize>(
 
 impl<L: HalfLine> Softness for Forward<L> {
     fn parameters(&self) -> usize {
-        L::PARAMETERS
+        L::SHAPES.len() + 2
     }
 
-    fn value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    fn logarithms(&self) -> usize {
+        L::SHAPES.len() + 1
+    }
+
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        L::default_phi(scale)
+    }
+
+    curve!(self.value(phi, x) => {
         where_begun(law_distance::<L, B, D>(&phi, x, 1.0), |y| L::split(&phi, y).0)
-    }
+    });
 
-    fn density<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.density(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, 1.0);
         where_begun(y, |y| L::slope(&phi, y)) * per_scale(&phi)
-    }
+    });
 
-    fn optical_depth<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.optical_depth(phi, x) => {
         where_begun(law_distance::<L, B, D>(&phi, x, 1.0), |y| L::depth(&phi, y))
-    }
+    });
 
-    fn hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.hazard(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, 1.0);
         where_begun(y, |y| L::depth_slope(&phi, y)) * per_scale(&phi)
-    }
+    });
 }
 
 impl<L: HalfLine> Softness for Reversed<L> {
     fn parameters(&self) -> usize {
-        L::PARAMETERS
+        L::SHAPES.len() + 2
     }
 
-    fn value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    fn logarithms(&self) -> usize {
+        L::SHAPES.len() + 1
+    }
+
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        L::default_phi(scale)
+    }
+
+    curve!(self.value(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
         L::split(&phi, y.clamp(0.0, FAR)).1
-    }
+    });
 
-    fn density<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.density(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
         where_begun(y, |y| L::slope(&phi, y)) * per_scale(&phi)
-    }
+    });
 
-    fn optical_depth<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.optical_depth(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
         let (open, covered) = L::split(&phi, y.clamp(0.0, FAR));
         bounded_depth(covered, open)
-    }
+    });
 
-    fn hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
+    curve!(self.hazard(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
         let slope = where_begun(y, |y| {
             let (open, _) = L::split(&phi, y.clone());
             bounded_hazard(L::slope(&phi, y), open)
         });
         slope * per_scale(&phi)
-    }
+    });
 }

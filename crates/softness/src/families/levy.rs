@@ -1,17 +1,14 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{
-    depth::optical_depth_of,
-    error_function::{erf, erfc},
-    half_line::HalfLine,
-};
+use super::half_line::HalfLine;
+use crate::error_function::{erf, erfc};
 
 /// Distances below this count as it: `erfc(sqrt(1 / 2y))` is 0 there in f64 already.
 const FLOOR: f64 = 5e-4;
 
 /// The Levy law, `F(y) = erfc(sqrt(1 / 2y))`; φ `[2]` is the logarithm of the scale, in the unit of
-/// x, and the shift in scales. Use it as [`Reversed`](crate::Reversed) or
-/// [`Forward`](crate::Forward).
+/// x, and the shift in scales. Use it as [`Reversed`](super::Reversed) or
+/// [`Forward`](super::Forward).
 ///
 /// `1 - F` falls like `1 / sqrt(y)`, the slowest of all tails. Source: Petersen et al. 2022,
 /// Table 1.
@@ -24,8 +21,6 @@ fn half_inverse<B: Backend, const D: usize>(y: Tensor<B, D>) -> Tensor<B, D> {
 }
 
 impl HalfLine for Levy {
-    const PARAMETERS: usize = 2;
-
     fn split<B: Backend, const D: usize>(
         _phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
@@ -38,18 +33,5 @@ impl HalfLine for Levy {
         // y^(-3/2) exp(-1 / 2y) / sqrt(2 π), in powers of 1 / 2y.
         let v = half_inverse(y);
         v.clone().sqrt() * v.clone() * v.neg().exp() * (2.0 / std::f64::consts::PI.sqrt())
-    }
-
-    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        let (below, above) = Self::split(phi, y);
-        optical_depth_of(below, above)
-    }
-
-    fn depth_slope<B: Backend, const D: usize>(
-        phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        let (_, above) = Self::split(phi, y.clone());
-        Self::slope(phi, y) / above
     }
 }

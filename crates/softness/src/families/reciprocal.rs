@@ -2,7 +2,8 @@ use std::f64::consts::LN_2;
 
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::{parameter::magnitude, unit_step::UnitStep};
+use super::unit_step::UnitStep;
+use crate::math::magnitude;
 
 /// `s(x) = 1/2 + u / (2 + 2 |u|)` with `u = x / scale`; φ `[1]` is the logarithm of the scale, in
 /// the unit of x.

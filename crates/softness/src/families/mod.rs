@@ -1,0 +1,41 @@
+//! The families of soft steps, a file each. [`Family`](crate::Family) has them by name.
+
+mod half_line;
+mod unit_step;
+
+pub use half_line::{Forward, Reversed};
+
+/// Hands the list of all families to the macro `$make`, behind its arguments.
+///
+/// A line is a file of this folder: name of the variant of [`Family`](crate::Family), name in files
+/// and on the command line, softness. A law and its mirror image `1 - s(-x)` share a file and a line;
+/// a family alone on its line is its own mirror image. The order is that of the documentation.
+macro_rules! families {
+    ($make:ident $($arguments:tt)*) => {
+        $make! { [$($arguments)*]
+            logistic: Logistic "logistic" => Logistic;
+            bilogit: Bilogit "bilogit" => BiLogit;
+            gauss: Gauss "gauss" => Gauss;
+            laplace: Laplace "laplace" => Laplace;
+            exp: Exp "exp" => Reversed(Exp), ExpForward "exp_forward" => Forward(Exp);
+            gamma: Gamma "gamma" => Reversed(Gamma), GammaForward "gamma_forward" => Forward(Gamma);
+            levy: Levy "levy" => Reversed(Levy), LevyForward "levy_forward" => Forward(Levy);
+            uniform: Uniform "uniform" => Uniform;
+            cubic_hermite: CubicHermite "cubic_hermite" => CubicHermite;
+            wigner: Wigner "wigner" => Wigner;
+            gudermannian: Gudermannian "gudermannian" => Gudermannian;
+            cauchy: Cauchy "cauchy" => Cauchy;
+            reciprocal: Reciprocal "reciprocal" => Reciprocal;
+            gumbel: GumbelMax "gumbel_max" => GumbelMax, GumbelMin "gumbel_min" => GumbelMin;
+            mlp: Mlp "mlp" => Mlp;
+        }
+    };
+}
+pub(crate) use families;
+
+macro_rules! modules {
+    ([] $($file:ident: $($variant:ident $name:literal => $softness:expr),+;)+) => {
+        $(mod $file; pub use $file::*;)+
+    };
+}
+families!(modules);

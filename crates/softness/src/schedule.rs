@@ -1,0 +1,95 @@
+use burn::tensor::{Tensor, backend::Backend};
+use serde::{Deserialize, Serialize};
+
+use crate::{EdgeSoftness, file::LARGEST_LOGARITHM};
+
+/// How wide a softness is in the course of a run: at part t of it, s is seen at `d / scale(t)`.
+///
+/// `scale(t) = floor + exp(l(t))`, where `l` joins the knots by straight lines. So the scale stays
+/// above the floor, which is given in pixels because that is what an image can resolve, and its
+/// gradient never vanishes, as it would under a hard limit.
+///
+/// Not in the paper, whose softness is the same at every step: a wide softness has a gradient far
+/// from the edges of the target, a narrow one has a sharp image, and a run needs one after the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScaleSchedule {
+    /// Logarithms of the scale above the floor at evenly spaced times, the first at the first step
+    /// and the last at the last; in NDC, or NDC² if the softness is squared.
+    pub knots: Vec<f64>,
+    /// What the scale stays above, in pixels.
+    pub floor_px: f64,
+}
+
+/// A schedule has at most so many knots.
+const MOST_KNOTS: usize = 16;
+
+impl ScaleSchedule {
+    /// Which part of a run is over at `step` of `steps`, 0 to 1: the last gradient is taken at the
+    /// end.
+    pub fn part(step: usize, steps: usize) -> f64 {
+        let last = steps.saturating_sub(1).max(1);
+        step.min(last) as f64 / last as f64
+    }
+
+    /// The floor in the unit of the scale of `softness`, on images of `size` × `size` pixels.
+    pub fn floor(&self, softness: EdgeSoftness, size: usize) -> f64 {
+        let width = self.floor_px * 2.0 / size as f64;
+        if softness.squared { width * width } else { width }
+    }
+
+    /// The scale `[1]` at `part` of a run, 0 to 1, for these `knots` `[K]` and `floor`.
+    ///
+    /// # Panics
+    ///
+    /// If there is no knot, or `part` is not in [0, 1].
+    pub fn scale<B: Backend>(knots: &Tensor<B, 1>, floor: f64, part: f64) -> Tensor<B, 1> {
+        let ([before, after], share) = between(knots.dims()[0], part);
+        let low = knots.clone().narrow(0, before, 1);
+        let high = knots.clone().narrow(0, after, 1);
+        (low * (1.0 - share) + high * share).exp() + floor
+    }
+
+    /// [`ScaleSchedule::scale`] of its own knots above this floor, as a plain number.
+    pub(crate) fn at(&self, floor: f64, part: f64) -> f64 {
+        let ([before, after], share) = between(self.knots.len(), part);
+        (self.knots[before] * (1.0 - share) + self.knots[after] * share).exp() + floor
+    }
+
+    /// If it cannot be followed, says what was found and what was expected.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let Self { knots, floor_px } = self;
+        if !(1..=MOST_KNOTS).contains(&knots.len()) {
+            return Err(format!("{} knots, expected 1 to {MOST_KNOTS}", knots.len()));
+        }
+        if let Some(knot) = knots.iter().find(|k| k.is_nan() || k.abs() > LARGEST_LOGARITHM) {
+            let limit = LARGEST_LOGARITHM;
+            return Err(format!("a knot of {knot}, expected -{limit} to {limit}"));
+        }
+        if !floor_px.is_finite() || *floor_px < 0.0 {
+            return Err(format!("a floor of {floor_px} pixels, expected 0 or more"));
+        }
+        Ok(())
+    }
+}
+
+/// The two of `count` knots around `part` of a run, and the share of the second.
+fn between(count: usize, part: f64) -> ([usize; 2], f64) {
+    assert!(count > 0, "a schedule has at least one knot");
+    assert!((0.0..=1.0).contains(&part), "part {part} of a run is not in [0, 1]");
+    let place = part * (count - 1) as f64;
+    let before = (place as usize).min(count.saturating_sub(2));
+    ([before, (before + 1).min(count - 1)], place - before as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_gradient_of_a_run_is_taken_at_its_end() {
+        let parts = |steps| [0, 1, 9, 10].map(|step| ScaleSchedule::part(step, steps));
+        assert_eq!(parts(10), [0.0, 1.0 / 9.0, 1.0, 1.0]);
+        assert_eq!(ScaleSchedule::part(0, 1), 0.0);
+    }
+}

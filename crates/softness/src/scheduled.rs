@@ -1,0 +1,321 @@
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    EdgeSoftness, ScaleSchedule, Softness, SoftnessFileError,
+    file::{Stored, check_phi, learned, stored},
+    math::ln_scale,
+};
+
+/// A second softness whose slope stands for that of the first in the backward pass.
+///
+/// The image is that of the first, the gradient that of this one: a sharp image with a wide gradient.
+/// What comes back is not the derivative of the image. Where the scale of the first moves along a
+/// [`ScaleSchedule`], this one is seen at `d / scale(t)` too: it keeps its ratio to the first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surrogate {
+    /// Which softness.
+    pub softness: EdgeSoftness,
+    /// Its parameters φ, as many as [`Softness::parameters`] says.
+    pub phi: Vec<f64>,
+}
+
+/// A softness with its parameters, and how its scale moves over a run.
+///
+/// In a JSON file its fields have these names, but for the schedule, which is called `path`.
+///
+/// ```
+/// use softrast_softness::ScheduledSoftness;
+///
+/// let learned = ScheduledSoftness::learned("pose")?;
+/// assert!(learned.scale_at(1.0, 64) < learned.scale_at(0.0, 64));
+/// # Ok::<(), softrast_softness::SoftnessFileError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScheduledSoftness {
+    /// Which softness.
+    pub softness: EdgeSoftness,
+    /// Its parameters φ, as many as [`Softness::parameters`] says.
+    pub phi: Vec<f64>,
+    /// How its width moves over a run; a softness without one stays as it is.
+    #[serde(rename = "path", default, skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<ScaleSchedule>,
+    /// What the gradient is taken of, where that is not the softness itself; it moves along the same
+    /// schedule.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surrogate: Option<Surrogate>,
+    /// The learning rate of the optimisations that it was learned on, which suits it best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub learning_rate: Option<f64>,
+    /// The task that it was learned on; without one, the rate is for any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<String>,
+    /// Where the parameters come from, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+impl ScheduledSoftness {
+    /// A softness that stays at `scale`, in NDC (NDC² if squared).
+    ///
+    /// # Panics
+    ///
+    /// If `scale` is not positive.
+    pub fn constant(softness: EdgeSoftness, scale: f64) -> Self {
+        Self::new(softness, scale, None)
+    }
+
+    /// A softness whose scale goes geometrically from `first` to `last`, in NDC (NDC² if squared);
+    /// where the two are the same, it stays.
+    ///
+    /// # Panics
+    ///
+    /// If one of them is not positive.
+    pub fn decay(softness: EdgeSoftness, first: f64, last: f64) -> Self {
+        let mut knots = vec![ln_scale(first), ln_scale(last)];
+        knots.dedup();
+        Self::new(softness, 1.0, Some(ScaleSchedule { knots, floor_px: 0.0 }))
+    }
+
+    fn new(softness: EdgeSoftness, scale: f64, schedule: Option<ScaleSchedule>) -> Self {
+        let phi = softness.default_phi(scale);
+        let (surrogate, learning_rate, task, note) = (None, None, None, None);
+        Self { softness, phi, schedule, surrogate, learning_rate, task, note }
+    }
+
+    /// With the same softness at `scale`, in NDC (NDC² if squared), as its surrogate.
+    ///
+    /// Where the scale moves, this is the surrogate's first one; a floor of the schedule is left out
+    /// of the ratio of the two, as it depends on the size of the image.
+    ///
+    /// # Panics
+    ///
+    /// If `scale` is not positive.
+    #[must_use]
+    pub fn with_surrogate_scale(self, scale: f64) -> Self {
+        let first = self.schedule.as_ref().map_or(1.0, |schedule| schedule.at(0.0, 0.0));
+        let phi = self.softness.default_phi(scale / first);
+        Self { surrogate: Some(Surrogate { softness: self.softness, phi }), ..self }
+    }
+
+    /// Whether the scale stays as it is.
+    pub fn is_constant(&self) -> bool {
+        self.schedule.as_ref().is_none_or(|schedule| schedule.knots.len() == 1)
+    }
+
+    /// How many numbers may be chosen: φ and that of the surrogate, and the knots of a schedule,
+    /// which take the place of a family's own scale.
+    pub fn parameters(&self) -> usize {
+        let replaced = self.softness.logarithms().min(1);
+        let knots = self.schedule.as_ref().map_or(0, |schedule| schedule.knots.len() - replaced);
+        self.phi.len() + knots + self.surrogate.as_ref().map_or(0, |of| of.phi.len())
+    }
+
+    /// The scale of the schedule at `part` of a run, 0 to 1, on images of `size` × `size` pixels;
+    /// without a schedule that of the softness. In NDC (NDC² if squared).
+    ///
+    /// # Panics
+    ///
+    /// If `part` is not in [0, 1].
+    pub fn scale_at(&self, part: f64, size: usize) -> f64 {
+        self.factor_at(part, size).unwrap_or_else(|| self.softness.scale(&self.phi))
+    }
+
+    /// The width of the soft edge at `part` of a run, 0 to 1, in NDC, on images of `size` × `size`
+    /// pixels.
+    ///
+    /// # Panics
+    ///
+    /// If `part` is not in [0, 1].
+    pub fn width_at(&self, part: f64, size: usize) -> f64 {
+        let own = self.softness.scale(&self.phi);
+        let scale = self.factor_at(part, size).map_or(own, |factor| factor * own);
+        if self.softness.squared { scale.sqrt() } else { scale }
+    }
+
+    /// Parameters of the softness at `part` of a run, 0 to 1, on images of `size` × `size` pixels.
+    ///
+    /// # Panics
+    ///
+    /// If `part` is not in [0, 1].
+    pub fn phi_at(&self, part: f64, size: usize) -> Vec<f64> {
+        scaled(self.softness, &self.phi, self.factor_at(part, size))
+    }
+
+    /// The surrogate at `part` of a run, 0 to 1, on images of `size` × `size` pixels.
+    ///
+    /// # Panics
+    ///
+    /// If `part` is not in [0, 1].
+    pub fn surrogate_at(&self, part: f64, size: usize) -> Option<Surrogate> {
+        let Surrogate { softness, phi } = self.surrogate.as_ref()?;
+        let phi = scaled(*softness, phi, self.factor_at(part, size));
+        Some(Surrogate { softness: *softness, phi })
+    }
+
+    /// What the schedule multiplies the scale of the parameters by.
+    fn factor_at(&self, part: f64, size: usize) -> Option<f64> {
+        let schedule = self.schedule.as_ref()?;
+        Some(schedule.at(schedule.floor(self.softness, size), part))
+    }
+}
+
+fn scaled(softness: EdgeSoftness, phi: &[f64], factor: Option<f64>) -> Vec<f64> {
+    factor.map_or_else(|| phi.to_vec(), |factor| softness.with_scale_values(phi, factor))
+}
+
+stored!(ScheduledSoftness);
+
+impl Stored for ScheduledSoftness {
+    const LEARNED: &'static [(&'static str, &'static str)] = learned![
+        ".json":
+        "shape2d", "shape2d-mlp", "shape2d-surrogate", "shape3d", "shape3d-mlp", "shape3d-surrogate",
+        "pose", "pose-mlp", "pose-surrogate", "occlusion", "occlusion-mlp", "networks/pose",
+        "networks/pose-15-35", "networks/pose-55-75", "networks/shape3d", "networks/shape3d-0",
+        "networks/shape3d-30", "networks/shape3d-60", "networks/shape3d-minus30",
+        "networks/shape3d-minus60"
+    ];
+
+    fn check(&self) -> Result<(), String> {
+        let surrogate = self.surrogate.iter().map(|of| (of.softness, &of.phi));
+        for (softness, phi) in [(self.softness, &self.phi)].into_iter().chain(surrogate) {
+            let expected = [softness.parameters(), softness.logarithms()];
+            check_phi(softness.family.name(), expected, phi)?;
+        }
+        if let Some(rate) = self.learning_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
+            return Err(format!(": the learning rate is {rate}, expected a positive number"));
+        }
+        let Some(schedule) = &self.schedule else { return Ok(()) };
+        schedule.check().map_err(|wrong| format!(" has a path with {wrong}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::{DepthSoftnessFile, Family};
+
+    fn example(family: Family) -> ScheduledSoftness {
+        let softness = EdgeSoftness { family, squared: true };
+        let schedule = ScaleSchedule { knots: vec![-3.5, -6.2], floor_px: 0.05 };
+        ScheduledSoftness {
+            softness,
+            phi: softness.default_phi(1e-4),
+            schedule: Some(schedule),
+            surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
+            learning_rate: Some(0.3),
+            task: Some("pose".into()),
+            note: Some("a start".into()),
+        }
+    }
+
+    fn error(text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        fs::write(&path, text).unwrap();
+        ScheduledSoftness::load(&path).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_saved_softness_comes_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        for family in Family::ALL {
+            let file = example(family);
+            file.save(&path).unwrap();
+            assert_eq!(ScheduledSoftness::load(&path).unwrap(), file);
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let error = ScheduledSoftness::load(Path::new("none.json")).unwrap_err();
+        assert!(error.to_string().starts_with("cannot read softness \"none.json\": "), "{error}");
+        assert!(std::error::Error::source(&error).is_none());
+    }
+
+    #[test]
+    fn unknown_fields_and_families_are_refused() {
+        let message = error(
+            r#"{"softness": {"family": "gauss", "squared": true}, "phi": [0], "colour": "red"}"#,
+        );
+        assert!(message.contains("unknown field `colour`"), "{message}");
+        let message = error(r#"{"softness": {"family": "gaus", "squared": true}, "phi": [0]}"#);
+        assert!(message.contains("`gaus`") && message.contains("gumbel_min"), "{message}");
+    }
+
+    #[test]
+    fn parameters_that_do_not_suit_are_refused_by_name() {
+        let message = error(r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#);
+        assert!(message.ends_with("softness.json\" has 1 parameters, but exp has 2"), "{message}");
+        let message = error(r#"{"softness": {"family": "gauss", "squared": false}, "phi": [-90]}"#);
+        assert!(message.ends_with("phi[0] is the logarithm -90, expected -80 to 80"), "{message}");
+        let message =
+            error(r#"{"softness": {"family": "gauss", "squared": false}, "phi": [1e999]}"#);
+        assert!(message.contains("number out of range"), "{message}");
+    }
+
+    #[test]
+    fn a_path_that_cannot_be_followed_is_refused() {
+        for (path, part) in [
+            (r#"{"knots": [], "floor_px": 0}"#, "0 knots, expected 1 to 16"),
+            (r#"{"knots": [-1, 99], "floor_px": 0}"#, "a knot of 99, expected -80 to 80"),
+            (r#"{"knots": [-1], "floor_px": -1}"#, "a floor of -1 pixels, expected 0 or more"),
+        ] {
+            let softness = r#"{"family": "gauss", "squared": false}"#;
+            let message =
+                error(&format!(r#"{{"softness": {softness}, "phi": [0], "path": {path}}}"#));
+            assert!(message.ends_with(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_learning_rate_that_leads_nowhere_is_refused() {
+        for rate in ["0", "-1"] {
+            let message = error(&format!(
+                r#"{{"softness": {{"family": "gauss", "squared": false}}, "phi": [0], "learning_rate": {rate}}}"#
+            ));
+            assert!(message.contains(&format!("the learning rate is {rate}")), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_surrogate_is_checked_like_the_softness() {
+        let softness = r#"{"family": "gauss", "squared": false}"#;
+        let felt = r#"{"softness": {"family": "exp", "squared": false}, "phi": [0]}"#;
+        let message =
+            error(&format!(r#"{{"softness": {softness}, "phi": [0], "surrogate": {felt}}}"#));
+        assert!(message.ends_with("has 1 parameters, but exp has 2"), "{message}");
+    }
+
+    #[test]
+    fn a_softness_that_is_not_a_number_is_not_saved() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        let mut file = example(Family::Exp);
+        file.phi[1] = f64::NAN;
+        let message = file.save(&path).unwrap_err().to_string();
+        assert!(message.ends_with("phi[1] is NaN, expected a finite number"), "{message}");
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn everything_learned_is_valid_and_tells_where_it_comes_from() {
+        for name in ScheduledSoftness::learned_names() {
+            assert!(ScheduledSoftness::learned(name).unwrap().note.is_some(), "{name}");
+        }
+        for name in DepthSoftnessFile::learned_names() {
+            assert!(DepthSoftnessFile::learned(name).unwrap().note.is_some(), "{name}");
+        }
+        let message = ScheduledSoftness::learned("nothing").unwrap_err().to_string();
+        assert!(
+            message.starts_with("no learned softness is called \"nothing\"; there are shape2d,")
+        );
+    }
+}

@@ -1,0 +1,147 @@
+//! Scales that move over the steps.
+
+use burn::backend::NdArray;
+use softrast_softness::{
+    EdgeSoftness, Family, ScaleSchedule, ScheduledSoftness, Softness, families::Mlp, initial_mlp,
+};
+use softrast_tests::{numbers, vector};
+
+type B = NdArray<f64>;
+
+#[test]
+fn a_schedule_joins_its_knots_above_the_floor() {
+    let knots = vector::<B>(&[0.0, 2.0, 1.0]);
+    for (part, expected) in [(0.0, 0.0), (0.25, 1.0), (0.5, 2.0), (0.75, 1.5), (1.0, 1.0)] {
+        let scale: f64 = ScaleSchedule::scale(&knots, 0.5, part).into_scalar();
+        assert!((scale - 0.5 - f64::exp(expected)).abs() < 1e-12, "{part}: {scale}");
+    }
+    let alone: f64 = ScaleSchedule::scale(&vector::<B>(&[1.0]), 0.0, 0.7).into_scalar();
+    assert!((alone - f64::exp(1.0)).abs() < 1e-12);
+}
+
+#[test]
+fn a_scaled_softness_is_seen_at_the_distance_in_scales() {
+    let x = vector::<B>(&[-0.3, -0.02, 0.1]);
+    for family in Family::ALL {
+        for squared in [false, true] {
+            let softness = EdgeSoftness { family, squared };
+            let phi = vector(&softness.default_phi(1.0));
+            let wide = softness.with_scale(phi.clone(), vector(&[0.09]));
+            let found = softness.value(wide, x.clone());
+            let divisor: f64 = if squared { 0.3 } else { 0.09 };
+            let expected = softness.value(phi, x.clone() * divisor.recip());
+            let off: f64 = (found - expected).abs().max().into_scalar();
+            assert!(off < 1e-12, "{softness:?}: {off}");
+        }
+    }
+}
+
+#[test]
+fn plain_numbers_are_scaled_as_tensors_are_to_the_last_bit() {
+    for family in Family::ALL {
+        let phi = family.default_phi(0.3);
+        let wide = numbers(family.with_scale(vector::<B>(&phi), vector(&[0.09])));
+        assert_eq!(family.with_scale_values(&phi, 0.09), wide, "{family}");
+    }
+}
+
+#[test]
+fn the_scale_of_parameters_is_what_they_were_made_for() {
+    for family in Family::ALL {
+        // A bilogit is as steep at the edge as a logistic of half its scale.
+        let own = if family == Family::Bilogit { 2.0 } else { 1.0 };
+        for scale in [1e-4, 0.02, 3.0] {
+            let phi = family.default_phi(scale);
+            for (phi, expected) in
+                [(phi.clone(), scale), (family.with_scale_values(&phi, 0.3), 0.3 * scale)]
+            {
+                let found = family.scale(&phi);
+                assert!((found / (own * expected) - 1.0).abs() < 1e-12, "{family}: {found}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_network_has_the_scale_of_a_logistic_with_its_slope() {
+    let weights: Vec<f64> = initial_mlp(5, 0.1).iter().map(|w| (7.0 * w).sin()).collect();
+    let slope = numbers(Mlp.density(vector::<B>(&weights), vector(&[0.0])))[0];
+    assert!((Mlp.scale(&weights) * 4.0 * slope.abs() - 1.0).abs() < 1e-13);
+    assert_eq!(Mlp.scale(&[0.0; 56]), 2.5e11);
+}
+
+fn gauss(squared: bool) -> EdgeSoftness {
+    EdgeSoftness { family: Family::Gauss, squared }
+}
+
+#[track_caller]
+fn assert_near(found: f64, expected: f64) {
+    assert!((found / expected - 1.0).abs() < 1e-12, "{found}, not {expected}");
+}
+
+#[test]
+fn a_decay_is_geometric_and_its_surrogate_keeps_the_ratio() {
+    for squared in [false, true] {
+        let decay = ScheduledSoftness::decay(gauss(squared), 0.1, 0.001).with_surrogate_scale(0.3);
+        for (part, expected) in [(0.0, 0.1), (0.5, 0.01), (1.0, 0.001)] {
+            assert_near(decay.scale_at(part, 64), expected);
+            assert_near(decay.phi_at(part, 64)[0].exp(), expected);
+            let width = if squared { f64::sqrt(expected) } else { expected };
+            assert_near(decay.width_at(part, 64), width);
+            let surrogate = decay.surrogate_at(part, 64).unwrap();
+            assert_near(surrogate.phi[0].exp(), 3.0 * expected);
+        }
+        assert!(!decay.is_constant());
+        // Two knots, and one parameter of the surrogate.
+        assert_eq!(decay.parameters(), 3);
+    }
+}
+
+#[test]
+fn a_softness_without_a_schedule_stays() {
+    let constant = ScheduledSoftness::constant(gauss(false), 0.02).with_surrogate_scale(0.1);
+    for part in [0.0, 0.7, 1.0] {
+        assert_near(constant.scale_at(part, 64), 0.02);
+        assert_near(constant.width_at(part, 64), 0.02);
+        assert_eq!(constant.phi_at(part, 64), [0.02_f64.ln()]);
+        assert_eq!(constant.surrogate_at(part, 64).unwrap().phi, [0.1_f64.ln()]);
+    }
+    assert!(constant.is_constant());
+    assert_eq!(constant.parameters(), 2);
+    let still = ScheduledSoftness::decay(gauss(false), 0.02, 0.02);
+    assert!(still.is_constant());
+    assert_near(still.scale_at(0.3, 64), 0.02);
+    assert_eq!(ScheduledSoftness::decay(gauss(false), 0.1, 0.01).surrogate_at(0.0, 8), None);
+}
+
+#[test]
+fn a_schedule_multiplies_the_scale_of_the_parameters_above_a_floor_in_pixels() {
+    let schedule = ScaleSchedule { knots: vec![-2.0, -5.0, -6.0], floor_px: 0.5 };
+    let network = EdgeSoftness { family: Family::Mlp, squared: false };
+    for softness in [gauss(false), gauss(true), network] {
+        let floor: f64 = if softness.squared { 1.0 / 4096.0 } else { 1.0 / 64.0 };
+        let phi = softness.default_phi(2.0);
+        let base = ScheduledSoftness::constant(softness, 2.0);
+        let moving = ScheduledSoftness { schedule: Some(schedule.clone()), ..base };
+        for (part, knot) in [(0.0, -2.0), (0.25, -3.5), (1.0, -6.0)] {
+            let scale = f64::exp(knot) + floor;
+            assert_near(moving.scale_at(part, 64), scale);
+            let tensor = ScaleSchedule::scale(&vector::<B>(&schedule.knots), floor, part);
+            assert_eq!(numbers(tensor), [moving.scale_at(part, 64)]);
+            assert_eq!(moving.phi_at(part, 64), softness.with_scale_values(&phi, scale));
+            let width = if softness.squared { (2.0 * scale).sqrt() } else { 2.0 * scale };
+            assert_near(moving.width_at(part, 64), width);
+        }
+        // The knots take the place of a family's scale; a network has none.
+        let expected = if softness == network { 56 + 3 } else { 3 };
+        assert_eq!(moving.parameters(), expected);
+    }
+}
+
+#[test]
+fn the_softness_learned_for_poses_narrows() {
+    let learned = ScheduledSoftness::learned("pose").unwrap();
+    let widths = [0.0, 0.5, 1.0].map(|part| learned.width_at(part, 64));
+    assert!(widths.windows(2).all(|pair| pair[1] < pair[0]), "{widths:?}");
+    assert_eq!(learned.task.as_deref(), Some("pose"));
+}
