@@ -18,3 +18,8 @@ pub use softrast_softness as softness;
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 pub struct Readme;
+
+/// Compiles and runs the guide's example.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/adding-a-softness.md")]
+pub struct AddingASoftness;

@@ -4,8 +4,9 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{Tensor, backend::Backend},
 };
+use softrast_raster::Rasterizer;
 use softrast_softness::{Family, OPAQUE, Softness};
-use softrast_tests::vector;
+use softrast_tests::{tensor, vector};
 
 use super::numbers;
 
@@ -129,6 +130,32 @@ fn the_first_parameter_of_a_value_alone_is_the_logarithm_of_its_scale() {
     assert_eq!(own.with_scale_values(&[2.0, 1.0, 3.0], 0.5), wide);
     let found = own.with_scale(vector::<Plain>(&[2.0, 1.0, 3.0]), vector(&[0.5]));
     assert_eq!(numbers(found), wide);
+}
+
+/// An image, and the gradients of a weighted sum of its pixels to φ and to the corners.
+fn drawn(softness: impl Softness) -> [Vec<f64>; 3] {
+    const SIZE: usize = 16;
+    let corners = [-0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.6, 1.0];
+    let corners = vector::<First>(&corners).require_grad();
+    let phi = vector::<First>(&Family::Logistic.default_phi(0.1)).require_grad();
+    let silhouette = Rasterizer::new(SIZE).prepare(&[[0, 1, 2]].into(), softness, &phi);
+    let image = silhouette.coverage(corners.clone().reshape([1, 3, 3]), phi.clone());
+    let weights: Vec<f64> = (0..SIZE * SIZE).map(|k| (0.37 * k as f64).sin()).collect();
+    let grads = (image.clone() * tensor(&weights, [1, SIZE, SIZE])).sum().backward();
+    let image = image.inner().reshape([SIZE * SIZE]);
+    [image, phi.grad(&grads).unwrap(), corners.grad(&grads).unwrap()].map(numbers)
+}
+
+#[test]
+fn a_value_alone_is_rasterized_as_the_family_is() {
+    let (found, expected) = (drawn(ValueOf(Family::Logistic)), drawn(Family::Logistic));
+    for (found, expected) in found.iter().zip(&expected) {
+        let size = expected.iter().fold(0.0_f64, |size, e| size.max(e.abs()));
+        for (f, e) in found.iter().zip(expected) {
+            // Twice the error that the rasterizer allows itself.
+            assert!((f - e).abs() <= 2.0 * Rasterizer::TOLERANCE * size, "{f}, not {e}");
+        }
+    }
 }
 
 /// Half of everything, wherever the edge is.
