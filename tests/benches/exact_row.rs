@@ -1,30 +1,37 @@
-//! Computes a workload of DESIGN 5 and compares it with its exact row, in f64.
+//! Computes a workload and compares it with its exact row, in f64.
 //!
-//! `cargo bench -p softrast-tests --bench exact_row -- w1|w2|spot64 reference|TOLERANCE`
+//! `cargo bench -p softrast-tests --bench exact_row -- NAME reference|TOLERANCE`
 //!
-//! `spot64` is W2 at 64 × 64 pixels, for its memory. A tolerance, such as 1e-5, runs the fused op;
-//! `reference` evaluates every pair, which takes minutes.
+//! NAME is sphere, fox, airplane, chair, or with the paper's meshes w1, w2 or spot64, which is w2 at
+//! 64 × 64 pixels, for its memory. A tolerance, such as 1e-5, runs the fused op; `reference`
+//! evaluates every pair, which takes minutes.
 
 use std::{env, time::Instant};
 
 use burn::backend::NdArray;
-use softrast_runner::peak_rss_mib;
-use softrast_tests::{Row, Workload, w1, w2};
+use softrast_lab::peak_rss_mib;
+use softrast_tests::{KnownRow, Row, Workload};
 
 type B = NdArray<f64>;
+
+/// The workload of this name, and its exact row if that is known.
+fn named(name: &str) -> (Workload, Option<Row>) {
+    let known = match name {
+        "w1" => KnownRow::w1(),
+        "w2" => KnownRow::w2(),
+        "spot64" => return (Workload { size: 64, ..KnownRow::w2().workload }, None),
+        _ => KnownRow::ours().into_iter().find(|known| known.name == name).unwrap_or_else(|| {
+            panic!("unknown workload {name:?}: see the first lines of the bench")
+        }),
+    };
+    (known.workload, Some(known.row))
+}
 
 fn main() {
     // Cargo adds a flag of its own.
     let mut arguments = env::args().skip(1).filter(|argument| argument != "--bench");
-    let mut argument = || arguments.next().expect("usage: w1|w2|spot64 reference|TOLERANCE");
-    let name = argument();
-    let (workload, exact) = match name.as_str() {
-        "w1" => (w1(), Some(Row::W1)),
-        "w2" => (w2(), Some(Row::W2)),
-        "spot64" => (w2().map(|w2| Workload { size: 64, ..w2 }), None),
-        other => panic!("unknown workload {other:?}: use w1, w2 or spot64"),
-    };
-    let Some(workload) = workload else { return };
+    let mut argument = || arguments.next().expect("usage: NAME reference|TOLERANCE");
+    let (workload, exact) = named(&argument());
     let path = argument();
     let start = Instant::now();
     let row = match path.as_str() {

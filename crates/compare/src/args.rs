@@ -1,18 +1,20 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use softrast_cli::{MethodArgs, SoftnessChoice, Variant};
+use softrast_inverse::{Method, Resolution};
 use softrast_raster::compiled_backends;
-use softrast_runner::usual_tolerance;
 
-use crate::{Cell, Purpose, TaskName};
+use crate::{
+    Cell, Purpose, Variation,
+    tasks::{AnyTask, TASKS, task},
+};
 
-/// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start
-/// reaches the whole image, which takes over twenty times as long as a logistic; the fitted one does not. A surrogate is
-/// left out where no edge moves.
+/// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start reaches the whole image, which
+/// takes over twenty times as long as a logistic; the fitted one does not.
 const METHODS: &str = "learned,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
-                       gamma --schedule static,mlp --init fitted --schedule static,\
-                       logistic --schedule decay,\
-                       gauss --schedule decay,exp --schedule decay,gamma --schedule decay";
+                       gamma --schedule static,mlp --init fitted --schedule static,logistic --schedule decay,gauss --schedule decay,\
+                       exp --schedule decay,gamma --schedule decay";
 
 /// What is varied unless said otherwise: the default of the tasks and the simplest method.
 const VARIED: &str = "learned,logistic --schedule static";
@@ -23,52 +25,85 @@ const VARIED: &str = "learned,logistic --schedule static";
 #[derive(Clone, Debug, Parser)]
 #[command(version)]
 pub struct Args {
-    /// Tasks: shape2d, shape3d, pose, occlusion, or all.
+    /// Tasks by name, or all
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "all")]
     pub tasks: Vec<String>,
 
-    /// Methods: softness families, softness files in JSON, or learned for what comes with the program;
-    /// behind one may stand its schedule, or other flags of the tasks.
-    #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS)]
-    pub methods: Vec<String>,
+    /// Methods: softness families or files, or learned for what comes with the program; behind one may stand flags of its own
+    #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS, value_parser = named)]
+    pub methods: Vec<NamedMethod>,
 
-    /// Those of the methods, or others, that the charts of error against seconds also show with half the pixels a
-    /// side, with pixels that may be off by more or less, neither of which OCCLUSION knows, and on every other backend
-    /// that the program was built with; "" for none.
-    #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED)]
-    pub varied: Vec<String>,
+    /// Methods that the charts of error against seconds also show with half the pixels a side, with pixels that may be off by more or
+    /// less, and on every other backend that the program was built with; "" for none
+    #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = VARIED, value_parser = named)]
+    pub varied: Vec<NamedMethod>,
 
-    /// What comes with the program for a task and is also tried on all other tasks that are compared, for Table 6; "" for
-    /// none.
-    #[arg(long, value_name = "learned|learned-mlp,...", value_delimiter = ',', default_value = "learned",
-          value_parser = crossing)]
+    /// What comes with the program for a task and is also tried on all others, for Table 6; "" for none
+    #[arg(long, value_name = "learned|learned-mlp,...", value_delimiter = ',', default_value = "learned", value_parser = crossing)]
     pub crossed: Vec<String>,
 
-    /// Seeds of every cell, instead of the number that its task asks for: one number, or one for each of
-    /// the tasks in their order.
-    #[arg(long, value_name = "N,...", value_delimiter = ',',
-          value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    /// Seeds of every cell: one number, or one for each of the tasks in their order [default: what the task asks for]
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub runs: Vec<u32>,
 
-    /// Few seeds, for a table in minutes instead of hours.
+    /// Few seeds, for a table in minutes instead of hours
     #[arg(long, conflicts_with = "runs")]
     pub quick: bool,
 
-    /// What to compute on: ndarray, flex or wgpu, if the program was built with it.
+    /// What to compute on: ndarray, flex or wgpu, if the program was built with it
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
 
-    /// Folder for the results of every cell.
+    /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out/compare")]
     pub out: PathBuf,
 
-    /// File for the tables [default: results.md in the folder].
+    /// File for the tables [default: results.md in the folder]
     #[arg(long, value_name = "FILE.md")]
     pub tables: Option<PathBuf>,
 
-    /// Show no progress.
+    /// Print one JSON object instead of the summary
+    #[arg(long)]
+    pub json: bool,
+
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// A method and what it is called; none for the empty text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedMethod {
+    name: String,
+    method: Option<MethodArgs>,
+}
+
+fn named(text: &str) -> Result<NamedMethod, String> {
+    if text.is_empty() {
+        return Ok(NamedMethod { name: String::new(), method: None });
+    }
+    let method = MethodArgs::parse(text)?;
+    let softness = match &method.softness {
+        Some(SoftnessChoice::File(path)) => {
+            path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+        }
+        choice => choice.as_ref().map(ToString::to_string).unwrap_or_default(),
+    };
+    // The flags without what every flag has.
+    let flags = text.split_whitespace().skip(1).filter(|word| *word != "--schedule");
+    let words = flags.map(|word| word.trim_start_matches("--").to_owned());
+    let name = [softness].into_iter().chain(words).collect::<Vec<_>>().join(" ");
+    Ok(NamedMethod { name, method: Some(method) })
+}
+
+fn crossing(text: &str) -> Result<String, String> {
+    match text {
+        "" | "learned" | "learned-mlp" => Ok(text.to_owned()),
+        _ => {
+            Err("expected what comes with the program for every task: learned or learned-mlp"
+                .into())
+        }
+    }
 }
 
 impl Args {
@@ -78,63 +113,119 @@ impl Args {
     ///
     /// If there is no task of that name, or the numbers of seeds are neither one nor one for each task.
     pub fn cells(&self) -> anyhow::Result<Vec<Cell>> {
-        let mut tasks = Vec::new();
+        let mut tasks: Vec<&'static dyn AnyTask> = Vec::new();
         for name in &self.tasks {
             match name.as_str() {
-                "all" => tasks.extend(TaskName::ALL),
-                name => tasks.push(name.parse()?),
+                "all" => tasks.extend(TASKS),
+                name => tasks.push(task(name)?),
             }
         }
-        tasks.dedup();
-        let others = self.other_backends();
+        tasks.dedup_by_key(|task| task.name());
         anyhow::ensure!(
             self.runs.len() <= 1 || self.runs.len() == tasks.len(),
             "--runs has {} numbers for {} tasks: say one, or one for each",
             self.runs.len(),
             tasks.len()
         );
-        let runs = |(k, task): (usize, &TaskName)| {
-            let usual = if self.quick { task.quick_runs() } else { task.runs() };
-            (*task, self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual))
-        };
-        let tasks: Vec<(TaskName, u32)> = tasks.iter().enumerate().map(runs).collect();
-        let compared = tasks.iter().flat_map(|&(task, runs)| {
-            let backends = &others;
-            VARIANTS.into_iter().flat_map(move |variant| {
-                let cell =
-                    move |purpose| move |method| Cell { task, variant, method, runs, purpose };
-                let varied = self.varied.iter().filter(|method| !method.is_empty());
-                let varied = varied.flat_map(move |method| {
-                    let side = format!("{method} --resolution {}", task.size() / 2);
-                    // What is usual where the scale moves, where it stays, and the other way round.
-                    let stays = method.contains("--schedule static");
-                    let other = usual_tolerance(stays);
-                    let off = format!("{method} --tolerance {other:e}");
-                    let freely = [side, off].into_iter().filter(move |_| task.moves_edges());
-                    let on = |name: &&str| format!("{method} --backend {name}");
-                    freely.chain(backends.iter().map(on).collect::<Vec<_>>())
-                });
-                let known =
-                    move |method: &&String| task.moves_edges() || *method != "learned-surrogate";
-                let methods = self.methods.iter().filter(known).cloned();
-                methods.map(cell(Purpose::Compared)).chain(varied.map(cell(Purpose::Varied)))
-            })
-        });
-        Ok(compared.chain(self.crossed(&tasks)).collect())
+        let backends = self.other_backends();
+        let mut cells = Vec::new();
+        for (k, task) in tasks.iter().enumerate() {
+            for variant in Variant::ALL {
+                let runs = self.runs_of(k, *task);
+                self.compared(*task, variant, runs, &backends, &mut cells)?;
+            }
+        }
+        for kind in self.crossed.iter().filter(|kind| !kind.is_empty() && tasks.len() > 1) {
+            for (k, task) in tasks.iter().enumerate() {
+                for variant in Variant::ALL {
+                    let runs = self.runs_of(k, *task);
+                    let crossed = tasks
+                        .iter()
+                        .map(|from| self.crossed_cell(*task, variant, runs, *from, kind));
+                    cells
+                        .extend(crossed.collect::<anyhow::Result<Vec<_>>>()?.into_iter().flatten());
+                }
+            }
+        }
+        Ok(cells)
     }
 
-    /// What was learned on each of the tasks on all others.
-    fn crossed(&self, tasks: &[(TaskName, u32)]) -> impl Iterator<Item = Cell> {
-        let names = self.crossed.iter().filter(|name| !name.is_empty() && tasks.len() > 1);
-        names.flat_map(move |name| {
-            let places = tasks.iter().flat_map(|to| VARIANTS.map(|variant| (*to, variant)));
-            places.flat_map(move |((task, runs), variant)| {
-                let methods = tasks.iter().map(move |(from, _)| from.learned_there(name, task));
-                let new = methods.filter(|method| !self.methods.contains(method));
-                let purpose = Purpose::Crossed;
-                new.map(move |method| Cell { task, variant, method, runs, purpose })
-            })
-        })
+    /// Methods as they are, and varied.
+    fn compared(
+        &self,
+        task: &'static dyn AnyTask,
+        variant: Variant,
+        runs: u32,
+        backends: &[&'static str],
+        cells: &mut Vec<Cell>,
+    ) -> anyhow::Result<()> {
+        let cell = |name: String, method: MethodArgs, backend, purpose| Cell {
+            task,
+            variant,
+            method,
+            name,
+            backend,
+            runs,
+            purpose,
+        };
+        for NamedMethod { name, method } in &self.methods {
+            let Some(method) = method else { continue };
+            // A surrogate is left out where no edge moves.
+            let surrogate = SoftnessChoice::Learned(Some("surrogate".into()));
+            if task.moves_edges() || method.softness.as_ref() != Some(&surrogate) {
+                cells.push(cell(name.clone(), method.clone(), None, Purpose::Compared));
+            }
+        }
+        for NamedMethod { name, method } in &self.varied {
+            let Some(method) = method else { continue };
+            let varied = |what: String| format!("{name} {what}");
+            if task.moves_edges() {
+                let usual =
+                    task.entry(&softrast_cli::Common { variant, ..Default::default() }, method)?;
+                let side = usual.solve.size / 2;
+                let fewer =
+                    MethodArgs { resolution: Some(Resolution::Side(side)), ..method.clone() };
+                let purpose = Purpose::Varied(Variation::Resolution);
+                cells.push(cell(varied(format!("resolution {side}")), fewer, None, purpose));
+                // What is usual where the scale moves, where it stays, and the other way round.
+                let other = Method::usual_tolerance(usual.method.softness.is_constant());
+                let less = MethodArgs { tolerance: Some(other), ..method.clone() };
+                let purpose = Purpose::Varied(Variation::Tolerance);
+                cells.push(cell(varied(format!("tolerance {other:e}")), less, None, purpose));
+            }
+            for backend in backends {
+                let purpose = Purpose::Varied(Variation::Backend);
+                let name = varied(format!("backend {backend}"));
+                cells.push(cell(name, method.clone(), Some(backend), purpose));
+            }
+        }
+        Ok(())
+    }
+
+    /// What was learned on one task, on another or, unless it is compared anyway, on itself.
+    fn crossed_cell(
+        &self,
+        task: &'static dyn AnyTask,
+        variant: Variant,
+        runs: u32,
+        from: &'static dyn AnyTask,
+        kind: &str,
+    ) -> anyhow::Result<Option<Cell>> {
+        let name = match kind.strip_prefix("learned") {
+            Some(kind) if from.name() != task.name() => format!("learned-{}{kind}", from.name()),
+            _ => kind.to_owned(),
+        };
+        if self.methods.iter().any(|method| method.name == name) {
+            return Ok(None);
+        }
+        let method = MethodArgs::parse(&name).map_err(anyhow::Error::msg)?;
+        let purpose = Purpose::Crossed(from.name());
+        Ok(Some(Cell { task, variant, method, name, backend: None, runs, purpose }))
+    }
+
+    fn runs_of(&self, k: usize, task: &dyn AnyTask) -> u32 {
+        let usual = task.paper().runs[usize::from(self.quick)];
+        self.runs.get(k).or(self.runs.first()).copied().unwrap_or(usual)
     }
 
     /// Backends that the program was built with and the system has, beside the one that is computed on.
@@ -144,18 +235,6 @@ impl Args {
         let used = self.backend.as_deref().or(first);
         let others = all.iter().filter(|backend| Some(backend.name()) != used);
         others.filter(|backend| backend.set_up().is_ok()).map(|backend| backend.name()).collect()
-    }
-}
-
-const VARIANTS: [&str; 2] = ["original", "transfer"];
-
-fn crossing(text: &str) -> Result<String, String> {
-    match text {
-        "" | "learned" | "learned-mlp" => Ok(text.to_owned()),
-        _ => {
-            Err("expected what comes with the program for every task: learned or learned-mlp"
-                .into())
-        }
     }
 }
 
@@ -171,31 +250,42 @@ mod tests {
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick").cells().unwrap();
         assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + 4 * 2 * 3);
-        assert_eq!((cells[0].task, cells[18].variant), (TaskName::Shape2d, "transfer"));
-        assert_eq!(cells[12].method, "learned --resolution 128");
-        let of = |purpose| cells.iter().filter(move |cell| cell.purpose == purpose);
-        assert_eq!(of(Purpose::Varied).count(), 3 * 2 * 4);
-        let crossed: Vec<_> = of(Purpose::Crossed).map(|cell| cell.method.as_str()).collect();
+        assert_eq!((cells[0].task.name(), cells[18].variant), ("shape2d", Variant::Transfer));
+        assert_eq!(cells[12].name, "learned resolution 128");
+        assert!(cells[0].is_default() && !cells[12].is_default());
+        let crossed: Vec<&str> = cells
+            .iter()
+            .filter(|c| matches!(c.purpose, Purpose::Crossed(_)))
+            .map(|c| c.name.as_str())
+            .collect();
         assert_eq!(crossed[..3], ["learned-shape3d", "learned-pose", "learned-occlusion"]);
         assert_eq!(crossed[21..], ["learned-shape2d", "learned-shape3d", "learned-pose"]);
-        let some =
-            args("--tasks pose --methods gauss,a/b.json --varied exp --runs 7").cells().unwrap();
-        assert!(some.len() == 8 && some[3].runs == 7 && some[5].method_name() == "b");
-        assert_eq!(some[2].method_name(), "exp resolution 32");
-        let runs = |line| {
-            let cells = args(line).cells().unwrap();
-            TaskName::ALL.map(|task| cells.iter().find(|cell| cell.task == task).unwrap().runs)
-        };
+        let some = args("--tasks pose --methods gauss,exp --varied exp --runs 7").cells().unwrap();
+        assert!(some.len() == 8 && some[3].runs == 7 && some[2].name == "exp resolution 32");
         assert_eq!(args("--tasks pose --methods exp --varied=").cells().unwrap().len(), 2);
         let two = "--tasks pose,occlusion --methods exp --varied= --crossed learned-mlp";
-        assert_eq!(args(two).cells().unwrap()[4].method, "learned-mlp");
-        assert_eq!(args(two).cells().unwrap()[5].method, "learned-occlusion-mlp");
-        assert_eq!(args(two).cells().unwrap().len(), 2 * 2 + 2 * 2 * 2);
+        let two = args(two).cells().unwrap();
+        assert_eq!([&two[4].name[..], &two[5].name], ["learned-mlp", "learned-occlusion-mlp"]);
+        assert_eq!(two.len(), 2 * 2 + 2 * 2 * 2);
+    }
+
+    #[test]
+    fn seeds_are_one_number_or_one_for_each_task_and_nonsense_is_refused() {
+        let runs = |line: &str| {
+            let cells =
+                args(&format!("--methods exp --varied= --crossed= {line}")).cells().unwrap();
+            cells.chunks(2).map(|of_task| of_task[0].runs).collect::<Vec<_>>()
+        };
         assert_eq!(runs("--runs 3"), [3; 4]);
         assert_eq!(runs("--runs 20,5,60,50"), [20, 5, 60, 50]);
         assert!(args("--runs 20,5").cells().is_err());
-        let line = ["compare", "--crossed", "learned-surrogate"];
-        assert!(Args::try_parse_from(line).unwrap_err().to_string().contains("every task"));
-        assert!(args("--tasks teapot").cells().unwrap_err().to_string().contains("shape2d"));
+        for (flag, value, part) in
+            [("--crossed", "learned-surrogate", "every task"), ("--methods", "sofft", "gumbel_min")]
+        {
+            let error = Args::try_parse_from(["compare", flag, value]).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+        let error = args("--tasks teapot").cells().err().unwrap().to_string();
+        assert!(error.contains("shape2d"), "{error}");
     }
 }

@@ -1,16 +1,24 @@
 //! Charts of speed against accuracy, for one task in one variant or over all of them.
 
-use softrast_runner::{mean, median, method_colour, quantile};
-
-use crate::{
-    Measured, Purpose, functions,
-    measured::{paired, short},
+use softrast_cli::method_colour;
+use softrast_lab::{
+    Run, mean, median, paired,
     plot::{Axis, Mark, Plot, Series},
+    quantile,
 };
+use softrast_meta::{numbers, tensor, vector};
+use softrast_raster::HostBackend;
+use softrast_softness::Softness;
 
-/// A run is solved where its hard error has fallen to this share of what it began with. Fixed before
-/// anything was measured (META 5.2).
-pub(crate) const TARGET: f64 = 0.1;
+use crate::{Measured, Purpose, Variation, measured::short};
+
+/// A run is solved where its hard error has fallen to this share of what it began with. Fixed before anything was measured.
+const TARGET: f64 = 0.1;
+/// Seconds of one cell in two comparisons differ by such a share and more.
+const SCATTER: f64 = 0.1;
+/// Farthest distance from the edge at which soft steps are shown, in pixels, and points on either side.
+const REACH_PX: f64 = 1.0;
+const HALF: i32 = 120;
 
 /// A chart with its file name and what it shows.
 pub(crate) struct Chart {
@@ -19,97 +27,85 @@ pub(crate) struct Chart {
     pub(crate) plot: Plot,
 }
 
+fn named(one: &Measured) -> Series {
+    let (name, colour) = (one.cell.name.clone(), method_colour(&one.cell.name));
+    Series { name, colour, dashed: one.moves(), ..Series::default() }
+}
+
 /// The charts of the cells of one task in one variant.
-pub(crate) fn of_variant(cells: &[&Measured]) -> Vec<Chart> {
-    let all = cells;
+pub(crate) fn of_variant(all: &[&Measured]) -> Vec<Chart> {
     let cells: Vec<&Measured> =
         all.iter().filter(|one| one.cell.purpose == Purpose::Compared).copied().collect();
     let Some(first) = cells.first() else { return Vec::new() };
-    let stem = format!("{}-{}", first.cell.task.name(), first.cell.variant);
-    let of = format!("{}, {}", first.cell.task.title(), first.cell.variant);
-    let steps = |one: &Measured, k: usize| k as f64 * one.steps as f64 / last(one);
-    let seconds = |one: &Measured, k: usize| k as f64 * one.seconds / last(one);
-    let runs = first.cell.runs;
+    let variant = first.cell.variant.name();
+    let stem = format!("{}-{variant}", first.cell.task.name());
+    let of = format!("{}, {variant}", first.cell.task.title());
+    let (hard, runs) = (first.hard_place(), first.cell.runs);
+    let (hard_title, parameter) = (first.title(hard), place_of(first, "parameter_error"));
+    let over_steps = |place: usize, name: &str, caption: String| Chart {
+        name: format!("{stem}-{name}"),
+        caption,
+        plot: Plot {
+            series: cells.iter().map(|one| over(one, place, false)).collect(),
+            ..Plot::new(Axis::linear("step"), Axis::logarithmic(&first.title(place)))
+        },
+    };
+    let quartiles = format!("median of {runs} seeds and, shaded, the middle half of them");
+    let anytime = Plot::new(
+        Axis::logarithmic("seconds of optimisation in a run"),
+        Axis::logarithmic(&format!("lowest {hard_title} so far")),
+    );
     vec![
-        Chart {
-            name: format!("{stem}-steps"),
-            caption: format!(
-                "{of}: {} over the steps, median of {runs} seeds and, shaded, the middle half of them.",
-                first.hard.name
-            ),
-            plot: Plot {
-                x: Axis::linear("step"),
-                y: Axis::logarithmic(&first.hard.name),
-                series: cells.iter().map(|one| over(one, Curve::Hard, steps)).collect(),
-                front: Vec::new(),
-            },
-        },
-        Chart {
-            name: format!("{stem}-parameters"),
-            caption: format!("{of}: {} over the steps, drawn likewise.", first.parameter.name),
-            plot: Plot {
-                x: Axis::linear("step"),
-                y: Axis::logarithmic(&first.parameter.name),
-                series: cells.iter().map(|one| over(one, Curve::Parameter, steps)).collect(),
-                front: Vec::new(),
-            },
-        },
+        over_steps(hard, "steps", format!("{of}: {hard_title} over the steps, {quartiles}.")),
+        over_steps(
+            parameter,
+            "parameters",
+            format!("{of}: {} over the steps, drawn likewise.", first.title(parameter)),
+        ),
         Chart {
             name: format!("{stem}-anytime"),
             caption: format!(
-                "{of}: the lowest {} that a run has reached by a time, median and middle half of \
-                 {runs} seeds. The method that is lowest at a time is the one to stop there with.",
-                first.hard.name
+                "{of}: the lowest {hard_title} that a run has reached by a time, {quartiles}. The method that is lowest at a time is \
+                 the one to stop there with."
             ),
             plot: Plot {
-                x: Axis::logarithmic("seconds of optimisation in a run"),
-                y: Axis::logarithmic(&format!("lowest {} so far", first.hard.name)),
-                series: cells.iter().map(|one| over(one, Curve::Lowest, seconds)).collect(),
-                front: Vec::new(),
+                series: cells.iter().map(|one| over(one, hard, true)).collect(),
+                ..anytime
             },
         },
         pareto(all, &stem, &of),
+        functions(&cells, &stem, &of),
     ]
-    .into_iter()
-    .chain(functions::chart(&cells))
-    .collect()
+}
+
+fn place_of(one: &Measured, key: &str) -> usize {
+    one.metrics.iter().position(|metric| metric.key == key).unwrap_or(one.hard_place())
 }
 
 /// Intervals between the points of a curve.
-fn last(one: &Measured) -> f64 {
-    let longest = one.traces.iter().map(|trace| trace.hard.len()).max().unwrap_or(0);
+fn intervals(one: &Measured) -> f64 {
+    let longest = one.runs.iter().map(|run| run.curve.len()).max().unwrap_or(0);
     longest.saturating_sub(1).max(1) as f64
 }
 
-#[derive(Clone, Copy)]
-enum Curve {
-    Hard,
-    Parameter,
-    Lowest,
+/// A metric of a run over its steps; with `lowest` the lowest so far.
+fn trace(run: &Run, place: usize, lowest: bool) -> Vec<f64> {
+    let mut least = f64::INFINITY;
+    let value = |point: &softrast_lab::Point| {
+        least = least.min(point.values[place]);
+        if lowest { least } else { point.values[place] }
+    };
+    run.curve.iter().map(value).collect()
 }
 
-fn named(one: &Measured) -> Series {
-    let name = one.cell.method_name();
-    let dashed = one.moves();
-    Series { colour: method_colour(&name), name, dashed, ..Series::default() }
-}
-
-/// Median and quartiles over the runs at every point of their curves.
-fn over(one: &Measured, curve: Curve, across: impl Fn(&Measured, usize) -> f64) -> Series {
-    let curves: Vec<Vec<f64>> = one
-        .traces
-        .iter()
-        .map(|trace| match curve {
-            Curve::Hard => trace.hard.clone(),
-            Curve::Parameter => trace.parameter.clone(),
-            Curve::Lowest => trace.lowest().collect(),
-        })
-        .collect();
-    let longest = curves.iter().map(Vec::len).max().unwrap_or(0);
+/// Median and quartiles over the runs at every point of their curves: over the steps, or the lowest so far over seconds.
+fn over(one: &Measured, place: usize, anytime: bool) -> Series {
+    let curves: Vec<Vec<f64>> = one.runs.iter().map(|run| trace(run, place, anytime)).collect();
+    let whole = if anytime { one.seconds } else { one.solve.steps as f64 };
     let mut series = named(one);
-    for k in 0..longest {
+    for k in 0..curves.iter().map(Vec::len).max().unwrap_or(0) {
         let now: Vec<f64> = curves.iter().filter_map(|curve| curve.get(k).copied()).collect();
-        series.points.push([across(one, k), median(&now)]);
+        series.points.push([k as f64 * whole / intervals(one), median(&now)]);
         series.band.push([quantile(&now, 0.25), quantile(&now, 0.75)]);
     }
     series
@@ -123,20 +119,13 @@ struct Price {
     errors: Vec<f64>,
 }
 
-/// Seconds of one cell in two comparisons differ by such a share and more.
-const SCATTER: f64 = 0.1;
-
 impl Price {
-    fn of(one: &&Measured) -> Self {
-        Self { seconds: one.seconds, errors: one.returned() }
-    }
-
     fn point(&self) -> [f64; 2] {
         [self.seconds, mean(&self.errors)]
     }
 
-    /// Whether it is at least as good as the other and clearly better in one of the two: by [`SCATTER`] of the seconds, or
-    /// in the error beyond the 95 % interval of the differences.
+    /// Whether it is at least as good as the other and clearly better in one of the two: by [`SCATTER`] of the seconds, or in the error
+    /// beyond the 95 % interval of the differences.
     fn beats(&self, other: &Self) -> bool {
         let ([seconds, error], [others, others_error]) = (self.point(), other.point());
         let faster = seconds <= (1.0 - SCATTER) * others;
@@ -154,43 +143,47 @@ fn front(prices: &[Price]) -> Vec<usize> {
 }
 
 fn pareto(cells: &[&Measured], stem: &str, of: &str) -> Chart {
-    let prices: Vec<Price> = cells.iter().map(Price::of).collect();
+    let price = |one: &&Measured| Price { seconds: one.seconds, errors: one.returned() };
+    let prices: Vec<Price> = cells.iter().map(price).collect();
     let best = front(&prices);
     let series = cells.iter().zip(&prices).enumerate().map(|(k, (one, price))| Series {
         points: vec![price.point()],
         marked: best.contains(&k),
-        boxed: is_default(one),
+        boxed: one.cell.is_default(),
         mark: mark(one),
         ..named(one)
     });
-    let names: Vec<String> = best.iter().map(|&k| cells[k].cell.method_name()).collect();
-    let default = cells.iter().position(|one| is_default(one));
+    let names: Vec<&str> = best.iter().map(|&k| cells[k].cell.name.as_str()).collect();
+    let default = cells.iter().position(|one| one.cell.is_default());
     let default = default.map(|k| match best.contains(&k) {
         true => " In the box: the default of the task, which is on the front.".to_owned(),
         false => format!(
-            " In the box: the default of the task, which is not on the front. Before it, with the seconds as a share \
-             of its own and what the error is higher by, seed by seed: {}.",
+            " In the box: the default of the task, which is not on the front. Before it, with the seconds as a share of its own and \
+             what the error is higher by, seed by seed: {}.",
             beaten_by(cells, &prices, k)
         ),
     });
     let elsewhere = cells.iter().any(|one| mark(one) == Mark::Square);
     let squares = if elsewhere { ", squares on another backend" } else { "" };
+    let first = cells[0];
+    let axes = Plot::new(
+        Axis::logarithmic("seconds of optimisation in a run"),
+        Axis::logarithmic(&format!("lowest {}", first.title(first.hard_place()))),
+    );
     Chart {
         name: format!("{stem}-pareto"),
         caption: format!(
-            "{of}: error of the step that a run returns against its seconds, means over the seeds; \
-             filled marks are static, open ones move; triangles are methods on half the pixels a side, crosses at \
-             another tolerance{}.{} On the front, ringed and joined, is what nothing beats, being no worse in both and \
-             better in one by a tenth of the seconds or beyond the 95 % interval of the error's differences: {}.",
-            squares,
+            "{of}: error of the step that a run returns against its seconds, means over the seeds; filled marks are static, open ones \
+             move; triangles are methods on half the pixels a side, crosses at another tolerance{squares}.{} On the front, ringed and \
+             joined, is what nothing beats, being no worse in both and better in one by a tenth of the seconds or beyond the 95 % \
+             interval of the error's differences: {}.",
             default.unwrap_or_default(),
             names.join(", ")
         ),
         plot: Plot {
-            x: Axis::logarithmic("seconds of optimisation in a run"),
-            y: Axis::logarithmic(&format!("lowest {}", cells[0].hard.name)),
             series: series.collect(),
             front: best.iter().map(|&k| prices[k].point()).collect(),
+            ..axes
         },
     }
 }
@@ -200,97 +193,111 @@ fn beaten_by(cells: &[&Measured], prices: &[Price], k: usize) -> String {
     let better = cells.iter().zip(prices).filter(|(_, other)| other.beats(&prices[k]));
     let by = better.map(|(one, Price { seconds, errors })| {
         let (mean, [low, high]) = paired(errors, &prices[k].errors);
-        format!(
-            "{} ({:.2}; {}, 95 % interval {} to {})",
-            one.cell.method_name(),
-            seconds / prices[k].seconds,
-            short(mean),
-            short(low),
-            short(high)
-        )
+        let [mean, low, high] = [mean, low, high].map(short);
+        let share = seconds / prices[k].seconds;
+        format!("{} ({share:.2}; {mean}, 95 % interval {low} to {high})", one.cell.name)
     });
     by.collect::<Vec<_>>().join(", ")
 }
 
 /// Variations are told from the method that they vary.
 fn mark(one: &Measured) -> Mark {
-    let flag = |name| one.cell.purpose == Purpose::Varied && one.cell.method.contains(name);
-    match (flag("--resolution"), flag("--tolerance"), flag("--backend")) {
-        (true, ..) => Mark::Triangle,
-        (_, true, _) => Mark::Cross,
-        (_, _, true) => Mark::Square,
-        _ => Mark::Dot,
+    match one.cell.purpose {
+        Purpose::Varied(Variation::Resolution) => Mark::Triangle,
+        Purpose::Varied(Variation::Tolerance) => Mark::Cross,
+        Purpose::Varied(Variation::Backend) => Mark::Square,
+        Purpose::Compared | Purpose::Crossed(_) => Mark::Dot,
     }
 }
 
-/// Whether it is what the task's program does without flags.
-fn is_default(one: &Measured) -> bool {
-    one.cell.method == "learned"
+/// What each method of one task takes for the step at an edge, at the last step of a run (Fig. 3 of the paper).
+fn functions(cells: &[&Measured], stem: &str, of: &str) -> Chart {
+    let series = cells.iter().map(|one| {
+        let (method, size) = (&one.method.softness, one.solve.size);
+        let offset = |k: i32| REACH_PX * f64::from(k) / f64::from(HALF);
+        let offsets: Vec<f64> = (-HALF..=HALF).map(offset).collect();
+        let distances: Vec<f64> = offsets.iter().map(|offset| offset * 2.0 / size as f64).collect();
+        let count = distances.len();
+        let phi = vector::<HostBackend>(&method.phi_at(1.0, size));
+        let covered = numbers(method.softness.value(phi, tensor(distances, [count])));
+        let points = offsets.into_iter().zip(covered).map(|(x, y)| [x, y]).collect();
+        Series { points, ..named(one) }
+    });
+    let axes = Plot::new(Axis::linear("signed distance (pixels)"), Axis::linear("coverage"));
+    Chart {
+        name: format!("{stem}-functions"),
+        caption: format!(
+            "{of}: how much a face covers a pixel by its distance from the nearest edge, inside being positive, with the parameters of \
+             the last step. What was searched for and what was learned are drawn alike."
+        ),
+        plot: Plot { series: series.collect(), ..axes },
+    }
 }
 
-/// The share of all problems, a problem being a seed of a task in a variant, that a method solves
-/// within a factor of the time of the fastest one on that problem.
+/// The share of all problems, a problem being a seed of a task in a variant, that a method solves within a factor of the time of the
+/// fastest one on that problem.
 pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
-    let mut methods: Vec<String> = Vec::new();
-    for one in groups.iter().flatten().filter(|one| one.cell.purpose == Purpose::Compared) {
-        let name = one.cell.method_name();
-        if !methods.contains(&name) {
-            methods.push(name);
-        }
-    }
-    // Of every method: its ratios, and the problems that it was given.
-    let mut ratios = vec![Vec::new(); methods.len()];
+    let compared = |group: &'_ [&'_ Measured]| -> Vec<usize> {
+        let kept = |k: &usize| group[*k].cell.purpose == Purpose::Compared;
+        (0..group.len()).filter(kept).collect()
+    };
+    let mut methods: Vec<Series> = Vec::new();
+    // Of every method its ratios.
+    let mut ratios: Vec<Vec<f64>> = Vec::new();
     let mut problems = 0;
     for group in groups {
-        let group = || group.iter().filter(|one| one.cell.purpose == Purpose::Compared);
-        let seeds = group().map(|one| one.traces.len()).min().unwrap_or(0);
-        for k in 0..seeds {
-            let time = |one: &&Measured| {
-                let trace = &one.traces[k];
-                let share = trace.reaches(TARGET * trace.hard.first()?)?;
-                // A target that holds from the start takes no time: the least that is told apart.
-                Some(one.seconds * share.max(1.0 / last(one)))
-            };
-            let times: Vec<Option<f64>> = group().map(time).collect();
-            let best = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-            problems += 1;
-            for (one, time) in group().zip(times) {
-                let method = methods.iter().position(|name| *name == one.cell.method_name())?;
-                ratios[method].extend(time.map(|time| time / best));
+        let cells: Vec<&Measured> = compared(group).into_iter().map(|k| group[k]).collect();
+        let seeds = cells.iter().map(|one| one.runs.len()).min().unwrap_or(0);
+        problems += seeds;
+        let times: Vec<Vec<Option<f64>>> = (0..seeds)
+            .map(|k| cells.iter().map(|one| seconds_to_target(one, k)).collect())
+            .collect();
+        for (place, one) in cells.iter().enumerate() {
+            let method = methods.iter().position(|series| series.name == one.cell.name);
+            let method = method.unwrap_or_else(|| {
+                methods.push(named(one));
+                ratios.push(Vec::new());
+                methods.len() - 1
+            });
+            for times in &times {
+                let best = times.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+                ratios[method].extend(times[place].map(|time| time / best));
             }
         }
     }
-    if problems == 0 {
-        return None;
-    }
     let widest = ratios.iter().flatten().copied().fold(2.0, f64::max) * 1.2;
-    let series = methods.iter().zip(&mut ratios).map(|(name, ratios)| {
+    let share = |count: usize| count as f64 / problems as f64;
+    for (series, ratios) in methods.iter_mut().zip(&mut ratios) {
         ratios.sort_by(f64::total_cmp);
-        let share = |count: usize| count as f64 / problems as f64;
-        let mut points = vec![[1.0, share(0)]];
+        series.points.push([1.0, share(0)]);
         for (k, ratio) in ratios.iter().enumerate() {
-            points.extend([[*ratio, share(k)], [*ratio, share(k + 1)]]);
+            series.points.extend([[*ratio, share(k)], [*ratio, share(k + 1)]]);
         }
-        points.push([widest, share(ratios.len())]);
-        let (dashed, colour) = (name.contains(" decay"), method_colour(name));
-        Series { name: name.clone(), dashed, colour, points, ..Series::default() }
-    });
-    Some(Chart {
+        series.points.push([widest, share(ratios.len())]);
+    }
+    let axes = Plot::new(
+        Axis::logarithmic("time, in units of the fastest method's"),
+        Axis::linear("share of problems"),
+    );
+    (problems > 0).then(|| Chart {
         name: "profile".to_owned(),
         caption: format!(
-            "Performance profile over {problems} problems (task, variant, seed): the share of them \
-             whose hard error falls to {} % of what it began with, within a factor of the time that \
-             the fastest method needs there. At the left, how often a method is the fastest; at the \
-             right, how often it gets there at all.",
+            "Performance profile over {problems} problems (task, variant, seed): the share of them whose hard error falls to {} % of \
+             what it began with, within a factor of the time that the fastest method needs there. At the left, how often a method is \
+             the fastest; at the right, how often it gets there at all.",
             100.0 * TARGET
         ),
-        plot: Plot {
-            x: Axis::logarithmic("time, in units of the fastest method's"),
-            y: Axis::linear("share of problems"),
-            series: series.collect(),
-            front: Vec::new(),
-        },
+        plot: Plot { series: methods, ..axes },
     })
+}
+
+/// Time until a run's hard error has fallen to the target; none if it never does.
+fn seconds_to_target(one: &Measured, run: usize) -> Option<f64> {
+    let hard = trace(&one.runs[run], one.hard_place(), false);
+    let target = TARGET * hard.first()?;
+    let step = hard.iter().position(|error| *error <= target)?;
+    // A target that holds from the start takes no time: the least that is told apart.
+    Some(one.seconds * (step.max(1) as f64 / intervals(one)))
 }
 
 #[cfg(test)]

@@ -1,55 +1,65 @@
 //! Table 6 of the paper: what was learned on one task, used on another.
 
+use softrast_cli::SoftnessChoice;
+use softrast_lab::report::Table;
+
 use crate::{
-    Cell, Error, Measured, Purpose, TaskName,
-    results::{by_variant, with_interval},
-    table::Table,
+    Measured, Purpose, TASKS,
+    tables::{by_variant, with_interval},
 };
 
-pub(crate) const CROSSED: &str = "\
-What comes with the program for one task, used on another at that task's own learning rate: the error of the hard image at the last step, mean and
-95 % interval, the lowest of a column in bold. The columns have the units of their tasks; compare within a column. Only the softness of edges is
-carried over: OCCLUSION's depths are the task's own logistic where the edges are another task's, and what was learned there is used elsewhere without its depths.
-";
-
-/// What was learned on each task, on all of them; the lowest of a column in bold.
+/// What was learned on each task, on all of them; the lowest of a column in bold. None where nothing is crossed.
 pub(crate) fn crossed(measured: &[Measured]) -> Option<Table> {
-    let mut learned: Vec<(TaskName, String)> = Vec::new();
-    for one in measured.iter().filter(|one| one.cell.purpose == Purpose::Crossed) {
-        learned.extend(one.cell.learned_on().filter(|row| !learned.contains(row)));
+    let mut rows: Vec<(String, &'static str)> = Vec::new();
+    for one in measured.iter().filter(|one| matches!(one.cell.purpose, Purpose::Crossed(_))) {
+        rows.extend(learned_on(one).filter(|row| !rows.contains(row)));
     }
-    learned.sort_by_key(|(task, name)| {
-        (name.clone(), TaskName::ALL.iter().position(|one| one == task))
-    });
+    rows.sort_by_key(|(kind, task)| (kind.clone(), TASKS.iter().position(|t| t.name() == *task)));
     let groups = by_variant(measured);
-    let column = |group: &Vec<&Measured>| {
-        let Measured { cell, hard, .. } = group[0];
-        format!("{} {}, {}", cell.task.title(), cell.variant, hard.name)
+    let columns = groups.iter().map(|group| {
+        let (cell, hard) = (&group[0].cell, group[0].title(group[0].hard_place()));
+        format!("{} {}, {hard}", cell.task.title(), cell.variant.name())
+    });
+    let mut table = Table::new(["learned on".to_owned()].into_iter().chain(columns));
+    let of = |row: &(String, &'static str), group: &[&Measured]| {
+        let here = |one: &&Measured| {
+            let (cell, other) = (&one.cell, &group[0].cell);
+            cell.task.name() == other.task.name() && cell.variant == other.variant
+        };
+        measured
+            .iter()
+            .filter(here)
+            .find(|one| learned_on(one).as_ref() == Some(row))
+            .map(Measured::hard)
     };
-    let head = std::iter::once("learned on".to_owned()).chain(groups.iter().map(column)).collect();
-    let mut table = Table { head, rows: Vec::new() };
-    for row in &learned {
-        let called = match row.1.strip_prefix("learned-") {
-            Some(kind) => format!("{}, {kind}", row.0.title()),
-            None => row.0.title().to_owned(),
-        };
-        table.rows.push(vec![called]);
-    }
-    for group in &groups {
-        let Cell { task, variant, .. } = group[0].cell;
-        let here = |one: &&Measured| (one.cell.task, one.cell.variant) == (task, variant);
-        let of = |row: &(TaskName, String)| {
-            let mut there = measured.iter().filter(here);
-            there.find(|one| one.cell.learned_on().as_ref() == Some(row)).map(|one| &one.hard)
-        };
-        let errors: Vec<Option<&Error>> = learned.iter().map(of).collect();
-        let lowest = errors.iter().flatten().map(|error| error.mean).fold(f64::INFINITY, f64::min);
-        for (row, error) in table.rows.iter_mut().zip(errors) {
-            row.push(error.map_or(String::new(), |error| match error.mean == lowest {
+    let errors: Vec<Vec<_>> =
+        rows.iter().map(|row| groups.iter().map(|group| of(row, group)).collect()).collect();
+    for ((kind, task), row) in rows.iter().zip(&errors) {
+        let title = TASKS.iter().find(|t| t.name() == *task).map_or(*task, |task| task.title());
+        let called = if kind.is_empty() { title.to_owned() } else { format!("{title}, {kind}") };
+        let cells = row.iter().enumerate().map(|(k, error)| {
+            let column = errors.iter().filter_map(|row| row[k].as_ref()).map(|error| error.mean);
+            let lowest = column.fold(f64::INFINITY, f64::min);
+            error.as_ref().map_or(String::new(), |error| match error.mean == lowest {
                 true => format!("**{}**", with_interval(error)),
                 false => with_interval(error),
-            }));
-        }
+            })
+        });
+        table.push([called].into_iter().chain(cells));
     }
-    (!learned.is_empty()).then_some(table)
+    (!rows.is_empty()).then_some(table)
+}
+
+/// The kind of what comes with the programs, and the task that it was learned on.
+fn learned_on(one: &Measured) -> Option<(String, &'static str)> {
+    let Some(SoftnessChoice::Learned(kind)) = &one.cell.method.softness else { return None };
+    let kind = kind.clone().unwrap_or_default();
+    match one.cell.purpose {
+        Purpose::Crossed(from) => {
+            let own = kind.strip_prefix(from).map(|kind| kind.trim_start_matches('-').to_owned());
+            Some((own.unwrap_or(kind), from))
+        }
+        Purpose::Compared => Some((kind, one.cell.task.name())),
+        Purpose::Varied(_) => None,
+    }
 }

@@ -1,151 +1,149 @@
-use std::path::Path;
+use anyhow::ensure;
+use serde_json::{Map, Value};
+use softrast_cli::{InOurUnits, Variant};
+use softrast_inverse::{Method, SolveConfig};
+use softrast_lab::{Encoded, Metric, Role, Run, mean, mean_interval, place, sweep::rounded};
 
-use anyhow::Context;
-use serde_json::Value;
-use softrast_runner::{bootstrap_mean_interval, mean};
+use crate::{Cell, tasks::Entry};
 
-use crate::{Cell, Trace};
-
-/// Samples behind the interval of a difference, and their seed.
-const RESAMPLES: usize = 10_000;
-const RESAMPLING_SEED: u64 = 0;
-
-/// What a cell came to, at the last step.
-#[derive(Clone, Debug)]
+/// What a cell came to.
 pub struct Measured {
     /// The cell.
     pub cell: Cell,
-    /// Error of the hard image, which compares methods of any width.
-    pub hard: Error,
-    /// Error of the method's own soft image.
-    pub soft: Error,
-    /// Error of the parameters.
-    pub parameter: Error,
-    /// POSE: the error of the parameters as the released curves have it.
-    pub released: Option<Error>,
-    /// Share of runs that succeed.
-    pub success_rate: f64,
-    /// Time of the optimisation steps of a run, in seconds: its share of a batch.
-    pub seconds: f64,
-    /// How each run went on, in the order of the seeds.
-    pub traces: Vec<Trace>,
-    /// Steps, pixels along a side of the image, and faces.
-    pub steps: u64,
-    /// Width and height of the image, in pixels.
-    pub size: u64,
+    /// The method with all its numbers.
+    pub method: Method,
+    /// Size, steps and learning rate.
+    pub solve: SolveConfig,
     /// Faces of the scene.
-    pub faces: u64,
-    /// Scale at the last step, where there is one, in NDC (NDC² if squared).
-    pub scale_end: Option<f64>,
-    /// Whether the softness sees the squared distance.
-    pub squared: bool,
-    /// Scale before the first and at the last step, depth scale if there is one, learning rate.
-    pub settings: String,
+    pub faces: usize,
+    /// What is measured at every point.
+    pub metrics: Vec<Metric>,
+    /// The runs, in the order of the seeds.
+    pub runs: Vec<Run>,
+    /// Of the first.
+    pub pictures: Option<Encoded>,
+    /// Time of the optimisation steps of a run, in seconds.
+    pub seconds: f64,
+    settings: Map<String, Value>,
 }
 
-/// One error over all runs.
+/// One error over all runs at the last step.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Error {
-    /// Name and unit.
-    pub name: String,
-    /// Mean over the runs, and its 95 % interval.
+pub struct MeanError {
+    /// Mean over the runs.
     pub mean: f64,
-    /// Of the mean.
+    /// Its 95 % interval.
     pub ci95: [f64; 2],
     /// In the order of the seeds.
     pub per_run: Vec<f64>,
 }
 
 impl Measured {
-    /// From the JSON line of `evaluate`.
-    ///
-    /// # Errors
-    ///
-    /// If something is not there that `evaluate` writes.
-    pub fn new(cell: Cell, json: &Value) -> anyhow::Result<Self> {
-        let number = |pointer: &str| {
-            let number = json.pointer(pointer).and_then(Value::as_f64);
-            number.with_context(|| format!("a result has no number {pointer}"))
-        };
-        let whole = |key: &str| {
-            json[key].as_u64().with_context(|| format!("a result has no whole number {key}"))
-        };
-        let settings = &json["settings"];
-        let named = |(key, name): (&str, &str)| {
-            settings[key].as_f64().map(|value| format!("{name} {}", plain(value)))
-        };
-        let first = settings["scale"].as_f64();
-        let end =
-            [("scale_end", "to")].into_iter().filter(|_| first != settings["scale_end"].as_f64());
-        let names = [("scale", "scale")].into_iter().chain(end);
-        let names = names.chain([
-            ("surrogate_scale", "surrogate"),
-            ("depth_scale", "depth"),
-            ("learning_rate", "rate"),
-        ]);
-        let released = &json["parameter_error"]["released"];
+    /// Of an evaluated entry.
+    pub(crate) fn new(
+        cell: Cell,
+        entry: Entry,
+        evaluation: softrast_lab::Evaluation,
+    ) -> anyhow::Result<Self> {
+        let Entry { experiment, method, solve, settings, faces } = entry;
+        let whole = evaluation.runs.iter().all(|run| !run.curve.is_empty());
+        ensure!(whole, "{}: the numbers are not finite before the first step", cell.name);
         Ok(Self {
-            hard: Error::new(&json["image_error"]["hard"])?,
-            soft: Error::new(&json["image_error"])?,
-            parameter: Error::new(&json["parameter_error"])?,
-            released: released.is_object().then(|| Error::new(released)).transpose()?,
-            success_rate: number("/success_rate")?,
-            seconds: number("/seconds/per_run")?,
-            traces: Vec::new(),
-            scale_end: settings["scale_end"].as_f64(),
-            squared: settings["squared"].as_bool() == Some(true),
-            steps: whole("steps")?,
-            size: whole("size")?,
-            faces: whole("faces")?,
-            settings: names.filter_map(named).collect::<Vec<_>>().join(", ").replace(", to", " to"),
             cell,
+            method,
+            solve,
+            faces,
+            metrics: experiment.metrics().to_vec(),
+            seconds: evaluation.seconds_per_run(),
+            runs: evaluation.runs,
+            pictures: evaluation.pictures,
+            settings,
         })
     }
-}
 
-impl Measured {
-    /// Whether the scale moves during a run.
-    pub(crate) fn moves(&self) -> bool {
-        self.settings.contains(" to ")
+    /// Place of the error of the hard image among the metrics, which compares methods of any width.
+    pub fn hard_place(&self) -> usize {
+        place(&self.metrics, Role::Score)
+    }
+
+    /// The error with this key, at the last step.
+    pub fn error(&self, key: &str) -> Option<MeanError> {
+        let place = self.metrics.iter().position(|metric| metric.key == key)?;
+        let last = |run: &Run| run.curve[run.curve.len() - 1].values[place];
+        let per_run: Vec<f64> = self.runs.iter().map(last).collect();
+        Some(MeanError { mean: mean(&per_run), ci95: mean_interval(&per_run), per_run })
+    }
+
+    /// The error of the hard image.
+    pub fn hard(&self) -> MeanError {
+        self.error(self.metrics[self.hard_place()].key)
+            .unwrap_or_else(|| unreachable!("it is there"))
+    }
+
+    /// The error of the parameters.
+    pub fn parameter(&self) -> MeanError {
+        self.error("parameter_error").unwrap_or_else(|| self.hard())
+    }
+
+    /// Name and unit of the metric at a place.
+    pub fn title(&self, place: usize) -> String {
+        let Metric { name, unit, .. } = self.metrics[place];
+        if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
     }
 
     /// Hard errors of the steps that the runs return, in the order of the seeds.
-    pub(crate) fn returned(&self) -> Vec<f64> {
-        self.traces.iter().filter_map(|trace| trace.lowest().last()).collect()
+    pub fn returned(&self) -> Vec<f64> {
+        let hard = self.hard_place();
+        let returned = |run: &Run| run.returned(hard).map(|point| point.values[hard]);
+        self.runs.iter().filter_map(returned).collect()
     }
 
-    /// With the curves that `evaluate` has left in its folder.
-    ///
-    /// # Errors
-    ///
-    /// If they are not there or cannot be read.
-    pub fn with_traces(mut self, folder: &Path) -> anyhow::Result<Self> {
-        self.traces = Trace::load(&folder.join("curve.csv"))?;
-        Ok(self)
+    /// Share of runs that succeed.
+    pub fn success_rate(&self) -> f64 {
+        self.runs.iter().filter(|run| run.success).count() as f64 / self.runs.len() as f64
     }
-}
 
-impl Error {
-    fn new(json: &Value) -> anyhow::Result<Self> {
-        let numbers = |key: &str| -> anyhow::Result<Vec<f64>> {
-            let list = json[key].as_array().with_context(|| format!("an error has no {key}"))?;
-            let number = |x: &Value| x.as_f64().with_context(|| format!("{key}: {x} is no number"));
-            list.iter().map(number).collect()
+    /// Whether the scale moves during a run.
+    pub fn moves(&self) -> bool {
+        !self.method.softness.is_constant()
+    }
+
+    /// Scale before the first and at the last step, surrogate and depth scale if there are such, learning rate.
+    pub fn setting(&self) -> String {
+        let size = self.solve.size;
+        let [first, last] = [0.0, 1.0].map(|part| plain(self.method.softness.scale_at(part, size)));
+        let scale = if self.moves() {
+            format!("scale {first} to {last}")
+        } else {
+            format!("scale {first}")
         };
-        let ci95 = numbers("ci95")?;
-        let ci95 = ci95.try_into().ok().context("an interval has two ends")?;
-        let [name, unit] = ["name", "unit"].map(|key| json[key].as_str().unwrap_or_default());
-        let name = if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") };
-        let mean = json["final"].as_f64().context("an error has no mean")?;
-        Ok(Self { name, mean, ci95, per_run: numbers("per_run")? })
+        let named =
+            [("surrogate_scale", "surrogate"), ("depth_scale", "depth"), ("learning_rate", "rate")];
+        let others = named.iter().filter_map(|(key, name)| {
+            Some(format!("{name} {}", plain(self.settings.get(*key)?.as_f64()?)))
+        });
+        [scale].into_iter().chain(others).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Image and parameter error in the unit of the paper's Table 3.
+    pub fn in_papers_unit(&self) -> [Option<f64>; 2] {
+        let parameters = self.metrics.iter().filter(|m| m.key.starts_with("parameter_error"));
+        let mean_of = |key: &str| self.error(key).map_or(f64::NAN, |error| error.mean);
+        let ours = InOurUnits {
+            original: self.cell.variant == Variant::Original,
+            hard: self.hard().mean,
+            soft: mean_of("image_error"),
+            parameters: parameters.map(|metric| mean_of(metric.key)).collect(),
+            faces: self.faces,
+        };
+        (self.cell.task.paper().in_its_unit)(&ours)
     }
 }
 
-/// Mean and 95 % interval of the differences on the seeds that both have.
-pub(crate) fn paired(errors: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
-    let differences: Vec<f64> = errors.iter().zip(reference).map(|(a, b)| a - b).collect();
-    let interval = bootstrap_mean_interval(&differences, RESAMPLES, RESAMPLING_SEED);
-    (mean(&differences), interval)
+/// A number of three digits as one would type it.
+fn plain(x: f64) -> String {
+    let rounded = rounded(x);
+    if rounded < 1e-4 { format!("{rounded:e}") } else { rounded.to_string() }
 }
 
 /// A number with three digits that count.
@@ -158,12 +156,6 @@ pub(crate) fn short(x: f64) -> String {
         3..6 => format!("{x:.0}"),
         _ => format!("{x:.2e}"),
     }
-}
-
-/// A number of three digits as one would type it.
-fn plain(x: f64) -> String {
-    let rounded = format!("{x:.2e}").parse().unwrap_or(x);
-    if rounded < 1e-4 { format!("{rounded:e}") } else { rounded.to_string() }
 }
 
 #[cfg(test)]

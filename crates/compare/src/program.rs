@@ -1,65 +1,75 @@
-use std::{
-    fs,
-    io::{self, Write},
-    path::Path,
-    process::ExitCode,
-};
+use std::{ffi::OsString, fs, io::Write, process::ExitCode};
 
 use anyhow::Context;
-use clap::Parser;
-use tempfile::NamedTempFile;
+use clap::CommandFactory;
+use serde_json::json;
+use softrast_lab::{
+    Cache, Failure, Progress, Runner,
+    program::{Output, parse, repeated, run_main},
+    write_atomically,
+};
 
 use crate::{
     Args, Measured,
     charts::{of_variant, profile},
     records,
-    results::{by_variant, html, markdown},
+    results::{html, markdown},
+    tables::by_variant,
 };
 
 /// The whole `main` of the program.
 pub fn main() -> ExitCode {
-    match compare(&Args::parse(), &command()) {
-        Ok(text) => {
-            println!("{text}");
-            ExitCode::SUCCESS
-        }
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    run_main(execute)
 }
 
-/// Evaluates all cells, writes tables, report and charts after each, and says where. `command` is what
-/// they name as what made them.
+fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
+    let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
+    let again = repeated("compare", &words);
+    compare(&args, &again)?.print(args.json, &again, stdout)
+}
+
+/// Evaluates all cells, writes tables, report and charts after each, and says where. `command` is what they name as what made them.
 ///
 /// # Errors
 ///
 /// If a cell cannot be evaluated or a file cannot be written.
-pub fn compare(args: &Args, command: &str) -> anyhow::Result<String> {
+pub fn compare(args: &Args, command: &str) -> anyhow::Result<Output> {
     let cells = args.cells()?;
+    fs::create_dir_all(&args.out)
+        .with_context(|| format!("cannot make the folder {:?}", args.out))?;
+    let runs = args.out.join("runs.jsonl");
+    let (cache, note) = Cache::open(&runs)?;
+    note.filter(|_| runs.exists()).iter().for_each(|note| eprintln!("{note}"));
+    let mut runner = Runner { progress: Progress::of_program(args.quiet), cache };
     let mut measured = Vec::with_capacity(cells.len());
     for (k, cell) in cells.iter().enumerate() {
+        let (task, variant) = (cell.task.name(), cell.variant.name());
         if !args.quiet {
-            let (task, variant, method) = (cell.task.name(), cell.variant, cell.method_name());
-            eprintln!("cell {} of {}: {task}, {variant}, {method}", k + 1, cells.len());
+            eprintln!("cell {} of {}: {task}, {variant}, {}", k + 1, cells.len(), cell.name);
         }
-        measured.push(cell.evaluate(&args.out, args.backend.as_deref(), args.quiet)?);
+        let one = cell.evaluate(&mut runner, args.backend.as_deref());
+        runner.progress = Progress::of_program(args.quiet);
+        measured.push(one.with_context(|| format!("{task} {variant} with {}", cell.name))?);
         // After every cell: whoever stops a long comparison has tables of what is finished.
         write(args, &measured, command)?;
     }
-    let path = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
+    let tables = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
     let report = args.out.join("report.html");
-    Ok(format!(
+    let text = format!(
         "{} cells, tables in {}, charts in {}",
         measured.len(),
-        path.display(),
+        tables.display(),
         report.display()
-    ))
+    );
+    let json = json!({ "cells": records::json(&measured), "tables": tables, "report": report });
+    Ok(Output { json, text: vec![text], ..Output::default() })
 }
 
 /// Tables, report, charts and numbers; each file is the old one or the new one, whole.
 fn write(args: &Args, measured: &[Measured], command: &str) -> anyhow::Result<()> {
+    let replace = |path: &std::path::Path, text: &str| {
+        write_atomically(path, text.as_bytes()).with_context(|| format!("cannot write {path:?}"))
+    };
     let tables = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
     let charts = match &args.tables {
         Some(tables) => tables.with_extension(""),
@@ -67,35 +77,14 @@ fn write(args: &Args, measured: &[Measured], command: &str) -> anyhow::Result<()
     };
     fs::create_dir_all(&charts).with_context(|| format!("cannot make the folder {charts:?}"))?;
     let groups = by_variant(measured);
-    let drawn = groups.iter().flat_map(|group| of_variant(group)).chain(profile(&groups));
-    for chart in drawn {
+    let all = groups.iter().flat_map(|group| of_variant(group)).chain(profile(&groups));
+    for chart in all {
         replace(&charts.join(format!("{}.svg", chart.name)), &chart.plot.svg()?)?;
         replace(&charts.join(format!("{}.csv", chart.name)), &chart.plot.csv())?;
     }
     let shown = charts.file_name().and_then(|name| name.to_str());
     replace(&tables, &markdown(measured, command, shown))?;
     replace(&args.out.join("cells.csv"), &records::csv(measured))?;
-    replace(&args.out.join("cells.json"), &records::json(measured))?;
-    replace(&args.out.join("report.html"), &html(measured, command, &args.out)?)
-}
-
-/// Writes a file under another name first.
-fn replace(path: &Path, text: &str) -> anyhow::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let written = || -> io::Result<()> {
-        let mut file = NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
-        file.write_all(text.as_bytes())?;
-        file.persist(path)?;
-        Ok(())
-    };
-    written().with_context(|| format!("cannot write {path:?}"))
-}
-
-/// The command line that the user gave.
-fn command() -> String {
-    let words = std::env::args().skip(1).map(|word| match word.contains(' ') {
-        true => format!(" \"{word}\""),
-        false => format!(" {word}"),
-    });
-    format!("cargo run --release -p compare --{}", words.collect::<String>())
+    replace(&args.out.join("cells.json"), &format!("{:#}\n", records::json(measured)))?;
+    replace(&args.out.join("report.html"), &html(measured, command)?)
 }

@@ -14,7 +14,7 @@ fn a_comparison_is_not_done_twice() {
         let output = Command::new(program).args(words).arg(out.path()).output().unwrap();
         let said = String::from_utf8(output.stdout).unwrap();
         assert!(said.starts_with("2 cells, tables in"), "{said} {:?}", output.stderr);
-        let journal = out.path().join("occlusion-transfer-exp-1/evaluate.jsonl");
+        let journal = out.path().join("runs.jsonl");
         let tables = fs::read_to_string(out.path().join("results.md")).unwrap();
         let report = fs::read_to_string(out.path().join("report.html")).unwrap();
         assert!(report.contains("<svg") && out.path().join("charts/profile.csv").exists());

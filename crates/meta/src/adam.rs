@@ -15,7 +15,8 @@ use crate::Optimizer;
 ///
 /// The learning rate may change from step to step: the optimiser is only read.
 ///
-/// Source: Kingma and Ba 2015, Algorithm 1; META 2.1 for `epsilon_root`.
+/// Source: Kingma and Ba 2015, Algorithm 1. For `epsilon_root`:
+/// docs/notes.md, Meta-gradients: Adam.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Adam {
     /// Largest move of a parameter in one step, roughly.
@@ -43,8 +44,9 @@ pub struct AdamState<B: Backend, const D: usize> {
 
 /// What [`Adam::fit_epsilon_root`] takes of the typical gradient.
 const ROOT_SHARE: f64 = 1e-4;
-/// Least and largest `epsilon_root` that [`Adam::fit_epsilon_root`] chooses: below, slopes at zero
-/// reach 1e10 times the learning rate; above, sharp scenes measurably lose accuracy (META 2.1).
+/// Least and largest `epsilon_root` that [`Adam::fit_epsilon_root`] chooses: below, the slope of
+/// the root at zero passes 5e9; above, sharp scenes measurably lose accuracy
+/// (docs/notes.md, Meta-gradients: Adam).
 const ROOT_RANGE: [f64; 2] = [1e-20, 1e-10];
 
 impl Adam {
@@ -59,7 +61,7 @@ impl Adam {
     /// The same with `epsilon_root` for problems whose first gradient is `grad`:
     /// `(1e-4 · median |grad|)²`, held within `[1e-20, 1e-10]`.
     ///
-    /// Source: META 2.1.
+    /// Source: docs/notes.md, Meta-gradients: Adam.
     ///
     /// # Panics
     ///

@@ -13,7 +13,8 @@ pub struct MetaEstimate<B: Backend> {
     /// it was clipped; empty where no step was walked back.
     pub adjoint_norms: Vec<f64>,
     /// By how many powers of ten the adjoint would have grown without clipping: above some units the
-    /// inner loop is chaotic at this φ, and an unclipped gradient means nothing (META 2.3).
+    /// inner loop is chaotic at this φ, and an unclipped gradient means nothing
+    /// (docs/notes.md, Meta-gradients: chaos).
     pub adjoint_growth: f64,
     /// How often the adjoint was clipped.
     pub clips: usize,

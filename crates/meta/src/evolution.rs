@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::{
     MetaEstimate,
-    vector::{numbers, tensor},
+    vector::{numbers, vector},
 };
 
 /// The mean of `(L(φ + σ ε) - L(φ - σ ε)) / 2σ · ε` over `pairs` normal ε drawn from `seed`.
@@ -13,7 +13,7 @@ use crate::{
 /// `run` gives the loss of a whole run. Both runs of a pair solve the same instance, so that what they have in common
 /// cancels.
 ///
-/// Source: META 2.3; Salimans et al. 2017 for the estimator.
+/// Source: Salimans et al. 2017; docs/notes.md, Meta-gradients: clipping, for its quality here.
 pub(crate) fn evolution<B: Backend>(
     run: impl Fn(&Tensor<B, 1>) -> f64,
     phi: &Tensor<B, 1>,
@@ -29,13 +29,13 @@ pub(crate) fn evolution<B: Backend>(
         let noise: Vec<f64> = middle.iter().map(|_| normal(&mut random)).collect();
         let [low, high] = [-sigma, sigma].map(|sigma| {
             let moved: Vec<f64> = middle.iter().zip(&noise).map(|(x, e)| x + sigma * e).collect();
-            run(&tensor(&moved))
+            run(&vector(&moved))
         });
         loss += (low + high) / (2 * pairs) as f64;
         let slope = (high - low) / (2.0 * sigma * pairs as f64);
         gradient.iter_mut().zip(noise).for_each(|(sum, e)| *sum += slope * e);
     }
-    MetaEstimate::without_steps(loss, tensor(&gradient))
+    MetaEstimate::without_steps(loss, vector(&gradient))
 }
 
 /// A normal number, by Box and Muller.

@@ -5,8 +5,8 @@ use burn::{
 use serde::Serialize;
 
 use crate::{
-    MetaEstimate, Objective, Optimizer, Problem, evolution::evolution, joint_loop::joint,
-    unrolled::unrolled,
+    BilevelProblem, MetaEstimate, Objective, Optimizer, TaskDistribution,
+    alternating_descent::joint, evolution::evolution, unrolled::unrolled,
 };
 
 /// How the derivative of the outer loss by the softness is taken.
@@ -16,7 +16,8 @@ pub enum MetaGradient {
     /// Exact second order, through every inner step.
     Unrolled {
         /// Limit of the adjoint, as a multiple of what the outer loss put into it. Without it the
-        /// gradient is exact, and beyond some ten steps of Adam often useless (META 2.3).
+        /// gradient is exact, and beyond some ten steps of Adam often useless
+        /// (docs/notes.md, Meta-gradients: chaos).
         clip: Option<f64>,
     },
     /// The same through the last steps only.
@@ -27,11 +28,11 @@ pub enum MetaGradient {
         clip: Option<f64>,
     },
     /// The derivative of the outer loss by φ where the inner loop ends, as though the solution did not
-    /// depend on φ: what the released shape code does. Zero under a referee that ignores φ.
+    /// depend on φ: what the released shape code does. Zero for an outer loss that ignores φ.
     Direct,
     /// An antithetic evolution strategy: differences of whole inner loops, no derivatives. Follows
     /// the outer loss blurred by a normal distribution.
-    Es {
+    EvolutionStrategy {
         /// Standard deviation of the steps away from φ, the same for every parameter.
         sigma: f64,
         /// Pairs of inner loops.
@@ -40,7 +41,7 @@ pub enum MetaGradient {
     /// No derivative of the outer loss at all: the softness goes along with the scene, down the inner
     /// loss, and stays where it ends. What the released pose code does. Its "gradient" is the way that
     /// φ went, turned round, and a learner takes all of it.
-    Joint {
+    AlternatingDescent {
         /// Rate of the Adam that moves φ, once per inner step.
         learning_rate: f64,
     },
@@ -49,7 +50,8 @@ pub enum MetaGradient {
 impl Default for MetaGradient {
     /// Through every step, with the adjoint kept within what the outer loss put into it.
     ///
-    /// Source: META 2.1 and 2.3: the only exact mode whose sign is reliable at 100 steps.
+    /// Source: docs/notes.md, Meta-gradients: clipping. How often its sign is right on the tasks
+    /// stands in docs/estimators.md.
     fn default() -> Self {
         Self::Unrolled { clip: Some(1.0) }
     }
@@ -58,7 +60,7 @@ impl Default for MetaGradient {
 impl MetaGradient {
     /// The outer loss of `problem` under `phi` `[P]` and its derivative.
     ///
-    /// `seed` is that of the noise of [`Es`](MetaGradient::Es); all else has none. Memory holds one
+    /// `seed` is that of the noise of [`Es`](MetaGradient::EvolutionStrategy); all else has none. Memory holds one
     /// inner step's tape, and the scene and the optimiser's state before each step walked back.
     ///
     /// # Panics
@@ -66,24 +68,43 @@ impl MetaGradient {
     /// If an evolution strategy has no pair, or a sigma that is not positive.
     pub fn estimate<B, P, R, O>(
         &self,
-        problem: &Problem<B, P, R, O>,
+        problem: &BilevelProblem<B, P, R, O>,
         phi: &Tensor<B, 1>,
         seed: u64,
     ) -> MetaEstimate<B>
     where
         B: Backend,
-        P: Objective<Autodiff<B>> + Objective<Autodiff<Autodiff<B>>>,
-        R: Objective<B> + Objective<Autodiff<B>>,
+        P: Objective<Autodiff<Autodiff<B>>>,
+        R: Objective<Autodiff<B>>,
         O: Optimizer,
     {
         match *self {
             Self::Unrolled { clip } => unrolled(problem, phi, problem.inner.steps, clip),
             Self::Truncated { steps, clip } => unrolled(problem, phi, steps, clip),
             Self::Direct => unrolled(problem, phi, 0, None),
-            Self::Es { sigma, pairs } => {
+            Self::EvolutionStrategy { sigma, pairs } => {
                 evolution(|phi| problem.loss(phi), phi, sigma, pairs, seed)
             }
-            Self::Joint { learning_rate } => joint(problem, phi, learning_rate),
+            Self::AlternatingDescent { learning_rate } => joint(problem, phi, learning_rate),
+        }
+    }
+
+    /// The same on the instance of `tasks` with this seed, which an evolution strategy prepares anew for every softness that it tries.
+    ///
+    /// # Panics
+    ///
+    /// Those of [`MetaGradient::estimate`].
+    pub fn estimate_on<B: Backend>(
+        &self,
+        tasks: &impl TaskDistribution<B>,
+        seed: u64,
+        phi: &Tensor<B, 1>,
+    ) -> MetaEstimate<B> {
+        match *self {
+            Self::EvolutionStrategy { sigma, pairs } => {
+                evolution(|phi| tasks.loss(seed, phi), phi, sigma, pairs, seed)
+            }
+            _ => self.estimate(&tasks.problem(seed, phi), phi, seed),
         }
     }
 }

@@ -1,4 +1,7 @@
-use burn::tensor::{Tensor, backend::Backend};
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
 
 /// What an inner loop minimises over `theta`, given `phi`.
 ///
@@ -39,5 +42,22 @@ pub trait Objective<B: Backend> {
     /// It is `theta` itself unless the scene has bounds.
     fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
         theta
+    }
+}
+
+/// An objective one level of autodiff below its own: what is tracked there is tracked here, and the level above sees constants.
+pub(crate) struct Lowered<'a, P>(pub(crate) &'a P);
+
+impl<B: Backend, P: Objective<Autodiff<B>>> Objective<B> for Lowered<'_, P> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+        self.0.loss(Tensor::from_inner(theta), Tensor::from_inner(phi)).inner()
+    }
+
+    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
+        self.0.loss_at(Tensor::from_inner(theta), Tensor::from_inner(phi), step).inner()
+    }
+
+    fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        self.0.allowed(Tensor::from_inner(theta)).inner()
     }
 }

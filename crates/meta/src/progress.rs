@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::exact;
+use crate::OuterLoop;
 
 /// How far learning has come: all that has to be kept to go on as though it had never stopped.
 ///
@@ -12,10 +12,9 @@ pub struct Progress {
     /// Updates of φ so far; records of this and later steps, if some are on file, will come again.
     pub step: usize,
     /// The softness `[P]`.
-    #[serde(with = "exact::vector")]
     pub phi: Vec<f64>,
     /// Tensors of the outer optimiser's state `[P]` each, in its order.
-    pub(crate) optimizer: Vec<Moment>,
+    pub(crate) optimizer: Vec<Vec<f64>>,
     /// The best softness so far, once there was a validation.
     pub best: Option<Best>,
     /// Validations since then that were not better.
@@ -27,7 +26,6 @@ pub struct Progress {
     /// Instances tried so far, those of validations not counted.
     pub tried: usize,
     /// Time spent so far.
-    #[serde(with = "exact::number")]
     pub seconds: f64,
 }
 
@@ -38,16 +36,10 @@ pub struct Best {
     /// Updates of φ that led to it.
     pub step: usize,
     /// Its validation loss.
-    #[serde(with = "exact::number")]
     pub loss: f64,
     /// The softness `[P]`.
-    #[serde(with = "exact::vector")]
     pub phi: Vec<f64>,
 }
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
-pub(crate) struct Moment(#[serde(with = "exact::vector")] pub(crate) Vec<f64>);
 
 impl Progress {
     /// The start, at softness `phi` `[P]`.
@@ -70,13 +62,31 @@ impl Progress {
         self.best.as_ref().map_or(&self.phi, |best| &best.phi)
     }
 
-    /// Whether all vectors have one length and are finite.
-    pub(crate) fn is_sound(&self) -> bool {
-        let best = self.best.iter().map(|best| &best.phi);
-        let moments = self.optimizer.iter().map(|Moment(values)| values);
-        let sound = |values: &Vec<f64>| {
-            values.len() == self.phi.len() && values.iter().all(|x| x.is_finite())
-        };
-        sound(&self.phi) && best.chain(moments).all(sound)
+    /// What keeps `learner` from going on from here with `parameters` numbers.
+    pub(crate) fn unsound(&self, learner: &OuterLoop, parameters: usize) -> Option<String> {
+        let Self { step, phi, optimizer, best, seconds, dropped, tried, .. } = self;
+        let best_phi = best.iter().map(|best| &best.phi);
+        for values in std::iter::once(phi).chain(best_phi).chain(optimizer) {
+            if values.len() != parameters {
+                return Some(format!("a vector has {} numbers, not {parameters}", values.len()));
+            }
+            if !values.iter().all(|x| x.is_finite()) {
+                return Some("a vector holds what is no finite number".into());
+            }
+        }
+        let best_step = best.as_ref().map_or(0, |best| best.step);
+        if *step > learner.steps || best_step > *step {
+            let steps = learner.steps;
+            return Some(format!("step {step} of {steps}, the best after {best_step}, cannot be"));
+        }
+        // Adam remembers two vectors once it has made a step.
+        if !(optimizer.is_empty() || optimizer.len() == 2 && *step > 0) {
+            return Some(format!("{} moments after step {step} cannot be", optimizer.len()));
+        }
+        let loss = best.as_ref().map_or(0.0, |best| best.loss);
+        if !(loss.is_finite() && seconds.is_finite() && *seconds >= 0.0 && dropped <= tried) {
+            return Some("its losses, times or counts cannot be".into());
+        }
+        None
     }
 }

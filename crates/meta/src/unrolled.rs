@@ -6,7 +6,7 @@ use burn::{
 };
 
 use crate::{
-    MetaEstimate, Objective, Optimizer, Problem,
+    BilevelProblem, MetaEstimate, Objective, Optimizer,
     adjoint::{Adjoint, Stored},
     vector::numbers,
 };
@@ -24,27 +24,27 @@ struct Taken<B: Backend> {
 /// so that memory holds the states of `depth` steps and the tape of one. With `clip`, the adjoint
 /// of the scene is kept within so many times what the losses so far have put into it.
 ///
-/// Source: META 2.1, with the optimiser's own adjoint from the tape instead of by hand.
+/// Source: docs/notes.md, Meta-gradients: Adam (the way back) and Meta-gradients: clipping.
 pub(crate) fn unrolled<B, P, R, O>(
-    problem: &Problem<B, P, R, O>,
+    problem: &BilevelProblem<B, P, R, O>,
     phi: &Tensor<B, 1>,
     depth: usize,
     clip: Option<f64>,
 ) -> MetaEstimate<B>
 where
     B: Backend,
-    P: Objective<Autodiff<B>> + Objective<Autodiff<Autodiff<B>>>,
+    P: Objective<Autodiff<Autodiff<B>>>,
     R: Objective<Autodiff<B>>,
     O: Optimizer,
 {
     let optimizer = &problem.inner.optimizer;
-    let at = problem.measured.at(problem.inner.steps);
+    let at = problem.outer_steps.at(problem.inner.steps);
     let share = 1.0 / at.len() as f64;
     let (mut kept, mut taken) = (VecDeque::new(), Vec::new());
     let mut estimate = MetaEstimate::without_steps(0.0, phi.zeros_like());
     problem.walk(phi, |step, theta, state| {
         if at.contains(&step) {
-            let (loss, by_theta, by_phi) = derivatives(&problem.referee, theta, phi);
+            let (loss, by_theta, by_phi) = derivatives(&problem.outer_loss, theta, phi);
             estimate.loss += share * loss;
             estimate.gradient = estimate.gradient.clone() + by_phi * share;
             taken.push(Taken { step, by_theta: by_theta * share });
@@ -79,7 +79,7 @@ where
     let mut prepared: Option<Prepared<B>> = None;
     while let Some(before) = kept.pop_back() {
         let step = before.step;
-        let stage = <P as Objective<Autodiff<Autodiff<B>>>>::stage(&problem.objective, step);
+        let stage = problem.objective.stage(step);
         if prepared.as_ref().is_none_or(|prepared| prepared.stage != stage) {
             let next = Prepared::new(&problem.objective, phi, step, stage);
             let last = prepared.replace(next).map(Prepared::by_phi);

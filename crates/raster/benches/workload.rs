@@ -1,10 +1,10 @@
 //! The scenes that are measured.
 
-use std::{path::Path, sync::Arc};
+use std::{env, path::Path, sync::Arc};
 
 use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_mesh::{Mesh, fox, icosphere};
-use softrast_raster::{Rasterizer, Silhouette, TConorm, project};
+use softrast_raster::{RasterBackend, Rasterizer, Silhouette, TConorm, project};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 
 /// A logistic of the signed squared distance: `width` is the root of its scale, in NDC.
@@ -75,7 +75,7 @@ impl Workload {
     }
 
     /// The silhouette and its table, made for a tolerance.
-    pub(crate) fn prepare<B: Backend>(
+    pub(crate) fn prepare<B: RasterBackend>(
         &self,
         tolerance: f64,
         dtype: DType,
@@ -107,12 +107,12 @@ pub(crate) fn disk(size: usize) -> Vec<f64> {
     (0..size * size).map(covered).collect()
 }
 
-/// A well-known mesh that is not part of this repository, from the folder beside it.
+/// A well-known mesh that is not part of this repository, from the folder that `SOFTRAST_MESHES` names.
 fn known(file: &str) -> Option<Mesh> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/meshes/paper");
-    let mesh = Mesh::load(folder.join(file)).ok();
+    let folder = env::var_os("SOFTRAST_MESHES")?;
+    let mesh = Mesh::load(Path::new(&folder).join("paper").join(file)).ok();
     if mesh.is_none() {
-        println!("skipped: {file} is not beside the checkout; a mesh like it stands in");
+        println!("there is no paper/{file} in {folder:?}; a mesh like it stands in");
     }
     mesh
 }

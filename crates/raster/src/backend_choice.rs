@@ -98,7 +98,7 @@ pub enum NoBackend {
     Unknown(String),
     /// Its feature was off when the program was built.
     #[error(
-        "this program was built without {asked}, for {}: add --features {asked} to the cargo command",
+        "this program was built without {asked}, for {}: build it with the feature {asked}",
         names(compiled)
     )]
     Missing {
@@ -187,8 +187,7 @@ mod tests {
         let missing = BackendChoice::among(&[NdArray, Flex], Some("wgpu")).unwrap_err();
         assert_eq!(
             missing.to_string(),
-            "this program was built without wgpu, for ndarray and flex: add --features wgpu to the \
-             cargo command"
+            "this program was built without wgpu, for ndarray and flex: build it with the feature wgpu"
         );
         let unknown = BackendChoice::among(&[NdArray], Some("cuda")).unwrap_err();
         assert!(unknown.to_string().contains("flex"), "{unknown}");

@@ -17,7 +17,7 @@ const FARTHEST: f64 = 1e15;
 /// Past the pole (|elevation| > 90°) the view rolls by half a turn, as `look_at` does. At the pole
 /// itself, where `look_at` divides by zero, this form keeps the axes that it has just before.
 ///
-/// Source: FACTS 1.1, with the cross products of `look_at` multiplied out.
+/// Source: docs/notes.md, Camera, with the cross products of `look_at` multiplied out.
 pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>) -> Tensor<B, 3> {
     let [sin_e, cos_e] = sin_cos(elevation);
     let [sin_a, cos_a] = sin_cos(azimuth);
@@ -51,7 +51,7 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 /// vertex nearer than [`NEAR`] is projected as though it were that near, so that nothing divides
 /// by zero; the rasterizer does not draw its faces, by their depth.
 ///
-/// Source: FACTS 1.1.
+/// Source: docs/notes.md, Camera.
 ///
 /// # Panics
 ///

@@ -12,7 +12,7 @@ pub struct Background<B: Backend> {
 /// Normalised depth, same shape: 1 at the near plane, 0 at the far plane, a straight line between
 /// and beyond.
 ///
-/// Source: FACTS 1.7.
+/// Source: docs/notes.md, Colour.
 ///
 /// # Panics
 ///
@@ -34,8 +34,8 @@ pub fn nearness<B: Backend, const D: usize>(
 /// exact.
 ///
 /// Source: Wu et al. 2024, Eq. 4. Not in the paper: the background, without which a pixel far from
-/// all faces is 0/0 (META 6.3). Not offered: the running rescale of the released code, which depends
-/// on the order of the faces, with a gradient that is not its own (FACTS 1.7).
+/// all faces is 0/0. Not offered: the running rescale of the released code, which depends
+/// on the order of the faces, with a gradient that is not its own (docs/notes.md, Colour).
 ///
 /// # Panics
 ///
@@ -67,7 +67,7 @@ pub fn blend<B: Backend>(
 /// equally near faces the first is seen; where there is none, `background` `[channels]`. The result
 /// has no gradient. Used for targets and metrics.
 ///
-/// Source: FACTS 1.7 (hard).
+/// Source: docs/notes.md, Colour.
 ///
 /// # Panics
 ///

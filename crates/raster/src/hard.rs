@@ -10,7 +10,7 @@ use crate::{NEAR, kernel::inside_spans};
 /// top row first, in the float type of `vertices`; it has no gradient. Used for targets and metrics.
 /// Faces that the soft rasterizer does not draw are not drawn here either.
 ///
-/// Source: FACTS 1.5 (hard), 1.1 (pixel centres).
+/// Source: docs/notes.md, Pixels.
 ///
 /// # Panics
 ///

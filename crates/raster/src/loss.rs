@@ -8,7 +8,7 @@ const EMPTY: f64 = 1e-6;
 /// `image` and `target` are `[views, height, width]` in [0, 1]; the result is `[views]`. Two empty
 /// images give 1, as an empty one against any other does: such a target cannot be matched.
 ///
-/// Source: FACTS 4.1.
+/// Source: docs/notes.md, Losses and errors.
 pub fn iou_loss<B: Backend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
     let [views, height, width] = image.dims();
     let sum =

@@ -62,7 +62,7 @@ impl Profile {
     /// **Gradients.** A culled face gives no gradient, and Adam would have moved it however small
     /// its gradient was. At the default tolerance of 1e-5 the gradient of a face that lies wholly in
     /// the culled tail is below Adam's usual epsilon of 1e-8 times the image's own; choose a
-    /// smaller tolerance where faces must be drawn in from afar (META 6.2).
+    /// smaller tolerance where faces must be drawn in from afar (docs/notes.md, Culling: gradient).
     ///
     /// `device` belongs to the backend that evaluates the softness, in f64 where it can.
     ///

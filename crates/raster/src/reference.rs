@@ -33,7 +33,8 @@ pub struct Scene<'a> {
 /// Inside or outside is told by edge functions, the distance is that to the nearest point of the
 /// boundary. Edges belong to the inside; a face without area has none.
 ///
-/// Source: FACTS 1.3, computed by projection onto the edges instead of barycentric coordinates.
+/// Source: Petersen et al. 2022, computed by projection onto the edges instead of barycentric
+/// coordinates (docs/notes.md, Signed distance).
 ///
 /// # Panics
 ///

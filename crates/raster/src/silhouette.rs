@@ -33,17 +33,46 @@ impl Rasterizer {
     /// # Panics
     ///
     /// If `faces` or the image is empty, or `phi` has the wrong length.
-    pub fn prepare<B: Backend, S: Softness>(
+    pub fn prepare<B: RasterBackend, S: Softness>(
         &self,
         faces: &Arc<[[u32; 3]]>,
         softness: S,
         phi: &Tensor<B, 1>,
     ) -> Silhouette<S> {
-        assert!(self.size > 0, "an image needs at least one pixel");
         let values: Vec<f64> = phi.to_data().iter().collect();
-        let profile = self.profile::<B>(&softness, &values, faces.len(), &phi.device());
+        #[cfg(feature = "wgpu")]
+        if !B::ON_HOST {
+            // Without a word between host and GPU for every attempt.
+            type Host = burn::backend::NdArray<f32>;
+            return self.prepare_on::<Host, S>(faces, softness, &values, false);
+        }
+        self.prepare_on::<B, S>(faces, softness, &values, B::ON_HOST)
+    }
+
+    /// [`Rasterizer::prepare`] from plain numbers, for drawing on the CPU (`on_host`) or on a GPU; `H` is where support and knots are
+    /// chosen, in f64 if it has that.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, or `phi` has the wrong length.
+    pub fn prepare_on<H: Backend, S: Softness>(
+        &self,
+        faces: &Arc<[[u32; 3]]>,
+        softness: S,
+        phi: &[f64],
+        on_host: bool,
+    ) -> Silhouette<S> {
+        assert!(self.size > 0, "an image needs at least one pixel");
+        let Self { t_conorm, tolerance, .. } = *self;
+        let (faces, device) = (faces.clone(), Default::default());
+        let count = faces.len();
+        let profile = match on_host {
+            true => Profile::new::<H>(&softness, t_conorm, phi, count, tolerance, &device),
+            // The look-up of a GPU knows no cells that are counted from the far end.
+            false => Profile::chosen::<H>(&softness, t_conorm, phi, count, tolerance, &[], &device),
+        };
         let op = ProfileSum {
-            faces: faces.clone(),
+            faces,
             grid: profile.grid,
             size: self.size,
             near: NEAR,
@@ -51,34 +80,6 @@ impl Rasterizer {
             topology: Default::default(),
         };
         Silhouette { softness, profile, op }
-    }
-
-    /// Support and knots; for a GPU chosen on the CPU, in f64 and without a word between host and
-    /// GPU for every attempt.
-    fn profile<B: Backend>(
-        &self,
-        softness: &impl Softness,
-        phi: &[f64],
-        faces: usize,
-        device: &B::Device,
-    ) -> Profile {
-        let Self { t_conorm, tolerance, .. } = *self;
-        #[cfg(feature = "wgpu")]
-        if B::name(device).contains("wgpu") {
-            type Host = burn::backend::NdArray<f32>;
-            let device = Default::default();
-            // Its look-up knows no cells that are counted from the far end.
-            return Profile::chosen::<Host>(
-                softness,
-                t_conorm,
-                phi,
-                faces,
-                tolerance,
-                &[],
-                &device,
-            );
-        }
-        Profile::new::<B>(softness, t_conorm, phi, faces, tolerance, device)
     }
 }
 
@@ -168,7 +169,7 @@ impl<S: Softness> Silhouette<S> {
     /// **not** the derivative of the image. Gradients reach the parameters of neither softness at the
     /// outermost level of autodiff. Costs one more forward pass.
     ///
-    /// Source: DESIGN 2 (`surrogate`).
+    /// Not in the paper. Source: docs/notes.md, Surrogate gradient.
     pub fn coverage_with_surrogate<B: RasterBackend, T: Softness>(
         &self,
         vertices: Tensor<B, 3>,

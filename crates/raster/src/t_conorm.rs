@@ -15,7 +15,7 @@ const SMALLEST: f64 = 1e-30;
 /// T-conorm. `max` is the only common one without a generator; it is offered by
 /// [`reference::maximum`](crate::reference::maximum) alone, because it needs no sum.
 ///
-/// Source: FACTS 1.6 (the table of `GenDR`); DESIGN 2 for the generators.
+/// Source: Petersen et al. 2022 for the T-conorms; docs/notes.md, T-conorms, for the generators.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum TConorm {
     /// `a + b - ab`, the default.

@@ -1,94 +1,93 @@
-use std::path::PathBuf;
+use std::{path::PathBuf, str::FromStr};
 
 use clap::Parser;
+use softrast_lab::parse::{count, positive, share, whole};
 use softrast_raster::{Rasterizer, TConorm};
 use softrast_softness::Family;
-
-use crate::target::Target;
 
 /// Draws soft silhouettes of a mesh and measures what they cost.
 #[derive(Debug, Parser)]
 #[command(name = "render", version, allow_negative_numbers = true)]
 pub(crate) struct Args {
-    /// Mesh to draw.
+    /// Mesh to draw
     #[arg(value_name = "MESH.obj")]
     pub(crate) mesh: PathBuf,
 
-    /// Width and height of the image, in pixels.
-    #[arg(long, value_name = "N", default_value_t = 256, value_parser = size)]
+    /// Width and height of the image, in pixels
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = whole::<1, 4096>)]
     pub(crate) size: usize,
 
-    /// Azimuths of the views in degrees: 0 looks along +z from -z, 90 from +x.
+    /// Azimuths of the views in degrees: 0 looks along +z from -z, 90 from +x
     #[arg(long, value_name = "A,B,..", default_value = "30", value_delimiter = ',', value_parser = finite, allow_hyphen_values = true)]
     pub(crate) azimuths: Vec<f64>,
 
-    /// Elevation of the views, in degrees above the ground.
+    /// Elevation of the views, in degrees above the ground
     #[arg(long, value_name = "X", default_value_t = 20.0, value_parser = finite)]
     pub(crate) elevation: f64,
 
-    /// Distance of the camera from the origin, in world units.
+    /// Distance of the camera from the origin, in world units
     #[arg(long, value_name = "X", default_value_t = 2.732, value_parser = positive)]
     pub(crate) distance: f64,
 
-    /// Whole field of view.
+    /// Whole field of view
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = angle)]
     pub(crate) fov: f64,
 
-    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file.
-    #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic", value_parser = softness)]
+    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file
+    #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
     pub(crate) softness: Choice,
 
-    /// Scale of a named softness in NDC, NDC² with --squared; by default edges are about half a
-    /// pixel wide.
+    /// Scale of a named softness in NDC, NDC² with --squared; by default edges are about half a pixel wide
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) scale: Option<f64>,
 
-    /// Feed a named softness the squared distance.
+    /// Feed a named softness the squared distance
     #[arg(long)]
     pub(crate) squared: bool,
 
-    /// How faces join: probabilistic, einstein, hamacher:p, frank:p, yager:p, `aczel_alsina:p`,
-    /// dombi:p or `schweizer_sklar:p`.
+    /// How faces join: probabilistic, einstein, hamacher:p, frank:p, yager:p, `aczel_alsina:p`, dombi:p or `schweizer_sklar:p`
     #[arg(long, value_name = "NAME[:p]", default_value = "probabilistic")]
     pub(crate) t_conorm: TConorm,
 
-    /// Take the mesh as it stands, instead of centring it with its longest side scaled to 2.
+    /// Take the mesh as it stands, instead of centring it with its longest side scaled to 2
     #[arg(long)]
     pub(crate) raw: bool,
 
-    /// Largest error of a pixel against evaluating every pixel-face pair.
-    #[arg(long, value_name = "X", default_value_t = Rasterizer::TOLERANCE, value_parser = tolerance)]
+    /// Largest error of a pixel against evaluating every pixel-face pair
+    #[arg(long, value_name = "X", default_value_t = Rasterizer::TOLERANCE, value_parser = share)]
     pub(crate) tolerance: f64,
 
-    /// Evaluate every pixel-face pair, by tensor ops in f64; takes minutes.
+    /// Evaluate every pixel-face pair, by tensor ops in f64; takes minutes
     #[arg(long)]
     pub(crate) reference: bool,
 
-    /// Image to compare all views with: a picture (its luminance counts), or a disk at x, y with
-    /// radius r in NDC, y up.
-    #[arg(long, value_name = "FILE.png|disk:x,y,r", value_parser = target)]
+    /// Image to compare all views with: a picture (its luminance counts), or a disk at x, y with radius r in NDC, y up
+    #[arg(long, value_name = "FILE.png|disk:x,y,r")]
     pub(crate) target: Option<Target>,
 
-    /// What to draw on: ndarray, flex or wgpu, if the program was built with it; the first of these by
-    /// default.
+    /// What to draw on: ndarray, flex or wgpu, if the program was built with it; the first of these by default
     #[arg(long, value_name = "NAME", conflicts_with = "reference")]
     pub(crate) backend: Option<String>,
 
-    /// Timed repetitions, after one that is not timed [default: 5, or 1 with --reference].
+    /// Timed repetitions, after one that is not timed [default: 5, or 1 with --reference]
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) repeat: Option<usize>,
 
-    /// Threads to use; all cores by default.
+    /// Threads to use; all cores by default
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) threads: Option<usize>,
 
-    /// Picture to write; a contact sheet if there are several views.
+    /// Picture to write; a contact sheet if there are several views
     #[arg(long, value_name = "FILE.png", default_value = "out/render.png")]
     pub(crate) out: PathBuf,
 
-    /// Print one JSON object instead of a table.
+    /// Print one JSON object instead of a table
     #[arg(long)]
     pub(crate) json: bool,
+
+    /// Show no progress
+    #[arg(long)]
+    pub(crate) quiet: bool,
 }
 
 /// A softness as named on the command line.
@@ -100,54 +99,54 @@ pub(crate) enum Choice {
     File(PathBuf),
 }
 
-/// Larger images would not fit into memory.
-const LARGEST: usize = 4096;
-/// More repetitions or threads than this are a slip of the finger.
-const MOST: usize = 100_000;
+impl FromStr for Choice {
+    type Err = String;
 
-fn size(text: &str) -> Result<usize, String> {
-    let size = text.parse().ok().filter(|n| (1..=LARGEST).contains(n));
-    size.ok_or_else(|| format!("expected a whole number of pixels from 1 to {LARGEST}"))
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.to_ascii_lowercase().ends_with(".json") {
+            return Ok(Self::File(text.into()));
+        }
+        let family = text.parse().map(Self::Named);
+        family.map_err(|unknown: softrast_softness::UnknownFamily| {
+            format!("{unknown}; or a file that ends in .json")
+        })
+    }
 }
 
-fn count(text: &str) -> Result<usize, String> {
-    let count = text.parse().ok().filter(|n| (1..=MOST).contains(n));
-    count.ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
+/// What the silhouettes should look like.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Target {
+    /// A disk with a hard edge at pixel centres, in NDC (x right, y up).
+    Disk { x: f64, y: f64, radius: f64 },
+    /// The luminance of a picture.
+    Picture(PathBuf),
 }
 
-fn number(text: &str, what: &str, holds: impl Fn(f64) -> bool) -> Result<f64, String> {
-    let number = text.trim().parse().ok().filter(|x: &f64| x.is_finite() && holds(*x));
-    number.ok_or_else(|| format!("expected {what}"))
+impl FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some(numbers) = text.strip_prefix("disk:") else {
+            return Ok(Self::Picture(text.into()));
+        };
+        let numbers: Result<Vec<f64>, _> = numbers.split(',').map(|x| x.trim().parse()).collect();
+        match numbers.as_deref() {
+            Ok(&[x, y, radius]) if x.is_finite() && y.is_finite() && radius > 0.0 => {
+                Ok(Self::Disk { x, y, radius })
+            }
+            _ => Err("expected disk:x,y,r with a positive radius r".into()),
+        }
+    }
 }
 
 fn finite(text: &str) -> Result<f64, String> {
-    number(text, "a number (or several, with commas between them)", |_| true)
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    number(text, "a positive number", |x| x > 0.0)
+    let number = text.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    number.ok_or_else(|| "expected a number (or several, with commas between them)".into())
 }
 
 fn angle(text: &str) -> Result<f64, String> {
-    number(text, "degrees between 0 and 180", |x| x > 0.0 && x < 180.0)
-}
-
-fn tolerance(text: &str) -> Result<f64, String> {
-    number(text, "a number between 0 and 1", |x| x > 0.0 && x < 1.0)
-}
-
-fn softness(text: &str) -> Result<Choice, String> {
-    if text.to_ascii_lowercase().ends_with(".json") {
-        return Ok(Choice::File(text.into()));
-    }
-    let family = text.parse().map(Choice::Named);
-    family.map_err(|unknown: softrast_softness::UnknownFamily| {
-        format!("{unknown}; or a file that ends in .json")
-    })
-}
-
-fn target(text: &str) -> Result<Target, String> {
-    text.parse()
+    let angle = positive(text).ok().filter(|&angle| angle < 180.0);
+    angle.ok_or_else(|| "expected degrees between 0 and 180".into())
 }
 
 #[cfg(test)]
@@ -155,14 +154,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_command_line_is_sound() {
-        use clap::CommandFactory;
-        Args::command().debug_assert();
-    }
-
-    #[test]
     fn azimuths_may_be_many_and_negative() {
         let args = Args::try_parse_from(["render", "a.obj", "--azimuths", "-30,0,1e1"]).unwrap();
         assert_eq!(args.azimuths, [-30.0, 0.0, 10.0]);
+    }
+
+    #[test]
+    fn a_broken_disk_is_refused() {
+        for text in ["disk:", "disk:1,2", "disk:0,0,0", "disk:0,0,-1", "disk:a,0,1", "disk:0,0,nan"]
+        {
+            assert!(text.parse::<Target>().is_err(), "{text}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! The fused op on the backend of the program, timed.
+//! The fused op on the backend of the program.
 
 use std::time::Instant;
 
@@ -7,69 +7,32 @@ use burn::{
     tensor::{DType, ElementConversion, Tensor},
 };
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss, project};
-use softrast_runner::median;
 use softrast_softness::EdgeSoftness;
 
-use crate::{
-    measured::{Knots, Measured},
-    scene::Scene,
-};
-
-/// Draws the scene `repeat` times, after once to warm up.
-pub(crate) fn measure<B: RasterBackend>(scene: &Scene, repeat: usize) -> Measured {
-    let fused = Fused::<B>::new(scene);
-    let mut last = fused.step();
-    let steps: Vec<Step<B>> = (0..repeat)
-        .map(|_| {
-            last = fused.step();
-            last.clone()
-        })
-        .collect();
-    let times = |of: fn(&Step<B>) -> f64| median(&steps.iter().map(of).collect::<Vec<_>>());
-    let pairs = fused.pairs(&fused.silhouette);
-    Measured {
-        alpha: last.image.to_data().iter().collect(),
-        loss: last.loss,
-        pairs,
-        culled: Some(fused.culled(scene, pairs)),
-        forward_ms: times(|step| step.forward_ms),
-        backward_ms: last.loss.map(|_| times(|step| step.backward_ms)),
-        total_ms: times(|step| step.forward_ms + step.backward_ms),
-        profile: Some(fused.knots()),
-    }
-}
+use crate::{program::Step, scene::Scene};
 
 /// What stays the same from step to step.
-struct Fused<B: RasterBackend> {
+pub(crate) struct Fused<B: RasterBackend> {
     silhouette: Silhouette<EdgeSoftness>,
-    prepare_ms: f64,
     table: Tensor<B, 2>,
     vertices: Tensor<B, 3>,
     orbits: Tensor<B, 2>,
     target: Option<Tensor<B, 3>>,
-}
-
-/// One image, its loss and gradient norm if there is a target, and what they took.
-#[derive(Clone)]
-struct Step<B: RasterBackend> {
-    image: Tensor<B, 3>,
-    loss: Option<[f64; 2]>,
-    forward_ms: f64,
-    backward_ms: f64,
+    /// Time to choose the knots and fill the table, which is done once for a softness.
+    pub(crate) prepare_ms: f64,
 }
 
 impl<B: RasterBackend> Fused<B> {
-    fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let &Scene { size, tolerance, t_conorm, .. } = scene;
         let start = Instant::now();
         let phi = scene.phi::<B>(DType::F32);
         let rasterizer = Rasterizer { size, tolerance, t_conorm };
         let silhouette = rasterizer.prepare(&scene.faces, scene.softness, &phi);
         let table = silhouette.table(phi);
-        let prepare_ms = milliseconds::<B>(start);
         Self {
+            prepare_ms: milliseconds::<B>(start),
             silhouette,
-            prepare_ms,
             table,
             vertices: scene.vertices(DType::F32),
             orbits: scene.orbits(DType::F32),
@@ -77,33 +40,30 @@ impl<B: RasterBackend> Fused<B> {
         }
     }
 
-    /// Pairs that one pass visits.
-    fn pairs(&self, silhouette: &Silhouette<EdgeSoftness>) -> usize {
-        silhouette.pairs(project(self.vertices.clone(), self.orbits.clone()))
+    /// Pairs that one pass visits, and the share of those which the default tolerance keeps that are not among them.
+    pub(crate) fn pairs(&self, scene: &Scene) -> (usize, f64) {
+        let rasterizer = Rasterizer { t_conorm: scene.t_conorm, ..Rasterizer::new(scene.size) };
+        let usual = rasterizer.prepare(&scene.faces, scene.softness, &scene.phi::<B>(DType::F32));
+        let [pairs, kept] = [&self.silhouette, &usual]
+            .map(|of| of.pairs(project(self.vertices.clone(), self.orbits.clone())));
+        (pairs, kept.saturating_sub(pairs) as f64 / kept.max(1) as f64)
     }
 
-    /// Share of the pairs which the default tolerance keeps that are not among these `pairs`.
-    fn culled(&self, scene: &Scene, pairs: usize) -> f64 {
-        let &Scene { size, t_conorm, .. } = scene;
-        let rasterizer = Rasterizer { t_conorm, ..Rasterizer::new(size) };
-        let phi = scene.phi::<B>(DType::F32);
-        let kept = self.pairs(&rasterizer.prepare(&scene.faces, scene.softness, &phi));
-        kept.saturating_sub(pairs) as f64 / kept.max(1) as f64
-    }
-
-    fn knots(&self) -> Knots {
+    /// Knots of the profile, and the distances outside and inside, in NDC, beyond which it is constant.
+    pub(crate) fn profile(&self) -> (usize, [f64; 2]) {
         let profile = self.silhouette.profile();
-        let prepare_ms = self.prepare_ms;
-        Knots { count: profile.knots(), support_ndc: profile.support(), prepare_ms }
+        (profile.knots(), profile.support())
     }
 
-    fn step(&self) -> Step<B> {
+    /// Draws the scene once, and differentiates if it has a target.
+    pub(crate) fn step(&self) -> Step {
+        let values = |image: Tensor<B, 3>| image.to_data().iter().collect();
         let [orbits, table] = [&self.orbits, &self.table].map(Clone::clone);
         let start = Instant::now();
         let Some(target) = &self.target else {
             let image = self.coverage(self.vertices.clone(), orbits, table);
             let forward_ms = milliseconds::<B>(start);
-            return Step { image, loss: None, forward_ms, backward_ms: 0.0 };
+            return Step { image: values(image), loss: None, forward_ms, backward_ms: None };
         };
         let vertices = Tensor::<Autodiff<B>, 3>::from_inner(self.vertices.clone()).require_grad();
         let [orbits, table] = [orbits, table].map(Tensor::from_inner);
@@ -113,10 +73,10 @@ impl<B: RasterBackend> Fused<B> {
         let start = Instant::now();
         let loss = mse_loss(image.clone(), Tensor::from_inner(target.clone())).mean();
         let grad = vertices.grad(&loss.backward()).expect("the image depends on the vertices");
-        let backward_ms = milliseconds::<B>(start);
+        let backward_ms = Some(milliseconds::<B>(start));
         let norm = grad.to_data().iter::<f64>().map(|g| g * g).sum::<f64>().sqrt();
-        let loss = loss.into_scalar().elem();
-        Step { image: image.inner(), loss: Some([loss, norm]), forward_ms, backward_ms }
+        let loss = Some([loss.into_scalar().elem(), norm]);
+        Step { image: values(image.inner()), loss, forward_ms, backward_ms }
     }
 
     /// From world vertices to coverage.

@@ -1,5 +1,5 @@
 //! Draws soft silhouettes of a mesh and measures what they cost.
 
 fn main() -> std::process::ExitCode {
-    render::main()
+    softrast_lab::program::run_main(render::execute)
 }

@@ -1,89 +1,209 @@
-use std::{
-    ffi::OsString,
-    io::{self, Write},
-    process::ExitCode,
-};
+use std::{ffi::OsString, io::Write, path::Path};
 
-use anyhow::Context;
-use clap::Parser;
-use softrast_raster::{BackendChoice, compiled_backends, on_backend};
-use softrast_runner::{Error, Failure, peak_rss_mib};
-
-use crate::{
-    args::Args,
-    dense, fused,
-    output::{self, Output},
-    report::{Report, Setting},
-    scene::Scene,
+use clap::CommandFactory;
+use serde_json::{Value, json};
+use softrast_lab::{
+    Error, Failure, OutputFolder, contact_sheet,
+    format::counted,
+    median, peak_rss_mib, png,
+    program::{Output, parse, repeated},
+    rgb_from_gray,
 };
+use softrast_raster::{BackendChoice, RasterBackend, Rasterizer, compiled_backends, on_backend};
+
+use crate::{args::Args, fused::Fused, reference, scene::Scene};
 
 /// Timed repetitions unless asked for another number.
 const REPEAT: usize = 5;
-const STDOUT: &str = "cannot write to the standard output";
-
-/// The whole `main` of the program.
-pub fn main() -> ExitCode {
-    match execute(std::env::args_os(), &mut io::stdout().lock()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{failure}");
-            ExitCode::from(failure.code)
-        }
-    }
-}
 
 /// Does what a command line asks, the name of the program being its first word.
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line. Unless only `stdout` failed, no
-/// picture was written then.
-pub fn execute(
-    words: impl IntoIterator<Item = OsString>,
-    stdout: &mut dyn Write,
-) -> Result<(), Failure> {
-    let args = match Args::try_parse_from(words) {
-        Ok(args) => args,
-        Err(help) if !help.use_stderr() => {
-            let text = help.render().to_string();
-            return Ok(writeln!(stdout, "{}", text.trim_end()).context(STDOUT)?);
-        }
-        Err(wrong) => return Err(wrong.into()),
-    };
-    let report = work(&args)?;
-    if let Some(warning) = report.warning() {
-        eprintln!("warning: {warning}");
-    }
-    let shown = match args.json {
-        true => serde_json::to_string(&report).context("cannot write the results as JSON")?,
-        false => report.text(),
-    };
-    Ok(writeln!(stdout, "{shown}").context(STDOUT)?)
+/// Everything that should end the program with an error line. Unless only `stdout` failed, no picture was written then.
+pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
+    let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
+    draw(&args)?.print(args.json, &repeated("render", &words), stdout)
 }
 
-fn work(args: &Args) -> anyhow::Result<Report> {
+/// What one pass gave and took. Times are in milliseconds.
+pub(crate) struct Step {
+    /// `[views, size, size]`, top row first.
+    pub(crate) image: Vec<f64>,
+    /// Mean squared difference to the target, and the norm of its gradient to the vertices.
+    pub(crate) loss: Option<[f64; 2]>,
+    /// From world vertices to coverage.
+    pub(crate) forward_ms: f64,
+    /// From coverage to the loss and its gradient to the world vertices.
+    pub(crate) backward_ms: Option<f64>,
+}
+
+/// All passes, and what is known of the fused op.
+struct Measured {
+    steps: Vec<Step>,
+    pairs: usize,
+    culled: Option<f64>,
+    prepare_ms: Option<f64>,
+    profile: Option<(usize, [f64; 2])>,
+}
+
+fn draw(args: &Args) -> anyhow::Result<Output> {
     if let Some(threads) = args.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         // Fails where threads run already: a library user has chosen their number.
         let _ = pool.build_global();
     }
-    let asked = args.backend.as_deref();
-    let backend = BackendChoice::among(compiled_backends!(), asked)
-        .map_err(|error| Error::Usage(error.to_string()))?;
+    let backend = BackendChoice::among(compiled_backends!(), args.backend.as_deref());
+    let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
     if !args.reference {
         backend.set_up()?;
     }
     let scene = Scene::load(args)?;
-    let output = Output::open(&args.out)?;
-    let setting = Setting {
-        backend: if args.reference { dense::BACKEND } else { backend.title() },
-        repeat: args.repeat.unwrap_or(if args.reference { 1 } else { REPEAT }),
-        base_rss_mib: peak_rss_mib(),
-    };
+    let name = args.out.file_name().and_then(|name| name.to_str());
+    let name = name.filter(|_| !args.out.is_dir()).ok_or_else(|| {
+        Error::usage(format!("--out {}: expected the name of a picture", args.out.display()))
+    })?;
+    let parent = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut folder = OutputFolder::open(parent.unwrap_or(Path::new(".")))?;
+
+    let repeat = args.repeat.unwrap_or(if args.reference { 1 } else { REPEAT });
+    let base_rss_mib = peak_rss_mib();
     let measured = match args.reference {
-        true => dense::measure(&scene, setting.repeat),
-        false => on_backend!(backend, B => fused::measure::<B>(&scene, setting.repeat)),
+        true => by_reference(&scene, repeat, args.quiet),
+        false => on_backend!(backend, B => by_fused_op::<B>(&scene, repeat)),
     };
-    output.write(&output::picture(&measured.alpha, scene.size))?;
-    Ok(Report::new(args, &scene, &setting, &measured))
+    let last = &measured.steps[repeat - 1];
+    folder.stage(name, &png(&picture(&last.image, scene.size))?)?;
+    folder.commit(&[])?;
+
+    let title = if args.reference { reference::BACKEND } else { backend.title() };
+    let times =
+        |of: &dyn Fn(&Step) -> f64| median(&measured.steps.iter().map(of).collect::<Vec<_>>());
+    let backward = |step: &Step| step.backward_ms.unwrap_or(0.0);
+    let json = json!({
+        "mesh": args.mesh,
+        "faces": scene.faces.len(),
+        "views": scene.views(),
+        "size": scene.size,
+        "softness": scene.softness.family.to_string(),
+        "squared": scene.softness.squared,
+        "phi": scene.phi,
+        "t_conorm": scene.t_conorm.to_string(),
+        "tolerance": scene.tolerance,
+        "backend": title,
+        "threads": rayon::current_num_threads(),
+        "repeat": repeat,
+        "pairs": measured.pairs,
+        "culled_by_tolerance": measured.culled,
+        "mean_alpha": last.image.iter().sum::<f64>() / last.image.len() as f64,
+        "loss": last.loss.map(|[loss, _]| loss),
+        "gradient_norm": last.loss.map(|[_, norm]| norm),
+        "forward_ms": times(&|step| step.forward_ms),
+        "backward_ms": last.backward_ms.map(|_| times(&backward)),
+        "total_ms": times(&|step| step.forward_ms + backward(step)),
+        "prepare_ms": measured.prepare_ms,
+        "base_rss_mib": base_rss_mib,
+        "peak_rss_mib": peak_rss_mib(),
+        "profile_knots": measured.profile.map(|(knots, _)| knots),
+        "support_ndc": measured.profile.map(|(_, support)| support),
+        "out": args.out,
+    });
+    let warnings = measured.culled.filter(|&culled| culled > 0.5).map(|culled| {
+        format!(
+            "--tolerance {} culls {:.0} % of the pairs that the default {:e} keeps: faces get no gradient from pixels that they still \
+             cover a little; try a smaller one",
+            scene.tolerance,
+            100.0 * culled,
+            Rasterizer::TOLERANCE
+        )
+    });
+    let text = lines(&json);
+    Ok(Output { json, text, warnings: warnings.into_iter().collect(), partial: None })
+}
+
+fn by_reference(scene: &Scene, repeat: usize, quiet: bool) -> Measured {
+    let steps = (0..repeat).map(|_| reference::step(scene, quiet)).collect();
+    let pairs = scene.views() * scene.size * scene.size * scene.faces.len();
+    Measured { steps, pairs, culled: None, prepare_ms: None, profile: None }
+}
+
+/// After one pass to warm up.
+fn by_fused_op<B: RasterBackend>(scene: &Scene, repeat: usize) -> Measured {
+    let fused = Fused::<B>::new(scene);
+    let steps = (0..=repeat).map(|_| fused.step()).skip(1).collect();
+    let (pairs, culled) = fused.pairs(scene);
+    let prepare_ms = Some(fused.prepare_ms);
+    Measured { steps, pairs, culled: Some(culled), prepare_ms, profile: Some(fused.profile()) }
+}
+
+/// The results for people.
+fn lines(json: &Value) -> Vec<String> {
+    let number = |key: &str| json[key].as_f64();
+    let count = |key: &str| json[key].as_u64().unwrap_or(0) as usize;
+    let text = |key: &str| json[key].as_str().unwrap_or_default();
+    let (size, views) = (count("size"), count("views"));
+    let squared = if json["squared"] == true { " of the squared distance" } else { "" };
+    let share = 100.0 * count("pairs") as f64 / (views * size * size * count("faces")) as f64;
+    let mut lines = vec![
+        ("mesh", format!("{}, {} faces", text("mesh"), count("faces"))),
+        ("image", format!("{} of {size} x {size} pixels", counted(views, "view"))),
+        ("softness", format!("{}{squared}, joined by {}", text("softness"), text("t_conorm"))),
+    ];
+    let support = [0, 1].map(|k| json["support_ndc"][k].as_f64());
+    if let [Some(outside), Some(inside)] = support.map(|ndc| Some(ndc? * size as f64 / 2.0)) {
+        let knots = count("profile_knots");
+        let value =
+            format!("{knots} knots, {outside:.2} px outside to {inside:.2} px inside an edge");
+        lines.push(("profile", value));
+    }
+    lines.push(("pairs", format!("{} visited, {share:.3} % of all", count("pairs"))));
+    lines.extend(number("mean_alpha").map(|mean| ("mean alpha", format!("{mean:.7}"))));
+    if let (Some(loss), Some(norm)) = (number("loss"), number("gradient_norm")) {
+        lines.push(("loss", format!("{loss:.7}, gradient norm {norm:.7}")));
+    }
+    let [forward, total] = ["forward_ms", "total_ms"].map(|key| number(key).unwrap_or(f64::NAN));
+    let time = match number("backward_ms") {
+        Some(backward) => {
+            format!("{forward:.3} ms forward + {backward:.3} ms backward = {total:.3} ms")
+        }
+        None => format!("{forward:.3} ms forward"),
+    };
+    let (repeat, threads) = (count("repeat"), counted(count("threads"), "thread"));
+    let how = format!("{time} (median of {repeat}), {} on {threads}", text("backend"));
+    lines.push(("time", how));
+    if let (Some(peak), Some(base)) = (number("peak_rss_mib"), number("base_rss_mib")) {
+        let grown = peak - base;
+        lines.push(("memory", format!("{peak:.1} MiB at most, {grown:.1} for drawing")));
+    }
+    lines.push(("picture", text("out").to_owned()));
+    lines.into_iter().map(|(name, value)| format!("{name:<12}{value}")).collect()
+}
+
+/// The views `[views, size, size]` as one picture: itself if there is one, else a contact sheet.
+fn picture(image: &[f64], size: usize) -> image::RgbImage {
+    let views: Vec<_> =
+        image.chunks_exact(size * size).map(|view| rgb_from_gray(view, size, size)).collect();
+    match &views[..] {
+        [view] => view.clone(),
+        views => contact_sheet(views, columns(views.len())),
+    }
+}
+
+/// Columns of a sheet that is wider than high, without empty cells where that can be.
+fn columns(views: usize) -> usize {
+    let root = views.isqrt() + usize::from(views.isqrt().pow(2) < views);
+    (root..=2 * root).find(|columns| views.is_multiple_of(*columns)).unwrap_or(root)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_is_wide_and_full() {
+        let expected = [(1, 1), (2, 2), (4, 2), (5, 5), (7, 3), (8, 4), (24, 6), (36, 6)];
+        for (views, expected) in expected {
+            assert_eq!(columns(views), expected, "{views} views");
+        }
+    }
 }

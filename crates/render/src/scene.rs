@@ -1,13 +1,14 @@
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 use anyhow::Context;
 use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use image::{ImageReader, imageops};
+use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::TConorm;
-use softrast_runner::Error;
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness};
 
-use crate::args::{Args, Choice};
+use crate::args::{Args, Choice, Target};
 
 /// Everything that a measurement needs, in plain numbers.
 pub(crate) struct Scene {
@@ -34,7 +35,7 @@ impl Scene {
         let (softness, phi) = softness(args)?;
         let mesh = Mesh::load(&args.mesh)?;
         let mesh = if args.raw { mesh } else { mesh.normalized() };
-        let target = args.target.as_ref().map(|target| target.pixels(args.size)).transpose()?;
+        let target = args.target.as_ref().map(|target| pixels(target, args.size)).transpose()?;
         let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov / 2.0];
         Ok(Self {
             faces: mesh.faces().into(),
@@ -86,10 +87,9 @@ fn tensor<B: Backend, const D: usize>(
 
 fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
     match &args.softness {
-        Choice::File(_) if args.scale.is_some() || args.squared => Err(Error::Usage(
-            "--scale and --squared are for a named softness: a file has its own".into(),
-        )
-        .into()),
+        Choice::File(_) if args.scale.is_some() || args.squared => {
+            Err(Error::usage("--scale and --squared are for a named softness: a file has its own"))
+        }
         Choice::File(path) => {
             let file = ScheduledSoftness::load(path).context("--softness")?;
             Ok((file.softness, file.phi))
@@ -100,5 +100,48 @@ fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
             let scale = args.scale.unwrap_or(if args.squared { narrow * narrow } else { narrow });
             Ok((softness, softness.default_phi(scale)))
         }
+    }
+}
+
+/// Values `[size, size]` in [0, 1], top row first.
+fn pixels(target: &Target, size: usize) -> anyhow::Result<Vec<f64>> {
+    match target {
+        &Target::Disk { x, y, radius } => Ok(disk(x, y, radius, size)),
+        Target::Picture(path) => picture(path, size),
+    }
+}
+
+fn disk(x: f64, y: f64, radius: f64, size: usize) -> Vec<f64> {
+    let centre = |index: usize| (2.0 * index as f64 + 1.0 - size as f64) / size as f64;
+    let covered = |pixel: usize| {
+        let (dx, dy) = (centre(pixel % size) - x, centre(size - 1 - pixel / size) - y);
+        f64::from(u8::from(dx * dx + dy * dy <= radius * radius))
+    };
+    (0..size * size).map(covered).collect()
+}
+
+fn picture(path: &Path, size: usize) -> anyhow::Result<Vec<f64>> {
+    let read = || -> anyhow::Result<_> {
+        Ok(ImageReader::open(path)?.with_guessed_format()?.decode()?.into_luma8())
+    };
+    let mut image = read().with_context(|| format!("cannot read the target {}", path.display()))?;
+    let (width, height) = image.dimensions();
+    if (width, height) != (size as u32, size as u32) {
+        eprintln!("the target is {width} x {height} pixels: resized to {size} x {size}");
+        image = imageops::resize(&image, size as u32, size as u32, imageops::FilterType::Triangle);
+    }
+    Ok(image.pixels().map(|pixel| f64::from(pixel.0[0]) / 255.0).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_disk_has_its_area_and_its_place() {
+        let pixels = disk(0.5, 0.5, 0.25, 200);
+        let area = pixels.iter().sum::<f64>() * 4.0 / 200.0 / 200.0;
+        assert!((area - std::f64::consts::PI / 16.0).abs() < 2e-3, "{area}");
+        assert_eq!([pixels[50 * 200 + 150], pixels[150 * 200 + 150]], [1.0, 0.0], "y points up");
     }
 }

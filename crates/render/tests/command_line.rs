@@ -5,8 +5,8 @@
 use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
+use softrast_lab::Failure;
 use softrast_mesh::icosphere;
-use softrast_runner::Failure;
 
 fn mesh(folder: &Path) -> String {
     let path = folder.join("sphere.obj");
@@ -92,18 +92,18 @@ fn bad_input_is_one_line_and_leaves_no_picture() {
     let out = folder.path().join("out.png");
     let cases: [(&[&str], u8, &str); 13] = [
         (&["missing.obj"], 1, "missing.obj: cannot be read"),
-        (&[&mesh, "--size", "0"], 2, "whole number of pixels"),
+        (&[&mesh, "--size", "0"], 2, "whole number from 1 to 4096"),
         (&[&mesh, "--scale", "-1"], 2, "expected a positive number"),
         (&[&mesh, "--azimuths", "1,,2"], 2, "with commas between them"),
         (&[&mesh, "--fov", "180"], 2, "between 0 and 180"),
-        (&[&mesh, "--tolerance", "1"], 2, "between 0 and 1"),
+        (&[&mesh, "--tolerance", "1"], 2, "above 0 and below 1"),
         (&[&mesh, "--softness", "soft"], 2, "known are logistic, bilogit, gauss"),
         (&[&mesh, "--softness", "missing.json"], 1, "missing.json"),
         (&[&mesh, "--softness", "a.json", "--squared"], 2, "a file has its own"),
         (&[&mesh, "--t-conorm", "max"], 2, "use probabilistic, einstein"),
         (&[&mesh, "--backend", "cuda"], 2, "expected ndarray, flex or wgpu"),
         (&[&mesh, "--target", &mesh], 1, "cannot read the target"),
-        (&[&mesh, "--out", blocked], 1, "choose another file with --out"),
+        (&[&mesh, "--out", blocked], 1, "choose another with --out"),
     ];
     for (words, code, message) in cases {
         let mut words = words.to_vec();

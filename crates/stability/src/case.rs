@@ -1,16 +1,15 @@
 use crate::Tested;
 
-/// Something that could go wrong, made worse level by level.
+/// A way to fail, made worse level by level. To miss the target is a property of the softness; only numbers that are not finite are a
+/// fault of the program.
 pub struct Case {
     /// Short and unique, such as `F02`; the letter says what is tested: F the image, G its
-    /// gradient, O an optimisation, M learning. Numbers are those of META 4 where it has the case.
+    /// gradient, O an optimisation, M learning.
     pub id: &'static str,
     /// A few words.
     pub name: &'static str,
     /// Whether it belongs to the quick part.
     pub quick: bool,
-    /// What a missed target means.
-    pub promise: Promise,
     /// What is drawn or optimised.
     pub scene: &'static str,
     /// What changes from level to level.
@@ -21,15 +20,6 @@ pub struct Case {
     pub target: &'static str,
     /// All levels for one method.
     pub run: fn(&Tested) -> anyhow::Result<Vec<Level>>,
-}
-
-/// What a missed target means.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Promise {
-    /// The program is broken: every method must reach the target in every trial.
-    Guaranteed,
-    /// This is where the method fails; only numbers that are not finite would be a fault.
-    Measured,
 }
 
 /// One strength of the perturbation.

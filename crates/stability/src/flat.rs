@@ -1,31 +1,35 @@
+//! Scenes in the image plane.
+
 use std::sync::Arc;
 
 /// Triangles in the image: x and y in NDC, and the depth.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Flat {
-    pub(crate) corners: Vec<[f64; 3]>,
-    pub(crate) faces: Arc<[[u32; 3]]>,
+pub struct Flat {
+    /// Corners of the faces.
+    pub corners: Vec<[f64; 3]>,
+    /// Three corners each.
+    pub faces: Arc<[[u32; 3]]>,
 }
 
 impl Flat {
     /// Loose triangles, three corners each.
-    pub(crate) fn loose(corners: Vec<[f64; 3]>) -> Self {
+    pub fn loose(corners: Vec<[f64; 3]>) -> Self {
         let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         Self { corners, faces }
     }
 
     /// One triangle at depth 2.
-    pub(crate) fn triangle(corners: [[f64; 2]; 3]) -> Self {
+    pub fn triangle(corners: [[f64; 2]; 3]) -> Self {
         Self::loose(corners.map(|[x, y]| [x, y, 2.0]).into())
     }
 
     /// A triangle of about a third of the image that no axis or pixel favours.
-    pub(crate) fn plain() -> Self {
+    pub fn plain() -> Self {
         Self::triangle([[-0.61, -0.47], [0.73, -0.33], [0.08, 0.69]])
     }
 
     /// `count` triangles of all sizes all over the image.
-    pub(crate) fn random(seed: u64, count: usize) -> Self {
+    pub fn random(seed: u64, count: usize) -> Self {
         let mut random = Random::new(seed);
         let corners = (0..count).flat_map(|_| {
             let centre = [random.within(1.1), random.within(1.1)];
@@ -40,13 +44,13 @@ impl Flat {
     }
 
     /// The same face `count` times.
-    pub(crate) fn stack(count: usize) -> Self {
+    pub fn stack(count: usize) -> Self {
         let one = Self::plain().corners;
         Self::loose((0..count).flat_map(|_| one.clone()).collect())
     }
 
     /// The square from -0.5 to 0.5 as `2 side²` triangles.
-    pub(crate) fn grid(side: usize) -> Self {
+    pub fn grid(side: usize) -> Self {
         let at = |k: usize| k as f64 / side as f64 - 0.5;
         let cell = |k: usize| {
             let (x, y) = (k % side, k / side);
@@ -58,7 +62,8 @@ impl Flat {
     }
 
     /// The same with every coordinate in the image multiplied by `factor`.
-    pub(crate) fn scaled(mut self, factor: f64) -> Self {
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
         self.corners.iter_mut().for_each(|p| {
             p[0] *= factor;
             p[1] *= factor;
@@ -67,7 +72,8 @@ impl Flat {
     }
 
     /// The same faces in another order.
-    pub(crate) fn permuted(&self, seed: u64) -> Self {
+    #[must_use]
+    pub fn permuted(&self, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let mut faces = self.faces.to_vec();
         for k in (1..faces.len()).rev() {
@@ -78,15 +84,16 @@ impl Flat {
 }
 
 /// Numbers that look random and are always the same (`SplitMix64`).
-pub(crate) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
+    /// The numbers of a seed.
+    pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(1))
     }
 
     /// In [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -95,7 +102,7 @@ impl Random {
     }
 
     /// From `-reach` to `reach`.
-    pub(crate) fn within(&mut self, reach: f64) -> f64 {
+    pub fn within(&mut self, reach: f64) -> f64 {
         reach * (2.0 * self.unit() - 1.0)
     }
 }

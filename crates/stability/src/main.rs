@@ -1,5 +1,5 @@
 //! Tests every softness on scenes where rasterizers and optimisers fail.
 
 fn main() -> std::process::ExitCode {
-    stability::main()
+    softrast_lab::program::run_main(stability::execute)
 }

@@ -1,20 +1,29 @@
-use serde::Serialize;
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
 
-use crate::{Case, Outcome, Promise, Tested};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use softrast_lab::{median, wilson_interval};
+
+use crate::{Case, Level, Tested, drawing::largest};
 
 /// All outcomes: cases down, methods across.
 #[derive(Serialize)]
 pub struct Matrix {
     /// Names of the methods.
-    pub methods: Vec<&'static str>,
+    pub methods: Vec<String>,
     /// Cases with their outcomes, in the order of the methods.
     pub rows: Vec<Row>,
     /// Trials in all.
     pub trials: usize,
     /// Trials with a number that is not finite.
     pub non_finite: usize,
-    /// Cells that are a fault of the program.
-    pub broken: usize,
     /// Wall time of all of them.
     pub seconds: f64,
 }
@@ -26,8 +35,6 @@ pub struct Row {
     pub id: &'static str,
     /// A few words.
     pub name: &'static str,
-    /// Whether every method must reach the target.
-    pub guaranteed: bool,
     /// What is drawn or optimised.
     pub scene: &'static str,
     /// What changes from level to level.
@@ -40,101 +47,175 @@ pub struct Row {
     pub outcomes: Vec<Outcome>,
 }
 
-impl Matrix {
-    /// Of outcomes in the order of [`run`](crate::run).
-    pub fn new(cases: &[&Case], methods: &[Tested], outcomes: Vec<Outcome>, seconds: f64) -> Self {
-        let mut outcomes = outcomes.into_iter();
-        let row = |case: &&Case| Row {
+/// What one case made of one method.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// The method.
+    pub method: String,
+    /// Trials of all levels.
+    pub trials: usize,
+    /// How many reached the target.
+    pub reached: usize,
+    /// 95 % interval of the share that does, after Wilson.
+    pub ci95: [f64; 2],
+    /// Trials with a number that is not finite; 0 unless something is broken.
+    pub non_finite: usize,
+    /// From the first to the last level.
+    pub levels: Vec<LevelOutcome>,
+    /// How the case ended where it could not be finished: a panic or an error.
+    pub failed: Option<String>,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// What one level made of one method.
+#[derive(Clone, Debug, Serialize)]
+pub struct LevelOutcome {
+    /// The strength of the perturbation as a word.
+    pub label: String,
+    /// The strength as a number, if it is one.
+    pub at: Option<f64>,
+    /// Trials.
+    pub trials: usize,
+    /// How many reached the target.
+    pub reached: usize,
+    /// 95 % interval of the share that does, after Wilson.
+    pub ci95: [f64; 2],
+    /// Trials with a number that is not finite.
+    pub non_finite: usize,
+    /// Middle measured number; none where it is not finite.
+    pub median: Option<f64>,
+    /// Largest measured number; none where it is not finite.
+    pub worst: Option<f64>,
+}
+
+/// Runs every case with every method, on so many threads.
+///
+/// The threads are plain ones, outside of the pool in which images are drawn: a thread of that pool that waits for an image may begin
+/// another case meanwhile, while it holds what the first needs.
+pub fn run(cases: &[&Case], methods: &[Tested], threads: usize, quiet: bool) -> Matrix {
+    let clock = Instant::now();
+    let cells: Vec<(&Case, &Tested)> =
+        cases.iter().flat_map(|&case| methods.iter().map(move |method| (case, method))).collect();
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(cells.len() as u64) };
+    if let Ok(style) = ProgressStyle::with_template("[{bar:32}] {pos}/{len}, {msg}, {eta} left") {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(cells.len())));
+    let work = || {
+        while let Some((case, method)) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
+            bar.set_message(format!("{} {}: {}", case.id, case.name, method.name));
+            let outcome = Outcome::of(case, method);
+            bar.inc(1);
+            if let Ok(mut done) = done.lock() {
+                done.push((case.id, outcome));
+            }
+        }
+    };
+    std::thread::scope(|scope| (0..threads.max(1)).for_each(|_| drop(scope.spawn(work))));
+    bar.finish_and_clear();
+    let done = done.into_inner().unwrap_or_default();
+    let row = |case: &&Case| {
+        let of_method = |method: &Tested| {
+            let found = |(id, o): &&(&str, Outcome)| *id == case.id && o.method == method.name;
+            done.iter().find(found).map(|(_, outcome)| outcome.clone())
+        };
+        Row {
             id: case.id,
             name: case.name,
-            guaranteed: case.promise == Promise::Guaranteed,
             scene: case.scene,
             perturbation: case.perturbation,
             measure: case.measure,
             target: case.target,
-            outcomes: outcomes.by_ref().take(methods.len()).collect(),
-        };
-        let rows: Vec<Row> = cases.iter().map(row).collect();
-        let all = || rows.iter().flat_map(|row| &row.outcomes);
-        let (trials, non_finite) =
-            (all().map(|o| o.trials).sum(), all().map(|o| o.non_finite).sum());
-        let broken = rows.iter().map(Row::broken).sum();
-        let methods = methods.iter().map(|method| method.name).collect();
-        Self { methods, rows, trials, non_finite, broken, seconds }
-    }
-
-    /// The matrix as a table, then what is broken.
-    pub fn text(&self) -> String {
-        const NAME: usize = 38;
-        let mut lines =
-            vec![format!("{:<4} {:<NAME$}", "", "share of trials that reach the target")];
-        lines[0] += &self.methods.iter().map(|name| format!(" {name:>9}")).collect::<String>();
-        for row in &self.rows {
-            let cells = row.outcomes.iter().map(|o| format!(" {:>9}", row.cell(o)));
-            let mark = if row.guaranteed { "!" } else { " " };
-            lines.push(format!(
-                "{:<4}{mark}{:<NAME$}{}",
-                row.id,
-                row.name,
-                cells.collect::<String>()
-            ));
+            outcomes: methods.iter().filter_map(of_method).collect(),
         }
-        lines.push(format!(
-            "{} cases x {} methods, {} trials in {:.0} s; not finite: {}; broken: {}",
-            self.rows.len(),
-            self.methods.len(),
-            self.trials,
-            self.seconds,
-            self.non_finite,
-            self.broken
-        ));
-        lines
-            .push("! = every trial must; elsewhere a lower share is where the method fails".into());
-        lines.extend(self.faults());
-        lines.join("\n")
+    };
+    let sum = |of: fn(&Outcome) -> usize| done.iter().map(|(_, outcome)| of(outcome)).sum();
+    Matrix {
+        methods: methods.iter().map(|method| method.name.clone()).collect(),
+        rows: cases.iter().map(row).collect(),
+        trials: sum(|outcome| outcome.trials),
+        non_finite: sum(|outcome| outcome.non_finite),
+        seconds: clock.elapsed().as_secs_f64(),
     }
+}
 
-    /// One line for each fault of the program.
+impl Matrix {
+    /// One line for each fault of the program: a panic, an error, numbers that are not finite.
     pub fn faults(&self) -> Vec<String> {
         let faults = self.rows.iter().flat_map(|row| {
-            let broken = row.outcomes.iter().filter(|o| o.is_broken(row.promise()));
-            broken.map(|outcome| row.fault(outcome))
+            row.outcomes.iter().filter_map(|outcome| {
+                let head = format!("broken: {} {}, {}", row.id, row.name, outcome.method);
+                match (&outcome.failed, outcome.non_finite) {
+                    (Some(failed), _) => Some(format!("{head}: {failed}")),
+                    (None, 0) => None,
+                    (None, count) => Some(format!("{head}: {count} trials are not finite")),
+                }
+            })
         });
         faults.collect()
     }
 }
 
-impl Row {
-    /// What a missed target means.
-    pub fn promise(&self) -> Promise {
-        if self.guaranteed { Promise::Guaranteed } else { Promise::Measured }
+impl Outcome {
+    /// Runs a case with a method; a panic becomes part of the outcome.
+    fn of(case: &Case, tested: &Tested) -> Self {
+        let clock = Instant::now();
+        let (levels, failed) = match catch_unwind(AssertUnwindSafe(|| (case.run)(tested))) {
+            Ok(Ok(levels)) => (levels, None),
+            Ok(Err(error)) => (Vec::new(), Some(format!("{error:#}"))),
+            Err(panic) => (Vec::new(), Some(format!("panic: {}", words(panic.as_ref())))),
+        };
+        let levels: Vec<LevelOutcome> = levels.iter().map(LevelOutcome::of).collect();
+        let sum = |of: fn(&LevelOutcome) -> usize| levels.iter().map(of).sum();
+        let (trials, reached) = (sum(|l| l.trials), sum(|l| l.reached));
+        Self {
+            method: tested.name.clone(),
+            trials,
+            reached,
+            ci95: wilson_interval(reached, trials),
+            non_finite: sum(|l| l.non_finite),
+            levels,
+            failed,
+            seconds: clock.elapsed().as_secs_f64(),
+        }
     }
 
-    fn broken(&self) -> usize {
-        self.outcomes.iter().filter(|o| o.is_broken(self.promise())).count()
+    /// The first level from which on fewer than half of the trials reach the target, if there is one.
+    pub fn fails_at(&self) -> Option<&LevelOutcome> {
+        self.levels.iter().find(|level| 2 * level.reached < level.trials)
     }
 
-    /// A cell of the table: the share that reached the target.
-    pub fn cell(&self, outcome: &Outcome) -> String {
-        if outcome.failed.is_some() {
-            return "FAILED".into();
+    /// The share that reached the target, in few letters.
+    pub fn share(&self) -> String {
+        match (&self.failed, self.non_finite) {
+            (Some(_), _) => "FAILED".into(),
+            (None, 0) => format!("{}/{}", self.reached, self.trials),
+            (None, count) => format!("{count} NaN"),
         }
-        if outcome.non_finite > 0 {
-            return format!("{} NaN", outcome.non_finite);
-        }
-        format!("{}/{}", outcome.reached, outcome.trials)
     }
+}
 
-    fn fault(&self, outcome: &Outcome) -> String {
-        let head = format!("broken: {} {}, {}", self.id, self.name, outcome.method);
-        if let Some(failed) = &outcome.failed {
-            return format!("{head}: {failed}");
+impl LevelOutcome {
+    fn of(level: &Level) -> Self {
+        let Level { label, at, trials } = level;
+        let reached = trials.iter().filter(|trial| trial.reached).count();
+        let values: Vec<f64> = trials.iter().map(|trial| trial.value).collect();
+        let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+        Self {
+            label: label.clone(),
+            at: *at,
+            trials: trials.len(),
+            reached,
+            ci95: wilson_interval(reached, trials.len()),
+            non_finite: trials.iter().filter(|trial| !trial.finite).count(),
+            median: finite(median(&values)),
+            worst: finite(largest(values)),
         }
-        let missed = |level: &&crate::LevelOutcome| level.reached < level.trials;
-        let levels = outcome.levels.iter().filter(missed).map(|level| {
-            let worst = level.worst.map_or("not finite".into(), |worst| format!("{worst:.2e}"));
-            format!("{} ({worst}, {} not finite)", level.label, level.non_finite)
-        });
-        format!("{head}: misses \"{}\" at {}", self.target, levels.collect::<Vec<_>>().join(", "))
     }
+}
+
+fn words(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into())
 }

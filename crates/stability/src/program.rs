@@ -1,15 +1,12 @@
-use std::{
-    ffi::OsString,
-    fs,
-    io::{self, Write},
-    path::PathBuf,
-    process::ExitCode,
-    time::Instant,
-};
+use std::{ffi::OsString, io::Write, path::PathBuf};
 
-use anyhow::Context;
-use clap::Parser;
-use softrast_runner::{Error, Failure};
+use anyhow::anyhow;
+use clap::{CommandFactory, Parser};
+use softrast_lab::{
+    Error, Failure, OutputFolder,
+    parse::count,
+    program::{Output, parse, repeated},
+};
 
 use crate::{Case, Matrix, Tested, cases, report, run};
 
@@ -17,112 +14,81 @@ use crate::{Case, Matrix, Tested, cases, report, run};
 #[derive(Debug, Parser)]
 #[command(name = "stability", version)]
 struct Args {
-    /// Cases to run: quick, all, or their names, such as F02,O03.
+    /// Cases to run: quick, all, or their names, such as O02,O03
     #[arg(long, value_name = "quick|all|ID,..", default_value = "quick")]
     cases: String,
 
-    /// Softness file to test as mlp, instead of the network that has not been trained.
+    /// Softness file to test as mlp, instead of the network that has not been trained
     #[arg(long, value_name = "FILE.json")]
     mlp: Option<PathBuf>,
 
-    /// Methods to test, such as logistic,decay; all six by default.
+    /// Methods to test, such as logistic,decay; all six by default
     #[arg(long, value_name = "NAME,..", value_delimiter = ',')]
     methods: Vec<String>,
 
-    /// Folder for the results; made if missing.
+    /// Folder for the results; made if missing
     #[arg(long, value_name = "DIR", default_value = "out/stability")]
     out: PathBuf,
 
-    /// Cases to run at the same time; all cores by default.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
+    /// Cases to run at the same time; all cores by default
+    #[arg(long, value_name = "N", value_parser = count)]
+    threads: Option<usize>,
 
-    /// Print one JSON object instead of a table.
+    /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
 
-    /// Show no progress.
+    /// Show no progress
     #[arg(long)]
     quiet: bool,
-}
-
-/// The whole `main` of the program.
-pub fn main() -> ExitCode {
-    // A panic in a case is part of its outcome.
-    std::panic::set_hook(Box::new(|_| {}));
-    match execute(std::env::args_os(), &mut io::stdout().lock()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{failure}");
-            ExitCode::from(failure.code)
-        }
-    }
 }
 
 /// Does what a command line asks, the name of the program being its first word.
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line; also, after the results are written
-/// and printed, that something is broken.
-pub fn execute(
-    words: impl IntoIterator<Item = OsString>,
-    stdout: &mut dyn Write,
-) -> Result<(), Failure> {
-    const STDOUT: &str = "cannot write to the standard output";
-    let words: Vec<OsString> = words.into_iter().collect();
-    let args = match Args::try_parse_from(&words) {
-        Ok(args) => args,
-        Err(help) if !help.use_stderr() => {
-            let text = help.render().to_string();
-            return Ok(writeln!(stdout, "{}", text.trim_end()).context(STDOUT)?);
-        }
-        Err(wrong) => return Err(wrong.into()),
-    };
-    let matrix = work(&args)?;
-    let shown = match args.json {
-        true => serde_json::to_string(&matrix).context("cannot write the results as JSON")?,
-        false => format!("{}\nreport: {}", matrix.text(), args.out.join("report.html").display()),
-    };
-    writeln!(stdout, "{shown}").context(STDOUT)?;
+/// Everything that should end the program with an error line; also, after the results are written and printed, that something is
+/// broken.
+pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
+    let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
+    let again = repeated("stability", &words);
+    let matrix = work(&args, &again)?;
+    let json = serde_json::to_value(&matrix).map_err(anyhow::Error::from)?;
+    let mut text = report::lines(&matrix);
+    text.push(format!("report: {}", args.out.join("report.html").display()));
+    Output { json, text, ..Output::default() }.print(args.json, &again, stdout)?;
     match matrix.faults().len() {
         0 => Ok(()),
-        count => Err(anyhow::anyhow!("{count} of the outcomes are faults of the program").into()),
+        count => Err(anyhow!("{count} of the outcomes are faults of the program").into()),
     }
 }
 
-fn work(args: &Args) -> anyhow::Result<Matrix> {
+fn work(args: &Args, again: &str) -> anyhow::Result<Matrix> {
     let chosen = chosen(&args.cases)?;
-    let refused = || format!("cannot write to the folder {}", args.out.display());
-    fs::create_dir_all(&args.out).with_context(refused)?;
     let methods = methods(args)?;
-    if args.mlp.is_some() {
-        // Refused here rather than in every case.
-        methods.iter().try_for_each(|method| method.method_at(0.1).map(drop))?;
-    }
+    let mut folder = OutputFolder::open(&args.out)?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let threads = args.threads.map_or(cores, usize::from);
-    let clock = Instant::now();
-    let outcomes = run(&chosen, &methods, threads, args.quiet);
-    let matrix = Matrix::new(&chosen, &methods, outcomes, clock.elapsed().as_secs_f64());
-    let page = report::html(&matrix, &again(args))?;
-    fs::write(args.out.join("report.html"), page).with_context(refused)?;
-    let json = serde_json::to_vec_pretty(&matrix)?;
-    fs::write(args.out.join("stability.json"), json).with_context(refused)?;
+    // A panic in a case is part of its outcome.
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let matrix = run(&chosen, &methods, args.threads.unwrap_or(cores), args.quiet);
+    std::panic::set_hook(hook);
+    folder.stage("report.html", report::html(&matrix, again)?.as_bytes())?;
+    folder.stage("stability.json", &serde_json::to_vec_pretty(&matrix)?)?;
+    folder.commit(&[])?;
     Ok(matrix)
 }
 
 /// The methods that `--methods` names.
 fn methods(args: &Args) -> anyhow::Result<Vec<Tested>> {
-    let all = Tested::all(args.mlp.clone());
+    let all = Tested::all(args.mlp.as_deref())?;
     if args.methods.is_empty() {
         return Ok(all);
     }
     let named = |name: &String| {
-        all.iter().find(|tested| tested.name == name).cloned().ok_or_else(|| {
-            let known: Vec<&str> = all.iter().map(|tested| tested.name).collect();
-            Error::Usage(format!("there is no method {name:?}; known are {}", known.join(", ")))
-                .into()
+        all.iter().find(|tested| tested.name == *name).cloned().ok_or_else(|| {
+            let known: Vec<&str> = all.iter().map(|tested| tested.name.as_str()).collect();
+            Error::usage(format!("there is no method {name:?}; known are {}", known.join(", ")))
         })
     };
     args.methods.iter().map(named).collect()
@@ -148,15 +114,4 @@ pub fn chosen(text: &str) -> Result<Vec<&'static Case>, Error> {
         })
     };
     text.split(',').map(named).collect()
-}
-
-fn again(args: &Args) -> String {
-    let mut line = format!("cargo run --release -p stability -- --cases {}", args.cases);
-    if !args.methods.is_empty() {
-        line += &format!(" --methods {}", args.methods.join(","));
-    }
-    if let Some(file) = &args.mlp {
-        line += &format!(" --mlp {}", file.display());
-    }
-    line
 }

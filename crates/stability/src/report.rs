@@ -1,144 +1,144 @@
-use std::fmt::Write;
+use softrast_cli::method_colour;
+use softrast_lab::{
+    format::short_or_none,
+    plot::{Axis, Plot, Series},
+    report::{Report, Table},
+};
 
-use softrast_runner::{escape, page};
+use crate::{LevelOutcome, Matrix, Outcome, Row};
 
-use crate::{LevelOutcome, Matrix, Outcome, Row, chart};
-
-const ABOUT: &str = "Where each softness fails: every method on scenes that break rasterizers and \
-                     optimisers";
+const ABOUT: &str =
+    "Where each softness fails: every method on scenes that break rasterizers and optimisers";
+const READING: &str = "Share of the trials that reach the target of the case, and the first level at which fewer than half do. A low share \
+                       shows where a method fails; only numbers that are not finite would be a fault of the program. decay is the \
+                       logistic with a scale that falls over the steps; mlp is a network of 56 weights.";
+/// Smaller measured numbers are drawn as this one.
+const LEAST: f64 = 1e-9;
 
 /// The matrix and all its levels as one page that needs no other file.
-///
-/// # Errors
-///
-/// If a chart cannot be drawn.
 pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
-    let mut body = String::from(STYLE);
-    let _ = writeln!(
-        body,
-        "<p>{} cases, {} methods, {} trials in {:.0} s. Trials with a number that is not finite: \
-         {}. Faults of the program: {}.</p>",
-        matrix.rows.len(),
-        matrix.methods.len(),
-        matrix.trials,
-        matrix.seconds,
-        matrix.non_finite,
-        matrix.broken
-    );
-    for fault in matrix.faults() {
-        let _ = writeln!(body, "<p class=\"warning\">{}</p>", escape(&fault));
-    }
-    body += "<h2>Matrix</h2>\n<p>Share of the trials that reach the target of the case, with the \
-             first level at which fewer than half do. Cases marked <strong>!</strong> are promises of \
-             this project, which every method must keep in every trial; the others show where a method \
-             fails. <code>decay</code> is the logistic with a scale that falls over the steps; \
-             <code>mlp</code> is a network of 56 weights. Move the pointer over a cell for its \
-             interval.</p>\n";
-    body += &table(matrix);
-    body += "<h2>Cases</h2>\n";
+    let mut report = Report::new("stability", ABOUT);
+    report.paragraph(&ended(matrix));
+    report.warnings(&matrix.faults());
+    report.heading("Matrix");
+    report.paragraph(READING);
+    report.table(&table(matrix, true));
     for row in &matrix.rows {
-        body += &section(matrix, row)?;
-    }
-    let beside = "<code>stability.json</code> holds every level of every case";
-    Ok(page("stability", ABOUT, &body, command, beside))
-}
-
-const STYLE: &str = "<style>
-td.held { background: #e6f4ea; } td.part { background: #fff4d6; } td.none { background: #fde2d8; }
-td.fault { background: #d1242f; color: #fff; font-weight: 700; }
-td.cell { text-align: center; padding: .25rem .5rem; font-variant-numeric: tabular-nums; }
-td.cell small { display: block; color: #57606a; font-size: .75rem; }
-dl { margin: .3rem 0; } dt { float: left; clear: left; width: 8rem; color: #57606a; }
-dd { margin-left: 8.5rem; }
-</style>\n";
-
-fn table(matrix: &Matrix) -> String {
-    let mut text = String::from("<table>\n<thead><tr><th></th><th>Case</th>");
-    for method in &matrix.methods {
-        let _ = write!(text, "<th>{method}</th>");
-    }
-    text += "</tr></thead>\n<tbody>\n";
-    for row in &matrix.rows {
-        let mark = if row.guaranteed { " <strong>!</strong>" } else { "" };
-        let (id, name) = (row.id, escape(row.name));
-        let _ = write!(text, "<tr><td><a href=\"#{id}\">{id}</a>{mark}</td><td>{name}</td>");
-        for outcome in &row.outcomes {
-            text += &cell(row, outcome);
+        report.heading(&format!("{}: {}", row.id, row.name));
+        report.table(&Table::pairs([
+            ["Scene", row.scene],
+            ["Levels", row.perturbation],
+            ["Measure", row.measure],
+            ["Target", row.target],
+        ]));
+        if row.outcomes.iter().all(has_axis) {
+            let (plot, caption) = chart(row);
+            report.chart(&plot.svg()?, caption);
         }
-        text += "</tr>\n";
+        report.details("Measured numbers: median (worst), share", &levels(matrix, row));
     }
-    text + "</tbody>\n</table>\n"
+    Ok(report.finish(command, "stability.json holds every level of every case"))
 }
 
-fn cell(row: &Row, outcome: &Outcome) -> String {
-    let class = match (outcome.reached, outcome.trials) {
-        _ if outcome.is_broken(row.promise()) => "fault",
-        (reached, trials) if reached == trials => "held",
-        (0, _) => "none",
-        _ => "part",
-    };
-    let from = match outcome.fails_at() {
-        Some(level) if !row.guaranteed => format!("<small>fails: {}</small>", escape(&level.label)),
-        _ => String::new(),
-    };
-    let [low, high] = outcome.ci95.map(|share| 100.0 * share);
-    let says = escape(&row.cell(outcome));
+/// The matrix for a terminal.
+pub(crate) fn lines(matrix: &Matrix) -> Vec<String> {
+    let mut lines = table(matrix, false).lines();
+    lines.push(ended(matrix));
+    lines.extend(matrix.faults());
+    lines
+}
+
+fn ended(matrix: &Matrix) -> String {
+    let Matrix { methods, rows, trials, non_finite, seconds } = matrix;
+    let (cases, methods) = (rows.len(), methods.len());
     format!(
-        "<td class=\"cell {class}\" title=\"95 % interval {low:.0} to {high:.0} %\">{says}{from}</td>"
+        "{cases} cases, {methods} methods, {trials} trials in {seconds:.0} s; not finite: {non_finite}."
     )
 }
 
-fn section(matrix: &Matrix, row: &Row) -> anyhow::Result<String> {
-    let mut text = format!("<h3 id=\"{}\">{}: {}</h3>\n<dl>", row.id, row.id, escape(row.name));
-    for (name, value) in [
-        ("Scene", row.scene),
-        ("Levels", row.perturbation),
-        ("Measure", row.measure),
-        ("Target", row.target),
-    ] {
-        let _ = write!(text, "<dt>{name}</dt><dd>{}</dd>", escape(value));
-    }
-    text += "</dl>\n";
-    if !row.guaranteed && row.outcomes.iter().all(has_axis) {
-        let svg = chart::svg(row)?;
-        let caption = match chart::shows_shares(row) {
-            true => {
-                "Share of trials that reach the target over the level, with its 95 % interval (Wilson)."
-            }
-            false => "What is measured over the level; one trial at each.",
+fn table(matrix: &Matrix, with_levels: bool) -> Table {
+    let head = ["", "Case"].map(str::to_owned).into_iter().chain(matrix.methods.clone());
+    let mut table = Table::new(head);
+    for row in &matrix.rows {
+        let cell = |outcome: &Outcome| match outcome.fails_at().filter(|_| with_levels) {
+            Some(level) => format!("{}, fails: {}", outcome.share(), level.label),
+            None => outcome.share(),
         };
-        let _ = writeln!(text, "<figure>\n{svg}\n<figcaption>{caption}</figcaption>\n</figure>");
+        let name = [row.id, row.name].map(str::to_owned).into_iter();
+        table.push(name.chain(row.outcomes.iter().map(cell)));
+        let share = |outcome: &Outcome| match outcome.trials {
+            0 => Some(0.0),
+            trials => Some(outcome.reached as f64 / trials as f64).filter(|&share| share < 1.0),
+        };
+        let blank = [None, None].into_iter();
+        table.shade_last(blank.chain(row.outcomes.iter().map(share)).collect());
     }
+    table
+}
+
+fn levels(matrix: &Matrix, row: &Row) -> Table {
+    let mut table = Table::new(["Level".to_owned()].into_iter().chain(matrix.methods.clone()));
     let levels = row.outcomes.first().map_or(&[][..], |outcome| &outcome.levels);
-    text += "<details>\n<summary>Measured numbers: median (worst), share</summary>\n<table>\n<thead><tr><th>Level</th>";
-    for method in &matrix.methods {
-        let _ = write!(text, "<th>{method}</th>");
-    }
-    text += "</tr></thead>\n<tbody>\n";
     for (k, level) in levels.iter().enumerate() {
-        let _ = write!(text, "<tr><td>{}</td>", escape(&level.label));
-        for outcome in &row.outcomes {
-            let says = outcome.levels.get(k).map(numbers).unwrap_or_default();
-            let _ = write!(text, "<td>{says}</td>");
-        }
-        text += "</tr>\n";
+        let numbers = |level: &LevelOutcome| {
+            let [median, worst] = [level.median, level.worst].map(short_or_none);
+            format!("{median} ({worst}), {}/{}", level.reached, level.trials)
+        };
+        let cell = |outcome: &Outcome| outcome.levels.get(k).map(numbers).unwrap_or_default();
+        table.push([level.label.clone()].into_iter().chain(row.outcomes.iter().map(cell)));
     }
-    Ok(text + "</tbody>\n</table>\n</details>\n")
+    table
 }
 
-fn numbers(level: &LevelOutcome) -> String {
-    let number = |x: Option<f64>| match x {
-        None => "not finite".to_owned(),
-        Some(0.0) => "0".to_owned(),
-        Some(x) if (1e-3..1e4).contains(&x.abs()) => format!("{x:.3}"),
-        Some(x) => format!("{x:.1e}"),
-    };
-    let (median, worst) = (number(level.median), number(level.worst));
-    let both = if level.trials == 1 { worst } else { format!("{median} ({worst})") };
-    format!("{both}, {}/{}", level.reached, level.trials)
-}
-
-/// Whether the levels are numbers.
 fn has_axis(outcome: &Outcome) -> bool {
-    outcome.levels.len() > 2 && outcome.levels.iter().all(|level| level.at.is_some())
+    outcome.levels.len() > 1 && outcome.levels.iter().all(|level| level.at.is_some())
+}
+
+/// The share of trials that reach the target over the level, or with one trial at a level what is measured.
+fn chart(row: &Row) -> (Plot, &'static str) {
+    let levels = || row.outcomes.iter().flat_map(|outcome| &outcome.levels);
+    let shares = levels().any(|level| level.trials > 1);
+    let decades = |numbers: Vec<f64>| {
+        let least = numbers.iter().copied().fold(f64::INFINITY, f64::min);
+        least > 0.0 && numbers.iter().any(|&x| x > 20.0 * least)
+    };
+    let value = |level: &LevelOutcome| level.worst.map(|worst| worst.max(LEAST));
+    let x = match decades(levels().filter_map(|level| level.at).collect()) {
+        true => Axis::logarithmic(row.perturbation),
+        false => Axis::linear(row.perturbation),
+    };
+    let (y, caption) = match shares {
+        true => (
+            Axis::linear("share of trials"),
+            "Share of trials that reach the target over the level, with its 95 % interval (Wilson).",
+        ),
+        false => (
+            match decades(levels().filter_map(value).collect()) {
+                true => Axis::logarithmic("measured"),
+                false => Axis::linear("measured"),
+            },
+            "What is measured over the level; one trial at each.",
+        ),
+    };
+    let mut plot = Plot { from_zero: shares, ..Plot::new(x, y) };
+    for outcome in &row.outcomes {
+        let mut series = Series {
+            name: outcome.method.clone(),
+            colour: method_colour(&outcome.method),
+            dashed: outcome.method == "decay",
+            marked: true,
+            ..Series::default()
+        };
+        for level in &outcome.levels {
+            let Some(at) = level.at else { continue };
+            if shares {
+                series.points.push([at, level.reached as f64 / level.trials.max(1) as f64]);
+                series.band.push(level.ci95);
+            } else if let Some(value) = value(level) {
+                series.points.push([at, value]);
+            }
+        }
+        plot.series.push(series);
+    }
+    (plot, caption)
 }

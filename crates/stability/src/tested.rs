@@ -1,112 +1,186 @@
-use std::{ffi::OsString, path::PathBuf};
+use std::path::Path;
 
-use clap::{Args, Parser};
-use softrast_method::{Defaults, Method};
-use softrast_raster::BackendChoice;
-use softrast_runner::{Batch, Command, Progress, Run, Schedule, Settings, Task};
-use softrast_softness::Family;
+use anyhow::Context;
+use softrast_cli::{
+    Common, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment, Variant,
+};
+use softrast_inverse::{InverseProblem, Method, SolveConfig, minimize};
+use softrast_lab::{Batch, Experiment, Progress, Run};
+use softrast_meta::numbers;
+use softrast_raster::Rasterizer;
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
-/// A method under test.
-#[derive(Clone, Debug, PartialEq, Eq)]
+use crate::drawing::Single;
+
+/// A softness under test.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tested {
     /// Name of the family, or `decay`.
-    pub name: &'static str,
-    /// Value of `--softness`.
-    softness: OsString,
-    decay: bool,
+    pub name: String,
+    family: Family,
+    /// What stands for the family at every scale.
+    file: Option<(SoftnessChoice, Box<ScheduledSoftness>)>,
+    decays: bool,
 }
 
 /// How much wider a decay starts than it ends, where a case names one scale only.
 const DECAY: f64 = 10.0;
 
-#[derive(Parser)]
-struct Line<A: Args> {
-    #[command(flatten)]
-    settings: Settings,
-    #[command(flatten)]
-    args: A,
+/// How a case has a task solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Original or transfer.
+    pub variant: Variant,
+    /// Pixels a side.
+    pub size: usize,
+    /// Steps; the task's where there are none.
+    pub steps: Option<usize>,
+    /// Learning rate; what goes with the softness where there is none.
+    pub learning_rate: Option<f64>,
+    /// Scale, for a decay the last; what goes with the task where there is none.
+    pub scale: Option<f64>,
+    /// Seeds, from 0 on.
+    pub runs: usize,
 }
 
 impl Tested {
-    /// The five families with a scale that stays, and the default family with one that decays.
+    /// A family whose scale stays.
+    pub fn family(family: Family) -> Self {
+        Self { name: family.name().into(), family, file: None, decays: false }
+    }
+
+    /// A logistic whose scale falls over the steps.
+    pub fn decay() -> Self {
+        Self { name: "decay".into(), decays: true, ..Self::family(Family::Logistic) }
+    }
+
+    /// The five families of the paper with a scale that stays, and a logistic with one that decays.
     ///
     /// `mlp` is a softness file to test in place of the network that has not been trained.
-    pub fn all(mlp: Option<PathBuf>) -> Vec<Self> {
-        let mut all: Vec<Self> = ["logistic", "gauss", "exp", "gamma", "mlp"]
-            .map(|name| Self { name, softness: name.into(), decay: false })
-            .into();
-        if let Some(file) = mlp {
-            all[4].softness = file.into();
-        }
-        all.push(Self { name: "decay", softness: "logistic".into(), decay: true });
-        all
-    }
-
-    /// Whether the scale falls over the steps.
-    pub fn decays(&self) -> bool {
-        self.decay
-    }
-
-    /// The family, which for a file of any family is [`Family::Mlp`].
-    pub fn family(&self) -> Family {
-        self.name.parse().unwrap_or(Family::Logistic)
-    }
-
-    /// Whether the parameters come from a file, so that no case can choose their scale.
-    pub fn is_file(&self) -> bool {
-        self.softness.to_string_lossy().ends_with(".json")
-    }
-
-    /// The method at `scale`, in NDC; one that decays ends there, ten times as narrow as it began.
     ///
     /// # Errors
     ///
-    /// If its file cannot be used.
-    pub fn method_at(&self, scale: f64) -> anyhow::Result<Method> {
-        let defaults = Defaults {
-            task: "stability",
-            schedule: Schedule::Static,
-            decay: [scale; 2],
-            fixed: scale,
-            size: 64,
-            backends: &[BackendChoice::NdArray],
-        };
-        let line = Line::<softrast_runner::NoArgs>::try_parse_from(self.words(&self.at(scale)))?;
-        Method::new(&line.settings, &defaults)
-    }
-
-    /// Flags that set the scale.
-    pub fn at(&self, scale: f64) -> String {
-        match (self.is_file(), self.decay) {
-            (true, _) => String::new(),
-            (false, true) => format!("--scale {} --scale-end {scale}", DECAY * scale),
-            (false, false) => format!("--scale {scale}"),
-        }
-    }
-
-    /// Solves `runs` seeds of a task, with these flags and those of the method.
-    ///
-    /// # Errors
-    ///
-    /// Those of the task.
-    pub fn solve<T: Task>(&self, flags: &str, runs: usize) -> anyhow::Result<Vec<Run>> {
-        let mut line = Line::<T::Args>::try_parse_from(self.words(flags))?;
-        line.settings.command = Command::Evaluate;
-        let task = T::prepare(&line.settings, &line.args)?;
-        let seeds: Vec<u64> = (0..runs as u64).collect();
-        let mut all = Vec::with_capacity(runs);
-        for seeds in seeds.chunks(task.batch_size().max(1)) {
-            let batch = Batch { seeds: seeds.to_vec(), pictures: false };
-            all.extend(task.run(&batch, &mut Progress::hidden())?);
+    /// If the file cannot be used.
+    pub fn all(mlp: Option<&Path>) -> anyhow::Result<Vec<Self>> {
+        let families = [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp];
+        let mut all: Vec<Self> = families.map(Self::family).into();
+        all.push(Self::decay());
+        if let Some(path) = mlp {
+            let file = ScheduledSoftness::load(path).context("--mlp")?;
+            all[4].file = Some((SoftnessChoice::File(path.into()), Box::new(file)));
         }
         Ok(all)
     }
 
-    fn words(&self, flags: &str) -> Vec<OsString> {
-        let schedule = if self.decay { "decay" } else { "static" };
-        let mut words: Vec<OsString> = vec!["task".into(), "--softness".into()];
-        words.extend([self.softness.clone(), "--schedule".into(), schedule.into()]);
-        words.extend(flags.split_whitespace().map(OsString::from));
-        words
+    /// Whether it is a network.
+    pub fn is_network(&self) -> bool {
+        self.family == Family::Mlp
+    }
+
+    /// The softness at `scale`, in NDC; one that decays ends there, ten times as narrow as it began. A file has a scale of its own.
+    pub fn at(&self, scale: f64) -> ScheduledSoftness {
+        let edge = EdgeSoftness { family: self.family, squared: false };
+        match &self.file {
+            Some((_, file)) => (**file).clone(),
+            None if self.decays => ScheduledSoftness::decay(edge, DECAY * scale, scale),
+            None => ScheduledSoftness::constant(edge, scale),
+        }
+    }
+
+    /// Solves seeds of a task.
+    ///
+    /// # Errors
+    ///
+    /// Those of the task.
+    pub fn solve<T: Task>(&self, args: T::Args, config: &Config) -> anyhow::Result<Vec<Run>> {
+        let family = SoftnessChoice::Family(self.family);
+        let file = self.file.as_ref().map(|(file, _)| file.clone());
+        let scale = config.scale.filter(|_| file.is_none());
+        let method = MethodArgs {
+            schedule: file.is_none().then_some(match self.decays {
+                true => Schedule::Decay,
+                false => Schedule::Static,
+            }),
+            softness: Some(file.unwrap_or(family)),
+            scale: scale.map(|scale| if self.decays { DECAY * scale } else { scale }),
+            scale_end: scale.filter(|_| self.decays),
+            learning_rate: config.learning_rate,
+            ..MethodArgs::default()
+        };
+        let common = Common {
+            variant: config.variant,
+            size: Some(config.size),
+            steps: config.steps,
+            ..Common::default()
+        };
+        let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Evaluating)?;
+        let seeds: Vec<u64> = (0..config.runs as u64).collect();
+        let mut runs = Vec::with_capacity(seeds.len());
+        for seeds in seeds.chunks(experiment.batch_size().max(1)) {
+            let batch = Batch { seeds: seeds.to_vec(), pictures: false };
+            runs.extend(experiment.run(&batch, &mut Progress::hidden())?);
+        }
+        Ok(runs)
+    }
+}
+
+/// Where a descent came to.
+pub struct Descended {
+    /// Loss of each hard image after each step.
+    hard: Vec<Vec<f64>>,
+    /// Parameters after each step.
+    thetas: Vec<Vec<f64>>,
+    /// Every loss and parameter.
+    pub numbers: Vec<f64>,
+}
+
+/// Goes down from given instances of a problem, all of them side by side.
+///
+/// # Errors
+///
+/// If there is no instance.
+pub fn descend<P: InverseProblem>(
+    problem: &P,
+    instances: &[P::Instance],
+    softness: ScheduledSoftness,
+    config: SolveConfig,
+) -> anyhow::Result<Descended> {
+    let tolerance = Some(Rasterizer::TOLERANCE);
+    let method = Method { tolerance, ..Method::new("tested", softness) };
+    let mut end = Descended { hard: Vec::new(), thetas: Vec::new(), numbers: Vec::new() };
+    minimize::<P, Single>(problem, instances, &method, &config, false, |iterate, _| {
+        let theta = numbers(iterate.theta);
+        end.numbers.extend(iterate.loss.iter().chain(&iterate.hard_loss).chain(&theta));
+        end.hard.push(iterate.hard_loss);
+        end.thetas.push(theta);
+        Ok(())
+    })?;
+    Ok(end)
+}
+
+impl Descended {
+    /// The step after which the hard image of an instance is best; the last of equal ones.
+    fn best_step(&self, instance: usize) -> usize {
+        let last_best = |best: usize, step: usize| {
+            if self.hard[step][instance] <= self.hard[best][instance] { step } else { best }
+        };
+        (0..self.hard.len()).fold(0, last_best)
+    }
+
+    /// Parameters of an instance at its best step: its share of the vector.
+    pub fn best(&self, instance: usize) -> &[f64] {
+        let theta = &self.thetas[self.best_step(instance)];
+        let share = theta.len() / self.hard[0].len();
+        &theta[instance * share..(instance + 1) * share]
+    }
+
+    /// Lowest loss of the hard image of an instance.
+    pub fn lowest(&self, instance: usize) -> f64 {
+        self.hard[self.best_step(instance)][instance]
+    }
+
+    /// Parameters after the last step.
+    pub fn last(&self) -> &[f64] {
+        self.thetas.last().map_or(&[], Vec::as_slice)
     }
 }

@@ -1,17 +1,16 @@
 use std::path::PathBuf;
 
+use softrast_lab::parse::positive;
 use softrast_softness::DepthSoftness;
 
 /// Flags that only OCCLUSION has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Softness of the depth: a family, `depth_mlp`, or a file in JSON [default: the family of
-    /// --softness, `depth_mlp` for mlp].
+    /// Softness of the depth: a family, `depth_mlp`, or a file [default: like that of edges]
     #[arg(long, value_name = "NAME|FILE.json", value_parser = depth_softness)]
     pub depth_softness: Option<DepthSoftnessChoice>,
 
-    /// Width of the soft depth, in units of the distance between the near and the far plane;
-    /// positive [default: 0.1].
+    /// Width of the soft depth, in units of the distance between both planes [default: 0.1]
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     pub depth_scale: Option<f64>,
 }
@@ -31,11 +30,4 @@ fn depth_softness(text: &str) -> Result<DepthSoftnessChoice, String> {
     }
     let named = text.parse().map(DepthSoftnessChoice::Named);
     named.map_err(|error| format!("{error}, or a file that ends in .json"))
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
-        _ => Err("expected a positive number".into()),
-    }
 }

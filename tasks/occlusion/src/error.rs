@@ -16,7 +16,7 @@ pub struct DepthError {
 impl DepthError {
     /// The error of the depths `found` against those of the target.
     ///
-    /// Not in the paper, which leaves its measure of the depth undefined (FACTS choice 17).
+    /// Not in the paper, which leaves its measure of the depth undefined.
     ///
     /// # Panics
     ///

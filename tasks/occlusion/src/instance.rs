@@ -41,7 +41,7 @@ impl Instance {
     /// of the two with the other behind it. The start is drawn until its answer is wrong, because
     /// otherwise nothing would be to be found.
     ///
-    /// Not in the paper, which gives the number of quads and their depths alone (FACTS 4.5).
+    /// Not in the paper, which gives the number of quads and their depths alone.
     pub fn seeded(seed: u64, problem: &Problem) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
         let target = depths(&mut random, problem);

@@ -9,7 +9,7 @@
 //! signed distance d to the quad and its depth z. The background counts as a quad as far away as
 //! quads may go that covers every pixel by [`BACKGROUND`]. The loss of an instance is the mean squared error
 //! against the hard image of the target; instances in a batch are independent. Source: Wu et al.
-//! 2024, Eq. 3 and 4, Sec. 5.1; FACTS 4.5.
+//! 2024, Eq. 3 and 4, Sec. 5.1; docs/notes.md, Occlusion.
 //!
 //! **Not in the paper**, which gives the number of quads and the range of their depths alone: places,
 //! textures, steps and learning rate are ours, see [`Instance::seeded`] and [`Problem`]. The view has
@@ -22,26 +22,20 @@
 //!
 //! **Transfer.** Eight quads, ten steps; only the front quad is asked for.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("occlusion needs a backend: turn on one of the features ndarray, flex and wgpu");
-
 mod args;
-mod depth_method;
+mod depth;
 mod error;
 mod instance;
-mod lesson;
-mod picture;
+mod paper;
 mod problem;
 mod quad;
 mod scene;
-mod solve;
 mod task;
 mod texture;
 
 pub use args::{Args, DepthSoftnessChoice};
 pub use error::DepthError;
 pub use instance::Instance;
-pub use lesson::OcclusionLesson;
 pub use problem::Problem;
 pub use quad::Quad;
 pub use scene::{BACKGROUND, Scene};

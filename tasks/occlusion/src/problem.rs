@@ -1,4 +1,4 @@
-use softrast_runner::Variant;
+use softrast_cli::Variant;
 
 /// What the instances of a variant have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,12 +19,12 @@ const MARGIN: f64 = 0.02;
 impl Problem {
     /// Three quads, whose order is to be found.
     ///
-    /// Source: Wu et al. 2024, Sec. 5.1; FACTS 4.5.
+    /// Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Occlusion.
     pub const ORIGINAL: Self = Self { quads: 3, depths: [0.5, 1.5], front_only: false };
 
     /// Eight quads, the front one of which is to be found.
     ///
-    /// Source: Wu et al. 2024, Sec. 5.1; FACTS 4.5.
+    /// Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Occlusion.
     pub const TRANSFER: Self = Self { quads: 8, depths: [-1.5, 2.0], front_only: true };
 
     /// That of a variant.

@@ -1,5 +1,7 @@
+use std::cell::RefCell;
+
 use burn::tensor::{Tensor, backend::Backend};
-use softrast_method::tensor;
+use softrast_meta::tensor;
 use softrast_raster::{Background, blend, hard_colour, mse_loss, nearness};
 use softrast_softness::{DepthSoftness, EdgeSoftness};
 
@@ -9,7 +11,7 @@ use crate::{Instance, Problem, instance::places};
 ///
 /// Not on the far plane itself, where the depth network is 0. Where a quad covers a pixel, the background takes at most this share of it; beside the quads it
 /// prevails. Not in the paper, whose Eq. 4 is 0/0 far from all faces; this is the least weight that
-/// META 6.3 asks for.
+/// docs/notes.md, Colour, asks for.
 pub const BACKGROUND: f64 = 1e-3;
 
 /// Colour behind all quads.
@@ -28,6 +30,8 @@ pub struct Scene<B: Backend> {
     colour: Tensor<B, 4>,
     start: Tensor<B, 2>,
     target: Tensor<B, 3>,
+    /// The edge part of a softness that nothing is differentiated by, and the stage of the run that it is of.
+    fixed_edges: RefCell<Option<(usize, Tensor<B, 3>)>>,
 }
 
 impl<B: Backend> Scene<B> {
@@ -58,7 +62,8 @@ impl<B: Backend> Scene<B> {
         let answer = depths(|instance| &instance.target);
         let black = tensor(BLACK.to_vec(), [3]);
         let target = hard_colour(distance.clone(), answer, colour.clone(), black);
-        Self { problem: *problem, distance, colour, start, target }
+        let fixed_edges = RefCell::new(None);
+        Self { problem: *problem, distance, colour, start, target, fixed_edges }
     }
 
     /// θ before the first step.
@@ -75,6 +80,29 @@ impl<B: Backend> Scene<B> {
     /// parameters `phi`. It does not depend on θ: compute it once for every `phi`.
     pub fn edges(&self, softness: EdgeSoftness, phi: Tensor<B, 1>) -> Tensor<B, 3> {
         softness.log_value(phi, self.distance.clone())
+    }
+
+    /// [`Scene::edges`] of a softness that nothing is differentiated by, made anew only at another `stage` of a run.
+    pub(crate) fn fixed_edges(
+        &self,
+        stage: usize,
+        softness: EdgeSoftness,
+        phi: Tensor<B, 1>,
+    ) -> Tensor<B, 3> {
+        let mut kept = self.fixed_edges.borrow_mut();
+        match kept.as_ref().filter(|(of, _)| *of == stage) {
+            Some((_, edges)) => edges.clone(),
+            None => {
+                let edges = self.edges(softness, phi).detach();
+                *kept = Some((stage, edges.clone()));
+                edges
+            }
+        }
+    }
+
+    /// A flat θ as `[views, quads]`.
+    pub fn by_view(&self, theta: Tensor<B, 1>) -> Tensor<B, 2> {
+        theta.reshape(self.start.dims())
     }
 
     /// The soft image at θ, `[views, 3, pixels]`: Eq. 4 with `edges` from [`Scene::edges`] and a

@@ -5,7 +5,7 @@
 use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
-use softrast_runner::Failure;
+use softrast_lab::Failure;
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
 
 /// Runs a command line with results in `out`; its JSON line.
@@ -185,7 +185,7 @@ fn contradictions_are_usage_errors_and_broken_files_are_not() {
         ("--depth-scale inf", 2, "positive number"),
         ("--depth-scale NaN", 2, "positive number"),
         ("--resolution auto", 2, "leave out --resolution"),
-        ("--tolerance 1e-3", 2, "leave out --resolution"),
+        ("--tolerance 1e-3", 2, "leave out --tolerance"),
         (&huge, 1, "not finite"),
     ] {
         let failure = run(line).unwrap_err();
@@ -216,10 +216,10 @@ const LEARN: &str = "learn --outer 3 --inner 6 --batch 2 --validation-runs 2 --s
 #[test]
 fn a_learned_softness_is_one_that_the_task_accepts() {
     for flags in [
-        "--order unrolled",
-        "--softness mlp --order direct",
-        "--schedule decay --order es --learn-rate",
-        "--order joint",
+        "--estimator unrolled",
+        "--softness mlp --estimator direct",
+        "--schedule decay --estimator es --learn-rate",
+        "--estimator alternating",
     ] {
         let out = tempfile::tempdir().unwrap();
         let json = run_in(out.path(), &format!("{LEARN} {flags}")).unwrap();
@@ -264,12 +264,12 @@ fn learning_goes_on_only_from_its_own_checkpoint() {
 #[test]
 fn flags_of_learning_that_make_no_sense_are_refused() {
     for (line, part) in [
-        ("solve --outer 3", "--outer goes with learn, not with solve"),
-        ("learn --runs 3", "learn has no --runs"),
-        ("learn --order truncated:0", "expected a whole number"),
-        ("learn --order direct --referee fixed", "leave out --referee"),
-        ("learn --referee hard --order unrolled", "--referee hard needs --order es"),
-        ("learn --learn-rate --softness mlp", "--learn-rate needs --order es"),
+        ("solve --outer 3", "--outer goes with learn"),
+        ("learn --runs 3", "--runs goes with evaluate, search"),
+        ("learn --estimator truncated:0", "expected a whole number"),
+        ("learn --estimator direct --outer-loss fixed", "leave out --outer-loss"),
+        ("learn --outer-loss hard --estimator unrolled", "--outer-loss hard needs --estimator es"),
+        ("learn --learn-rate --softness mlp", "--learn-rate needs --estimator es"),
         ("learn --knots 6", "expected a whole number from 1 to 5"),
         ("learn --scales 0.1", "--scales goes with search"),
     ] {

@@ -5,29 +5,27 @@ use clap::ValueEnum;
 /// Flags that only POSE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh to view, used as it stands; the project's own fox by default.
+    /// Mesh to view, used as it stands [default: the project's own fox]
     #[arg(long, value_name = "FILE.obj")]
     pub mesh: Option<PathBuf>,
 
-    /// Centre the mesh, and scale it so that the longest side of its box is 2.
+    /// Centre the mesh, and scale it so that the longest side of its box is 2
     #[arg(long)]
     pub normalize: bool,
 
-    /// Degrees between the start and the target [default: 35-55].
+    /// Degrees between the start and the target [default: 35-55]
     #[arg(long, value_enum)]
     pub range: Option<Range>,
 
-    /// Where the pairs of start and target come from.
+    /// Where the pairs of start and target come from
     #[arg(long, value_enum, default_value_t)]
     pub instances: Instances,
 
-    /// Poses to start from: the given one and, while the image does not fit (hard `IoU` loss above 0.1),
-    /// others 50 degrees around it. The one that ends with the best image is kept [default: 8 to solve
-    /// a seed, else 1].
+    /// Poses to start from while the image does not fit [default: 8 to solve a seed, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     pub starts: Option<u32>,
 
-    /// Optimise the field of view too, from a random start, instead of knowing it.
+    /// Optimise the field of view too, from a random start, instead of knowing it
     #[arg(long)]
     pub optimise_fov: bool,
 }

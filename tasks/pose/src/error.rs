@@ -20,7 +20,7 @@ impl PoseError {
 
     /// The parameter error of the released curves: `|p - p*|² / 3` of the unit directions.
     ///
-    /// Source: FACTS 4.1; the curves hold the sum over 24 instances.
+    /// Source: docs/notes.md, Losses and errors; the curves hold the sum over 24 instances.
     pub fn released(&self) -> f64 {
         (2.0 * (self.angle_deg.to_radians() / 2.0).sin()).powi(2) / 3.0
     }

@@ -54,7 +54,7 @@ impl Instance {
     /// field of view 20. Start: distance 2 to 10, at an angle within `range` in a random direction of
     /// (elevation, azimuth), half field of view 10 to 30. Uniform unless said.
     ///
-    /// Source: FACTS 4.3. The paper says that distances end at 8; its code goes to 10.
+    /// Source: docs/notes.md, Pose. In the paper distances end at 8; its code goes to 10.
     pub fn seeded(seed: u64, range: Range) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
         let mut target_angle = || 60.0 * normal(&mut random);

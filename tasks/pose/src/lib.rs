@@ -7,7 +7,7 @@
 //! **Definition.** The mesh is first turned by the rotation of the target camera, then viewed from
 //! the pose (distance, elevation, azimuth), so the answer is elevation 0, azimuth 0 and the
 //! target's distance. The loss of an instance is the soft `IoU` loss against the hard silhouette at
-//! the target; instances in a batch are independent. Source: Wu et al. 2024, Sec. 5.1; FACTS 4.3.
+//! the target; instances in a batch are independent. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Pose.
 //!
 //! **Field of view.** The released code starts it at a wrong random value and never moves it, which
 //! leaves no pose that fits. Here the camera's own instances know their field of view, as a
@@ -21,21 +21,16 @@
 //!
 //! **Transfer.** Fewer steps and a larger learning rate, on whichever mesh `--mesh` names.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("pose needs a backend: turn on one of the features ndarray, flex and wgpu");
-
 mod args;
 mod error;
 mod instance;
-mod lesson;
+mod paper;
 mod picture;
 mod scene;
-mod solve;
 mod task;
 
 pub use args::{Args, Instances, Range};
 pub use error::PoseError;
 pub use instance::{Camera, Instance};
-pub use lesson::PoseLesson;
 pub use scene::Scene;
 pub use task::Pose;

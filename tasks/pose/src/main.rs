@@ -1,5 +1,5 @@
 //! POSE: recovers the pose of a camera from a silhouette.
 
 fn main() -> std::process::ExitCode {
-    softrast_runner::main::<pose::Pose>()
+    softrast_cli::main::<pose::Pose>()
 }

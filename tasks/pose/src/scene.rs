@@ -1,8 +1,9 @@
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
+use softrast_inverse::Targets;
 use softrast_mesh::Mesh;
-use softrast_method::{Targets, tensor};
+use softrast_meta::tensor;
 use softrast_raster::{hard_silhouette, iou_loss, project, view_rotation};
 
 use crate::Instance;
@@ -71,14 +72,14 @@ impl<B: Backend> Scene<B> {
         self.start.clone()
     }
 
+    /// A flat θ as `[views, 3]` or `[views, 4]`.
+    pub fn by_view(&self, theta: Tensor<B, 1>) -> Tensor<B, 2> {
+        theta.reshape(self.start.dims())
+    }
+
     /// Hard silhouettes to arrive at, `[views, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
-    }
-
-    /// Faces of the mesh.
-    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
-        &self.faces
     }
 
     /// The mesh as seen at θ: `[views, vertices, 3]`, x and y in NDC and the depth.
@@ -108,7 +109,7 @@ impl<B: Backend> Scene<B> {
     /// so that the whole mesh is in front of it (a step of Adam can be 0.3 world units, whatever
     /// there is to gain); an instance that starts or ends nearer may go that near. Half the field of
     /// view stays within 1 to 80 degrees. Not in the paper, whose released code lets the mesh pass
-    /// through the camera (FACTS S11).
+    /// through the camera (docs/notes.md, Faces behind the camera).
     pub fn allowed(&self, theta: Tensor<B, 2>) -> Tensor<B, 2> {
         let part = |start: usize, length: usize| theta.clone().narrow(1, start, length);
         let mut columns = vec![part(0, 1).max_pair(self.nearest.clone()), part(1, 2)];

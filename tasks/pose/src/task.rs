@@ -1,57 +1,37 @@
-use anyhow::ensure;
-use burn::backend::Autodiff;
-use softrast_mesh::{Mesh, fox};
-use softrast_method::{Defaults, Method, numbers, study};
-use softrast_raster::{RasterBackend, compiled_backends, on_backend};
-use softrast_runner::{
-    Batch, Command, Description, Error, ErrorGroup, ExtraError, Measure, Plan, Point, Progress,
-    Run, Schedule, Score, Settings, Study, Task, Variant, best_step,
+use std::sync::Arc;
+
+use burn::tensor::Tensor;
+use image::RgbImage;
+use serde_json::json;
+use softrast_cli::{
+    Description, EdgeChoice, Ended, Measures, Paper, Scales, Schedule, Task, Variant, theta_of,
 };
+use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
+use softrast_lab::Error;
+use softrast_mesh::{Mesh, fox};
+use softrast_meta::numbers;
+use softrast_raster::{HostBackend, RasterBackend};
 
 use crate::{
-    Args, Instance, Instances, PoseError, Range, Scene,
-    lesson::PoseLesson,
-    picture::Album,
+    Args, Instance, Instances, PoseError, Range, Scene, paper::PAPER, picture::outlined,
     scene::nearest_distance,
-    solve::{Solver, State},
 };
 
 /// A run succeeds when the camera ends at most this far from the target.
 const SUCCESS_DEG: f64 = 5.0;
 /// Starts that `solve` may try, unless asked for another number.
 const STARTS: usize = 8;
-/// A hard `IoU` loss above this says that the pose only looks alike, and that another start is worth
-/// its time. Poses within 5 degrees end below 0.08, others hardly ever below 0.2.
-const FITS: f64 = 0.1;
 /// Instances solved together in `evaluate`: all released pairs fit.
 const BATCH: usize = 25;
 
-/// First and last scale of a decay, in NDC, and that of a static softness: wide enough at first to
-/// pull from afar, and at last as narrow as still gives the best hard silhouettes.
-///
-/// Measured with a logistic. The 24 released pairs on spot end at a hard `IoU` loss, summed, of 1.09
-/// at 0.0015, 1.12 at 0.002, 1.26 at 0.003 and 3.2 at 0.01. Of 50 seeds on the fox that start 35 to
-/// 55 degrees away 41 succeed at 0.002, and 48 with a decay to it from 0.03 (from 0.01: 45, from
-/// 0.05: 47). This is below the quarter of a pixel that META 6.6 asks for, because thousands of
-/// small faces add up to an edge that is wider than that of one (META 6.7).
-const SCALES: Defaults = Defaults {
-    task: Pose::NAME,
-    schedule: Schedule::Decay,
-    decay: [0.03, 0.002],
-    fixed: 0.002,
-    size: 64,
-    backends: compiled_backends!(),
-};
-
-/// The prepared task.
+/// POSE: a camera that orbits a mesh, and the silhouette that it should see.
 pub struct Pose {
-    pub(crate) mesh: Mesh,
+    mesh: Mesh,
     mesh_name: String,
+    faces: Arc<[[u32; 3]]>,
     source: Source,
-    pub(crate) optimise_fov: bool,
-    /// Poses that a run may start from.
-    starts: usize,
-    pub(crate) solver: Solver,
+    optimise_fov: bool,
+    variant: Variant,
 }
 
 /// Where instances come from.
@@ -60,218 +40,20 @@ enum Source {
     Released(Vec<Instance>),
 }
 
-impl Task for Pose {
-    const NAME: &'static str = "pose";
-    const ABOUT: &'static str = "Recovers the pose of a camera from a silhouette";
-    type Args = Args;
+impl InverseProblem for Pose {
+    type Instance = Instance;
+    type Scene<B: RasterBackend> = Scene<B>;
 
-    fn prepare(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
-        let method = Method::new(settings, &SCALES)?;
-        let suited = method.learning_rate();
-        let (steps, learning_rate) = match settings.variant {
-            Variant::Original => (300, suited.unwrap_or(0.3)),
-            Variant::Transfer => (150, 0.5),
-        };
-        let solver = Solver {
-            method,
-            size: settings.size.unwrap_or(SCALES.size),
-            steps: settings.steps.unwrap_or(steps),
-            learning_rate: settings.learning_rate.unwrap_or(learning_rate),
-        };
-        let (mesh, mesh_name) = mesh(args)?;
-        let source = Source::new(settings, args)?;
-        let thorough = settings.command == Command::Solve && args.instances == Instances::Seeded;
-        let starts = args.starts.map_or(if thorough { STARTS } else { 1 }, |n| n as usize);
-        Ok(Self { mesh, mesh_name, source, optimise_fov: args.optimise_fov, starts, solver })
-    }
-
-    fn describe(&self) -> Description {
-        let Solver { method, size, steps, learning_rate } = &self.solver;
-        let (instances, range) = match &self.source {
-            Source::Seeded(range) => ("seeded", range.name()),
-            Source::Released(_) => ("released24", Range::Near.name()),
-        };
-        let settings = serde_json::json!({
-            "mesh": self.mesh_name,
-            "instances": instances,
-            "range": range,
-            "optimise_fov": self.optimise_fov,
-            "starts": self.starts,
-            "learning_rate": learning_rate,
-            "resolution": method.resolution().to_string(),
-            "tolerance": method.rasterizer(*size).tolerance,
-        });
-        Description {
-            softness: method.name().to_owned(),
-            parameters: method.parameters(),
-            backend: method.backend().title().to_owned(),
-            steps: *steps,
-            size: *size,
-            faces: self.mesh.faces().len(),
-            runs: match &self.source {
-                Source::Seeded(_) => 50,
-                Source::Released(pairs) => pairs.len(),
-            },
-            image_error: Measure { name: "soft IoU loss", unit: "" },
-            parameter_error: Measure { name: "camera angle", unit: "degrees" },
-            extra: EXTRA.to_vec(),
-            success: format!("the camera ends within {SUCCESS_DEG} degrees"),
-            settings: method.settings(*steps, settings),
-        }
-    }
-
-    fn batch_size(&self) -> usize {
-        BATCH
-    }
-
-    /// What can be seen of a pose; the soft loss of a method falls with its scale.
-    fn score(&self) -> Score {
-        Score::Extra("hard")
-    }
-
-    fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
-        let instances = batch.seeds.iter().map(|&seed| self.instance(seed));
-        let instances = instances.collect::<anyhow::Result<Vec<_>>>()?;
-        let mut kept = self.solve(&instances, batch, progress)?;
-        for start in 1..self.starts {
-            let tried: Vec<usize> =
-                (0..kept.len()).filter(|&k| kept[k].image_loss() > FITS).collect();
-            if tried.is_empty() {
-                break;
-            }
-            let others = tried.iter().map(|&k| instances[k].around(start, self.starts));
-            let others = self.solve(&others.collect::<Vec<_>>(), batch, progress)?;
-            for (k, other) in tried.into_iter().zip(others) {
-                if other.image_loss() < kept[k].image_loss() {
-                    kept[k] = other;
-                }
-            }
-        }
-        let runs = kept.into_iter().enumerate().map(|(k, solved)| {
-            let (seed, curve) = (batch.seeds[k], solved.curve);
-            Run {
-                seed,
-                success: end(&curve).is_some_and(|end| end.parameter_error <= SUCCESS_DEG),
-                warnings: self.warnings(seed, &instances[k], &solved.target, &curve),
-                curve,
-                step_seconds: solved.step_seconds,
-                pictures: (k == 0).then_some(solved.album).flatten().map(Album::pictures),
-            }
-        });
-        Ok(runs.collect())
-    }
-
-    fn study(self, plan: &Plan) -> anyhow::Result<Box<dyn Study>> {
-        if let Source::Released(_) = self.source {
-            let message =
-                "learn needs more instances than --instances released24 has: leave it out";
-            return Err(Error::Usage(message.into()).into());
-        }
-        study(PoseLesson::new(self, plan), plan)
-    }
-}
-
-/// One instance, solved from one start.
-struct Solved {
-    target: Vec<f64>,
-    curve: Vec<Point>,
-    step_seconds: Vec<f64>,
-    album: Option<Album>,
-}
-
-impl Solved {
-    /// Hard `IoU` loss of what is returned: what can be told without knowing the answer.
-    fn image_loss(&self) -> f64 {
-        end(&self.curve).map_or(f64::INFINITY, |end| end.extra[0])
-    }
-}
-
-/// Errors beside the soft image error and the angle, in the order of [`point`].
-const EXTRA: [ExtraError; 3] = [
-    ExtraError {
-        group: ErrorGroup::Image,
-        key: "hard",
-        measure: Measure { name: "hard IoU loss", unit: "" },
-    },
-    ExtraError {
-        group: ErrorGroup::Parameter,
-        key: "distance",
-        measure: Measure { name: "camera distance", unit: "world units" },
-    },
-    ExtraError {
-        group: ErrorGroup::Parameter,
-        key: "released",
-        measure: Measure { name: "squared chord / 3", unit: "" },
-    },
-];
-
-/// The point of a curve that is returned.
-fn end(curve: &[Point]) -> Option<&Point> {
-    best_step(curve, |point| point.extra[0])
-}
-
-fn point(state: &State, view: usize, instance: &Instance) -> Point {
-    let theta = &state.theta[view];
-    let error = PoseError::new([theta[0], theta[1], theta[2]], instance.target.distance);
-    Point {
-        step: state.step,
-        loss: state.soft[view],
-        image_error: state.soft[view],
-        parameter_error: error.angle_deg,
-        scale: state.scale,
-        extra: vec![state.hard[view], error.distance, error.released()],
-    }
-}
-
-impl Pose {
-    /// Solves instances side by side.
-    fn solve(
-        &self,
-        instances: &[Instance],
-        batch: &Batch,
-        progress: &mut Progress,
-    ) -> anyhow::Result<Vec<Solved>> {
-        let backend = self.solver.method.backend();
-        on_backend!(backend, B => self.solve_on::<B>(instances, batch, progress))
-    }
-
-    fn solve_on<B: RasterBackend>(
-        &self,
-        instances: &[Instance],
-        batch: &Batch,
-        progress: &mut Progress,
-    ) -> anyhow::Result<Vec<Solved>> {
-        let Solver { size, steps, .. } = self.solver;
-        let scene = Scene::<Autodiff<B>>::new(&self.mesh, instances, size, self.optimise_fov);
-        let targets = numbers(scene.target().inner());
-        let solved = |target: &[f64]| Solved {
-            target: target.to_vec(),
-            curve: Vec::with_capacity(steps + 1),
-            step_seconds: Vec::with_capacity(steps),
-            album: batch.pictures.then(|| Album::new(target.to_vec(), size)),
-        };
-        let mut all: Vec<Solved> = targets.chunks(size * size).map(solved).collect();
-        self.solver.run(&scene, batch.pictures, |state: State| {
-            let image: Option<Vec<f64>> = state.image.as_ref().map(|image| image.iter().collect());
-            for (view, solved) in all.iter_mut().enumerate() {
-                solved.curve.push(point(&state, view, &instances[view]));
-                solved.step_seconds.extend(state.seconds);
-                if let (Some(album), Some(image)) = (&mut solved.album, &image) {
-                    let image = &image[view * size * size..(view + 1) * size * size];
-                    album.take(image, state.hard[view], batch.wants_frame(state.step, steps));
-                }
-            }
-            let loss = state.soft.iter().sum::<f64>() / state.soft.len() as f64;
-            if state.step == 0 { Ok(()) } else { progress.step(state.step, loss) }
-        })?;
-        Ok(all)
-    }
-
-    pub(crate) fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
+    fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
         match &self.source {
             Source::Released(pairs) => {
                 let pair = usize::try_from(seed).ok().and_then(|k| pairs.get(k)).copied();
-                pair.ok_or_else(|| too_many(pairs.len()))
+                pair.ok_or_else(|| {
+                    Error::usage(format!(
+                        "--instances released24 has {} pairs, counted from seed 0: --seed and --runs together may not go beyond",
+                        pairs.len()
+                    ))
+                })
             }
             Source::Seeded(range) => {
                 let mut instance = Instance::seeded(seed, *range);
@@ -283,67 +65,188 @@ impl Pose {
         }
     }
 
-    /// What is wrong with an instance, so that nobody trusts its numbers.
-    fn warnings(
+    fn restart(&self, instance: &Instance, k: usize, count: usize) -> Option<Instance> {
+        Some(instance.around(k, count))
+    }
+
+    fn scene<B: RasterBackend>(&self, instances: &[Instance], size: usize) -> Scene<B> {
+        Scene::new(&self.mesh, instances, size, self.optimise_fov)
+    }
+
+    fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
+        Some(self.faces.clone())
+    }
+
+    fn start<B: RasterBackend>(&self, scene: &Scene<B>) -> Tensor<B, 1> {
+        scene.start().flatten(0, 1)
+    }
+
+    fn allowed<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        scene.allowed(scene.by_view(theta)).flatten(0, 1)
+    }
+
+    fn image<B: RasterBackend>(
         &self,
-        seed: u64,
-        instance: &Instance,
-        target: &[f64],
-        curve: &[Point],
-    ) -> Vec<String> {
+        scene: &Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 3> {
+        softness.silhouette(scene.project(scene.by_view(theta)))
+    }
+
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+        scene.hard(scene.project(scene.by_view(theta)))
+    }
+
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        scene.image_loss(image)
+    }
+
+    fn defaults(&self) -> SolveConfig {
+        match self.variant {
+            Variant::Original => SolveConfig { size: 64, steps: 300, learning_rate: 0.3 },
+            Variant::Transfer => SolveConfig { size: 64, steps: 150, learning_rate: 0.5 },
+        }
+    }
+}
+
+impl Task for Pose {
+    const NAME: &'static str = "pose";
+    const TITLE: &'static str = "POSE";
+    const ABOUT: &'static str = "Recovers the pose of a camera from a silhouette";
+
+    /// Wide enough at first to pull from afar, and at last as narrow as still gives the best hard silhouettes.
+    ///
+    /// Measured with a logistic. The 24 released pairs on spot end at a hard `IoU` loss, summed, of 1.09 at 0.0015, 1.12 at 0.002, 1.26
+    /// at 0.003 and 3.2 at 0.01. Of 50 seeds on the fox that start 35 to 55 degrees away 41 succeed at 0.002, and 48 with a decay to it
+    /// from 0.03 (from 0.01: 45, from 0.05: 47). This is below a quarter of a pixel, because thousands of small faces add up to an edge
+    /// that is wider than that of one.
+    const SCALES: Scales = Scales { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+
+    /// Poses within 5 degrees end below 0.08, others hardly ever below 0.2.
+    const FITS: f64 = 0.1;
+
+    type Args = Args;
+
+    fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
+        let (mesh, mesh_name) = mesh(args)?;
+        let source = match (args.instances, args.range) {
+            (Instances::Seeded, range) => Source::Seeded(range.unwrap_or_default()),
+            (Instances::Released24, None) => Source::Released(Instance::released()?),
+            (Instances::Released24, Some(_)) => {
+                return Err(Error::usage(
+                    "--range does not go with --instances released24, whose angles are 15 to 35",
+                ));
+            }
+        };
+        let faces = mesh.faces().into();
+        let optimise_fov = args.optimise_fov;
+        Ok(Self { mesh, mesh_name, faces, source, optimise_fov, variant })
+    }
+
+    fn measures() -> Measures {
+        Measures {
+            soft: "soft IoU loss",
+            hard: "hard IoU loss",
+            parameter: ["camera angle", "degrees"],
+            further: &[
+                ["parameter_error.distance", "camera distance", "world units"],
+                ["parameter_error.released", "squared chord / 3", ""],
+            ],
+        }
+    }
+
+    fn description(&self) -> Description {
+        let (instances, range, runs) = match &self.source {
+            Source::Seeded(range) => ("seeded", range.name(), 50),
+            Source::Released(pairs) => ("released24", Range::Near.name(), pairs.len()),
+        };
+        let settings = json!({
+            "mesh": self.mesh_name,
+            "instances": instances,
+            "range": range,
+            "optimise_fov": self.optimise_fov,
+        });
+        Description {
+            faces: self.mesh.faces().len(),
+            runs,
+            success: format!("the camera ends within {SUCCESS_DEG} degrees"),
+            settings: settings.as_object().cloned().unwrap_or_default(),
+        }
+    }
+
+    fn shares_learning_rate(&self) -> bool {
+        self.variant == Variant::Original
+    }
+
+    fn batch_size(&self) -> usize {
+        BATCH
+    }
+
+    fn starts(args: &Args, solves: bool) -> usize {
+        let thorough = solves && args.instances == Instances::Seeded;
+        args.starts.map_or(if thorough { STARTS } else { 1 }, |n| n as usize)
+    }
+
+    fn errors(
+        &self,
+        instances: &[Instance],
+        _scene: &Scene<HostBackend>,
+        iterate: &Iterate,
+    ) -> Vec<Vec<f64>> {
+        let poses = theta_of(&iterate.theta, instances.len());
+        let error = |(pose, instance): (&Vec<f64>, &Instance)| {
+            let error = PoseError::new([pose[0], pose[1], pose[2]], instance.target.distance);
+            vec![error.angle_deg, error.distance, error.released()]
+        };
+        poses.iter().zip(instances).map(error).collect()
+    }
+
+    fn is_success(&self, _hard: f64, errors: &[f64]) -> bool {
+        errors[0] <= SUCCESS_DEG
+    }
+
+    fn targets(&self, scene: &Scene<HostBackend>) -> Vec<f64> {
+        numbers(scene.target())
+    }
+
+    fn frame(&self, image: &[f64], target: &[f64], size: usize) -> RgbImage {
+        outlined(image, target, size)
+    }
+
+    fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {
+        let Ended { seed, instance, target, hard, .. } = *run;
         let mut warnings = Vec::new();
         let covered = target.iter().filter(|&&p| p > 0.5).count();
         if covered == 0 {
             warnings.push(format!(
-                "seed {seed}: the target image is empty, so there is nothing to match: check that \
-                 the mesh is around the origin (--normalize moves it there) and raise --size"
+                "seed {seed}: the target image is empty, so there is nothing to match: check that the mesh is around the origin \
+                 (--normalize moves it there) and raise --size"
             ));
         } else if covered == target.len() {
             warnings.push(format!(
-                "seed {seed}: the mesh fills the whole target image, so no edge shows its pose: try \
-                 --normalize or a larger --size"
+                "seed {seed}: the mesh fills the whole target image, so no edge shows its pose: try --normalize or a larger --size"
             ));
         }
         let (nearest, camera) = (nearest_distance(&self.mesh), instance.target.distance);
         if camera < nearest {
             warnings.push(format!(
-                "seed {seed}: the mesh reaches to the target camera: it would have to be {nearest:.3} \
-                 from the origin but is at {camera:.3}; try --normalize"
+                "seed {seed}: the mesh reaches to the target camera: it would have to be {nearest:.3} from the origin but is at \
+                 {camera:.3}; try --normalize"
             ));
         }
-        if covered > 0 && end(curve).is_some_and(|end| end.extra[0] >= 1.0) {
+        if covered > 0 && hard >= 1.0 {
             warnings.push(format!(
-                "seed {seed}: the mesh ends outside the target's silhouette, where nothing pulls it \
-                 back: try a larger --scale or a smaller --learning-rate"
+                "seed {seed}: the mesh ends outside the target's silhouette, where nothing pulls it back: try a larger --scale or a \
+                 smaller --learning-rate"
             ));
         }
         warnings
     }
-}
 
-impl Source {
-    fn new(settings: &Settings, args: &Args) -> anyhow::Result<Self> {
-        if args.instances == Instances::Seeded {
-            return Ok(Source::Seeded(args.range.unwrap_or_default()));
-        }
-        if args.range.is_some() {
-            let message =
-                "--range does not go with --instances released24, whose angles are 15 to 35";
-            return Err(Error::Usage(message.into()).into());
-        }
-        let pairs = Instance::released()?;
-        let last = settings.seed.saturating_add(settings.runs.unwrap_or(1) as u64);
-        ensure!(last <= pairs.len() as u64, too_many(pairs.len()));
-        Ok(Source::Released(pairs))
+    fn paper() -> &'static Paper {
+        &PAPER
     }
-}
-
-fn too_many(pairs: usize) -> anyhow::Error {
-    let message = format!(
-        "--instances released24 has {pairs} pairs, counted from seed 0: --seed and --runs together \
-         may not go beyond"
-    );
-    Error::Usage(message).into()
 }
 
 /// The mesh to view and its name.

@@ -1,8 +1,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use softrast_lab::{
+    Error,
+    parse::{count, positive, seed, whole},
+};
 use softrast_raster::TConorm;
-use softrast_runner::Error;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
 
 use crate::{Data, Settings, Width};
@@ -18,6 +21,10 @@ pub(crate) struct CommandLine {
     /// default.
     #[arg(long, global = true, value_name = "NAME")]
     pub(crate) backend: Option<String>,
+
+    /// Print one JSON object instead of text.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -78,7 +85,7 @@ pub(crate) struct Common {
     pub(crate) quick: bool,
 
     /// Seed of weights, shapes and order.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed)]
     pub(crate) seed: u64,
 
     /// Go on from the checkpoint in the folder.
@@ -132,12 +139,8 @@ pub(crate) struct EvaluateArgs {
     pub(crate) shapes: usize,
 
     /// Views of each shape, 1 to 24.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = views)]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole::<1, { crate::VIEWS }>)]
     pub(crate) views: usize,
-
-    /// Print one JSON object instead of the table.
-    #[arg(long)]
-    pub(crate) json: bool,
 }
 
 #[derive(Args, Clone, Debug)]
@@ -235,7 +238,7 @@ pub(crate) fn softness(
     Ok((softness, phi))
 }
 
-/// Scale of a family for the probabilistic sum. Source: FACTS 4.6; families that are not named there
+/// Scale of a family for the probabilistic sum. Source: docs/notes.md, Reconstruction; families that are not named there
 /// take that of the logistic.
 fn default_scale(softness: EdgeSoftness) -> f64 {
     match (softness.family, softness.squared) {
@@ -249,29 +252,9 @@ fn default_scale(softness: EdgeSoftness) -> f64 {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(x) if x > 0.0 && f64::is_finite(x) => Ok(x),
-        _ => Err("expected a positive number".into()),
-    }
-}
-
 fn rate(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(x) if x >= 0.0 && f64::is_finite(x) => Ok(x),
         _ => Err("expected 0 or a positive number".into()),
     }
-}
-
-/// More of anything is a slip of the finger.
-const MOST: usize = 1_000_000;
-
-fn count(text: &str) -> Result<usize, String> {
-    let count = text.parse().ok().filter(|n| (1..=MOST).contains(n));
-    count.ok_or_else(|| format!("expected a whole number from 1 to {MOST}"))
-}
-
-fn views(text: &str) -> Result<usize, String> {
-    let count = text.parse().ok().filter(|n| (1..=crate::VIEWS).contains(n));
-    count.ok_or_else(|| format!("expected a whole number from 1 to {}", crate::VIEWS))
 }

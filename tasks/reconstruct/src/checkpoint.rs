@@ -1,14 +1,11 @@
-use std::{
-    fs,
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
-use tempfile::NamedTempFile;
+use softrast_lab::write_atomically;
+use softrast_softness::ScheduledSoftness;
 
-use crate::{Epoch, Settings};
+use crate::{Data, Epoch, Settings, Time};
 
 /// What a file of a training begins with; the number counts changes of the format or the network.
 const MAGIC: &[u8] = b"softrast reconstruct 1\n";
@@ -45,9 +42,9 @@ impl Checkpoint {
         if !bytes.starts_with(MAGIC) {
             let family = &MAGIC[..MAGIC.len() - 3];
             if bytes.starts_with(family) {
-                bail!("{name} is a checkpoint of another version of this program");
+                bail!("{name} is a checkpoint of another version of this program: train anew");
             }
-            bail!("{name} is not a checkpoint of reconstruct");
+            bail!("{name} is not a checkpoint of reconstruct: train one");
         }
         let damaged = || format!("{name} is damaged or cut off: train anew");
         let rest = &bytes[MAGIC.len()..];
@@ -58,9 +55,12 @@ impl Checkpoint {
         let body = &rest[16..];
         let length = usize::try_from(length).ok().filter(|&length| length <= body.len());
         let (header, records) = body.split_at(length.with_context(damaged)?);
-        let header = serde_json::from_slice(header).with_context(|| {
-            format!("{name} is a checkpoint of another version of this program")
+        let header: Header = serde_json::from_slice(header).with_context(|| {
+            format!("{name} is a checkpoint of another version of this program: train anew")
         })?;
+        header
+            .check(path)
+            .with_context(|| format!("{name} holds what no training writes: train anew"))?;
         Ok(Self { header, records: records.to_vec() })
     }
 
@@ -75,31 +75,59 @@ impl Checkpoint {
         body.extend(&header);
         body.extend(&self.records);
         let sum = checksum(&body).to_le_bytes();
-        write(path, &[MAGIC, &sum, &body])
+        write(path, &[MAGIC, &sum, &body].concat())
     }
 }
 
-/// Writes a file by way of a temporary one beside it.
+impl Header {
+    /// Checks that every value is one that a training writes.
+    fn check(&self, path: &Path) -> anyhow::Result<()> {
+        let Self { settings, classes, epochs } = self;
+        let is_count = |n: usize| (1..=1_000_000).contains(&n);
+        let is_phi = |phi: &[f64]| {
+            let softness = serde_json::json!({ "softness": settings.softness, "phi": phi });
+            ScheduledSoftness::parse(&softness.to_string(), path)
+        };
+        settings.t_conorm()?;
+        is_phi(&settings.phi)?;
+        let rates = [settings.learning_rate, settings.softness_rate];
+        ensure!(rates.iter().all(|&rate| is_finite_from_0(rate)), "a rate is {rates:?}");
+        let counts = [settings.pairs, settings.steps, settings.val];
+        ensure!(counts.into_iter().all(is_count), "pairs, steps and val are {counts:?}");
+        if let Data::Procedural(shapes) = settings.data {
+            ensure!(is_count(shapes), "a class has {shapes} shapes");
+        }
+        ensure!(!classes.is_empty() && !epochs.is_empty(), "there is no class or no epoch");
+        for (number, epoch) in epochs.iter().enumerate() {
+            ensure!(epoch.number == number, "epoch {number} has the number {}", epoch.number);
+            let [found, expected] = [epoch.voxel_iou.len(), classes.len()];
+            ensure!(found == expected, "epoch {number} scores {found} classes of {expected}");
+            let is_share = |iou: &f64| (0.0..=1.0).contains(iou);
+            let shares = epoch.voxel_iou.iter().all(is_share);
+            ensure!(shares, "an IoU of epoch {number} is not from 0 to 1");
+            let Time { all, data, network, rasterizer, smoothness, optimizer, .. } = epoch.time;
+            let times = [all, data, network, rasterizer, smoothness, optimizer];
+            let is_time = times.into_iter().all(is_finite_from_0);
+            ensure!(is_time, "a time of epoch {number} is no time");
+            is_phi(&epoch.phi).with_context(|| format!("epoch {number}"))?;
+        }
+        Ok(())
+    }
+}
+
+fn is_finite_from_0(x: f64) -> bool {
+    x.is_finite() && x >= 0.0
+}
+
+/// Writes a file that appears whole or not at all, and its folder if that is missing.
 ///
 /// # Errors
 ///
 /// If it cannot be written.
-pub(crate) fn write(path: &Path, parts: &[&[u8]]) -> anyhow::Result<()> {
-    let failed = || format!("cannot write {}", path.display());
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    fs::create_dir_all(&folder).with_context(failed)?;
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".softrast-").suffix(".tmp");
-    // A temporary file is private by default; this one becomes an ordinary file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file: NamedTempFile = builder.tempfile_in(folder).with_context(failed)?;
-    for part in parts {
-        file.write_all(part).with_context(failed)?;
-    }
-    file.persist(path).map_err(|error| error.error).with_context(failed)?;
-    Ok(())
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    let made = path.parent().map_or(Ok(()), fs::create_dir_all);
+    let written = made.and_then(|()| write_atomically(path, bytes));
+    written.with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// FNV-1a over words of eight bytes: finds what a disk or a copy breaks, not what a forger does.
@@ -110,4 +138,111 @@ fn checksum(bytes: &[u8]) -> u64 {
         sum = (sum ^ u64::from_le_bytes(word)).wrapping_mul(0x0100_0000_01b3).rotate_left(23);
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::OnceLock;
+
+    use proptest::prelude::*;
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    /// The file of a training that is as small as it can be: its header, and what follows it.
+    fn written() -> &'static (Value, Vec<u8>) {
+        static WRITTEN: OnceLock<(Value, Vec<u8>)> = OnceLock::new();
+        WRITTEN.get_or_init(|| {
+            let folder = tempfile::tempdir().unwrap();
+            let out = folder.path().display();
+            run(&format!(
+                "train --quick --epochs 1 --pairs 1 --steps 1 --shapes 1 --val 1 --quiet --out {out}"
+            ))
+            .unwrap();
+            let Checkpoint { header, records } =
+                Checkpoint::load(&folder.path().join("checkpoint.bin")).unwrap();
+            (serde_json::to_value(header).unwrap(), records)
+        })
+    }
+
+    fn run(line: &str) -> Result<(), String> {
+        let words = ["reconstruct"].into_iter().chain(line.split_whitespace()).map(Into::into);
+        crate::execute(words, &mut Vec::new()).map_err(|failure| failure.to_string())
+    }
+
+    /// Evaluates a file: fine, or one line that names it and says what to do.
+    fn evaluate(bytes: &[u8]) -> Result<(), TestCaseError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("checkpoint.bin");
+        fs::write(&path, bytes).unwrap();
+        let ended = run(&format!("evaluate --shapes 1 --views 1 --checkpoint {}", path.display()));
+        if let Err(line) = ended {
+            let says = line.contains("checkpoint.bin") && line.contains("train");
+            prop_assert!(says && line.lines().count() == 1, "{line}");
+        }
+        Ok(())
+    }
+
+    /// A file with this header and a checksum that fits.
+    fn sealed(header: &Value, records: &[u8]) -> Vec<u8> {
+        let header = header.to_string();
+        let length = (header.len() as u64).to_le_bytes();
+        let body = [&length, header.as_bytes(), records].concat();
+        [MAGIC, &checksum(&body).to_le_bytes(), &body].concat()
+    }
+
+    /// Every value in a JSON value, as pointers.
+    fn pointers(value: &Value, at: &str, found: &mut Vec<String>) {
+        found.push(at.to_owned());
+        match value {
+            Value::Object(map) => {
+                map.iter().for_each(|(k, v)| pointers(v, &format!("{at}/{k}"), found));
+            }
+            Value::Array(all) => {
+                all.iter().enumerate().for_each(|(k, v)| pointers(v, &format!("{at}/{k}"), found));
+            }
+            _ => {}
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn a_damaged_file_ends_in_one_line(at in any::<prop::sample::Index>(), byte: u8, cut: bool) {
+            let (header, records) = written();
+            let mut bytes = sealed(header, records);
+            let at = at.index(bytes.len());
+            if cut { bytes.truncate(at) } else { bytes[at] = byte }
+            evaluate(&bytes)?;
+        }
+
+        #[test]
+        fn another_value_in_the_header_ends_in_one_line_or_a_score(
+            at in any::<prop::sample::Index>(), other in 0..9_usize
+        ) {
+            let (header, records) = written();
+            let (mut header, mut all) = (header.clone(), Vec::new());
+            pointers(&header, "", &mut all);
+            let value = header.pointer_mut(at.get::<String>(&all)).unwrap();
+            match (other, &mut *value) {
+                (0, Value::Array(all)) => drop(all.pop()),
+                (1, Value::Array(all)) => all.push(all.first().cloned().unwrap_or(json!(0.5))),
+                (0 | 1, _) => *value = json!("unknown"),
+                (other, _) => {
+                    *value = [
+                        json!(null), json!(-1), json!(1e300), json!(0), json!([]), json!({}),
+                        json!("paper"),
+                    ][other - 2].clone();
+                }
+            }
+            evaluate(&sealed(&header, records))?;
+        }
+
+        #[test]
+        fn records_that_are_cut_end_in_one_line(at in any::<prop::sample::Index>()) {
+            let (header, records) = written();
+            evaluate(&sealed(header, &records[..at.index(records.len())]))?;
+        }
+    }
 }

@@ -2,8 +2,8 @@ use std::fmt::Write;
 
 use anyhow::Context;
 use serde_json::json;
+use softrast_lab::{Error, program::Output};
 use softrast_raster::{RasterBackend, TConorm};
-use softrast_runner::Error;
 
 use crate::{
     Template, Training,
@@ -35,7 +35,7 @@ pub(crate) fn compare<B: RasterBackend>(
     args: &CompareArgs,
     command: &str,
     device: &B::Device,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<Output> {
     let methods =
         args.methods.iter().map(|text| method(text)).collect::<anyhow::Result<Vec<_>>>()?;
     let mut rows = Vec::new();
@@ -60,10 +60,10 @@ pub(crate) fn compare<B: RasterBackend>(
         rows.push(Row { name, classes: header.classes, score, minutes: seconds / 60.0 });
     }
     let table = markdown(args, &rows, command);
-    checkpoint::write(&args.out.join("compare.md"), &[table.as_bytes()])?;
+    checkpoint::write(&args.out.join("compare.md"), table.as_bytes())?;
     let json: Vec<_> = rows.iter().map(Row::json).collect();
-    checkpoint::write(&args.out.join("compare.json"), &[&serde_json::to_vec_pretty(&json)?])?;
-    Ok(table)
+    checkpoint::write(&args.out.join("compare.json"), &serde_json::to_vec_pretty(&json)?)?;
+    Ok(Output { json: json!({ "methods": json }), text: vec![table], ..Output::default() })
 }
 
 /// What is known of a method.

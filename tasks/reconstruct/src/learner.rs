@@ -1,8 +1,10 @@
 use std::{
+    panic::{self, AssertUnwindSafe},
     sync::{Mutex, PoisonError},
     time::Instant,
 };
 
+use anyhow::{Context, ensure};
 use burn::{
     backend::Autodiff,
     module::{AutodiffModule, Module},
@@ -154,14 +156,29 @@ impl<B: RasterBackend> Learner<B> {
     /// If they are not that.
     pub(crate) fn with_bytes(mut self, bytes: Vec<u8>, device: &B::Device) -> anyhow::Result<Self> {
         let recorder = Bytes::default();
-        let (modules, optimizers): Records<B> =
-            Recorder::<Autodiff<B>>::load(&recorder, bytes, device)?;
+        let load = || Recorder::<Autodiff<B>>::load::<Records<B>>(&recorder, bytes, device);
+        let loaded = quietly(load).context("its weights cannot be read: train anew")?;
+        let (modules, optimizers) = loaded?;
+        let expected = (self.network.sizes(), self.phi().len());
         self.network = self.network.load_record(modules.0);
         self.softness = self.softness.load_record(modules.1);
+        let found = (self.network.sizes(), self.phi().len());
+        ensure!(found == expected, "its weights are not those of such a network: train anew");
         self.of_network = self.of_network.load_record(optimizers.0);
         self.of_softness = self.of_softness.load_record(optimizers.1);
         Ok(self)
     }
+}
+
+/// What `work` gives; none if it panics, as burn's recorder does where its bytes are damaged.
+fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
+    // The hook belongs to the whole process too.
+    let _alone = DRAWING.lock().unwrap_or_else(PoisonError::into_inner);
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let found = panic::catch_unwind(AssertUnwindSafe(work)).ok();
+    panic::set_hook(hook);
+    found
 }
 
 /// What a learner keeps: both modules, then both optimisers.

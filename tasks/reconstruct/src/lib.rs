@@ -2,13 +2,13 @@
 //!
 //! An encoder sees one picture of 64×64 pixels, a decoder says how the 642 vertices of a sphere move.
 //! Nothing tells them the shape: the loss compares soft silhouettes of what they made with those of
-//! two pictures, from both cameras. Source: Wu et al. 2024, Sec. 5.2; FACTS 4.6.
+//! two pictures, from both cameras. Source: Wu et al. 2024, Sec. 5.2; docs/notes.md, Reconstruction.
 //!
 //! **Loss.** `1 - IoU` of the silhouettes, mean over the four of each pair of pictures, plus what keeps
 //! surfaces smooth ([`Smoothness`]).
 //!
 //! **Softness.** Its parameters learn beside the network, by an optimiser of their own. In the released
-//! script they do not: its optimiser is made before they are (FACTS 0.12).
+//! script they do not: its optimiser is made before they are.
 //!
 //! **Metric.** `IoU` of [`Voxels`], mean over the shapes of a class, then over the classes.
 //!
@@ -18,8 +18,6 @@
 compile_error!("reconstruct needs a backend: turn on one of the features flex, ndarray and wgpu");
 
 mod args;
-mod bar;
-mod chart;
 mod checkpoint;
 mod compare;
 mod convolution;

@@ -1,14 +1,9 @@
 //! Single-view 3D reconstruction: a network that learns shapes from their silhouettes.
 
-use std::{io, process::ExitCode};
+/// Pictures come and go by the thousand, each too large for the system's allocator to keep.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-fn main() -> ExitCode {
-    let words = std::env::args_os();
-    match reconstruct::execute(words, &mut io::stdout().lock()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("{failure}");
-            ExitCode::from(failure.code)
-        }
-    }
+fn main() -> std::process::ExitCode {
+    softrast_lab::program::run_main(|words, stdout| reconstruct::execute(words, stdout))
 }

@@ -41,7 +41,7 @@ impl Width {
 ///
 /// Three convolutions of 5×5 with stride 2 to 64, 128 and 256 channels, each with a batch norm; fully
 /// connected layers of 1024, 1024 and 512 (the code), then of 1024 and 2048, and from there to a
-/// centre and to all vertices. Rectifiers between all of them. Source: FACTS 4.6.
+/// centre and to all vertices. Rectifiers between all of them. Source: docs/notes.md, Reconstruction.
 #[derive(Module, Debug)]
 pub struct Network<B: Backend> {
     convolutions: Vec<Conv2d<B>>,
@@ -55,7 +55,7 @@ pub struct Network<B: Backend> {
 const CHANNELS: [usize; 3] = [64, 128, 256];
 /// Outputs of the fully connected layers of the encoder, then of the decoder.
 const CONNECTED: [usize; 5] = [1024, 1024, 512, 1024, 2048];
-/// The centre moves slowly at first. Source: FACTS 4.6.
+/// The centre moves slowly at first. Source: docs/notes.md, Reconstruction.
 const CENTRE: f64 = 0.1;
 
 impl<B: Backend> Network<B> {
@@ -80,6 +80,15 @@ impl<B: Backend> Network<B> {
             centre: LinearConfig::new(last, 3).init(device),
             displacement: LinearConfig::new(last, 3 * vertices).init(device),
         }
+    }
+
+    /// Dimensions of the weights of all layers, in order.
+    pub(crate) fn sizes(&self) -> Vec<Vec<usize>> {
+        let convolutions = self.convolutions.iter().map(|layer| layer.weight.dims().to_vec());
+        let norms = self.norms.iter().map(|norm| norm.gamma.dims().to_vec());
+        let connected = self.connected.iter().chain([&self.centre, &self.displacement]);
+        let connected = connected.map(|layer| layer.weight.dims().to_vec());
+        convolutions.chain(norms).chain(connected).collect()
     }
 
     /// Pictures `[pictures, 4, 64, 64]` to the centre `[pictures, 3]` and the displacements

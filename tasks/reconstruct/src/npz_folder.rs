@@ -16,7 +16,7 @@ use crate::{
 /// 32, 32]` truth values. View k is taken from azimuth -15 k degrees; the order of the voxels is told
 /// at [`Voxels`]. Rows are read when they are asked for.
 ///
-/// Source: FACTS 4.6; the layout is that of Kato et al. 2018.
+/// Source: the layout of Kato et al. 2018; docs/notes.md, Reconstruction.
 #[derive(Debug)]
 pub struct NpzFolder {
     classes: Vec<String>,

@@ -52,7 +52,7 @@ impl<B: RasterBackend> Objective<B> {
     /// the pairs, then all second ones.
     ///
     /// Either prediction of a pair is drawn from both of its views, four silhouettes; the mean is over
-    /// all of them. Source: FACTS 4.6.
+    /// all of them. Source: docs/notes.md, Reconstruction.
     pub(crate) fn silhouettes(
         &mut self,
         vertices: Tensor<B, 3>,

@@ -1,9 +1,6 @@
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
-use burn::{
-    data::{dataloader::batcher::Batcher, dataset::Dataset},
-    tensor::{Element, Tensor, TensorData, backend::Backend},
-};
+use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rayon::prelude::*;
 
@@ -23,20 +20,16 @@ pub(crate) struct Pair {
 /// The pairs of one epoch: classes, shapes and views are all drawn evenly.
 ///
 /// Which pairs they are depends on the seed, the epoch and the number of the pair alone, so that a
-/// training that is resumed sees what it would have seen. Source: FACTS 4.6.
+/// training that is resumed sees what it would have seen.
 #[derive(Debug)]
 pub(crate) struct Pairs {
     pub(crate) shapes: Arc<dyn Shapes>,
     pub(crate) seed: u64,
     pub(crate) epoch: u64,
-    pub(crate) count: usize,
 }
 
-impl Dataset<Pair> for Pairs {
-    fn get(&self, index: usize) -> Option<Pair> {
-        if index >= self.count {
-            return None;
-        }
+impl Pairs {
+    fn get(&self, index: usize) -> Pair {
         let mut seed = [0; 32];
         for (bytes, part) in seed.chunks_mut(8).zip([self.seed, self.epoch, index as u64]) {
             bytes.copy_from_slice(&part.to_le_bytes());
@@ -44,11 +37,27 @@ impl Dataset<Pair> for Pairs {
         let mut random = StdRng::from_seed(seed);
         let class = random.random_range(0..self.shapes.classes().len());
         let shape = random.random_range(0..self.shapes.count(class));
-        Some(Pair { class, shape, views: [(); 2].map(|()| random.random_range(0..VIEWS)) })
+        Pair { class, shape, views: [(); 2].map(|()| random.random_range(0..VIEWS)) }
     }
 
-    fn len(&self) -> usize {
-        self.count
+    /// The pictures of the pairs with these numbers, made all at once.
+    ///
+    /// # Errors
+    ///
+    /// If a picture cannot be read.
+    pub(crate) fn batch<B: Backend>(
+        &self,
+        numbers: Range<usize>,
+        device: &B::Device,
+    ) -> anyhow::Result<PairBatch<B>> {
+        let pairs: Vec<Pair> = numbers.map(|number| self.get(number)).collect();
+        let seen: Vec<_> = [0, 1].iter().flat_map(|&k| pairs.iter().map(move |p| (p, k))).collect();
+        let read = |&(pair, k): &(&Pair, usize)| {
+            self.shapes.picture(pair.class, pair.shape, pair.views[k])
+        };
+        let pictures = seen.par_iter().map(read).collect::<anyhow::Result<Vec<_>>>()?;
+        let views = seen.iter().map(|&(pair, k)| pair.views[k]).collect();
+        Ok(PairBatch { pictures: tensor(&pictures, device), views })
     }
 }
 
@@ -59,27 +68,6 @@ pub(crate) struct PairBatch<B: Backend> {
     pub(crate) pictures: Tensor<B, 4>,
     /// View of each picture, `[2 pairs]`.
     pub(crate) views: Vec<usize>,
-}
-
-/// Makes the pictures of a batch, all at once.
-#[derive(Clone, Debug)]
-pub(crate) struct PairBatcher {
-    pub(crate) shapes: Arc<dyn Shapes>,
-}
-
-/// Errors are words here, because burn's loader clones what it hands out.
-impl<B: Backend> Batcher<B, Pair, Result<PairBatch<B>, String>> for PairBatcher {
-    fn batch(&self, pairs: Vec<Pair>, device: &B::Device) -> Result<PairBatch<B>, String> {
-        let wanted: Vec<_> =
-            [0, 1].into_iter().flat_map(|k| pairs.iter().map(move |pair| (pair, k))).collect();
-        let read = |&(pair, k): &(&Pair, usize)| {
-            self.shapes.picture(pair.class, pair.shape, pair.views[k])
-        };
-        let pictures = wanted.par_iter().map(read).collect::<anyhow::Result<Vec<_>>>();
-        let pictures = pictures.map_err(|error| format!("{error:#}"))?;
-        let views = wanted.iter().map(|&(pair, k)| pair.views[k]).collect();
-        Ok(PairBatch { pictures: tensor(&pictures, device), views })
-    }
 }
 
 /// Pictures as one tensor `[pictures, 4, 64, 64]`, 0 to 1.
@@ -97,10 +85,11 @@ mod tests {
     #[test]
     fn pairs_cover_classes_and_views_and_change_from_epoch_to_epoch() {
         let shapes: Arc<dyn Shapes> = Arc::new(Procedural::new(Split::Train, 0, 7));
-        let of = |epoch| Pairs { shapes: shapes.clone(), seed: 1, epoch, count: 500 };
-        let pairs: Vec<_> = of(0).iter().collect();
-        assert_eq!(pairs, of(0).iter().collect::<Vec<_>>());
-        assert_ne!(pairs, of(1).iter().collect::<Vec<_>>());
+        let of = |epoch| Pairs { shapes: shapes.clone(), seed: 1, epoch };
+        let first = |epoch| (0..500).map(|k| of(epoch).get(k)).collect::<Vec<_>>();
+        let pairs = first(0);
+        assert_eq!(pairs, first(0));
+        assert_ne!(pairs, first(1));
         for class in 0..5 {
             assert!(pairs.iter().filter(|pair| pair.class == class).count() > 60);
         }

@@ -1,9 +1,13 @@
 use std::{ffi::OsString, io::Write, path::Path};
 
 use anyhow::Context;
-use clap::Parser;
+use clap::CommandFactory;
+use serde_json::json;
+use softrast_lab::{
+    Error, Failure, INTERRUPTED,
+    program::{Output, parse, repeated},
+};
 use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
-use softrast_runner::{Error, Failure};
 
 use crate::{
     Checkpoint, Network, Template, Training,
@@ -30,20 +34,29 @@ pub fn execute(
     stdout: &mut dyn Write,
 ) -> Result<(), Failure> {
     let words: Vec<OsString> = words.into_iter().collect();
-    let line = match CommandLine::try_parse_from(&words) {
-        Ok(line) => line,
-        Err(help) if !help.use_stderr() => {
-            let text = help.render().to_string();
-            return Ok(writeln!(stdout, "{}", text.trim_end()).context(STDOUT)?);
-        }
-        Err(wrong) => return Err(wrong.into()),
+    let Some(line) = parse::<CommandLine>(CommandLine::command(), &words, stdout)? else {
+        return Ok(());
     };
-    let again = repeat(&words);
-    let said = on_backend!(backend(line.backend.as_deref())?, B => work::<B>(line.command, again))?;
-    Ok(writeln!(stdout, "{said}").context(STDOUT)?)
+    let again = repeated("reconstruct", &words);
+    let backend = backend(line.backend.as_deref())?;
+    let output = on_backend!(backend, B => work::<B>(line.command, again.clone()))
+        .map_err(|error| stopped(error, &again))?;
+    output.print(line.json, &again, stdout)
 }
 
-const STDOUT: &str = "cannot write to the standard output";
+/// A training that the user stops has kept the epochs before.
+fn stopped(error: anyhow::Error, again: &str) -> Failure {
+    let failure = Failure::from(error);
+    match failure.code {
+        INTERRUPTED => Failure {
+            message: format!(
+                "stopped amid an epoch; go on from the one before with: {again} --resume"
+            ),
+            ..failure
+        },
+        _ => failure,
+    }
+}
 
 /// The backend that was asked for, set up; of those there are flex is the quickest on a CPU.
 fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
@@ -54,7 +67,7 @@ fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
     Ok(backend)
 }
 
-fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<String> {
+fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<Output> {
     let device = B::Device::default();
     match command {
         Command::Train(args) => train::<B>(&args, again, &device),
@@ -68,7 +81,7 @@ fn train<B: RasterBackend>(
     args: &TrainArgs,
     command: String,
     device: &B::Device,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<Output> {
     let softness = args::softness(&args.softness, args.scale, args.squared)?;
     let training = Training {
         settings: args.common.settings(softness, args.t_conorm),
@@ -81,37 +94,48 @@ fn train<B: RasterBackend>(
     let (header, sphere) = training.run::<B>(device)?;
     let iou = header.epochs.last().map(|epoch| epoch.voxel_iou.clone()).unwrap_or_default();
     let page = training.out.join(crate::train::REPORT);
-    Ok(format!("{}\nreport: {}", table(&header.classes, &iou, &sphere), page.display()))
+    let text = vec![table(&header.classes, &iou, &sphere), format!("report: {}", page.display())];
+    let json = json!({
+        "voxel_iou": by_class(&header.classes, &iou),
+        "mean": mean(&iou),
+        "sphere": mean(&sphere),
+        "epochs": header.epochs.len() - 1,
+        "report": page,
+    });
+    Ok(Output { json, text, ..Output::default() })
 }
 
-fn evaluate<B: RasterBackend>(args: &EvaluateArgs, device: &B::Device) -> anyhow::Result<String> {
+fn evaluate<B: RasterBackend>(args: &EvaluateArgs, device: &B::Device) -> anyhow::Result<Output> {
     let (checkpoint, network) = trained::<B>(&args.checkpoint, device)?;
     let settings = &checkpoint.header.settings;
     let data = args.data.clone().map_or_else(|| settings.data.clone(), Data::Files);
     let shapes = data::open(&data, Split::Test, settings.seed)?;
     let views = [args.shapes, args.views];
     let score = score(&network, &Template::new(device), shapes.as_ref(), views, device)?;
-    if args.json {
-        let classes = shapes.classes().iter().zip(&score.classes);
-        let classes: serde_json::Map<_, _> =
-            classes.map(|(name, &iou)| (name.clone(), iou.into())).collect();
-        let json = serde_json::json!({
-            "voxel_iou": classes,
-            "mean": mean(&score.classes),
-            "sphere": mean(&score.sphere),
-            "pictures": score.pictures.iter().sum::<usize>(),
-            "epochs": checkpoint.header.epochs.len() - 1,
-        });
-        return Ok(json.to_string());
-    }
     let pictures: usize = score.pictures.iter().sum();
-    Ok(format!("{}\n{pictures} pictures", table(shapes.classes(), &score.classes, &score.sphere)))
+    let json = json!({
+        "voxel_iou": by_class(shapes.classes(), &score.classes),
+        "mean": mean(&score.classes),
+        "sphere": mean(&score.sphere),
+        "pictures": pictures,
+        "epochs": checkpoint.header.epochs.len() - 1,
+    });
+    let text = vec![
+        table(shapes.classes(), &score.classes, &score.sphere),
+        format!("{pictures} pictures"),
+    ];
+    Ok(Output { json, text, ..Output::default() })
+}
+
+/// Voxel `IoU` under the names of the classes.
+fn by_class(classes: &[String], iou: &[f64]) -> serde_json::Map<String, serde_json::Value> {
+    classes.iter().zip(iou).map(|(name, &iou)| (name.clone(), iou.into())).collect()
 }
 
 fn predict_mesh<B: RasterBackend>(
     args: &PredictArgs,
     device: &B::Device,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<Output> {
     let (_, network) = trained::<B>(&args.checkpoint, device)?;
     let picture = read_picture(&args.picture)?;
     let template = Template::new(device);
@@ -119,12 +143,10 @@ fn predict_mesh<B: RasterBackend>(
     let mesh = softrast_mesh::Mesh::new(vertices, template.faces().to_vec())
         .context("the network gives no mesh: train it anew")?;
     mesh.write_obj(&args.out)?;
-    Ok(format!(
-        "{} vertices, {} faces: {}",
-        template.vertices(),
-        mesh.faces().len(),
-        args.out.display()
-    ))
+    let [vertices, faces] = [template.vertices(), mesh.faces().len()];
+    let text = vec![format!("{vertices} vertices, {faces} faces: {}", args.out.display())];
+    let json = json!({ "vertices": vertices, "faces": faces, "mesh": args.out });
+    Ok(Output { json, text, ..Output::default() })
 }
 
 /// The network of a checkpoint.
@@ -137,22 +159,7 @@ pub(crate) fn trained<B: RasterBackend>(
     let learner = Learner::<B>::new(&checkpoint.header.settings, device)?;
     let learner = learner
         .with_bytes(records, device)
-        .with_context(|| format!("{} cannot be used", path.display()))?;
+        .with_context(|| format!("{} cannot be used: train anew", path.display()))?;
     let network = learner.network();
     Ok((checkpoint, network))
-}
-
-/// The command line that does the same again from the beginning.
-fn repeat(words: &[OsString]) -> String {
-    let mut command = String::from("cargo run --release -p reconstruct --");
-    for word in words.iter().skip(1).filter(|word| *word != "--resume") {
-        let word = word.to_string_lossy();
-        let plain = |c: char| c.is_alphanumeric() || "-_=./,+:@%".contains(c);
-        if !word.is_empty() && word.chars().all(plain) {
-            command += &format!(" {word}");
-        } else {
-            command += &format!(" '{}'", word.replace('\'', r"'\''"));
-        }
-    }
-    command
 }

@@ -2,7 +2,7 @@
 
 use burn::tensor::backend::Backend;
 use image::{Rgb, RgbImage, imageops};
-use softrast_runner::contact_sheet;
+use softrast_lab::contact_sheet;
 
 use crate::{
     Network, SIZE, Shapes, Template, VIEWS, score,

@@ -1,12 +1,12 @@
 use burn::tensor::{Element, Int, Tensor, TensorData, backend::Backend};
 use softrast_mesh::Edges;
 
-/// Weights of the two terms. Source: FACTS 4.6.
+/// Weights of the two terms. Source: docs/notes.md, Reconstruction.
 const LAPLACIAN: f64 = 5e-3;
 const FLATNESS: f64 = 5e-4;
 
 /// Added to squared lengths before they divide or a root is taken, in squared world units; hides edges
-/// and heights below a thousandth of a unit. Source: FACTS 4.1.
+/// and heights below a thousandth of a unit. Source: docs/notes.md, Losses and errors.
 const EPSILON: f64 = 1e-6;
 
 /// What keeps the surfaces of many shapes with the same closed topology smooth.
@@ -54,7 +54,7 @@ impl<B: Backend> Smoothness<B> {
     /// `[1]`, of `vertices` `[shapes, 3, vertices]`.
     ///
     /// The first sum is over the vertices; the second over the edges between two faces, whose heights
-    /// on the edge enclose α: half a turn where the surface is flat. Source: FACTS 4.1, 4.6.
+    /// on the edge enclose α: half a turn where the surface is flat. Source: docs/notes.md, Losses and errors.
     pub fn loss(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         let [shapes, _, count] = vertices.dims();
         let rows = vertices.reshape([3 * shapes, count]);

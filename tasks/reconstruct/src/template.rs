@@ -8,7 +8,7 @@ use softrast_mesh::{Mesh, icosphere};
 const ON_PLANE: f64 = 1e-6;
 /// Radius of the sphere before it is deformed, and by how much everything is scaled in the end.
 ///
-/// Source: FACTS 4.6.
+/// Source: docs/notes.md, Reconstruction.
 const RADIUS: f64 = 0.5;
 const OUTPUT: f64 = 0.5;
 
@@ -16,7 +16,7 @@ const OUTPUT: f64 = 0.5;
 ///
 /// A coordinate at `v` on the sphere of radius 0.5, moved by `d`, ends at `(s·σ(logit|v| + d)·(1 - s·c) +
 /// c) / 2` with `s` the sign of `v` and `c` the tanh of the centre: within ±0.5, and never across the
-/// planes through the centre. A coordinate of 0 is that of the centre. Source: FACTS 4.6.
+/// planes through the centre. A coordinate of 0 is that of the centre. Source: docs/notes.md, 3D shape.
 #[derive(Clone, Debug)]
 pub struct Template<B: Backend> {
     /// `logit |v|` of each coordinate, `[1, 3, vertices]`; 0 where the sign is 0.

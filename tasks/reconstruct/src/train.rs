@@ -5,17 +5,17 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use burn::{backend::Autodiff, data::dataloader::DataLoaderBuilder};
+use burn::backend::Autodiff;
+use softrast_lab::Progress;
 use softrast_raster::RasterBackend;
 
 use crate::{
     Checkpoint, Epoch, Score, Settings, Shapes, Template,
-    bar::Bar,
     checkpoint::{self, Header},
     data,
     epoch::Time,
     learner::Learner,
-    pairs::{PairBatch, PairBatcher, Pairs},
+    pairs::Pairs,
     report,
     score::{mean, score},
     shapes::Split,
@@ -28,7 +28,7 @@ pub(crate) const REPORT: &str = "report.html";
 
 /// After this part of the epochs the learning rates fall to this factor.
 ///
-/// Source: FACTS 4.6 (after 150,000 of 250,000 steps, times 0.3).
+/// Source: docs/notes.md, Reconstruction (after 150,000 of 250,000 steps, times 0.3).
 const LATE: (f64, f64) = (0.6, 0.3);
 
 /// A training and where it goes.
@@ -64,8 +64,9 @@ impl Training {
         let held_out = data::open(&self.settings.data, Split::Val, self.settings.seed)?;
         let (mut header, mut learner) = self.start::<B>(&path, shapes.as_ref(), device)?;
         let template = Template::new(device);
-        let bar = Bar::new(self.visible, (self.epochs * self.settings.steps) as u64);
-        bar.skip((header.epochs.len().saturating_sub(1) * self.settings.steps) as u64);
+        let mut bar = Progress::of_program(!self.visible);
+        bar.expect(self.epochs * self.settings.steps);
+        bar.skip(header.epochs.len().saturating_sub(1), self.settings.steps);
         let views = [self.settings.val, 2];
         let judge = |learner: &Learner<B>| -> anyhow::Result<Score> {
             score(&learner.network(), &template, held_out.as_ref(), views, device)
@@ -75,20 +76,21 @@ impl Training {
             let phi = learner.phi();
             let time = Time::default();
             let first = Epoch { number: 0, loss: None, silhouette_iou: None, voxel_iou, phi, time };
-            bar.epoch(&first, self.epochs);
+            self.say(&first);
             header.epochs.push(first);
         }
         let mut sphere = Vec::new();
         while header.epochs.len() <= self.epochs || sphere.is_empty() {
             if header.epochs.len() <= self.epochs {
-                let epoch = self.epoch(&mut learner, &shapes, header.epochs.len(), &bar, device)?;
+                let epoch =
+                    self.epoch(&mut learner, &shapes, header.epochs.len(), &mut bar, device)?;
                 header.epochs.push(epoch);
             }
             let judged = judge(&learner)?;
             sphere = judged.sphere;
             if let Some(epoch) = header.epochs.last_mut() {
                 epoch.voxel_iou = judged.classes;
-                bar.epoch(epoch, self.epochs);
+                self.say(epoch);
             }
             self.write(&header, &learner, &path, &sphere, &template, held_out.as_ref(), device)?;
         }
@@ -131,7 +133,7 @@ impl Training {
         );
         let learner = learner
             .with_bytes(records, device)
-            .with_context(|| format!("{name} cannot be used"))?;
+            .with_context(|| format!("{name} cannot be used: train anew"))?;
         Ok((header, learner))
     }
 
@@ -141,26 +143,20 @@ impl Training {
         learner: &mut Learner<B>,
         shapes: &Arc<dyn Shapes>,
         number: usize,
-        bar: &Bar,
+        bar: &mut Progress,
         device: &B::Device,
     ) -> anyhow::Result<Epoch> {
         let Settings { pairs, steps, seed, learning_rate, softness_rate, .. } = self.settings;
         let late = number as f64 > LATE.0 * self.epochs as f64;
         let factor = if late { LATE.1 } else { 1.0 };
-        let dataset =
-            Pairs { shapes: shapes.clone(), seed, epoch: number as u64, count: pairs * steps };
-        let loader =
-            DataLoaderBuilder::<Autodiff<B>, _, Result<PairBatch<_>, String>>::new(PairBatcher {
-                shapes: shapes.clone(),
-            })
-            .batch_size(pairs)
-            .set_device(device.clone())
-            .build(dataset);
+        let all = Pairs { shapes: shapes.clone(), seed, epoch: number as u64 };
         learner.begin();
+        bar.begin(format!("epoch {number}/{}", self.epochs), 1, steps)?;
         let (mut loss, mut soft, mut time) = (0.0, 0.0, Time::default());
         let mut clock = Instant::now();
-        for batch in loader.iter() {
-            let batch = batch.map_err(anyhow::Error::msg)?;
+        for step_number in 0..steps {
+            let batch =
+                all.batch::<Autodiff<B>>(step_number * pairs..(step_number + 1) * pairs, device)?;
             let data = clock.elapsed().as_secs_f64();
             let step = learner.step(&batch, factor * learning_rate, factor * softness_rate);
             let now = step.silhouette + step.smoothness;
@@ -172,9 +168,10 @@ impl Training {
             loss += now / steps as f64;
             soft += (1.0 - step.silhouette) / steps as f64;
             time.add(&Time { data, all: step.time.all + data, ..step.time });
-            bar.step(now, 1.0 - step.silhouette);
+            bar.step(step_number + 1, now)?;
             clock = Instant::now();
         }
+        bar.end();
         Ok(Epoch {
             number,
             loss: Some(loss),
@@ -199,9 +196,7 @@ impl Training {
     ) -> anyhow::Result<()> {
         let number = header.epochs.len() - 1;
         let sheet = sheet::sheet(&learner.network(), template, held_out, device)?;
-        let mut png = std::io::Cursor::new(Vec::new());
-        sheet.write_to(&mut png, image::ImageFormat::Png).context("cannot encode a sheet")?;
-        checkpoint::write(&self.sheet(number), &[png.get_ref()])?;
+        checkpoint::write(&self.sheet(number), &softrast_lab::png(&sheet)?)?;
         // Sheets of a few epochs tell how it went: the first, one amid, and the last.
         let shown = [1.min(number), number.div_ceil(3), number];
         let mut sheets: Vec<(usize, Vec<u8>)> = Vec::new();
@@ -211,10 +206,21 @@ impl Training {
             }
         }
         let page = report::html(header, sphere, &sheets, &self.command)?;
-        checkpoint::write(&self.out.join(REPORT), &[page.as_bytes()])?;
+        checkpoint::write(&self.out.join(REPORT), page.as_bytes())?;
         let history = serde_json::to_vec_pretty(header)?;
-        checkpoint::write(&self.out.join("history.json"), &[&history])?;
+        checkpoint::write(&self.out.join("history.json"), &history)?;
         Checkpoint { header: header.clone(), records: learner.to_bytes()? }.save(path)
+    }
+
+    /// Tells on stderr what an epoch brought.
+    fn say(&self, epoch: &Epoch) {
+        if self.visible {
+            let loss = epoch.loss.map_or_else(String::new, |loss| format!("loss {loss:.4}, "));
+            let (iou, time) = (epoch.mean_iou(), epoch.time);
+            let share = 100.0 * time.rasterizer_share();
+            let speed = format!("{:.1} pictures/s, rasterizer {share:.0} %", time.rate());
+            eprintln!("epoch {}/{}: {loss}voxel IoU {iou:.3}, {speed}", epoch.number, self.epochs);
+        }
     }
 
     fn sheet(&self, epoch: usize) -> PathBuf {

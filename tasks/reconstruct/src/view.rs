@@ -9,7 +9,7 @@ pub const SIZE: usize = 64;
 pub const VIEWS: usize = 24;
 /// Distance of the cameras in world units, their elevation and half their field of view.
 ///
-/// Source: FACTS 4.6.
+/// Source: docs/notes.md, Reconstruction.
 const DISTANCE: f64 = 2.732;
 const ELEVATION_DEG: f64 = 30.0;
 const HALF_FOV_DEG: f64 = 15.0;

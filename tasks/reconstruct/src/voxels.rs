@@ -7,7 +7,7 @@ pub(crate) const CELLS: usize = 32;
 /// centres are at ±0.5. A cell is full where its centre is inside the shape. Kept in the order of the
 /// public files: y rises with the first index, x with the second, and z falls with the third.
 ///
-/// Source: FACTS 4.6 (grid of 32³). Not in the paper: thin surfaces do not fill the cells that they
+/// Source: docs/notes.md, Reconstruction (grid of 32³). Not in the paper: thin surfaces do not fill the cells that they
 /// touch, because only the rule of centres can be held against solids whose volume is known.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Voxels(Vec<bool>);

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use shape2d::Logo;
-use softrast_runner::{Variant, rgb_from_gray};
+use softrast_cli::Variant;
+use softrast_lab::rgb_from_gray;
 
 const SIZE: usize = 256;
 

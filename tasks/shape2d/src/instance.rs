@@ -19,7 +19,7 @@ impl Instance {
     /// areas add up to half the image. Their centres are Halton's points with bases 2 and 3, moved
     /// by a random offset that wraps around.
     ///
-    /// Source: FACTS 4.4. Not as in the released code: its centres fill a wider box, and its
+    /// Not as in the released code (docs/notes.md, 2D shape): its centres fill a wider box, and its
     /// triangles are unequal and all of one shape.
     pub fn seeded(seed: u64, triangles: usize) -> Self {
         let mut random = StdRng::seed_from_u64(seed);

@@ -6,7 +6,7 @@
 //!
 //! **Definition.** The loss is the mean squared difference between soft silhouette and picture, plus
 //! the Laplacian of each triangle, which keeps useless ones small; 200 steps at 256 × 256 pixels. θ
-//! holds the corners in NDC, see [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; FACTS 4.4.
+//! holds the corners in NDC, see [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, 2D shape.
 //!
 //! **Errors.** Seen in the image: the mean squared error, soft and hard. Many arrangements of
 //! triangles cover the same picture, so there are no right parameters and the paper has no error of
@@ -16,22 +16,17 @@
 //!
 //! **Transfer.** 4,000 triangles instead of 800, and another picture; `--target` takes any.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("shape2d needs a backend: turn on one of the features ndarray, flex and wgpu");
-
 mod args;
 mod instance;
-mod lesson;
 mod letters;
 mod logo;
+mod paper;
 mod scene;
-mod solve;
 mod target;
 mod task;
 
 pub use args::Args;
 pub use instance::Instance;
-pub use lesson::Shape2dLesson;
 pub use logo::Logo;
 pub use scene::Scene;
 pub use task::Shape2d;

@@ -1,4 +1,4 @@
-use softrast_runner::Variant;
+use softrast_cli::Variant;
 
 use crate::letters::{HALF_STROKE, Line, arc, word};
 
@@ -16,7 +16,7 @@ impl Logo {
     /// The logo of a variant: letters that cover about 9 % of the image, or a skyline below letters
     /// that together cover about 29 %.
     ///
-    /// Drawn for this project. Source: FACTS 4.4 for what the paper's pictures cover.
+    /// Drawn for this project. The paper's pictures cover as much (docs/notes.md, 2D shape).
     pub fn of(variant: Variant) -> Self {
         match variant {
             Variant::Original => Self::letters(0.0, 0.53),

@@ -1,14 +1,15 @@
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
-use softrast_method::{Targets, tensor};
+use softrast_inverse::Targets;
+use softrast_meta::tensor;
 use softrast_raster::{hard_silhouette, mse_loss};
 
 use crate::Instance;
 
 /// Weight of the Laplacian in the loss.
 ///
-/// Source: FACTS 4.4: 0.03, on coordinates that the camera multiplies by 2.155 to get to NDC.
+/// Source: docs/notes.md, 2D shape: 0.03, on coordinates that the camera multiplies by 2.155.
 const LAPLACIAN: f64 = 0.03 / (2.155 * 2.155);
 /// A corner is this much farther from the middle of the other two than from the centroid.
 const FROM_CENTROID: f64 = 1.5;
@@ -54,11 +55,6 @@ impl<B: Backend> Scene<B> {
         self.targets.full()
     }
 
-    /// The triangles, as corner numbers.
-    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
-        &self.faces
-    }
-
     /// The corners at θ as the rasterizer wants them, `[1, corners, 3]`: x and y in NDC, depth 1.
     pub fn vertices(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
         let count = 3 * self.faces.len();
@@ -80,7 +76,7 @@ impl<B: Backend> Scene<B> {
 
     /// What keeps triangles small: the Laplacian loss of each by itself, weighted, `[1]`.
     ///
-    /// `Σ |corner - middle of the other two|²` over all corners, times 0.0065. Source: FACTS 4.4.
+    /// `Σ |corner - middle of the other two|²` over all corners, times 0.0065. Source: docs/notes.md, 2D shape.
     pub fn smoothness_loss(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
         let corners = theta.reshape([self.faces.len(), 3, 2]);
         let centroids = corners.clone().sum_dim(1) * (1.0 / 3.0);

@@ -1,29 +1,70 @@
 use std::path::Path;
 
 use anyhow::Context;
+use softrast_cli::Variant;
 
-/// The luminance of a picture file as an image `[size * size]`, top row first, 0 black to 1 white.
-///
-/// The longer side of the picture takes up the whole image; the rest, and what is transparent, is
-/// black. Each pixel is the mean of the picture over its area.
-///
-/// # Errors
-///
-/// If the file is missing or no picture.
-pub(crate) fn luminance(path: &Path, size: usize) -> anyhow::Result<Vec<f64>> {
-    let picture = image::ImageReader::open(path)
-        .with_context(|| format!("cannot open the target {}", path.display()))?
-        .with_guessed_format()?
-        .decode()
-        .with_context(|| format!("{} is no picture that can be read", path.display()))?;
-    let picture = picture.into_luma_alpha16();
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let full = f64::from(u16::MAX);
-    let level = |p: &image::LumaA<u16>| f64::from(p.0[0]) / full * (f64::from(p.0[1]) / full);
-    let levels: Vec<f64> = picture.pixels().map(level).collect();
+use crate::Logo;
+
+/// A picture to cover, at any size.
+pub(crate) struct Target {
+    name: String,
+    source: Source,
+}
+
+enum Source {
+    Logo(Logo),
+    /// Luminance from 0 to 1, row by row, and the width.
+    Picture(Vec<f64>, usize),
+}
+
+impl Target {
+    /// The project's own logo of a variant.
+    pub(crate) fn logo(variant: Variant) -> Self {
+        let name = match variant {
+            Variant::Original => "letters",
+            Variant::Transfer => "skyline",
+        };
+        Self { name: name.to_owned(), source: Source::Logo(Logo::of(variant)) }
+    }
+
+    /// The luminance of a picture file; what is transparent is black.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or no picture.
+    pub(crate) fn load(path: &Path) -> anyhow::Result<Self> {
+        let picture = image::ImageReader::open(path)
+            .with_context(|| format!("cannot open the target {}", path.display()))?
+            .with_guessed_format()?
+            .decode()
+            .with_context(|| format!("{} is no picture that can be read", path.display()))?;
+        let picture = picture.into_luma_alpha16();
+        let full = f64::from(u16::MAX);
+        let level = |p: &image::LumaA<u16>| f64::from(p.0[0]) / full * (f64::from(p.0[1]) / full);
+        let levels = picture.pixels().map(level).collect();
+        let source = Source::Picture(levels, picture.width() as usize);
+        Ok(Self { name: path.display().to_string(), source })
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The image `[size * size]`, top row first, 0 black to 1 white.
+    ///
+    /// The longer side of a picture takes up the whole image; the rest is black. Each pixel is the mean of the picture over its area.
+    pub(crate) fn image(&self, size: usize) -> Vec<f64> {
+        match &self.source {
+            Source::Logo(logo) => logo.image(size),
+            Source::Picture(levels, width) => resized(levels, *width, size),
+        }
+    }
+}
+
+fn resized(levels: &[f64], width: usize, size: usize) -> Vec<f64> {
+    let height = levels.len() / width;
     let longest = width.max(height) as f64;
-    let columns = shares(width, longest, size);
-    let rows = shares(height, longest, size);
+    let (columns, rows) = (shares(width, longest, size), shares(height, longest, size));
     let pixel = |pixel: usize| {
         let (column, row) = (&columns[pixel % size], &rows[pixel / size]);
         let along = |&(y, share): &(usize, f64)| {
@@ -31,7 +72,7 @@ pub(crate) fn luminance(path: &Path, size: usize) -> anyhow::Result<Vec<f64>> {
         };
         row.iter().map(along).sum()
     };
-    Ok((0..size * size).map(pixel).collect())
+    (0..size * size).map(pixel).collect()
 }
 
 /// For each of `size` cells which of `count` picture elements it holds, and what share of the cell
@@ -58,7 +99,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         picture.into().save(&path).unwrap();
-        luminance(&path, size).unwrap()
+        Target::load(&path).unwrap().image(size)
     }
 
     fn assert_close(found: &[f64], expected: &[f64]) {

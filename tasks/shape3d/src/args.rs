@@ -3,26 +3,23 @@ use std::path::PathBuf;
 /// Flags that only 3D SHAPE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh whose silhouettes are the target, used as it stands; by default the project's own
-    /// airplane, or its chair with --variant transfer.
+    /// Mesh whose silhouettes are the target, used as it stands [default: our airplane, or chair]
     #[arg(long, value_name = "FILE.obj")]
     pub mesh: Option<PathBuf>,
 
-    /// Centre the target mesh, and scale it so that the longest side of its box is 1.
+    /// Centre the target mesh, and scale it so that the longest side of its box is 1
     #[arg(long)]
     pub normalize: bool,
 
-    /// Mesh that is deformed, centred and with the longest side of its box scaled to 1; a sphere by
-    /// default.
+    /// Mesh that is deformed, centred and with the longest side scaled to 1 [default: a sphere]
     #[arg(long, value_name = "FILE.obj", conflicts_with = "detail")]
     pub template: Option<PathBuf>,
 
-    /// How finely the sphere is divided: 162, 642 or 2,562 vertices [default: 3].
+    /// How finely the sphere is divided: 162, 642 or 2,562 vertices [default: 3]
     #[arg(long, value_name = "2|3|4", value_parser = detail)]
     pub detail: Option<usize>,
 
-    /// Elevation of all 24 cameras in degrees, -90 to 90; without it, seeds 0 to 4 stand for 30, 60,
-    /// 0, -30 and -60.
+    /// Elevation of all 24 cameras, -90 to 90 [default: 30, 60, 0, -30, -60 by seed]
     #[arg(long, value_name = "DEGREES", value_parser = elevation, allow_negative_numbers = true)]
     pub elevation: Option<f64>,
 }

@@ -18,7 +18,7 @@ const FACTOR: f64 = 1e3;
 /// surface of area `a` has a distance of about `1000 a / (π · 10000)` to itself, because its two
 /// sets of points differ: 0.016 for one of area 0.5.
 ///
-/// Not in the paper: a definition. Source of this one: FACTS 6, row 17.
+/// Not in the paper, which names the Chamfer distance and does not define it: this definition.
 pub struct Chamfer {
     target: Nearest,
 }

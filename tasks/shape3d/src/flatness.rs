@@ -6,7 +6,7 @@ use crate::laplacian::indices;
 /// Added to squared lengths before they divide or a root is taken, in squared world units.
 ///
 /// Hides edges and heights below a thousandth of a unit, and so keeps both derivatives finite
-/// where faces collapse. Source: FACTS 4.1.
+/// where faces collapse. Source: docs/notes.md, Losses and errors.
 const EPSILON: f64 = 1e-6;
 
 /// How sharply faces bend at their common edges.
@@ -26,7 +26,7 @@ impl<B: Backend> Flatness<B> {
     /// `Σ (cos α + 1)²` over all edges between two faces of `vertices` `[3, vertices]`, `[1]`.
     ///
     /// `α` is the angle between the heights of both faces on their common edge: half a turn where
-    /// the surface is flat, so that it adds nothing. Source: FACTS 4.1.
+    /// the surface is flat, so that it adds nothing. Source: docs/notes.md, Losses and errors.
     #[allow(clippy::missing_panics_doc, reason = "four parts are four parts")]
     pub fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let Some(corners) = &self.corners else { return vertices.sum() * 0.0 };

@@ -1,6 +1,6 @@
 use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData, backend::Backend};
 use softrast_mesh::Edges;
-use softrast_method::tensor;
+use softrast_meta::tensor;
 
 /// How far vertices are from the mean of their neighbours.
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ impl<B: Backend> Laplacian<B> {
 
     /// `Σ |v - mean of the neighbours of v|²` of `vertices` `[3, vertices]`, `[1]`.
     ///
-    /// A vertex without neighbours, which cannot be seen, does not count. Source: FACTS 4.1.
+    /// A vertex without neighbours, which cannot be seen, does not count. Source: docs/notes.md, Losses and errors.
     pub fn loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let neighbours = vertices.clone().gather(1, self.to.clone());
         let sums =

@@ -6,7 +6,7 @@
 //!
 //! **Definition.** The loss is the soft `IoU` loss against the target's hard silhouettes, mean over
 //! the views, plus 0.03 times the Laplacian and 0.0003 times the flatness of the surface. How θ moves
-//! the vertices is told by [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; FACTS 4.1 and 4.2.
+//! the vertices is told by [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, 3D shape.
 //!
 //! **Errors.** Seen in the image: the `IoU` loss, soft and hard. Of the shape: the [`Chamfer`]
 //! distance to the target's surface. Both from cameras at one elevation only: what none of them
@@ -17,19 +17,14 @@
 //!
 //! **Transfer.** The same on a chair instead of an airplane; `--mesh` names any other.
 
-#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
-compile_error!("shape3d needs a backend: turn on one of the features ndarray, flex and wgpu");
-
 mod args;
 mod chamfer;
 mod flatness;
 mod instance;
 mod laplacian;
-mod lesson;
 mod nearest;
-mod picture;
+mod paper;
 mod scene;
-mod solve;
 mod task;
 
 pub use args::Args;
@@ -37,6 +32,5 @@ pub use chamfer::Chamfer;
 pub use flatness::Flatness;
 pub use instance::Instance;
 pub use laplacian::Laplacian;
-pub use lesson::Shape3dLesson;
 pub use scene::{Scene, VIEWS};
 pub use task::Shape3d;

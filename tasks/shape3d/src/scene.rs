@@ -1,8 +1,9 @@
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
+use softrast_inverse::Targets;
 use softrast_mesh::{Edges, Mesh};
-use softrast_method::{Targets, tensor};
+use softrast_meta::tensor;
 use softrast_raster::{hard_silhouette, iou_loss, project};
 
 use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
@@ -11,11 +12,11 @@ use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
 pub const VIEWS: usize = 24;
 /// Distance of the cameras in world units, and half their field of view in degrees.
 ///
-/// Source: FACTS 4.2.
+/// Source: docs/notes.md, 3D shape.
 pub(crate) const DISTANCE: f64 = 2.732;
 const HALF_FOV_DEG: f64 = 15.0;
 
-/// Weights of the bending of the surface in the loss: Laplacian and flatness. Source: FACTS 4.2.
+/// Weights of the bending of the surface in the loss: Laplacian and flatness. Source: docs/notes.md, 3D shape.
 const LAPLACIAN: f64 = 0.03;
 const FLATNESS: f64 = 0.0003;
 
@@ -28,7 +29,7 @@ const ON_PLANE: f64 = 1e-6;
 /// The optimised θ is flat, `[3 vertices + 3]`: a displacement `d` of each coordinate, then the centre
 /// `k`. A coordinate that starts at `v` is at `s·σ(logit|v| + d)·(1 - s·c) + c` with `s` the sign of `v`
 /// and `c = tanh k`, all within -1 to 1. So no vertex crosses the planes through the centre, and a
-/// coordinate that starts at 0 stays at that of the centre. Source: FACTS 4.2.
+/// coordinate that starts at 0 stays at that of the centre. Source: docs/notes.md, 3D shape.
 #[derive(Clone, Debug)]
 pub struct Scene<B: Backend> {
     /// `logit |v|` of each coordinate, `[vertices, 3]`; 0 where the sign is 0.
@@ -84,11 +85,6 @@ impl<B: Backend> Scene<B> {
     /// Hard silhouettes to arrive at, `[views, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
-    }
-
-    /// Faces of the template.
-    pub fn faces(&self) -> &Arc<[[u32; 3]]> {
-        &self.faces
     }
 
     /// Where the vertices are at θ, `[vertices, 3]` in world units.

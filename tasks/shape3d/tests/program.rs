@@ -5,7 +5,7 @@
 use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
-use softrast_runner::Failure;
+use softrast_lab::Failure;
 
 /// Runs a command line with results in `out`; its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {

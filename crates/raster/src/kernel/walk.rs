@@ -305,3 +305,6 @@ dispatched!(walk_image, true, false, false);
 dispatched!(walk_gradient, false, true, false);
 dispatched!(walk_gradient_and_table, false, true, true);
 dispatched!(walk_everything, true, true, true);
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests;

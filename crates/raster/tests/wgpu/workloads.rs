@@ -1,13 +1,20 @@
-//! W1 and W2, the workloads whose exact results are known; skipped where their meshes are missing.
+//! Workloads whose exact results are known.
 
+#[allow(dead_code, unreachable_pub, reason = "libraries elsewhere, with a reference for the CPU")]
+#[path = "../../../../tests/support/known_row.rs"]
+mod known_row;
+#[allow(unreachable_pub, reason = "a library elsewhere")]
+#[path = "../../../../tests/support/paper_mesh.rs"]
+mod paper_mesh;
 #[allow(dead_code, unreachable_pub, reason = "a library elsewhere, with a reference for the CPU")]
-#[path = "../../../../tests/src/workload.rs"]
+#[path = "../../../../tests/support/workload.rs"]
 mod workload;
 
 use burn::{backend::NdArray, tensor::DType};
+use known_row::KnownRow;
 use softrast_raster::{Rasterizer, Wgpu};
 use softrast_softness::{EdgeSoftness, Family};
-use workload::{Row, Workload, w1, w2};
+use workload::Workload;
 
 use crate::{
     adapter,
@@ -15,29 +22,43 @@ use crate::{
     seen,
 };
 
+/// Of loss, mean coverage and gradient norm.
+const BOUNDS: [f64; 3] = [1e-5, 1e-5, 1e-4];
+
+fn assert_exact(KnownRow { name, workload, row }: &KnownRow) {
+    workload.by_fused_op::<Wgpu>(Rasterizer::TOLERANCE).assert_agrees(name, row, BOUNDS);
+}
+
+fn assert_agrees_with_the_kernel(KnownRow { name, workload, .. }: KnownRow) {
+    let Workload { mesh, azimuths_deg, size } = workload;
+    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let scene = seen(&mesh, (0.0, &azimuths_deg), size, softness, 1e-4);
+    let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
+    let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
+    found.assert_close(&expected, name);
+}
+
 #[test]
-fn the_workloads_have_their_exact_rows() {
-    if !adapter() {
-        return;
-    }
-    for (workload, exact) in [(w1(), Row::W1), (w2(), Row::W2)] {
-        if let Some(workload) = workload {
-            workload.by_fused_op::<Wgpu>(Rasterizer::TOLERANCE).assert_agrees(&exact);
-        }
+fn workloads_have_their_exact_rows() {
+    if adapter() {
+        KnownRow::ours().iter().for_each(assert_exact);
     }
 }
 
 #[test]
-fn the_workloads_agree_with_the_kernel_in_f64_to_second_order() {
-    if !adapter() {
-        return;
+fn workloads_agree_with_the_kernel_in_f64_to_second_order() {
+    if adapter() {
+        KnownRow::ours().into_iter().for_each(assert_agrees_with_the_kernel);
     }
-    for (name, workload) in [("W1", w1()), ("W2", w2())] {
-        let Some(Workload { mesh, azimuths_deg, size }) = workload else { continue };
-        let softness = EdgeSoftness { family: Family::Logistic, squared: true };
-        let scene = seen(&mesh, (0.0, &azimuths_deg), size, softness, 1e-4);
-        let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
-        let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
-        found.assert_close(&expected, name);
+}
+
+#[test]
+#[ignore = "needs the paper's meshes"]
+fn workloads_of_the_paper_have_their_exact_rows_and_agree_with_the_kernel() {
+    if adapter() {
+        for known in [KnownRow::w1(), KnownRow::w2()] {
+            assert_exact(&known);
+            assert_agrees_with_the_kernel(known);
+        }
     }
 }

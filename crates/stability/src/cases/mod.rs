@@ -1,102 +1,65 @@
 //! What is tested, one file for each part of a rasterizer or task.
 
-mod corners;
 mod depths;
-mod faces;
 mod gradients;
-mod learning;
-mod many;
-mod numbers;
-mod poses;
+pub mod learning;
+pub mod poses;
 mod shapes;
+pub mod triangle;
 
-use std::{path::Path, sync::Arc};
+use softrast_cli::{Task, Variant};
 
-use clap::Parser;
-use softrast_method::{Defaults, Method};
-use softrast_raster::BackendChoice;
-use softrast_runner::{Schedule, Settings};
-
-use crate::{
-    Case, Level, Tested, Trial,
-    drawn::{Drawing, Exact, Painter, Single, weights},
-    flat::Flat,
-};
+use crate::{Case, Config, Tested, Trial};
 
 /// Softness, in NDC, of cases that do not vary it.
-const SCALE: f64 = 0.03;
-/// Width and height of small images.
-const SIZE: usize = 16;
+pub const SCALE: f64 = 0.03;
+
+/// A task as it is, on its original variant.
+const ORIGINAL: Config = Config {
+    variant: Variant::Original,
+    size: 24,
+    steps: None,
+    learning_rate: None,
+    scale: None,
+    runs: 1,
+};
+
+/// Places of the metrics of a task: error of the parameters, and of the hard image.
+const PARAMETER: usize = 2;
+const HARD: usize = 4;
 
 /// All cases, in the order of the report.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
     let parts = [
-        faces::CASES,
-        many::CASES,
-        numbers::CASES,
-        depths::CASES,
         gradients::CASES,
-        corners::CASES,
+        triangle::CASES,
         poses::CASES,
         shapes::CASES,
+        depths::CASES,
         learning::CASES,
     ];
     parts.into_iter().flatten()
 }
 
-/// One level for each scene: the largest error of a pixel against the definition, at most 1e-5, with
-/// finite gradients in both float types.
-fn against_dense<L: Into<String>>(
+/// Solves seeds of a task, one trial each: the metric at `measured` where the hard image is best. It reaches its target if the run is a
+/// success.
+fn trials<T: Task>(
     tested: &Tested,
-    scenes: impl IntoIterator<Item = (L, Flat)>,
-) -> anyhow::Result<Vec<Level>> {
-    let method = tested.method_at(SCALE)?;
-    let weights = weights(SIZE);
-    let mut painters: Option<Painters> = None;
-    let mut levels = Vec::new();
-    for (label, flat) in scenes {
-        let drawing = Drawing::new(&method, &flat, SIZE);
-        // To choose the knots costs more than an image.
-        let kept = painters.take().filter(|kept| kept.faces == flat.faces);
-        let kept = painters.insert(kept.unwrap_or_else(|| Painters::new(&drawing)));
-        let exact = kept.exact.draw(&flat, &weights);
-        let single = kept.single.draw(&flat, &weights);
-        let off = exact.off(&drawing.dense());
-        let trial = Trial::at_most(off, 1e-5).with(&exact.all()).with(&single.all());
-        levels.push(Level::named(label, vec![trial]));
-    }
-    Ok(levels)
-}
-
-/// What draws some faces in both float types.
-struct Painters {
-    faces: Arc<[[u32; 3]]>,
-    exact: Painter<Exact>,
-    single: Painter<Single>,
-}
-
-impl Painters {
-    fn new(drawing: &Drawing) -> Self {
-        let faces = drawing.flat.faces.clone();
-        Self { faces, exact: drawing.painter(), single: drawing.painter() }
-    }
-}
-
-/// The method of a softness file.
-fn from_file(path: &Path) -> anyhow::Result<Method> {
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        settings: Settings,
-    }
-    let words = ["task".into(), "--softness".into(), path.as_os_str().to_owned()];
-    let defaults = Defaults {
-        task: "stability",
-        schedule: Schedule::Static,
-        decay: [SCALE; 2],
-        fixed: SCALE,
-        size: SIZE,
-        backends: &[BackendChoice::NdArray],
+    args: T::Args,
+    config: &Config,
+    measured: usize,
+) -> anyhow::Result<Vec<Trial>> {
+    let runs = tested.solve::<T>(args, config)?;
+    let trial = |run: &softrast_lab::Run| {
+        let value = run.returned(HARD).map_or(f64::NAN, |point| point.values[measured]);
+        let finite = run.curve.iter().flat_map(|point| &point.values).all(|x| x.is_finite());
+        Trial { value, reached: finite && run.success, finite }
     };
-    Method::new(&Line::try_parse_from(words)?.settings, &defaults)
+    Ok(runs.iter().map(trial).collect())
+}
+
+/// The same trials with another target: at most `limit`.
+fn with_limit(mut trials: Vec<Trial>, limit: f64) -> Vec<Trial> {
+    trials.iter_mut().for_each(|trial| trial.reached = trial.finite && trial.value <= limit);
+    trials
 }

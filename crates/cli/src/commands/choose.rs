@@ -1,0 +1,278 @@
+use anyhow::Context;
+use serde_json::json;
+use softrast_inverse::Resolution;
+use softrast_lab::{
+    Cache, Error, Experiment, Progress, Runner, check_held_out,
+    format::{counted, exact},
+    program::Output,
+    report::Report,
+    seeds,
+    select::{Budget, Candidate, Selection, chosen_flags, price, section},
+    sweep::TRAINING_SEED,
+};
+use softrast_softness::Family;
+
+use super::{ended, evaluate::Chosen};
+use crate::{
+    Init, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment,
+    program::{Choose, Session, Shared},
+};
+
+/// Methods from the least complex one on: parameters of the family first, then whether the scale moves.
+///
+/// Source: Wu et al. 2024, Table 1, for the numbers of parameters.
+const FAMILIES: [Family; 5] =
+    [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp];
+/// Images are not tried below this many pixels a side.
+const FEWEST: usize = 8;
+/// Largest errors of a pixel, the last being what tasks take if nobody says otherwise.
+const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+/// Training seeds that every answer is tried on where nobody says.
+const RUNS: usize = 8;
+
+/// Finds the cheapest way to solve the task that is as good as the best, and gives its reasons.
+///
+/// # Errors
+///
+/// Those of the task, of the cache and of the output folder, and if no method gave finite numbers.
+pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyhow::Result<Output> {
+    let Choose { mut shared, auto, training, resume } = flags;
+    shared.method.reconcile().map_err(Error::usage)?;
+    let mut folder = session.folder()?;
+    let mut runner = session.runner(&folder, resume.resume)?;
+    let training = seeds(TRAINING_SEED, training.search_runs);
+    let found = find::<T>(&shared, auto.budget, &training, &mut runner);
+    runner.progress.finish();
+    let (chosen, stages, lasted) = found.map_err(|error| ended(error, runner.cache.kept()))?;
+    let score = T::measures().hard;
+    let variant = shared.common.variant.name();
+    let head = format!(
+        "{} ({variant}): the cheapest within one standard error of the best, by {score} of what is returned on {} training seeds",
+        T::NAME,
+        training.len()
+    );
+    let line = |name: &str, text: &str| format!("  {name:<12} {text}");
+    let mut text = vec![head.clone()];
+    text.extend(stages.iter().flat_map(|stage| stage.table().lines()));
+    text.push(line("chosen", &chosen.flags));
+    text.push(line("price", &chosen.price));
+    text.push(line("report", &session.out.join("report.html").display().to_string()));
+    let unfinished = "the time budget ended before everything was tried";
+    let warnings: Vec<String> = (!lasted).then(|| unfinished.to_owned()).into_iter().collect();
+    let json = json!({
+        "task": T::NAME,
+        "command": session.command,
+        "variant": variant,
+        "score": score,
+        "training_seed": TRAINING_SEED,
+        "training_runs": training.len(),
+        "flags": chosen.flags,
+        "price": chosen.price,
+        "choice": { "stages": stages, "whole": lasted },
+        "warnings": warnings,
+        "out": session.out,
+    });
+    folder.stage("choose.json", &serde_json::to_vec_pretty(&json)?)?;
+    let mut report = Report::new(T::NAME, "What is enough");
+    report.paragraph(&format!("{head}."));
+    section(&stages, &mut report);
+    let page = report.finish(&session.again, "choose.json holds all errors");
+    folder.stage("report.html", page.as_bytes())?;
+    folder.commit(&[])?;
+    Ok(Output { json, text, warnings, partial: None })
+}
+
+/// What `--softness auto` stands for.
+///
+/// # Errors
+///
+/// Those of the task, and if no method gave finite numbers.
+pub(crate) fn chosen<T: Task>(
+    shared: &Shared<T::Args>,
+    budget: Option<f64>,
+    session: &Session,
+) -> anyhow::Result<Chosen<T::Args>> {
+    let progress = Progress::of_program(session.quiet);
+    let mut runner = Runner { progress, cache: Cache::in_memory() };
+    let training = seeds(TRAINING_SEED, RUNS);
+    let found = find::<T>(shared, budget, &training, &mut runner);
+    runner.progress.finish();
+    Ok(found?.0)
+}
+
+/// Asks one question after the other, each with the answers to those before: the least complex softness, then the fewest pixels to
+/// optimise on, the largest tolerance and the coarsest mesh. What the flags name of these is not asked, nor is what the task does not
+/// know.
+fn find<T: Task>(
+    shared: &Shared<T::Args>,
+    budget: Option<f64>,
+    training: &[u64],
+    runner: &mut Runner,
+) -> anyhow::Result<(Chosen<T::Args>, Vec<Selection>, bool)> {
+    if shared.method.surrogate_scale.is_some() {
+        return Err(Error::usage(
+            "--surrogate-scale does not go with choose or --softness auto, whose methods have none",
+        ));
+    }
+    check_held_out(training, &[shared.common.seed])?;
+    // Not the learned one, which is none of the methods that there are to choose from.
+    let mut now = Answer { args: shared.args.clone(), method: shared.method.clone() };
+    now.method.softness = None;
+    let mut budget = Budget { left: budget.unwrap_or(f64::INFINITY), lasted: true };
+    let (mut stages, mut runs): (Vec<Selection>, usize) = (Vec::new(), 0);
+    for of in ["softness", "resolution", "tolerance", "detail"] {
+        let make = |now: &Answer<T::Args>| {
+            TaskExperiment::<T>::new(&now.args, &shared.common, &now.method, Purpose::Finding)
+        };
+        let usual = make(&now)?;
+        let answers = match of {
+            "softness" => softnesses(&now),
+            "resolution" if T::MOVES_EDGES => resolutions(&now, usual.solve.size),
+            "tolerance" if T::MOVES_EDGES => tolerances(&now),
+            "detail" => details::<T>(&now, &usual.task),
+            _ => Vec::new(),
+        };
+        let mut candidates = Vec::new();
+        for (flags, answer) in answers {
+            let experiment = make(&answer)?;
+            let with = with(of, &experiment);
+            candidates.push(Candidate { flags, with, experiment: Box::new(experiment), answer });
+        }
+        if candidates.len() < 2 {
+            continue;
+        }
+        runs += candidates.len() * training.len();
+        runner.progress.expect(runs * usual.steps());
+        let (answer, stage) = runner.select(of, candidates, training, &mut budget)?.context(
+            "the numbers stop being finite with every method: try a smaller --learning-rate",
+        )?;
+        now = answer;
+        stages.push(stage);
+    }
+    let (flags, price) = (chosen_flags(&stages), price(&stages));
+    let Answer { args, method } = now;
+    Ok((Chosen { args, method, flags, price }, stages, budget.lasted))
+}
+
+/// The flags of an answer.
+#[derive(Clone)]
+struct Answer<A> {
+    args: A,
+    method: MethodArgs,
+}
+
+impl<A: Clone> Answer<A> {
+    fn with(&self, change: impl FnOnce(&mut MethodArgs)) -> Self {
+        let mut answer = self.clone();
+        change(&mut answer.method);
+        answer
+    }
+
+    fn moves(&self) -> bool {
+        self.method.schedule == Some(Schedule::Decay)
+    }
+}
+
+/// What an answer makes more or less of.
+fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
+    let (size, method) = (experiment.solve.size, &experiment.method);
+    match of {
+        "softness" => counted(experiment.parameters(), "parameter"),
+        "resolution" => match method.resolution {
+            Resolution::Auto => format!("at most {size} pixels a side"),
+            resolution => format!("{} pixels a side", resolution.side(size, 1.0)),
+        },
+        "tolerance" => format!("pixels off by {:e}", method.tolerance()),
+        _ => format!("{} faces", experiment.description.faces),
+    }
+}
+
+/// The softness families and how their scale moves, at the scales of the task.
+fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<(String, Answer<A>)> {
+    let paths = |family| [(family, Schedule::Static), (family, Schedule::Decay)];
+    let mut all: Vec<_> = FAMILIES.into_iter().flat_map(paths).collect();
+    // Both static ones of one parameter come before those that move.
+    all.swap(1, 2);
+    let answer = |(family, schedule): (Family, Schedule)| {
+        let name = if schedule == Schedule::Static { "static" } else { "decay" };
+        // A random start reaches the whole image, and takes over twenty times as long as a logistic.
+        let init = (family == Family::Mlp).then_some(Init::Fitted);
+        let from = if init.is_some() { " --init fitted" } else { "" };
+        let answer = now.with(|method| {
+            method.softness = Some(SoftnessChoice::Family(family));
+            (method.schedule, method.init) = (Some(schedule), init);
+            (method.scale, method.scale_end) = (None, None);
+        });
+        (format!("--softness {family}{from} --schedule {name}"), answer)
+    };
+    all.into_iter().map(answer).collect()
+}
+
+/// Resolutions of images of `size`, the fewest pixels first; none if one was asked for. Where the scale moves, so may the resolution.
+fn resolutions<A: Clone>(now: &Answer<A>, size: usize) -> Vec<(String, Answer<A>)> {
+    if now.method.resolution.is_some() {
+        return Vec::new();
+    }
+    let smaller: Vec<usize> =
+        Resolution::sides(size).skip(1).take_while(|&side| side >= FEWEST).collect();
+    let auto = (now.moves() && !smaller.is_empty()).then_some(Resolution::Auto);
+    let smaller = smaller.into_iter().rev().map(Resolution::Side);
+    let answer = |resolution: Resolution| {
+        let answer = now.with(|method| method.resolution = Some(resolution));
+        (format!("--resolution {resolution}"), answer)
+    };
+    smaller.chain(auto).chain([Resolution::Full]).map(answer).collect()
+}
+
+/// Tolerances of culling, the largest first; none if one was asked for.
+fn tolerances<A: Clone>(now: &Answer<A>) -> Vec<(String, Answer<A>)> {
+    if now.method.tolerance.is_some() {
+        return Vec::new();
+    }
+    let answer = |tolerance: f64| {
+        let answer = now.with(|method| method.tolerance = Some(tolerance));
+        (format!("--tolerance {}", exact(tolerance)), answer)
+    };
+    TOLERANCES.into_iter().map(answer).collect()
+}
+
+/// Details of the task's mesh, the coarsest first; none if it has none to choose.
+fn details<T: Task>(now: &Answer<T::Args>, task: &T) -> Vec<(String, Answer<T::Args>)> {
+    let Some(detail) = task.detail(&now.args) else { return Vec::new() };
+    let answer = |value: usize| {
+        let mut answer = now.clone();
+        (detail.set)(&mut answer.args, value);
+        (format!("--{} {value}", detail.flag), answer)
+    };
+    detail.values.iter().copied().map(answer).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use softrast_inverse::Method;
+
+    use super::*;
+
+    fn flags(answers: &[(String, Answer<()>)]) -> Vec<&str> {
+        answers.iter().map(|(flags, _)| flags.as_str()).collect()
+    }
+
+    #[test]
+    fn the_cheapest_comes_first_and_what_is_asked_for_is_not_asked() {
+        let still = Answer { args: (), method: MethodArgs::default() };
+        let sides = ["8", "16", "32", "full"].map(|name| format!("--resolution {name}"));
+        assert_eq!(flags(&resolutions(&still, 64)), sides);
+        let moving = still.with(|method| method.schedule = Some(Schedule::Decay));
+        let expected = ["--resolution 9", "--resolution auto", "--resolution full"];
+        assert_eq!(flags(&resolutions(&moving, 18)), expected);
+        assert_eq!(flags(&resolutions(&moving, 15)), ["--resolution full"]);
+        let asked = moving.with(|method| method.resolution = Some(Resolution::Auto));
+        assert!(resolutions(&asked, 64).is_empty());
+        let all = tolerances(&moving);
+        assert_eq!(all[3].0, "--tolerance 1e-5");
+        assert_eq!(all[0].1.method.tolerance, Some(Method::usual_tolerance(true)));
+        let softnesses = softnesses(&moving);
+        assert_eq!(softnesses[1].0, "--softness gauss --schedule static");
+        assert_eq!(softnesses[9].0, "--softness mlp --init fitted --schedule decay");
+    }
+}

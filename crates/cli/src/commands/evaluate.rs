@@ -1,0 +1,124 @@
+use anyhow::Context;
+use softrast_lab::{Comparison, Error, Evaluation, Experiment, Partial, program::Output, seeds};
+
+use super::{Before, Finished, choose::chosen, ended, write};
+use crate::{
+    MethodArgs, Purpose, SoftnessChoice, Task, TaskExperiment,
+    program::{Auto, Evaluate, Session, Shared, Solve},
+};
+
+/// Solves one instance.
+///
+/// # Errors
+///
+/// Those of the task and of the output folder.
+pub(crate) fn solve<T: Task>(session: &Session, flags: Solve<T::Args>) -> anyhow::Result<Output> {
+    let Solve { mut shared, auto } = flags;
+    let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
+    run(session, &first, None, &[shared.common.seed], false, false)
+}
+
+/// Solves many instances with one method or two.
+///
+/// # Errors
+///
+/// Those of the task, of the cache and of the output folder; [`Error::Interrupted`] if the user stopped the work before any run was
+/// finished.
+pub(crate) fn evaluate<T: Task>(
+    session: &Session,
+    flags: Evaluate<T::Args>,
+) -> anyhow::Result<Output> {
+    let Evaluate { mut shared, runs, against, resume, auto } = flags;
+    let first = prepared::<T>(&mut shared, auto, session, Purpose::Evaluating)?;
+    let second = against.map(|method| {
+        let method = method.beside(&shared.method);
+        let Shared { args, common, .. } = &shared;
+        TaskExperiment::<T>::new(args, common, &method, Purpose::Evaluating)
+    });
+    let second = second.transpose().context("--against")?;
+    let seeds = seeds(shared.common.seed, runs.unwrap_or(first.description.runs));
+    // What would fail in the middle fails at once.
+    seeds.iter().try_for_each(|&seed| first.task.instance(seed).map(drop))?;
+    run(session, &first, second.as_ref(), &seeds, true, resume.resume)
+}
+
+/// The experiment of the flags; `--softness auto` is what `choose` finds.
+fn prepared<T: Task>(
+    shared: &mut Shared<T::Args>,
+    auto: Auto,
+    session: &Session,
+    purpose: Purpose,
+) -> anyhow::Result<TaskExperiment<T>> {
+    shared.method.reconcile().map_err(Error::usage)?;
+    if shared.method.softness == Some(SoftnessChoice::Auto) {
+        let choice = chosen::<T>(shared, auto.budget, session)?;
+        eprintln!("--softness auto is {}", choice.in_words());
+        (shared.args, shared.method) = (choice.args, choice.method);
+    }
+    TaskExperiment::new(&shared.args, &shared.common, &shared.method, purpose)
+}
+
+fn run<T: Task>(
+    session: &Session,
+    first: &TaskExperiment<T>,
+    second: Option<&TaskExperiment<T>>,
+    seeds: &[u64],
+    many: bool,
+    resume: bool,
+) -> anyhow::Result<Output> {
+    let folder = session.folder()?;
+    let mut runner = session.runner(&folder, resume)?;
+    let experiments: Vec<&dyn Experiment> =
+        [Some(first), second].into_iter().flatten().map(|one| one as &dyn Experiment).collect();
+    let steps: usize = experiments.iter().map(|one| one.steps() * seeds.len()).sum();
+    runner.progress.expect(steps);
+    let solved = runner.evaluate(&experiments, seeds, true, None);
+    runner.progress.finish();
+    let (evaluations, stopped) = solved.map_err(|error| ended(error, runner.cache.kept()))?;
+    let finished = Finished { experiment: first, evaluation: &evaluations[0] };
+    if finished.evaluation.runs.is_empty() {
+        return Err(Error::Interrupted.into());
+    }
+    let is_begun = |(_, evaluation): &(_, &Evaluation)| !evaluation.runs.is_empty();
+    let other = second.zip(evaluations.get(1)).filter(is_begun);
+    let mut summary = finished.summary(many)?;
+    let partial = Partial { finished: summary.successes[1], asked: seeds.len() };
+    summary.partial = stopped.then_some(partial);
+    summary.against = other.map(|(second, evaluation)| {
+        let titles = [title(first, second), title(second, first)];
+        let mut about = second.about("evaluate");
+        about.retain(|key, _| ["softness", "parameters", "settings"].contains(&key.as_str()));
+        Comparison::new(titles, about, first, finished.evaluation, evaluation)
+    });
+    let other = other.map(|(experiment, evaluation)| Finished { experiment, evaluation });
+    write(session, folder, &finished, other.as_ref(), &summary, &Before::nothing())
+}
+
+/// The name of a method, and where the other has the same what else is different.
+fn title<T: Task>(one: &TaskExperiment<T>, other: &TaskExperiment<T>) -> String {
+    if one.name() != other.name() {
+        return one.name().to_owned();
+    }
+    let others = other.settings();
+    let settings = one.settings();
+    let differs = settings.iter().filter(|(key, value)| others.get(*key) != Some(value));
+    let named = differs.map(|(key, value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        format!("{} {value}", key.replace('_', " "))
+    });
+    [one.name().to_owned()].into_iter().chain(named).collect::<Vec<_>>().join(", ")
+}
+
+/// The flags of a method and what they are for, where both come from a choice.
+pub(crate) struct Chosen<A> {
+    pub(crate) args: A,
+    pub(crate) method: MethodArgs,
+    pub(crate) flags: String,
+    pub(crate) price: String,
+}
+
+impl<A> Chosen<A> {
+    fn in_words(&self) -> String {
+        format!("{}: {}", self.flags, self.price)
+    }
+}

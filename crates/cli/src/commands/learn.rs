@@ -1,0 +1,518 @@
+use std::{
+    fs::{self, OpenOptions},
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use softrast_inverse::{Input, LearnConfig, Learning, OuterLoss, SIGMA};
+use softrast_lab::{
+    Error, Experiment, OutputFolder, Progress,
+    format::{short, short_or_none},
+    parse::{count, positive, whole},
+    peak_rss_mib,
+    plot::{Axis, Plot, Series},
+    program::Output,
+    report::{Report, Table},
+    write_atomically,
+};
+use softrast_meta::{MetaGradient, OuterSteps, Record};
+use softrast_raster::{BackendChoice, HostBackend};
+use softrast_softness::ScheduledSoftness;
+
+use crate::{
+    Purpose, Task, TaskExperiment, Variant,
+    learned_charts::learned_charts,
+    program::{Learn, Session, Shared},
+};
+
+/// Flags that say how to learn.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct LearnArgs {
+    /// How the meta-gradient is taken: unrolled, truncated:K, direct, alternating, es or es:S [default: es for few parameters, else unrolled]
+    #[arg(long, alias = "order", value_name = "NAME", value_parser = estimator)]
+    estimator: Option<Estimator>,
+    /// Updates of the softness [default: 50]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    outer: Option<usize>,
+    /// Steps of each optimisation that is learned through [default: those of the task]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    inner: Option<usize>,
+    /// Instances for each update [default: 8]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    batch: Option<usize>,
+    /// Largest move of a parameter in an update, roughly [default: 0.03]
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    outer_rate: Option<f64>,
+    /// Learn the inner learning rate along with the softness; with --estimator es
+    #[arg(long)]
+    learn_rate: bool,
+    /// Instances that decide which softness is kept [default: 8]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    validation_runs: Option<usize>,
+    /// End after so many validations that found nothing better [default: never]
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    patience: Option<usize>,
+    /// The image that the outer loss is taken of [default: fixed; own for direct, which sees nothing else]
+    #[arg(long, alias = "referee", value_enum)]
+    outer_loss: Option<OuterLossArg>,
+    /// The inner steps after which the outer loss is taken [default: last]
+    #[arg(long, alias = "judged", value_enum)]
+    outer_steps: Option<OuterStepsArg>,
+    /// Numbers that describe how a moving scale moves [default: 3, or those of the file]
+    #[arg(long, value_name = "N", value_parser = whole::<1, 5>, allow_negative_numbers = true)]
+    knots: Option<usize>,
+    /// What a softness whose scale stays is a function of [default: ndc]
+    #[arg(long, value_enum)]
+    input: Option<InputArg>,
+    /// Pixels that a learned width or a moving scale stays above [default: 0.03]
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
+    floor: Option<f64>,
+}
+
+/// How the gradient is taken, as the command line names it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Estimator {
+    Alternating,
+    Other(MetaGradient),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum OuterLossArg {
+    /// A fixed narrow softness on a finer image
+    Fixed,
+    /// The same on the image's own pixels
+    Pixels,
+    /// The hard image; it has no gradient
+    Hard,
+    /// The loss that was optimised, as in the paper
+    Own,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum OuterStepsArg {
+    /// After the last step
+    #[value(alias = "end")]
+    Last,
+    /// After a quarter, half and all of the steps
+    Quarters,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum InputArg {
+    /// The distance in NDC, as in the paper
+    Ndc,
+    /// The distance over a learned width
+    Relative,
+}
+
+fn estimator(text: &str) -> Result<Estimator, String> {
+    const EXPECTED: &str = "expected unrolled, truncated:K, direct, alternating, es or es:S";
+    let es = |sigma| MetaGradient::EvolutionStrategy { sigma, pairs: 1 };
+    let estimator = match text.split_once(':') {
+        None => match text {
+            "alternating" | "joint" => return Ok(Estimator::Alternating),
+            "unrolled" => MetaGradient::default(),
+            "direct" => MetaGradient::Direct,
+            "es" => es(SIGMA),
+            _ => return Err(EXPECTED.into()),
+        },
+        Some(("truncated", steps)) => {
+            MetaGradient::Truncated { steps: count(steps)?, clip: Some(1.0) }
+        }
+        Some(("es", sigma)) => es(positive(sigma)?),
+        Some(_) => return Err(EXPECTED.into()),
+    };
+    Ok(Estimator::Other(estimator))
+}
+
+impl LearnArgs {
+    /// `seed` is added to the seeds of training and validation.
+    fn config(&self, seed: u64) -> LearnConfig {
+        let usual = LearnConfig::default();
+        let outer_rate = self.outer_rate.unwrap_or(usual.outer_rate);
+        LearnConfig {
+            estimator: self.estimator.map(|estimator| match estimator {
+                Estimator::Alternating => {
+                    MetaGradient::AlternatingDescent { learning_rate: outer_rate }
+                }
+                Estimator::Other(estimator) => estimator,
+            }),
+            updates: self.outer.unwrap_or(usual.updates),
+            batch: self.batch.unwrap_or(usual.batch),
+            outer_rate,
+            learn_rate: self.learn_rate,
+            seed: usual.seed.saturating_add(seed),
+            validation_seed: usual.validation_seed.saturating_add(seed),
+            validation_runs: self.validation_runs.unwrap_or(usual.validation_runs),
+            patience: self.patience,
+            outer_loss: self.outer_loss.map(|image| match image {
+                OuterLossArg::Fixed => OuterLoss::Fixed,
+                OuterLossArg::Pixels => OuterLoss::Pixels,
+                OuterLossArg::Hard => OuterLoss::Hard,
+                OuterLossArg::Own => OuterLoss::Own,
+            }),
+            outer_steps: match self.outer_steps {
+                None | Some(OuterStepsArg::Last) => OuterSteps::Last,
+                Some(OuterStepsArg::Quarters) => OuterSteps::Quarters,
+            },
+            knots: self.knots,
+            input: match self.input {
+                None | Some(InputArg::Ndc) => Input::Ndc,
+                Some(InputArg::Relative) => Input::Relative,
+            },
+            floor_px: self.floor,
+        }
+    }
+}
+
+/// Learns a softness, and writes it with a report.
+///
+/// Every outer step leaves a line in `learn.jsonl` and then a checkpoint, so that a program that was killed at any moment goes on with
+/// `--resume` as though it had not been.
+///
+/// # Errors
+///
+/// Those of the task and of the output folder; if learning cannot go on.
+pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow::Result<Output> {
+    let Learn { shared: Shared { args, mut common, mut method }, learn, resume } = flags;
+    method.reconcile().map_err(Error::usage)?;
+    if method.resolution.is_some() {
+        return Err(Error::usage("learn draws at --size: leave out --resolution"));
+    }
+    common.steps = learn.inner.or(common.steps);
+    if common.backend.take().is_some_and(|asked| asked != BackendChoice::NdArray.name()) {
+        return Err(Error::usage("learn computes on the CPU: leave out --backend"));
+    }
+    let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Finding)?;
+    let config = learn.config(common.seed);
+    let (about, settings) = (experiment.about("learn"), experiment.settings());
+    let identity = experiment.identity();
+    let TaskExperiment { task, method, solve, description, .. } = experiment;
+    let own_start = task.own_phi();
+    let task = std::rc::Rc::into_inner(task).context("a task has one owner")?;
+    let learning = Learning::<T, HostBackend>::new(task, &method, &solve, &config);
+    let mut learning = learning.map_err(|error| Error::usage(error.to_string()))?;
+    let job = json!({ "task": T::NAME, "method": identity, "learned": learning.identity() });
+    let mut folder = session.folder()?;
+    let mut log = Log::new(&folder, resume.resume, &mut learning, &job.to_string())?;
+    let mut progress = Progress::of_program(session.quiet);
+    let stopped = walk(&mut learning, &mut log, &mut progress);
+    progress.finish();
+    let kept = "learning stopped; what was learned before is kept, and --resume goes on from it";
+    let stopped = stopped.context(kept)?;
+
+    let (done, updates) = (log.updates(), learning.config().updates);
+    let start = log.validations().first().map(|point| point[1]);
+    let (mut softness, own) = learning.learned();
+    softness.note = Some(note(session, &learning, done, start));
+    softness.task = Some(T::NAME.to_owned());
+    // The rate is one for the original variant.
+    softness.learning_rate = softness.learning_rate.filter(|_| common.variant == Variant::Original);
+    let files = files(&learning, &softness, &own)?;
+    let partial = stopped.then(|| format!("{done} of {updates} outer steps are done and kept"));
+    let best = learning.progress().best.as_ref();
+    let parameters = learning.progress().phi.len();
+    let result = json!({
+        "task": T::NAME,
+        "command": session.command,
+        "partial": partial,
+        "softness": about["softness"],
+        "parameters": parameters,
+        "outer_steps": done,
+        "start_validation_loss": start,
+        "best": best.map(|best| json!({ "step": best.step, "validation_loss": best.loss })),
+        "instances": { "tried": learning.progress().tried, "dropped": learning.progress().dropped },
+        "seconds": learning.progress().seconds,
+        "peak_memory_mib": peak_rss_mib(),
+        "inner_steps": solve.steps,
+        "size": solve.size,
+        "faces": description.faces,
+        "config": learning.config(),
+        "settings": settings,
+        "files": files.iter().map(|(name, _)| session.out.join(name)).collect::<Vec<_>>(),
+        "out": session.out,
+    });
+    let text = text::<T>(session, &result, &files);
+    let mut report = Report::new(T::NAME, T::ABOUT);
+    let begun = partial.iter().map(|done| format!("Stopped: {done}; --resume goes on from them"));
+    report.warnings(&begun.collect::<Vec<_>>());
+    report.heading("Learning");
+    text.iter().for_each(|line| report.paragraph(line));
+    report.chart(&losses(&log).svg()?, LOSSES);
+    for (plot, caption) in learned_charts(learning.layout(), &softness) {
+        report.chart(&plot.svg()?, caption);
+    }
+    if let Some((plot, caption)) = learning.problem().own_chart(&own_start, &own) {
+        report.chart(&plot.svg()?, caption);
+    }
+    settings_table(&mut report, &result);
+    let beside = "learn.json holds the result, learn.jsonl every outer step; softness.json is for --softness of any task";
+    for (name, content) in &files {
+        folder.stage(name, content.as_bytes())?;
+    }
+    folder.stage("report.html", report.finish(&session.again, beside).as_bytes())?;
+    folder.stage("learn.json", &serde_json::to_vec_pretty(&result)?)?;
+    folder.commit(&[])?;
+    let warnings = warnings(&learning);
+    Ok(Output { json: result, text, warnings, partial })
+}
+
+/// Takes outer steps until learning has finished, or the user stops it: then true.
+fn walk<T: Task>(
+    learning: &mut Learning<T, HostBackend>,
+    log: &mut Log,
+    progress: &mut Progress,
+) -> anyhow::Result<bool> {
+    let outer = learning.config().updates;
+    let before = log.updates();
+    progress.expect(outer);
+    progress.skip(1, before);
+    if progress.begin("learn".into(), 1, outer - before.min(outer)).is_err() {
+        return Ok(true);
+    }
+    let mut loss = f64::NAN;
+    while let Some(record) = learning.step()? {
+        log.add(&record, learning)?;
+        loss = record.loss.unwrap_or(loss);
+        if progress.step((record.step + 1).min(outer) - before, loss).is_err() {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The records of all outer steps so far, on file and here.
+struct Log {
+    records: PathBuf,
+    checkpoint: PathBuf,
+    job: String,
+    steps: Vec<Point>,
+}
+
+struct Point {
+    step: usize,
+    loss: Option<f64>,
+    validation: Option<f64>,
+}
+
+impl Log {
+    /// Goes on from the checkpoint in the folder if asked to; else from the beginning.
+    fn new<T: Task>(
+        folder: &OutputFolder,
+        resume: bool,
+        learning: &mut Learning<T, HostBackend>,
+        job: &str,
+    ) -> anyhow::Result<Self> {
+        let (records, checkpoint) =
+            (folder.file("learn.jsonl"), folder.file("learn.checkpoint.json"));
+        let mut log = Self { records, checkpoint, job: job.to_owned(), steps: Vec::new() };
+        let mut kept = String::new();
+        if resume && log.checkpoint.exists() {
+            let named = || log.checkpoint.display().to_string();
+            let checkpoint = fs::read(&log.checkpoint).with_context(named)?;
+            learning.resume(&checkpoint, job).with_context(named)?;
+            let progress = learning.progress();
+            // The record of the last step, after which there is no update, is on file too.
+            let next = progress.step + usize::from(progress.finished);
+            let text = fs::read(&log.records).unwrap_or_default();
+            // A step that came after the checkpoint was written will come again, and the line behind the last line feed was being
+            // written when the program was killed.
+            for line in String::from_utf8_lossy(&text).split_inclusive('\n') {
+                let point = serde_json::from_str(line).ok().and_then(|record| point(&record));
+                let point = point.filter(|point| point.step < next && line.ends_with('\n'));
+                if let Some(point) =
+                    point.filter(|point| log.steps.iter().all(|p| p.step < point.step))
+                {
+                    log.steps.push(point);
+                    kept += line;
+                }
+            }
+            if log.steps.len() < next {
+                eprintln!(
+                    "{} of {next} records of {} are missing or damaged: the charts leave them out",
+                    next - log.steps.len(),
+                    log.records.display()
+                );
+            }
+        } else if resume {
+            eprintln!("there is no {}, so nothing to go on from", log.checkpoint.display());
+        }
+        fs::write(&log.records, kept).with_context(|| format!("cannot write {:?}", log.records))?;
+        Ok(log)
+    }
+
+    fn add<T: Task>(
+        &mut self,
+        record: &Record,
+        learning: &Learning<T, HostBackend>,
+    ) -> anyhow::Result<()> {
+        let written = OpenOptions::new().append(true).open(&self.records);
+        let line = serde_json::to_string(record)?;
+        written
+            .and_then(|mut file| writeln!(file, "{line}"))
+            .with_context(|| format!("cannot write {:?}", self.records))?;
+        let checkpoint = learning.checkpoint(&self.job)?;
+        write_atomically(&self.checkpoint, checkpoint.as_bytes())
+            .with_context(|| format!("cannot write {:?}", self.checkpoint))?;
+        let &Record { step, loss, validation_loss: validation, .. } = record;
+        self.steps.push(Point { step, loss, validation });
+        Ok(())
+    }
+
+    fn updates(&self) -> usize {
+        self.steps
+            .iter()
+            .filter(|point| point.loss.is_some())
+            .map(|p| p.step + 1)
+            .max()
+            .unwrap_or(0)
+    }
+
+    fn losses(&self) -> Vec<[f64; 2]> {
+        let point = |point: &Point| Some([point.step as f64, point.loss?]);
+        self.steps.iter().filter_map(point).collect()
+    }
+
+    fn validations(&self) -> Vec<[f64; 2]> {
+        let point = |point: &Point| Some([point.step as f64, point.validation?]);
+        self.steps.iter().filter_map(point).collect()
+    }
+}
+
+fn point(record: &Value) -> Option<Point> {
+    Some(Point {
+        step: usize::try_from(record["step"].as_u64()?).ok()?,
+        loss: record["loss"].as_f64(),
+        validation: record["validation_loss"].as_f64(),
+    })
+}
+
+/// Where a softness comes from, for its file.
+fn note<T: Task>(
+    session: &Session,
+    learning: &Learning<T, HostBackend>,
+    updates: usize,
+    start: Option<f64>,
+) -> String {
+    let from = start.map(|loss| format!(", from a validation loss of {}", short(loss)));
+    let progress = learning.progress();
+    let best = progress.best.as_ref();
+    let best = best.map(|best| format!("; validation loss {:.6} after {}", best.loss, best.step));
+    format!(
+        "learned in {updates} outer steps on seeds from {}{} by: {}{}; {:.0} s",
+        learning.config().seed,
+        from.unwrap_or_default(),
+        session.again,
+        best.unwrap_or_default(),
+        progress.seconds
+    )
+}
+
+/// Files for the command line: name and text.
+fn files<T: Task>(
+    learning: &Learning<T, HostBackend>,
+    softness: &ScheduledSoftness,
+    own: &[f64],
+) -> anyhow::Result<Vec<(&'static str, String)>> {
+    let name = "softness.json";
+    let text = softness.text(Path::new(name)).context("the learned softness")?;
+    let note = softness.note.as_deref().unwrap_or_default();
+    let own = learning.problem().own_file(own, note).context("the learned softness")?;
+    Ok([Some((name, text)), own].into_iter().flatten().collect())
+}
+
+fn text<T: Task>(session: &Session, result: &Value, files: &[(&str, String)]) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{}: learned {} parameters of {} in {} outer steps of {} inner ones, {:.1} s",
+        T::NAME,
+        result["parameters"],
+        result["softness"].as_str().unwrap_or_default(),
+        result["outer_steps"],
+        result["inner_steps"],
+        result["seconds"].as_f64().unwrap_or_default(),
+    )];
+    if let Some(loss) = result["best"]["validation_loss"].as_f64() {
+        let start = short_or_none(result["start_validation_loss"].as_f64());
+        let step = &result["best"]["step"];
+        lines.push(format!(
+            "validation loss {start} at the start, {} at the best, after {step} updates",
+            short(loss)
+        ));
+    }
+    lines.extend(files.iter().map(|(name, _)| session.out.join(name).display().to_string()));
+    lines.push(format!("report: {}", session.out.join("report.html").display()));
+    lines
+}
+
+fn warnings<T: Task>(learning: &Learning<T, HostBackend>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let progress = learning.progress();
+    if progress.dropped > 0 {
+        warnings.push(format!(
+            "{} of {} training instances were left out, because their loss or gradient was not finite: a wider softness or fewer \
+             inner steps may help",
+            progress.dropped, progress.tried
+        ));
+    }
+    if progress.best.as_ref().is_some_and(|best| best.step == 0) {
+        warnings.push(
+            "no update made the validation loss lower, so the softness is that of the start: try another --outer-rate or --estimator, or \
+             a larger --batch"
+                .into(),
+        );
+    }
+    warnings
+}
+
+const LOSSES: &str = "Mean outer loss of the batch of each outer step, whose instances differ from step to step, and of the validation \
+                      instances, which are always the same. The softness with the lowest validation loss is kept.";
+
+/// The loss over the outer steps.
+fn losses(log: &Log) -> Plot {
+    let series = [("batch", log.losses()), ("validation", log.validations())];
+    let series =
+        series.map(|(name, points)| Series { name: name.into(), points, ..Series::default() });
+    Plot {
+        series: series.into(),
+        ..Plot::new(Axis::linear("outer step"), Axis::linear("outer loss"))
+    }
+}
+
+fn settings_table(report: &mut Report, result: &Value) {
+    let rows = ["config", "settings"].iter().filter_map(|key| result[key].as_object()).flatten();
+    let row = |(key, value): (&String, &Value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        [key.replace('_', " "), value]
+    };
+    report.heading("Settings");
+    report.table(&Table::pairs(rows.map(row)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_have_the_names_of_the_documentation() {
+        let es = |sigma| Ok(Estimator::Other(MetaGradient::EvolutionStrategy { sigma, pairs: 1 }));
+        assert_eq!([estimator("es"), estimator("es:0.3")], [es(0.2), es(0.3)]);
+        let truncated = MetaGradient::Truncated { steps: 5, clip: Some(1.0) };
+        assert_eq!(estimator("truncated:5"), Ok(Estimator::Other(truncated)));
+        for wrong in ["truncated", "truncated:0", "unrolled:3", "second", "es:0", "es:x"] {
+            assert!(estimator(wrong).is_err(), "{wrong}");
+        }
+        let joint = LearnArgs {
+            estimator: Some(Estimator::Alternating),
+            outer_rate: Some(0.5),
+            ..LearnArgs::default()
+        };
+        assert_eq!(
+            joint.config(3).estimator,
+            Some(MetaGradient::AlternatingDescent { learning_rate: 0.5 })
+        );
+        assert_eq!(joint.config(3).validation_seed, 2_000_003);
+    }
+}

@@ -1,0 +1,334 @@
+use std::rc::Rc;
+
+use serde_json::{Map, Value, json};
+use softrast_inverse::{Iterate, Method, SolveConfig, minimize};
+use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
+use softrast_raster::{BackendChoice, HostBackend, RasterBackend, compiled_backends, on_backend};
+use softrast_softness::{Softness, Surrogate};
+
+use crate::{
+    Common, Description, EdgeChoice, MethodArgs, SoftnessChoice, Task, Variant, learned_name,
+    task::{Ended, HARD, theta_of},
+};
+
+/// A task with a method to solve it.
+pub struct TaskExperiment<T: Task> {
+    /// The task.
+    pub task: Rc<T>,
+    /// The method.
+    pub method: Method,
+    /// Size, steps and learning rate.
+    pub solve: SolveConfig,
+    /// Which variant.
+    pub variant: Variant,
+    /// What the task says of itself.
+    pub description: Description,
+    backend: BackendChoice,
+    starts: usize,
+    name: String,
+    metrics: Vec<Metric>,
+}
+
+impl<T: Task> TaskExperiment<T> {
+    /// The task and the method that flags ask for; `solves` one instance or many, and does not look for a method.
+    ///
+    /// # Errors
+    ///
+    /// If flags contradict each other or a file cannot be used.
+    pub fn new(
+        args: &T::Args,
+        common: &Common,
+        method_args: &MethodArgs,
+        solves: Purpose,
+    ) -> anyhow::Result<Self> {
+        // Before the first tensor.
+        let backend = backend(common.backend.as_deref())?;
+        let is_solved = solves != Purpose::Finding;
+        let family = match method_args.softness {
+            Some(SoftnessChoice::Family(family)) => Some(family),
+            _ => None,
+        };
+        let learned = learned_name(method_args, T::NAME, is_solved);
+        let edges = EdgeChoice { family, learned, schedule: method_args.schedule };
+        let task = T::new(args, common.variant, &edges)?;
+        let mut method = method_args.method(T::NAME, &T::SCALES, is_solved)?;
+        if !T::MOVES_EDGES {
+            refuse_what_edges_that_stay_do_not_know(method_args)?;
+            method.softness.surrogate = None;
+        }
+        let usual = task.defaults();
+        let size = common.size.unwrap_or(usual.size);
+        method.resolution.check(size).map_err(Error::usage)?;
+        let of_method = method.softness.learning_rate.filter(|_| task.shares_learning_rate());
+        let learning_rate = method_args.learning_rate.or(of_method).unwrap_or(usual.learning_rate);
+        let steps = common.steps.unwrap_or(usual.steps);
+        Ok(Self {
+            solve: SolveConfig { size, steps, learning_rate },
+            variant: common.variant,
+            description: task.description(),
+            backend,
+            starts: T::starts(args, solves == Purpose::Solving),
+            name: task.method_name(&method.name),
+            metrics: T::measures().metrics(),
+            task: Rc::new(task),
+            method,
+        })
+    }
+
+    /// Parameters of the softness, the task's own included.
+    pub fn parameters(&self) -> usize {
+        self.method.softness.parameters() + self.task.own_phi().len()
+    }
+
+    /// Every choice that decides the numbers, as it stands in the results.
+    pub fn settings(&self) -> Map<String, Value> {
+        let (softness, size) = (&self.method.softness, self.solve.size);
+        let mut settings = self.description.settings.clone();
+        let mut set = |name: &str, value: Value| drop(settings.insert(name.into(), value));
+        set("learning_rate", self.solve.learning_rate.into());
+        if T::MOVES_EDGES {
+            set("resolution", self.method.resolution.to_string().into());
+            set("tolerance", self.method.tolerance().into());
+        }
+        if T::FITS.is_finite() {
+            set("starts", self.starts.into());
+        }
+        set("schedule", if softness.is_constant() { "static" } else { "decay" }.into());
+        set("squared", softness.softness.squared.into());
+        for (name, part) in [("scale", 0.0), ("scale_end", 1.0)] {
+            set(name, softness.scale_at(part, size).into());
+            if let Some(Surrogate { softness, phi }) = softness.surrogate_at(part, size) {
+                set("surrogate", softness.family.name().into());
+                set(&format!("surrogate_{name}"), softness.scale(&phi).into());
+            }
+        }
+        if let Some(note) = &softness.note {
+            set("softness_note", note.as_str().into());
+        }
+        settings
+    }
+
+    /// What the results say first.
+    pub fn about(&self, command: &str) -> Map<String, Value> {
+        let about = json!({
+            "task": T::NAME,
+            "command": command,
+            "variant": self.variant.name(),
+            "softness": self.name,
+            "parameters": self.parameters(),
+            "backend": self.backend.title(),
+            "steps": self.solve.steps,
+            "size": self.solve.size,
+            "faces": self.description.faces,
+            "settings": self.settings(),
+        });
+        about.as_object().cloned().unwrap_or_default()
+    }
+
+    /// Solves instances side by side from one start.
+    fn solve_once(
+        &self,
+        instances: &[T::Instance],
+        batch: &Batch,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Vec<Solved>> {
+        on_backend!(self.backend, B => self.solve_on::<B>(instances, batch, progress))
+    }
+
+    fn solve_on<B: RasterBackend>(
+        &self,
+        instances: &[T::Instance],
+        batch: &Batch,
+        progress: &mut Progress,
+    ) -> anyhow::Result<Vec<Solved>> {
+        let mut all: Vec<Solved> = Vec::new();
+        let pictures = batch.pictures;
+        let watch = |iterate: Iterate, scene: &T::Scene<HostBackend>| {
+            if all.is_empty() {
+                let targets = self.task.targets(scene);
+                let target = targets.chunks(targets.len() / instances.len());
+                all = target.map(|target| Solved::new(target.to_vec())).collect();
+            }
+            let thetas = theta_of(&iterate.theta, instances.len());
+            let errors = self.task.errors(instances, scene, &iterate);
+            assert_eq!(
+                errors.len(),
+                instances.len(),
+                "Task::errors gives a list for each instance"
+            );
+            for (k, (solved, errors)) in all.iter_mut().zip(errors).enumerate() {
+                let at = [iterate.loss[k], iterate.soft_loss[k], errors[0], iterate.scale];
+                let values = [&at[..], &[iterate.hard_loss[k]], &errors[1..]].concat();
+                solved.curve.push(Point { step: iterate.step, values });
+                // The steps of a batch are shared by its runs.
+                let share = iterate.seconds.map(|time| time / instances.len() as f64);
+                solved.step_seconds.extend(share);
+                solved.theta.clone_from(&thetas[k]);
+            }
+            if let Some(image) = &iterate.image {
+                let frame = batch.wants_frame(iterate.step, self.solve.steps);
+                self.keep_picture(&mut all[0], image, frame);
+            }
+            let loss = iterate.loss.iter().sum::<f64>() / iterate.loss.len() as f64;
+            if iterate.step == 0 { Ok(()) } else { progress.step(iterate.step, loss) }
+        };
+        minimize::<T, B>(&self.task, instances, &self.method, &self.solve, pictures, watch)?;
+        Ok(all)
+    }
+
+    /// Keeps an image as the result, if no step before had a lower error of the hard one, and as a frame if so asked.
+    fn keep_picture(&self, solved: &mut Solved, image: &[f64], frame: bool) {
+        let size = self.solve.size;
+        let step = solved.curve.len() - 1;
+        let best = best_point(&solved.curve, HARD).is_none_or(|best| best.step == step);
+        let now = || self.task.picture(image, size);
+        let pictures = solved.pictures.get_or_insert_with(|| Pictures {
+            target: self.task.picture(&solved.target, size),
+            start: now(),
+            result: now(),
+            frames: Vec::new(),
+        });
+        if best {
+            pictures.result = now();
+        }
+        if frame {
+            pictures.frames.push(self.task.frame(image, &solved.target, size));
+        }
+    }
+
+    fn run_of(&self, seed: u64, instance: &T::Instance, solved: Solved) -> Run {
+        let Solved { target, curve, step_seconds, theta, pictures } = solved;
+        let returned = best_point(&curve, HARD);
+        let hard = returned.map_or(f64::INFINITY, |point| point.values[HARD]);
+        let errors = returned.map(|point| {
+            [&[point.values[crate::task::PARAMETER]], &point.values[HARD + 1..]].concat()
+        });
+        let success = errors.is_some_and(|errors| self.task.is_success(hard, &errors));
+        let size = self.solve.size;
+        let ended = Ended { seed, instance, target: &target, size, hard, theta: &theta };
+        let warnings = self.task.warnings(&ended);
+        Run { seed, curve, success, step_seconds, warnings, broke_at: None, pictures }
+    }
+}
+
+/// What an experiment is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// One instance, as well as possible.
+    Solving,
+    /// Many instances, by the protocol.
+    Evaluating,
+    /// Finding a method, from a family on unless another is named.
+    Finding,
+}
+
+impl<T: Task> Experiment for TaskExperiment<T> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn identity(&self) -> Value {
+        json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "task": T::NAME,
+            "variant": self.variant,
+            "method": self.method,
+            "softness": self.name,
+            "backend": self.backend.title(),
+            "steps": self.solve.steps,
+            "size": self.solve.size,
+            "faces": self.description.faces,
+            "settings": self.settings(),
+            "starts": self.starts,
+        })
+    }
+
+    fn metrics(&self) -> &[Metric] {
+        &self.metrics
+    }
+
+    fn steps(&self) -> usize {
+        self.solve.steps
+    }
+
+    fn batch_size(&self) -> usize {
+        self.task.batch_size()
+    }
+
+    /// Where the image does not fit, other starts are tried, and that with the best image is kept.
+    fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
+        let instances = batch.seeds.iter().map(|&seed| self.task.instance(seed));
+        let instances = instances.collect::<anyhow::Result<Vec<_>>>()?;
+        let mut kept = self.solve_once(&instances, batch, progress)?;
+        for start in 1..self.starts {
+            let again = (0..kept.len()).filter(|&k| kept[k].hard() > T::FITS);
+            let again = again
+                .filter_map(|k| Some((k, self.task.restart(&instances[k], start, self.starts)?)));
+            let (places, others): (Vec<_>, Vec<_>) = again.unzip();
+            if others.is_empty() {
+                break;
+            }
+            for (k, other) in places.into_iter().zip(self.solve_once(&others, batch, progress)?) {
+                if other.hard() < kept[k].hard() {
+                    kept[k] = other;
+                }
+            }
+        }
+        let runs = kept.into_iter().enumerate().map(|(k, mut solved)| {
+            solved.pictures = solved.pictures.filter(|_| k == 0);
+            self.run_of(batch.seeds[k], &instances[k], solved)
+        });
+        Ok(runs.collect())
+    }
+}
+
+/// One instance, solved from one start.
+struct Solved {
+    target: Vec<f64>,
+    curve: Vec<Point>,
+    step_seconds: Vec<f64>,
+    /// After the last step.
+    theta: Vec<f64>,
+    pictures: Option<Pictures>,
+}
+
+impl Solved {
+    fn new(target: Vec<f64>) -> Self {
+        let (curve, step_seconds, theta) = (Vec::new(), Vec::new(), Vec::new());
+        Self { target, curve, step_seconds, theta, pictures: None }
+    }
+
+    /// Error of the hard image that is returned: what can be told without knowing the answer.
+    fn hard(&self) -> f64 {
+        best_point(&self.curve, HARD).map_or(f64::INFINITY, |point| point.values[HARD])
+    }
+}
+
+/// The backend that the command line asks for, set up.
+///
+/// # Errors
+///
+/// If there is none of that name or no adapter for it.
+pub fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
+    let backend = BackendChoice::among(compiled_backends!(), asked);
+    let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
+    backend.set_up()?;
+    Ok(backend)
+}
+
+fn refuse_what_edges_that_stay_do_not_know(method: &MethodArgs) -> anyhow::Result<()> {
+    let given = [
+        (
+            method.resolution.is_some_and(|asked| asked != softrast_inverse::Resolution::Full),
+            "--resolution",
+        ),
+        (method.tolerance.is_some(), "--tolerance"),
+        (method.surrogate_scale.is_some(), "--surrogate-scale"),
+    ];
+    match given.iter().find(|(given, _)| *given) {
+        None => Ok(()),
+        Some((_, flag)) => Err(Error::usage(format!(
+            "edges stay where they are here, and every pixel sees every face: leave out {flag}"
+        ))),
+    }
+}

@@ -1,0 +1,313 @@
+//! The flags that all tasks have.
+
+use std::{fmt, path::PathBuf, str::FromStr};
+
+use clap::{Args, Parser, ValueEnum};
+use serde::{Deserialize, Serialize};
+use softrast_inverse::Resolution;
+use softrast_lab::{
+    found,
+    parse::{count, positive, seed, share, whole},
+};
+use softrast_softness::Family;
+
+/// Heading of the flags that few need.
+pub(crate) const RARE: &str = "Rarely needed";
+
+/// What is solved, and where results go.
+#[derive(Args, Clone, Debug, PartialEq)]
+pub struct Common {
+    /// The variant that a softness is tuned on, or the one it is transferred to
+    #[arg(long, value_enum, default_value = "original")]
+    pub variant: Variant,
+
+    /// Optimisation steps
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub steps: Option<usize>,
+
+    /// Width and height of the image, in pixels
+    #[arg(long, value_name = "N", value_parser = whole::<1, 4096>, allow_negative_numbers = true)]
+    pub size: Option<usize>,
+
+    /// Seed of the run, or the first of several
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
+    pub seed: u64,
+
+    /// Folder for the results; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+
+    /// Print one JSON object instead of the summary
+    #[arg(long)]
+    pub json: bool,
+
+    /// Show no progress
+    #[arg(long)]
+    pub quiet: bool,
+
+    /// Compute on ndarray, flex or wgpu, if the program was built with it
+    #[arg(long, value_name = "NAME", help_heading = RARE)]
+    pub backend: Option<String>,
+}
+
+impl Default for Common {
+    fn default() -> Self {
+        usual_args()
+    }
+}
+
+/// Flags of which none is given.
+///
+/// # Panics
+/// If a flag of `A` has no default, an error in the program.
+pub fn usual_args<A: Args>() -> A {
+    let command = A::augment_args(clap::Command::new("task"));
+    let parsed = A::from_arg_matches(&command.get_matches_from(["task"]));
+    parsed.unwrap_or_else(|error| panic!("every flag has a default: {error}"))
+}
+
+/// The method: a softness, how its scale moves, and how finely it is drawn. What is `None` is as the task has it.
+#[derive(Args, Clone, Debug, Default, PartialEq)]
+pub struct MethodArgs {
+    /// A family such as logistic, gauss, exp, gamma or mlp, a file, learned[-KIND], or auto
+    #[arg(long, value_name = "NAME|FILE.json", help_heading = "Softness")]
+    pub softness: Option<SoftnessChoice>,
+
+    /// Width of the soft edge, in NDC
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
+    pub scale: Option<f64>,
+
+    /// Width at the last step of a decay
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
+    pub scale_end: Option<f64>,
+
+    /// Whether the width stays or falls geometrically
+    #[arg(long, value_enum, help_heading = "Softness")]
+    pub schedule: Option<Schedule>,
+
+    /// Learning rate of the optimiser
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
+    pub learning_rate: Option<f64>,
+
+    /// Feed the softness the squared distance; widths are in NDC² then
+    #[arg(long, help_heading = RARE)]
+    pub squared: bool,
+
+    /// Take the gradient of the same softness at this width instead; it moves along with --scale
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = RARE)]
+    pub surrogate_scale: Option<f64>,
+
+    /// Weights of an mlp: at random, or fitted to the logistic or the file that is named
+    #[arg(long, value_enum, help_heading = RARE)]
+    pub init: Option<Init>,
+
+    /// Pixels a side to optimise on: all, as few as the softness can tell apart, or so many
+    #[arg(long, value_name = "full|auto|N", help_heading = RARE)]
+    pub resolution: Option<Resolution>,
+
+    /// Largest error of a pixel by leaving out far faces [default: 1e-5, or 1e-2 in a decay]
+    #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true, help_heading = RARE)]
+    pub tolerance: Option<f64>,
+}
+
+/// The two variants of every task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variant {
+    /// The one a softness is tuned on
+    Original,
+    /// The one a tuned softness must also work on
+    Transfer,
+}
+
+impl Variant {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Original, Self::Transfer];
+
+    /// Name on the command line and in the results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Variant::Original => "original",
+            Variant::Transfer => "transfer",
+        }
+    }
+}
+
+/// How the scale changes over a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Schedule {
+    /// It does not
+    Static,
+    /// Geometrically from --scale to --scale-end
+    Decay,
+}
+
+/// What the weights of an untrained MLP softness are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Init {
+    /// Random, as in the paper
+    Uniform,
+    /// Such that it is like another softness
+    Fitted,
+}
+
+/// A softness as named on the command line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SoftnessChoice {
+    /// A family.
+    Family(Family),
+    /// A file, not opened yet.
+    File(PathBuf),
+    /// One that comes with the program: the default of the task, or the one of this kind.
+    Learned(Option<String>),
+    /// What `choose` finds.
+    Auto,
+}
+
+/// What a softness that comes with the program is called, and with what its name begins.
+const LEARNED: &str = "learned";
+
+impl fmt::Display for SoftnessChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Family(family) => family.fmt(f),
+            Self::File(path) => path.display().fmt(f),
+            Self::Learned(None) => f.write_str(LEARNED),
+            Self::Learned(Some(kind)) => write!(f, "{LEARNED}-{kind}"),
+            Self::Auto => f.write_str("auto"),
+        }
+    }
+}
+
+impl FromStr for SoftnessChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(family) = text.parse() {
+            return Ok(Self::Family(family));
+        }
+        if text.to_ascii_lowercase().ends_with(".json") {
+            return Ok(Self::File(text.into()));
+        }
+        match text.strip_prefix(LEARNED).map(|kind| (kind, kind.strip_prefix('-'))) {
+            Some(("", _)) => return Ok(Self::Learned(None)),
+            Some((_, Some(kind))) => return Ok(Self::Learned(Some(kind.to_owned()))),
+            _ => {}
+        }
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let families = Family::ALL.map(Family::name).join(", ");
+        Err(format!("expected learned, auto, a file that ends in .json, or one of {families}"))
+    }
+}
+
+impl MethodArgs {
+    /// A method as one word of a command line names it: a softness, and behind it flags of its own.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with it, in one line.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        #[derive(Parser)]
+        #[command(no_binary_name = true, disable_help_flag = true)]
+        struct Line {
+            #[command(flatten)]
+            method: MethodArgs,
+        }
+        // The name of a file may hold spaces.
+        let words: Vec<&str> = match text.parse::<SoftnessChoice>() {
+            Ok(SoftnessChoice::File(_)) => vec![text],
+            _ => text.split_whitespace().collect(),
+        };
+        let line = Line::try_parse_from(["--softness"].into_iter().chain(words));
+        let mut method = line.map_err(|error| found(&error))?.method;
+        method.reconcile()?;
+        Ok(method)
+    }
+
+    /// This method beside a first one: its scales are its own or the task's, never those of the first, whose scale may mean another
+    /// width; its learning rate, resolution and tolerance are its own or those of the first.
+    #[must_use]
+    pub fn beside(self, first: &Self) -> Self {
+        Self {
+            learning_rate: self.learning_rate.or(first.learning_rate),
+            resolution: self.resolution.or(first.resolution),
+            tolerance: self.tolerance.or(first.tolerance),
+            ..self
+        }
+    }
+
+    /// Fills in what one flag says about another.
+    ///
+    /// # Errors
+    ///
+    /// If two contradict each other.
+    pub(crate) fn reconcile(&mut self) -> Result<(), String> {
+        match (self.schedule, self.scale_end) {
+            (Some(Schedule::Static), Some(_)) => {
+                Err("--scale-end needs --schedule decay, but --schedule static was given".into())
+            }
+            (None, Some(_)) => {
+                self.schedule = Some(Schedule::Decay);
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The schedule that is asked for: a scale without one stays as it is.
+    pub(crate) fn asked_schedule(&self) -> Option<Schedule> {
+        self.schedule.or(self.scale.map(|_| Schedule::Static))
+    }
+
+    /// Whether it says of scales what a file says itself.
+    pub(crate) fn is_scaled(&self) -> bool {
+        self.scale.is_some() || self.scale_end.is_some() || self.squared
+    }
+
+    /// Whether it says nothing of the softness.
+    pub(crate) fn is_silent(&self) -> bool {
+        let moved = self.schedule.is_some() || self.surrogate_scale.is_some();
+        self.softness.is_none() && !moved && self.init.is_none() && !self.is_scaled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_method_has_its_own_scales_and_shares_the_rest() {
+        let first = MethodArgs::parse("exp --scale 0.1 --surrogate-scale 1 --learning-rate 0.3");
+        let first = first.unwrap();
+        let second = MethodArgs::parse("gauss").unwrap().beside(&first);
+        assert_eq!(second.softness, Some(SoftnessChoice::Family(Family::Gauss)));
+        assert_eq!((second.scale, second.surrogate_scale), (None, None));
+        assert_eq!(second.learning_rate, Some(0.3));
+        let second = MethodArgs::parse("mlp --scale-end 1e-3 --learning-rate 2").unwrap();
+        let second = second.beside(&first);
+        assert_eq!((second.scale_end, second.learning_rate), (Some(1e-3), Some(2.0)));
+        assert_eq!(second.schedule, Some(Schedule::Decay));
+    }
+
+    #[test]
+    fn a_method_that_makes_no_sense_is_refused_in_a_line() {
+        assert!(MethodArgs::parse("my softness.json").is_ok());
+        let wrong = ["", "sofft", "gauss --scale 0", "gauss --steps 3", "gauss exp"];
+        for wrong in wrong.into_iter().chain(["gauss --schedule static --scale-end 1e-3"]) {
+            let message = MethodArgs::parse(wrong).err().unwrap_or_else(|| panic!("{wrong}"));
+            assert_eq!(message.lines().count(), 1, "{message}");
+        }
+    }
+
+    #[test]
+    fn every_family_is_a_softness_and_is_read_as_it_is_written() {
+        let others = ["learned", "learned-mlp", "auto", "a/b.json"];
+        for name in Family::ALL.map(Family::name).into_iter().chain(others) {
+            assert_eq!(name.parse::<SoftnessChoice>().unwrap().to_string(), name);
+        }
+        let message = "learn".parse::<SoftnessChoice>().unwrap_err();
+        assert!(message.contains("gumbel_min"), "{message}");
+    }
+}

@@ -1,0 +1,32 @@
+//! The command line of a task: `solve`, `evaluate`, `search`, `choose` and `learn`.
+//!
+//! A program is a type that implements [`Task`] and a `main` of one call of [`main()`]. [`MethodArgs`] are the flags of a method; together
+//! with a task they make a [`TaskExperiment`], which is what `softrast-lab` runs, keeps and compares.
+
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
+compile_error!("a program needs a backend: turn on one of the features ndarray, flex and wgpu");
+
+mod commands;
+mod diagnostics;
+mod experiment;
+mod flags;
+mod learned_charts;
+mod method;
+mod paper;
+mod presets;
+mod program;
+mod task;
+
+/// Images come and go by the thousand, each too large for the system's allocator to keep: it maps their pages anew every time, which
+/// costs a seventh of a step. Every program of a task has this crate, and no library.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+pub use experiment::{Purpose, TaskExperiment, backend};
+pub use flags::{Common, Init, MethodArgs, Schedule, SoftnessChoice, Variant, usual_args};
+use method::learned_name;
+pub use method::{Scales, learned_kind, method_colour};
+pub use paper::{InOurUnits, Paper};
+pub use presets::Preset;
+pub use program::{execute, main};
+pub use task::{Description, Detail, EdgeChoice, Ended, Measures, NoArgs, OwnAxis, Task, theta_of};

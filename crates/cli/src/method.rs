@@ -1,0 +1,289 @@
+//! From flags to a [`Method`].
+
+use softrast_inverse::{Method, distilled_mlp, mlp_like};
+use softrast_lab::Error;
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness, Surrogate};
+
+use crate::{Init, MethodArgs, Preset, Schedule, SoftnessChoice};
+
+/// Scales of a task that neither the command line nor a [`Preset`] names, as widths in NDC.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    /// How the scale moves if neither a schedule nor a scale is given.
+    pub schedule: Schedule,
+    /// First and last scale of a decay.
+    pub decay: [f64; 2],
+    /// Scale of a static softness.
+    pub fixed: f64,
+}
+
+impl MethodArgs {
+    /// The method that the flags ask for on a task. Where they say nothing of the softness, something that `solves` takes what comes
+    /// with the program for the task; else it is a logistic.
+    ///
+    /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are squared, so that they mean the same
+    /// widths.
+    ///
+    /// # Errors
+    ///
+    /// If a softness file cannot be used or none comes with the program that is asked for, or flags contradict each other.
+    pub fn method(&self, task: &str, scales: &Scales, solves: bool) -> anyhow::Result<Method> {
+        let (name, softness) = match &self.softness {
+            Some(SoftnessChoice::File(file)) => {
+                self.check_goes_with_file()?;
+                (file.display().to_string(), self.of_file(ScheduledSoftness::load(file)?, task)?)
+            }
+            choice => match learned_name(self, task, solves) {
+                Some(learned) => {
+                    self.check_goes_with_file()?;
+                    let called =
+                        choice.clone().unwrap_or(SoftnessChoice::Learned(None)).to_string();
+                    let found = ScheduledSoftness::learned(&learned).map_err(|_| {
+                        Error::usage(format!(
+                            "no softness {called} comes with the program for {task}: name a family or a file"
+                        ))
+                    })?;
+                    (called, self.of_file(found, task)?)
+                }
+                None => self.of_family(task, scales)?,
+            },
+        };
+        let (resolution, tolerance) = (self.resolution.unwrap_or_default(), self.tolerance);
+        Ok(Method { name, softness, resolution, tolerance })
+    }
+
+    /// That no flag says what a softness file says.
+    fn check_goes_with_file(&self) -> anyhow::Result<()> {
+        let moved = self.schedule == Some(Schedule::Decay);
+        let begun = self.init == Some(Init::Uniform);
+        if self.is_scaled() || moved || self.surrogate_scale.is_some() || begun {
+            return Err(Error::usage(
+                "a softness file holds its own parameters: leave out --scale, --scale-end, --squared, --surrogate-scale, --init \
+                 uniform and --schedule decay, or name a family",
+            ));
+        }
+        Ok(())
+    }
+
+    /// A softness of a file, with the learning rate if that suits the task.
+    fn of_file(&self, file: ScheduledSoftness, task: &str) -> anyhow::Result<ScheduledSoftness> {
+        let suits = file.task.as_ref().is_none_or(|learned_on| learned_on == task);
+        let mut softness =
+            ScheduledSoftness { learning_rate: file.learning_rate.filter(|_| suits), ..file };
+        if self.init == Some(Init::Fitted) {
+            (softness.softness, softness.phi) = network_like(softness.softness, &softness.phi)?;
+            if let Some(Surrogate { softness, phi }) = &mut softness.surrogate {
+                (*softness, *phi) = network_like(*softness, phi)?;
+            }
+        }
+        Ok(softness)
+    }
+
+    /// A family, and its name.
+    fn of_family(
+        &self,
+        task: &str,
+        scales: &Scales,
+    ) -> anyhow::Result<(String, ScheduledSoftness)> {
+        let family = match self.softness {
+            Some(SoftnessChoice::Family(family)) => family,
+            _ => Family::Logistic,
+        };
+        if self.init.is_some() && family != Family::Mlp {
+            return Err(Error::usage(
+                "--init is about the weights of --softness mlp: leave it out",
+            ));
+        }
+        let fitted = self.init == Some(Init::Fitted);
+        let like = if fitted { Family::Logistic } else { family };
+        // Found together, so taken whole or not at all.
+        let preset = Preset::of(task, like.name(), self.asked_schedule(), scales.schedule);
+        let preset = preset.filter(|_| !self.is_scaled());
+        let [first, last] = self.scales(&preset.map_or(*scales, |preset| scales.with(preset)));
+        let edge = EdgeSoftness { family, squared: self.squared };
+        let mut softness = match first == last {
+            true => ScheduledSoftness::constant(edge, first),
+            false => ScheduledSoftness::decay(edge, first, last),
+        };
+        if fitted {
+            let weights = distilled_mlp();
+            let factor = if first == last { first } else { 1.0 };
+            softness.phi = edge.with_scale_values(&weights, factor);
+        }
+        softness.learning_rate = preset.and_then(|preset| preset.learning_rate);
+        match self.surrogate_scale {
+            None => Ok((family.name().to_owned(), softness)),
+            Some(scale) => {
+                Ok((format!("{family} with surrogate"), softness.with_surrogate_scale(scale)))
+            }
+        }
+    }
+
+    /// First and last scale.
+    fn scales(&self, usual: &Scales) -> [f64; 2] {
+        let unit = |scale: f64| if self.squared { scale * scale } else { scale };
+        match self.asked_schedule().unwrap_or(usual.schedule) {
+            Schedule::Static => [self.scale.unwrap_or(unit(usual.fixed)); 2],
+            Schedule::Decay => {
+                let [first, last] = usual.decay.map(unit);
+                let first = self.scale.unwrap_or(first.max(self.scale_end.unwrap_or(0.0)));
+                [first, self.scale_end.unwrap_or(last.min(first))]
+            }
+        }
+    }
+}
+
+/// Colour of a method in every chart; told apart also by those who see no red. Methods that have none share one dark colour.
+pub fn method_colour(name: &str) -> [u8; 3] {
+    match name.split([' ', '.']).next().unwrap_or_default() {
+        "learned-mlp" => [170, 20, 60],
+        "learned-surrogate" => [110, 80, 190],
+        "logistic" => [31, 96, 168],
+        "gauss" => [86, 180, 233],
+        "exp" => [0, 140, 100],
+        "gamma" => [204, 121, 167],
+        "mlp" => [196, 84, 24],
+        _ => [40, 40, 40],
+    }
+}
+
+impl Scales {
+    /// With the schedule and the scale of a preset.
+    fn with(self, preset: &Preset) -> Self {
+        match preset.scale_end {
+            None => Self { schedule: Schedule::Static, fixed: preset.scale, ..self },
+            Some(end) => Self { schedule: Schedule::Decay, decay: [preset.scale, end], ..self },
+        }
+    }
+}
+
+/// The name of what flags mean among what comes with the program, whether it is there or not: they say so, or they say nothing and
+/// there is one for the task.
+pub(crate) fn learned_name(method: &MethodArgs, task: &str, solves: bool) -> Option<String> {
+    match &method.softness {
+        Some(SoftnessChoice::Learned(None)) => Some(task.to_owned()),
+        Some(SoftnessChoice::Learned(Some(kind))) => Some(learned_kind(task, kind)),
+        Some(_) => None,
+        None => {
+            let there = || ScheduledSoftness::learned(task).is_ok();
+            (solves && method.is_silent() && there()).then(|| task.to_owned())
+        }
+    }
+}
+
+/// The name of what `learned-KIND` means on a task: that of this kind for the task, or else what was learned on the task of that name.
+pub fn learned_kind(task: &str, kind: &str) -> String {
+    let (own, there) =
+        (format!("{task}-{kind}"), |name: &str| ScheduledSoftness::learned(name).is_ok());
+    if !there(&own) && there(kind) { kind.to_owned() } else { own }
+}
+
+/// A network, and its weights, in the place of a softness.
+fn network_like(softness: EdgeSoftness, phi: &[f64]) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
+    let scale = softness.scale(phi);
+    let network = EdgeSoftness { family: Family::Mlp, ..softness };
+    let plain = EdgeSoftness { squared: false, ..softness };
+    let weights = mlp_like(plain, &softness.with_scale_values(phi, scale.recip()));
+    let weights = weights.ok_or_else(|| {
+        Error::usage(
+            "--init fitted: a network treats both sides of an edge alike and cannot be like this softness, which does not",
+        )
+    })?;
+    Ok((network, network.with_scale_values(&weights, scale)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCALES: Scales = Scales { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
+
+    fn method(line: &str) -> anyhow::Result<Method> {
+        let args = MethodArgs::parse(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+        args.method("none", &SCALES, true)
+    }
+
+    /// First, middle and last scale of the method that a line gives.
+    fn assert_scales(line: &str, expected: [f64; 3]) {
+        let softness = method(line).unwrap().softness;
+        for (part, expected) in [0.0, 0.5, 1.0].into_iter().zip(expected) {
+            let found = softness.scale_at(part, 64);
+            assert!((found / expected - 1.0).abs() < 1e-6, "{line}: {found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn a_decay_is_a_straight_line_in_the_logarithm() {
+        assert_scales("gauss --schedule decay --scale 0.1 --scale-end 0.001", [0.1, 0.01, 0.001]);
+        let middle = (0.03f64 * 0.002).sqrt();
+        assert_scales("exp", [0.03, middle, 0.002]);
+        assert_scales("exp --squared", [0.03, middle, 0.002].map(|scale| scale * scale));
+    }
+
+    #[test]
+    fn a_scale_alone_stays_as_it_is_and_a_decay_never_widens() {
+        assert_scales("exp --scale 0.1", [0.1; 3]);
+        assert_scales("exp --schedule static", [0.002; 3]);
+        assert_scales("exp --schedule decay --scale 0.001", [0.001; 3]);
+        assert_scales("exp --schedule decay --scale-end 0.1", [0.1; 3]);
+    }
+
+    #[test]
+    fn what_comes_with_the_program_is_used_where_nothing_is_said_and_something_is_solved() {
+        let silent = MethodArgs::default();
+        let name =
+            |args: &MethodArgs, task, solves| args.method(task, &SCALES, solves).unwrap().name;
+        assert_eq!(name(&silent, "pose", true), "learned");
+        assert_eq!(name(&silent, "pose", false), "logistic");
+        assert_eq!(name(&silent, "none", true), "logistic");
+        let scaled = MethodArgs { scale: Some(0.1), ..silent };
+        assert_eq!(name(&scaled, "pose", true), "logistic");
+        let names = [("pose", "mlp"), ("pose", "shape3d"), ("pose", "shape3d-mlp"), ("pose", "x")];
+        let names = names.map(|(task, kind)| learned_kind(task, kind));
+        assert_eq!(names, ["pose-mlp", "shape3d", "shape3d-mlp", "pose-x"]);
+    }
+
+    #[test]
+    fn a_learning_rate_goes_with_its_task() {
+        let learned = MethodArgs::parse("learned-pose").unwrap();
+        let rate = |task| learned.method(task, &SCALES, true).unwrap().softness.learning_rate;
+        assert!(rate("pose").is_some() && rate("shape3d").is_none());
+    }
+
+    #[test]
+    fn a_surrogate_is_the_same_family_and_keeps_its_ratio() {
+        let method = method("exp --scale 0.1 --scale-end 0.001 --surrogate-scale 0.3").unwrap();
+        assert_eq!(method.name, "exp with surrogate");
+        for (part, scale) in [(0.0, 0.3), (1.0, 0.003)] {
+            let Surrogate { softness, phi } = method.softness.surrogate_at(part, 64).unwrap();
+            assert_eq!(softness.family, Family::Exp);
+            assert!((softness.scale(&phi) / scale - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_fitted_mlp_has_the_scale_of_the_logistic_of_the_same_flags() {
+        for line in ["--scale 0.05", "--schedule decay", "--schedule static"] {
+            let width = |softness: &str| {
+                let softness = method(&format!("{softness} {line}")).unwrap().softness;
+                softness.width_at(0.3, 64)
+            };
+            let ratio = width("mlp --init fitted") / width("logistic");
+            assert!((ratio - 1.0).abs() < 0.04, "{line}: {ratio}");
+        }
+        assert!(method("gauss --init fitted").is_err());
+    }
+
+    #[test]
+    fn a_learned_softness_that_is_not_there_or_not_alone_is_refused() {
+        for (line, part) in [
+            ("learned", "no softness learned comes with the program for"),
+            ("learned-x", "no softness learned-x comes"),
+            ("learned-pose --scale 0.1", "holds its own parameters"),
+        ] {
+            let error = method(line).unwrap_err();
+            assert!(matches!(error.downcast_ref(), Some(Error::Usage(_))));
+            assert!(error.to_string().contains(part), "{error}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+use std::{collections::BTreeMap, sync::LazyLock};
+
+use serde::Deserialize;
+
+use crate::Schedule;
+
+/// What `search` found best for a softness family on a task's original variant, on training seeds; in OCCLUSION, where most settings solve
+/// the original without an error, on the transfer.
+///
+/// All of them stand in `presets.json` beside this file, with the command that made each: for every task and family a static setting, a
+/// decay, or both.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Preset {
+    /// Scale, at first if it decays, in NDC.
+    pub scale: f64,
+    /// Scale at the last step of a decay; none for a static one.
+    pub scale_end: Option<f64>,
+    /// Learning rate in the original variant; none leaves the task's own.
+    pub learning_rate: Option<f64>,
+    /// Width of the soft depth, where the task has one.
+    pub depth_scale: Option<f64>,
+    /// Mean over the training seeds of the error that the search went by.
+    pub error: f64,
+    /// The flags of the search.
+    pub command: String,
+}
+
+/// The settings of a family in a task.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Found {
+    #[serde(rename = "static")]
+    fixed: Option<Preset>,
+    decay: Option<Preset>,
+}
+
+type Tasks = BTreeMap<String, BTreeMap<String, Found>>;
+
+static TASKS: LazyLock<Tasks> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("presets.json"))
+        .expect("presets.json is part of the program and tested")
+});
+
+impl Preset {
+    /// The setting of a family in a task under the schedule that is asked for; else under the better of the two, or under the `usual`
+    /// one of the task as long as not both were searched for. None where nothing was.
+    pub fn of(
+        task: &str,
+        family: &str,
+        asked: Option<Schedule>,
+        usual: Schedule,
+    ) -> Option<&'static Self> {
+        let Found { fixed, decay } = TASKS.get(task)?.get(family)?;
+        if let (None, Some(fixed), Some(decay)) = (asked, fixed, decay) {
+            return Some(if fixed.error <= decay.error { fixed } else { decay });
+        }
+        match asked.unwrap_or(usual) {
+            Schedule::Static => fixed.as_ref(),
+            Schedule::Decay => decay.as_ref(),
+        }
+    }
+
+    /// Whether the scale moves.
+    pub fn schedule(&self) -> Schedule {
+        if self.scale_end.is_some() { Schedule::Decay } else { Schedule::Static }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_is_whole_and_its_numbers_are_positive() {
+        let families = TASKS.iter().flat_map(|(task, found)| found.iter().map(move |f| (task, f)));
+        for (task, (family, Found { fixed, decay })) in families {
+            assert!(fixed.iter().all(|found| found.scale_end.is_none()), "{task} {family}");
+            assert!(decay.iter().all(|f| f.scale_end.is_some_and(|end| end < f.scale)), "{task}");
+            for found in fixed.iter().chain(decay) {
+                let Preset { scale, scale_end, learning_rate, depth_scale, .. } = found;
+                let numbers = [Some(*scale), *scale_end, *learning_rate, *depth_scale];
+                assert!(numbers.into_iter().flatten().all(|x| x > 0.0), "{task} {family}");
+                let schedule = found.schedule();
+                for usual in [Schedule::Static, Schedule::Decay] {
+                    let asked = Preset::of(task, family, Some(schedule), usual);
+                    assert_eq!(asked, Some(found));
+                }
+                let better = Preset::of(task, family, None, schedule).unwrap();
+                assert!(better.error <= found.error, "{task} {family}");
+            }
+        }
+        assert_eq!(Preset::of("teapot", "logistic", None, Schedule::Static), None);
+    }
+}

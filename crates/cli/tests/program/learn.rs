@@ -1,0 +1,131 @@
+//! Learning that is gone on from, also from files that somebody has damaged.
+
+use std::{fs, path::Path, sync::LazyLock};
+
+use proptest::{prelude::*, sample::Index};
+use serde_json::{Value, json};
+use softrast_lab::Failure;
+use softrast_meta::Checkpoint;
+
+use crate::{
+    disc::Disc,
+    line::{json as of_text, run_in, solved, timeless},
+};
+
+const LEARN: &str =
+    "learn --outer 3 --inner 3 --batch 2 --validation-runs 1 --size 8 --estimator es";
+
+/// The checkpoint, the steps and the result of a run.
+static WHOLE: LazyLock<(String, String, Value)> = LazyLock::new(|| {
+    let (out, json) = solved::<Disc>(LEARN);
+    let text = |name: &str| fs::read_to_string(out.path().join(name)).unwrap();
+    (text("learn.checkpoint.json"), text("learn.jsonl"), timeless(json))
+});
+
+fn resumed(checkpoint: &[u8], steps: &[u8]) -> Result<Value, Failure> {
+    let out = tempfile::tempdir().unwrap();
+    let file = |name: &str| out.path().join(name);
+    fs::write(file("learn.checkpoint.json"), checkpoint).unwrap();
+    fs::write(file("learn.jsonl"), steps).unwrap();
+    let (stdout, ended) = run_in::<Disc>(out.path(), &format!("{LEARN} --resume"));
+    ended.map(|()| timeless(of_text(&stdout)))
+}
+
+fn assert_one_line(failure: &Failure, file: &str) {
+    assert_eq!(failure.code, 1, "{failure}");
+    assert_eq!(failure.to_string().lines().count(), 1, "{failure}");
+    assert!(failure.message.contains(file), "{failure}");
+}
+
+/// Bytes changed, left out, put in, doubled, and the end cut off.
+fn damaged(text: &str, changes: &[(Index, u8, u8)]) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    for (at, byte, kind) in changes {
+        if bytes.is_empty() {
+            break;
+        }
+        let k = at.index(bytes.len());
+        match kind {
+            0 => bytes[k] = *byte,
+            1 => bytes.truncate(k),
+            2 => drop(bytes.remove(k)),
+            3 => bytes.insert(k, *byte),
+            _ => bytes.extend_from_within(k..),
+        }
+    }
+    bytes
+}
+
+fn changes() -> impl Strategy<Value = Vec<(Index, u8, u8)>> {
+    prop::collection::vec((any::<Index>(), any::<u8>(), 0..5_u8), 1..5)
+}
+
+/// All places in a value that can be replaced.
+fn places(value: &Value, at: &str, all: &mut Vec<String>) {
+    match value {
+        Value::Object(map) => {
+            map.iter().for_each(|(key, value)| places(value, &format!("{at}/{key}"), all));
+        }
+        Value::Array(list) => {
+            list.iter().enumerate().for_each(|(k, value)| places(value, &format!("{at}/{k}"), all));
+        }
+        _ => {}
+    }
+    all.push(at.to_owned());
+}
+
+#[test]
+fn a_finished_run_is_gone_on_from_without_a_step() {
+    let (checkpoint, steps, expected) = &*WHOLE;
+    let again = resumed(checkpoint.as_bytes(), steps.as_bytes()).unwrap();
+    assert_eq!(again["best"], expected["best"]);
+    assert!(Path::new(expected["files"][0].as_str().unwrap()).ends_with("softness.json"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    #[test]
+    fn a_damaged_checkpoint_is_one_line(changes in changes()) {
+        let (checkpoint, steps, expected) = &*WHOLE;
+        match resumed(&damaged(checkpoint, &changes), steps.as_bytes()) {
+            Ok(json) => prop_assert_eq!(&json["best"], &expected["best"]),
+            Err(failure) => assert_one_line(&failure, "learn.checkpoint.json"),
+        }
+    }
+
+    /// What is not whole is left out; what cannot be steps is one line.
+    #[test]
+    fn damaged_steps_are_one_line_or_an_intact_rest(changes in changes()) {
+        let (checkpoint, steps, expected) = &*WHOLE;
+        match resumed(checkpoint.as_bytes(), &damaged(steps, &changes)) {
+            Ok(json) => prop_assert_eq!(&json["best"], &expected["best"]),
+            Err(failure) => assert_one_line(&failure, "learn.jsonl"),
+        }
+    }
+
+    /// Another value at some place, and a checksum that fits.
+    #[test]
+    fn a_checkpoint_with_other_values_is_one_line_or_something_to_go_on_from(
+        place in any::<Index>(),
+        other in prop::sample::select(vec![
+            json!(null), json!(true), json!(-1), json!(0), json!(2), json!(1_000_000_000_u64), json!(0.5), json!(-1e300), json!("x"),
+            json!([]), json!([0.5]), json!([0.1, 0.2, 0.3]), json!([[0.5]]), json!([[], []]), json!({}),
+        ]),
+    ) {
+        let (checkpoint, steps, _) = &*WHOLE;
+        let mut file: Value = serde_json::from_str(checkpoint).unwrap();
+        let mut all = Vec::new();
+        places(&file["checkpoint"], "/checkpoint", &mut all);
+        *file.pointer_mut(&all[place.index(all.len())]).unwrap() = other;
+        let text = match serde_json::from_value::<Checkpoint>(file["checkpoint"].clone()) {
+            Ok(checkpoint) => checkpoint.text().unwrap(),
+            Err(_) => file.to_string(),
+        };
+        if let Err(failure) = resumed(text.as_bytes(), steps.as_bytes()) {
+            // A softness may also be one that breaks down, which is told without a file.
+            prop_assert_eq!(failure.code, 1, "{}", failure);
+            prop_assert_eq!(failure.to_string().lines().count(), 1, "{}", failure);
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! A softness that adapts inside every run, against one that stays and the learned one.
+//!
+//! ```text
+//! cargo run --release -p compare --example alternating              # as many seeds as in docs/results.md
+//! cargo run --release -p compare --example alternating -- --quick   # two seeds of tiny instances, to out/alternating.md
+//! ```
+//!
+//! The strongest baseline without learning: φ goes down the inner loss along with the scene, from the searched static softness, at a
+//! rate that is chosen on training seeds of the original variant. Judged by the hard image where a run ends, on the seeds from 0 on.
+//! Writes `docs/learning.md`.
+
+mod common;
+
+use clap::Parser;
+use common::{Study, constant, setup};
+use occlusion::Occlusion;
+use pose::Pose;
+use shape2d::Shape2d;
+use shape3d::Shape3d;
+use softrast_cli::{Common, Init, MethodArgs, SoftnessChoice, Task, Variant, usual_args};
+use softrast_inverse::{Instances, LearnConfig, OuterLoss, SIGMA};
+use softrast_lab::{machine, mean, paired, report::Table};
+use softrast_meta::{MetaGradient, TaskDistribution, vector};
+use softrast_raster::HostBackend as B;
+use softrast_softness::Family;
+
+/// Rates of the Adam that moves φ.
+const RATES: [f64; 4] = [0.001, 0.01, 0.03, 0.1];
+/// Training seeds that rates are chosen on, at most.
+const TRAINING: u64 = 6;
+
+fn main() -> anyhow::Result<()> {
+    let study = Study::parse();
+    let head = ["task", "softness", "seeds", "stays", "adapts, at its rate", "adapts less stays"];
+    let mut table = Table::new(head.into_iter().chain(["`learned`", "adapts less `learned`"]));
+    rows::<Pose>(&mut table, 48, &study)?;
+    rows::<Occlusion>(&mut table, 50, &study)?;
+    rows::<Shape3d>(&mut table, 12, &study)?;
+    rows::<Shape2d>(&mut table, 20, &study)?;
+    study.page("learning.md", &format!("On {}.\n{}", machine(), table.markdown()))
+}
+
+/// Adds the rows of a task: for each softness that adapts, both variants.
+fn rows<T: Task>(table: &mut Table, seeds: u64, study: &Study) -> anyhow::Result<()> {
+    let seeds = if study.quick { 2 } else { seeds };
+    let of = |variant, method: &MethodArgs| -> anyhow::Result<Instances<T, B>> {
+        let (size, steps) = (study.quick.then_some(32), study.quick.then_some(10));
+        let common = Common { variant, size, steps, ..Common::default() };
+        let (task, method, solve) = setup::<T>(&usual_args(), &common, method)?;
+        // Nothing is learned: of the estimators it is the one that a hard image and a surrogate go with.
+        let estimator = Some(MetaGradient::EvolutionStrategy { sigma: SIGMA, pairs: 1 });
+        let outer_loss = Some(OuterLoss::Hard);
+        let config = LearnConfig { estimator, outer_loss, ..LearnConfig::default() };
+        Instances::new(task, &method, &solve, &config)
+    };
+    let softness = Some(SoftnessChoice::Learned(None));
+    let learned = MethodArgs { softness, ..MethodArgs::default() };
+    let learned = |variant| Ok(stays(&of(variant, &learned)?, seeds));
+    let learned: Vec<Vec<f64>> =
+        Variant::ALL.into_iter().map(learned).collect::<anyhow::Result<_>>()?;
+    let network = MethodArgs { init: Some(Init::Fitted), ..constant(Family::Mlp) };
+    for (name, method) in [
+        ("logistic", constant(Family::Logistic)),
+        ("gauss", constant(Family::Gauss)),
+        ("network, fitted", network),
+    ] {
+        let original = of(Variant::Original, &method)?;
+        let first = LearnConfig::default().seed;
+        let training = first..first + TRAINING.min(seeds);
+        let tried = RATES.map(|rate| (rate, mean(&adapts(&original, training.clone(), rate))));
+        println!("{} {name}: {tried:?}", T::NAME);
+        let finite = tried.into_iter().filter(|(_, loss)| loss.is_finite());
+        let Some((rate, _)) = finite.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+        for (variant, learned) in Variant::ALL.into_iter().zip(&learned) {
+            let start = of(variant, &method)?;
+            let (stays, adapts) = (stays(&start, seeds), adapts(&start, 0..seeds, rate));
+            let row = [
+                format!("{}, {}", T::NAME, variant.name()),
+                name.to_owned(),
+                seeds.to_string(),
+                short(mean(&stays)),
+                format!("{}, {rate}", short(mean(&adapts))),
+                less(&adapts, &stays),
+                short(mean(learned)),
+                less(&adapts, learned),
+            ];
+            println!("  {}", row.join(" | "));
+            table.push(row);
+        }
+    }
+    Ok(())
+}
+
+/// Hard errors where runs end whose softness stays, by seed.
+fn stays<T: Task>(instances: &Instances<T, B>, seeds: u64) -> Vec<f64> {
+    let phi = vector::<B>(&instances.start());
+    (0..seeds).map(|seed| instances.loss(seed, &phi)).collect()
+}
+
+/// The same where it goes down the inner loss at this rate.
+fn adapts<T: Task>(
+    instances: &Instances<T, B>,
+    seeds: impl Iterator<Item = u64>,
+    learning_rate: f64,
+) -> Vec<f64> {
+    let phi = vector::<B>(&instances.start());
+    let along = MetaGradient::AlternatingDescent { learning_rate };
+    seeds.map(|seed| along.estimate_on(instances, seed, &phi).loss).collect()
+}
+
+fn short(x: f64) -> String {
+    if x.abs() < 0.01 { format!("{x:.5}") } else { format!("{x:.3}") }
+}
+
+/// The mean difference, seed by seed, and its interval: in bold where that leaves out 0.
+fn less(a: &[f64], b: &[f64]) -> String {
+    let (mean, [low, high]) = paired(a, b);
+    let text = format!("{} ({} to {})", short(mean), short(low), short(high));
+    if low > 0.0 || high < 0.0 { format!("**{text}**") } else { text }
+}

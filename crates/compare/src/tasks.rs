@@ -1,0 +1,102 @@
+use std::marker::PhantomData;
+
+use serde_json::{Map, Value};
+use softrast_cli::{Common, MethodArgs, Paper, Purpose, Task, TaskExperiment};
+use softrast_inverse::{Method, SolveConfig};
+use softrast_lab::Experiment;
+
+/// The tasks that are compared, in the order of the tables.
+macro_rules! tasks {
+    ($($task:ty),* $(,)?) => {
+        /// All tasks.
+        pub static TASKS: &[&dyn AnyTask] = &[$(&Of::<$task>(PhantomData)),*];
+    };
+}
+
+tasks! {
+    shape2d::Shape2d,
+    shape3d::Shape3d,
+    pose::Pose,
+    occlusion::Occlusion,
+}
+
+/// A task, whichever it is.
+pub trait AnyTask: Sync {
+    /// Name of its program.
+    fn name(&self) -> &'static str;
+
+    /// Name in the paper.
+    fn title(&self) -> &'static str;
+
+    /// Whether edges move: only then can its images be drawn on fewer pixels and less exactly, and has a surrogate a use.
+    fn moves_edges(&self) -> bool;
+
+    /// What the paper says of it.
+    fn paper(&self) -> &'static Paper;
+
+    /// The task with the method that flags ask for, and all else as it is by default.
+    ///
+    /// # Errors
+    ///
+    /// If flags contradict each other or a file cannot be used.
+    fn entry(&self, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry>;
+}
+
+/// A task with a method, ready to be evaluated.
+pub struct Entry {
+    /// What is run.
+    pub experiment: Box<dyn Experiment>,
+    /// The method.
+    pub method: Method,
+    /// Size, steps and learning rate.
+    pub solve: SolveConfig,
+    /// Every choice behind the numbers.
+    pub settings: Map<String, Value>,
+    /// Faces of the scene.
+    pub faces: usize,
+}
+
+struct Of<T>(PhantomData<fn() -> T>);
+
+impl<T: Task> AnyTask for Of<T> {
+    fn name(&self) -> &'static str {
+        T::NAME
+    }
+
+    fn title(&self) -> &'static str {
+        T::TITLE
+    }
+
+    fn moves_edges(&self) -> bool {
+        T::MOVES_EDGES
+    }
+
+    fn paper(&self) -> &'static Paper {
+        T::paper()
+    }
+
+    fn entry(&self, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        let args = softrast_cli::usual_args::<T::Args>();
+        let experiment = TaskExperiment::<T>::new(&args, common, method, Purpose::Evaluating)?;
+        Ok(Entry {
+            method: experiment.method.clone(),
+            solve: experiment.solve,
+            settings: experiment.settings(),
+            faces: experiment.description.faces,
+            experiment: Box::new(experiment),
+        })
+    }
+}
+
+/// The task with this name.
+///
+/// # Errors
+///
+/// If there is none.
+pub fn task(name: &str) -> anyhow::Result<&'static dyn AnyTask> {
+    let found = TASKS.iter().copied().find(|task| task.name() == name);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = TASKS.iter().map(|task| task.name()).collect();
+        anyhow::anyhow!("there is no task {name:?}: expected {} or all", known.join(", "))
+    })
+}

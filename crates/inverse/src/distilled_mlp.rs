@@ -1,0 +1,115 @@
+use std::sync::LazyLock;
+
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, backend::Backend},
+};
+use softrast_meta::{Adam, Optimizer, numbers, tensor};
+use softrast_raster::HostBackend;
+use softrast_softness::{EdgeSoftness, Family, Softness, families::Mlp, initial_mlp};
+
+/// The fit reaches so many scales from the edge, and so large a logit. That is far above the 14.1 which an MLP
+/// needs far outside, so that many faces are not seen there: see [`initial_mlp`].
+const REACH: f64 = 24.0;
+/// Places on one side of the edge; the MLP is odd.
+const PLACES: usize = 48;
+/// How much denser places are at the edge than at the end, as the argument of a hyperbolic sine.
+const DENSER: f64 = 3.0;
+/// Steps of the fit, and first and last learning rate.
+const STEPS: usize = 3000;
+const RATES: [f64; 2] = [0.1, 3e-4];
+/// What is covered on the two sides of an edge may differ from 1 by so much.
+const SYMMETRIC: f64 = 1e-4;
+
+/// Weights `[56]` of an MLP softness that is a logistic of scale 1, to 3e-3.
+pub fn distilled_mlp() -> Vec<f64> {
+    static FITTED: LazyLock<Vec<f64>> = LazyLock::new(|| {
+        let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+        mlp_like(logistic, &logistic.default_phi(1.0)).unwrap_or_default()
+    });
+    FITTED.clone()
+}
+
+/// Weights `[56]` of an MLP softness that is like another one of scale 1; none if that treats the two sides of
+/// an edge differently, which an MLP cannot.
+///
+/// Found by least squares on the logit up to [`REACH`], always from the same random weights. The error of a place
+/// counts over one scale more than its distance: at the edge the logit decides the image, and far from it only has
+/// to be large.
+pub fn mlp_like(softness: EdgeSoftness, phi: &[f64]) -> Option<Vec<f64>> {
+    type A = Autodiff<HostBackend>;
+    let place = |k: usize| {
+        let share = (k + 1) as f64 / PLACES as f64;
+        REACH * (DENSER * share).sinh() / DENSER.sinh()
+    };
+    let places: Vec<f64> = (0..PLACES).map(place).collect();
+    let counts = places.iter().map(|x| 1.0 / (1.0 + x)).collect();
+    let (places, counts) = (tensor::<A, 1>(places, [PLACES]), tensor::<A, 1>(counts, [PLACES]));
+    let phi = tensor::<A, 1>(phi.to_vec(), [phi.len()]);
+    let inside = softness.value(phi.clone(), places.clone());
+    let both = inside + softness.value(phi.clone(), places.clone().neg());
+    if numbers(both.inner()).into_iter().any(|sum| (sum - 1.0).abs() > SYMMETRIC) {
+        return None;
+    }
+    let aim = logit(&softness, &phi, places.clone()).clamp_max(REACH);
+    let start = initial_mlp(0, 1.0);
+    let mut theta = tensor::<HostBackend, 1>(start.clone(), [start.len()]);
+    let mut state = Adam::new(RATES[0]).init(&theta);
+    for step in 0..STEPS {
+        let part = step as f64 / STEPS as f64;
+        let adam = Adam::new(RATES[0] * (RATES[1] / RATES[0]).powf(part));
+        let leaf = Tensor::<A, 1>::from_inner(theta.clone()).require_grad();
+        let off = (logit(&Mlp, &leaf, places.clone()) - aim.clone()) * counts.clone();
+        let grads = (off.clone() * off).mean().backward();
+        let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
+        (theta, state) = adam.step(theta, grad, state);
+    }
+    Some(numbers(theta))
+}
+
+/// The argument of the sigmoid: `-ln(1 - s)` is its softplus, and it is odd where s is symmetric.
+fn logit<B: Backend>(
+    softness: &impl Softness,
+    phi: &Tensor<B, 1>,
+    x: Tensor<B, 1>,
+) -> Tensor<B, 1> {
+    softness.optical_depth(phi.clone(), x.clone()) - softness.optical_depth(phi.clone(), x.neg())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distilled_mlp_has_the_logit_of_a_logistic_and_stays_large_beyond() {
+        let phi = distilled_mlp();
+        let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
+        let at = |x: f64| numbers(logit(&Mlp, &phi, tensor(vec![x], [1])))[0];
+        for x in [0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 24.0] {
+            assert!((at(x) / x - 1.0).abs() < 0.04, "at {x}: {}", at(x));
+        }
+        assert!(at(100.0) > 20.0, "far: {}", at(100.0));
+    }
+    #[test]
+    fn a_symmetric_softness_has_an_mlp_like_it_and_another_has_none() {
+        let like = |family| {
+            let softness = EdgeSoftness { family, squared: false };
+            let phi = softness.default_phi(1.0);
+            (softness, phi.clone(), mlp_like(softness, &phi))
+        };
+        let (gauss, phi, mlp) = like(Family::Gauss);
+        let mlp = mlp.unwrap();
+        let values = |softness: &dyn Fn(Tensor<HostBackend, 1>) -> Tensor<HostBackend, 1>| {
+            let places = (-60..=60).map(|k| 0.1 * f64::from(k)).collect();
+            numbers(softness(tensor(places, [121])))
+        };
+        let phi = tensor(phi.clone(), [phi.len()]);
+        let mlp = tensor(mlp.clone(), [mlp.len()]);
+        let pairs = values(&|x| gauss.value(phi.clone(), x))
+            .into_iter()
+            .zip(values(&|x| Mlp.value(mlp.clone(), x)));
+        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-2, "{off}");
+        assert!(like(Family::Exp).2.is_none());
+    }
+}

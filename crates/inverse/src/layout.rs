@@ -1,0 +1,196 @@
+use burn::tensor::Tensor;
+use softrast_meta::{tensor, vector};
+use softrast_raster::RasterBackend;
+use softrast_softness::{EdgeSoftness, ScaleSchedule, ScheduledSoftness, Softness, Surrogate};
+
+use crate::{Input, LearnConfig};
+
+/// Least share of a scale that stands above the floor where a learned schedule starts.
+const ABOVE_FLOOR: f64 = 0.05;
+/// Pixels that a learned scale stays above, and knots of a schedule that is learned, unless somebody says otherwise.
+const FLOOR_PX: f64 = 0.03;
+const KNOTS: usize = 3;
+
+/// What the entries of a vector mean that stands for a softness, and so can be learned.
+///
+/// First come the knots of the schedule, if the scale moves or is learned apart. Then the parameters of the softness, at scale 1 and
+/// without the logarithm of the scale where there is a schedule, which replaces it. Then those of the surrogate, whole, as it keeps a
+/// ratio to the schedule that is its own. Last come parameters of the problem's own.
+#[derive(Clone, Debug)]
+pub struct PhiLayout {
+    /// Parameters to start from, and what has none.
+    start: ScheduledSoftness,
+    own: Vec<f64>,
+    steps: usize,
+    size: usize,
+}
+
+impl PhiLayout {
+    /// Of a softness as it is, with `own` parameters of the problem, on runs of `steps` steps and images of `size` × `size` pixels.
+    pub fn new(start: ScheduledSoftness, own: Vec<f64>, steps: usize, size: usize) -> Self {
+        Self { start, own, steps, size }
+    }
+
+    /// Of a softness as it is learned: a scale that stays is part of the parameters, or apart from them if `config` says so; one that
+    /// moves is a schedule with a floor.
+    pub fn learned(
+        start: &ScheduledSoftness,
+        own: Vec<f64>,
+        steps: usize,
+        size: usize,
+        config: &LearnConfig,
+    ) -> Self {
+        let (phi, surrogate) = (start.phi_at(0.0, size), start.surrogate_at(0.0, size));
+        if start.is_constant() && config.input == Input::Ndc {
+            let start = ScheduledSoftness { phi, surrogate, schedule: None, ..start.clone() };
+            return Self::new(start, own, steps, size);
+        }
+        let kept = start.schedule.as_ref().filter(|kept| {
+            kept.floor_px > 0.0
+                && kept.knots.len() > 1
+                && config.knots.is_none()
+                && config.floor_px.is_none()
+        });
+        if kept.is_some() {
+            return Self::new(start.clone(), own, steps, size);
+        }
+        let floor_px = config.floor_px.unwrap_or(FLOOR_PX);
+        let mut schedule = ScaleSchedule { knots: Vec::new(), floor_px };
+        let floor = schedule.floor(start.softness, size);
+        let knots = if start.is_constant() { 1 } else { config.knots.unwrap_or(KNOTS) };
+        let last = knots.max(2) - 1;
+        let knot = |k: usize| {
+            let step = (steps.saturating_sub(1) * k).div_ceil(last);
+            let scale = start.scale_at(ScaleSchedule::part(step, steps), size);
+            (scale - floor).max(ABOVE_FLOOR * scale).ln()
+        };
+        schedule.knots = (0..knots).map(knot).collect();
+        let start = ScheduledSoftness { schedule: Some(schedule), ..at_unit_scale(start) };
+        Self::new(start, own, steps, size)
+    }
+
+    /// The vector that learning starts from.
+    pub fn start(&self) -> Vec<f64> {
+        let knots = self.start.schedule.iter().flat_map(|schedule| &schedule.knots);
+        let surrogate = self.start.surrogate.iter().flat_map(|surrogate| &surrogate.phi);
+        let phi = &self.start.phi[self.replaced()..];
+        knots.chain(phi).chain(surrogate).chain(&self.own).copied().collect()
+    }
+
+    /// The softness that a vector stands for, and the parameters of the problem's own.
+    pub fn softness(&self, learned: &[f64]) -> (ScheduledSoftness, Vec<f64>) {
+        let (knots, rest) = learned.split_at(self.knots());
+        let (phi, rest) = rest.split_at(self.start.phi.len() - self.replaced());
+        let (surrogate, own) = rest.split_at(self.surrogate_len());
+        let mut softness = self.start.clone();
+        softness.phi[self.replaced()..].copy_from_slice(phi);
+        softness.schedule.iter_mut().for_each(|schedule| schedule.knots = knots.to_vec());
+        softness.surrogate.iter_mut().for_each(|found| found.phi = surrogate.to_vec());
+        (softness, own.to_vec())
+    }
+
+    /// Which softness of edges it is.
+    pub fn edge(&self) -> EdgeSoftness {
+        self.start.softness
+    }
+
+    /// Steps of a run.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Width and height of the image, in pixels.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Which part of a run is over after `step` steps.
+    pub fn part(&self, step: usize) -> f64 {
+        ScaleSchedule::part(step, self.steps)
+    }
+
+    /// Steps with the same number have the same softness.
+    pub fn stage(&self, step: usize) -> usize {
+        if self.knots() > 1 { step.min(self.steps) } else { 0 }
+    }
+
+    /// Parameters of the softness of edges at a step, `[P]`.
+    pub(crate) fn phi<B: RasterBackend>(
+        &self,
+        learned: &Tensor<B, 1>,
+        step: usize,
+    ) -> Tensor<B, 1> {
+        let (knots, replaced) = (self.knots(), self.replaced());
+        let learned_phi = self.start.phi.len() - replaced;
+        let Some(scale) = self.scale(learned, step) else {
+            return learned.clone().narrow(0, 0, learned_phi);
+        };
+        let mut parts = Vec::new();
+        if replaced > 0 {
+            parts.push(vector(&self.start.phi[..replaced]));
+        }
+        if learned_phi > 0 {
+            parts.push(learned.clone().narrow(0, knots, learned_phi));
+        }
+        self.edge().with_scale(Tensor::cat(parts, 0), scale)
+    }
+
+    /// The surrogate and its parameters at a step.
+    pub(crate) fn surrogate<B: RasterBackend>(
+        &self,
+        learned: &Tensor<B, 1>,
+        step: usize,
+    ) -> Option<(EdgeSoftness, Tensor<B, 1>)> {
+        let Surrogate { softness, phi } = self.start.surrogate.as_ref()?;
+        let before = self.knots() + self.start.phi.len() - self.replaced();
+        let own = learned.clone().narrow(0, before, phi.len());
+        let phi = match self.scale(learned, step) {
+            None => own,
+            Some(scale) => softness.with_scale(own, scale),
+        };
+        Some((*softness, phi))
+    }
+
+    /// Parameters of the problem's own, `[P]`, which may be none.
+    pub(crate) fn own<B: RasterBackend>(&self, learned: &Tensor<B, 1>) -> Tensor<B, 1> {
+        let [all] = learned.dims();
+        match self.own.len() {
+            0 => tensor(Vec::new(), [0]),
+            own => learned.clone().narrow(0, all - own, own),
+        }
+    }
+
+    /// The scale `[1]` at a step, if there is a schedule.
+    fn scale<B: RasterBackend>(&self, learned: &Tensor<B, 1>, step: usize) -> Option<Tensor<B, 1>> {
+        let schedule = self.start.schedule.as_ref()?;
+        let floor = schedule.floor(self.edge(), self.size);
+        let knots = learned.clone().narrow(0, 0, self.knots());
+        Some(ScaleSchedule::scale(&knots, floor, self.part(step)))
+    }
+
+    fn knots(&self) -> usize {
+        self.start.schedule.as_ref().map_or(0, |schedule| schedule.knots.len())
+    }
+
+    fn surrogate_len(&self) -> usize {
+        self.start.surrogate.as_ref().map_or(0, |surrogate| surrogate.phi.len())
+    }
+
+    /// Leading parameters that the schedule replaces.
+    fn replaced(&self) -> usize {
+        usize::from(self.start.schedule.is_some() && self.edge().logarithms() > 0)
+    }
+}
+
+/// The parameters at scale 1, for a schedule to go with.
+fn at_unit_scale(softness: &ScheduledSoftness) -> ScheduledSoftness {
+    let mut unit = softness.clone();
+    if softness.schedule.is_none() {
+        let factor = softness.softness.scale(&softness.phi).recip();
+        unit.phi = softness.softness.with_scale_values(&softness.phi, factor);
+        if let Some(Surrogate { softness, phi }) = &mut unit.surrogate {
+            *phi = softness.with_scale_values(phi, factor);
+        }
+    }
+    unit
+}

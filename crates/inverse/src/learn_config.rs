@@ -1,0 +1,179 @@
+use anyhow::{bail, ensure};
+use serde::Serialize;
+use softrast_meta::{MetaGradient, OuterSteps};
+
+/// How a softness is learned.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LearnConfig {
+    /// How the gradient is taken; none for an evolution strategy where the softness has up to ten parameters, and exactly, through all
+    /// steps, where it has more.
+    pub estimator: Option<MetaGradient>,
+    /// Updates of the softness.
+    pub updates: usize,
+    /// Instances for each update.
+    pub batch: usize,
+    /// Learning rate of the updates.
+    pub outer_rate: f64,
+    /// Whether the logarithm of the inner learning rate is learned too.
+    pub learn_rate: bool,
+    /// Seed of the first training instance.
+    pub seed: u64,
+    /// Seed of the first validation instance.
+    pub validation_seed: u64,
+    /// Instances to validate on.
+    pub validation_runs: usize,
+    /// Validations in vain before learning ends early.
+    pub patience: Option<usize>,
+    /// What judges a result; none for a sharp image, or for the inner loss where nothing else has a gradient.
+    pub outer_loss: Option<OuterLoss>,
+    /// After which steps it judges.
+    pub outer_steps: OuterSteps,
+    /// Knots of a scale that moves; none for three, or as many as the schedule of a file has.
+    pub knots: Option<usize>,
+    /// What a softness is a function of whose scale stays.
+    pub input: Input,
+    /// What a learned scale stays above, in pixels; none for 0.03, or that of a file.
+    pub floor_px: Option<f64>,
+}
+
+/// What judges the result of an inner loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OuterLoss {
+    /// A fixed narrow softness on a finer image, which no learned softness can flatter.
+    Fixed,
+    /// The same on the image's own pixels, on which the hard errors of tables are taken as well.
+    Pixels,
+    /// The hard image, by which tables compare. It has no gradient, so it goes with what takes none of it.
+    Hard,
+    /// The loss that was optimised, under the learned softness itself, as in the paper.
+    Own,
+}
+
+/// What a softness whose scale stays is a function of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Input {
+    /// The distance in NDC, as in the paper.
+    Ndc,
+    /// The distance over a learned width: a schedule of one knot.
+    Relative,
+}
+
+/// Seeds of training instances count from here, and those of validation from there; runs that are reported count from 0.
+const TRAINING_SEED: u64 = 1_000_000;
+/// A softness of no more parameters is learned by differences, which is as good there and cheaper (docs/estimators.md).
+const FEW: usize = 10;
+/// How far apart the runs of an evolution strategy are unless somebody says otherwise: entries of φ are mostly logarithms.
+pub const SIGMA: f64 = 0.2;
+
+impl Default for LearnConfig {
+    fn default() -> Self {
+        Self {
+            estimator: None,
+            updates: 50,
+            batch: 8,
+            outer_rate: 0.03,
+            learn_rate: false,
+            seed: TRAINING_SEED,
+            validation_seed: 2 * TRAINING_SEED,
+            validation_runs: 8,
+            patience: None,
+            outer_loss: None,
+            outer_steps: OuterSteps::Last,
+            knots: None,
+            input: Input::Ndc,
+            floor_px: None,
+        }
+    }
+}
+
+impl LearnConfig {
+    /// The same with what follows from the number of parameters.
+    ///
+    /// # Errors
+    ///
+    /// If choices contradict each other.
+    pub fn resolved(&self, parameters: usize, has_surrogate: bool) -> anyhow::Result<Self> {
+        let es = MetaGradient::EvolutionStrategy { sigma: SIGMA, pairs: 1 };
+        let usual = if parameters <= FEW { es } else { MetaGradient::default() };
+        let estimator = self.estimator.unwrap_or(usual);
+        let differences = matches!(estimator, MetaGradient::EvolutionStrategy { .. });
+        let along = matches!(estimator, MetaGradient::AlternatingDescent { .. });
+        let direct = estimator == MetaGradient::Direct;
+        let usual = if direct { OuterLoss::Own } else { OuterLoss::Fixed };
+        let outer_loss = self.outer_loss.unwrap_or(usual);
+        ensure!(
+            !direct || outer_loss == OuterLoss::Own,
+            "--estimator direct sees how the loss depends on the softness where a run ends, and a fixed outer loss does not: leave out --outer-loss"
+        );
+        ensure!(
+            outer_loss != OuterLoss::Hard || differences || along,
+            "a hard image has no gradient: --outer-loss hard needs --estimator es or alternating"
+        );
+        ensure!(
+            !self.learn_rate || differences,
+            "--learn-rate needs --estimator es: the others differentiate by the softness alone"
+        );
+        if has_surrogate && (along || outer_loss == OuterLoss::Own) {
+            bail!(
+                "a surrogate is learned with --estimator unrolled, truncated:K or es and --outer-loss fixed: all else follows the image's \
+                 own derivative, which it replaces"
+            );
+        }
+        Ok(Self { estimator: Some(estimator), outer_loss: Some(outer_loss), ..self.clone() })
+    }
+
+    /// Pixels a side of the image that judges, over those of the image that is optimised.
+    pub(crate) fn finer(&self) -> usize {
+        match self.outer_loss {
+            None | Some(OuterLoss::Fixed | OuterLoss::Own) => 2,
+            Some(OuterLoss::Pixels | OuterLoss::Hard) => 1,
+        }
+    }
+
+    /// Whether runs are differentiated.
+    pub(crate) fn differentiates(&self) -> bool {
+        !matches!(self.estimator, Some(MetaGradient::EvolutionStrategy { .. }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(estimator: MetaGradient) -> LearnConfig {
+        LearnConfig { estimator: Some(estimator), ..LearnConfig::default() }
+    }
+
+    #[test]
+    fn a_direct_gradient_needs_a_loss_that_sees_the_softness() {
+        let direct = with(MetaGradient::Direct);
+        assert_eq!(direct.resolved(1, false).unwrap().outer_loss, Some(OuterLoss::Own));
+        let fixed = LearnConfig { outer_loss: Some(OuterLoss::Fixed), ..direct };
+        assert!(fixed.resolved(1, false).is_err());
+    }
+
+    #[test]
+    fn few_parameters_are_learned_by_differences_and_many_by_derivatives() {
+        let estimator = |n| LearnConfig::default().resolved(n, false).unwrap().estimator.unwrap();
+        assert!(matches!(estimator(4), MetaGradient::EvolutionStrategy { .. }));
+        assert_eq!(estimator(56), MetaGradient::default());
+        let hard = LearnConfig { outer_loss: Some(OuterLoss::Hard), ..LearnConfig::default() };
+        let rate = LearnConfig { learn_rate: true, ..LearnConfig::default() };
+        for config in [hard, rate] {
+            assert!(config.resolved(4, false).is_ok() && config.resolved(56, false).is_err());
+        }
+    }
+
+    #[test]
+    fn a_surrogate_is_not_learned_by_what_needs_the_derivative_that_it_replaces() {
+        let along = MetaGradient::AlternatingDescent { learning_rate: 0.1 };
+        for config in [
+            with(along),
+            LearnConfig { outer_loss: Some(OuterLoss::Own), ..with(MetaGradient::default()) },
+        ] {
+            assert!(config.resolved(1, true).is_err() && config.resolved(1, false).is_ok());
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! Inverse rendering under a soft rasterizer: solving problems, and learning the softness on them.
+//!
+//! An [`InverseProblem`] says what is optimised, how its image is made and what is wrong with an image. A [`Method`] says how edges are
+//! softened over a run. [`minimize`] solves instances of a problem with a method and shows every step; [`learn()`] makes a better method,
+//! by the gradient of what whole runs end with. Both draw through a [`ScheduledRenderer`], which decides when support and knots are
+//! chosen anew.
+
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
+compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
+
+mod distilled_mlp;
+mod layout;
+mod learn;
+mod learn_config;
+mod method;
+mod minimize;
+mod problem;
+mod renderer;
+mod resolution;
+mod targets;
+
+pub use distilled_mlp::{distilled_mlp, mlp_like};
+pub use layout::PhiLayout;
+pub use learn::{Inner, Instances, Learning, Outer, learn};
+pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
+pub use method::Method;
+pub use minimize::{Iterate, minimize};
+pub use problem::{InverseProblem, SolveConfig};
+pub use renderer::{ScheduledRenderer, SoftnessAt};
+pub use resolution::Resolution;
+pub use targets::Targets;

@@ -1,0 +1,110 @@
+use std::{fmt, path::PathBuf};
+
+/// An error that programs treat apart from all others.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The command line asks for something that does not exist or make sense. Exit code 2.
+    #[error("{0}")]
+    Usage(String),
+    /// The folder for the results cannot be written.
+    #[error("cannot write to the folder {path:?}: {reason}; choose another with --out")]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        reason: std::io::Error,
+    },
+    /// The user asked the program to stop. Exit code 130.
+    #[error("stopped before anything was finished")]
+    Interrupted,
+}
+
+/// Exit code of an interrupted program: 128 and the number of SIGINT.
+pub const INTERRUPTED: u8 = 130;
+
+/// How a program that could not do its work ends: one line on stderr and an exit code.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// 2 where the command line is at fault, 130 where the user stopped the program, 1 for the rest.
+    pub code: u8,
+    /// The line behind `error: `, or behind `interrupted: `.
+    pub message: String,
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = if self.code == INTERRUPTED { "interrupted" } else { "error" };
+        write!(f, "{kind}: {}", self.message)
+    }
+}
+
+impl Error {
+    /// A mistake on the command line, as an error of any program.
+    pub fn usage(message: impl Into<String>) -> anyhow::Error {
+        Self::Usage(message.into()).into()
+    }
+}
+
+impl From<anyhow::Error> for Failure {
+    fn from(error: anyhow::Error) -> Self {
+        let message = one_line(&format!("{error:#}"));
+        match error.downcast_ref() {
+            Some(Error::Usage(_)) => {
+                Failure { code: 2, message: format!("{message} (see --help)") }
+            }
+            Some(Error::Interrupted) => Failure { code: INTERRUPTED, message },
+            _ => Failure { code: 1, message },
+        }
+    }
+}
+
+impl From<clap::Error> for Failure {
+    /// Keeps what clap found and its tip; its usage and the pointer to `--help` become a bracket.
+    fn from(error: clap::Error) -> Self {
+        Failure { code: 2, message: format!("{} (see --help)", found(&error)) }
+    }
+}
+
+/// What clap found wrong and its tip, in one line.
+pub fn found(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let found = text.split("\n\nUsage:").next().unwrap_or_default();
+    let found = found.split("\n\nFor more information").next().unwrap_or_default();
+    one_line(found.trim_start_matches("error: "))
+}
+
+/// Joins the paragraphs of a message by `; ` and the lines of a paragraph by a space.
+fn one_line(text: &str) -> String {
+    let paragraphs = text.split("\n\n").map(|paragraph| {
+        paragraph
+            .lines()
+            .map(str::trim)
+            .filter(|line| !line.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ")
+    });
+    paragraphs.filter(|paragraph| !paragraph.is_empty()).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn a_chain_of_causes_becomes_one_line() {
+        let error = Err::<(), _>(anyhow::anyhow!("no such\nfile")).context("cannot read a.obj");
+        let failure = Failure::from(error.unwrap_err());
+        assert_eq!(failure.to_string(), "error: cannot read a.obj: no such file");
+        assert_eq!(failure.code, 1);
+    }
+
+    #[test]
+    fn a_usage_error_keeps_its_code_below_a_context() {
+        let error = Err::<(), _>(Error::Usage("no range 1-2".into())).context("--range");
+        assert_eq!(
+            Failure::from(error.unwrap_err()),
+            Failure { code: 2, message: "--range: no range 1-2 (see --help)".into() }
+        );
+    }
+}

@@ -1,0 +1,176 @@
+use std::{collections::BTreeMap, time::Instant};
+
+use crate::{
+    Batch, Cache, Encoded, Error, Experiment, Progress, Run,
+    cache::{Finished, key},
+};
+
+/// Runs experiments, and recalls what an earlier call has finished.
+pub struct Runner {
+    /// How far the work is.
+    pub progress: Progress,
+    /// What is finished.
+    pub cache: Cache,
+}
+
+/// Finished runs of one experiment, in the order of the seeds.
+#[derive(Clone, Default)]
+pub struct Evaluation {
+    /// The runs.
+    pub runs: Vec<Run>,
+    /// Of the first, if they were asked for.
+    pub pictures: Option<Encoded>,
+    /// Wall time of the runs, with errors and pictures.
+    pub seconds: f64,
+}
+
+impl Evaluation {
+    /// Wall time of the steps of a run, mean over the runs.
+    pub fn seconds_per_run(&self) -> f64 {
+        self.runs.iter().map(Run::seconds).sum::<f64>() / self.runs.len().max(1) as f64
+    }
+}
+
+impl Runner {
+    /// One that shows and keeps nothing, for experiments that are run as a library.
+    pub fn hidden() -> Self {
+        Self { progress: Progress::hidden(), cache: Cache::in_memory() }
+    }
+
+    /// Runs all seeds with each of the experiments, and says whether the user cut that short.
+    ///
+    /// A batch goes through all experiments before the next begins, so that what is finished stays paired. With `pictures`, the first
+    /// seed brings them. `label` stands beside the progress bar.
+    ///
+    /// # Errors
+    ///
+    /// Those of the experiments and of the cache; [`Error::Interrupted`] if a single run was stopped.
+    pub fn evaluate(
+        &mut self,
+        experiments: &[&dyn Experiment],
+        seeds: &[u64],
+        pictures: bool,
+        label: Option<&str>,
+    ) -> anyhow::Result<(Vec<Evaluation>, bool)> {
+        let mut evaluations: Vec<_> = experiments.iter().map(|_| Evaluation::default()).collect();
+        let size = experiments.iter().map(|one| one.batch_size().max(1)).min().unwrap_or(1);
+        for (k, now) in seeds.chunks(size).enumerate() {
+            for (experiment, evaluation) in experiments.iter().zip(&mut evaluations) {
+                let (first, last) = (evaluation.runs.len() + 1, evaluation.runs.len() + now.len());
+                let mut prefix = match label {
+                    Some(label) => label.to_owned(),
+                    None => range(first, last, seeds.len()),
+                };
+                if experiments.len() > 1 {
+                    prefix = format!("{}, {prefix}", experiment.name());
+                }
+                match self.batch(*experiment, now, pictures && k == 0, prefix) {
+                    Ok(finished) => evaluation.extend(finished),
+                    Err(stopped) if was_interrupted(&stopped) && seeds.len() > 1 => {
+                        return Ok((evaluations, true));
+                    }
+                    Err(failed) => return Err(failed),
+                }
+            }
+        }
+        Ok((evaluations, false))
+    }
+
+    /// Whether the runs of all seeds are finished.
+    pub(crate) fn is_finished(&self, experiment: &dyn Experiment, seeds: &[u64]) -> bool {
+        let kept_as = key(&experiment.identity());
+        seeds.iter().all(|&seed| self.cache.get(&kept_as, seed, |_| true).is_some())
+    }
+
+    /// The runs of some seeds: from the cache, or made together.
+    fn batch(
+        &mut self,
+        experiment: &dyn Experiment,
+        seeds: &[u64],
+        pictures: bool,
+        label: String,
+    ) -> anyhow::Result<Vec<Finished>> {
+        let (kept_as, steps) = (key(&experiment.identity()), experiment.steps());
+        let metrics = experiment.metrics().len();
+        let mut finished = BTreeMap::new();
+        for &seed in seeds {
+            let needs_pictures = pictures && seed == seeds[0];
+            let suits = |found: &Finished| {
+                found.run.fits(seed, metrics, steps)
+                    && (found.pictures.is_some() || !needs_pictures)
+            };
+            finished.extend(self.cache.get(&kept_as, seed, suits).map(|found| (seed, found)));
+        }
+        self.progress.skip(finished.len(), steps);
+        let missing: Vec<u64> =
+            seeds.iter().copied().filter(|seed| !finished.contains_key(seed)).collect();
+        if !missing.is_empty() {
+            self.progress.begin(label, missing.len(), steps)?;
+            let pictures = pictures && missing[0] == seeds[0];
+            let made = run(experiment, &Batch { seeds: missing, pictures }, &mut self.progress)?;
+            self.progress.end();
+            for one in made {
+                self.cache.put(&kept_as, experiment.name(), &one)?;
+                finished.insert(one.run.seed, one);
+            }
+        }
+        Ok(seeds.iter().filter_map(|seed| finished.remove(seed)).collect())
+    }
+}
+
+impl Evaluation {
+    fn extend(&mut self, finished: Vec<Finished>) {
+        for Finished { run, seconds, pictures } in finished {
+            self.runs.push(run);
+            self.seconds += seconds;
+            self.pictures = self.pictures.take().or(pictures);
+        }
+    }
+}
+
+/// Runs one batch.
+fn run(
+    experiment: &dyn Experiment,
+    batch: &Batch,
+    progress: &mut Progress,
+) -> anyhow::Result<Vec<Finished>> {
+    let clock = Instant::now();
+    let mut runs = experiment.run(batch, progress)?;
+    assert!(
+        runs.iter().map(|run| run.seed).eq(batch.seeds.iter().copied()),
+        "an experiment must return one run per seed, in the order of the seeds"
+    );
+    let mut encoded = None;
+    for run in &mut runs {
+        run.keep_finite();
+        let (metrics, steps) = (experiment.metrics().len(), experiment.steps());
+        assert!(
+            run.fits(run.seed, metrics, steps),
+            "a run has a point per step and a value per metric"
+        );
+        if let Some(pictures) = run.pictures.take() {
+            encoded = Some(Encoded::new(&pictures)?);
+        }
+    }
+    let seconds = clock.elapsed().as_secs_f64() / runs.len() as f64;
+    let finished = runs.into_iter().map(|run| Finished { run, seconds, pictures: encoded.take() });
+    Ok(finished.collect())
+}
+
+/// Whether the user stopped the work.
+pub fn was_interrupted(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(Error::Interrupted))
+}
+
+/// `runs` seeds from the first on.
+pub fn seeds(first: u64, runs: usize) -> Vec<u64> {
+    (0..runs as u64).map(|k| first.wrapping_add(k)).collect()
+}
+
+fn range(first: usize, last: usize, all: usize) -> String {
+    match (first, last) {
+        (1, 1) if all == 1 => "solving".into(),
+        _ if first == last => format!("run {first} of {all}"),
+        _ => format!("runs {first}-{last} of {all}"),
+    }
+}

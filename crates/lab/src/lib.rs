@@ -1,0 +1,46 @@
+//! What serves every experiment that is run on seeds, whatever it is about.
+//!
+//! An [`Experiment`] is something that can be run on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same
+//! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. [`Runner::sweep`] tries a
+//! grid, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
+//! [`report::Report`] writes pages.
+//!
+//! Nothing here knows of rendering: it sees seeds, numbers and RGB images.
+
+mod cache;
+mod comparison;
+pub mod curves;
+mod error;
+mod evaluate;
+mod files;
+pub mod format;
+mod machine;
+mod metric;
+pub mod parse;
+mod picture;
+pub mod plot;
+pub mod program;
+mod progress;
+pub mod report;
+mod run;
+/// The cheapest of several answers that is as good as the best.
+pub mod select;
+mod statistics;
+mod summary;
+/// Grid search.
+pub mod sweep;
+mod ticks;
+
+pub use cache::Cache;
+pub use comparison::{Comparison, Difference, paired};
+pub use error::{Error, Failure, INTERRUPTED, found};
+pub use evaluate::{Evaluation, Runner, seeds, was_interrupted};
+pub use files::{OutputFolder, write_atomically};
+pub use machine::{machine, peak_rss_mib};
+pub use metric::{Metric, Role, place};
+pub use picture::{Encoded, contact_sheet, difference, png, rgb_from_gray, rgb_from_planes};
+pub use progress::{Progress, stop_on_ctrl_c};
+pub use run::{Batch, Experiment, Pictures, Point, Run, best_point};
+pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
+pub use summary::{ErrorSummary, Partial, Returned, Summary, headline, mean_interval};
+pub use sweep::check_held_out;

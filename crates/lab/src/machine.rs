@@ -1,0 +1,32 @@
+use std::{fs, thread::available_parallelism};
+
+/// Most memory this process has held so far, in MiB; `None` where the system does not say.
+///
+/// Read from `VmHWM` of `/proc/self/status`, so Linux only.
+pub fn peak_rss_mib() -> Option<f64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+/// How many cores of which processor there are, as far as the system tells.
+pub fn machine() -> String {
+    let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let mut names = cpuinfo.lines().filter_map(|line| line.strip_prefix("model name"));
+    let name = names.find_map(|name| name.split(": ").nth(1)).unwrap_or("an unknown processor");
+    let cores = available_parallelism().map_or(1, |cores| cores.get());
+    format!("{cores} cores of {name}")
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    #[test]
+    fn peak_memory_grows_by_what_is_touched() {
+        let before = super::peak_rss_mib().unwrap();
+        let touched = std::hint::black_box(vec![1_u8; 64 << 20]);
+        let after = super::peak_rss_mib().unwrap();
+        drop(touched);
+        assert!(after - before > 32.0, "{before} to {after} MiB");
+    }
+}

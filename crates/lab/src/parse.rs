@@ -1,0 +1,70 @@
+//! Parsers of flags, one for each kind of number.
+
+/// A positive, finite number.
+///
+/// # Errors
+///
+/// What was expected.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|&x: &f64| x > 0.0 && x.is_finite());
+    number.ok_or_else(|| "expected a positive number".into())
+}
+
+/// A number above 0 and below 1.
+///
+/// # Errors
+///
+/// What was expected.
+pub fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|&x: &f64| x > 0.0 && x < 1.0);
+    share.ok_or_else(|| "expected a number above 0 and below 1".into())
+}
+
+/// A whole number from `LOW` to `HIGH`.
+///
+/// # Errors
+///
+/// What was expected.
+pub fn whole<const LOW: usize, const HIGH: usize>(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|n| (LOW..=HIGH).contains(n));
+    number.ok_or_else(|| format!("expected a whole number from {LOW} to {HIGH}"))
+}
+
+/// A number of steps or runs: more than a million are a slip of the finger.
+///
+/// # Errors
+///
+/// What was expected.
+pub fn count(text: &str) -> Result<usize, String> {
+    whole::<1, 1_000_000>(text)
+}
+
+/// A seed.
+///
+/// # Errors
+///
+/// What was expected.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "expected a whole number from 0".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_out_of_range_and_words_are_refused() {
+        assert_eq!(
+            (positive("1e-3"), share("0.5"), count("7"), seed("0")),
+            (Ok(1e-3), Ok(0.5), Ok(7), Ok(0))
+        );
+        for wrong in ["0", "-1", "inf", "nan", "x", ""] {
+            assert!(
+                positive(wrong).is_err() && share(wrong).is_err() && count(wrong).is_err(),
+                "{wrong}"
+            );
+        }
+        assert!(share("1").is_err() && count("1000001").is_err() && seed("-1").is_err());
+        assert_eq!(whole::<2, 4>("5"), Err("expected a whole number from 2 to 4".into()));
+    }
+}

@@ -1,0 +1,243 @@
+use std::io;
+
+use anyhow::Context;
+use base64::{Engine, engine::general_purpose::STANDARD};
+use image::{
+    Delay, DynamicImage, Frame, Rgb, RgbImage,
+    codecs::gif::{GifEncoder, Repeat},
+    imageops,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::Pictures;
+
+const SEPARATOR: u32 = 2;
+const SEPARATOR_COLOUR: Rgb<u8> = Rgb([170; 3]);
+const WHITE: Rgb<u8> = Rgb([255; 3]);
+
+/// A gray image as RGB: `values` `[height * width]`, row by row from the top, 0 black to 1 white.
+///
+/// Values outside [0, 1] are clamped, NaN becomes black.
+///
+/// # Panics
+///
+/// If the number of values is not `width * height`.
+pub fn rgb_from_gray(values: &[f64], width: usize, height: usize) -> RgbImage {
+    assert_eq!(values.len(), width * height, "an image of {width} x {height} needs as many values");
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let value = values[y as usize * width + x as usize];
+        Rgb([level(value); 3])
+    })
+}
+
+/// A coloured image as RGB: `values` `[3 * height * width]`, first all of red, then green, then
+/// blue, each row by row from the top, 0 dark to 1 bright.
+///
+/// Values outside [0, 1] are clamped, NaN becomes dark.
+///
+/// # Panics
+///
+/// If the number of values is not `3 * width * height`.
+pub fn rgb_from_planes(values: &[f64], width: usize, height: usize) -> RgbImage {
+    let pixels = width * height;
+    assert_eq!(
+        values.len(),
+        3 * pixels,
+        "{width} x {height} pixels need three times as many values"
+    );
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let pixel = y as usize * width + x as usize;
+        Rgb([0, 1, 2].map(|channel| level(values[channel * pixels + pixel])))
+    })
+}
+
+/// The byte of a value in [0, 1].
+fn level(value: f64) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+/// Where two images of the same size differ, and in which direction.
+///
+/// White where they agree, red where the target is brighter, blue where the result is brighter;
+/// the deeper the colour, the larger the difference of the channel that differs most.
+///
+/// # Panics
+///
+/// If the sizes differ.
+pub fn difference(target: &RgbImage, result: &RgbImage) -> RgbImage {
+    assert_eq!(target.dimensions(), result.dimensions(), "a difference needs images of one size");
+    RgbImage::from_fn(target.width(), target.height(), |x, y| {
+        let channels = target.get_pixel(x, y).0.into_iter().zip(result.get_pixel(x, y).0);
+        let differences = channels.map(|(target, result)| i16::from(target) - i16::from(result));
+        let largest = differences.max_by_key(|d| d.abs()).unwrap_or(0);
+        let faded = 255 - largest.unsigned_abs() as u8;
+        if largest > 0 { Rgb([255, faded, faded]) } else { Rgb([faded, faded, 255]) }
+    })
+}
+
+/// Images side by side in rows of `columns`, with a thin gray line around each.
+///
+/// Cells have the size of the largest image; smaller ones sit at the top left of theirs, on white.
+///
+/// # Panics
+///
+/// If there is no image or no column.
+pub fn contact_sheet(images: &[RgbImage], columns: usize) -> RgbImage {
+    assert!(!images.is_empty() && columns > 0, "a contact sheet needs images and columns");
+    let columns = columns.min(images.len()) as u32;
+    let rows = (images.len() as u32).div_ceil(columns);
+    let width = images.iter().map(RgbImage::width).max().unwrap_or(0);
+    let height = images.iter().map(RgbImage::height).max().unwrap_or(0);
+    let (pitch_x, pitch_y) = (width + SEPARATOR, height + SEPARATOR);
+    let size = (columns * pitch_x + SEPARATOR, rows * pitch_y + SEPARATOR);
+    let mut sheet = RgbImage::from_fn(size.0, size.1, |x, y| {
+        let line = x % pitch_x < SEPARATOR || y % pitch_y < SEPARATOR;
+        if line { SEPARATOR_COLOUR } else { WHITE }
+    });
+    for (k, image) in images.iter().enumerate() {
+        let (column, row) = (k as u32 % columns, k as u32 / columns);
+        let (x, y) = (column * pitch_x + SEPARATOR, row * pitch_y + SEPARATOR);
+        imageops::replace(&mut sheet, image, x.into(), y.into());
+    }
+    sheet
+}
+
+/// Pictures of a run as files.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Encoded {
+    /// PNG: from left to right the target, the start, the result and the difference of target and result.
+    #[serde(with = "as_base64")]
+    pub before_after: Vec<u8>,
+    /// GIF: the target on the left, the run on the right.
+    #[serde(with = "as_base64")]
+    pub animation: Vec<u8>,
+}
+
+/// Small pictures are enlarged to at least these widths, in pixels: in the row of four, and in the animation.
+const WIDTHS: [u32; 2] = [256, 192];
+const FRAME_MS: u32 = 80;
+const LAST_FRAME_MS: u32 = 2000;
+/// Quality of the palette, 1 best to 30 fastest. Up to 256 colours are kept exactly in any case.
+const SPEED: i32 = 10;
+
+impl Encoded {
+    /// Encodes the pictures of a run.
+    ///
+    /// # Errors
+    ///
+    /// If an encoder fails.
+    pub fn new(pictures: &Pictures) -> anyhow::Result<Self> {
+        let Pictures { target, start, result, frames } = pictures;
+        let before_after = row(&[target, start, result, &difference(target, result)], WIDTHS[0]);
+        let animation = gif(target, frames).context("cannot encode an animation")?;
+        Ok(Self { before_after: png(&before_after)?, animation })
+    }
+}
+
+/// An image as a PNG file.
+///
+/// # Errors
+///
+/// If the encoder fails.
+pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
+    let mut png = io::Cursor::new(Vec::new());
+    image.write_to(&mut png, image::ImageFormat::Png).context("cannot encode a picture")?;
+    Ok(png.into_inner())
+}
+
+/// An endless GIF: the target on the left, the frames on the right.
+fn gif(target: &RgbImage, frames: &[RgbImage]) -> image::ImageResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = GifEncoder::new_with_speed(&mut bytes, SPEED);
+    encoder.set_repeat(Repeat::Infinite)?;
+    for (k, frame) in frames.iter().enumerate() {
+        let ms = if k + 1 == frames.len() { LAST_FRAME_MS } else { FRAME_MS };
+        let delay = Delay::from_numer_denom_ms(ms, 1);
+        let rgba = DynamicImage::from(row(&[target, frame], WIDTHS[1])).into_rgba8();
+        encoder.encode_frame(Frame::from_parts(rgba, 0, 0, delay))?;
+    }
+    drop(encoder);
+    Ok(bytes)
+}
+
+/// Images in one row; small ones enlarged so that their pixels show.
+fn row(images: &[&RgbImage], width_at_least: u32) -> RgbImage {
+    let cells: Vec<_> = images.iter().map(|image| enlarged(image, width_at_least)).collect();
+    contact_sheet(&cells, cells.len())
+}
+
+/// Repeats pixels, by the smallest whole factor that reaches the width.
+fn enlarged(image: &RgbImage, width_at_least: u32) -> RgbImage {
+    let factor = width_at_least.div_ceil(image.width().max(1)).max(1);
+    let size = (image.width() * factor, image.height() * factor);
+    imageops::resize(image, size.0, size.1, imageops::FilterType::Nearest)
+}
+
+mod as_base64 {
+    use serde::{Deserializer, Serializer, de::Error as _};
+
+    use super::{Deserialize, Engine, STANDARD};
+
+    pub(super) fn serialize<S: Serializer>(bytes: &[u8], to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&STANDARD.encode(bytes))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<u8>, D::Error> {
+        STANDARD.decode(String::deserialize(from)?).map_err(D::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(width: u32, height: u32, level: u8) -> RgbImage {
+        RgbImage::from_pixel(width, height, Rgb([level; 3]))
+    }
+
+    #[test]
+    fn gray_values_are_rounded_and_clamped() {
+        let image = rgb_from_gray(&[0.0, 0.5, 1.0, 7.0, -1.0, f64::NAN], 3, 2);
+        let levels: Vec<u8> = image.pixels().map(|p| p.0[0]).collect();
+        assert_eq!(levels, [0, 128, 255, 255, 0, 0]);
+    }
+
+    #[test]
+    fn planes_become_the_channels_of_each_pixel() {
+        let image = rgb_from_planes(&[1.0, 0.0, 0.5, 2.0, f64::NAN, 0.2], 2, 1);
+        let pixels: Vec<_> = image.pixels().map(|p| p.0).collect();
+        assert_eq!(pixels, [[255, 128, 0], [0, 255, 51]]);
+    }
+
+    #[test]
+    fn difference_is_white_red_or_blue() {
+        let pixel = |target, result| {
+            difference(&plain(1, 1, target), &plain(1, 1, result)).get_pixel(0, 0).0
+        };
+        assert_eq!(pixel(90, 90), [255; 3]);
+        assert_eq!(pixel(255, 0), [255, 0, 0]);
+        assert_eq!(pixel(0, 100), [155, 155, 255]);
+    }
+
+    #[test]
+    fn contact_sheet_has_lines_around_every_cell() {
+        let sheet = contact_sheet(&[plain(4, 3, 1), plain(4, 3, 2), plain(2, 2, 3)], 2);
+        assert_eq!(sheet.dimensions(), (2 * 4 + 3 * SEPARATOR, 2 * 3 + 3 * SEPARATOR));
+        let at = |x, y| sheet.get_pixel(x, y).0;
+        let second = (2 * SEPARATOR + 4, 2 * SEPARATOR + 3);
+        assert_eq!(at(SEPARATOR, SEPARATOR), [1; 3]);
+        assert_eq!(at(second.0, SEPARATOR), [2; 3]);
+        assert_eq!(at(SEPARATOR, second.1), [3; 3]);
+        assert_eq!(at(second.0, second.1), WHITE.0, "a cell without image");
+        assert_eq!(at(SEPARATOR + 2, second.1), WHITE.0, "beside a smaller image");
+        for line in [0, second.0 - 1, sheet.width() - 1] {
+            assert_eq!(at(line, SEPARATOR), SEPARATOR_COLOUR.0);
+        }
+    }
+
+    #[test]
+    fn a_row_enlarges_by_whole_factors() {
+        let row = row(&[&plain(3, 3, 0), &plain(3, 3, 0)], 10);
+        assert_eq!(row.dimensions(), (2 * 12 + 3 * SEPARATOR, 12 + 2 * SEPARATOR));
+    }
+}

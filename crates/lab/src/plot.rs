@@ -1,0 +1,289 @@
+//! A chart as SVG: lines with bands, dashes and dots over axes that may be logarithmic.
+
+use std::fmt::Write;
+
+use anyhow::anyhow;
+use plotters::{coord::Shift, prelude::*};
+
+use crate::ticks::Ticks;
+
+const WIDTH: u32 = 900;
+const HEIGHT: u32 = 380;
+/// Room for the names of the methods, right of the axes.
+const LEGEND: u32 = 230;
+const ROW: i32 = 19;
+const GRID: RGBColor = RGBColor(225, 228, 232);
+const LIGHT: RGBColor = RGBColor(243, 244, 246);
+const BEHIND: RGBColor = RGBColor(150, 150, 150);
+
+/// Colours of series that have none of their own; told apart also by those who see no red.
+const PALETTE: [[u8; 3]; 8] = [
+    [31, 96, 168],
+    [196, 84, 24],
+    [0, 140, 100],
+    [204, 121, 167],
+    [86, 180, 233],
+    [180, 140, 20],
+    [110, 80, 190],
+    [90, 90, 90],
+];
+
+/// One pair of axes and what is drawn over them.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// From left to right.
+    pub x: Axis,
+    /// Upwards.
+    pub y: Axis,
+    /// What is drawn; those that have a name stand in the legend.
+    pub series: Vec<Series>,
+    /// Points joined by a line under the others.
+    pub front: Vec<[f64; 2]>,
+    /// Whether a linear y axis begins at 0.
+    pub from_zero: bool,
+}
+
+/// Name with unit, and whether it is divided in decades.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Name with unit.
+    pub name: String,
+    /// Whether it is divided in decades; values must be positive then, others are left out.
+    pub logarithmic: bool,
+}
+
+/// A line or a mark.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Red, green and blue; black stands for a colour of its own among the series.
+    pub colour: [u8; 3],
+    /// Whether the line is dashed, or the mark open.
+    pub dashed: bool,
+    /// Drawn as a line; a single one as a mark.
+    pub points: Vec<[f64; 2]>,
+    /// What a single point looks like.
+    pub mark: Mark,
+    /// Lower and upper end at every point, or nothing.
+    pub band: Vec<[f64; 2]>,
+    /// Whether a ring around its dots marks it.
+    pub marked: bool,
+    /// Whether a box around its dots marks it.
+    pub boxed: bool,
+}
+
+/// What a single point is drawn as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mark {
+    /// A disc.
+    #[default]
+    Dot,
+    /// A triangle.
+    Triangle,
+    /// A cross.
+    Cross,
+    /// A square.
+    Square,
+}
+
+impl Axis {
+    /// One of even steps.
+    pub fn linear(name: &str) -> Self {
+        Self { name: name.to_owned(), logarithmic: false }
+    }
+
+    /// One of decades.
+    pub fn logarithmic(name: &str) -> Self {
+        Self { name: name.to_owned(), logarithmic: true }
+    }
+
+    fn place(&self, value: f64) -> f64 {
+        if self.logarithmic { value.log10() } else { value }
+    }
+
+    fn label(&self, place: f64) -> String {
+        let value = if self.logarithmic { 10f64.powf(place) } else { place };
+        match value.abs() {
+            0.0 => "0".into(),
+            1e-3..1e5 => {
+                let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
+                let text = format!("{value:.digits$}");
+                match text.contains('.') {
+                    true => text.trim_end_matches('0').trim_end_matches('.').into(),
+                    false => text,
+                }
+            }
+            _ => format!("{value:.0e}"),
+        }
+    }
+
+    /// Least and largest place with some room.
+    fn range(&self, values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+        let places = values.map(|value| self.place(value)).filter(|place| place.is_finite());
+        let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+            [low.min(place), high.max(place)]
+        });
+        if low > high {
+            return 0.0..1.0;
+        }
+        let room = (0.04 * (high - low)).max(1e-3 * high.abs()).max(1e-9);
+        low - room..high + room
+    }
+}
+
+impl Series {
+    /// Its mark around a place in pixels: filled where nothing moves, open where the scale does.
+    fn mark_at<DB: DrawingBackend>(&self, at: (i32, i32)) -> DynElement<'static, DB, (i32, i32)> {
+        let [r, g, b] = self.colour;
+        let colour = RGBColor(r, g, b);
+        let style = if self.dashed { colour.stroke_width(2) } else { colour.filled() };
+        match self.mark {
+            Mark::Dot => Circle::new(at, 5, style).into_dyn(),
+            Mark::Triangle => TriangleMarker::new(at, 6, style).into_dyn(),
+            Mark::Square => {
+                let corners = [(at.0 - 4, at.1 - 4), (at.0 + 4, at.1 + 4)];
+                Rectangle::new(corners, style).into_dyn()
+            }
+            Mark::Cross => Cross::new(at, 5, colour.stroke_width(2)).into_dyn(),
+        }
+    }
+}
+
+impl Plot {
+    /// Axes with nothing on them yet.
+    pub fn new(x: Axis, y: Axis) -> Self {
+        Self { x, y, series: Vec::new(), front: Vec::new(), from_zero: false }
+    }
+
+    /// The chart as SVG. Values that an axis cannot show are left out.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be drawn.
+    pub fn svg(&self) -> anyhow::Result<String> {
+        let mut text = String::new();
+        {
+            let mut coloured = self.clone();
+            for (series, colour) in coloured.series.iter_mut().zip(PALETTE.iter().cycle()) {
+                if series.colour == [0; 3] {
+                    series.colour = *colour;
+                }
+            }
+            let size = (WIDTH, self.height());
+            let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
+            let drawn = root.fill(&WHITE).and_then(|()| coloured.draw(&root));
+            drawn.and_then(|()| root.present()).map_err(|e| anyhow!("cannot draw a chart: {e}"))?;
+        }
+        Ok(text)
+    }
+
+    /// The points behind it, one a line.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("series,x,y,low,high\n");
+        for Series { name, points, band, .. } in &self.series {
+            for (k, [x, y]) in points.iter().enumerate() {
+                let ends = band.get(k).map(|[low, high]| format!("{low},{high}"));
+                // Writing to a string does not fail.
+                let _ = writeln!(text, "{name},{x},{y},{}", ends.unwrap_or(",".to_owned()));
+            }
+        }
+        text
+    }
+
+    fn draw<DB: DrawingBackend>(
+        &self,
+        root: &DrawingArea<DB, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let named = self.series.iter().any(|series| !series.name.is_empty());
+        let (panel, legend) = root.split_horizontally(WIDTH - if named { LEGEND } else { 0 });
+        let points = || self.series.iter().flat_map(|series| &series.points);
+        let bands = self.series.iter().flat_map(|series| series.band.iter().flatten());
+        let zero = (self.from_zero && !self.y.logarithmic).then_some(0.0);
+        let heights = points().map(|point| point[1]).chain(bands.copied()).chain(zero);
+        let (across, up) = (self.x.range(points().map(|point| point[0])), self.y.range(heights));
+        let [x, y] = [(&self.x, across, 7), (&self.y, up, 6)]
+            .map(|(axis, range, most)| Ticks::new(range.clone(), axis.logarithmic, most).on(range));
+        let mut chart = ChartBuilder::on(&panel)
+            .margin(14)
+            .x_label_area_size(46)
+            .y_label_area_size(78)
+            .build_cartesian_2d(x, y)?;
+        chart
+            .configure_mesh()
+            .x_desc(&self.x.name)
+            .y_desc(&self.y.name)
+            .x_label_formatter(&|place| self.x.label(*place))
+            .y_label_formatter(&|place| self.y.label(*place))
+            .label_style(("sans-serif", 14))
+            .axis_desc_style(("sans-serif", 15))
+            .bold_line_style(GRID)
+            .light_line_style(LIGHT)
+            .draw()?;
+        let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
+        let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        let front = self.front.iter().map(|point| place(*point)).filter(shown);
+        chart.draw_series(LineSeries::new(front, BEHIND.stroke_width(1)))?;
+        for series in &self.series {
+            let [r, g, b] = series.colour;
+            let colour = RGBColor(r, g, b);
+            let end = |k: usize| {
+                let pairs = series.points.iter().zip(&series.band);
+                pairs.map(move |(point, band)| place([point[0], band[k]])).filter(shown)
+            };
+            let band: Vec<_> = end(0).chain(end(1).collect::<Vec<_>>().into_iter().rev()).collect();
+            if band.len() > 2 {
+                chart.draw_series([Polygon::new(band, colour.mix(0.12))])?;
+            }
+            let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
+            if let [point] = points[..] {
+                let mark = EmptyElement::at(point) + series.mark_at((0, 0));
+                chart.draw_series([mark])?;
+                if series.marked {
+                    chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
+                }
+                if series.boxed {
+                    let corners = [(-14, -14), (14, 14)];
+                    let frame = Rectangle::new(corners, BLACK.stroke_width(1));
+                    chart.draw_series([EmptyElement::at(point) + frame])?;
+                }
+            } else if series.dashed {
+                let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
+                chart.draw_series(line)?;
+            } else {
+                chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
+            }
+        }
+        self.legend(&legend)
+    }
+
+    /// As much as the names of all methods need.
+    fn height(&self) -> u32 {
+        HEIGHT.max((ROW as u32) * (self.series.len() as u32 + 3))
+    }
+
+    fn legend<DB: DrawingBackend>(
+        &self,
+        area: &DrawingArea<DB, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let named = self.series.iter().filter(|series| !series.name.is_empty());
+        for (row, series) in named.enumerate() {
+            let [r, g, b] = series.colour;
+            let (colour, y) = (RGBColor(r, g, b), 26 + ROW * row as i32);
+            let style = colour.stroke_width(3);
+            // A dashed line as long as its name allows: two dashes.
+            let dashes = if series.dashed { vec![(0, 8), (13, 21)] } else { vec![(0, 21)] };
+            match series.points.len() {
+                1 => area.draw(&series.mark_at((10, y)))?,
+                _ => {
+                    for (from, to) in dashes {
+                        area.draw(&PathElement::new([(from, y), (to, y)], style))?;
+                    }
+                }
+            }
+            let text = ("sans-serif", 14).into_font().color(&BLACK);
+            area.draw(&Text::new(series.name.clone(), (28, y - 7), text))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,124 @@
+//! What every program does around its work: words in, one error line or results out.
+
+use std::{
+    ffi::OsString,
+    io::{self, Write},
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use clap::Parser;
+use serde_json::Value;
+
+use crate::{Failure, error::INTERRUPTED, progress::stop_on_ctrl_c};
+
+/// What a command has to say once its files are written.
+#[derive(Clone, Debug, Default)]
+pub struct Output {
+    /// For programs.
+    pub json: Value,
+    /// For people, line by line.
+    pub text: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// How far the work came if the user stopped it.
+    pub partial: Option<String>,
+}
+
+/// The whole `main` of a program: `execute` gets the words of the command line, the name of the program first, and a place for results.
+pub fn run_main(
+    execute: impl FnOnce(Vec<OsString>, &mut dyn Write) -> Result<(), Failure>,
+) -> ExitCode {
+    stop_on_ctrl_c();
+    match execute(std::env::args_os().collect(), &mut io::stdout().lock()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{failure}");
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+/// Parses a command line. If it asks for help, that is printed and there is nothing else to do: none.
+///
+/// # Errors
+///
+/// What is wrong with it, in one line.
+pub fn parse<P: Parser>(
+    command: clap::Command,
+    words: &[OsString],
+    stdout: &mut dyn Write,
+) -> Result<Option<P>, Failure> {
+    let parsed = command.try_get_matches_from(words).and_then(|found| P::from_arg_matches(&found));
+    match parsed {
+        Ok(line) => Ok(Some(line)),
+        Err(help) if !help.use_stderr() => {
+            let text = help.render().to_string();
+            writeln!(stdout, "{}", text.trim_end()).context(STDOUT)?;
+            Ok(None)
+        }
+        Err(wrong) => Err(wrong.into()),
+    }
+}
+
+impl Output {
+    /// Prints warnings to stderr and the rest to `stdout`; `again` is the command that goes on.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be written, or the work is not finished.
+    pub fn print(&self, as_json: bool, again: &str, stdout: &mut dyn Write) -> Result<(), Failure> {
+        /// More of them are in the results.
+        const SHOWN: usize = 3;
+        for warning in self.warnings.iter().take(SHOWN) {
+            eprintln!("warning: {warning}");
+        }
+        if self.warnings.len() > SHOWN {
+            eprintln!("warning: and {} more, listed in the results", self.warnings.len() - SHOWN);
+        }
+        let shown = if as_json { self.json.to_string() } else { self.text.join("\n") };
+        writeln!(stdout, "{shown}").context(STDOUT)?;
+        match &self.partial {
+            None => Ok(()),
+            Some(finished) => {
+                let message = format!("{finished}; go on with: {again} --resume");
+                Err(Failure { code: INTERRUPTED, message })
+            }
+        }
+    }
+}
+
+const STDOUT: &str = "cannot write to the standard output";
+
+/// The command line that gives the same results again from the beginning.
+pub fn repeated(package: &str, words: &[OsString]) -> String {
+    let words = words.iter().skip(1).filter(|word| *word != "--resume");
+    let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();
+    let quoted = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default();
+    format!("cargo run --release -p {package} -- {quoted}").trim_end_matches(" -- ").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_repeated_as_one_would_type_it() {
+        let words = ["pose", "evaluate", "--resume", "--mesh", "a b.obj", "--scale"];
+        let words = words.map(OsString::from);
+        let expected = "cargo run --release -p pose -- evaluate --mesh 'a b.obj' --scale";
+        assert_eq!(repeated("pose", &words), expected);
+        assert_eq!(repeated("pose", &words[..1]), "cargo run --release -p pose");
+    }
+
+    #[test]
+    fn an_unfinished_command_says_how_to_go_on() {
+        let mut stdout = Vec::new();
+        let output =
+            Output { partial: Some("1 of 2 runs are finished".into()), ..Output::default() };
+        let failure = output.print(true, "pose evaluate", &mut stdout).unwrap_err();
+        assert_eq!(failure.code, INTERRUPTED);
+        assert!(failure.message.ends_with("go on with: pose evaluate --resume"));
+        assert_eq!(stdout, b"null\n");
+    }
+}

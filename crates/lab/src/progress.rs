@@ -1,0 +1,163 @@
+use std::{
+    io::IsTerminal,
+    process,
+    sync::atomic::{AtomicBool, Ordering},
+    time::{Duration, Instant},
+};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::{Error, error::INTERRUPTED};
+
+/// Shows on stderr how far the work is, and stops it when the user asks for that.
+///
+/// On a terminal it is a bar with steps, loss and time left; elsewhere a line every ten seconds. Each
+/// step counts once for every run that makes it, so that batches of any size share one bar.
+pub struct Progress {
+    bar: ProgressBar,
+    lines: bool,
+    last_line: Instant,
+    stop: &'static AtomicBool,
+    /// Steps of all runs of earlier batches.
+    before: u64,
+    /// Runs and steps of this batch.
+    runs: usize,
+    steps: usize,
+    prefix: String,
+}
+
+/// Time between two lines where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// For work that nobody stops.
+static NEVER: AtomicBool = AtomicBool::new(false);
+/// Whether the user has asked the program to stop.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// Lets Ctrl-C stop the work after the step in progress; a second one ends the program at once.
+pub fn stop_on_ctrl_c() {
+    // Without a handler Ctrl-C ends the program at once, which loses no finished run either.
+    let _ = ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::SeqCst) {
+            process::exit(INTERRUPTED.into());
+        }
+        eprintln!("\nstopping after this step; Ctrl-C once more ends at once");
+    });
+}
+
+impl Progress {
+    /// Progress that nobody sees or stops, for what is run as a library.
+    pub fn hidden() -> Self {
+        Self::new(ProgressDrawTarget::hidden(), false, &NEVER)
+    }
+
+    /// Progress of a program, which ends on Ctrl-C; shown unless `quiet`.
+    pub fn of_program(quiet: bool) -> Self {
+        let on_terminal = std::io::stderr().is_terminal();
+        match (quiet, on_terminal) {
+            (false, true) => Self::new(ProgressDrawTarget::stderr(), false, &STOP),
+            (quiet, _) => Self::new(ProgressDrawTarget::hidden(), !quiet, &STOP),
+        }
+    }
+
+    fn new(target: ProgressDrawTarget, lines: bool, stop: &'static AtomicBool) -> Self {
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let template = "{prefix} [{bar:32}] step {pos}/{len}, {msg}, {eta} left";
+        let style = ProgressStyle::with_template(template).expect("the template is valid");
+        bar.set_style(style.progress_chars("=> "));
+        let last_line = Instant::now();
+        Self { bar, lines, last_line, stop, before: 0, runs: 1, steps: 0, prefix: String::new() }
+    }
+
+    /// Says how many steps all runs of all batches have together.
+    pub fn expect(&self, steps: usize) {
+        self.bar.set_length(steps as u64);
+    }
+
+    /// Starts a batch of `runs` that make `steps` each; `prefix` says which.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Interrupted`] if the user has asked the program to stop.
+    pub fn begin(&mut self, prefix: String, runs: usize, steps: usize) -> Result<(), Error> {
+        if self.stop.load(Ordering::SeqCst) {
+            return Err(Error::Interrupted);
+        }
+        (self.runs, self.steps) = (runs, steps);
+        self.bar.set_prefix(prefix.clone());
+        self.prefix = prefix;
+        Ok(())
+    }
+
+    /// Tells that `step` steps of this batch are done, and the loss they led to.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Interrupted`] when the work should stop here; pass it on.
+    pub fn step(&mut self, step: usize, loss: f64) -> anyhow::Result<()> {
+        let done = self.before + (step * self.runs) as u64;
+        self.bar.set_message(format!("loss {loss:.4e}"));
+        self.bar.set_position(done);
+        if self.lines && self.last_line.elapsed() >= LINE_EVERY {
+            self.last_line = Instant::now();
+            let steps = self.bar.length().unwrap_or(done);
+            let left = indicatif::HumanDuration(self.bar.eta());
+            eprintln!("{}: step {done}/{steps}, loss {loss:.4e}, {left} left", self.prefix);
+        }
+        // After the last step the batch is as good as finished, and would be lost.
+        if step < self.steps && self.stop.load(Ordering::SeqCst) {
+            return Err(Error::Interrupted.into());
+        }
+        Ok(())
+    }
+
+    /// Ends the batch that began last.
+    pub fn end(&mut self) {
+        self.before += (self.runs * self.steps) as u64;
+        self.bar.set_position(self.before);
+    }
+
+    /// Passes over steps that an earlier call of the program has made.
+    pub fn skip(&mut self, runs: usize, steps: usize) {
+        self.before += (runs * steps) as u64;
+        self.bar.set_position(self.before);
+        // They took no time now, so they say nothing about the time left.
+        self.bar.reset_eta();
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stopped_batch_ends_after_its_step_unless_that_was_its_last() {
+        let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
+        let mut progress = Progress::new(ProgressDrawTarget::hidden(), false, stop);
+        progress.begin("run".into(), 1, 3).unwrap();
+        progress.step(1, 0.5).unwrap();
+        stop.store(true, Ordering::SeqCst);
+        let stopped = progress.step(2, 0.5).unwrap_err();
+        assert!(matches!(stopped.downcast_ref(), Some(Error::Interrupted)));
+        progress.step(3, 0.5).unwrap();
+        progress.end();
+        assert!(matches!(progress.begin("run".into(), 1, 3), Err(Error::Interrupted)));
+    }
+
+    #[test]
+    fn batches_of_any_size_share_one_bar() {
+        let mut progress = Progress::hidden();
+        progress.expect(100);
+        progress.skip(2, 10);
+        progress.begin("runs".into(), 4, 10).unwrap();
+        progress.step(5, 0.5).unwrap();
+        assert_eq!(progress.bar.position(), 40);
+        progress.end();
+        assert_eq!((progress.bar.position(), progress.bar.length()), (60, Some(100)));
+    }
+}

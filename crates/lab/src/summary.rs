@@ -1,0 +1,330 @@
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::{
+    Comparison, Evaluation, Experiment, Metric, Role, Run, bootstrap_mean_interval,
+    format::{counted, short},
+    mean, median, peak_rss_mib, place,
+    report::{Report, Table},
+    wilson_interval,
+};
+
+/// Samples behind a confidence interval, and the seed that draws them.
+const RESAMPLES: usize = 10_000;
+const RESAMPLING_SEED: u64 = 0;
+
+/// 95 % interval of a mean, as all results have it.
+pub fn mean_interval(values: &[f64]) -> [f64; 2] {
+    bootstrap_mean_interval(values, RESAMPLES, RESAMPLING_SEED)
+}
+
+/// What the runs of one experiment came to.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// All errors, in the order of the metrics.
+    pub errors: Vec<ErrorSummary>,
+    /// The step that each run returns.
+    pub returned: Returned,
+    /// How many runs succeeded, of how many.
+    pub successes: [usize; 2],
+    /// First of the seeds.
+    pub seed: u64,
+    /// Whether there are intervals and values of each run.
+    pub many: bool,
+    /// Wall time of all runs, with errors and pictures, in seconds.
+    pub seconds: f64,
+    /// Wall time of a step of a run, median, and of all steps of a run, mean.
+    pub step_seconds: [f64; 2],
+    /// What the user should know, each line once.
+    pub warnings: Vec<String>,
+    /// Finished runs of how many, where the user stopped the program.
+    pub partial: Option<Partial>,
+    /// Another experiment on the same seeds.
+    pub against: Option<Comparison>,
+}
+
+/// One error over all runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ErrorSummary {
+    /// Which one.
+    #[serde(skip)]
+    pub metric: Metric,
+    /// Mean before the first step.
+    pub initial: f64,
+    /// Mean after the last step.
+    #[serde(rename = "final")]
+    pub last: f64,
+    /// Mean over the runs of the lowest over all steps.
+    pub best: f64,
+    /// 95 % interval of the mean of `last`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ci95: Option<[f64; 2]>,
+    /// `last` of every run, in the order of the seeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub per_run: Option<Vec<f64>>,
+}
+
+/// Which step of its runs a program returns: the one where the score is least.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Returned {
+    /// Name of the score.
+    pub by: &'static str,
+    /// Its value there, mean over the runs.
+    pub error: f64,
+    /// The step, median over the runs.
+    pub step: f64,
+    /// Steps of a run.
+    pub of: usize,
+}
+
+/// How much of the work is finished.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Partial {
+    /// So much.
+    pub finished: usize,
+    /// Of so much.
+    pub asked: usize,
+}
+
+impl Partial {
+    /// How much that is, in words.
+    pub fn of(self, what: &str) -> String {
+        format!("{} of {} {what} are finished", self.finished, self.asked)
+    }
+}
+
+impl Summary {
+    /// Of a finished or partial evaluation; `many` asks for intervals.
+    ///
+    /// # Errors
+    ///
+    /// If a run has no finite number even before its first step.
+    pub fn new(
+        experiment: &dyn Experiment,
+        evaluation: &Evaluation,
+        many: bool,
+    ) -> anyhow::Result<Self> {
+        let (runs, metrics) = (&evaluation.runs, experiment.metrics());
+        if let Some(run) = runs.iter().find(|run| run.curve.is_empty()) {
+            anyhow::bail!(
+                "seed {}: the errors are not finite numbers before the first step: check that the target is in view and that the \
+                 scale is not extreme",
+                run.seed
+            );
+        }
+        let errors = errors_of(metrics);
+        let steps: Vec<f64> = runs.iter().flat_map(|run| run.step_seconds.clone()).collect();
+        let mut warnings: Vec<String> = Vec::new();
+        for warning in runs.iter().flat_map(|run| &run.warnings) {
+            if !warnings.contains(warning) {
+                warnings.push(warning.clone());
+            }
+        }
+        Ok(Self {
+            errors: errors.map(|(k, metric)| ErrorSummary::new(metric, k, runs, many)).collect(),
+            returned: Returned::new(experiment, runs),
+            successes: [runs.iter().filter(|run| run.success).count(), runs.len()],
+            seed: runs.first().map_or(0, |run| run.seed),
+            many,
+            seconds: evaluation.seconds,
+            step_seconds: [median(&steps), evaluation.seconds_per_run()],
+            warnings,
+            partial: None,
+            against: None,
+        })
+    }
+
+    /// Share of runs that succeeded.
+    pub fn success_rate(&self) -> f64 {
+        self.successes[0] as f64 / self.successes[1].max(1) as f64
+    }
+
+    /// As it stands in `result.json`, behind what `about` says of what was run.
+    pub fn json(&self, about: &Map<String, Value>, success_means: &str) -> Map<String, Value> {
+        let mut json = about.clone();
+        json.insert("seed".into(), self.seed.into());
+        json.insert("runs".into(), self.successes[1].into());
+        json.extend(nested(self.errors.iter().map(|error| (&error.metric, json!(error)))));
+        json.insert("returned".into(), json!(self.returned));
+        json.insert("success_rate".into(), self.success_rate().into());
+        if self.many {
+            let [successes, runs] = self.successes;
+            json.insert("success_ci95".into(), json!(wilson_interval(successes, runs)));
+        }
+        json.insert("success_means".into(), success_means.into());
+        let [step_median, per_run] = self.step_seconds;
+        let seconds =
+            json!({ "total": self.seconds, "step_median": step_median, "per_run": per_run });
+        json.insert("seconds".into(), seconds);
+        json.insert("peak_memory_mib".into(), json!(peak_rss_mib()));
+        json.insert("warnings".into(), json!(self.warnings));
+        json.extend(self.partial.map(|partial| ("partial".into(), json!(partial))));
+        json.extend(self.against.as_ref().map(|against| ("against".into(), against.json())));
+        json
+    }
+
+    /// How often the runs succeeded and what that means.
+    pub fn success(&self, means: &str) -> String {
+        let [successes, runs] = self.successes;
+        let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
+        match (self.many, successes) {
+            (false, 0) => format!("no (asked: {means})"),
+            (false, _) => format!("yes (asked: {means})"),
+            (true, _) => format!(
+                "{:.1} % of runs, 95 % interval {low:.1} to {high:.1} % (asked: {means})",
+                self.success_rate() * 100.0
+            ),
+        }
+    }
+
+    /// Which seeds were run.
+    pub fn seeds(&self) -> String {
+        match self.successes[1] {
+            1 => format!("seed {}", self.seed),
+            n => {
+                let last = self.seed.wrapping_add(n as u64 - 1);
+                format!("means over {n} runs, seeds {} to {last}", self.seed)
+            }
+        }
+    }
+
+    /// A few lines for people.
+    pub fn text(&self, success_means: &str) -> Vec<String> {
+        let line = |name: &str, text: String| format!("  {name:<22} {text}");
+        let mut lines: Vec<String> =
+            self.partial.iter().map(|partial| line("stopped", partial.of("runs"))).collect();
+        for error in &self.errors {
+            let [initial, last, best] = [error.initial, error.last, error.best].map(short);
+            let interval = error.ci95.map(|ends| ends.map(short));
+            let interval = interval.map(|[low, high]| format!("; 95 % interval {low} to {high}"));
+            let unit = match error.metric.unit {
+                "" => String::new(),
+                unit => format!(" {unit}"),
+            };
+            let interval = interval.unwrap_or_default();
+            let text = format!("{initial} -> {last}{unit} (best {best}{interval})");
+            lines.push(line(error.metric.name, text));
+        }
+        lines.push(line("returned", self.returned.in_words(self.successes[1])));
+        lines.push(line("success", self.success(success_means)));
+        lines.push(line("time", self.time()));
+        lines.extend(self.against.iter().flat_map(Comparison::text));
+        lines
+    }
+
+    fn time(&self) -> String {
+        let memory = peak_rss_mib().map(|mib| format!(", peak memory {mib:.0} MiB"));
+        let ms = short(self.step_seconds[0] * 1e3);
+        format!("{:.1} s, {ms} ms per step{}", self.seconds, memory.unwrap_or_default())
+    }
+
+    /// The results as a section of a page.
+    pub fn section(&self, report: &mut Report, runs: &[Run], success_means: &str) {
+        let interval = self.many.then_some("95 % interval of the end");
+        let head = ["Error", "Start", "End", "Lowest"].into_iter().chain(interval);
+        let mut table = Table::new(head);
+        for error in &self.errors {
+            let numbers = [error.initial, error.last, error.best].map(short);
+            let interval =
+                error.ci95.map(|[low, high]| format!("{} to {}", short(low), short(high)));
+            table.push([error.metric.title()].into_iter().chain(numbers).chain(interval));
+        }
+        report.heading("Results");
+        report.table(&table);
+        report.labelled("Returned", &self.returned.in_words(self.successes[1]));
+        report.labelled("Success", &self.success(success_means));
+        let means = if self.successes[1] > 1 { " All are means over the runs." } else { "" };
+        report.note(&format!(
+            "The lower the better; \"lowest\" is over all steps, for each error by itself.{means} {}.",
+            self.time()
+        ));
+        if let Some(against) = &self.against {
+            against.section(report);
+        }
+        if self.many {
+            report.details("Every run at its end", &self.each_run(runs));
+        }
+    }
+
+    fn each_run(&self, runs: &[Run]) -> Table {
+        let titles = self.errors.iter().map(|error| error.metric.title());
+        let mut table =
+            Table::new(["Seed".to_owned()].into_iter().chain(titles).chain(["Success".into()]));
+        for (k, run) in runs.iter().enumerate() {
+            let last = self.errors.iter().filter_map(|error| error.per_run.as_ref());
+            let success = if run.success { "yes" } else { "no" };
+            let cells = last.map(|values| short(values[k]));
+            table.push([run.seed.to_string()].into_iter().chain(cells).chain([success.into()]));
+        }
+        table
+    }
+}
+
+/// The errors among metrics and their places, those of a group one after the other.
+pub(crate) fn errors_of(metrics: &[Metric]) -> impl Iterator<Item = (usize, Metric)> {
+    let errors = metrics.iter().copied().enumerate().filter(|(_, metric)| metric.is_error());
+    let mut errors: Vec<_> = errors.collect();
+    errors.sort_by_key(|(_, metric)| metric.key);
+    errors.into_iter()
+}
+
+impl ErrorSummary {
+    /// Of the metric at `place`.
+    pub(crate) fn new(metric: Metric, place: usize, runs: &[Run], many: bool) -> Self {
+        let each = |pick: fn(&[f64]) -> f64| -> Vec<f64> {
+            let curve = |run: &Run| run.curve.iter().map(|p| p.values[place]).collect::<Vec<_>>();
+            runs.iter().map(|run| pick(&curve(run))).collect()
+        };
+        let last = each(|curve| curve[curve.len() - 1]);
+        Self {
+            metric,
+            initial: mean(&each(|curve| curve[0])),
+            last: mean(&last),
+            best: mean(&each(|curve| curve.iter().copied().fold(f64::INFINITY, f64::min))),
+            ci95: many.then(|| mean_interval(&last)),
+            per_run: many.then_some(last),
+        }
+    }
+}
+
+impl Returned {
+    fn new(experiment: &dyn Experiment, runs: &[Run]) -> Self {
+        let score = place(experiment.metrics(), Role::Score);
+        let best = runs.iter().filter_map(|run| run.returned(score));
+        let (errors, steps): (Vec<f64>, Vec<f64>) =
+            best.map(|point| (point.values[score], point.step as f64)).unzip();
+        let by = experiment.metrics()[score].name;
+        Self { by, error: mean(&errors), step: median(&steps), of: experiment.steps() }
+    }
+
+    fn in_words(&self, runs: usize) -> String {
+        let Self { by, error, step, of } = self;
+        let error = short(*error);
+        match runs {
+            1 => format!("step {step} of {of}, where the {by} is lowest: {error}"),
+            _ => format!(
+                "of each run the step where the {by} is lowest: {error}; in the middle step {step} of {of}"
+            ),
+        }
+    }
+}
+
+/// Objects by the keys of their metrics: that of `a.b` stands inside that of `a`.
+pub(crate) fn nested<'a>(objects: impl Iterator<Item = (&'a Metric, Value)>) -> Map<String, Value> {
+    let mut all: Map<String, Value> = Map::new();
+    for (metric, mut object) in objects {
+        object["name"] = metric.name.into();
+        object["unit"] = metric.unit.into();
+        match metric.key.split_once('.') {
+            None => drop(all.insert(metric.key.into(), object)),
+            Some((group, key)) => all.entry(group).or_insert_with(|| json!({}))[key] = object,
+        }
+    }
+    all
+}
+
+/// What was run, in a line: `pose (original): gauss with 1 parameter, 300 steps, seed 0`.
+pub fn headline(what: &str, method: &str, parameters: usize, steps: usize, seeds: &str) -> String {
+    let parameters = counted(parameters, "parameter");
+    format!("{what}: {method} with {parameters}, {steps} steps, {seeds}")
+}

@@ -1,0 +1,90 @@
+//! What this project promises of every softness, whatever the scene: a trial that misses its target is a fault.
+//!
+//! The numbers F01 and so on are those under which docs/stability.md lists them.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod depths;
+mod descents;
+mod faces;
+mod gradients;
+mod many;
+mod meta_gradients;
+mod numbers;
+
+use std::sync::Arc;
+
+use softrast_meta::{numbers, tensor};
+use softrast_softness::{Family, Softness};
+use stability::{
+    Level, Tested, Trial,
+    cases::SCALE,
+    drawing::{Drawing, Exact, Painter, Single, weights},
+    flat::Flat,
+};
+
+type Levels = anyhow::Result<Vec<Level>>;
+/// What draws some faces in both float types.
+type Painters = (Arc<[[u32; 3]]>, Painter<Exact>, Painter<Single>);
+
+/// Width and height of small images.
+const SIZE: usize = 16;
+
+/// Holds every family there is to a promise, and a scale that decays.
+fn hold(promise: impl Fn(&Tested) -> Levels) {
+    let families = Family::ALL.into_iter().map(Tested::family);
+    families.chain([Tested::decay()]).for_each(|tested| hold_one(&promise, &tested));
+}
+
+/// The same for softnesses whose tails end: those of Lévy, Cauchy and the reciprocal reach as far as anything is seen.
+fn hold_where_tails_end(promise: impl Fn(&Tested) -> Levels) {
+    hold(|tested| {
+        let softness = tested.at(SCALE);
+        let phi = tensor::<Exact, 1>(softness.phi_at(1.0, SIZE), [softness.softness.parameters()]);
+        let far = tensor::<Exact, 1>(vec![-1000.0 * SCALE, 1000.0 * SCALE], [2]);
+        let tails = numbers(softness.softness.value(phi, far));
+        match tails[0].max(1.0 - tails[1]) < 1e-9 {
+            true => promise(tested),
+            false => Ok(vec![Level::new(0.0, vec![Trial::holds(true)])]),
+        }
+    });
+}
+
+/// The same for the families of the paper alone, where a promise takes whole descents.
+fn hold_for_the_paper(promise: impl Fn(&Tested) -> Levels) {
+    Tested::all(None).unwrap().iter().for_each(|tested| hold_one(&promise, tested));
+}
+
+fn hold_one(promise: impl Fn(&Tested) -> Levels, tested: &Tested) {
+    let levels = promise(tested).unwrap();
+    assert!(!levels.is_empty() && levels.iter().all(|level| !level.trials.is_empty()));
+    for Level { label, trials, .. } in levels {
+        let kept = trials.iter().all(|trial| trial.reached && trial.finite);
+        assert!(kept, "{}, {label}: {trials:?}", tested.name);
+    }
+}
+
+/// One level for each scene: the largest error of a pixel against the definition, at most 1e-5, with finite gradients in both float
+/// types.
+fn against_dense<L: Into<String>>(
+    tested: &Tested,
+    scenes: impl IntoIterator<Item = (L, Flat)>,
+) -> Levels {
+    let softness = tested.at(SCALE);
+    let weights = weights(SIZE);
+    let mut painters: Option<Painters> = None;
+    let mut levels = Vec::new();
+    for (label, flat) in scenes {
+        let drawing = Drawing::new(&softness, &flat, SIZE);
+        // To choose the knots costs more than an image.
+        let kept = painters.take().filter(|(faces, ..)| *faces == flat.faces);
+        let made = || (flat.faces.clone(), drawing.painter(), drawing.painter());
+        let (_, exact, single) = painters.insert(kept.unwrap_or_else(made));
+        let exact = exact.draw(&flat, &weights);
+        let single = single.draw(&flat, &weights);
+        let off = exact.off(&drawing.dense());
+        let trial = Trial::at_most(off, 1e-5).with(&exact.all()).with(&single.all());
+        levels.push(Level::named(label, vec![trial]));
+    }
+    Ok(levels)
+}

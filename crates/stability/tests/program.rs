@@ -1,0 +1,39 @@
+//! The program: what it prints, what it writes, and how it refuses.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{collections::HashSet, ffi::OsString};
+
+use serde_json::Value;
+use stability::{cases, execute};
+
+#[test]
+fn every_case_has_its_own_name() {
+    let ids: Vec<&str> = cases().map(|case| case.id).collect();
+    assert_eq!(ids.iter().collect::<HashSet<_>>().len(), ids.len());
+}
+
+#[test]
+fn the_program_writes_its_matrix_as_a_page_and_as_json() {
+    let out = tempfile::tempdir().unwrap();
+    let line = "stability --quiet --json --cases f16,G01,O06 --methods logistic,decay --out";
+    let mut words: Vec<OsString> = line.split(' ').map(OsString::from).collect();
+    words.push(out.path().into());
+    let mut stdout = Vec::new();
+    execute(words, &mut stdout).unwrap();
+    let json: Value = serde_json::from_slice(&stdout).unwrap();
+    assert_eq!(json["rows"].as_array().unwrap().len(), 3);
+    assert_eq!(json["non_finite"], 0);
+    let page = std::fs::read_to_string(out.path().join("report.html")).unwrap();
+    assert!(page.contains("loss times a factor") && page.contains("<svg"));
+    let kept = std::fs::read(out.path().join("stability.json")).unwrap();
+    assert_eq!(serde_json::from_slice::<Value>(&kept).unwrap(), json);
+}
+
+#[test]
+fn a_case_that_does_not_exist_is_answered_with_those_that_do() {
+    let words = ["stability", "--cases", "O01,X99"].map(OsString::from).to_vec();
+    let failure = execute(words, &mut Vec::new()).unwrap_err();
+    assert_eq!(failure.code, 2);
+    assert!(failure.message.contains("\"X99\"; known are F16, G01"), "{failure}");
+}

@@ -1,3 +1,0 @@
-//! RECONSTRUCT.
-
-mod convolution;

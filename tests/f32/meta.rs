@@ -1,0 +1,40 @@
+//! Meta-gradients in f32, against the same in f64.
+
+use burn::{backend::NdArray, tensor::backend::Backend};
+use softrast_meta::{Adam, BilevelProblem, InnerLoop, MetaGradient, OuterSteps};
+use softrast_tests::{WAVES, numbers, vector};
+
+fn meta_gradient<B: Backend>(scene: usize, steps: usize) -> Vec<f64> {
+    let start: Vec<f64> =
+        (0..4).map(|k| 1.5 * (1.7 * scene as f64 + 2.3 * k as f64).sin()).collect();
+    let problem = BilevelProblem {
+        objective: WAVES,
+        // The first step of Adam has almost no derivative by the softness: what f32 makes of it is
+        // rounding. The share of the outer loss itself covers that.
+        outer_loss: WAVES,
+        inner: InnerLoop { optimizer: Adam::new(0.05), steps },
+        start: vector::<B>(&start),
+        outer_steps: OuterSteps::Last,
+    };
+    let mode = MetaGradient::Unrolled { clip: None };
+    numbers(mode.estimate(&problem, &vector(&[-0.3, 0.4]), 0).gradient)
+}
+
+#[test]
+fn single_precision_loses_digits_with_every_step_but_not_the_gradient() {
+    // Medians over twelve scenes; source: docs/notes.md, Meta-gradients: checks.
+    for (steps, bound) in [(1, 1e-5), (10, 2e-2), (30, 0.3)] {
+        let mut errors: Vec<f64> = (0..12)
+            .map(|scene| {
+                let single = meta_gradient::<NdArray<f32>>(scene, steps);
+                let double = meta_gradient::<NdArray<f64>>(scene, steps);
+                let norm = |values: Vec<f64>| values.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let off = single.iter().zip(&double).map(|(a, b)| a - b).collect();
+                norm(off) / norm(double)
+            })
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        println!("{steps} steps: median {:.1e}, largest {:.1e}", errors[6], errors[11]);
+        assert!(errors[6] <= bound, "{errors:?}");
+    }
+}

@@ -1,0 +1,5 @@
+//! The fused op in f32.
+
+mod limits;
+mod second_order;
+mod threads;

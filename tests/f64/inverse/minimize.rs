@@ -1,0 +1,91 @@
+//! Descents whose every place is known.
+
+use burn::backend::NdArray;
+use softrast_inverse::{InverseProblem, Iterate, Method, minimize};
+use softrast_meta::{Adam, Optimizer};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_tests::{numbers, vector};
+
+use super::square::Square;
+
+type B = NdArray<f64>;
+
+const START: [f64; 2] = [4.0, -8.0];
+
+fn iterates(
+    problem: &Square,
+    instances: &[f64],
+    mut visit: impl FnMut(&Iterate) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let method = Method::new("none", ScheduledSoftness::constant(softness, 0.1));
+    let config = problem.defaults();
+    minimize::<_, B>(problem, instances, &method, &config, false, |iterate, _| visit(&iterate))
+}
+
+/// Where Adam goes, down `θ²`.
+fn expected(floor: f64) -> Vec<Vec<f64>> {
+    let adam = Adam::new(0.25);
+    let mut theta = vector::<B>(&START);
+    let mut state = adam.init(&theta);
+    let mut places = vec![numbers(theta.clone())];
+    for _ in 0..3 {
+        let gradient = theta.clone() * 2.0;
+        let (moved, next) = adam.step(theta, gradient, state);
+        (theta, state) = (moved.clamp_min(floor), next);
+        places.push(numbers(theta.clone()));
+    }
+    places
+}
+
+fn assert_goes_as_expected(floor: f64) -> Vec<Vec<f64>> {
+    let mut places = Vec::new();
+    let visit = |now: &Iterate| {
+        assert_eq!((now.step, now.step > 0), (places.len(), now.seconds.is_some()));
+        let theta = numbers(now.theta.clone());
+        let squares: Vec<f64> = theta.iter().map(|x| x * x).collect();
+        assert_eq!([&now.loss, &now.soft_loss], [&squares; 2]);
+        let rounded: Vec<f64> = theta.iter().map(|x| x.round() * x.round()).collect();
+        assert_eq!(now.hard_loss, rounded);
+        assert!(now.image.is_none());
+        places.push(theta);
+        Ok(())
+    };
+    iterates(&Square { floor, seen: true }, &START, visit).unwrap();
+    assert_eq!(places, expected(floor));
+    places
+}
+
+#[test]
+fn every_place_from_the_start_to_the_end_is_seen_once() {
+    let places = assert_goes_as_expected(-10.0);
+    // The first step of Adam has the length of the learning rate.
+    assert_eq!((places.len(), &places[0]), (4, &START.to_vec()));
+    assert!((places[1][0] - 3.75).abs() < 1e-6 && (places[1][1] + 7.75).abs() < 1e-6);
+}
+
+#[test]
+fn a_step_ends_where_it_is_allowed_to() {
+    let places = assert_goes_as_expected(3.6);
+    assert_eq!((places[1][1], places[3][0]), (3.6, 3.6));
+}
+
+#[test]
+fn parameters_without_a_gradient_stay_and_an_error_ends_the_descent() {
+    let mut seen = 0;
+    let visit = |now: &Iterate| {
+        assert_eq!(numbers(now.theta.clone()), [7.0]);
+        seen += 1;
+        anyhow::ensure!(seen < 3, "enough");
+        Ok(())
+    };
+    let end = iterates(&Square { floor: 0.0, seen: false }, &[7.0], visit);
+    assert_eq!(end.unwrap_err().to_string(), "enough");
+    assert_eq!(seen, 3);
+}
+
+#[test]
+fn nothing_to_solve_is_an_error() {
+    let end = iterates(&Square { floor: 0.0, seen: true }, &[], |_| Ok(()));
+    assert_eq!(end.unwrap_err().to_string(), "there is no instance to solve");
+}

@@ -1,0 +1,11 @@
+//! The rasterizer: cameras, the reference, and the fused op against it.
+
+mod bad_cases;
+mod camera;
+mod colour;
+mod fused;
+mod reference;
+mod threads;
+mod tolerance;
+#[path = "../../../crates/raster/tests/triangles/mod.rs"]
+mod triangles;

@@ -1,4 +1,0 @@
-//! The fused op in f32.
-
-mod limits;
-mod second_order;
