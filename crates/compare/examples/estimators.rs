@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p compare --example estimators              # 16 scenes; 10, 30 and 100 steps
-//! cargo run --release -p compare --example estimators -- --quick   # 4 scenes; 10 steps, to out/estimators.md
+//! cargo run --release -p compare --example estimators -- --quick   # 2 scenes; 10 steps, to out/estimators.md
 //! ```
 //!
 //! Small instances of 2D SHAPE and POSE under a static logistic, so that φ is one number, the logarithm of its scale. The truth is the
@@ -56,7 +56,7 @@ struct Mean {
 fn main() -> anyhow::Result<()> {
     let study = Study::parse();
     let (scenes, steps): (u64, &[usize]) =
-        if study.quick { (4, &[10]) } else { (16, &[10, 30, 100]) };
+        if study.quick { (2, &[10]) } else { (16, &[10, 30, 100]) };
     let clock = Instant::now();
     let args = shape2d::Args { triangles: Some(24), ..usual_args() };
     let title = "shape2d --size 32 --triangles 24 --learning-rate 0.03";
