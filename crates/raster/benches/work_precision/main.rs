@@ -15,13 +15,13 @@ mod scalar;
 #[path = "../workload.rs"]
 mod workload;
 
-use std::{error::Error, fs, hint::black_box, path::Path, sync::Arc, time::Instant};
+use std::{fs, hint::black_box, path::Path, sync::Arc, time::Instant};
 
 use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor},
 };
-use chart::{Panel, Series};
+use chart::Panel;
 use machine::machine;
 use scalar::Scalar;
 use softrast_mesh::icosphere;
@@ -38,7 +38,7 @@ const REPEATS: usize = 15;
 /// A point of the scaling chart takes at least three runs, and about this long at most.
 const SECONDS: f64 = 2.0;
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> anyhow::Result<()> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
     fs::create_dir_all(&docs)?;
     let threads = rayon::current_num_threads();
@@ -52,13 +52,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         panels.extend(work_precision(&workload, &mut csv));
     }
     let title = format!("Work and precision of a silhouette and its gradient ({threads} threads)");
-    chart::write(&docs.join("work_precision.svg"), &title, &panels, 2)?;
+    fs::write(docs.join("work_precision.svg"), chart::svg(&title, &panels)?)?;
     fs::write(docs.join("work_precision.csv"), csv)?;
 
     let mut csv = format!("{header}varied,faces,size,views,pairs,ms\n");
     let panels = scaling(&mut csv);
     let title = format!("Time for a silhouette and its gradient ({threads} threads, f32)");
-    chart::write(&docs.join("scaling.svg"), &title, &panels, 3)?;
+    fs::write(docs.join("scaling.svg"), chart::svg(&title, &panels)?)?;
     fs::write(docs.join("scaling.csv"), csv)?;
     Ok(())
 }
@@ -138,7 +138,7 @@ fn work_precision(workload: &Workload, csv: &mut String) -> [Panel; 2] {
             relative_difference(&drawn.gradient, &exact.gradient),
         ];
         for (points, error) in series[method].iter_mut().zip(errors) {
-            points.push((error, drawn.ms));
+            points.push([error, drawn.ms]);
         }
         let ([tolerance, knots, pairs], [image, gradient]) = (label, errors);
         let method = METHODS[method];
@@ -165,13 +165,8 @@ fn work_precision(workload: &Workload, csv: &mut String) -> [Panel; 2] {
         add(2, [1e-8, knots as f64, scene.pairs() as f64], &median(|| scene.draw()));
     }
     [("largest error of a pixel", 0), ("relative error of the gradient", 1)].map(|(x, which)| {
-        let lines = METHODS.iter().zip(&series);
-        Panel {
-            title: name.clone(),
-            x: x.to_owned(),
-            y: "time of image and gradient [ms]".to_owned(),
-            series: lines.map(|(name, points)| Series::new(name, &points[which])).collect(),
-        }
+        let lines = METHODS.into_iter().zip(series.iter().map(|points| points[which].clone()));
+        Panel::new(name, x, lines)
     })
 }
 
@@ -245,8 +240,8 @@ const WIDTH_PX: f64 = 0.5;
 const FITTED: usize = 4;
 
 /// Slope of a straight line through the logarithms, by least squares.
-fn slope(points: &[(f64, f64)]) -> f64 {
-    let logs = points.iter().map(|&(x, y)| [x.ln(), y.ln()]);
+fn slope(points: &[[f64; 2]]) -> f64 {
+    let logs = points.iter().map(|point| point.map(f64::ln));
     let mean = |k: usize| logs.clone().map(|log| log[k]).sum::<f64>() / points.len() as f64;
     let (x, y) = (mean(0), mean(1));
     let sum = |of: fn(f64, f64) -> f64| logs.clone().map(|[a, b]| of(a - x, b - y)).sum::<f64>();
@@ -265,21 +260,19 @@ fn scaling(csv: &mut String) -> Vec<Panel> {
         let (faces, pairs) = (workload.faces.len(), scene.pairs());
         let ms = median(|| scene.draw()).ms;
         *csv += &format!("{varied},{faces},{size},{views},{pairs},{ms:.4}\n");
-        (faces as f64, ms)
+        [faces as f64, ms]
     };
     let faces: Vec<_> = (1..=8).map(|level| measure("faces", level, 256, 1)).collect();
     let sizes = [32, 64, 128, 256, 512, 1024, 2048];
     let pixels: Vec<_> =
-        sizes.iter().map(|&n| ((n * n) as f64, measure("pixels", 4, n, 1).1)).collect();
+        sizes.iter().map(|&n| [(n * n) as f64, measure("pixels", 4, n, 1)[1]]).collect();
     let counts = [1, 2, 4, 8, 16, 32, 64, 128];
-    let views: Vec<_> = counts.iter().map(|&n| (n as f64, measure("views", 3, 64, n).1)).collect();
-    let panel = |title: &str, x: &str, points: &[(f64, f64)]| {
-        let (x0, y0) = *points.last().expect("a series has points");
-        let line = points.iter().map(|&(x, _)| (x, y0 * x / x0)).collect::<Vec<_>>();
-        let series = vec![Series::new("measured", points), Series::line("linear", &line)];
-        let y = "time of image and gradient [ms]".to_owned();
+    let views: Vec<_> = counts.iter().map(|&n| [n as f64, measure("views", 3, 64, n)[1]]).collect();
+    let panel = |title: &str, x: &str, points: &[[f64; 2]]| {
+        let [x0, y0] = *points.last().expect("a series has points");
+        let line = points.iter().map(|[x, _]| [*x, y0 * x / x0]).collect();
         let title = format!("{title}: slope {:.2}", slope(&points[points.len() - FITTED..]));
-        Panel { title, x: x.to_owned(), y, series }
+        Panel::new(&title, x, [("measured", points.to_vec()), ("linear", line)])
     };
     vec![
         panel("256 x 256 pixels, 1 view", "faces", &faces),
