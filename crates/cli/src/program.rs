@@ -7,7 +7,7 @@ use softrast_lab::{
     program::{parse, repeated, run_main},
 };
 
-use crate::{Common, MethodArgs, Task, commands, commands::learn::LearnArgs};
+use crate::{Common, MethodArgs, Task, commands, commands::learn_args::LearnArgs};
 
 /// Everything on the command line of a task.
 #[derive(Debug, Parser)]

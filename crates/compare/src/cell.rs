@@ -1,7 +1,6 @@
-use softrast_cli::{Common, MethodArgs, SoftnessChoice, Variant};
-use softrast_lab::Runner;
+use softrast_cli::{MethodArgs, SoftnessChoice, Variant};
 
-use crate::{Measured, tasks::AnyTask};
+use crate::tasks::AnyTask;
 
 /// A task in one variant, solved with one method.
 #[derive(Clone)]
@@ -55,27 +54,5 @@ impl Cell {
     /// Whether the softness comes with the programs.
     pub fn is_learned(&self) -> bool {
         matches!(self.method.softness, Some(SoftnessChoice::Learned(_)))
-    }
-
-    /// Evaluates the cell on the `backend` that all cells are computed on; what is finished is not done again.
-    ///
-    /// # Errors
-    ///
-    /// Those of the task.
-    pub fn evaluate(&self, runner: &mut Runner, backend: Option<&str>) -> anyhow::Result<Measured> {
-        let common = Common {
-            variant: self.variant,
-            backend: self.backend.or(backend).map(str::to_owned),
-            ..Common::default()
-        };
-        let entry = self.task.entry(&common, &self.method)?;
-        let seeds = softrast_lab::seeds(0, self.runs as usize);
-        runner.progress.expect(entry.solve.steps * seeds.len());
-        let (mut evaluations, stopped) =
-            runner.evaluate(&[entry.experiment.as_ref()], &seeds, true, Some(&self.name))?;
-        if stopped {
-            return Err(softrast_lab::Error::Interrupted.into());
-        }
-        Measured::new(self.clone(), entry, evaluations.remove(0))
     }
 }

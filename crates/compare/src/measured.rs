@@ -1,8 +1,10 @@
 use anyhow::ensure;
 use serde_json::{Map, Value};
-use softrast_cli::{InOurUnits, Variant};
+use softrast_cli::{Common, InOurUnits, Variant};
 use softrast_inverse::{Method, SolveConfig};
-use softrast_lab::{Encoded, Metric, Role, Run, mean, mean_interval, place, sweep::rounded};
+use softrast_lab::{
+    Encoded, Metric, Role, Run, Runner, mean, mean_interval, place, sweep::rounded,
+};
 
 use crate::{Cell, tasks::Entry};
 
@@ -39,6 +41,28 @@ pub struct MeanError {
 }
 
 impl Measured {
+    /// Evaluates a cell on the `backend` that all cells are computed on; what is finished is not done again.
+    ///
+    /// # Errors
+    ///
+    /// Those of the task.
+    pub fn of(cell: &Cell, runner: &mut Runner, backend: Option<&str>) -> anyhow::Result<Self> {
+        let common = Common {
+            variant: cell.variant,
+            backend: cell.backend.or(backend).map(str::to_owned),
+            ..Common::default()
+        };
+        let entry = cell.task.entry(&common, &cell.method)?;
+        let seeds = softrast_lab::seeds(0, cell.runs as usize);
+        runner.progress.expect(entry.solve.steps * seeds.len());
+        let (mut evaluations, stopped) =
+            runner.evaluate(&[entry.experiment.as_ref()], &seeds, true, Some(&cell.name))?;
+        if stopped {
+            return Err(softrast_lab::Error::Interrupted.into());
+        }
+        Self::new(cell.clone(), entry, evaluations.remove(0))
+    }
+
     /// Of an evaluated entry.
     pub(crate) fn new(
         cell: Cell,

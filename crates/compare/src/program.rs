@@ -47,7 +47,7 @@ pub fn compare(args: &Args, command: &str) -> anyhow::Result<Output> {
         if !args.quiet {
             eprintln!("cell {} of {}: {task}, {variant}, {}", k + 1, cells.len(), cell.name);
         }
-        let one = cell.evaluate(&mut runner, args.backend.as_deref());
+        let one = Measured::of(cell, &mut runner, args.backend.as_deref());
         runner.progress = Progress::of_program(args.quiet);
         measured.push(one.with_context(|| format!("{task} {variant} with {}", cell.name))?);
         // After every cell: whoever stops a long comparison has tables of what is finished.

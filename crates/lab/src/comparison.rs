@@ -3,10 +3,10 @@ use serde_json::{Map, Value, json};
 
 use crate::{
     ErrorSummary, Evaluation, Experiment, Metric, Run,
+    error_summary::{errors_of, nested},
     format::short,
     mean, mean_interval,
     report::{Report, Table},
-    summary::{errors_of, nested},
     wilson_interval,
 };
 

@@ -8,7 +8,7 @@ const FORMAT: &str = "softrast learning checkpoint 2";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Everything that decides the result: task, settings, learner, in the words of the program that
+    /// Everything that decides the result: task and settings, in the words of the program that
     /// learns. A checkpoint of another job is refused.
     pub job: String,
     /// How far it has come.
@@ -51,15 +51,15 @@ impl Checkpoint {
         Ok(serde_json::to_string_pretty(&file)? + "\n")
     }
 
-    /// How far learning of `job` has come, by the text of a checkpoint; `learner` goes on from it with `parameters` numbers.
+    /// How far learning of `job` has come, by the text of a checkpoint; `outer_loop` goes on from it with `parameters` numbers.
     ///
     /// # Errors
     ///
-    /// If it is not a whole checkpoint as it was written, is of another job, or is nothing that the learner can go on from.
+    /// If it is not a whole checkpoint as it was written, is of another job, or is nothing that it can go on from.
     pub fn parse(
         text: &[u8],
         job: &str,
-        learner: &OuterLoop,
+        outer_loop: &OuterLoop,
         parameters: usize,
     ) -> Result<Progress, CheckpointError> {
         let damaged = |reason: String| CheckpointError::Damaged(reason);
@@ -77,7 +77,7 @@ impl Checkpoint {
             return Err(CheckpointError::Foreign { found, expected });
         }
         let progress = checkpoint.progress;
-        match progress.unsound(learner, parameters) {
+        match progress.unsound(outer_loop.steps, parameters) {
             None => Ok(progress),
             Some(reason) => Err(damaged(reason)),
         }

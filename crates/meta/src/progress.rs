@@ -1,7 +1,5 @@
 use serde::{Deserialize, Serialize};
 
-use crate::OuterLoop;
-
 /// How far learning has come: all that has to be kept to go on as though it had never stopped.
 ///
 /// There is no state of a random generator in it: instances are numbered through, and everything
@@ -62,8 +60,8 @@ impl Progress {
         self.best.as_ref().map_or(&self.phi, |best| &best.phi)
     }
 
-    /// What keeps `learner` from going on from here with `parameters` numbers.
-    pub(crate) fn unsound(&self, learner: &OuterLoop, parameters: usize) -> Option<String> {
+    /// What keeps learning of `steps` updates from going on from here with `parameters` numbers.
+    pub(crate) fn unsound(&self, steps: usize, parameters: usize) -> Option<String> {
         let Self { step, phi, optimizer, best, seconds, dropped, tried, .. } = self;
         let best_phi = best.iter().map(|best| &best.phi);
         for values in std::iter::once(phi).chain(best_phi).chain(optimizer) {
@@ -75,8 +73,7 @@ impl Progress {
             }
         }
         let best_step = best.as_ref().map_or(0, |best| best.step);
-        if *step > learner.steps || best_step > *step {
-            let steps = learner.steps;
+        if *step > steps || best_step > *step {
             return Some(format!("step {step} of {steps}, the best after {best_step}, cannot be"));
         }
         // Adam remembers two vectors once it has made a step.

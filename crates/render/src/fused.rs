@@ -9,7 +9,7 @@ use burn::{
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss, project};
 use softrast_softness::EdgeSoftness;
 
-use crate::{program::Step, scene::Scene};
+use crate::scene::{Scene, Step};
 
 /// What stays the same from step to step.
 pub(crate) struct Fused<B: RasterBackend> {

@@ -11,7 +11,12 @@ use softrast_lab::{
 };
 use softrast_raster::{BackendChoice, RasterBackend, Rasterizer, compiled_backends, on_backend};
 
-use crate::{args::Args, fused::Fused, reference, scene::Scene};
+use crate::{
+    args::Args,
+    fused::Fused,
+    reference,
+    scene::{Scene, Step},
+};
 
 /// Timed repetitions unless asked for another number.
 const REPEAT: usize = 5;
@@ -24,18 +29,6 @@ const REPEAT: usize = 5;
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     draw(&args)?.print(args.json, &repeated("render", &words), stdout)
-}
-
-/// What one pass gave and took. Times are in milliseconds.
-pub(crate) struct Step {
-    /// `[views, size, size]`, top row first.
-    pub(crate) image: Vec<f64>,
-    /// Mean squared difference to the target, and the norm of its gradient to the vertices.
-    pub(crate) loss: Option<[f64; 2]>,
-    /// From world vertices to coverage.
-    pub(crate) forward_ms: f64,
-    /// From coverage to the loss and its gradient to the world vertices.
-    pub(crate) backward_ms: Option<f64>,
 }
 
 /// All passes, and what is known of the fused op.

@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use rayon::prelude::*;
 use softrast_raster::{mse_loss, project, reference};
 
-use crate::{program::Step, scene::Scene};
+use crate::scene::{Scene, Step};
 
 type B = NdArray<f64>;
 type A = Autodiff<B>;

@@ -26,6 +26,18 @@ pub(crate) struct Scene {
     pub(crate) target: Option<Vec<f64>>,
 }
 
+/// What one pass gave and took. Times are in milliseconds.
+pub(crate) struct Step {
+    /// `[views, size, size]`, top row first.
+    pub(crate) image: Vec<f64>,
+    /// Mean squared difference to the target, and the norm of its gradient to the vertices.
+    pub(crate) loss: Option<[f64; 2]>,
+    /// From world vertices to coverage.
+    pub(crate) forward_ms: f64,
+    /// From coverage to the loss and its gradient to the world vertices.
+    pub(crate) backward_ms: Option<f64>,
+}
+
 /// Scale of the logistic that rises from 10 % to 90 % within half a pixel, in pixels.
 const HALF_PIXEL: f64 = 0.5 / 4.4;
 

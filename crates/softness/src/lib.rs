@@ -43,9 +43,10 @@ pub use depth_softness::{DepthSoftness, DepthSoftnessFile, UnknownDepthSoftness}
 pub use edge::EdgeSoftness;
 pub use family::{Family, UnknownFamily};
 pub use file::SoftnessFileError;
+pub use math::OPAQUE;
 pub use network::initial_mlp;
 pub use schedule::ScaleSchedule;
 pub use scheduled::{ScheduledSoftness, Surrogate};
 pub use soft_step::SoftStep;
-pub use softness::{OPAQUE, Softness};
+pub use softness::Softness;
 pub use support::{Support, support};

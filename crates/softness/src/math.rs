@@ -1,6 +1,11 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::OPAQUE;
+/// What is left of the light behind a face that the formula calls fully opaque.
+///
+/// One-sided families reach `s = 1` exactly, where the optical depth `-ln(1 - s)` is infinite. For
+/// them it is taken as `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`: at most `-ln(OPAQUE)` = 16.1, and no
+/// silhouette moves by more than `OPAQUE`.
+pub const OPAQUE: f64 = 1e-7;
 
 /// The largest distance, in scales, that a softness tells apart from infinity.
 ///

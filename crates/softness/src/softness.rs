@@ -7,13 +7,6 @@ use burn::{
 
 use crate::math::{bounded_depth, ln_scale, with_first};
 
-/// What is left of the light behind a face that the formula calls fully opaque.
-///
-/// One-sided families reach `s = 1` exactly, where the optical depth `-ln(1 - s)` is infinite. For
-/// them it is taken as `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`: at most `-ln(OPAQUE)` = 16.1, and no
-/// silhouette moves by more than `OPAQUE`.
-pub const OPAQUE: f64 = 1e-7;
-
 /// A soft step: how much a face covers a pixel at signed distance `x`.
 ///
 /// `x` is positive inside the face; its unit is NDC, or NDC² for a softness of the squared
@@ -67,7 +60,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
     /// Optical depth `q = -ln(1 - s)`, at least 0, same shape as `x`.
     ///
     /// Silhouettes are sums of it: `1 - Π (1 - sⱼ) = 1 - exp(-Σ qⱼ)` (Wu et al. 2024, Sec. 4.4).
-    /// Provided: `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`, see [`OPAQUE`]. Override it where `1 - s` loses
+    /// Provided: `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`, see [`OPAQUE`](crate::OPAQUE). Override it where `1 - s` loses
     /// digits that matter and s does not reach 1.
     fn optical_depth<B: Backend, const D: usize>(
         &self,

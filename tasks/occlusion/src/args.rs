@@ -3,6 +3,9 @@ use std::path::PathBuf;
 use softrast_lab::parse::positive;
 use softrast_softness::DepthSoftness;
 
+/// Name of the task.
+pub(crate) const NAME: &str = "occlusion";
+
 /// Flags that only OCCLUSION has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {

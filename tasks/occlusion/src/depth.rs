@@ -1,11 +1,14 @@
 use anyhow::ensure;
-use softrast_cli::{EdgeChoice, Preset, Schedule, Task};
+use softrast_cli::{EdgeChoice, Preset, Schedule};
 use softrast_lab::Error;
 use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
 
-use crate::{Args, Occlusion, args::DepthSoftnessChoice};
+use crate::{
+    Args,
+    args::{DepthSoftnessChoice, NAME},
+};
 
 /// Width of the soft depth unless the command line names one, in units of the distance between the planes.
 ///
@@ -54,7 +57,7 @@ impl Depth {
             }
             return Ok(Self { softness, phi: softness.default_phi(1.0), name, scale: None });
         }
-        let preset = Preset::of(Occlusion::NAME, softness.name(), edges.schedule, Schedule::Static);
+        let preset = Preset::of(NAME, softness.name(), edges.schedule, Schedule::Static);
         let preset = preset.and_then(|found| found.depth_scale);
         let scale = args.depth_scale.or(preset).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()

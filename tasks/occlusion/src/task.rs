@@ -18,6 +18,7 @@ use softrast_softness::{DepthSoftness, DepthSoftnessFile, EdgeSoftness, Family, 
 
 use crate::{
     Args, DepthError, Instance, Problem, Scene,
+    args::NAME,
     depth::Depth,
     instance::{front, pairs},
     paper::PAPER,
@@ -117,7 +118,7 @@ impl InverseProblem for Occlusion {
 }
 
 impl Task for Occlusion {
-    const NAME: &'static str = "occlusion";
+    const NAME: &'static str = NAME;
     const TITLE: &'static str = "OCCLUSION";
     const ABOUT: &'static str = "Finds which of several overlapping quads is in front";
 

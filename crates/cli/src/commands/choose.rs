@@ -12,7 +12,7 @@ use softrast_lab::{
 };
 use softrast_softness::Family;
 
-use super::{ended, evaluate::Chosen};
+use super::ended;
 use crate::{
     Init, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment,
     program::{Choose, Session, Shared},
@@ -245,6 +245,20 @@ fn details<T: Task>(now: &Answer<T::Args>, task: &T) -> Vec<(String, Answer<T::A
         (format!("--{} {value}", detail.flag), answer)
     };
     detail.values.iter().copied().map(answer).collect()
+}
+
+/// The flags of a method and what they are for, where both come from a choice.
+pub(crate) struct Chosen<A> {
+    pub(crate) args: A,
+    pub(crate) method: MethodArgs,
+    pub(crate) flags: String,
+    pub(crate) price: String,
+}
+
+impl<A> Chosen<A> {
+    pub(super) fn in_words(&self) -> String {
+        format!("{}: {}", self.flags, self.price)
+    }
 }
 
 #[cfg(test)]

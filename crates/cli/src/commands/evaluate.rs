@@ -3,7 +3,7 @@ use softrast_lab::{Comparison, Error, Evaluation, Experiment, Partial, program::
 
 use super::{Before, Finished, choose::chosen, ended, write};
 use crate::{
-    MethodArgs, Purpose, SoftnessChoice, Task, TaskExperiment,
+    Purpose, SoftnessChoice, Task, TaskExperiment,
     program::{Auto, Evaluate, Session, Shared, Solve},
 };
 
@@ -107,18 +107,4 @@ fn title<T: Task>(one: &TaskExperiment<T>, other: &TaskExperiment<T>) -> String 
         format!("{} {value}", key.replace('_', " "))
     });
     [one.name().to_owned()].into_iter().chain(named).collect::<Vec<_>>().join(", ")
-}
-
-/// The flags of a method and what they are for, where both come from a choice.
-pub(crate) struct Chosen<A> {
-    pub(crate) args: A,
-    pub(crate) method: MethodArgs,
-    pub(crate) flags: String,
-    pub(crate) price: String,
-}
-
-impl<A> Chosen<A> {
-    fn in_words(&self) -> String {
-        format!("{}: {}", self.flags, self.price)
-    }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod choose;
 pub(crate) mod evaluate;
 pub(crate) mod learn;
+pub(crate) mod learn_args;
 pub(crate) mod search;
 
 use softrast_lab::{

@@ -1,0 +1,75 @@
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::{Metric, Run, bootstrap_mean_interval, mean};
+
+/// Samples behind a confidence interval, and the seed that draws them.
+const RESAMPLES: usize = 10_000;
+const RESAMPLING_SEED: u64 = 0;
+
+/// 95 % interval of a mean, as all results have it.
+pub fn mean_interval(values: &[f64]) -> [f64; 2] {
+    bootstrap_mean_interval(values, RESAMPLES, RESAMPLING_SEED)
+}
+
+/// One error over all runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ErrorSummary {
+    /// Which one.
+    #[serde(skip)]
+    pub metric: Metric,
+    /// Mean before the first step.
+    pub initial: f64,
+    /// Mean after the last step.
+    #[serde(rename = "final")]
+    pub last: f64,
+    /// Mean over the runs of the lowest over all steps.
+    pub best: f64,
+    /// 95 % interval of the mean of `last`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ci95: Option<[f64; 2]>,
+    /// `last` of every run, in the order of the seeds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub per_run: Option<Vec<f64>>,
+}
+
+/// The errors among metrics and their places, those of a group one after the other.
+pub(crate) fn errors_of(metrics: &[Metric]) -> impl Iterator<Item = (usize, Metric)> {
+    let errors = metrics.iter().copied().enumerate().filter(|(_, metric)| metric.is_error());
+    let mut errors: Vec<_> = errors.collect();
+    errors.sort_by_key(|(_, metric)| metric.key);
+    errors.into_iter()
+}
+
+impl ErrorSummary {
+    /// Of the metric at `place`.
+    pub(crate) fn new(metric: Metric, place: usize, runs: &[Run], many: bool) -> Self {
+        let each = |pick: fn(&[f64]) -> f64| -> Vec<f64> {
+            let curve = |run: &Run| run.curve.iter().map(|p| p.values[place]).collect::<Vec<_>>();
+            runs.iter().map(|run| pick(&curve(run))).collect()
+        };
+        let last = each(|curve| curve[curve.len() - 1]);
+        Self {
+            metric,
+            initial: mean(&each(|curve| curve[0])),
+            last: mean(&last),
+            best: mean(&each(|curve| curve.iter().copied().fold(f64::INFINITY, f64::min))),
+            ci95: many.then(|| mean_interval(&last)),
+            per_run: many.then_some(last),
+        }
+    }
+}
+
+/// Objects by the keys of their metrics: that of `a.b` stands inside that of `a`.
+pub(crate) fn nested<'a>(objects: impl Iterator<Item = (&'a Metric, Value)>) -> Map<String, Value> {
+    let mut all: Map<String, Value> = Map::new();
+    for (metric, mut object) in objects {
+        object["name"] = metric.name.into();
+        object["unit"] = metric.unit.into();
+        match metric.key.split_once('.') {
+            None => drop(all.insert(metric.key.into(), object)),
+            Some((group, key)) => all.entry(group).or_insert_with(|| json!({}))[key] = object,
+        }
+    }
+    all
+}
