@@ -8,7 +8,7 @@ use softrast_softness::ScheduledSoftness;
 use crate::{Data, Epoch, Settings, Time};
 
 /// What a file of a training begins with; the number counts changes of the format or the network.
-const MAGIC: &[u8] = b"softrast reconstruct 1\n";
+const MAGIC: &[u8] = b"softrast reconstruct 2\n";
 
 /// A training as it stood after an epoch.
 #[derive(Clone, Debug, PartialEq)]

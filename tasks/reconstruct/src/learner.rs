@@ -1,5 +1,4 @@
 use std::{
-    panic::{self, AssertUnwindSafe},
     sync::{Mutex, PoisonError},
     time::Instant,
 };
@@ -9,7 +8,7 @@ use burn::{
     backend::Autodiff,
     module::{AutodiffModule, Module},
     optim::{Adam, AdamConfig, GradientsParams, Optimizer, adaptor::OptimizerAdaptor},
-    record::{BinBytesRecorder, FullPrecisionSettings, Recorder},
+    record::{FullPrecisionSettings, NamedMpkBytesRecorder, Recorder},
     tensor::{Tensor, backend::Backend},
 };
 use softrast_raster::RasterBackend;
@@ -45,7 +44,8 @@ pub(crate) struct Step {
 /// burn has one seed for the whole process: held while weights are drawn from it.
 static DRAWING: Mutex<()> = Mutex::new(());
 
-type Bytes = BinBytesRecorder<FullPrecisionSettings>;
+/// Of burn's recorders to bytes the one that gives an error, not a panic, where they do not fit.
+type Bytes = NamedMpkBytesRecorder<FullPrecisionSettings>;
 
 impl<B: RasterBackend> Learner<B> {
     /// One that has learned nothing.
@@ -156,9 +156,8 @@ impl<B: RasterBackend> Learner<B> {
     /// If they are not that.
     pub(crate) fn with_bytes(mut self, bytes: Vec<u8>, device: &B::Device) -> anyhow::Result<Self> {
         let recorder = Bytes::default();
-        let load = || Recorder::<Autodiff<B>>::load::<Records<B>>(&recorder, bytes, device);
-        let loaded = quietly(load).context("its weights cannot be read: train anew")?;
-        let (modules, optimizers) = loaded?;
+        let loaded = Recorder::<Autodiff<B>>::load::<Records<B>>(&recorder, bytes, device);
+        let (modules, optimizers) = loaded.context("its weights cannot be read: train anew")?;
         let expected = (self.network.sizes(), self.phi().len());
         self.network = self.network.load_record(modules.0);
         self.softness = self.softness.load_record(modules.1);
@@ -168,17 +167,6 @@ impl<B: RasterBackend> Learner<B> {
         self.of_softness = self.of_softness.load_record(optimizers.1);
         Ok(self)
     }
-}
-
-/// What `work` gives; none if it panics, as burn's recorder does where its bytes are damaged.
-fn quietly<T>(work: impl FnOnce() -> T) -> Option<T> {
-    // The hook belongs to the whole process too.
-    let _alone = DRAWING.lock().unwrap_or_else(PoisonError::into_inner);
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| {}));
-    let found = panic::catch_unwind(AssertUnwindSafe(work)).ok();
-    panic::set_hook(hook);
-    found
 }
 
 /// What a learner keeps: both modules, then both optimisers.
