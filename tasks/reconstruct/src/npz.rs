@@ -65,7 +65,7 @@ impl NpzArray {
         let (file, start) = if entry.compression() == CompressionMethod::Stored {
             drop(entry);
             let length = file.metadata()?.len();
-            ensure!(data_start + size <= length, "it is cut off");
+            ensure!(data_start.saturating_add(size) <= length, "it is cut off");
             (file, data_start + head.length as u64)
         } else {
             (unpacked(&mut entry, size - head.length as u64)?, 0)

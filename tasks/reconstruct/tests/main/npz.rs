@@ -1,5 +1,6 @@
-use std::fs;
+use std::{fs, sync::OnceLock};
 
+use proptest::prelude::*;
 use reconstruct::{NpzFolder, Procedural, Shapes, Split};
 use zip::CompressionMethod;
 
@@ -79,4 +80,48 @@ fn what_is_wrong_with_a_file_is_said_in_one_line_that_names_it() {
     bytes[middle..middle + 64].fill(0x55);
     fs::write(&images, &bytes).unwrap();
     check(error(), &["cannot use", "car_train_images.npz", "damaged"]);
+}
+
+/// The bytes of both files of a class, not compressed and compressed: made once, because pictures take a while.
+fn whole() -> &'static [[Vec<u8>; 2]; 2] {
+    static WHOLE: OnceLock<[[Vec<u8>; 2]; 2]> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        [CompressionMethod::Stored, CompressionMethod::Deflated].map(|method| {
+            let folder = tempfile::tempdir().unwrap();
+            class(folder.path(), "car", 1, Split::Test, method);
+            WHAT.map(|what| fs::read(path(folder.path(), "car", Split::Test, what)).unwrap())
+        })
+    })
+}
+
+const WHAT: [&str; 2] = ["images", "voxels"];
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    /// Heads stand at both ends of a file, so most of the damage is done there.
+    #[test]
+    fn a_damaged_file_is_read_or_ends_in_one_line_that_names_it(
+        compressed: bool, voxels: bool, cut: bool, from_end: bool, at in 0..260_usize, bytes: [u8; 3],
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let mut files = whole()[usize::from(compressed)].clone();
+        let damaged = &mut files[usize::from(voxels)];
+        let at = if from_end { damaged.len() - 3 - at } else { at };
+        if cut { damaged.truncate(at) } else { damaged[at..at + 3].copy_from_slice(&bytes) }
+        for (file, what) in files.iter().zip(WHAT) {
+            fs::write(path(folder.path(), "car", Split::Test, what), file).unwrap();
+        }
+        let read = NpzFolder::open(folder.path(), Split::Test).and_then(|files| {
+            (0..files.count(0)).try_for_each(|shape| {
+                files.voxels(0, shape)?;
+                assert_eq!(files.picture(0, shape, 23)?.len(), 4 * 64 * 64);
+                Ok(())
+            })
+        });
+        if let Err(error) = read {
+            let line = format!("{error:#}");
+            prop_assert!(line.contains("car_test_") && !line.contains('\n'), "{}", line);
+        }
+    }
 }
