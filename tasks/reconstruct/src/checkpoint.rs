@@ -1,11 +1,9 @@
 use std::{fs, path::Path};
 
 use anyhow::{Context, bail, ensure};
-use serde::{Deserialize, Serialize};
 use softrast_lab::write_atomically;
-use softrast_softness::ScheduledSoftness;
 
-use crate::{Data, Epoch, Settings, Time};
+use crate::Header;
 
 /// What a file of a training begins with; the number counts changes of the format or the network.
 const MAGIC: &[u8] = b"softrast reconstruct 2\n";
@@ -17,17 +15,6 @@ pub struct Checkpoint {
     pub header: Header,
     /// Weights and the state of the optimisers, as burn's recorder writes them.
     pub(crate) records: Vec<u8>,
-}
-
-/// What a checkpoint says about itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Header {
-    /// The training.
-    pub settings: Settings,
-    /// Names of the classes of its shapes.
-    pub classes: Vec<String>,
-    /// Epochs until now, the first one before any step.
-    pub epochs: Vec<Epoch>,
 }
 
 impl Checkpoint {
@@ -77,46 +64,6 @@ impl Checkpoint {
         let sum = checksum(&body).to_le_bytes();
         write(path, &[MAGIC, &sum, &body].concat())
     }
-}
-
-impl Header {
-    /// Checks that every value is one that a training writes.
-    fn check(&self, path: &Path) -> anyhow::Result<()> {
-        let Self { settings, classes, epochs } = self;
-        let is_count = |n: usize| (1..=1_000_000).contains(&n);
-        let is_phi = |phi: &[f64]| {
-            let softness = serde_json::json!({ "softness": settings.softness, "phi": phi });
-            ScheduledSoftness::parse(&softness.to_string(), path)
-        };
-        settings.t_conorm()?;
-        is_phi(&settings.phi)?;
-        let rates = [settings.learning_rate, settings.softness_rate];
-        ensure!(rates.iter().all(|&rate| is_finite_from_0(rate)), "a rate is {rates:?}");
-        let counts = [settings.pairs, settings.steps, settings.val];
-        ensure!(counts.into_iter().all(is_count), "pairs, steps and val are {counts:?}");
-        if let Data::Procedural(shapes) = settings.data {
-            ensure!(is_count(shapes), "a class has {shapes} shapes");
-        }
-        ensure!(!classes.is_empty() && !epochs.is_empty(), "there is no class or no epoch");
-        for (number, epoch) in epochs.iter().enumerate() {
-            ensure!(epoch.number == number, "epoch {number} has the number {}", epoch.number);
-            let [found, expected] = [epoch.voxel_iou.len(), classes.len()];
-            ensure!(found == expected, "epoch {number} scores {found} classes of {expected}");
-            let is_share = |iou: &f64| (0.0..=1.0).contains(iou);
-            let shares = epoch.voxel_iou.iter().all(is_share);
-            ensure!(shares, "an IoU of epoch {number} is not from 0 to 1");
-            let Time { all, data, network, rasterizer, smoothness, optimizer, .. } = epoch.time;
-            let times = [all, data, network, rasterizer, smoothness, optimizer];
-            let is_time = times.into_iter().all(is_finite_from_0);
-            ensure!(is_time, "a time of epoch {number} is no time");
-            is_phi(&epoch.phi).with_context(|| format!("epoch {number}"))?;
-        }
-        Ok(())
-    }
-}
-
-fn is_finite_from_0(x: f64) -> bool {
-    x.is_finite() && x >= 0.0
 }
 
 /// Writes a file that appears whole or not at all, and its folder if that is missing.

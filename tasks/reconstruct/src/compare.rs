@@ -1,18 +1,15 @@
-use std::fmt::Write;
-
 use anyhow::Context;
 use serde_json::json;
-use softrast_lab::{Error, program::Output};
+use softrast_lab::{Error, mean, program::Output, report::Table};
 use softrast_raster::{RasterBackend, TConorm};
 
 use crate::{
-    Template, Training,
+    Settings, Template, Training,
     args::{self, CompareArgs},
-    checkpoint, data,
+    checkpoint,
     program::trained,
-    score::{Score, mean, score},
-    settings::Data,
-    shapes::Split,
+    score::{Score, score},
+    shapes::{self, Split},
     train::CHECKPOINT,
 };
 
@@ -53,11 +50,12 @@ pub(crate) fn compare<B: RasterBackend>(
         }
         let (header, _) = training.run::<B>(device)?;
         let (_, network) = trained::<B>(&training.out.join(CHECKPOINT), device)?;
-        let shapes = data::open(&training.settings.data, Split::Test, training.settings.seed)?;
+        let shapes = shapes::open(&training.settings.data, Split::Test, training.settings.seed)?;
         let views = [args.test_shapes, VIEWS];
         let score = score(&network, &Template::new(device), shapes.as_ref(), views, device)?;
         let seconds: f64 = header.epochs.iter().map(|epoch| epoch.time.all).sum();
-        rows.push(Row { name, classes: header.classes, score, minutes: seconds / 60.0 });
+        let (classes, settings) = (header.classes, header.settings);
+        rows.push(Row { name, classes, score, minutes: seconds / 60.0, settings });
     }
     let table = markdown(args, &rows, command);
     checkpoint::write(&args.out.join("compare.md"), table.as_bytes())?;
@@ -72,6 +70,7 @@ struct Row {
     classes: Vec<String>,
     score: Score,
     minutes: f64,
+    settings: Settings,
 }
 
 impl Row {
@@ -97,53 +96,37 @@ fn method(text: &str) -> anyhow::Result<Method> {
     Ok((text.to_owned(), parsed, t_conorm))
 }
 
+/// The table of all methods, and how they were trained.
 fn markdown(args: &CompareArgs, rows: &[Row], command: &str) -> String {
-    let mut text = String::new();
-    let Some(first) = rows.first() else { return text };
-    let columns = first.classes.join(" | ");
-    let line = "---|".repeat(first.classes.len() + 3);
-    let _ = writeln!(text, "| voxel IoU | {columns} | mean | minutes |\n|{line}");
-    let mut row = |name: &str, values: &[f64], minutes: &str| {
-        let cells: Vec<_> =
-            values.iter().chain([&mean(values)]).map(|x| format!("{x:.3}")).collect();
-        let _ = writeln!(text, "| {name} | {} | {minutes} |", cells.join(" | "));
+    let Some(Row { classes, score, settings, .. }) = rows.first() else { return String::new() };
+    let classes = classes.iter().map(String::as_str);
+    let mut table = Table::new(["voxel IoU"].into_iter().chain(classes).chain(["mean", "minutes"]));
+    let mut push = |name: &str, values: &[f64], minutes: String| {
+        let cells = values.iter().copied().chain([mean(values)]).map(|x| format!("{x:.3}"));
+        table.push([name.to_owned()].into_iter().chain(cells).chain([minutes]));
     };
-    row("sphere, not deformed", &first.score.sphere, "");
-    for found in rows {
-        row(&found.name, &found.score.classes, &format!("{:.1}", found.minutes));
+    push("sphere, not deformed", &score.sphere, String::new());
+    for Row { name, score, minutes, .. } in rows {
+        push(name, &score.classes, format!("{minutes:.1}"));
     }
-    let settings = args.common.settings(
-        (
-            softrast_softness::EdgeSoftness {
-                family: softrast_softness::Family::Logistic,
-                squared: false,
-            },
-            vec![],
-        ),
-        TConorm::Probabilistic,
-    );
-    let set = match settings.data {
-        Data::Procedural(count) => format!("the procedural set ({count} shapes of a class)"),
-        Data::Files(folder) => folder.display().to_string(),
-    };
-    let _ = writeln!(
-        text,
-        "\n{} epochs of {} steps, {} pairs of pictures each, {} widths, seed {}, on {set}; test shapes: \
-         {} of a class, {VIEWS} views of each. Softness parameters learn beside the network at a rate of \
-         {}.\n\n`{command}`",
+    let mut text = format!(
+        "{}\n{} epochs of {} steps, {} pairs of pictures each, {} widths, seed {}; {}; test shapes: {} of a \
+         class, {VIEWS} views of each. Softness parameters learn beside the network at a rate of {}.\n\n\
+         `{command}`\n",
+        table.markdown().trim_start(),
         args.common.epochs(),
         settings.steps,
         settings.pairs,
         settings.width.name(),
         settings.seed,
+        settings.data,
         args.test_shapes,
         settings.softness_rate,
     );
     for (name, iou) in PAPER {
-        let _ = writeln!(
-            text,
-            "\nFor context, not for comparison: {name}, ShapeNet, 250,000 steps of 64 pairs: {iou:.3} \
-             (Wu et al. 2024, Table 4)."
+        text += &format!(
+            "\nFor context, not for comparison: {name}, ShapeNet, 250,000 steps of 64 pairs: {iou:.3} (Wu et \
+             al. 2024, Table 4).\n"
         );
     }
     text

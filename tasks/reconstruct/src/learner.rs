@@ -15,8 +15,7 @@ use softrast_raster::RasterBackend;
 use softrast_softness::SoftStep;
 
 use crate::{
-    Network, Settings, Template,
-    epoch::Time,
+    Network, Settings, Template, Time,
     objective::{Objective, soft_step},
     pairs::PairBatch,
 };

@@ -6,7 +6,10 @@ use std::{
 use anyhow::{Context, bail, ensure};
 
 use crate::{
-    SIZE, Shapes, Split, VIEWS, Voxels, npy::Element, npz::NpzArray, pairs::PICTURE, voxels::CELLS,
+    SIZE, Shapes, Split, VIEWS, Voxels,
+    npz::{Element, NpzArray},
+    pairs::PICTURE,
+    voxels::CELLS,
 };
 
 /// Shapes in the public files of earlier papers.

@@ -1,6 +1,6 @@
 use rand::{SeedableRng, rngs::StdRng};
 
-use crate::{Shapes, Split, Voxels, kinds::Kind, solid::Solid, view};
+use crate::{Shapes, Split, Voxels, kinds, solid::Solid, view};
 
 /// Shapes that are drawn at random and made when they are asked for: any number of them, in no memory.
 ///
@@ -22,7 +22,7 @@ impl Procedural {
     /// If `per_class` is 0.
     pub fn new(split: Split, seed: u64, per_class: usize) -> Self {
         assert!(per_class > 0, "a class needs shapes");
-        let classes = Kind::ALL.map(|kind| kind.name().to_owned()).to_vec();
+        let classes = kinds::KINDS.map(|(name, _)| name.to_owned()).to_vec();
         Self { classes, split, seed, per_class }
     }
 
@@ -33,7 +33,7 @@ impl Procedural {
         for (bytes, part) in seed.chunks_mut(8).zip(parts) {
             bytes.copy_from_slice(&part.to_le_bytes());
         }
-        Kind::ALL[class].solid(&mut StdRng::from_seed(seed))
+        kinds::solid(class, &mut StdRng::from_seed(seed))
     }
 }
 

@@ -1,24 +1,22 @@
 use std::{ffi::OsString, io::Write, path::Path};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::CommandFactory;
+use image::{ImageReader, imageops};
 use serde_json::json;
 use softrast_lab::{
-    Error, Failure, INTERRUPTED,
+    Error, Failure, INTERRUPTED, mean,
     program::{Output, parse, repeated},
 };
 use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
 
 use crate::{
-    Checkpoint, Network, Template, Training,
+    Checkpoint, Data, Network, SIZE, Template, Training,
     args::{self, Command, CommandLine, EvaluateArgs, PredictArgs, TrainArgs},
     compare::compare,
-    data,
     learner::Learner,
-    picture::read_picture,
-    score::{mean, predict, score},
-    settings::Data,
-    shapes::Split,
+    score::{predict, score},
+    shapes::{self, Split},
     train::table,
 };
 
@@ -109,7 +107,7 @@ fn evaluate<B: RasterBackend>(args: &EvaluateArgs, device: &B::Device) -> anyhow
     let (checkpoint, network) = trained::<B>(&args.checkpoint, device)?;
     let settings = &checkpoint.header.settings;
     let data = args.data.clone().map_or_else(|| settings.data.clone(), Data::Files);
-    let shapes = data::open(&data, Split::Test, settings.seed)?;
+    let shapes = shapes::open(&data, Split::Test, settings.seed)?;
     let views = [args.shapes, args.views];
     let score = score(&network, &Template::new(device), shapes.as_ref(), views, device)?;
     let pictures: usize = score.pictures.iter().sum();
@@ -162,4 +160,38 @@ pub(crate) fn trained<B: RasterBackend>(
         .with_context(|| format!("{} cannot be used: train anew", path.display()))?;
     let network = learner.network();
     Ok((checkpoint, network))
+}
+
+/// A picture file as the network takes it: planes of red, green, blue and alpha, `[4 * 64 * 64]`.
+///
+/// Others than 64×64 pixels are scaled. Colours are multiplied by alpha, because pictures that are
+/// learned from are black where nothing is.
+///
+/// # Errors
+///
+/// If the file is no picture, not square, or empty: alpha 0 everywhere.
+fn read_picture(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let name = path.display();
+    let reader = ImageReader::open(path).with_context(|| format!("cannot read {name}"))?;
+    let reader = reader.with_guessed_format().with_context(|| format!("cannot read {name}"))?;
+    let image = reader.decode().with_context(|| format!("{name} is no PNG picture"))?;
+    let (width, height) = (image.width(), image.height());
+    ensure!(width == height, "{name} is {width} x {height} pixels, expected a square");
+    if !image.color().has_alpha() {
+        eprintln!(
+            "warning: {name} has no alpha, so all of it counts as the object; the network expects \
+             alpha 0 around it"
+        );
+    }
+    let mut image = image.to_rgba8();
+    if width as usize != SIZE {
+        let side = SIZE as u32;
+        image = imageops::resize(&image, side, side, imageops::FilterType::Triangle);
+    }
+    ensure!(image.pixels().any(|p| p.0[3] > 0), "{name} shows nothing: its alpha is 0 everywhere");
+    let level = |p: &image::Rgba<u8>, k: usize| match k {
+        3 => p.0[3],
+        k => (u16::from(p.0[k]) * u16::from(p.0[3]) / 255) as u8,
+    };
+    Ok((0..4).flat_map(|k| image.pixels().map(move |p| level(p, k))).collect())
 }

@@ -1,9 +1,10 @@
 use softrast_lab::{
+    mean,
     plot::{Axis, Plot, Series},
     report::{Report, Table},
 };
 
-use crate::{Epoch, checkpoint::Header, epoch::Time, score::mean, settings::Data};
+use crate::{Epoch, Header, Time};
 
 /// The page of a training: figures, curves and contact sheets, in one file that needs no other.
 ///
@@ -62,13 +63,9 @@ fn figures(header: &Header) -> [(&'static str, String); 13] {
     let mut time = Time::default();
     header.epochs.iter().for_each(|epoch| time.add(&epoch.time));
     let part = |seconds: f64| 100.0 * seconds / time.all.max(1e-9);
-    let data = match &settings.data {
-        Data::Procedural(count) => format!("procedural, {count} shapes of a class to learn from"),
-        Data::Files(folder) => folder.display().to_string(),
-    };
     let squared = if settings.softness.squared { " of the squared distance" } else { "" };
     [
-        ("shapes", data),
+        ("shapes", settings.data.to_string()),
         ("network", format!("{} widths", settings.width.name())),
         ("softness", format!("{}{squared}", settings.softness.family)),
         ("T-conorm", settings.t_conorm.clone()),

@@ -17,11 +17,6 @@ pub struct Score {
     pub pictures: Vec<usize>,
 }
 
-/// Mean of the classes, as the paper takes it.
-pub(crate) fn mean(classes: &[f64]) -> f64 {
-    classes.iter().sum::<f64>() / classes.len().max(1) as f64
-}
-
 /// Scores `network` on the first `per_class` shapes of every class, each seen from `views` views
 /// that are spread around it and differ from shape to shape.
 ///

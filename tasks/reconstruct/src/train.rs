@@ -6,19 +6,16 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use burn::backend::Autodiff;
-use softrast_lab::Progress;
+use softrast_lab::{Progress, mean};
 use softrast_raster::RasterBackend;
 
 use crate::{
-    Checkpoint, Epoch, Score, Settings, Shapes, Template,
-    checkpoint::{self, Header},
-    data,
-    epoch::Time,
+    Checkpoint, Epoch, Header, Score, Settings, Shapes, Template, Time, checkpoint,
     learner::Learner,
     pairs::Pairs,
     report,
-    score::{mean, score},
-    shapes::Split,
+    score::score,
+    shapes::{self, Split},
     sheet,
 };
 
@@ -60,8 +57,8 @@ impl Training {
     /// loss is not finite any more.
     pub fn run<B: RasterBackend>(&self, device: &B::Device) -> anyhow::Result<(Header, Vec<f64>)> {
         let path = self.out.join(CHECKPOINT);
-        let shapes = data::open(&self.settings.data, Split::Train, self.settings.seed)?;
-        let held_out = data::open(&self.settings.data, Split::Val, self.settings.seed)?;
+        let shapes = shapes::open(&self.settings.data, Split::Train, self.settings.seed)?;
+        let held_out = shapes::open(&self.settings.data, Split::Val, self.settings.seed)?;
         let (mut header, mut learner) = self.start::<B>(&path, shapes.as_ref(), device)?;
         let template = Template::new(device);
         let mut bar = Progress::of_program(!self.visible);

@@ -1,0 +1,203 @@
+//! What a training does and what has come of it until now.
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, ensure};
+use serde::{Deserialize, Serialize};
+use softrast_raster::TConorm;
+use softrast_softness::{EdgeSoftness, ScheduledSoftness};
+
+use crate::Width;
+
+/// What a checkpoint says about itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// The training.
+    pub settings: Settings,
+    /// Names of the classes of its shapes.
+    pub classes: Vec<String>,
+    /// Epochs until now, the first one before any step.
+    pub epochs: Vec<Epoch>,
+}
+
+/// What a training does; kept in its checkpoint, so that going on means the same training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Where the shapes come from.
+    pub data: Data,
+    /// Widths of the layers.
+    pub width: Width,
+    /// The softness of the silhouettes.
+    pub softness: EdgeSoftness,
+    /// Its parameters before the first step.
+    pub phi: Vec<f64>,
+    /// How the coverages of several faces make one, as the command line names it.
+    pub t_conorm: String,
+    /// Learning rate of the network.
+    pub learning_rate: f64,
+    /// Learning rate of the parameters of the softness; 0 leaves them as they are.
+    pub softness_rate: f64,
+    /// Pairs of pictures in a step.
+    pub pairs: usize,
+    /// Steps in an epoch.
+    pub steps: usize,
+    /// Shapes of a class that the `IoU` after every epoch is taken from.
+    pub val: usize,
+    /// Seed of the weights, the shapes and their order.
+    pub seed: u64,
+}
+
+/// Where shapes come from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Data {
+    /// [`Procedural`](crate::Procedural), with so many shapes of a class to learn from.
+    Procedural(usize),
+    /// The files of a folder, see [`NpzFolder`](crate::NpzFolder).
+    Files(PathBuf),
+}
+
+impl fmt::Display for Data {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Procedural(count) => {
+                write!(f, "procedural, {count} shapes of a class to learn from")
+            }
+            Self::Files(folder) => folder.display().fmt(f),
+        }
+    }
+}
+
+impl Settings {
+    /// The T-conorm.
+    ///
+    /// # Errors
+    ///
+    /// If its name is not one.
+    pub fn t_conorm(&self) -> anyhow::Result<TConorm> {
+        Ok(self.t_conorm.parse()?)
+    }
+
+    /// What differs from `other`, in words; nothing if they are the same training.
+    pub(crate) fn difference(&self, other: &Self) -> Option<String> {
+        let [mine, theirs] = [self, other].map(|settings| serde_json::to_value(settings).ok());
+        let (mine, theirs) = (mine?, theirs?);
+        let differ = |(key, value): (&String, &serde_json::Value)| {
+            (theirs.get(key) != Some(value)).then(|| {
+                let other = theirs.get(key).unwrap_or(&serde_json::Value::Null);
+                format!("{key} is {value} there, {other} here")
+            })
+        };
+        let found: Vec<String> = mine.as_object()?.iter().filter_map(differ).collect();
+        (!found.is_empty()).then(|| found.join("; "))
+    }
+}
+
+/// What is known after an epoch; number 0 is before the first step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Epoch {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Mean loss over its steps: silhouettes and smoothness; none before the first step.
+    pub loss: Option<f64>,
+    /// Mean soft `IoU` of the silhouettes over its steps.
+    pub silhouette_iou: Option<f64>,
+    /// Mean voxel `IoU` of each class on held-out shapes.
+    pub voxel_iou: Vec<f64>,
+    /// Parameters of the softness.
+    pub phi: Vec<f64>,
+    /// Time of its steps in seconds.
+    pub time: Time,
+}
+
+/// Seconds that the steps of an epoch took, in all and by what they did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Time {
+    /// All of it.
+    pub all: f64,
+    /// Making or reading pictures.
+    pub data: f64,
+    /// The network, forward and back.
+    pub network: f64,
+    /// The rasterizer and the loss of silhouettes, forward and back.
+    pub rasterizer: f64,
+    /// What keeps surfaces smooth, forward and back.
+    pub smoothness: f64,
+    /// The optimisers.
+    pub optimizer: f64,
+    /// Pictures that the network saw.
+    pub pictures: usize,
+}
+
+impl Epoch {
+    /// Mean of the classes.
+    pub fn mean_iou(&self) -> f64 {
+        softrast_lab::mean(&self.voxel_iou)
+    }
+}
+
+impl Time {
+    /// Pictures a second; 0 without any.
+    pub fn rate(&self) -> f64 {
+        if self.all > 0.0 { self.pictures as f64 / self.all } else { 0.0 }
+    }
+
+    /// Part of the time that the rasterizer takes, 0 to 1.
+    pub fn rasterizer_share(&self) -> f64 {
+        if self.all > 0.0 { self.rasterizer / self.all } else { 0.0 }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.all += other.all;
+        self.data += other.data;
+        self.network += other.network;
+        self.rasterizer += other.rasterizer;
+        self.smoothness += other.smoothness;
+        self.optimizer += other.optimizer;
+        self.pictures += other.pictures;
+    }
+}
+
+impl Header {
+    /// Checks that every value is one that a training writes.
+    pub(crate) fn check(&self, path: &Path) -> anyhow::Result<()> {
+        let Self { settings, classes, epochs } = self;
+        let is_count = |n: usize| (1..=1_000_000).contains(&n);
+        let is_phi = |phi: &[f64]| {
+            let softness = serde_json::json!({ "softness": settings.softness, "phi": phi });
+            ScheduledSoftness::parse(&softness.to_string(), path)
+        };
+        settings.t_conorm()?;
+        is_phi(&settings.phi)?;
+        let rates = [settings.learning_rate, settings.softness_rate];
+        ensure!(rates.iter().all(|&rate| is_finite_from_0(rate)), "a rate is {rates:?}");
+        let counts = [settings.pairs, settings.steps, settings.val];
+        ensure!(counts.into_iter().all(is_count), "pairs, steps and val are {counts:?}");
+        if let Data::Procedural(shapes) = settings.data {
+            ensure!(is_count(shapes), "a class has {shapes} shapes");
+        }
+        ensure!(!classes.is_empty() && !epochs.is_empty(), "there is no class or no epoch");
+        for (number, epoch) in epochs.iter().enumerate() {
+            ensure!(epoch.number == number, "epoch {number} has the number {}", epoch.number);
+            let [found, expected] = [epoch.voxel_iou.len(), classes.len()];
+            ensure!(found == expected, "epoch {number} scores {found} classes of {expected}");
+            let is_share = |iou: &f64| (0.0..=1.0).contains(iou);
+            let shares = epoch.voxel_iou.iter().all(is_share);
+            ensure!(shares, "an IoU of epoch {number} is not from 0 to 1");
+            let Time { all, data, network, rasterizer, smoothness, optimizer, .. } = epoch.time;
+            let times = [all, data, network, rasterizer, smoothness, optimizer];
+            let is_time = times.into_iter().all(is_finite_from_0);
+            ensure!(is_time, "a time of epoch {number} is no time");
+            is_phi(&epoch.phi).with_context(|| format!("epoch {number}"))?;
+        }
+        Ok(())
+    }
+}
+
+fn is_finite_from_0(x: f64) -> bool {
+    x.is_finite() && x >= 0.0
+}
