@@ -5,10 +5,12 @@
 //! - [`mesh`]: triangle meshes, a careful OBJ loader, generators;
 //! - [`softness`]: soft step functions as burn tensor ops;
 //! - [`raster`]: cameras, silhouettes, losses, exact to second order;
-//! - [`meta`]: optimisers and inner loops that can be differentiated.
+//! - [`meta`]: optimisers and inner loops that can be differentiated;
+//! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them.
 //!
 //! The README of the project has a first program.
 
+pub use softrast_inverse as inverse;
 pub use softrast_mesh as mesh;
 pub use softrast_meta as meta;
 pub use softrast_raster as raster;
