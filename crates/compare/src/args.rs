@@ -4,6 +4,7 @@ use clap::Parser;
 use softrast_cli::{MethodArgs, SoftnessChoice, Variant};
 use softrast_inverse::{Method, Resolution};
 use softrast_raster::compiled_backends;
+use softrast_softness::ScheduledSoftness;
 
 use crate::{
     Cell, Purpose, Variation,
@@ -106,6 +107,18 @@ fn crossing(text: &str) -> Result<String, String> {
     }
 }
 
+/// Whether a method that comes with the programs does so for a task; one that is added may have none.
+fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
+    let there = |name: &str| ScheduledSoftness::learned(name).is_ok();
+    match &method.softness {
+        Some(SoftnessChoice::Learned(None)) => there(task.name()),
+        Some(SoftnessChoice::Learned(Some(kind))) => {
+            kind == "surrogate" || there(kind) || there(&format!("{}-{kind}", task.name()))
+        }
+        _ => true,
+    }
+}
+
 impl Args {
     /// All cells in the order of the tables: by task, variant and method, and at the end what is tried on other tasks.
     ///
@@ -169,7 +182,9 @@ impl Args {
             purpose,
         };
         for NamedMethod { name, method } in &self.methods {
-            let Some(method) = method else { continue };
+            let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
+                continue;
+            };
             // A surrogate is left out where no edge moves.
             let surrogate = SoftnessChoice::Learned(Some("surrogate".into()));
             if task.moves_edges() || method.softness.as_ref() != Some(&surrogate) {
@@ -177,7 +192,9 @@ impl Args {
             }
         }
         for NamedMethod { name, method } in &self.varied {
-            let Some(method) = method else { continue };
+            let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
+                continue;
+            };
             let varied = |what: String| format!("{name} {what}");
             if task.moves_edges() {
                 let usual =
@@ -219,6 +236,9 @@ impl Args {
             return Ok(None);
         }
         let method = MethodArgs::parse(&name).map_err(anyhow::Error::msg)?;
+        if !is_there(task, &method) {
+            return Ok(None);
+        }
         let purpose = Purpose::Crossed(from.name());
         Ok(Some(Cell { task, variant, method, name, backend: None, runs, purpose }))
     }
@@ -248,7 +268,7 @@ mod tests {
 
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
-        let cells = args("--quick").cells().unwrap();
+        let cells = args("--quick --tasks shape2d,shape3d,pose,occlusion").cells().unwrap();
         assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + 4 * 2 * 3);
         assert_eq!((cells[0].task.name(), cells[18].variant), ("shape2d", Variant::Transfer));
         assert_eq!(cells[12].name, "learned resolution 128");
@@ -272,13 +292,16 @@ mod tests {
     #[test]
     fn seeds_are_one_number_or_one_for_each_task_and_nonsense_is_refused() {
         let runs = |line: &str| {
-            let cells =
-                args(&format!("--methods exp --varied= --crossed= {line}")).cells().unwrap();
+            let cells = args(&format!(
+                "--tasks shape2d,shape3d,pose,occlusion --methods exp --varied= --crossed= {line}"
+            ))
+            .cells()
+            .unwrap();
             cells.chunks(2).map(|of_task| of_task[0].runs).collect::<Vec<_>>()
         };
         assert_eq!(runs("--runs 3"), [3; 4]);
         assert_eq!(runs("--runs 20,5,60,50"), [20, 5, 60, 50]);
-        assert!(args("--runs 20,5").cells().is_err());
+        assert!(args("--tasks shape2d,shape3d,pose,occlusion --runs 20,5").cells().is_err());
         for (flag, value, part) in
             [("--crossed", "learned-surrogate", "every task"), ("--methods", "sofft", "gumbel_min")]
         {
