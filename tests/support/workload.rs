@@ -14,8 +14,8 @@ use softrast_softness::{EdgeSoftness, Family, Softness};
 const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
 /// Its scale in NDC².
 const SCALE: f64 = 1e-4;
-/// Distance (world units), elevation and half the field of view (degrees) of every camera.
-const CAMERA: [f64; 3] = [2.732, 0.0, 30.0];
+/// Distance (world units), elevation and field of view (degrees) of every camera.
+const CAMERA: [f64; 3] = [2.732, 0.0, 60.0];
 /// Centre and radius of the disk that images are compared with, in NDC.
 const DISK: ([f64; 2], f64) = ([-0.1, 0.05], 0.5);
 
@@ -120,8 +120,8 @@ impl Workload {
 
     /// Vertices of all views on the screen, `[views, vertices, 3]`.
     fn project<B: Backend>(&self, world: Tensor<B, 3>) -> Tensor<B, 3> {
-        let [distance, elevation, half_angle] = CAMERA;
-        let orbit = |&azimuth| [distance, elevation, azimuth, half_angle];
+        let [distance, elevation, fov] = CAMERA;
+        let orbit = |&azimuth| [distance, elevation, azimuth, fov];
         let orbits: Vec<f64> = self.azimuths_deg.iter().flat_map(orbit).collect();
         project(world, tensor(orbits, [self.azimuths_deg.len(), 4]))
     }

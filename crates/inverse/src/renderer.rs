@@ -1,38 +1,32 @@
-use std::{
-    cell::{OnceCell, RefCell},
-    collections::BTreeMap,
-    sync::Arc,
-};
+use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
-use burn::tensor::{DType, Element, Tensor, TensorData};
-use softrast_meta::{numbers, tensor, vector};
-use softrast_raster::{HostBackend, RasterBackend, Rasterizer, Silhouette};
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, Surrogate};
+use burn::tensor::{Element, Tensor, TensorData};
+use softrast_meta::{tensor, vector};
+use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer};
+use softrast_softness::{EdgeSoftness, ScheduledSoftness};
 
 use crate::{PhiLayout, Resolution};
 
-/// A scale may fall by this factor before support and knots are chosen anew.
-const STALE: f64 = 0.95;
-
 /// Draws soft silhouettes of one mesh topology at every step of a run.
 ///
-/// Support and knots are chosen for a step when it is first drawn, and serve the steps after it for as long as the scale has not fallen
-/// by 5 %. Tables of steps without a gradient to φ are kept.
+/// Support and knots follow the softness as in a [`SoftRenderer`]. Tables of steps without a gradient to φ are kept.
 #[derive(Debug)]
 pub struct ScheduledRenderer {
     layout: PhiLayout,
     /// What is drawn where nothing is differentiated by φ.
     values: ScheduledSoftness,
     own: Vec<f64>,
-    rasterizer: Rasterizer,
+    size: usize,
     resolution: Resolution,
-    faces: Option<Arc<[[u32; 3]]>>,
-    /// Of each step the first one that has its support and knots.
-    prepared_at: Vec<usize>,
-    prepared: BTreeMap<usize, OnceCell<Silhouettes>>,
-    /// Tables of the values, by [`PhiLayout::stage`].
+    /// What draws silhouettes, if the problem has any: as they are seen, and as their gradient has it, if that is another.
+    renderers: Option<(Edges, Option<Edges>)>,
+    /// What was drawn with so far, by [`PhiLayout::stage`].
+    silhouettes: RefCell<BTreeMap<usize, Silhouettes>>,
+    /// Tables of the values, by stage.
     tables: RefCell<BTreeMap<usize, TensorData>>,
 }
+
+type Edges = SoftRenderer<EdgeSoftness>;
 
 /// Silhouettes as they are seen, and those whose gradient stands for theirs, if there are such.
 #[derive(Clone, Debug)]
@@ -52,22 +46,16 @@ impl ScheduledRenderer {
         faces: Option<Arc<[[u32; 3]]>>,
     ) -> Self {
         let (values, own) = layout.softness(phi);
-        let mut prepared_at = Vec::with_capacity(layout.steps() + 1);
-        let (mut first, mut prepared) = (0, f64::NAN);
-        for step in 0..=layout.steps() {
-            let scale = match &values.schedule {
-                None => 1.0,
-                Some(_) => values.scale_at(layout.part(step), layout.size()),
+        let renderers = faces.map(|faces| {
+            let of = |softness, phi| {
+                SoftRenderer::with_rasterizer(rasterizer, faces.clone(), softness, phi)
             };
-            // Not a number at first, which is in no range.
-            if !(STALE..=1.0).contains(&(scale / prepared)) {
-                (first, prepared) = (step, scale);
-            }
-            prepared_at.push(first);
-        }
-        let cells = prepared_at.iter().map(|&first| (first, OnceCell::new())).collect();
-        let (prepared, tables) = (cells, RefCell::default());
-        Self { layout, values, own, rasterizer, resolution, faces, prepared_at, prepared, tables }
+            let surrogate = values.surrogate.clone().map(|found| of(found.softness, found.phi));
+            (of(values.softness, values.phi.clone()), surrogate)
+        });
+        let (silhouettes, tables) = Default::default();
+        let size = rasterizer.size;
+        Self { layout, values, own, size, resolution, renderers, silhouettes, tables }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
@@ -101,8 +89,8 @@ impl ScheduledRenderer {
         step: usize,
     ) -> Tensor<B, 1> {
         let step = step.min(self.layout.steps());
-        match &self.faces {
-            Some(faces) => self.table(faces, phi, step).flatten(0, 1),
+        match &self.renderers {
+            Some(_) => self.table(&self.silhouettes::<B>(step), phi, step).flatten(0, 1),
             None => {
                 let parts = [self.layout.phi(phi, step), self.layout.own(phi)];
                 Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0)
@@ -123,33 +111,36 @@ impl ScheduledRenderer {
     /// Pixels a side of the image at a step.
     pub fn side(&self, step: usize) -> usize {
         let width = self.values.width_at(self.layout.part(step), self.layout.size());
-        self.resolution.side(self.rasterizer.size, width)
+        self.resolution.side(self.size, width)
     }
 
-    fn silhouettes<B: RasterBackend>(&self, faces: &Arc<[[u32; 3]]>, step: usize) -> &Silhouettes {
-        let first = self.prepared_at[step];
-        self.prepared[&first].get_or_init(|| {
-            let part = self.layout.part(first);
-            let size = self.layout.size();
-            let prepared = |softness: EdgeSoftness, phi: &[f64]| {
-                self.rasterizer.prepare_on::<HostBackend, _>(faces, softness, phi, B::ON_HOST)
-            };
-            let surrogate = self.values.surrogate_at(part, size);
+    /// What draws at a step, always the same: tables belong to its knots.
+    ///
+    /// # Panics
+    ///
+    /// If the problem has no faces.
+    fn silhouettes<B: RasterBackend>(&self, step: usize) -> Silhouettes {
+        let mut kept = self.silhouettes.borrow_mut();
+        let silhouettes = kept.entry(self.layout.stage(step)).or_insert_with(|| {
+            let renderers = self.renderers.as_ref();
+            let (seen, surrogate) = renderers.expect("a problem that sees silhouettes has faces");
+            let (part, size) = (self.layout.part(step), self.layout.size());
+            let other = surrogate.as_ref().zip(self.values.surrogate_at(part, size));
             Silhouettes {
-                seen: prepared(self.layout.edge(), &self.values.phi_at(part, size)),
-                surrogate: surrogate.map(|Surrogate { softness, phi }| prepared(softness, &phi)),
+                seen: seen.prepared::<B>(&self.values.phi_at(part, size)),
+                surrogate: other.map(|(renderer, found)| renderer.prepared::<B>(&found.phi)),
             }
-        })
+        });
+        silhouettes.clone()
     }
 
     /// The table of a step `[rows, 4]`, and below it that of the surrogate.
     fn table<B: RasterBackend>(
         &self,
-        faces: &Arc<[[u32; 3]]>,
+        Silhouettes { seen, surrogate }: &Silhouettes,
         phi: &Tensor<B, 1>,
         step: usize,
     ) -> Tensor<B, 2> {
-        let Silhouettes { seen, surrogate } = self.silhouettes::<B>(faces, step);
         let table = seen.table(self.layout.phi(phi, step));
         match surrogate.iter().zip(self.layout.surrogate(phi, step)).next() {
             None => table,
@@ -158,33 +149,26 @@ impl ScheduledRenderer {
     }
 
     /// The table of the values.
-    ///
-    /// For a GPU it is computed on the CPU in f64: the GPU then gets it in one piece, instead of some sixty small kernels over a few
-    /// hundred numbers, and its curvature is not lost to rounding.
-    fn fixed_table<B: RasterBackend>(&self, faces: &Arc<[[u32; 3]]>, step: usize) -> Tensor<B, 2> {
+    fn fixed_table<B: RasterBackend>(
+        &self,
+        Silhouettes { seen, surrogate }: &Silhouettes,
+        step: usize,
+    ) -> Tensor<B, 2> {
+        let dtype = <B::FloatElem as Element>::dtype();
         let mut tables = self.tables.borrow_mut();
         let table = tables.entry(self.layout.stage(step)).or_insert_with(|| {
             let (part, size) = (self.layout.part(step), self.layout.size());
-            let (phi, surrogate) =
-                (self.values.phi_at(part, size), self.values.surrogate_at(part, size));
-            let Silhouettes { seen, surrogate: other } = self.silhouettes::<B>(faces, step);
-            let pairs = [(seen, phi)].into_iter().chain(other.iter().zip(surrogate.map(|s| s.phi)));
-            let tables: Vec<Vec<f64>> =
-                pairs.map(|(of, phi)| table_values::<B>(of, &phi)).collect();
-            let values = tables.concat();
+            let own = (seen, self.values.phi_at(part, size));
+            let other = surrogate.iter().zip(self.values.surrogate_at(part, size));
+            let pairs = [own].into_iter().chain(other.map(|(of, found)| (of, found.phi)));
+            let tables = pairs
+                .map(|(of, phi)| of.table_data::<B>(&phi, dtype).iter::<f64>().collect::<Vec<_>>());
+            let values = tables.collect::<Vec<_>>().concat();
             let rows = values.len() / 4;
             TensorData::new(values, [rows, 4])
         });
-        let dtype = <B::FloatElem as Element>::dtype();
         Tensor::from_data(table.clone(), (&Default::default(), dtype))
     }
-}
-
-/// Numbers of the table of a softness, for drawing on `B`.
-fn table_values<B: RasterBackend>(of: &Silhouette<EdgeSoftness>, phi: &[f64]) -> Vec<f64> {
-    let dtype = if B::ON_HOST { <B::FloatElem as Element>::dtype() } else { DType::F64 };
-    let data = TensorData::new(phi.to_vec(), [phi.len()]);
-    numbers(of.table(Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), dtype))))
 }
 
 /// The softness at one step of a run, as [`InverseProblem::image`](crate::InverseProblem::image) sees it.
@@ -215,19 +199,19 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     /// If the problem has no faces.
     pub fn silhouette(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
         let renderer = self.renderer;
-        let faces = renderer.faces.as_ref().expect("a problem that sees silhouettes has faces");
+        let silhouettes = renderer.silhouettes::<B>(self.step);
         let table = match &self.phi {
-            Phi::Fixed => renderer.fixed_table(faces, self.step),
-            Phi::Tracked(phi) => renderer.table(faces, phi, self.step),
+            Phi::Fixed => renderer.fixed_table(&silhouettes, self.step),
+            Phi::Tracked(phi) => renderer.table(&silhouettes, phi, self.step),
             Phi::Prepared(table) => table.clone().reshape([-1, 4]),
         };
-        let Silhouettes { seen, surrogate } = renderer.silhouettes::<B>(faces, self.step);
+        let Silhouettes { seen, surrogate } = silhouettes;
         let side = renderer.side(self.step);
-        let seen = seen.clone().sized(side);
+        let seen = seen.sized(side);
         let Some(surrogate) = surrogate else { return seen.coverage_by_table(vertices, table) };
         let ([rows, _], own) = (table.dims(), seen.profile().knots());
         let below = table.clone().narrow(0, own, rows - own);
-        let surrogate = surrogate.clone().sized(side);
+        let surrogate = surrogate.sized(side);
         seen.coverage_with_surrogate(vertices, table.narrow(0, 0, own), &surrogate, below)
     }
 

@@ -26,7 +26,7 @@ pub(crate) struct Workload {
 impl Workload {
     /// A mesh seen from 2.732 away with a field of view of 60 degrees, at width 1e-2.
     pub(crate) fn new(name: &str, mesh: &Mesh, azimuths: &[f64], size: usize) -> Self {
-        let orbit = |&azimuth: &f64| [2.732, 0.0, azimuth, 30.0];
+        let orbit = |&azimuth: &f64| [2.732, 0.0, azimuth, 60.0];
         Self {
             name: name.to_owned(),
             faces: mesh.faces().into(),

@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
 
 /// Camera depth, in world units, below which a vertex counts as behind the camera. Faces with such
 /// a vertex are not drawn.
@@ -7,6 +7,101 @@ pub const NEAR: f64 = 1e-2;
 /// Vertices farther than this from the origin along an axis, in world units, are moved there: their
 /// squares would leave the range of f32, and their gradients with them.
 const FARTHEST: f64 = 1e15;
+
+/// A camera that looks at the origin, with y up.
+///
+/// ```
+/// # use burn::backend::NdArray;
+/// use softrast_raster::Orbit;
+///
+/// let front = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 0.0, fov_deg: 40.0 };
+/// let side = Orbit { azimuth_deg: 90.0, ..front };
+/// let cameras = Orbit::tensors::<NdArray>(&[front, side], &Default::default()); // [2, 4]
+/// assert_eq!(Orbit::from_tensor(cameras), [front, side]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orbit {
+    /// Distance from the origin, in world units.
+    pub distance: f64,
+    /// Angle above the ground.
+    pub elevation_deg: f64,
+    /// Angle around the vertical axis: at 0 the camera stands at -z, at 90 at +x.
+    pub azimuth_deg: f64,
+    /// Whole field of view, from one side of the image to the other; below 180.
+    pub fov_deg: f64,
+}
+
+impl Orbit {
+    /// The numbers as [`project`] takes them, `[1, 4]`.
+    pub fn tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 2> {
+        Self::tensors(std::slice::from_ref(self), device)
+    }
+
+    /// The numbers of a camera for each view, `[views, 4]`.
+    pub fn tensors<B: Backend>(cameras: &[Self], device: &B::Device) -> Tensor<B, 2> {
+        floats(
+            cameras.iter().flat_map(|camera| camera.numbers()).collect(),
+            [cameras.len(), 4],
+            device,
+        )
+    }
+
+    /// The cameras that such a tensor `[views, 4]` stands for.
+    ///
+    /// # Panics
+    ///
+    /// If the tensor has another shape.
+    pub fn from_tensor<B: Backend>(cameras: Tensor<B, 2>) -> Vec<Self> {
+        let [_, four] = cameras.dims();
+        assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", cameras.dims());
+        let numbers: Vec<f64> = cameras.into_data().iter().collect();
+        let of = |c: &[f64]| Self {
+            distance: c[0],
+            elevation_deg: c[1],
+            azimuth_deg: c[2],
+            fov_deg: c[3],
+        };
+        numbers.chunks(4).map(of).collect()
+    }
+
+    fn numbers(&self) -> [f64; 4] {
+        [self.distance, self.elevation_deg, self.azimuth_deg, self.fov_deg]
+    }
+}
+
+/// A camera that stands anywhere and looks anywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LookAt {
+    /// Where it stands, in world units.
+    pub eye: [f64; 3],
+    /// What is in the middle of its image.
+    pub target: [f64; 3],
+    /// Which way is up; not along the line of sight.
+    pub up: [f64; 3],
+    /// Whole field of view, from one side of the image to the other; below 180.
+    pub fov_deg: f64,
+}
+
+impl LookAt {
+    /// Rotation `[1, 3, 3]` and translation `[1, 3]` from world to camera axes, as [`project_from`] takes them.
+    ///
+    /// # Panics
+    ///
+    /// If the camera stands at its target, or looks along `up`.
+    pub fn pose<B: Backend>(&self, device: &B::Device) -> (Tensor<B, 3>, Tensor<B, 2>) {
+        let ahead =
+            unit([0, 1, 2].map(|k| self.target[k] - self.eye[k]), "a camera stands at its target");
+        let right = unit(cross(self.up, ahead), "a camera looks along its up");
+        let rows = [right, cross(ahead, right), ahead];
+        let translation = rows.map(|row| -dot(row, self.eye));
+        (floats(rows.concat(), [1, 3, 3], device), floats(translation.to_vec(), [1, 3], device))
+    }
+}
+
+/// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: the vertices of a mesh, for [`project`].
+pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tensor<B, 3> {
+    floats(positions.concat(), [1, positions.len(), 3], device)
+}
 
 /// Rotation from world to camera axes for cameras that look at the origin with y up.
 ///
@@ -44,8 +139,9 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 ///
 /// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates.
 /// `orbits` `[views, 4]` holds for each view the distance in world units, then elevation, azimuth
-/// and **half** the field of view in degrees. The result is `[views, vertices, 3]`: x and y in NDC
-/// (the image is [-1, 1]², x right, y up) and the camera depth in world units.
+/// and the whole field of view in degrees, as [`Orbit::tensor`] makes it. The result is `[views,
+/// vertices, 3]`: x and y in NDC (the image is [-1, 1]², x right, y up) and the camera depth in world
+/// units.
 ///
 /// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
 /// vertex nearer than [`NEAR`] is projected as though it were that near, so that nothing divides
@@ -59,25 +155,94 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 pub fn project<B: Backend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     let [views, four] = orbits.dims();
     assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", orbits.dims());
-    let [held, _, three] = vertices.dims();
-    assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
     let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([views]);
     let rotation = view_rotation(column(1), column(2));
-    let [distance, half_angle] = [column(0), column(3)].map(|c| c.reshape([views, 1, 1]));
-    let [sin, cos] = sin_cos(half_angle);
-    let focal = cos / sin;
+    seen(vertices, rotation, column(3), |camera| {
+        let depth = camera.clone().narrow(1, 2, 1) + column(0).reshape([views, 1, 1]);
+        (camera.narrow(1, 0, 2), depth)
+    })
+}
+
+/// Perspective projection by cameras of any pose.
+///
+/// `rotation` `[views, 3, 3]` and `translation` `[views, 3]` go from world to camera axes (x right, y up, z ahead): a point p is seen at
+/// `R p + t`. `fov_deg` `[views]` is the whole field of view in degrees. All else is as with [`project`].
+///
+/// # Panics
+///
+/// If the shapes do not fit.
+pub fn project_from<B: Backend>(
+    vertices: Tensor<B, 3>,
+    rotation: Tensor<B, 3>,
+    translation: Tensor<B, 2>,
+    fov_deg: Tensor<B, 1>,
+) -> Tensor<B, 3> {
+    let [views] = fov_deg.dims();
+    let (rotations, translations) = (rotation.dims(), translation.dims());
+    assert_eq!(rotations, [views, 3, 3], "rotations of {views} views are {rotations:?}");
+    assert_eq!(translations, [views, 3], "translations of {views} views are {translations:?}");
+    let focal = focal(fov_deg.clone());
+    seen(vertices, rotation, fov_deg, |camera| {
+        let along = |k: usize, n: usize| translation.clone().narrow(1, k, n).unsqueeze_dim::<3>(2);
+        let xy = camera.clone().narrow(1, 0, 2) + along(0, 2) * focal;
+        (xy, camera.narrow(1, 2, 1) + along(2, 1))
+    })
+}
+
+/// x, y and depth `[views, vertices, 3]` of vertices that are turned, magnified, and then `moved` to where the camera sees them: x and y
+/// times the focal length, and the depth.
+fn seen<B: Backend>(
+    vertices: Tensor<B, 3>,
+    rotation: Tensor<B, 3>,
+    fov_deg: Tensor<B, 1>,
+    moved: impl FnOnce(Tensor<B, 3>) -> (Tensor<B, 3>, Tensor<B, 3>),
+) -> Tensor<B, 3> {
+    let [views, ..] = rotation.dims();
+    let [held, _, three] = vertices.dims();
+    assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
+    let focal = focal(fov_deg);
     let zoom = Tensor::cat(vec![focal.clone(), focal.clone(), focal.ones_like()], 1);
     // One row for each axis: every op then runs along all vertices. The rasterizer wants the rows
     // too, and turning them back is free.
     let vertices = vertices.clamp(-FARTHEST, FARTHEST).swap_dims(1, 2);
-    let camera = (rotation * zoom).matmul(vertices);
-    let depth = camera.clone().narrow(1, 2, 1) + distance;
-    let xy = camera.narrow(1, 0, 2) * depth.clone().clamp_min(NEAR).recip();
+    let (xy, depth) = moved((rotation * zoom).matmul(vertices));
+    let xy = xy * depth.clone().clamp_min(NEAR).recip();
     Tensor::cat(vec![xy, depth], 1).swap_dims(1, 2)
+}
+
+/// Distance of the image plane whose image is [-1, 1]², `[views, 1, 1]`.
+fn focal<B: Backend>(fov_deg: Tensor<B, 1>) -> Tensor<B, 3> {
+    let [views] = fov_deg.dims();
+    let [sin, cos] = sin_cos(fov_deg * 0.5);
+    (cos / sin).reshape([views, 1, 1])
 }
 
 fn sin_cos<B: Backend, const D: usize>(degrees: Tensor<B, D>) -> [Tensor<B, D>; 2] {
     // One factor: burn 0.21 differentiates a division by a number in f32.
     let radians = degrees * (std::f64::consts::PI / 180.0);
     [radians.clone().sin(), radians.cos()]
+}
+
+fn floats<B: Backend, const D: usize>(
+    values: Vec<f64>,
+    shape: [usize; D],
+    device: &B::Device,
+) -> Tensor<B, D> {
+    let dtype = <B::FloatElem as Element>::dtype();
+    Tensor::from_data(TensorData::new(values, shape), (device, dtype))
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| a[k] * b[k]).sum()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
+}
+
+/// `a / |a|`; `otherwise` is what is wrong where that is no direction.
+fn unit(a: [f64; 3], otherwise: &str) -> [f64; 3] {
+    let length = dot(a, a).sqrt();
+    assert!(length > 1e-12, "{otherwise}");
+    a.map(|x| x / length)
 }

@@ -2,12 +2,14 @@
 //!
 //! A silhouette is a sum over faces of a one-dimensional function of the signed distance
 //! ([`profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
-//! softness and the T-conorm ([`Profile`]). [`Rasterizer`] puts the pieces together;
+//! softness and the T-conorm ([`Profile`]). A [`SoftRenderer`] puts the pieces together;
 //! [`reference`] is the same in plain tensor ops over every pixel-face pair. Scenes of a few faces
 //! that hide one another take their colours from [`blend`].
 
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
+compile_error!("softrast-raster needs a backend: turn on one of the features ndarray, flex, wgpu");
+
 mod backend;
-#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
 mod backend_choice;
 mod camera;
 mod colour;
@@ -19,12 +21,12 @@ mod loss;
 mod profile;
 pub mod reference;
 mod silhouette;
+mod soft_renderer;
 mod t_conorm;
 
 pub use backend::{ProfileSum, RasterBackend, profile_sum};
-#[cfg(any(feature = "ndarray", feature = "flex", feature = "wgpu"))]
 pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
-pub use camera::{NEAR, project, view_rotation};
+pub use camera::{LookAt, NEAR, Orbit, project, project_from, vertices, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;
@@ -34,4 +36,5 @@ pub use hard::hard_silhouette;
 pub use loss::{iou_loss, mse_loss};
 pub use profile::Profile;
 pub use silhouette::{Rasterizer, Silhouette};
+pub use soft_renderer::SoftRenderer;
 pub use t_conorm::{TConorm, UnknownTConorm};

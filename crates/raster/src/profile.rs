@@ -12,8 +12,12 @@ const BITS: std::ops::RangeInclusive<u32> = 2..=7;
 const FAR: [u32; 4] = [8, 16, 26, 36];
 /// There, the terms of a second derivative all but cancel; this many bits more keep what is left.
 const SHARPER: u32 = 2;
-/// Stands in for a support that does not end, in NDC: no drawn face is farther from a pixel.
+/// Stands in for a support that does not end, in NDC.
 const EVERYWHERE: f64 = 4e6;
+/// No drawn face is farther from a pixel, in NDC.
+const FARTHEST_DRAWN: f64 = 1.5e6;
+/// The largest radius that a profile may be stretched to, in NDC: its square fits an f32.
+const WIDEST: f64 = 1e9;
 /// Tails have the value of a place this many times as far as the support. Any place beyond it is as
 /// good for the image; but where the profile ends with a steep slope, its parameters must not move
 /// all that lies in the tail.
@@ -147,6 +151,22 @@ impl Profile {
         }
         let error = reached.innermost.max(reached.rest) * tolerance / 2.0;
         Self { grid, t_conorm, error }
+    }
+
+    /// The profile of the same softness stretched by `factor` along the distance, with the same bounds:
+    /// all that they were proven and measured from is stretched alike.
+    ///
+    /// None where a radius would leave the range that can be drawn, so that it has to be chosen anew.
+    pub(crate) fn stretched(mut self, factor: f64) -> Option<Self> {
+        let stretch = |radius: &mut f64| {
+            let least = if *radius >= EVERYWHERE { FARTHEST_DRAWN } else { NARROWEST };
+            // A side of the least radius is constant, or all but that: a narrower one suits it no better.
+            if *radius > NARROWEST || factor > 1.0 {
+                *radius *= factor;
+            }
+            (least..=WIDEST).contains(radius)
+        };
+        (stretch(&mut self.grid.outer) && stretch(&mut self.grid.inner)).then_some(self)
     }
 
     /// Distances, in NDC, beyond which a pixel outside and inside sees a constant.

@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
 
-use crate::{NEAR, Profile, ProfileSum, RasterBackend, TConorm, profile_sum};
+use crate::{HostBackend, NEAR, Profile, ProfileSum, RasterBackend, TConorm, profile_sum};
 
 /// How silhouettes are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,6 +110,17 @@ impl<S: Softness> Silhouette<S> {
         self.profile.table(&self.softness, phi)
     }
 
+    /// The numbers of the table of plain parameters, for drawing on `B` with vertices of this float type.
+    ///
+    /// For a GPU it is computed on the CPU in f64: the GPU then gets it in one piece, instead of some sixty small kernels over a few
+    /// hundred numbers, and its curvature is not lost to rounding.
+    pub fn table_data<B: RasterBackend>(&self, phi: &[f64], dtype: DType) -> TensorData {
+        let dtype = if B::ON_HOST { dtype } else { DType::F64 };
+        let data = TensorData::new(phi.to_vec(), [phi.len()]);
+        let phi = Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), dtype));
+        self.table(phi).into_data()
+    }
+
     /// Like [`Silhouette::coverage`], from a table.
     pub fn coverage_by_table<B: RasterBackend>(
         &self,
@@ -127,6 +138,18 @@ impl<S: Softness> Silhouette<S> {
         table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
         profile_sum(&self.op, vertices, table)
+    }
+
+    /// What draws with the softness stretched by `factor` along the distance, if it can be told from this.
+    pub(crate) fn stretched(&self, factor: f64) -> Option<Self> {
+        let profile = self.profile.stretched(factor)?;
+        let op = ProfileSum { grid: profile.grid, ..self.op.clone() };
+        Some(Self { softness: self.softness.clone(), profile, op })
+    }
+
+    /// Which softness it is.
+    pub(crate) fn softness(&self) -> &S {
+        &self.softness
     }
 
     /// The same on images of `size` × `size` pixels: neither support nor knots depend on it.

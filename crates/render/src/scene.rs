@@ -48,7 +48,7 @@ impl Scene {
         let mesh = Mesh::load(&args.mesh)?;
         let mesh = if args.raw { mesh } else { mesh.normalized() };
         let target = args.target.as_ref().map(|target| pixels(target, args.size)).transpose()?;
-        let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov / 2.0];
+        let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov];
         Ok(Self {
             faces: mesh.faces().into(),
             vertices: mesh.positions().as_flattened().to_vec(),

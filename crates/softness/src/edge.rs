@@ -77,6 +77,11 @@ impl Softness for EdgeSoftness {
         self.family.scale(phi)
     }
 
+    /// In NDC.
+    fn width(&self, phi: &[f64]) -> f64 {
+        if self.squared { self.scale(phi).sqrt() } else { self.scale(phi) }
+    }
+
     fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
         self.family.with_scale(phi, factor)
     }

@@ -131,9 +131,7 @@ impl ScheduledSoftness {
     ///
     /// If `part` is not in [0, 1].
     pub fn width_at(&self, part: f64, size: usize) -> f64 {
-        let own = self.softness.scale(&self.phi);
-        let scale = self.factor_at(part, size).map_or(own, |factor| factor * own);
-        if self.softness.squared { scale.sqrt() } else { scale }
+        self.softness.width(&self.phi_at(part, size))
     }
 
     /// Parameters of the softness at `part` of a run, 0 to 1, on images of `size` × `size` pixels.

@@ -106,8 +106,15 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         phi[0].exp()
     }
 
-    /// Parameters of `s(x / factor)`, where `phi` are those of s and `factor` is `[1]`. Provided: the
-    /// logarithm of the factor is added to the first.
+    /// How wide the step is, in the unit of `x`: the scale, unless that has another unit. Where
+    /// [`with_scale`](Softness::with_scale) is all that changes the parameters, the step is stretched
+    /// along `x` by as much as the width grows.
+    fn width(&self, phi: &[f64]) -> f64 {
+        self.scale(phi)
+    }
+
+    /// Parameters of a step whose scale is `factor` `[1]` times that of `phi`, and which is the same
+    /// but for that. Provided: the logarithm of the factor is added to the first.
     fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
         let first = phi.clone().narrow(0, 0, 1) + factor.log();
         with_first(first, phi)

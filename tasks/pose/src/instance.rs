@@ -18,7 +18,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Distance, elevation, azimuth and half field of view, as `softrast_raster::project` wants.
+    /// Distance, elevation, azimuth and half field of view.
     pub fn orbit(&self) -> [f64; 4] {
         [self.distance, self.elevation_deg, self.azimuth_deg, self.half_fov_deg]
     }

@@ -54,7 +54,8 @@ impl<B: Backend> Scene<B> {
         let faces: Arc<[[u32; 3]]> = mesh.faces().into();
 
         let targets = orbits(|instance| instance.target.orbit());
-        let target = hard_silhouette(project(positions.clone(), targets.clone()), &faces, size);
+        let target =
+            hard_silhouette(project(positions.clone(), whole_fov(targets.clone())), &faces, size);
         let angle = |k: usize| targets.clone().narrow(1, k, 1).reshape([views]);
         let rotation = view_rotation(angle(1), angle(2));
         let turned = positions.expand([views, count, 3]).matmul(rotation.swap_dims(1, 2));
@@ -88,7 +89,7 @@ impl<B: Backend> Scene<B> {
             None => theta,
             Some(half_fov) => Tensor::cat(vec![theta, half_fov.clone()], 1),
         };
-        project(self.turned.clone(), orbits)
+        project(self.turned.clone(), whole_fov(orbits))
     }
 
     /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
@@ -119,6 +120,11 @@ impl<B: Backend> Scene<B> {
         }
         Tensor::cat(columns, 1)
     }
+}
+
+/// Orbits with half the field of view in their last column, as [`project`] takes them.
+fn whole_fov<B: Backend>(orbits: Tensor<B, 2>) -> Tensor<B, 2> {
+    Tensor::cat(vec![orbits.clone().narrow(1, 0, 3), orbits.narrow(1, 3, 1) * 2.0], 1)
 }
 
 /// Distance from the origin beyond which a camera has the whole mesh in front of it.

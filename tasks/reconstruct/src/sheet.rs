@@ -66,9 +66,9 @@ fn on_white(planes: &[u8]) -> RgbImage {
 
 /// A mesh in a view, with the light of the pictures of solids; nearest faces win.
 pub(crate) fn drawn(vertices: &[[f64; 3]], faces: &[[u32; 3]], view: usize) -> RgbImage {
-    let [distance, _, _, half_fov] = view::orbit(view);
+    let [distance, _, _, fov] = view::orbit(view);
     let axes = view::axes(view);
-    let focal = half_fov.to_radians().tan().recip();
+    let focal = (fov / 2.0).to_radians().tan().recip();
     let mut image = RgbImage::from_pixel(SIZE as u32, SIZE as u32, Rgb([255; 3]));
     let mut nearest = vec![f64::INFINITY; SIZE * SIZE];
     let seen: Vec<[f64; 3]> = vertices

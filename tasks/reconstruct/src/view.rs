@@ -7,22 +7,22 @@ use crate::solid::{Part, Solid, dot, norm};
 pub const SIZE: usize = 64;
 /// Views around a shape.
 pub const VIEWS: usize = 24;
-/// Distance of the cameras in world units, their elevation and half their field of view.
+/// Distance of the cameras in world units, their elevation and field of view.
 ///
 /// Source: docs/notes.md, Reconstruction.
 const DISTANCE: f64 = 2.732;
 const ELEVATION_DEG: f64 = 30.0;
-const HALF_FOV_DEG: f64 = 15.0;
+const FOV_DEG: f64 = 30.0;
 
 /// Nearer to a surface than this, in world units, a ray has met it: a thirtieth of a pixel.
 const MET: f64 = 8e-4;
 /// A ray that takes more steps grazes a surface for ever.
 const STEPS: usize = 96;
 
-/// Camera of a view: distance, elevation, azimuth and half the field of view, in world units and
+/// Camera of a view: distance, elevation, azimuth and field of view, in world units and
 /// degrees, as [`softrast_raster::project`] wants them. Azimuth falls by 15 degrees from view to view.
 pub fn orbit(view: usize) -> [f64; 4] {
-    [DISTANCE, ELEVATION_DEG, -360.0 / VIEWS as f64 * view as f64, HALF_FOV_DEG]
+    [DISTANCE, ELEVATION_DEG, -360.0 / VIEWS as f64 * view as f64, FOV_DEG]
 }
 
 /// Right, up and ahead of the camera of a view, in world axes.
@@ -45,7 +45,7 @@ pub(crate) fn light(normal: [f64; 3], axes: &[[f64; 3]; 3]) -> f64 {
 /// else 0, and so are the colours.
 pub(crate) fn picture(solid: &Solid, view: usize) -> Vec<u8> {
     let axes = axes(view);
-    let focal = HALF_FOV_DEG.to_radians().tan();
+    let focal = (FOV_DEG / 2.0).to_radians().tan();
     let eye = axes[2].map(|x| -DISTANCE * x);
     let pixels = SIZE * SIZE;
     let mut planes = vec![0; 4 * pixels];

@@ -10,11 +10,11 @@ use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
 
 /// Cameras around the target, evenly in azimuth.
 pub const VIEWS: usize = 24;
-/// Distance of the cameras in world units, and half their field of view in degrees.
+/// Distance of the cameras in world units, and their field of view in degrees.
 ///
 /// Source: docs/notes.md, 3D shape.
 pub(crate) const DISTANCE: f64 = 2.732;
-const HALF_FOV_DEG: f64 = 15.0;
+const FOV_DEG: f64 = 30.0;
 
 /// Weights of the bending of the surface in the loss: Laplacian and flatness. Source: docs/notes.md, 3D shape.
 const LAPLACIAN: f64 = 0.03;
@@ -48,7 +48,7 @@ impl<B: Backend> Scene<B> {
     /// The `instance` with these meshes on images of `size` × `size` pixels.
     pub fn new(target: &Mesh, template: &Mesh, instance: &Instance, size: usize) -> Self {
         let azimuths_deg = (0..VIEWS).map(|view| 360.0 / VIEWS as f64 * view as f64);
-        let orbit = |azimuth| [DISTANCE, instance.elevation_deg, azimuth, HALF_FOV_DEG];
+        let orbit = |azimuth| [DISTANCE, instance.elevation_deg, azimuth, FOV_DEG];
         let orbits = tensor(azimuths_deg.flat_map(orbit).collect(), [VIEWS, 4]);
         let count = target.positions().len();
         let positions: Tensor<B, 3> = tensor(target.positions().concat(), [1, count, 3]);

@@ -109,7 +109,7 @@ fn gradients_are_finite_on_every_broken_mesh_that_loads() {
         loaded += 1;
         let positions = mesh.positions().as_flattened();
         let vertices = tensor::<A>(positions, DType::F32).require_grad();
-        let orbit = tensor::<A>(&[2.732, 10.0, 30.0, 30.0], DType::F32).reshape([1, 4]);
+        let orbit = tensor::<A>(&[2.732, 10.0, 30.0, 60.0], DType::F32).reshape([1, 4]);
         let shaped = vertices.clone().reshape([1, mesh.positions().len() as i64, 3]);
         let softness = EdgeSoftness { family: Family::Logistic, squared: false };
         let phi = tensor::<A>(&softness.default_phi(0.02), DType::F32).require_grad();
@@ -132,7 +132,7 @@ fn drawn(softness: EdgeSoftness, scale: f64) -> String {
     let fox = fox();
     let positions = fox.positions().as_flattened();
     let vertices = tensor::<N>(positions, DType::F32).reshape([1, fox.positions().len() as i64, 3]);
-    let orbit = tensor::<N>(&[3.0, 10.0, 90.0, 20.0], DType::F32).reshape([1, 4]);
+    let orbit = tensor::<N>(&[3.0, 10.0, 90.0, 40.0], DType::F32).reshape([1, 4]);
     let phi = tensor::<N>(&softness.default_phi(scale), DType::F32);
     let silhouette = Rasterizer::new(WIDE).prepare(&fox.faces().into(), softness, &phi);
     let image = silhouette.coverage(project(vertices, orbit), phi);

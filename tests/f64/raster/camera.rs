@@ -20,8 +20,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// x and y in NDC and the depth of one vertex, with the camera built by `look_at`.
-fn looked_at(vertex: [f64; 3], [distance, elevation, azimuth, half]: [f64; 4]) -> [f64; 3] {
-    let [e, a, half] = [elevation, azimuth, half].map(f64::to_radians);
+fn looked_at(vertex: [f64; 3], [distance, elevation, azimuth, fov]: [f64; 4]) -> [f64; 3] {
+    let [e, a, half] = [elevation, azimuth, fov / 2.0].map(f64::to_radians);
     let eye = [e.cos() * a.sin(), e.sin(), -e.cos() * a.cos()].map(|x| distance * x);
     let z = unit(eye.map(|x| -x));
     let x = unit(cross([0.0, 1.0, 0.0], z));
@@ -40,7 +40,7 @@ fn projected(vertex: [f64; 3], orbit: [f64; 4]) -> Vec<f64> {
 
 #[test]
 fn a_camera_without_angles_looks_along_z() {
-    let found = projected([0.5, -1.0, 1.0], [3.0, 0.0, 0.0, 45.0]);
+    let found = projected([0.5, -1.0, 1.0], [3.0, 0.0, 0.0, 90.0]);
     for (found, expected) in found.into_iter().zip([0.125, -0.25, 4.0]) {
         assert!((found - expected).abs() < 1e-15, "{found}, not {expected}");
     }
@@ -55,11 +55,11 @@ proptest! {
         distance in 0.1..10.0,
         elevation in -269.0..269.0,
         azimuth in -400.0..400.0,
-        half in 1.0..80.0,
+        fov in 2.0..160.0,
     ) {
         // At the poles `look_at` has no answer, and next to them no digits.
         prop_assume!(f64::cos(f64::to_radians(elevation)).abs() > 1e-2);
-        let orbit = [distance, elevation, azimuth, half];
+        let orbit = [distance, elevation, azimuth, fov];
         let expected = looked_at(vertex, orbit);
         for (found, expected) in projected(vertex, orbit).into_iter().zip(expected) {
             prop_assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()));
@@ -85,7 +85,7 @@ proptest! {
         vertex in [-1e6..1e6, -1e6..1e6, -1e6..1e6],
         elevation in prop_oneof![Just(90.0), Just(-90.0), -180.0..180.0],
     ) {
-        let found = projected(vertex, [0.0, elevation, 0.0, 30.0]);
+        let found = projected(vertex, [0.0, elevation, 0.0, 60.0]);
         prop_assert!(found.iter().all(|x| x.is_finite()));
     }
 }

@@ -39,7 +39,7 @@ fn seen(
     let positions = mesh.positions();
     let world: Tensor<NdArray<f64>, 3> =
         tensor(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
-    let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, elevation, a, 30.0]).collect();
+    let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, elevation, a, 60.0]).collect();
     let orbits: Tensor<NdArray<f64>, 2> = tensor(&orbits, [azimuths.len(), 4], DType::F64);
     Scene {
         vertices: project(world, orbits).into_data().iter().collect(),

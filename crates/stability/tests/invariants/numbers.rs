@@ -83,7 +83,7 @@ fn world(tested: &Tested) -> Levels {
 fn viewed<B: RasterBackend>(softness: &ScheduledSoftness, mesh: &Mesh, factor: f64) -> Vec<f64> {
     let positions: Vec<f64> = mesh.positions().iter().flatten().map(|x| factor * x).collect();
     let vertices = tensor::<B, 3>(positions, [1, mesh.positions().len(), 3]);
-    let orbit = tensor::<B, 2>(vec![3.0 * factor, 21.0, 35.0, 25.0], [1, 4]);
+    let orbit = tensor::<B, 2>(vec![3.0 * factor, 21.0, 35.0, 50.0], [1, 4]);
     let layout = PhiLayout::new(softness.clone(), Vec::new(), 1, SIZE);
     let (phi, faces) = (layout.start(), Some(mesh.faces().into()));
     let rasterizer = Rasterizer::new(SIZE);

@@ -1,0 +1,295 @@
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
+use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
+
+use crate::{HostBackend, RasterBackend, Rasterizer, Silhouette, TConorm};
+
+/// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
+const SAME: f64 = 1e-12;
+
+/// Draws soft silhouettes of one mesh topology.
+///
+/// It holds what an image depends on beside the vertices: faces, size, softness, T-conorm and tolerance. Support and knots follow the
+/// parameters φ by themselves, so no pixel is ever off by more than the tolerance. Where only the scale of the softness has changed they
+/// are stretched, which costs nothing; where its shape has, they are chosen anew, which takes milliseconds.
+///
+/// ```
+/// use burn::backend::{Autodiff, NdArray};
+/// use softrast_raster::{Orbit, SoftRenderer, project, vertices};
+/// use softrast_softness::Family;
+///
+/// let device = Default::default();
+/// let corners = vertices::<Autodiff<NdArray>>(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &device);
+/// let camera = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 20.0, fov_deg: 60.0 }.tensor(&device).require_grad();
+/// let renderer = SoftRenderer::new(&[[0, 1, 2]], 32, Family::Logistic, 0.01);
+/// let alpha = renderer.silhouette(project(corners, camera.clone())); // [1, 32, 32]
+/// let gradient = camera.grad(&alpha.mean().backward()).unwrap(); // [1, 4]
+/// # assert_eq!(gradient.dims(), [1, 4]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct SoftRenderer<S> {
+    rasterizer: Rasterizer,
+    faces: Arc<[[u32; 3]]>,
+    softness: S,
+    phi: Vec<f64>,
+    surrogate: Option<Box<Self>>,
+    kept: Arc<Mutex<Kept<S>>>,
+}
+
+/// What the last image needed and the next one may need again.
+#[derive(Debug)]
+struct Kept<S> {
+    prepared: Option<Prepared<S>>,
+    table: Option<Table>,
+}
+
+/// Support and knots, for the parameters `phi` and others of the same shape.
+#[derive(Debug)]
+struct Prepared<S> {
+    phi: Vec<f64>,
+    on_host: bool,
+    silhouette: Silhouette<S>,
+}
+
+/// The table of the parameters `phi`.
+#[derive(Debug)]
+struct Table {
+    phi: Vec<f64>,
+    on_host: bool,
+    dtype: DType,
+    data: TensorData,
+}
+
+impl<S: Softness> SoftRenderer<S> {
+    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` × `size` pixels, under a softness of this `scale`
+    /// (NDC, or NDC² if squared; one pixel is `2 / size`), the probabilistic sum and [`Rasterizer::TOLERANCE`].
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, or `scale` is not positive.
+    pub fn new(faces: &[[u32; 3]], size: usize, softness: S, scale: f64) -> Self {
+        let phi = softness.default_phi(scale);
+        Self::with_rasterizer(Rasterizer::new(size), faces.into(), softness, phi)
+    }
+
+    /// The same from parts: `phi` `[parameters]` are the parameters of the softness.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, or `phi` has the wrong length.
+    pub fn with_rasterizer(
+        rasterizer: Rasterizer,
+        faces: Arc<[[u32; 3]]>,
+        softness: S,
+        phi: Vec<f64>,
+    ) -> Self {
+        assert!(rasterizer.size > 0, "an image needs at least one pixel");
+        assert!(!faces.is_empty(), "a silhouette needs at least one face");
+        check(&softness, &phi);
+        Self { rasterizer, faces, softness, phi, surrogate: None, kept: Arc::default() }
+    }
+
+    /// With another largest error of a pixel, in (0, 1); see [`Profile::new`](crate::Profile::new).
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: f64) -> Self {
+        self.changed(|rasterizer| rasterizer.tolerance = tolerance)
+    }
+
+    /// With another way to make one coverage of those of several faces.
+    #[must_use]
+    pub fn with_t_conorm(self, t_conorm: TConorm) -> Self {
+        self.changed(|rasterizer| rasterizer.t_conorm = t_conorm)
+    }
+
+    /// With another softness in the backward pass, at this `scale`: a sharp image with a wide gradient. What comes back is not the
+    /// derivative of the image; see [`Silhouette::coverage_with_surrogate`].
+    ///
+    /// # Panics
+    ///
+    /// If `scale` is not positive.
+    #[must_use]
+    pub fn with_surrogate(mut self, softness: S, scale: f64) -> Self {
+        let phi = softness.default_phi(scale);
+        let surrogate = Self::with_rasterizer(self.rasterizer, self.faces.clone(), softness, phi);
+        self.surrogate = Some(Box::new(surrogate));
+        self
+    }
+
+    /// The parameters φ, `[parameters]`: those to draw with where no others are given.
+    pub fn phi(&self) -> &[f64] {
+        &self.phi
+    }
+
+    /// The same as a tensor to be optimised, for [`silhouette_with`](Self::silhouette_with).
+    pub fn phi_tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 1> {
+        let data = TensorData::new(self.phi.clone(), [self.phi.len()]);
+        Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+    }
+
+    /// Draws with these parameters from now on.
+    ///
+    /// # Panics
+    ///
+    /// If there are more or fewer of them than the softness has.
+    pub fn set_phi(&mut self, phi: Vec<f64>) {
+        check(&self.softness, &phi);
+        self.phi = phi;
+    }
+
+    /// Coverage `[views, size, size]` in [0, 1], top row first, under the renderer's own parameters.
+    ///
+    /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. It
+    /// receives gradients, to second order on `Autodiff<Autodiff<B>>`.
+    pub fn silhouette<B: RasterBackend>(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
+        let (silhouette, table) = self.own_table(&vertices);
+        self.drawn(&silhouette, vertices, table)
+    }
+
+    /// [`silhouette`](Self::silhouette) under parameters `phi` `[parameters]`, which receive gradients too, unless there is a surrogate.
+    ///
+    /// Their values are read from the device, to see whether support and knots still suit them.
+    ///
+    /// # Panics
+    ///
+    /// If `phi` has the wrong length.
+    pub fn silhouette_with<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        phi: &Tensor<B, 1>,
+    ) -> Tensor<B, 3> {
+        let values: Vec<f64> = phi.to_data().iter().collect();
+        let silhouette = self.prepared::<B>(&values);
+        let table = silhouette.table(phi.clone());
+        self.drawn(&silhouette, vertices, table)
+    }
+
+    /// What draws under parameters `phi`, with support and knots for them.
+    ///
+    /// # Panics
+    ///
+    /// If `phi` has the wrong length.
+    pub fn prepared<B: RasterBackend>(&self, phi: &[f64]) -> Silhouette<S> {
+        check(&self.softness, phi);
+        let mut kept = self.kept();
+        let prepared = kept.prepared.as_ref().filter(|prepared| prepared.on_host == B::ON_HOST);
+        if let Some(silhouette) = prepared.and_then(|prepared| prepared.stretched_to(phi)) {
+            return silhouette;
+        }
+        let (faces, softness) = (&self.faces, self.softness.clone());
+        let silhouette =
+            self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, phi, B::ON_HOST);
+        let prepared = silhouette.clone();
+        kept.prepared =
+            Some(Prepared { phi: phi.to_vec(), on_host: B::ON_HOST, silhouette: prepared });
+        silhouette
+    }
+
+    fn drawn<B: RasterBackend>(
+        &self,
+        silhouette: &Silhouette<S>,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, 2>,
+    ) -> Tensor<B, 3> {
+        let Some(surrogate) = &self.surrogate else {
+            return silhouette.coverage_by_table(vertices, table);
+        };
+        let (wide, wide_table) = surrogate.own_table(&vertices);
+        silhouette.coverage_with_surrogate(vertices, table, &wide, wide_table)
+    }
+
+    /// What draws these vertices under the renderer's own parameters, and its table.
+    fn own_table<B: RasterBackend>(
+        &self,
+        vertices: &Tensor<B, 3>,
+    ) -> (Silhouette<S>, Tensor<B, 2>) {
+        let silhouette = self.prepared::<B>(&self.phi);
+        let (dtype, on_host) = (vertices.dtype(), B::ON_HOST);
+        let mut kept = self.kept();
+        let table = match kept.table.take() {
+            Some(table) if table.is_of(&self.phi, on_host, dtype) => table,
+            _ => {
+                let data = silhouette.table_data::<B>(&self.phi, dtype);
+                Table { phi: self.phi.clone(), on_host, dtype, data }
+            }
+        };
+        let data = kept.table.insert(table).data.clone();
+        (silhouette, Tensor::from_data(data, (&vertices.device(), dtype)))
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept<S>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn changed(mut self, change: impl Fn(&mut Rasterizer) + Copy) -> Self {
+        change(&mut self.rasterizer);
+        self.kept = Arc::default();
+        self.surrogate = self.surrogate.map(|surrogate| Box::new(surrogate.changed(change)));
+        self
+    }
+}
+
+impl SoftRenderer<EdgeSoftness> {
+    /// Draws with a softness whose scale moves, as it is at the beginning of a run; its surrogate, if it has one, comes along.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty.
+    pub fn scheduled(faces: &[[u32; 3]], size: usize, softness: &ScheduledSoftness) -> Self {
+        let phi = softness.phi_at(0.0, size);
+        let mut renderer =
+            Self::with_rasterizer(Rasterizer::new(size), faces.into(), softness.softness, phi);
+        renderer.surrogate = softness.surrogate_at(0.0, size).map(|Surrogate { softness, phi }| {
+            let (rasterizer, faces) = (renderer.rasterizer, renderer.faces.clone());
+            Box::new(Self::with_rasterizer(rasterizer, faces, softness, phi))
+        });
+        renderer
+    }
+
+    /// Draws from now on as `softness` does at `part` of a run, 0 to 1: the one that [`scheduled`](Self::scheduled) was given.
+    ///
+    /// # Panics
+    ///
+    /// If `part` is not in [0, 1], or the softness is another one.
+    pub fn move_to(&mut self, softness: &ScheduledSoftness, part: f64) {
+        let size = self.rasterizer.size;
+        assert_eq!(self.softness, softness.softness, "the softness of a renderer stays the same");
+        self.set_phi(softness.phi_at(part, size));
+        if let Some((own, now)) = self.surrogate.as_mut().zip(softness.surrogate_at(part, size)) {
+            own.set_phi(now.phi);
+        }
+    }
+}
+
+impl<S: Softness> Prepared<S> {
+    /// What draws under parameters `phi`, if their softness is the prepared one stretched.
+    fn stretched_to(&self, phi: &[f64]) -> Option<Silhouette<S>> {
+        let softness = self.silhouette.softness();
+        let [before, now] = [&self.phi[..], phi];
+        let factor = softness.scale(now) / softness.scale(before);
+        let stretched = softness.with_scale_values(before, factor);
+        let same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs().max(1.0);
+        if !stretched.iter().zip(now).all(same) {
+            return None;
+        }
+        let widened = softness.width(now) / softness.width(before);
+        self.silhouette.stretched(widened)
+    }
+}
+
+impl Table {
+    fn is_of(&self, phi: &[f64], on_host: bool, dtype: DType) -> bool {
+        self.phi == phi && self.on_host == on_host && self.dtype == dtype
+    }
+}
+
+impl<S> Default for Kept<S> {
+    fn default() -> Self {
+        Self { prepared: None, table: None }
+    }
+}
+
+fn check(softness: &impl Softness, phi: &[f64]) {
+    let (found, expected) = (phi.len(), softness.parameters());
+    assert_eq!(found, expected, "{softness:?} has {expected} parameters, found {found}");
+}
