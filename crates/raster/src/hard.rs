@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use burn::tensor::{Tensor, TensorData, backend::Backend};
 
 use crate::{NEAR, kernel::inside_spans};
@@ -17,7 +15,7 @@ use crate::{NEAR, kernel::inside_spans};
 /// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
 pub fn hard_silhouette<B: Backend>(
     vertices: Tensor<B, 3>,
-    faces: &Arc<[[u32; 3]]>,
+    faces: &[[u32; 3]],
     size: usize,
 ) -> Tensor<B, 3> {
     let [views, _, _] = vertices.dims();

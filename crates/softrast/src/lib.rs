@@ -10,6 +10,8 @@
 //!
 //! The README of the project has a first program.
 
+pub mod prelude;
+
 pub use softrast_inverse as inverse;
 pub use softrast_mesh as mesh;
 pub use softrast_meta as meta;

@@ -4,10 +4,7 @@
 //! where the target picture was taken, and Adam turns it, by the gradient of a soft silhouette,
 //! until both silhouettes agree.
 //!
-//! **Definition.** The mesh is first turned by the rotation of the target camera, then viewed from
-//! the pose (distance, elevation, azimuth), so the answer is elevation 0, azimuth 0 and the
-//! target's distance. The loss of an instance is the soft `IoU` loss against the hard silhouette at
-//! the target; instances in a batch are independent. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Pose.
+//! **Definition.** See [`softrast_inverse::pose`].
 //!
 //! **Field of view.** The released code starts it at a wrong random value and never moves it, which
 //! leaves no pose that fits. Here the camera's own instances know their field of view, as a
@@ -23,14 +20,12 @@
 
 mod args;
 mod error;
-mod instance;
 mod paper;
 mod picture;
-mod scene;
+mod released;
 mod task;
 
 pub use args::{Args, Instances, Range};
 pub use error::PoseError;
-pub use instance::{Camera, Instance};
-pub use scene::Scene;
+pub use released::released24;
 pub use task::Pose;

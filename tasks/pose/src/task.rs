@@ -6,15 +6,17 @@ use serde_json::json;
 use softrast_cli::{
     Description, EdgeChoice, Ended, Measures, Paper, Scales, Schedule, Task, Variant, theta_of,
 };
-use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
+use softrast_inverse::{
+    InverseProblem, Iterate, PoseProblem, SoftnessAt, SolveConfig,
+    pose::{PoseInstance, PoseScene, nearest_distance},
+};
 use softrast_lab::Error;
 use softrast_mesh::{Mesh, fox};
 use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 
 use crate::{
-    Args, Instance, Instances, PoseError, Range, Scene, paper::PAPER, picture::outlined,
-    scene::nearest_distance,
+    Args, Instances, PoseError, Range, paper::PAPER, picture::outlined, released::released24,
 };
 
 /// A run succeeds when the camera ends at most this far from the target.
@@ -26,85 +28,82 @@ const BATCH: usize = 25;
 
 /// POSE: a camera that orbits a mesh, and the silhouette that it should see.
 pub struct Pose {
-    mesh: Mesh,
+    problem: PoseProblem,
     mesh_name: String,
     faces: Arc<[[u32; 3]]>,
     source: Source,
-    optimise_fov: bool,
     variant: Variant,
 }
 
 /// Where instances come from.
 enum Source {
     Seeded(Range),
-    Released(Vec<Instance>),
+    Released(Vec<PoseInstance>),
 }
 
 impl InverseProblem for Pose {
-    type Instance = Instance;
-    type Scene<B: RasterBackend> = Scene<B>;
+    type Instance = PoseInstance;
+    type Scene<B: RasterBackend> = PoseScene<B>;
 
-    fn instance(&self, seed: u64) -> anyhow::Result<Instance> {
-        match &self.source {
-            Source::Released(pairs) => {
-                let pair = usize::try_from(seed).ok().and_then(|k| pairs.get(k)).copied();
-                pair.ok_or_else(|| {
-                    Error::usage(format!(
-                        "--instances released24 has {} pairs, counted from seed 0: --seed and --runs together may not go beyond",
-                        pairs.len()
-                    ))
-                })
-            }
-            Source::Seeded(range) => {
-                let mut instance = Instance::seeded(seed, *range);
-                if !self.optimise_fov {
-                    instance.start.half_fov_deg = instance.target.half_fov_deg;
-                }
-                Ok(instance)
-            }
-        }
+    fn instance(&self, seed: u64) -> anyhow::Result<PoseInstance> {
+        let Source::Released(pairs) = &self.source else { return self.problem.instance(seed) };
+        let pair = usize::try_from(seed).ok().and_then(|k| pairs.get(k)).copied();
+        pair.ok_or_else(|| {
+            Error::usage(format!(
+                "--instances released24 has {} pairs, counted from seed 0: --seed and --runs together may not go beyond",
+                pairs.len()
+            ))
+        })
     }
 
-    fn restart(&self, instance: &Instance, k: usize, count: usize) -> Option<Instance> {
-        Some(instance.around(k, count))
+    fn restart(&self, instance: &PoseInstance, k: usize, count: usize) -> Option<PoseInstance> {
+        self.problem.restart(instance, k, count)
     }
 
-    fn scene<B: RasterBackend>(&self, instances: &[Instance], size: usize) -> Scene<B> {
-        Scene::new(&self.mesh, instances, size, self.optimise_fov)
+    fn scene<B: RasterBackend>(&self, instances: &[PoseInstance], size: usize) -> PoseScene<B> {
+        self.problem.scene(instances, size)
     }
 
     fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
         Some(self.faces.clone())
     }
 
-    fn start<B: RasterBackend>(&self, scene: &Scene<B>) -> Tensor<B, 1> {
-        scene.start().flatten(0, 1)
+    fn start<B: RasterBackend>(&self, scene: &PoseScene<B>) -> Tensor<B, 1> {
+        self.problem.start(scene)
     }
 
-    fn allowed<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
-        scene.allowed(scene.by_view(theta)).flatten(0, 1)
+    fn allowed<B: RasterBackend>(&self, scene: &PoseScene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        self.problem.allowed(scene, theta)
     }
 
     fn image<B: RasterBackend>(
         &self,
-        scene: &Scene<B>,
+        scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B>,
     ) -> Tensor<B, 3> {
-        softness.silhouette(scene.project(scene.by_view(theta)))
+        self.problem.image(scene, theta, softness)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        scene.hard(scene.project(scene.by_view(theta)))
+    fn hard_image<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        theta: Tensor<B, 1>,
+    ) -> Tensor<B, 3> {
+        self.problem.hard_image(scene, theta)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        scene.image_loss(image)
+    fn image_loss<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        image: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        self.problem.image_loss(scene, image)
     }
 
     fn defaults(&self) -> SolveConfig {
         match self.variant {
-            Variant::Original => SolveConfig { size: 64, steps: 300, learning_rate: 0.3 },
+            Variant::Original => self.problem.defaults(),
             Variant::Transfer => SolveConfig { size: 64, steps: 150, learning_rate: 0.5 },
         }
     }
@@ -132,7 +131,7 @@ impl Task for Pose {
         let (mesh, mesh_name) = mesh(args)?;
         let source = match (args.instances, args.range) {
             (Instances::Seeded, range) => Source::Seeded(range.unwrap_or_default()),
-            (Instances::Released24, None) => Source::Released(Instance::released()?),
+            (Instances::Released24, None) => Source::Released(released24()?),
             (Instances::Released24, Some(_)) => {
                 return Err(Error::usage(
                     "--range does not go with --instances released24, whose angles are 15 to 35",
@@ -140,8 +139,9 @@ impl Task for Pose {
             }
         };
         let faces = mesh.faces().into();
-        let optimise_fov = args.optimise_fov;
-        Ok(Self { mesh, mesh_name, faces, source, optimise_fov, variant })
+        let range_deg = args.range.unwrap_or_default().degrees();
+        let problem = PoseProblem { mesh, range_deg, optimise_fov: args.optimise_fov };
+        Ok(Self { problem, mesh_name, faces, source, variant })
     }
 
     fn measures() -> Measures {
@@ -165,10 +165,10 @@ impl Task for Pose {
             "mesh": self.mesh_name,
             "instances": instances,
             "range": range,
-            "optimise_fov": self.optimise_fov,
+            "optimise_fov": self.problem.optimise_fov,
         });
         Description {
-            faces: self.mesh.faces().len(),
+            faces: self.faces.len(),
             runs,
             success: format!("the camera ends within {SUCCESS_DEG} degrees"),
             settings: settings.as_object().cloned().unwrap_or_default(),
@@ -190,12 +190,12 @@ impl Task for Pose {
 
     fn errors(
         &self,
-        instances: &[Instance],
-        _scene: &Scene<HostBackend>,
+        instances: &[PoseInstance],
+        _scene: &PoseScene<HostBackend>,
         iterate: &Iterate,
     ) -> Vec<Vec<f64>> {
         let poses = theta_of(&iterate.theta, instances.len());
-        let error = |(pose, instance): (&Vec<f64>, &Instance)| {
+        let error = |(pose, instance): (&Vec<f64>, &PoseInstance)| {
             let error = PoseError::new([pose[0], pose[1], pose[2]], instance.target.distance);
             vec![error.angle_deg, error.distance, error.released()]
         };
@@ -206,7 +206,7 @@ impl Task for Pose {
         errors[0] <= SUCCESS_DEG
     }
 
-    fn targets(&self, scene: &Scene<HostBackend>) -> Vec<f64> {
+    fn targets(&self, scene: &PoseScene<HostBackend>) -> Vec<f64> {
         numbers(scene.target())
     }
 
@@ -228,7 +228,7 @@ impl Task for Pose {
                 "seed {seed}: the mesh fills the whole target image, so no edge shows its pose: try --normalize or a larger --size"
             ));
         }
-        let (nearest, camera) = (nearest_distance(&self.mesh), instance.target.distance);
+        let (nearest, camera) = (nearest_distance(&self.problem.mesh), instance.target.distance);
         if camera < nearest {
             warnings.push(format!(
                 "seed {seed}: the mesh reaches to the target camera: it would have to be {nearest:.3} from the origin but is at \

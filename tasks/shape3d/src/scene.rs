@@ -52,11 +52,8 @@ impl<B: Backend> Scene<B> {
         let orbits = tensor(azimuths_deg.flat_map(orbit).collect(), [VIEWS, 4]);
         let count = target.positions().len();
         let positions: Tensor<B, 3> = tensor(target.positions().concat(), [1, count, 3]);
-        let target = hard_silhouette(
-            project(positions, Tensor::clone(&orbits)),
-            &target.faces().into(),
-            size,
-        );
+        let target =
+            hard_silhouette(project(positions, Tensor::clone(&orbits)), target.faces(), size);
 
         let start = instance.start(template).concat();
         let count = template.positions().len();

@@ -3,7 +3,8 @@
 //! Source: docs/notes.md, Values before any step. The mesh belongs to others and is not part of this repository.
 
 use burn::{backend::NdArray, tensor::Tensor};
-use pose::{Instance, PoseError, Scene};
+use pose::{PoseError, released24};
+use softrast_inverse::pose::{PoseInstance, PoseScene};
 use softrast_raster::{Rasterizer, iou_loss};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{paper_mesh, vector};
@@ -26,8 +27,8 @@ fn sum(losses: Tensor<B, 1>) -> f64 {
 #[ignore = "needs the paper's meshes"]
 fn targets_and_losses_before_any_step_are_those_measured_before() {
     let mesh = paper_mesh("spot.obj");
-    let instances = Instance::released().unwrap();
-    let scene = Scene::<B>::new(&mesh, &instances, SIZE, false);
+    let instances = released24().unwrap();
+    let scene = PoseScene::<B>::new(&mesh, &instances, SIZE, false);
     let target = scene.target();
     let coverage: f64 = target.clone().mean().into_scalar();
     assert_close("coverage of the targets", coverage, 0.25180, TOLERANCE);
@@ -36,7 +37,7 @@ fn targets_and_losses_before_any_step_are_those_measured_before() {
     let hard = sum(iou_loss(scene.hard(projected.clone()), target.clone()));
     assert_close("hard loss", hard, 16.5601, TOLERANCE);
 
-    let released = instances.iter().map(|Instance { target, start }| {
+    let released = instances.iter().map(|PoseInstance { target, start }| {
         let pose = [start.distance, start.elevation_deg, start.azimuth_deg];
         PoseError::new(pose, target.distance).released()
     });

@@ -4,7 +4,7 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::Tensor,
 };
-use pose::{Instance, Range, Scene};
+use softrast_inverse::pose::{PoseInstance, PoseScene};
 use softrast_mesh::fox;
 use softrast_raster::{Rasterizer, Silhouette, iou_loss};
 use softrast_softness::{EdgeSoftness, Family, Softness};
@@ -19,7 +19,7 @@ const SIZE: usize = 24;
 const H: f64 = 1e-5;
 
 fn losses(
-    scene: &Scene<A>,
+    scene: &PoseScene<A>,
     silhouette: &Silhouette<EdgeSoftness>,
     theta: Tensor<A, 2>,
 ) -> Tensor<A, 1> {
@@ -31,8 +31,8 @@ fn losses(
 /// Compares all entries of θ `[views, columns]`, whose last column is the field of view if there
 /// are four.
 fn check(optimise_fov: bool) {
-    let instances = [0, 1, 2].map(|seed| Instance::seeded(seed, Range::Near));
-    let scene = Scene::<A>::new(&fox(), &instances, SIZE, optimise_fov);
+    let instances = [0, 1, 2].map(|seed| PoseInstance::seeded(seed, [15.0, 35.0]));
+    let scene = PoseScene::<A>::new(&fox(), &instances, SIZE, optimise_fov);
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
     let phi = vector::<A>(&softness.default_phi(0.05));
     let rasterizer = Rasterizer { tolerance: 1e-9, ..Rasterizer::new(SIZE) };

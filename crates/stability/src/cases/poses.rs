@@ -1,9 +1,11 @@
 //! POSE where it fails: from afar, from too near, too sharp, too small, too fast.
 
-use pose::{Args, Camera, Instance, Pose, PoseError, Range};
+use pose::{Args, Pose, PoseError, Range};
 use softrast_cli::{EdgeChoice, Task, Variant};
 use softrast_inverse::SolveConfig;
+use softrast_inverse::pose::PoseInstance;
 use softrast_mesh::{Mesh, icosphere};
+use softrast_raster::Orbit;
 
 use super::{ORIGINAL, trials};
 use crate::{Case, Config, Descended, Level, Tested, Trial, descend};
@@ -163,17 +165,16 @@ const SIDE: usize = 24;
 const DISTANCE: f64 = 3.5;
 
 /// A camera at a distance, and a start some degrees off in one of eight directions.
-pub fn instance(target: f64, distance: f64, angle_deg: f64, direction: usize) -> Instance {
+pub fn instance(target: f64, distance: f64, angle_deg: f64, direction: usize) -> PoseInstance {
     let direction = std::f64::consts::TAU * (direction as f64 + 0.3) / 8.0;
-    let camera =
-        Camera { distance: target, elevation_deg: 20.0, azimuth_deg: 35.0, half_fov_deg: 20.0 };
-    let start = Camera {
+    let camera = Orbit { distance: target, elevation_deg: 20.0, azimuth_deg: 35.0, fov_deg: 40.0 };
+    let start = Orbit {
         distance,
         elevation_deg: angle_deg * direction.sin(),
         azimuth_deg: angle_deg * direction.cos(),
-        half_fov_deg: 20.0,
+        fov_deg: 40.0,
     };
-    Instance { target: camera, start }
+    PoseInstance { target: camera, start }
 }
 
 /// Solves instances of a mesh side by side.
@@ -184,7 +185,7 @@ pub fn instance(target: f64, distance: f64, angle_deg: f64, direction: usize) ->
 pub fn solved(
     tested: &Tested,
     mesh: &Mesh,
-    instances: &[Instance],
+    instances: &[PoseInstance],
     steps: usize,
 ) -> anyhow::Result<Descended> {
     let config = SolveConfig { size: SIDE, steps, learning_rate: 1.2 };
@@ -197,9 +198,9 @@ pub fn solved(
 fn angle_trials(
     tested: &Tested,
     mesh: &Mesh,
-    start: impl Fn(usize) -> Instance,
+    start: impl Fn(usize) -> PoseInstance,
 ) -> anyhow::Result<Vec<Trial>> {
-    let instances: Vec<Instance> = (0..8).map(start).collect();
+    let instances: Vec<PoseInstance> = (0..8).map(start).collect();
     let solved = solved(tested, mesh, &instances, 100)?;
     let trial = |view: usize| {
         let pose = solved.best(view);

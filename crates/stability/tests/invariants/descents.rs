@@ -1,7 +1,7 @@
 //! Whole descents: no shape in the target, any number of threads, the object out of view.
 
-use pose::Instance;
 use softrast_inverse::SolveConfig;
+use softrast_inverse::pose::PoseInstance;
 use softrast_mesh::icosphere;
 use stability::{
     Level, Trial,
@@ -80,7 +80,7 @@ fn a_ball_is_found_from_any_angle() {
     hold_for_the_paper(|tested| {
         let level = |angle: f64| {
             let start = |direction| instance(DISTANCE, 1.3 * DISTANCE, angle, direction);
-            let instances: Vec<Instance> = (0..4).map(start).collect();
+            let instances: Vec<PoseInstance> = (0..4).map(start).collect();
             let found = solved(tested, &icosphere(2), &instances, 40)?;
             let trial = |k: usize| Trial::at_most(found.lowest(k), 0.15).with(&found.numbers);
             Ok(Level::new(angle, (0..4).map(trial).collect()))

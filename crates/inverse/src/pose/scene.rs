@@ -1,12 +1,10 @@
 use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
-use softrast_inverse::Targets;
 use softrast_mesh::Mesh;
-use softrast_meta::tensor;
-use softrast_raster::{hard_silhouette, iou_loss, project, view_rotation};
+use softrast_raster::{Orbit, hard_silhouette, iou_loss, project, vertices, view_rotation};
 
-use crate::Instance;
+use crate::{Targets, pose::PoseInstance};
 
 /// How much nearer than its farthest vertex a camera may not come, as a factor.
 const CLEARANCE: f64 = 1.05;
@@ -18,11 +16,11 @@ const HALF_FOV_DEG: [f64; 2] = [1.0, 80.0];
 /// The optimised θ is `[views, 3]`: distance in world units, elevation and azimuth in degrees; with
 /// an optimised field of view `[views, 4]`, the last being half of it in degrees.
 #[derive(Clone, Debug)]
-pub struct Scene<B: Backend> {
+pub struct PoseScene<B: Backend> {
     /// The mesh as each target camera sees it, turned but not moved: `[views, vertices, 3]`.
     turned: Tensor<B, 3>,
-    /// Half the field of view of each view in degrees, `[views, 1]`, unless θ holds it.
-    half_fov: Option<Tensor<B, 2>>,
+    /// Field of view of each view in degrees, `[views, 1]`, unless θ holds half of it.
+    fov: Option<Tensor<B, 2>>,
     start: Tensor<B, 2>,
     /// Nearest distance of each view, `[views, 1]`.
     nearest: Tensor<B, 2>,
@@ -31,7 +29,7 @@ pub struct Scene<B: Backend> {
     size: usize,
 }
 
-impl<B: Backend> Scene<B> {
+impl<B: Backend> PoseScene<B> {
     /// Instances of `mesh` on images of `size` × `size` pixels.
     ///
     /// The start's field of view is used as it is, and optimised if `optimise_fov`.
@@ -39,33 +37,33 @@ impl<B: Backend> Scene<B> {
     /// # Panics
     ///
     /// If there is no instance.
-    pub fn new(mesh: &Mesh, instances: &[Instance], size: usize, optimise_fov: bool) -> Self {
+    pub fn new(mesh: &Mesh, instances: &[PoseInstance], size: usize, optimise_fov: bool) -> Self {
         let views = instances.len();
         assert!(views > 0, "a scene needs an instance");
-        let column = |of: fn(&Instance) -> f64| -> Tensor<B, 2> {
-            tensor(instances.iter().map(of).collect(), [views, 1])
+        let device = Default::default();
+        let orbits = |of: fn(&PoseInstance) -> Orbit| {
+            let orbits: Vec<Orbit> = instances.iter().map(of).collect();
+            Orbit::tensors::<B>(&orbits, &device)
         };
-        let orbits = |of: fn(&Instance) -> [f64; 4]| -> Tensor<B, 2> {
-            tensor(instances.iter().flat_map(of).collect(), [views, 4])
-        };
-        let positions: Vec<f64> = mesh.positions().iter().flatten().copied().collect();
+        let positions = vertices::<B>(mesh.positions(), &device);
         let count = mesh.positions().len();
-        let positions = tensor::<B, 3>(positions, [1, count, 3]);
         let faces: Arc<[[u32; 3]]> = mesh.faces().into();
 
-        let targets = orbits(|instance| instance.target.orbit());
-        let target =
-            hard_silhouette(project(positions.clone(), whole_fov(targets.clone())), &faces, size);
+        let targets = orbits(|instance| instance.target);
+        let target = hard_silhouette(project(positions.clone(), targets.clone()), &faces, size);
         let angle = |k: usize| targets.clone().narrow(1, k, 1).reshape([views]);
         let rotation = view_rotation(angle(1), angle(2));
         let turned = positions.expand([views, count, 3]).matmul(rotation.swap_dims(1, 2));
 
-        let starts = orbits(|instance| instance.start.orbit());
-        let start = starts.clone().narrow(1, 0, if optimise_fov { 4 } else { 3 });
-        let half_fov = (!optimise_fov).then(|| starts.narrow(1, 3, 1));
-        let given = column(|instance| instance.start.distance.min(instance.target.distance));
+        let starts = orbits(|instance| instance.start);
+        let [pose, fov] = [(0, 3), (3, 1)].map(|(start, n)| starts.clone().narrow(1, start, n));
+        let (start, fov) = match optimise_fov {
+            true => (Tensor::cat(vec![pose, fov * 0.5], 1), None),
+            false => (pose, Some(fov)),
+        };
+        let given = starts.narrow(1, 0, 1).min_pair(targets.narrow(1, 0, 1));
         let nearest = given.clamp_max(nearest_distance(mesh));
-        Self { turned, half_fov, start, nearest, faces, targets: Targets::new(target), size }
+        Self { turned, fov, start, nearest, faces, targets: Targets::new(target), size }
     }
 
     /// θ before the first step.
@@ -85,14 +83,11 @@ impl<B: Backend> Scene<B> {
 
     /// The mesh as seen at θ: `[views, vertices, 3]`, x and y in NDC and the depth.
     pub fn project(&self, theta: Tensor<B, 2>) -> Tensor<B, 3> {
-        let orbits = match &self.half_fov {
-            None => theta,
-            Some(half_fov) => Tensor::cat(vec![theta, half_fov.clone()], 1),
-        };
-        project(self.turned.clone(), whole_fov(orbits))
+        let fov = self.fov.clone().unwrap_or_else(|| theta.clone().narrow(1, 3, 1) * 2.0);
+        project(self.turned.clone(), Tensor::cat(vec![theta.narrow(1, 0, 3), fov], 1))
     }
 
-    /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
+    /// Hard silhouettes `[views, size, size]` of vertices that [`PoseScene::project`] gave.
     pub fn hard(&self, projected: Tensor<B, 3>) -> Tensor<B, 3> {
         hard_silhouette(projected, &self.faces, self.size)
     }
@@ -114,7 +109,7 @@ impl<B: Backend> Scene<B> {
     pub fn allowed(&self, theta: Tensor<B, 2>) -> Tensor<B, 2> {
         let part = |start: usize, length: usize| theta.clone().narrow(1, start, length);
         let mut columns = vec![part(0, 1).max_pair(self.nearest.clone()), part(1, 2)];
-        if self.half_fov.is_none() {
+        if self.fov.is_none() {
             let [least, largest] = HALF_FOV_DEG;
             columns.push(part(3, 1).clamp(least, largest));
         }
@@ -122,13 +117,8 @@ impl<B: Backend> Scene<B> {
     }
 }
 
-/// Orbits with half the field of view in their last column, as [`project`] takes them.
-fn whole_fov<B: Backend>(orbits: Tensor<B, 2>) -> Tensor<B, 2> {
-    Tensor::cat(vec![orbits.clone().narrow(1, 0, 3), orbits.narrow(1, 3, 1) * 2.0], 1)
-}
-
 /// Distance from the origin beyond which a camera has the whole mesh in front of it.
-pub(crate) fn nearest_distance(mesh: &Mesh) -> f64 {
+pub fn nearest_distance(mesh: &Mesh) -> f64 {
     let radius = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
     CLEARANCE * mesh.triangles().flatten().map(radius).fold(0.0, f64::max)
 }

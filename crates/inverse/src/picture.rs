@@ -1,0 +1,178 @@
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use image::{DynamicImage, GrayImage, Luma, LumaA};
+use softrast_meta::numbers;
+
+/// A gray picture of any size, to be seen as a square image: a target for silhouettes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// From 0 to 1, row by row from the top.
+    levels: Vec<f64>,
+    width: usize,
+}
+
+impl Picture {
+    /// The mask in a picture file: its transparency, or where all of it is opaque its luminance.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or no picture.
+    pub fn load_mask(path: &Path) -> anyhow::Result<Self> {
+        let picture = open(path)?;
+        let opaque = !picture.color().has_alpha()
+            || picture.to_luma_alpha16().pixels().all(|p| p.0[1] == u16::MAX);
+        Ok(Self::of(&picture, |p| f64::from(p.0[usize::from(!opaque)]) / FULL))
+    }
+
+    /// The luminance of a picture file; what is transparent is black.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or no picture.
+    pub fn load_luminance(path: &Path) -> anyhow::Result<Self> {
+        let level = |p: &LumaA<u16>| f64::from(p.0[0]) / FULL * (f64::from(p.0[1]) / FULL);
+        Ok(Self::of(&open(path)?, level))
+    }
+
+    fn of(picture: &DynamicImage, level: impl Fn(&LumaA<u16>) -> f64) -> Self {
+        let levels = picture.to_luma_alpha16().pixels().map(level).collect();
+        Self { levels, width: picture.width() as usize }
+    }
+
+    /// The image `[size * size]`, top row first, 0 black to 1 white.
+    ///
+    /// The longer side of a picture takes up the whole image; the rest is black. Each pixel is the mean of the picture over its area.
+    pub fn levels(&self, size: usize) -> Vec<f64> {
+        resized(&self.levels, self.width, size)
+    }
+
+    /// The same as a tensor, `[1, size, size]`.
+    pub fn tensor<B: Backend>(&self, size: usize, device: &B::Device) -> Tensor<B, 3> {
+        let dtype = <B::FloatElem as Element>::dtype();
+        Tensor::from_data(TensorData::new(self.levels(size), [1, size, size]), (device, dtype))
+    }
+}
+
+/// Writes the views of an `image` `[views, height, width]` side by side into a gray PNG: 0 is black, 1 is white, what lies outside is
+/// clamped.
+///
+/// # Errors
+///
+/// If the file cannot be written, or the image is empty.
+pub fn save_picture<B: Backend>(image: Tensor<B, 3>, path: &Path) -> anyhow::Result<()> {
+    let [views, height, width] = image.dims();
+    ensure!(views * height * width > 0, "an empty image cannot be written to {}", path.display());
+    let row = image.swap_dims(0, 1).reshape([height, views * width]);
+    let levels = numbers(row);
+    let picture = GrayImage::from_fn((views * width) as u32, height as u32, |x, y| {
+        let level = levels[y as usize * views * width + x as usize];
+        Luma([(level.clamp(0.0, 1.0) * 255.0).round() as u8])
+    });
+    picture.save(path).with_context(|| format!("cannot write the picture {}", path.display()))
+}
+
+const FULL: f64 = u16::MAX as f64;
+
+fn open(path: &Path) -> anyhow::Result<DynamicImage> {
+    image::ImageReader::open(path)
+        .with_context(|| format!("cannot open the picture {}", path.display()))?
+        .with_guessed_format()?
+        .decode()
+        .with_context(|| format!("{} is no picture that can be read", path.display()))
+}
+
+fn resized(levels: &[f64], width: usize, size: usize) -> Vec<f64> {
+    let height = levels.len() / width;
+    let longest = width.max(height) as f64;
+    let (columns, rows) = (shares(width, longest, size), shares(height, longest, size));
+    let pixel = |pixel: usize| {
+        let (column, row) = (&columns[pixel % size], &rows[pixel / size]);
+        let along = |&(y, share): &(usize, f64)| {
+            share * column.iter().map(|&(x, part)| part * levels[y * width + x]).sum::<f64>()
+        };
+        row.iter().map(along).sum()
+    };
+    (0..size * size).map(pixel).collect()
+}
+
+/// For each of `size` cells which of `count` picture elements it holds, and what share of the cell
+/// they fill. The elements sit in the middle of `longest`, which the cells share evenly.
+fn shares(count: usize, longest: f64, size: usize) -> Vec<Vec<(usize, f64)>> {
+    let cell = longest / size as f64;
+    let margin = (longest - count as f64) / 2.0;
+    let of_cell = |k: usize| {
+        let (from, to) = (k as f64 * cell - margin, (k + 1) as f64 * cell - margin);
+        let (first, last) = (from.max(0.0) as usize, (to.max(0.0).ceil() as usize).min(count));
+        let share = |x: usize| ((x + 1) as f64).min(to) - (x as f64).max(from);
+        (first..last).map(|x| (x, share(x) / cell)).filter(|&(_, share)| share > 0.0).collect()
+    };
+    (0..size).map(of_cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::backend::NdArray;
+
+    use super::*;
+
+    fn luminance_of(picture: impl Into<image::DynamicImage>, size: usize) -> Vec<f64> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        picture.into().save(&path).unwrap();
+        Picture::load_luminance(&path).unwrap().levels(size)
+    }
+
+    fn assert_close(found: &[f64], expected: &[f64]) {
+        let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(close && found.len() == expected.len(), "{found:?}");
+    }
+
+    #[test]
+    fn smaller_is_the_mean_and_larger_repeats() {
+        let picture = GrayImage::from_fn(2, 2, |x, y| Luma([if x + y == 1 { 255 } else { 0 }]));
+        assert_close(&luminance_of(picture.clone(), 1), &[0.5]);
+        assert_close(&luminance_of(picture.clone(), 2), &[0.0, 1.0, 1.0, 0.0]);
+        let middle = 0.5;
+        let expected = [0.0, middle, 1.0, middle, middle, middle, 1.0, middle, 0.0];
+        assert_close(&luminance_of(picture, 3), &expected);
+    }
+
+    #[test]
+    fn a_wide_picture_has_black_above_and_below() {
+        let picture = GrayImage::from_pixel(4, 2, Luma([255]));
+        let expected: Vec<f64> =
+            (0..16).map(|k| f64::from(u8::from((4..12).contains(&k)))).collect();
+        assert_close(&luminance_of(picture, 4), &expected);
+    }
+
+    #[test]
+    fn a_mask_is_the_transparency_of_a_picture_that_has_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mask.png");
+        let mask = |pixels: [[u8; 2]; 2]| {
+            let picture = image::GrayAlphaImage::from_fn(2, 1, |x, _| LumaA(pixels[x as usize]));
+            picture.save(&path).unwrap();
+            Picture::load_mask(&path).unwrap().levels
+        };
+        assert_eq!(mask([[0, 255], [255, 0]]), [1.0, 0.0]);
+        assert_eq!(mask([[0, 255], [255, 255]]), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn what_is_written_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let levels = [0.0, 1.0, 0.2, 0.4];
+        let image = Tensor::<NdArray, 1>::from_floats(levels, &Default::default());
+        save_picture(image.reshape([1, 2, 2]), &path).unwrap();
+        assert_close(&Picture::load_mask(&path).unwrap().levels(2), &levels);
+    }
+
+    #[test]
+    fn transparent_is_black() {
+        let picture = image::GrayAlphaImage::from_pixel(1, 1, LumaA([255, 0]));
+        assert_close(&luminance_of(picture, 1), &[0.0]);
+    }
+}

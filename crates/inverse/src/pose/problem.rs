@@ -1,0 +1,91 @@
+use std::sync::Arc;
+
+use burn::tensor::Tensor;
+use softrast_mesh::Mesh;
+use softrast_raster::RasterBackend;
+
+use super::{PoseInstance, PoseScene};
+use crate::{InverseProblem, SoftnessAt, SolveConfig};
+
+/// Finds the camera that orbits a mesh from the silhouette that it should see.
+///
+/// θ is distance, elevation and azimuth of each instance, as [`PoseScene`] has it. The loss is the soft `IoU` loss against the hard
+/// silhouette at the target.
+#[derive(Clone, Debug)]
+pub struct PoseProblem {
+    /// What is seen, in world units.
+    pub mesh: Mesh,
+    /// Least and largest angle between a start and its target, in degrees.
+    pub range_deg: [f64; 2],
+    /// Whether the field of view is optimised too, from a random start, instead of being known.
+    pub optimise_fov: bool,
+}
+
+impl PoseProblem {
+    /// The poses of a mesh around the origin, from starts 35 to 55 degrees away, with a known field of view.
+    pub fn new(mesh: &Mesh) -> Self {
+        Self { mesh: mesh.clone(), range_deg: [35.0, 55.0], optimise_fov: false }
+    }
+}
+
+impl InverseProblem for PoseProblem {
+    type Instance = PoseInstance;
+    type Scene<B: RasterBackend> = PoseScene<B>;
+
+    fn instance(&self, seed: u64) -> anyhow::Result<PoseInstance> {
+        let mut instance = PoseInstance::seeded(seed, self.range_deg);
+        if !self.optimise_fov {
+            instance.start.fov_deg = instance.target.fov_deg;
+        }
+        Ok(instance)
+    }
+
+    fn restart(&self, instance: &PoseInstance, k: usize, count: usize) -> Option<PoseInstance> {
+        Some(instance.around(k, count))
+    }
+
+    fn scene<B: RasterBackend>(&self, instances: &[PoseInstance], size: usize) -> PoseScene<B> {
+        PoseScene::new(&self.mesh, instances, size, self.optimise_fov)
+    }
+
+    fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
+        Some(self.mesh.faces().into())
+    }
+
+    fn start<B: RasterBackend>(&self, scene: &PoseScene<B>) -> Tensor<B, 1> {
+        scene.start().flatten(0, 1)
+    }
+
+    fn allowed<B: RasterBackend>(&self, scene: &PoseScene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        scene.allowed(scene.by_view(theta)).flatten(0, 1)
+    }
+
+    fn image<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 3> {
+        softness.silhouette(scene.project(scene.by_view(theta)))
+    }
+
+    fn hard_image<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        theta: Tensor<B, 1>,
+    ) -> Tensor<B, 3> {
+        scene.hard(scene.project(scene.by_view(theta)))
+    }
+
+    fn image_loss<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        image: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        scene.image_loss(image)
+    }
+
+    fn defaults(&self) -> SolveConfig {
+        SolveConfig { size: 64, steps: 300, learning_rate: 0.3 }
+    }
+}

@@ -1,0 +1,48 @@
+//! Moves the vertices of a sphere until it fits two silhouettes. A scale that narrows finds the shape first and its edges later.
+//!
+//! `cargo run --release -p softrast --example fit`
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
+use softrast::{
+    mesh::{fox, icosphere},
+    prelude::*,
+};
+
+type Plain = NdArray;
+type B = Autodiff<Plain>;
+
+const SIZE: usize = 64;
+const STEPS: usize = 200;
+
+fn main() {
+    let device = Default::default();
+    let front = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 0.0, fov_deg: 50.0 };
+    let cameras = [front, Orbit { azimuth_deg: 90.0, ..front }];
+
+    // Masks `[2, 64, 64]` of 0 and 1, top row first; here those of a fox.
+    let fox = fox();
+    let seen = project(vertices(fox.positions(), &device), Orbit::tensors(&cameras, &device));
+    let masks: Tensor<B, 3> = hard_silhouette(seen, fox.faces(), SIZE);
+
+    let (sphere, cameras) = (icosphere(3), Orbit::tensors::<B>(&cameras, &device));
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = ScheduledSoftness::decay(softness, 0.05, 0.005);
+    let mut renderer = SoftRenderer::scheduled(sphere.faces(), SIZE, &softness);
+    let mut corners = vertices::<Plain>(sphere.positions(), &device);
+    let adam = Adam::new(0.01);
+    let mut state = adam.init(&corners);
+    for step in 0..=STEPS {
+        renderer.move_to(&softness, step as f64 / STEPS as f64);
+        let leaf = Tensor::<B, 3>::from_inner(corners.clone()).require_grad();
+        let image = renderer.silhouette(project(leaf.clone(), cameras.clone()));
+        let loss = iou_loss(image, masks.clone()).mean();
+        if step % 50 == 0 {
+            println!("step {step:3}: IoU loss {:.4}", loss.clone().into_scalar());
+        }
+        let gradient = leaf.grad(&loss.backward()).unwrap();
+        (corners, state) = adam.step(corners, gradient, state);
+    }
+}

@@ -1,0 +1,30 @@
+//! A soft silhouette, and its gradient by the camera, the vertices and the softness.
+//!
+//! `cargo run --release -p softrast --example silhouette`
+
+use burn::backend::{Autodiff, NdArray};
+use softrast::{mesh::fox, prelude::*};
+
+type B = Autodiff<NdArray>;
+
+fn main() {
+    let device = Default::default();
+    let mesh = fox(); // or Mesh::load("my.obj".as_ref())?
+    let corners = vertices::<B>(mesh.positions(), &device).require_grad(); // [1, V, 3]
+    let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
+    let camera = camera.tensor::<B>(&device).require_grad(); // [1, 4]
+    let renderer = SoftRenderer::new(mesh.faces(), 64, Family::Logistic, 0.01);
+    let phi = renderer.phi_tensor::<B>(&device).require_grad();
+
+    let alpha = renderer.silhouette_with(project(corners.clone(), camera.clone()), &phi); // [1, 64, 64]
+    let gradients = alpha.clone().mean().backward();
+
+    println!("coverage                 {:.4}", alpha.mean().into_scalar());
+    println!("its gradient by camera   {}", camera.grad(&gradients).unwrap().to_data());
+    println!("by the log of the scale  {}", phi.grad(&gradients).unwrap().to_data());
+    let by_corners = corners.grad(&gradients).unwrap();
+    println!(
+        "by the vertices, norm    {:.4}",
+        by_corners.powi_scalar(2).sum().sqrt().into_scalar()
+    );
+}

@@ -1,0 +1,13 @@
+//! What most programs need, for `use softrast::prelude::*`.
+
+pub use softrast_inverse::{
+    InverseProblem, Iterate, LearnConfig, Method, Picture, PoseProblem, SoftnessAt, SolveConfig,
+    learn, minimize, save_picture,
+};
+pub use softrast_mesh::{Mesh, MeshError};
+pub use softrast_meta::{Adam, MetaGradient, Optimizer};
+pub use softrast_raster::{
+    LookAt, Orbit, RasterBackend, SoftRenderer, TConorm, hard_silhouette, iou_loss, mse_loss,
+    project, project_from, vertices,
+};
+pub use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
