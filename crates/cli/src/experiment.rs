@@ -143,14 +143,14 @@ impl<T: Task> TaskExperiment<T> {
     ) -> anyhow::Result<Vec<Solved>> {
         let mut all: Vec<Solved> = Vec::new();
         let pictures = batch.pictures;
-        let watch = |iterate: Iterate, scene: &T::Scene<HostBackend>| {
+        let watch = |iterate: &Iterate, scene: &T::Scene<HostBackend>| {
             if all.is_empty() {
                 let targets = self.task.targets(scene);
                 let target = targets.chunks(targets.len() / instances.len());
                 all = target.map(|target| Solved::new(target.to_vec())).collect();
             }
             let thetas = theta_of(&iterate.theta, instances.len());
-            let errors = self.task.errors(instances, scene, &iterate);
+            let errors = self.task.errors(instances, scene, iterate);
             assert_eq!(
                 errors.len(),
                 instances.len(),

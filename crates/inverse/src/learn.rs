@@ -134,7 +134,7 @@ impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
     }
 }
 
-/// Learns a softness on a problem to the end, and shows every outer step to `visit`: the best softness.
+/// Learns a softness on runs of a problem as `solve` has them, and shows every outer step to `visit`: the best softness.
 ///
 /// # Errors
 ///
@@ -142,11 +142,11 @@ impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
 pub fn learn<P: InverseProblem, B: RasterBackend>(
     problem: P,
     method: &Method,
+    solve: &SolveConfig,
     config: &LearnConfig,
     mut visit: impl FnMut(&Record) -> anyhow::Result<()>,
 ) -> anyhow::Result<ScheduledSoftness> {
-    let solve = problem.defaults();
-    let mut learning = Learning::<P, B>::new(problem, method, &solve, config)?;
+    let mut learning = Learning::<P, B>::new(problem, method, solve, config)?;
     while let Some(record) = learning.step()? {
         visit(&record)?;
     }

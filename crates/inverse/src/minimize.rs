@@ -1,11 +1,11 @@
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::ensure;
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData, Transaction, backend::Backend},
 };
-use softrast_meta::{Optimizer, numbers};
+use softrast_meta::{InnerLoop, descend, numbers};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 
 use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig};
@@ -32,10 +32,10 @@ pub struct Iterate {
     pub seconds: Option<f64>,
 }
 
-/// Goes down the gradient of a problem's loss from its start, all `instances` side by side, and shows every iterate from the start to
-/// the end to `visit`, along with the scene on the CPU. `visit` does not count as time of a step.
+/// Goes down the gradient of a problem's loss from its start, all `instances` side by side: what it ends with.
 ///
-/// Parameters without a gradient, as where nothing was drawn, stay as they are.
+/// It shows every iterate from the start to the end to `visit`, along with the scene on the CPU. `visit` does not count as time of a
+/// step. Parameters without a gradient, as where nothing was drawn, stay as they are.
 ///
 /// # Errors
 ///
@@ -46,8 +46,8 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
     method: &Method,
     config: &SolveConfig,
     pictures: bool,
-    mut visit: impl FnMut(Iterate, &P::Scene<HostBackend>) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
+    mut visit: impl FnMut(&Iterate, &P::Scene<HostBackend>) -> anyhow::Result<()>,
+) -> anyhow::Result<Iterate> {
     ensure!(!instances.is_empty(), "there is no instance to solve");
     let SolveConfig { size, steps, learning_rate } = *config;
     let layout = PhiLayout::new(method.softness.clone(), problem.own_phi(), steps, size);
@@ -57,97 +57,62 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
         ScheduledRenderer::new(layout, &phi, rasterizer, method.resolution, problem.faces());
     let scene = problem.scene::<Autodiff<B>>(instances, size);
     let host = problem.scene::<HostBackend>(instances, size);
-    descend(
-        &problem.optimizer(learning_rate),
-        steps,
-        problem.start(&scene).inner(),
-        |step, theta| {
-            let image = problem.image(&scene, theta.clone(), &renderer.at(step));
-            let soft = problem.image_loss(&scene, image.clone());
-            let loss = match problem.regularizer(&scene, theta) {
-                Some(regularizer) => soft.clone() + regularizer,
-                None => soft.clone(),
-            };
-            (loss, (soft, image))
-        },
-        |theta| problem.allowed(&scene, Tensor::from_inner(theta)).inner(),
-        |now| {
-            let (soft, image) = now.seen;
-            // One round trip to the device for all of it.
-            let read = Transaction::default().register(now.theta).register(now.loss);
-            let read = read.register(soft.inner());
-            let image = pictures.then(|| of_first(image.inner(), instances.len()));
-            let rows = image.as_ref().map(|image| image.dims()[2]);
-            let read = image.into_iter().fold(read, |read, image| read.register(image));
-            let read: [Option<TensorData>; 4] = {
-                let mut read = read.execute().into_iter();
-                std::array::from_fn(|_| read.next())
-            };
-            let [Some(theta), Some(loss), Some(soft), image] = read else {
-                unreachable!("as many tensors are read as were registered")
-            };
-            let theta = on_host(theta);
-            let hard = problem.image_loss(&host, problem.hard_image(&host, theta.clone()));
-            let image = image
-                .zip(rows)
-                .map(|(image, side)| enlarged(&image.iter().collect::<Vec<f64>>(), side, size));
-            let iterate = Iterate {
-                step: now.step,
-                scale: renderer.scale(now.step),
-                theta,
-                loss: loss.iter().collect(),
-                soft_loss: soft.iter().collect(),
-                hard_loss: numbers(hard),
-                image,
-                seconds: now.seconds,
-            };
-            visit(iterate, &host)
-        },
-    )
-}
-
-/// A place on the way down.
-struct Place<B: Backend, S> {
-    step: usize,
-    theta: Tensor<B, 1>,
-    loss: Tensor<B, 1>,
-    /// What the objective saw on the way to the loss.
-    seen: S,
-    seconds: Option<f64>,
-}
-
-/// Goes down the gradient of the sum of the losses that `objective` gives at a step, from `theta` on; `allowed` says where a step may
-/// end.
-fn descend<B: Backend, S>(
-    optimizer: &impl Optimizer,
-    steps: usize,
-    mut theta: Tensor<B, 1>,
-    mut objective: impl FnMut(usize, Tensor<Autodiff<B>, 1>) -> (Tensor<Autodiff<B>, 1>, S),
-    allowed: impl Fn(Tensor<B, 1>) -> Tensor<B, 1>,
-    mut visit: impl FnMut(Place<B, S>) -> anyhow::Result<()>,
-) -> anyhow::Result<()> {
-    let (mut state, mut seconds) = (optimizer.init(&theta), None);
-    for step in 0..=steps {
+    // Time of drawing, and since when the step has gone on.
+    let mut spent: Option<(Duration, Instant)> = None;
+    let mut look = |step: usize, leaf: Tensor<Autodiff<B>, 1>| {
+        let seconds = spent.map(|(drawing, since)| (drawing + since.elapsed()).as_secs_f64());
         let clock = Instant::now();
-        let leaf = Tensor::from_inner(theta.clone()).require_grad();
-        let (loss, seen) = objective(step, leaf.clone());
+        let image = problem.image(&scene, leaf.clone(), &renderer.at(step));
+        let soft = problem.image_loss(&scene, image.clone());
+        let loss = match problem.regularizer(&scene, leaf.clone()) {
+            Some(regularizer) => soft.clone() + regularizer,
+            None => soft.clone(),
+        };
         // A GPU has only been asked so far, also for the end of the step before.
-        B::sync(&theta.device())?;
-        let mut time = clock.elapsed();
-        let inner = loss.clone().inner();
-        visit(Place { step, theta: theta.clone(), loss: inner, seen, seconds })?;
-        if step == steps {
-            break;
-        }
-        let clock = Instant::now();
-        let grads = loss.sum().backward();
-        let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
-        let (moved, next) = optimizer.step(theta, grad, state);
-        (theta, state) = (allowed(moved), next);
-        time += clock.elapsed();
-        seconds = Some(time.as_secs_f64());
-    }
-    Ok(())
+        B::sync(&leaf.device())?;
+        let drawing = clock.elapsed();
+        let image = pictures.then(|| of_first(image.inner(), instances.len()));
+        let rows = image.as_ref().map(|image| image.dims()[2]);
+        // One round trip to the device for all of it.
+        let read = Transaction::default().register(leaf.inner()).register(loss.clone().inner());
+        let read = read.register(soft.inner());
+        let read = image.into_iter().fold(read, |read, image| read.register(image));
+        let read: [Option<TensorData>; 4] = {
+            let mut read = read.execute().into_iter();
+            std::array::from_fn(|_| read.next())
+        };
+        let [Some(theta), Some(losses), Some(soft), image] = read else {
+            unreachable!("as many tensors are read as were registered")
+        };
+        let theta = on_host(theta);
+        let hard = problem.image_loss(&host, problem.hard_image(&host, theta.clone()));
+        let image = image
+            .zip(rows)
+            .map(|(image, side)| enlarged(&image.iter().collect::<Vec<f64>>(), side, size));
+        let iterate = Iterate {
+            step,
+            scale: renderer.scale(step),
+            theta,
+            loss: losses.iter().collect(),
+            soft_loss: soft.iter().collect(),
+            hard_loss: numbers(hard),
+            image,
+            seconds,
+        };
+        visit(&iterate, &host)?;
+        spent = Some((drawing, Instant::now()));
+        anyhow::Ok((loss, iterate))
+    };
+    let inner = InnerLoop { optimizer: problem.optimizer(learning_rate), steps };
+    let gradient = |step: usize, theta: &Tensor<B, 1>| {
+        let leaf = Tensor::from_inner(theta.clone()).require_grad();
+        let (loss, _) = look(step, Tensor::clone(&leaf))?;
+        Ok(leaf.grad(&loss.sum().backward()).unwrap_or_else(|| theta.zeros_like()))
+    };
+    let allowed = |theta| problem.allowed(&scene, Tensor::from_inner(theta)).inner();
+    let start = problem.start(&scene).inner();
+    let theta = descend::<B, _, anyhow::Error>(&inner, start, gradient, allowed, |_, _, _| ())?;
+    Ok(look(steps, Tensor::from_inner(theta))?.1)
 }
 
 /// The views of the first of so many instances.

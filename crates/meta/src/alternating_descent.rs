@@ -1,11 +1,13 @@
+use std::convert::Infallible;
+
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, backend::Backend},
 };
 
 use crate::{
-    Adam, BilevelProblem, InnerLoop, MetaEstimate, Objective, Optimizer, inner_loop::allowed,
-    objective::Lowered, vector::numbers,
+    Adam, BilevelProblem, InnerLoop, MetaEstimate, Objective, Optimizer, descend,
+    inner_loop::allowed, objective::Lowered, vector::numbers,
 };
 
 /// An inner loop that moves the softness along with the scene, down the same loss.
@@ -36,7 +38,7 @@ fn solve<B, P, O, S>(
     inner: &InnerLoop<O>,
     softness: &S,
     objective: &P,
-    mut theta: Tensor<B, 1>,
+    theta: Tensor<B, 1>,
     mut phi: Tensor<B, 1>,
 ) -> (Tensor<B, 1>, Tensor<B, 1>)
 where
@@ -45,19 +47,17 @@ where
     O: Optimizer,
     S: Optimizer,
 {
-    let InnerLoop { optimizer, steps } = inner;
-    let mut state = optimizer.init(&theta);
-    let mut softness_state = softness.init(&phi);
-    for step in 0..*steps {
+    let mut state = softness.init(&phi);
+    let gradient = |step: usize, theta: &Tensor<B, 1>| {
         let [leaf, soft] =
-            [&theta, &phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()).require_grad());
+            [theta, &phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()).require_grad());
         let grads = objective.loss_at(leaf.clone(), soft.clone(), step).backward();
-        let grad = leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like());
         let soft_grad = soft.grad(&grads).unwrap_or_else(|| phi.zeros_like());
-        (theta, state) = optimizer.step(theta, grad, state);
-        theta = allowed(objective, theta);
-        (phi, softness_state) = softness.step(phi, soft_grad, softness_state);
-    }
+        (phi, state) = softness.step(phi.clone(), soft_grad, state.clone());
+        Ok(leaf.grad(&grads).unwrap_or_else(|| theta.zeros_like()))
+    };
+    let Ok::<_, Infallible>(theta) =
+        descend(inner, theta, gradient, |theta| allowed(objective, theta), |_, _, _| ());
     (theta, phi)
 }
 

@@ -1,11 +1,13 @@
+use std::convert::Infallible;
+
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, backend::Backend},
 };
 
 use crate::{
-    InnerLoop, Objective, Optimizer, OuterSteps, gradient, inner_loop::allowed, objective::Lowered,
-    vector::numbers,
+    InnerLoop, Objective, Optimizer, OuterSteps, descend, gradient, inner_loop::allowed,
+    objective::Lowered, vector::numbers,
 };
 
 /// One instance of a task, to learn a softness on: what is optimised, and how the result is judged.
@@ -51,19 +53,16 @@ impl<B: Backend, P: Objective<Autodiff<Autodiff<B>>>, R, O: Optimizer> BilevelPr
     pub(crate) fn walk(
         &self,
         phi: &Tensor<B, 1>,
-        mut see: impl FnMut(usize, &Tensor<B, 1>, &O::State<B, 1>),
+        see: impl FnMut(usize, &Tensor<B, 1>, &O::State<B, 1>),
     ) {
-        let (optimizer, objective) = (&self.inner.optimizer, Lowered(&self.objective));
-        let mut state = optimizer.init(&self.start);
-        let mut theta = self.start.clone();
-        see(0, &theta, &state);
-        for step in 0..self.inner.steps {
-            let [at, phi] = [&theta, phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()));
+        let gradient = |step: usize, theta: &Tensor<B, 1>| {
+            let [at, phi] = [theta, phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()));
             // On the level of the way back: what the objective detaches, it detaches there.
-            let grad = gradient(&self.objective, at, phi, step).inner();
-            (theta, state) = optimizer.step(theta, grad, state);
-            theta = allowed(&objective, theta);
-            see(step + 1, &theta, &state);
-        }
+            Ok(gradient(&self.objective, at, phi, step).inner())
+        };
+        let objective = Lowered(&self.objective);
+        let allowed = |theta| allowed(&objective, theta);
+        let Ok::<_, Infallible>(_) =
+            descend(&self.inner, self.start.clone(), gradient, allowed, see);
     }
 }

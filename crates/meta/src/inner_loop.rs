@@ -1,3 +1,5 @@
+use std::convert::Infallible;
+
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, backend::Backend},
@@ -27,15 +29,37 @@ impl<O: Optimizer> InnerLoop<O> {
         theta: Tensor<B, 1>,
         phi: &Tensor<B, 1>,
     ) -> Tensor<B, 1> {
-        let mut state = self.optimizer.init(&theta);
-        let mut theta = theta;
-        for step in 0..self.steps {
-            let grad = gradient(objective, theta.clone(), phi.clone(), step);
-            (theta, state) = self.optimizer.step(theta, grad, state);
-            theta = allowed(objective, theta);
-        }
+        let gradient = |step: usize, theta: &Tensor<B, 1>| {
+            Ok(gradient(objective, theta.clone(), phi.clone(), step))
+        };
+        let Ok::<_, Infallible>(theta) =
+            descend(self, theta, gradient, |theta| allowed(objective, theta), |_, _, _| ());
         theta
     }
+}
+
+/// Goes down the `gradient` that is found at each step, counted from 0, from `theta` `[N]` on: the scene at the end. `allowed` says where
+/// a step may end, and `see` is shown the scene and the optimiser's state before the first step and after each.
+///
+/// # Errors
+///
+/// That of `gradient`, which ends the descent.
+pub fn descend<B: Backend, O: Optimizer, E>(
+    InnerLoop { optimizer, steps }: &InnerLoop<O>,
+    mut theta: Tensor<B, 1>,
+    mut gradient: impl FnMut(usize, &Tensor<B, 1>) -> Result<Tensor<B, 1>, E>,
+    allowed: impl Fn(Tensor<B, 1>) -> Tensor<B, 1>,
+    mut see: impl FnMut(usize, &Tensor<B, 1>, &O::State<B, 1>),
+) -> Result<Tensor<B, 1>, E> {
+    let mut state = optimizer.init(&theta);
+    see(0, &theta, &state);
+    for step in 0..*steps {
+        let grad = gradient(step, &theta)?;
+        (theta, state) = optimizer.step(theta, grad, state);
+        theta = allowed(theta);
+        see(step + 1, &theta, &state);
+    }
+    Ok(theta)
 }
 
 /// The nearest scene `[N]` that the objective allows; tracked like `theta` on an `Autodiff` backend.

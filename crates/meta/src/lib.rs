@@ -30,7 +30,7 @@ pub use alternating_descent::AlternatingDescent;
 pub use bilevel_problem::BilevelProblem;
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use estimate::MetaEstimate;
-pub use inner_loop::{InnerLoop, gradient};
+pub use inner_loop::{InnerLoop, descend, gradient};
 pub use meta_gradient::MetaGradient;
 pub use objective::Objective;
 pub use optimizer::Optimizer;

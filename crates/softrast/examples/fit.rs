@@ -42,7 +42,7 @@ fn main() {
         if step % 50 == 0 {
             println!("step {step:3}: IoU loss {:.4}", loss.clone().into_scalar());
         }
-        let gradient = leaf.grad(&loss.backward()).unwrap();
+        let gradient = leaf.grad(&loss.backward()).expect("the image depends on it");
         (corners, state) = adam.step(corners, gradient, state);
     }
 }

@@ -2,7 +2,10 @@
 //!
 //! `cargo run --release -p softrast --example silhouette`
 
-use burn::backend::{Autodiff, NdArray};
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
 use softrast::{mesh::fox, prelude::*};
 
 type B = Autodiff<NdArray>;
@@ -19,12 +22,14 @@ fn main() {
     let alpha = renderer.silhouette_with(project(corners.clone(), camera.clone()), &phi); // [1, 64, 64]
     let gradients = alpha.clone().mean().backward();
 
-    println!("coverage                 {:.4}", alpha.mean().into_scalar());
-    println!("its gradient by camera   {}", camera.grad(&gradients).unwrap().to_data());
-    println!("by the log of the scale  {}", phi.grad(&gradients).unwrap().to_data());
-    let by_corners = corners.grad(&gradients).unwrap();
+    let norm = |gradient: Option<Tensor<NdArray, 3>>| {
+        gradient.map(|gradient| gradient.powi_scalar(2).sum().sqrt().into_scalar())
+    };
+    println!("mean coverage        {:.4}", alpha.mean().into_scalar());
     println!(
-        "by the vertices, norm    {:.4}",
-        by_corners.powi_scalar(2).sum().sqrt().into_scalar()
+        "gradient by camera   {:?}",
+        camera.grad(&gradients).map(|g| Orbit::from_tensor(g)[0])
     );
+    println!("by ln of the scale   {:?}", phi.grad(&gradients).map(|g| g.into_scalar()));
+    println!("by vertices, norm    {:?}", norm(corners.grad(&gradients)));
 }

@@ -149,9 +149,9 @@ pub fn descend<P: InverseProblem>(
     let method = Method { tolerance, ..Method::new("tested", softness) };
     let mut end = Descended { hard: Vec::new(), thetas: Vec::new(), numbers: Vec::new() };
     minimize::<P, Single>(problem, instances, &method, &config, false, |iterate, _| {
-        let theta = numbers(iterate.theta);
+        let theta = numbers(iterate.theta.clone());
         end.numbers.extend(iterate.loss.iter().chain(&iterate.hard_loss).chain(&theta));
-        end.hard.push(iterate.hard_loss);
+        end.hard.push(iterate.hard_loss.clone());
         end.thetas.push(theta);
         Ok(())
     })?;

@@ -20,7 +20,8 @@ fn iterates(
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
     let method = Method::new("none", ScheduledSoftness::constant(softness, 0.1));
     let config = problem.defaults();
-    minimize::<_, B>(problem, instances, &method, &config, false, |iterate, _| visit(&iterate))
+    minimize::<_, B>(problem, instances, &method, &config, false, |iterate, _| visit(iterate))?;
+    Ok(())
 }
 
 /// Where Adam goes, down `θ²`.

@@ -1,0 +1,28 @@
+//! Learns how the scale of a softness should move while a camera is found, by differentiating through whole runs; then solves with it.
+//!
+//! `cargo run --release -p softrast --example learn`
+
+use burn::backend::NdArray;
+use softrast::{mesh::icosphere, prelude::*};
+
+fn main() -> anyhow::Result<()> {
+    let ball = icosphere(1);
+    let stretched = ball.positions().iter().map(|[x, y, z]| [*x, 0.7 * y, 0.4 * z + 0.3 * x]);
+    let problem = PoseProblem::new(&Mesh::new(stretched.collect(), ball.faces().to_vec())?);
+    let runs = SolveConfig { size: 32, steps: 30, learning_rate: 2.0 };
+
+    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let start = Method::new("start", ScheduledSoftness::decay(logistic, 0.05, 0.005));
+    let config = LearnConfig { updates: 12, batch: 4, outer_rate: 0.1, ..LearnConfig::default() };
+    let learned = learn::<_, NdArray>(problem.clone(), &start, &runs, &config, |record| {
+        println!("update {:2}: outer loss {:.4?}", record.step, record.loss);
+        Ok(())
+    })?;
+    learned.save("learned.json".as_ref())?;
+
+    let method = Method::new("learned", learned);
+    let instances = [problem.instance(0)?];
+    let end = minimize::<_, NdArray>(&problem, &instances, &method, &runs, false, |_, _| Ok(()))?;
+    println!("IoU loss of the hard image: {:.4}", end.hard_loss[0]);
+    Ok(())
+}
