@@ -170,7 +170,7 @@ fn body() -> (TempDir, PathBuf) {
 
 fn small_pose() -> (TempDir, pose::Args) {
     let (folder, mesh) = body();
-    (folder, pose::Args { mesh: Some(mesh), ..pose::Args::default() })
+    (folder, pose::Args { mesh: Some(mesh), raw: true, ..pose::Args::default() })
 }
 
 fn small_shape2d() -> shape2d::Args {

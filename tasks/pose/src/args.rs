@@ -5,13 +5,13 @@ use clap::ValueEnum;
 /// Flags that only POSE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh to view, used as it stands [default: the project's own fox]
+    /// Mesh to view, centred and with the longest side of its box scaled to 2 [default: the project's own fox]
     #[arg(long, value_name = "FILE.obj")]
     pub mesh: Option<PathBuf>,
 
-    /// Centre the mesh, and scale it so that the longest side of its box is 2
-    #[arg(long)]
-    pub normalize: bool,
+    /// Take the mesh as it stands, as the paper's experiments do
+    #[arg(long, requires = "mesh")]
+    pub raw: bool,
 
     /// Degrees between the start and the target [default: 35-55]
     #[arg(long, value_enum)]

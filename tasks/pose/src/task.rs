@@ -221,18 +221,18 @@ impl Task for Pose {
         if covered == 0 {
             warnings.push(format!(
                 "seed {seed}: the target image is empty, so there is nothing to match: check that the mesh is around the origin \
-                 (--normalize moves it there) and raise --size"
+                 (without --raw it is moved there) and raise --size"
             ));
         } else if covered == target.len() {
             warnings.push(format!(
-                "seed {seed}: the mesh fills the whole target image, so no edge shows its pose: try --normalize or a larger --size"
+                "seed {seed}: the mesh fills the whole target image, so no edge shows its pose: leave out --raw or take a larger --size"
             ));
         }
         let (nearest, camera) = (nearest_distance(&self.problem.mesh), instance.target.distance);
         if camera < nearest {
             warnings.push(format!(
                 "seed {seed}: the mesh reaches to the target camera: it would have to be {nearest:.3} from the origin but is at \
-                 {camera:.3}; try --normalize"
+                 {camera:.3}; leave out --raw"
             ));
         }
         if covered > 0 && hard >= 1.0 {
@@ -255,9 +255,11 @@ fn mesh(args: &Args) -> anyhow::Result<(Mesh, String)> {
         None => (fox(), "fox".to_owned()),
         Some(path) => (Mesh::load(path)?, path.display().to_string()),
     };
-    Ok(if args.normalize {
-        (mesh.normalized(), format!("{name}, normalized"))
-    } else {
+    // The released pairs belong to the released meshes.
+    let as_it_stands = args.raw || args.instances == Instances::Released24;
+    Ok(if as_it_stands || args.mesh.is_none() {
         (mesh, name)
+    } else {
+        (mesh.normalized(), format!("{name}, normalized"))
     })
 }

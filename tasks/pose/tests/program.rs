@@ -118,17 +118,17 @@ fn one_field_of_view_more_can_be_optimised() {
 #[test]
 fn a_mesh_out_of_view_is_said_to_be_so() {
     let far = "v 90 0 0\nv 91 0 0\nv 90 1 0\nf 1 2 3\n";
-    let json = with_mesh(far, "--steps 3 --size 16").unwrap();
+    let json = with_mesh(far, "--steps 3 --size 16 --raw").unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("target image is empty"), "{json}");
-    let json = with_mesh(far, "--steps 3 --size 16 --normalize").unwrap();
+    let json = with_mesh(far, "--steps 3 --size 16").unwrap();
     assert!(!warnings(&json).contains("target image is empty"), "{json}");
 }
 
 #[test]
 fn a_mesh_around_the_camera_ends_with_finite_numbers() {
     let huge = "v -50 -50 0\nv 50 -50 0\nv 0 90 1\nv 0 0 40\nf 1 2 3\nf 1 4 2\nf 2 4 3\n";
-    let json = with_mesh(huge, "--steps 5 --size 16").unwrap();
+    let json = with_mesh(huge, "--steps 5 --size 16 --raw").unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("reaches to the target camera"), "{json}");
 }
@@ -140,7 +140,7 @@ fn a_mesh_that_fills_the_view_is_said_to_do_so() {
     let ball = icosphere(1);
     let large = ball.positions().iter().map(|p| p.map(|x| 2.2 * x)).collect();
     Mesh::new(large, ball.faces().to_vec()).unwrap().write_obj(&mesh).unwrap();
-    let json = run(&format!("--size 16 --steps 3 --mesh {}", mesh.display())).unwrap();
+    let json = run(&format!("--size 16 --steps 3 --raw --mesh {}", mesh.display())).unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("fills the whole target image"), "{json}");
 }

@@ -3,13 +3,13 @@ use std::path::PathBuf;
 /// Flags that only 3D SHAPE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh whose silhouettes are the target, used as it stands [default: our airplane, or chair]
+    /// Mesh whose silhouettes are the target, centred and with the longest side of its box scaled to 1 [default: our airplane, or chair]
     #[arg(long, value_name = "FILE.obj")]
     pub mesh: Option<PathBuf>,
 
-    /// Centre the target mesh, and scale it so that the longest side of its box is 1
-    #[arg(long)]
-    pub normalize: bool,
+    /// Take the target mesh as it stands, as the paper's experiments do
+    #[arg(long, requires = "mesh")]
+    pub raw: bool,
 
     /// Mesh that is deformed, centred and with the longest side scaled to 1 [default: a sphere]
     #[arg(long, value_name = "FILE.obj", conflicts_with = "detail")]

@@ -189,20 +189,20 @@ impl Task for Shape3d {
         if empty > 0 {
             warnings.push(format!(
                 "seed {seed}: {empty} of {VIEWS} target images are empty, so there is nothing to match in them: check that the mesh \
-                 is around the origin (--normalize moves it there) and raise --size"
+                 is around the origin (without --raw it is moved there) and raise --size"
             ));
         }
         if full > 0 {
             warnings.push(format!(
-                "seed {seed}: the mesh fills {full} of {VIEWS} target images, so no edge shows its shape in them: try --normalize or \
-                 a larger --size"
+                "seed {seed}: the mesh fills {full} of {VIEWS} target images, so no edge shows its shape in them: leave out --raw \
+                 or take a larger --size"
             ));
         }
         let radius = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
         let radius = self.target.triangles().flatten().map(radius).fold(0.0, f64::max);
         if radius >= DISTANCE {
             warnings.push(format!(
-                "seed {seed}: the target mesh reaches {radius:.3} from the origin, as far as the cameras at {DISTANCE}: try --normalize"
+                "seed {seed}: the target mesh reaches {radius:.3} from the origin, as far as the cameras at {DISTANCE}: leave out --raw"
             ));
         }
         if empty < VIEWS && hard >= 1.0 {
@@ -235,7 +235,7 @@ fn target(variant: Variant, args: &Args) -> anyhow::Result<(Mesh, String)> {
         (None, Variant::Original) => (airplane(), "airplane".to_owned()),
         (None, Variant::Transfer) => (chair(), "chair".to_owned()),
     };
-    if !args.normalize {
+    if args.raw || args.mesh.is_none() {
         return Ok((mesh, name));
     }
     let halved = mesh.normalized().positions().iter().map(|p| p.map(|x| 0.5 * x)).collect();

@@ -92,10 +92,10 @@ fn a_coarser_sphere_has_fewer_faces_and_few_pixels_are_judged_on_all() {
 #[test]
 fn a_mesh_out_of_view_is_said_to_be_so() {
     let far = "v 0 90 0\nv 1 90 0\nv 0 91 0\nf 1 2 3\n";
-    let json = with_file("--mesh", far, "--steps 3 --size 8").unwrap();
+    let json = with_file("--mesh", far, "--steps 3 --size 8 --raw").unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("24 of 24 target images are empty"), "{json}");
-    let json = with_file("--mesh", far, "--steps 3 --size 8 --normalize").unwrap();
+    let json = with_file("--mesh", far, "--steps 3 --size 8").unwrap();
     assert!(!warnings(&json).contains("24 of 24 target images are empty"), "{json}");
 }
 
@@ -103,7 +103,7 @@ fn a_mesh_out_of_view_is_said_to_be_so() {
 fn a_mesh_that_fills_the_view_is_said_to_do_so() {
     let box_of_cubes = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\n\
                         v -1 1 1\nf 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 4 3 7 8\nf 1 4 8 5\nf 2 3 7 6\n";
-    let json = with_file("--mesh", box_of_cubes, "--steps 3 --size 8 --elevation 0").unwrap();
+    let json = with_file("--mesh", box_of_cubes, "--steps 3 --size 8 --elevation 0 --raw").unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("fills 24 of 24 target images"), "{json}");
 }
@@ -111,7 +111,7 @@ fn a_mesh_that_fills_the_view_is_said_to_do_so() {
 #[test]
 fn a_mesh_beyond_the_cameras_ends_with_finite_numbers() {
     let huge = "v -50 -50 0\nv 50 -50 0\nv 0 90 1\nv 0 0 40\nf 1 2 3\nf 1 4 2\nf 2 4 3\n";
-    let json = with_file("--mesh", huge, "--steps 3 --size 8").unwrap();
+    let json = with_file("--mesh", huge, "--steps 3 --size 8 --raw").unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("as far as the cameras"), "{json}");
 }

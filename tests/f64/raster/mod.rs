@@ -5,6 +5,7 @@ mod camera;
 mod colour;
 mod fused;
 mod reference;
+mod soft_renderer;
 mod threads;
 mod tolerance;
 #[path = "../../../crates/raster/tests/triangles/mod.rs"]

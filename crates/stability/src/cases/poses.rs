@@ -89,7 +89,7 @@ fn with_body<R>(mesh: &Mesh, work: impl FnOnce(Args) -> anyhow::Result<R>) -> an
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("body.obj");
     mesh.write_obj(&path)?;
-    work(Args { mesh: Some(path), ..Args::default() })
+    work(Args { mesh: Some(path), raw: true, ..Args::default() })
 }
 
 /// Degrees that seeds of the lopsided body end off; a success is 5.

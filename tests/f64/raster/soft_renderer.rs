@@ -1,0 +1,180 @@
+//! Support and knots follow the parameters: the promised error holds whatever happens to them.
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
+use proptest::prelude::*;
+use softrast_raster::{Rasterizer, SoftRenderer, TConorm, reference};
+use softrast_softness::{
+    EdgeSoftness, Family, ScaleSchedule, ScheduledSoftness, Softness, Surrogate,
+};
+use softrast_tests::{numbers, vector};
+
+use super::triangles::triangles;
+
+type B = NdArray<f64>;
+
+const SIZE: usize = 16;
+const TOLERANCE: f64 = 1e-4;
+
+fn shaped(vertices: &[f64]) -> Tensor<B, 3> {
+    vector::<B>(vertices).reshape([1, vertices.len() as i64 / 3, 3])
+}
+
+/// By how much the renderer's image differs from that of every pixel-face pair, and the bound.
+fn off(
+    renderer: &SoftRenderer<EdgeSoftness>,
+    (vertices, faces): (&[f64], &[[u32; 3]]),
+    softness: EdgeSoftness,
+    phi: &[f64],
+) -> [f64; 2] {
+    let drawn = numbers(renderer.silhouette_with(shaped(vertices), &vector(phi)));
+    let scene = reference::Scene { faces, size: SIZE };
+    let t_conorm = TConorm::Probabilistic;
+    let sums = reference::sums(scene, shaped(vertices), &softness, t_conorm, vector(phi));
+    let exact = numbers(t_conorm.coverage(sums));
+    let largest = drawn.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let error = renderer.prepared::<B>(phi).profile().error();
+    [largest, TOLERANCE / 2.0 + error.max(TOLERANCE / 2.0)]
+}
+
+fn renderer(softness: EdgeSoftness, faces: &[[u32; 3]], scale: f64) -> SoftRenderer<EdgeSoftness> {
+    SoftRenderer::new(faces, SIZE, softness, scale).with_tolerance(TOLERANCE)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_pixel_is_off_by_more_than_the_tolerance_wherever_the_parameters_go(
+        seed in 0u64..1000,
+        family in proptest::sample::select(Family::ALL.to_vec()),
+        squared: bool,
+        width in -3.0f64..0.0,
+        moves in proptest::collection::vec((-3.0f64..3.0, 0usize..3, -0.5f64..0.5), 1..5),
+    ) {
+        let softness = EdgeSoftness { family, squared };
+        let (vertices, faces) = triangles(seed, 20);
+        let scale = |width: f64| 10f64.powf(if squared { 2.0 * width } else { width });
+        let renderer = renderer(softness, &faces, scale(width));
+        let mut phi = renderer.phi().to_vec();
+        for (wider, which, by) in moves {
+            phi = softness.with_scale_values(&phi, scale(wider.clamp(-3.0 - width, 0.5 - width)));
+            if let Some(entry) = phi.iter_mut().skip(1).nth(which) {
+                *entry += by;
+            }
+            let [largest, bound] = off(&renderer, (&vertices, &faces), softness, &phi);
+            prop_assert!(largest <= bound, "{phi:?}: off by {largest:e}, not {bound:e}");
+        }
+    }
+}
+
+#[test]
+fn a_softness_that_is_only_stretched_keeps_its_knots() {
+    let (_, faces) = triangles(1, 20);
+    for family in [Family::Logistic, Family::Exp, Family::Gamma, Family::Mlp] {
+        for squared in [false, true] {
+            let softness = EdgeSoftness { family, squared };
+            let renderer = renderer(softness, &faces, 0.01);
+            let [outer, inner] = renderer.prepared::<B>(renderer.phi()).profile().support();
+            let wider = softness.with_scale_values(renderer.phi(), 4.0);
+            let factor = if squared { 2.0 } else { 4.0 };
+            for (found, before) in
+                renderer.prepared::<B>(&wider).profile().support().into_iter().zip([outer, inner])
+            {
+                assert!((found / before / factor - 1.0).abs() < 1e-12, "{family} {found} {before}");
+            }
+            let other = SoftRenderer::with_rasterizer(
+                Rasterizer { tolerance: TOLERANCE, ..Rasterizer::new(SIZE) },
+                faces.clone(),
+                softness,
+                wider.clone(),
+            );
+            let anew = *other.prepared::<B>(&wider).profile();
+            assert_eq!(renderer.prepared::<B>(&wider).profile().knots(), anew.knots(), "{family}");
+        }
+    }
+}
+
+#[test]
+fn a_support_that_does_not_end_is_chosen_anew_before_faces_could_leave_it() {
+    let (_, faces) = triangles(1, 3);
+    let softness = EdgeSoftness { family: Family::Reciprocal, squared: false };
+    let renderer = renderer(softness, &faces, 0.1);
+    let support = |scale: f64| {
+        renderer.prepared::<B>(&softness.default_phi(scale)).profile().support().map(|x| x > 1.5e6)
+    };
+    assert_eq!(support(0.1), [true; 2]);
+    for scale in [0.05, 0.01, 1e-4, 0.1, 1.0] {
+        assert_eq!(support(scale), [true; 2], "{scale}");
+    }
+}
+
+#[test]
+fn gradients_to_vertices_and_parameters_are_those_of_the_image() {
+    type A = Autodiff<B>;
+    let (vertices, faces) = triangles(2, 6);
+    let softness = EdgeSoftness { family: Family::Gamma, squared: false };
+    let renderer = renderer(softness, &faces, 0.05).with_tolerance(1e-9);
+    let loss = |vertices: Tensor<A, 1>, phi: Tensor<A, 1>| {
+        let vertices = vertices.clone().reshape([1, vertices.dims()[0] as i64 / 3, 3]);
+        renderer.silhouette_with(vertices, &phi).powi_scalar(2).sum()
+    };
+    let both = [vertices, renderer.phi().to_vec()];
+    let [at, phi] = [0, 1].map(|k| vector::<A>(&both[k]).require_grad());
+    let grads = loss(at.clone(), phi.clone()).backward();
+    let found = [at, phi].map(|x| numbers(x.grad(&grads).unwrap()));
+    const H: f64 = 1e-5;
+    for (which, entries) in [(0, vec![0, 4, 6, 10, 13]), (1, vec![0, 1])] {
+        for k in entries {
+            let value = |h: f64| {
+                let mut moved = both.clone();
+                moved[which][k] += h;
+                numbers(loss(vector(&moved[0]), vector(&moved[1])))[0]
+            };
+            let (slope, found) = ((value(H) - value(-H)) / (2.0 * H), found[which][k]);
+            let close = (slope - found).abs() < 1e-4 * (1.0 + slope.abs());
+            assert!(close, "{which} {k}: {found}, not {slope}");
+        }
+    }
+}
+
+#[test]
+fn a_scheduled_softness_is_drawn_as_it_is_at_each_part_with_the_gradient_of_its_surrogate() {
+    type A = Autodiff<B>;
+    let (vertices, faces) = triangles(4, 12);
+    let softness = EdgeSoftness { family: Family::Gauss, squared: false };
+    let schedule = ScaleSchedule { knots: vec![-2.0, -3.0], floor_px: 0.1 };
+    let plain = ScheduledSoftness {
+        schedule: Some(schedule),
+        ..ScheduledSoftness::constant(softness, 1.0)
+    };
+    let surrogate = Surrogate { softness, phi: softness.default_phi(3.0) };
+    let wide = ScheduledSoftness { surrogate: Some(surrogate), ..plain.clone() };
+    let mut scheduled = SoftRenderer::scheduled(&faces, SIZE, &wide);
+    for part in [0.0, 0.3, 1.0, 0.3] {
+        scheduled.move_to(&wide, part);
+        let scale = plain.scale_at(part, SIZE);
+        let by_hand =
+            SoftRenderer::new(&faces, SIZE, softness, scale).with_surrogate(softness, 3.0 * scale);
+        let image = |renderer: &SoftRenderer<EdgeSoftness>| {
+            let leaf = Tensor::<A, 3>::from_inner(shaped(&vertices)).require_grad();
+            let image = renderer.silhouette(leaf.clone());
+            let grads = image.clone().powi_scalar(2).sum().backward();
+            [numbers(image), numbers(leaf.grad(&grads).unwrap())]
+        };
+        let [found, expected] = [&scheduled, &by_hand].map(image);
+        for (found, expected) in found.concat().into_iter().zip(expected.concat()) {
+            let close = (found - expected).abs() < 1e-4 * (1.0 + expected.abs());
+            assert!(close, "{part}: {found}, not {expected}");
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "has 1 parameters, found 2")]
+fn parameters_of_another_length_are_refused() {
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    renderer(softness, &[[0, 1, 2]], 0.1).set_phi(vec![0.0, 0.0]);
+}
