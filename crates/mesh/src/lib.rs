@@ -27,3 +27,8 @@ pub use error::{LineError, MeshError};
 pub use fox::fox;
 pub use icosphere::icosphere;
 pub use mesh::Mesh;
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

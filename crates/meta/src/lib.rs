@@ -41,3 +41,8 @@ pub use record::Record;
 pub use sgd::Sgd;
 pub use task_distribution::TaskDistribution;
 pub use vector::{numbers, tensor, vector};
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

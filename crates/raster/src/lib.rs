@@ -38,3 +38,8 @@ pub use profile::Profile;
 pub use silhouette::{Rasterizer, Silhouette};
 pub use soft_renderer::SoftRenderer;
 pub use t_conorm::{TConorm, UnknownTConorm};
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -50,3 +50,8 @@ pub use scheduled::{ScheduledSoftness, Surrogate};
 pub use soft_step::SoftStep;
 pub use softness::Softness;
 pub use support::{Support, support};
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

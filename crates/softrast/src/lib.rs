@@ -18,12 +18,17 @@ pub use softrast_meta as meta;
 pub use softrast_raster as raster;
 pub use softrast_softness as softness;
 
-/// Compiles and runs the README's examples.
+/// Compiles and runs the examples of the project's README.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
-pub struct Readme;
+pub struct ProjectReadme;
 
 /// Compiles and runs the guide's example.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/adding-a-softness.md")]
 pub struct AddingASoftness;
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
