@@ -32,3 +32,8 @@ pub struct AddingASoftness;
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;
+
+/// Compiles the example of the page for newcomers from other rasterizers.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/coming-from-pytorch3d.md")]
+pub struct ComingFromPyTorch3d;

@@ -4,6 +4,7 @@ mod bad_cases;
 mod camera;
 mod colour;
 mod fused;
+mod pytorch3d;
 mod reference;
 mod soft_renderer;
 mod threads;
