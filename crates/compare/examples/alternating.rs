@@ -7,7 +7,7 @@
 //!
 //! The strongest baseline without learning: φ goes down the inner loss along with the scene, from the searched static softness, at a
 //! rate that is chosen on training seeds of the original variant. Judged by the hard image where a run ends, on the seeds from 0 on.
-//! Writes `docs/learning.md`.
+//! Writes `docs/studies/learning.md`.
 
 mod common;
 

@@ -7,7 +7,7 @@
 //!
 //! Small instances of 2D SHAPE and POSE under a static logistic, so that φ is one number, the logarithm of its scale. The truth is the
 //! slope of the outer loss, averaged over the scenes, by central differences of a tenth of a decade on either side; all estimators see
-//! the same scenes. Writes `docs/estimators.md`.
+//! the same scenes. Writes `docs/studies/estimators.md`.
 
 mod common;
 

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! 24 views of a sphere of 1,280 faces on 64 × 64 pixels, exact with the adjoint clipped, as `learn` takes it and in f64 with an error
-//! of 1e-5 a pixel; every measurement in a process of its own. Fails above 1 GiB. Writes `docs/estimators.md`.
+//! of 1e-5 a pixel; every measurement in a process of its own. Fails above 1 GiB. Writes `docs/studies/estimators.md`.
 
 mod common;
 

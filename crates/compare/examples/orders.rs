@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Small instances of 2D SHAPE, once with the scale of a logistic to learn and once with the weights of the network that is fitted to
-//! it. Writes `docs/orders-*.svg`, their points as CSV and `docs/estimators.md`.
+//! it. Writes `docs/studies/orders-*.svg`, their points as CSV and `docs/studies/estimators.md`.
 
 mod common;
 

@@ -62,7 +62,7 @@ pub enum Input {
 
 /// Seeds of training instances count from here, and those of validation from there; runs that are reported count from 0.
 const TRAINING_SEED: u64 = 1_000_000;
-/// A softness of no more parameters is learned by differences, which is as good there and cheaper (docs/estimators.md).
+/// A softness of no more parameters is learned by differences, which is as good there and cheaper (docs/studies/estimators.md).
 const FEW: usize = 10;
 /// How far apart the runs of an evolution strategy are unless somebody says otherwise: entries of φ are mostly logarithms.
 pub const SIGMA: f64 = 0.2;

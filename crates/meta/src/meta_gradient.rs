@@ -51,7 +51,7 @@ impl Default for MetaGradient {
     /// Through every step, with the adjoint kept within what the outer loss put into it.
     ///
     /// Source: docs/notes.md, Meta-gradients: clipping. How often its sign is right on the tasks
-    /// stands in docs/estimators.md.
+    /// stands in docs/studies/estimators.md.
     fn default() -> Self {
         Self::Unrolled { clip: Some(1.0) }
     }

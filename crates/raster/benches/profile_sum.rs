@@ -10,7 +10,7 @@
 //! backward pass of `Σ u · vjp`. `scalar` is the plain version in `scalar.rs`. A `step` is all that an
 //! optimisation does: projection, image, mean squared difference, gradient to the world vertices.
 //! Throughput counts pixel-face pairs that the op visits. Widths are those of a logistic of the squared
-//! distance, in NDC. A complete run writes the medians to `docs/speed.md`.
+//! distance, in NDC. A complete run writes the medians to `docs/studies/speed.md`.
 
 mod machine;
 mod record;
@@ -81,7 +81,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Without arguments, or with a filter, some rows are missing.
     let words: Vec<_> = std::env::args().skip(1).collect();
     if words == ["--bench"] {
-        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/speed.md");
+        let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies/speed.md");
         record::write(&page, &bench.tables(&machine)?)?;
     }
     Ok(())

@@ -19,7 +19,7 @@ const NAME: &str = env!("CARGO_CRATE_NAME");
 /// The flags of a study.
 #[derive(Parser)]
 pub(crate) struct Study {
-    /// Do so little that it takes less than a minute, and write to out/ instead of docs/
+    /// Do so little that it takes less than a minute, and write to out/ instead of docs/studies/
     #[arg(long)]
     pub(crate) quick: bool,
 }
@@ -27,7 +27,7 @@ pub(crate) struct Study {
 impl Study {
     /// Writes a file to the documents, or to `out` in the quick mode.
     pub(crate) fn file(&self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies");
         let folder = if self.quick { PathBuf::from("out") } else { docs };
         fs::create_dir_all(&folder)?;
         let path = folder.join(name);
@@ -41,7 +41,7 @@ impl Study {
         }
         let start = format!("<!-- what follows is written by the study {NAME} -->\n");
         let end = format!("<!-- end of what the study {NAME} writes -->");
-        let old = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(page);
+        let old = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies").join(page);
         let old = fs::read_to_string(old)?;
         let (before, rest) =
             old.split_once(&start).context("the page has no mark for the start")?;

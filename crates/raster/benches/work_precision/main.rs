@@ -4,7 +4,7 @@
 //! cargo bench -p softrast-raster --bench work_precision
 //! ```
 //!
-//! Writes `docs/work_precision.svg` and `docs/scaling.svg`, each with its numbers as CSV. Times are
+//! Writes `docs/studies/work_precision.svg` and `docs/studies/scaling.svg`, each with its numbers as CSV. Times are
 //! medians, from world vertices to the gradient of a mean squared difference to a disk.
 
 mod chart;
@@ -39,7 +39,7 @@ const REPEATS: usize = 15;
 const SECONDS: f64 = 2.0;
 
 fn main() -> anyhow::Result<()> {
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies");
     fs::create_dir_all(&docs)?;
     let threads = rayon::current_num_threads();
     let header = format!("# {}\n", machine());

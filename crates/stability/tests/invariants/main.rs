@@ -1,6 +1,6 @@
 //! What this project promises of every softness, whatever the scene: a trial that misses its target is a fault.
 //!
-//! The numbers F01 and so on are those under which docs/stability.md lists them.
+//! The numbers F01 and so on are those under which docs/studies/stability.md lists them.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
