@@ -19,8 +19,8 @@ impl Picture {
     /// # Errors
     ///
     /// If the file is missing or no picture.
-    pub fn load_mask(path: &Path) -> anyhow::Result<Self> {
-        let picture = open(path)?;
+    pub fn load_mask(path: impl AsRef<Path>) -> anyhow::Result<Self> {
+        let picture = open(path.as_ref())?;
         let opaque = !picture.color().has_alpha()
             || picture.to_luma_alpha16().pixels().all(|p| p.0[1] == u16::MAX);
         Ok(Self::of(&picture, |p| f64::from(p.0[usize::from(!opaque)]) / FULL))
@@ -31,9 +31,9 @@ impl Picture {
     /// # Errors
     ///
     /// If the file is missing or no picture.
-    pub fn load_luminance(path: &Path) -> anyhow::Result<Self> {
+    pub fn load_luminance(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let level = |p: &LumaA<u16>| f64::from(p.0[0]) / FULL * (f64::from(p.0[1]) / FULL);
-        Ok(Self::of(&open(path)?, level))
+        Ok(Self::of(&open(path.as_ref())?, level))
     }
 
     fn of(picture: &DynamicImage, level: impl Fn(&LumaA<u16>) -> f64) -> Self {
@@ -61,7 +61,8 @@ impl Picture {
 /// # Errors
 ///
 /// If the file cannot be written, or the image is empty.
-pub fn save_picture<B: Backend>(image: Tensor<B, 3>, path: &Path) -> anyhow::Result<()> {
+pub fn save_picture<B: Backend>(image: Tensor<B, 3>, path: impl AsRef<Path>) -> anyhow::Result<()> {
+    let path = path.as_ref();
     let [views, height, width] = image.dims();
     ensure!(views * height * width > 0, "an empty image cannot be written to {}", path.display());
     let row = image.swap_dims(0, 1).reshape([height, views * width]);

@@ -82,8 +82,8 @@ macro_rules! stored {
             ///
             /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do
             /// not suit the softness.
-            pub fn load(path: &Path) -> Result<Self, SoftnessFileError> {
-                Self::parse(&crate::file::read(path)?, path)
+            pub fn load(path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
+                Self::parse(&crate::file::read(path.as_ref())?, path)
             }
 
             /// Parses and checks the text of a file; `path` names it in errors.
@@ -91,8 +91,8 @@ macro_rules! stored {
             /// # Errors
             ///
             /// Those of `load` but for reading.
-            pub fn parse(text: &str, path: &Path) -> Result<Self, SoftnessFileError> {
-                crate::file::parse(text, path)
+            pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
+                crate::file::parse(text, path.as_ref())
             }
 
             /// Checks the parameters and writes the file at `path`, replacing what was there.
@@ -103,8 +103,8 @@ macro_rules! stored {
             /// # Errors
             ///
             /// If the parameters do not suit the softness, or the file cannot be written.
-            pub fn save(&self, path: &Path) -> Result<(), SoftnessFileError> {
-                crate::file::save(self, path)
+            pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SoftnessFileError> {
+                crate::file::save(self, path.as_ref())
             }
 
             /// Checks the parameters; what `save` would write at `path`.
@@ -112,8 +112,8 @@ macro_rules! stored {
             /// # Errors
             ///
             /// If the parameters do not suit the softness.
-            pub fn text(&self, path: &Path) -> Result<String, SoftnessFileError> {
-                crate::file::text(self, path)
+            pub fn text(&self, path: impl AsRef<Path>) -> Result<String, SoftnessFileError> {
+                crate::file::text(self, path.as_ref())
             }
 
             /// What was learned on a task and comes with the crate; its note says how it was learned.

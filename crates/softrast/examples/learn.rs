@@ -18,7 +18,7 @@ fn main() -> anyhow::Result<()> {
         println!("update {:2}: outer loss {:.4?}", record.step, record.loss);
         Ok(())
     })?;
-    learned.save("learned.json".as_ref())?;
+    learned.save("learned.json")?;
 
     let method = Method::new("learned", learned);
     let instances = [problem.instance(0)?];

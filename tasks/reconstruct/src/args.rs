@@ -229,7 +229,7 @@ pub(crate) fn softness(
                 "a softness file holds its own parameters: leave out --scale and --squared";
             return Err(Error::Usage(message.into()).into());
         }
-        let file = ScheduledSoftness::load(text.as_ref())?;
+        let file = ScheduledSoftness::load(text)?;
         return Ok((file.softness, file.phi));
     }
     let family: Family = text.parse().map_err(|error| Error::Usage(format!("{error}")))?;
