@@ -260,7 +260,7 @@ impl Task for Occlusion {
         let name = "depth_softness.json";
         let (depth_softness, note) = (self.depth.softness, Some(note.to_owned()));
         let file = DepthSoftnessFile { depth_softness, phi: phi.to_vec(), note };
-        Ok(Some((name, file.text(name.as_ref())?)))
+        Ok(Some((name, file.text(name)?)))
     }
 
     fn own_chart(&self, start: &[f64], learned: &[f64]) -> Option<(Plot, &'static str)> {
