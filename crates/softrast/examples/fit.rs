@@ -2,10 +2,7 @@
 //!
 //! `cargo run --release -p softrast --example fit`
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
+use burn::backend::{Autodiff, NdArray};
 use softrast::{
     mesh::{fox, icosphere},
     prelude::*,

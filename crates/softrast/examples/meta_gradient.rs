@@ -4,10 +4,7 @@
 //!
 //! `cargo run --release -p softrast --example meta_gradient`
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
+use burn::backend::{Autodiff, NdArray};
 use softrast::{mesh::fox, prelude::*};
 
 type Plain = NdArray<f64>;

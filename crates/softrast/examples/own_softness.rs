@@ -4,10 +4,7 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
+use burn::backend::NdArray;
 use softrast::{mesh::fox, prelude::*};
 
 #[derive(Clone, Debug)]

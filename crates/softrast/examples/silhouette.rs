@@ -2,10 +2,7 @@
 //!
 //! `cargo run --release -p softrast --example silhouette`
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
+use burn::backend::{Autodiff, NdArray};
 use softrast::{mesh::fox, prelude::*};
 
 type B = Autodiff<NdArray>;

@@ -1,5 +1,6 @@
 //! What most programs need, for `use softrast::prelude::*`.
 
+pub use burn::tensor::{Tensor, backend::Backend};
 pub use softrast_inverse::{
     InverseProblem, Iterate, LearnConfig, Method, Picture, PoseProblem, SoftnessAt, SolveConfig,
     learn, minimize, save_picture,
