@@ -1,4 +1,4 @@
-//! What the tests that cross crates share: workloads with known results, small problems, tensors.
+//! What the tests that cross crates share: workloads with known results, small problems, tensors; and the examples of the pages.
 
 mod known_row;
 mod outputs;
@@ -15,3 +15,18 @@ pub use shape2d::{Shape2d, shape2d_start};
 pub use tensors::{numbers, tensor, vector};
 pub use waves::{WAVES, Waves};
 pub use workload::{Row, Workload};
+
+/// Compiles and runs the examples of the project's README.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;
+
+/// Compiles and runs the guide's example.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/guide/adding-a-softness.md")]
+pub struct AddingASoftness;
+
+/// Compiles and runs the examples of the page for those who come from other rasterizers.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/guide/coming-from-pytorch3d.md")]
+pub struct ComingFromPyTorch3d;

@@ -33,7 +33,7 @@ pub fn distilled_mlp() -> Vec<f64> {
 /// Weights `[56]` of an MLP softness that is like another one of scale 1; none if that treats the two sides of
 /// an edge differently, which an MLP cannot.
 ///
-/// Found by least squares on the logit up to [`REACH`], always from the same random weights. The error of a place
+/// Found by least squares on the logit up to `REACH`, always from the same random weights. The error of a place
 /// counts over one scale more than its distance: at the edge the logit decides the image, and far from it only has
 /// to be large.
 pub fn mlp_like(softness: EdgeSoftness, phi: &[f64]) -> Option<Vec<f64>> {

@@ -3,7 +3,25 @@
 //! An [`InverseProblem`] says what is optimised, how its image is made and what is wrong with an image. A [`Method`] says how edges are
 //! softened over a run. [`minimize`] solves instances of a problem with a method and shows every step; [`learn()`] makes a better method,
 //! by the gradient of what whole runs end with. Both draw through a [`ScheduledRenderer`], which decides when support and knots are
-//! chosen anew.
+//! chosen anew. [`PoseProblem`] finds a camera.
+//!
+//! ```
+//! use burn::backend::NdArray;
+//! use softrast_inverse::{InverseProblem, Method, PoseProblem, SolveConfig, minimize};
+//! use softrast_mesh::icosphere;
+//! use softrast_softness::ScheduledSoftness;
+//!
+//! let problem = PoseProblem::new(&icosphere(0));
+//! let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
+//! let config = SolveConfig { size: 8, steps: 2, ..problem.defaults() };
+//! let mut steps = Vec::new();
+//! minimize::<_, NdArray>(&problem, &[problem.instance(0)?], &method, &config, false, |iterate, _| {
+//!     steps.push(iterate.step);
+//!     Ok(())
+//! })?;
+//! assert_eq!(steps, [0, 1, 2]);
+//! # Ok::<(), anyhow::Error>(())
+//! ```
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");

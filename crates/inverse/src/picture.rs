@@ -79,7 +79,8 @@ const FULL: f64 = u16::MAX as f64;
 fn open(path: &Path) -> anyhow::Result<DynamicImage> {
     image::ImageReader::open(path)
         .with_context(|| format!("cannot open the picture {}", path.display()))?
-        .with_guessed_format()?
+        .with_guessed_format()
+        .with_context(|| format!("cannot read the picture {}", path.display()))?
         .decode()
         .with_context(|| format!("{} is no picture that can be read", path.display()))
 }
@@ -169,6 +170,47 @@ mod tests {
         let image = Tensor::<NdArray, 1>::from_floats(levels, &Default::default());
         save_picture(image.reshape([1, 2, 2]), &path).unwrap();
         assert_close(&Picture::load_mask(&path).unwrap().levels(2), &levels);
+    }
+
+    #[test]
+    fn a_file_with_a_wrong_bit_or_no_end_is_a_picture_or_one_line_that_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let picture = GrayImage::from_fn(5, 4, |x, y| Luma([(50 * x + y) as u8]));
+        let seen = |name: &str| match Picture::load_luminance(path(name)) {
+            Ok(picture) => {
+                let levels = picture.levels(3);
+                assert!(
+                    levels.iter().all(|level| (0.0..=1.0 + 1e-9).contains(level)),
+                    "{levels:?}"
+                );
+            }
+            Err(error) => {
+                let line = format!("{error:#}");
+                assert!(line.contains(name) && line.lines().count() == 1, "{line}");
+            }
+        };
+        for name in ["a.png", "a.gif"] {
+            DynamicImage::from(picture.clone()).to_rgba8().save(path(name)).unwrap();
+            let whole = std::fs::read(path(name)).unwrap();
+            // Heads stand at both ends; the palette of a GIF lies between them.
+            let ends = |&bit: &usize| bit / 8 < 40 || whole.len() - bit / 8 <= 40;
+            for bit in (0..8 * whole.len()).filter(ends) {
+                let mut bytes = whole.clone();
+                bytes[bit / 8] ^= 1 << (bit % 8);
+                std::fs::write(path(name), bytes).unwrap();
+                seen(name);
+            }
+            for end in (0..whole.len()).step_by(7) {
+                std::fs::write(path(name), &whole[..end]).unwrap();
+                seen(name);
+            }
+        }
+        // No width at all, and a folder.
+        std::fs::write(path("b.gif"), b"GIF89a\0\0\0\0\0\0\0;").unwrap();
+        seen("b.gif");
+        std::fs::create_dir(path("c.png")).unwrap();
+        seen("c.png");
     }
 
     #[test]

@@ -3,6 +3,15 @@
 //! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
 //! has at least one face. Whatever breaks these rules is a [`MeshError`] of one line that names
 //! the file, the line and the reason. Nothing here depends on burn.
+//!
+//! ```
+//! use softrast_mesh::{Mesh, icosphere};
+//!
+//! let ball = icosphere(2);
+//! assert_eq!(ball.faces().len(), 320);
+//! let error = Mesh::parse(b"v 0 0 0\nv 1 0 0\nf 1 2 3", "a.obj").unwrap_err();
+//! assert_eq!(error.to_string(), "a.obj:3: index 3 is out of range: the file has 2 vertices");
+//! ```
 
 mod airplane;
 mod chair;

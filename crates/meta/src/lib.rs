@@ -1,9 +1,31 @@
 //! Optimisers that can be differentiated, inner loops, and learning through them, on burn.
 //!
 //! A scene is one flat vector θ, a softness one flat vector φ. An [`Objective`] gives the loss of
-//! both, an [`InnerLoop`] solves for θ. A [`BilevelProblem`] adds an outer loss of the solution, and
-//! [`MetaGradient`] its derivative by φ, and a [`OuterLoop`] goes down it over many [`TaskDistribution`]. The same loop learns and evaluates: on a plain backend it
-//! just solves, on `Autodiff<B>` its result still depends on φ. Nothing here knows of rendering.
+//! both, an [`InnerLoop`] solves for θ. A [`BilevelProblem`] adds an outer loss of the solution.
+//! [`MetaGradient`] is its derivative by φ, and an [`OuterLoop`] goes down it over the instances of a
+//! [`TaskDistribution`]. The same loop learns and evaluates: on a plain backend it just solves, on
+//! `Autodiff<B>` its result still depends on φ. Nothing here knows of rendering.
+//!
+//! ```
+//! use burn::{backend::{Autodiff, NdArray}, tensor::{Tensor, backend::Backend}};
+//! use softrast_meta::{InnerLoop, Objective, Sgd, vector};
+//!
+//! /// A parabola around φ.
+//! struct Parabola;
+//! impl<B: Backend> Objective<B> for Parabola {
+//!     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+//!         (theta - phi).powi_scalar(2).sum()
+//!     }
+//! }
+//!
+//! type Outer = Autodiff<NdArray>;
+//! let phi = vector::<Outer>(&[3.0]).require_grad();
+//! let inner = InnerLoop { optimizer: Sgd { learning_rate: 0.25 }, steps: 4 };
+//! let theta = inner.solve(&Parabola, vector::<Outer>(&[0.0]), &phi);
+//! let by_phi = phi.grad(&theta.backward()).unwrap().into_scalar();
+//! // Each step halves what is left to φ.
+//! assert!((by_phi - (1.0 - 0.5_f32.powi(4))).abs() < 1e-6);
+//! ```
 
 mod adam;
 mod adjoint;

@@ -3,8 +3,21 @@
 //! A silhouette is a sum over faces of a one-dimensional function of the signed distance
 //! ([`profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
 //! softness and the T-conorm ([`Profile`]). A [`SoftRenderer`] puts the pieces together;
-//! [`reference`] is the same in plain tensor ops over every pixel-face pair. Scenes of a few faces
+//! [`mod@reference`] is the same in plain tensor ops over every pixel-face pair. Scenes of a few faces
 //! that hide one another take their colours from [`blend`].
+//!
+//! ```
+//! use burn::{backend::NdArray, tensor::Tensor};
+//! use softrast_raster::SoftRenderer;
+//! use softrast_softness::Family;
+//!
+//! // x and y in NDC, and the depth, as a camera gives them.
+//! let corners = [[[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]]];
+//! let corners = Tensor::<NdArray, 3>::from_floats(corners, &Default::default());
+//! let renderer = SoftRenderer::new(&[[0, 1, 2]], 3, Family::Logistic, 0.01);
+//! let alpha: Vec<f32> = renderer.silhouette(corners).into_data().iter().collect();
+//! assert!(alpha[4] > 0.99 && alpha[0] < 0.01); // the pixel in the middle, and that at the top left
+//! ```
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-raster needs a backend: turn on one of the features ndarray, flex, wgpu");

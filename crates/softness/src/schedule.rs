@@ -17,12 +17,14 @@ pub struct ScaleSchedule {
     /// Logarithms of the scale above the floor at evenly spaced times, the first at the first step
     /// and the last at the last; in NDC, or NDC² if the softness is squared.
     pub knots: Vec<f64>,
-    /// What the scale stays above, in pixels.
+    /// What the scale stays above, in pixels, 0 to 1e6.
     pub floor_px: f64,
 }
 
 /// A schedule has at most so many knots.
 const MOST_KNOTS: usize = 16;
+/// A floor is at most so many pixels, so that its square in NDC fits an f32.
+const LARGEST_FLOOR_PX: f64 = 1e6;
 
 impl ScaleSchedule {
     /// Which part of a run is over at `step` of `steps`, 0 to 1: the last gradient is taken at the
@@ -66,8 +68,9 @@ impl ScaleSchedule {
             let limit = LARGEST_LOGARITHM;
             return Err(format!("a knot of {knot}, expected -{limit} to {limit}"));
         }
-        if !floor_px.is_finite() || *floor_px < 0.0 {
-            return Err(format!("a floor of {floor_px} pixels, expected 0 or more"));
+        if !(0.0..=LARGEST_FLOOR_PX).contains(floor_px) {
+            let limit = LARGEST_FLOOR_PX;
+            return Err(format!("a floor of {floor_px} pixels, expected 0 to {limit}"));
         }
         Ok(())
     }

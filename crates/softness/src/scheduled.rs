@@ -239,6 +239,29 @@ mod tests {
     }
 
     #[test]
+    fn a_file_with_one_wrong_bit_or_no_end_is_a_softness_or_one_line() {
+        let whole = example(Family::Gamma).text("a.json").unwrap().into_bytes();
+        let flipped = (0..8 * whole.len()).map(|bit| {
+            let mut bytes = whole.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            bytes
+        });
+        let cut = (0..whole.len()).map(|end| whole[..end].to_vec());
+        let mut read = 0;
+        for text in flipped.chain(cut).filter_map(|bytes| String::from_utf8(bytes).ok()) {
+            match ScheduledSoftness::parse(&text, "a.json") {
+                Ok(softness) => {
+                    let phi = softness.phi_at(1.0, 64);
+                    assert!(phi.iter().all(|x| x.is_finite()), "{phi:?} of {text}");
+                    read += 1;
+                }
+                Err(error) => assert_eq!(error.to_string().lines().count(), 1, "{error}"),
+            }
+        }
+        assert!(read > 100, "{read}");
+    }
+
+    #[test]
     fn unknown_fields_and_families_are_refused() {
         let message = error(
             r#"{"softness": {"family": "gauss", "squared": true}, "phi": [0], "colour": "red"}"#,
@@ -264,7 +287,11 @@ mod tests {
         for (path, part) in [
             (r#"{"knots": [], "floor_px": 0}"#, "0 knots, expected 1 to 16"),
             (r#"{"knots": [-1, 99], "floor_px": 0}"#, "a knot of 99, expected -80 to 80"),
-            (r#"{"knots": [-1], "floor_px": -1}"#, "a floor of -1 pixels, expected 0 or more"),
+            (r#"{"knots": [-1], "floor_px": -1}"#, "a floor of -1 pixels, expected 0 to 1000000"),
+            (
+                r#"{"knots": [-1], "floor_px": 1e7}"#,
+                "a floor of 10000000 pixels, expected 0 to 1000000",
+            ),
         ] {
             let softness = r#"{"family": "gauss", "squared": false}"#;
             let message =

@@ -8,7 +8,19 @@
 //! - [`meta`]: optimisers and inner loops that can be differentiated;
 //! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them.
 //!
-//! The README of the project has a first program.
+//! ```
+//! use burn::backend::{Autodiff, NdArray};
+//! use softrast::{mesh::fox, prelude::*};
+//!
+//! let (mesh, device) = (fox(), Default::default());
+//! let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
+//! let camera = camera.tensor::<Autodiff<NdArray>>(&device).require_grad();
+//! let renderer = SoftRenderer::new(mesh.faces(), 64, Family::Logistic, 0.01);
+//! let alpha = renderer.silhouette(project(vertices(mesh.positions(), &device), camera.clone()));
+//! assert_eq!(alpha.dims(), [1, 64, 64]);
+//! let gradient = camera.grad(&alpha.mean().backward()).unwrap();
+//! assert_eq!(gradient.dims(), [1, 4]);
+//! ```
 
 pub mod prelude;
 
@@ -18,22 +30,7 @@ pub use softrast_meta as meta;
 pub use softrast_raster as raster;
 pub use softrast_softness as softness;
 
-/// Compiles and runs the examples of the project's README.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-pub struct ProjectReadme;
-
-/// Compiles and runs the guide's example.
-#[cfg(doctest)]
-#[doc = include_str!("../../../docs/guide/adding-a-softness.md")]
-pub struct AddingASoftness;
-
 /// Compiles and runs the README's example.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;
-
-/// Compiles the example of the page for newcomers from other rasterizers.
-#[cfg(doctest)]
-#[doc = include_str!("../../../docs/guide/coming-from-pytorch3d.md")]
-pub struct ComingFromPyTorch3d;

@@ -1,8 +1,10 @@
 //! A soft silhouette as `PyTorch3D` draws it, from its published formulas in plain numbers, against ours with what
 //! docs/guide/coming-from-pytorch3d.md translates.
+//!
+//! Source: Liu et al. 2019, Eq. 1 and its aggregate function for silhouettes, as in `sigmoid_alpha_blend` of `PyTorch3D`.
 
 use burn::{backend::NdArray, tensor::Tensor};
-use softrast_mesh::icosphere;
+use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{Orbit, SoftRenderer, project, project_from, vertices};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tests::numbers;
@@ -50,62 +52,104 @@ fn signed_squared_distance(p: Point, corners: [Point; 3]) -> f64 {
     if inside { -nearest } else { nearest }
 }
 
+/// A ball that is pressed and sheared, so that no two of its sides look the same.
+fn mesh() -> Mesh {
+    let ball = icosphere(1);
+    let sheared =
+        ball.positions().iter().map(|[x, y, z]| [x + 0.3 * y, 0.6 * y, 0.8 * z - 0.2 * x]);
+    Mesh::new(sheared.collect(), ball.faces().to_vec()).unwrap()
+}
+
+fn focal() -> f64 {
+    (FOV_DEG / 2.0).to_radians().tan().recip()
+}
+
+/// The vertices along the axes of their camera: left, up, ahead.
+fn seen(mesh: &Mesh) -> Vec<[f64; 3]> {
+    let (r, t) = view();
+    let along = |p: &[f64; 3], j: usize| (0..3).map(|i| p[i] * r[i][j]).sum::<f64>() + t[j];
+    mesh.positions().iter().map(|p| [0, 1, 2].map(|j| along(p, j))).collect()
+}
+
+/// `1 - Π (1 - sigmoid(-dists / sigma))` of each pixel, over the faces within `blur_radius`. Their NDC has x left: the first column is at
+/// x = 1, the first row at y = 1.
+fn theirs(mesh: &Mesh, blur_radius: f64) -> Vec<f64> {
+    let seen: Vec<Point> =
+        seen(mesh).iter().map(|p| [0, 1].map(|k| focal() * p[k] / p[2])).collect();
+    let place = |index: usize| 1.0 - (2 * index + 1) as f64 / SIZE as f64;
+    let alpha = |pixel: usize| {
+        let p = [place(pixel % SIZE), place(pixel / SIZE)];
+        let corners = mesh.faces().iter().map(|face| face.map(|v| seen[v as usize]));
+        let distances = corners.map(|corners| signed_squared_distance(p, corners));
+        let near = distances.filter(|&distance| distance < blur_radius);
+        1.0 - near.map(|distance| 1.0 - 1.0 / (1.0 + (distance / SIGMA).exp())).product::<f64>()
+    };
+    (0..SIZE * SIZE).map(alpha).collect()
+}
+
+/// Our silhouette of vertices on the screen, with `sigma` as the scale.
+fn ours(mesh: &Mesh, seen: Tensor<B, 3>) -> Vec<f64> {
+    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let image = SoftRenderer::new(mesh.faces(), SIZE, softness, SIGMA).silhouette(seen);
+    numbers(image)
+}
+
+fn row(values: &[f64]) -> Tensor<B, 1> {
+    Tensor::from_data(values, &Default::default())
+}
+
+fn assert_same(ours: &[f64], theirs: &[f64]) {
+    assert_eq!(ours.len(), theirs.len());
+    for (pixel, (ours, theirs)) in ours.iter().zip(theirs).enumerate() {
+        assert!((ours - theirs).abs() < 1e-5, "pixel {pixel}: {ours}, not {theirs}");
+    }
+}
+
 #[test]
 fn a_silhouette_with_the_translated_scale_and_camera_is_that_of_pytorch3d() {
-    let mesh = icosphere(1);
-    let positions: Vec<[f64; 3]> = mesh
-        .positions()
-        .iter()
-        .map(|&[x, y, z]| [x + 0.3 * y, 0.6 * y, 0.8 * z - 0.2 * x])
-        .collect();
-    let (r, t) = view();
-    let focal = (FOV_DEG / 2.0).to_radians().tan().recip();
-
-    // Theirs: NDC with x left, the first column at x = 1, the first row at y = 1.
-    let seen: Vec<Point> = positions
-        .iter()
-        .map(|p| {
-            let camera = [0, 1, 2].map(|j| (0..3).map(|i| p[i] * r[i][j]).sum::<f64>() + t[j]);
-            [0, 1].map(|k| focal * camera[k] / camera[2])
-        })
-        .collect();
-    let theirs: Vec<f64> = (0..SIZE * SIZE)
-        .map(|pixel| {
-            let place = |index: usize| 1.0 - (2 * index + 1) as f64 / SIZE as f64;
-            let p = [place(pixel % SIZE), place(pixel / SIZE)];
-            let transparent = mesh.faces().iter().map(|face| {
-                let distance = signed_squared_distance(p, face.map(|v| seen[v as usize]));
-                1.0 - 1.0 / (1.0 + (distance / SIGMA).exp())
-            });
-            1.0 - transparent.product::<f64>()
-        })
-        .collect();
-
-    // Ours: x is right, so the first row of rotation and translation changes sign.
-    let rows = [-1.0, 1.0, 1.0];
-    let rotation: Vec<f64> = (0..9).map(|k| rows[k / 3] * r[k % 3][k / 3]).collect();
-    let translation: Vec<f64> = (0..3).map(|k| rows[k] * t[k]).collect();
-    let device = Default::default();
-    let row = |values: &[f64]| Tensor::<B, 1>::from_data(values, &device);
-    let seen = project_from(
-        vertices::<B>(&positions, &device),
-        row(&rotation).reshape([1, 3, 3]),
-        row(&translation).reshape([1, 3]),
-        row(&[FOV_DEG]),
-    );
-    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
-    let renderer = SoftRenderer::new(mesh.faces(), SIZE, softness, SIGMA);
-    let ours = numbers(renderer.silhouette(seen));
-    // Our own orbit shows the mirror image.
-    let orbit =
-        Orbit { distance: 3.0, elevation_deg: 20.0, azimuth_deg: 180.0 - 35.0, fov_deg: FOV_DEG };
-    let seen = project(vertices::<B>(&positions, &device), orbit.tensor(&device));
-    let mirrored = numbers(renderer.silhouette(seen).flip([2]));
-    for (pixel, theirs) in theirs.iter().enumerate() {
-        for ours in [ours[pixel], mirrored[pixel]] {
-            assert!((ours - theirs).abs() < 1e-5, "pixel {pixel}: {ours}, not {theirs}");
-        }
-    }
+    let mesh = mesh();
+    let theirs = theirs(&mesh, f64::INFINITY);
     let covered = theirs.iter().sum::<f64>() / (SIZE * SIZE) as f64;
     assert!((0.1..0.9).contains(&covered), "{covered}");
+
+    // Transposed, for column vectors; x is right, so the first row changes sign.
+    let ((r, t), flip, device) = (view(), row(&[-1.0, 1.0, 1.0]), Default::default());
+    let rotation = row(r.as_flattened()).reshape([1, 3, 3]).transpose();
+    let rotation = rotation * flip.clone().reshape([1, 3, 1]);
+    let translation = (row(&t) * flip).reshape([1, 3]);
+    let corners = vertices::<B>(mesh.positions(), &device);
+    let seen = project_from(corners.clone(), rotation, translation, row(&[FOV_DEG]));
+    assert_same(&ours(&mesh, seen), &theirs);
+}
+
+#[test]
+fn an_orbit_shows_the_mirror_image() {
+    let mesh = mesh();
+    let azimuth_deg = 180.0 - 35.0;
+    let orbit = Orbit { distance: 3.0, elevation_deg: 20.0, azimuth_deg, fov_deg: FOV_DEG };
+    let device = Default::default();
+    let seen = project(vertices::<B>(mesh.positions(), &device), orbit.tensor(&device));
+    let mut mirrored = ours(&mesh, seen);
+    mirrored.chunks_mut(SIZE).for_each(<[f64]>::reverse);
+    assert_same(&mirrored, &theirs(&mesh, f64::INFINITY));
+}
+
+#[test]
+fn clip_space_of_opengl_over_its_w_is_what_we_draw() {
+    let mesh = mesh();
+    // Their left is the other way round in OpenGL; w is the depth ahead.
+    let clip = seen(&mesh).into_iter().map(|[x, y, z]| [-focal() * x, focal() * y, z]);
+    let over_w: Vec<[f64; 3]> = clip.map(|[x, y, w]| [x / w, y / w, w]).collect();
+    let image = ours(&mesh, vertices::<B>(&over_w, &Default::default()));
+    assert_same(&image, &theirs(&mesh, f64::INFINITY));
+}
+
+/// What the page says of their usual cut: where a face still covers 1e-4.
+#[test]
+fn the_usual_blur_radius_leaves_out_more_than_our_tolerance() {
+    let mesh = mesh();
+    let cut = theirs(&mesh, (1.0 / 1e-4_f64 - 1.0).ln() * SIGMA);
+    let all = theirs(&mesh, f64::INFINITY);
+    let most = all.iter().zip(&cut).map(|(all, cut)| all - cut).fold(0.0, f64::max);
+    assert!((1e-4..1e-3).contains(&most), "{most}");
 }
