@@ -332,10 +332,10 @@ impl<P: InverseProblem, B: RasterBackend> Objective<Twice<B>> for Inner<P, B> {
         phi: Tensor<Twice<B>, 1>,
         step: usize,
     ) -> Tensor<Twice<B>, 1> {
-        // Mere numbers are those that the renderer was made for.
         let tracked = phi.is_require_grad() || phi.clone().inner().is_require_grad();
-        let softness =
-            if tracked { self.renderer.tracked(step, phi) } else { self.renderer.at(step) };
+        // What the renderer was made for, it draws from tables that it keeps.
+        let kept = !tracked && self.renderer.is_of(&phi);
+        let softness = if kept { self.renderer.at(step) } else { self.renderer.tracked(step, phi) };
         self.loss_by(theta, &softness)
     }
 

@@ -1,7 +1,7 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use burn::tensor::{Element, Tensor, TensorData};
-use softrast_meta::{tensor, vector};
+use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness};
 
@@ -13,6 +13,8 @@ use crate::{PhiLayout, Resolution};
 #[derive(Debug)]
 pub struct ScheduledRenderer {
     layout: PhiLayout,
+    /// The vector that it was made for.
+    phi: Vec<f64>,
     /// What is drawn where nothing is differentiated by φ.
     values: ScheduledSoftness,
     own: Vec<f64>,
@@ -55,7 +57,8 @@ impl ScheduledRenderer {
         });
         let (silhouettes, tables) = Default::default();
         let size = rasterizer.size;
-        Self { layout, values, own, size, resolution, renderers, silhouettes, tables }
+        let phi = phi.to_vec();
+        Self { layout, phi, values, own, size, resolution, renderers, silhouettes, tables }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
@@ -96,6 +99,12 @@ impl ScheduledRenderer {
                 Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0)
             }
         }
+    }
+
+    /// Whether these are the numbers that it was made for, as far as the float type of `phi` `[P]` can tell.
+    pub(crate) fn is_of<B: RasterBackend>(&self, phi: &Tensor<B, 1>) -> bool {
+        let own = numbers(vector::<B>(&self.phi));
+        numbers(phi.clone()) == own
     }
 
     /// How the vector is laid out.

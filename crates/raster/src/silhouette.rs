@@ -114,6 +114,7 @@ impl<S: Softness> Silhouette<S> {
     ///
     /// For a GPU it is computed on the CPU in f64: the GPU then gets it in one piece, instead of some sixty small kernels over a few
     /// hundred numbers, and its curvature is not lost to rounding.
+    #[doc(hidden)]
     pub fn table_data<B: RasterBackend>(&self, phi: &[f64], dtype: DType) -> TensorData {
         let dtype = if B::ON_HOST { dtype } else { DType::F64 };
         let data = TensorData::new(phi.to_vec(), [phi.len()]);
@@ -132,6 +133,7 @@ impl<S: Softness> Silhouette<S> {
 
     /// Sums over the faces of each pixel, `[views, size, size]`: what the T-conorm of the profile
     /// turns into coverage. Arguments are those of [`Silhouette::coverage_by_table`].
+    #[doc(hidden)]
     pub fn sums<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
@@ -166,6 +168,7 @@ impl<S: Softness> Silhouette<S> {
 
     /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what
     /// one pass over all views visits, forward or backward.
+    #[doc(hidden)]
     pub fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
         self.op.pairs(vertices)
     }
@@ -177,6 +180,7 @@ impl<S: Softness> Silhouette<S> {
     /// # Panics
     ///
     /// If `bits` is above 12.
+    #[doc(hidden)]
     #[must_use]
     pub fn with_cells(mut self, bits: u32) -> Self {
         assert!(bits <= 12, "a table of 2^{bits} cells in an octave is too large");

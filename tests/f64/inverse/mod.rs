@@ -1,5 +1,6 @@
 //! Inverse rendering, on problems small enough to know every number.
 
+mod another_phi;
 mod layout;
 mod minimize;
 mod square;
