@@ -46,7 +46,7 @@ pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use gpu::adapter_name;
 pub use hard::hard_silhouette;
-pub use loss::{iou_loss, mse_loss};
+pub use loss::{flatness, iou_loss, mse_loss};
 pub use profile::Profile;
 pub use silhouette::{Rasterizer, Silhouette};
 pub use soft_renderer::SoftRenderer;

@@ -24,3 +24,38 @@ pub fn mse_loss<B: Backend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor
     let difference = image - target;
     (difference.clone() * difference).reshape([views, height * width]).mean_dim(1).reshape([views])
 }
+
+/// Added to squared lengths before they divide or a root is taken, in squared world units.
+///
+/// Hides edges and heights below a thousandth of a unit, and so keeps both derivatives finite where
+/// faces collapse. Source: docs/notes.md, Losses and errors.
+const EPSILON: f64 = 1e-6;
+
+/// How sharply surfaces bend: `Σ (cos α + 1)²` over all edges between two faces, `[1]`.
+///
+/// `α` is the angle between the heights of both faces on their common edge: half a turn where the
+/// surface is flat, so that it adds nothing. `hinges` `[shapes, 3, 4 edges]` holds the corners of both
+/// faces of each edge: its two ends, then the two others; all first ones before all second ones, and
+/// so on. Source: docs/notes.md, Losses and errors.
+///
+/// # Panics
+///
+/// If there is no edge, or the last axis is not four parts.
+pub fn flatness<B: Backend>(hinges: Tensor<B, 3>) -> Tensor<B, 1> {
+    let [from, to, one, other] = hinges.chunk(4, 2).try_into().expect("four equal parts");
+    let edge = to - from.clone();
+    let inverse = (dot(&edge, &edge) + EPSILON).recip();
+    let heights = [one, other].map(|corner| {
+        let side = corner - from.clone();
+        side.clone() - edge.clone() * (dot(&side, &edge) * inverse.clone())
+    });
+    let [h1, h2] = &heights;
+    let lengths = (dot(h1, h1) + EPSILON) * (dot(h2, h2) + EPSILON);
+    let bend = dot(h1, h2) * lengths.sqrt().recip() + 1.0;
+    (bend.clone() * bend).sum()
+}
+
+/// Of the vectors along the middle axis: `[shapes, 3, n]` twice to `[shapes, 1, n]`.
+fn dot<B: Backend>(a: &Tensor<B, 3>, b: &Tensor<B, 3>) -> Tensor<B, 3> {
+    (a.clone() * b.clone()).sum_dim(1)
+}

@@ -2,7 +2,9 @@
 
 use burn::tensor::{Element, Int, Tensor, TensorData, backend::Backend};
 use softrast_mesh::Edges;
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, TConorm, iou_loss, project};
+use softrast_raster::{
+    RasterBackend, Rasterizer, Silhouette, TConorm, flatness, iou_loss, project,
+};
 use softrast_softness::{EdgeSoftness, SoftStep};
 
 use crate::{SIZE, Template, orbit};
@@ -112,10 +114,6 @@ pub(crate) fn phi<B: Backend>(softness: &SoftStep<B>) -> Vec<f64> {
 const LAPLACIAN: f64 = 5e-3;
 const FLATNESS: f64 = 5e-4;
 
-/// Added to squared lengths before they divide or a root is taken, in squared world units; hides edges
-/// and heights below a thousandth of a unit. Source: docs/notes.md, Losses and errors.
-const EPSILON: f64 = 1e-6;
-
 /// What keeps the surfaces of many shapes with the same closed topology smooth.
 #[derive(Clone, Debug)]
 pub struct Smoothness<B: Backend> {
@@ -167,28 +165,9 @@ impl<B: Backend> Smoothness<B> {
         let rows = vertices.reshape([3 * shapes, count]);
         let away = rows.clone().matmul(self.away.clone());
         let laplacian = (away.clone() * away).sum();
-        let flatness = self.bends(rows, shapes);
+        let [count] = self.corners.dims();
+        let hinges = rows.select(1, self.corners.clone()).reshape([shapes, 3, count]);
+        let flatness = flatness(hinges);
         (laplacian * LAPLACIAN + flatness * FLATNESS) * (shapes as f64).recip()
     }
-
-    fn bends(&self, rows: Tensor<B, 2>, shapes: usize) -> Tensor<B, 1> {
-        let [count] = self.corners.dims();
-        let corners = rows.select(1, self.corners.clone()).reshape([shapes, 3, count]);
-        let [from, to, one, other] = corners.chunk(4, 2).try_into().expect("four equal parts");
-        let edge = to - from.clone();
-        let inverse = (dot(&edge, &edge) + EPSILON).recip();
-        let heights = [one, other].map(|corner| {
-            let side = corner - from.clone();
-            side.clone() - edge.clone() * (dot(&side, &edge) * inverse.clone())
-        });
-        let [h1, h2] = &heights;
-        let lengths = (dot(h1, h1) + EPSILON) * (dot(h2, h2) + EPSILON);
-        let bend = dot(h1, h2) * lengths.sqrt().recip() + 1.0;
-        (bend.clone() * bend).sum()
-    }
-}
-
-/// Of the vectors along the middle axis: `[shapes, 3, n]` twice to `[shapes, 1, n]`.
-fn dot<B: Backend>(a: &Tensor<B, 3>, b: &Tensor<B, 3>) -> Tensor<B, 3> {
-    (a.clone() * b.clone()).sum_dim(1)
 }
