@@ -12,12 +12,15 @@ fn main() -> anyhow::Result<()> {
     let runs = SolveConfig { size: 32, steps: 30, learning_rate: 2.0 };
 
     let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
-    let start = Method::new("start", ScheduledSoftness::decay(logistic, 0.05, 0.005));
-    let config = LearnConfig { updates: 12, batch: 4, outer_rate: 0.1, ..LearnConfig::default() };
+    let start = Method::new("start", ScheduledSoftness::decay(logistic, 0.3, 0.05));
+    let estimator = Some(MetaGradient::default()); // exact, through all steps
+    let config = LearnConfig { estimator, updates: 20, outer_rate: 0.1, ..LearnConfig::default() };
     let learned = learn::<_, NdArray>(problem.clone(), &start, &runs, &config, |record| {
-        println!("update {:2}: outer loss {:.4?}", record.step, record.loss);
+        let validated = record.validation_loss.map(|loss| format!(", validation {loss:.3}"));
+        println!("update {:2}{}", record.step, validated.unwrap_or_default());
         Ok(())
     })?;
+    println!("scale from {:.3} to {:.4}", learned.scale_at(0.0, 32), learned.scale_at(1.0, 32));
     learned.save("learned.json")?;
 
     let method = Method::new("learned", learned);

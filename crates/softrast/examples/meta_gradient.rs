@@ -23,6 +23,9 @@ fn main() {
     let phi = renderer.phi_tensor::<Outer>(&device).require_grad();
     let start = Orbit { elevation_deg: 22.0, azimuth_deg: 15.0, ..camera };
     let mut pose: Tensor<Outer, 2> = start.tensor(&device);
+    // Only the angles move.
+    let rates = Orbit { distance: 0.0, elevation_deg: 300.0, azimuth_deg: 300.0, fov_deg: 0.0 };
+    let rates: Tensor<Outer, 2> = rates.tensor(&device);
     for step in 0..10 {
         // One level further in: its gradient is an ordinary tensor of `Outer`, which remembers where it comes from.
         let leaf = Tensor::<Inner, 2>::from_inner(pose.clone()).require_grad();
@@ -31,7 +34,7 @@ fn main() {
         let loss = iou_loss(image, target.clone()).mean();
         println!("step {step}: IoU loss {:.4}", loss.clone().into_scalar());
         let gradient = leaf.grad(&loss.backward()).expect("the image depends on the pose");
-        pose = pose - gradient * 200.0;
+        pose = pose - gradient * rates.clone();
     }
     let off = pose - camera.tensor(&device);
     let outer_loss = off.powi_scalar(2).sum();

@@ -24,7 +24,7 @@ fn main() {
     let (mesh, device) = (fox(), Default::default());
     let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
     let seen = project(vertices::<NdArray>(mesh.positions(), &device), camera.tensor(&device));
-    let renderer = SoftRenderer::new(mesh.faces(), 24, Arctan, 0.002).with_tolerance(1e-3);
+    let renderer = SoftRenderer::new(mesh.faces(), 24, Arctan, 2e-5).with_tolerance(1e-3);
     let alpha: Vec<f64> = renderer.silhouette(seen).into_data().iter().collect();
     for row in alpha.chunks(24) {
         let shade = |&a: &f64| b" .:-=+*#%@"[(a * 9.99) as usize] as char;
