@@ -11,7 +11,7 @@
 //! calibrated camera does, or optimise it with `--optimise-fov`. `--instances released24` keeps the
 //! released values, right or wrong, so that its numbers compare with the released curves.
 //!
-//! **Method.** By default a logistic whose scale decays. From one start, as in the paper and in
+//! **Method.** By default the softness that was learned here, a Gauss curve whose scale falls. From one start, as in the paper and in
 //! `evaluate`, about one run in twenty from 35 to 55 degrees ends in a wrong pose that looks alike,
 //! such as front for back. The image tells: `solve` then tries other starts around the given one and
 //! keeps the run whose image fits best; `--starts 1` is the single start.
