@@ -7,16 +7,17 @@ use crate::{
     softness::curve,
 };
 
-/// A logistic whose argument has two slopes: `s = sigmoid(a tanh(y) + y / r)` with `y = x / scale`.
+/// A logistic whose argument has two slopes: `s = sigmoid(a tanh(y) + y / r)` with `y = x / (2 scale)`.
 ///
-/// φ `[3]` holds the logarithms of the scale, in the unit of x, of the height a and of the ratio r.
-/// Near the edge the argument rises by a + 1/r for a scale, far from it by 1/r: a steep edge with wide
-/// tails, or the other way round. With three parameters it follows the learned networks that were
-/// released with the paper to 5e-5.
+/// φ `[3]` holds the logarithms of twice the scale, in the unit of x, of the height a and of the ratio
+/// r. Near the edge the argument rises by a + 1/r for two scales, far from it by 1/r: a steep edge with
+/// wide tails, or the other way round. With a = r = 1 it is as steep at the edge as a logistic of the
+/// same scale. With three parameters it follows the learned networks that were released with the paper
+/// to 5e-5.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct BiLogit;
+pub struct Bilogit;
 
-impl BiLogit {
+impl Bilogit {
     /// The argument of the sigmoid.
     fn logit<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
         let [height, slope] = height_and_slope(phi);
@@ -40,7 +41,7 @@ fn height_and_slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>) -> [Tensor<B
     [parameter(phi, 1).exp(), parameter(phi, 2).neg().exp()]
 }
 
-impl Softness for BiLogit {
+impl Softness for Bilogit {
     fn parameters(&self) -> usize {
         3
     }
@@ -49,10 +50,12 @@ impl Softness for BiLogit {
         3
     }
 
-    /// As steep at the edge as a logistic of that scale: its own is twice as wide, height and ratio
-    /// are 1.
     fn default_phi(&self, scale: f64) -> Vec<f64> {
         vec![ln_scale(2.0 * scale), 0.0, 0.0]
+    }
+
+    fn scale(&self, phi: &[f64]) -> f64 {
+        phi[0].exp() / 2.0
     }
 
     curve!(self.value(phi, x) => Logistic::step(Self::logit(&phi, in_scales(&phi, x))));

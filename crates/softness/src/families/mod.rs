@@ -14,7 +14,7 @@ macro_rules! families {
     ($make:ident $($arguments:tt)*) => {
         $make! { [$($arguments)*]
             logistic: Logistic "logistic" => Logistic;
-            bilogit: Bilogit "bilogit" => BiLogit;
+            bilogit: Bilogit "bilogit" => Bilogit;
             gauss: Gauss "gauss" => Gauss;
             laplace: Laplace "laplace" => Laplace;
             exp: Exp "exp" => Reversed(Exp), ExpForward "exp_forward" => Forward(Exp);
