@@ -12,7 +12,8 @@ pub use known_row::KnownRow;
 pub use outputs::{Outputs, outputs};
 pub use paper_mesh::paper_mesh;
 pub use shape2d::{Shape2d, shape2d_start};
-pub use tensors::{numbers, tensor, vector};
+pub use softrast_softness::{numbers, vector};
+pub use tensors::tensor;
 pub use waves::{WAVES, Waves};
 pub use workload::{Row, Workload};
 

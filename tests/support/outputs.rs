@@ -6,9 +6,9 @@ use burn::{
 };
 use softrast_mesh::fox;
 use softrast_raster::{RasterBackend, Rasterizer, project};
-use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_softness::{EdgeSoftness, Family, Softness, numbers};
 
-use crate::tensors::{numbers, tensor};
+use crate::tensors::tensor;
 
 /// Width and height of the image in pixels: more rows than are computed at once, four times over.
 const SIZE: usize = 150;

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use burn::{
     backend::Autodiff,
-    tensor::{Element, Tensor, TensorData, backend::Backend},
+    tensor::{Tensor, backend::Backend},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, mse_loss, project, reference};
-use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_softness::{EdgeSoftness, Family, Softness, numbers, tensor};
 
 /// The logistic of the signed squared distance.
 const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
@@ -143,17 +143,11 @@ impl Workload {
     }
 }
 
-fn tensor<B: Backend, const D: usize>(values: Vec<f64>, shape: [usize; D]) -> Tensor<B, D> {
-    let dtype = <B::FloatElem as Element>::dtype();
-    Tensor::from_data(TensorData::new(values, shape), (&Default::default(), dtype))
-}
-
 fn row<B: Backend>(loss: Tensor<B, 1>, alpha: Tensor<B, 3>, gradient: Tensor<B, 3>) -> Row {
-    let numbers = |data: TensorData| -> Vec<f64> { data.iter().collect() };
-    let alpha = numbers(alpha.into_data());
+    let alpha = numbers(alpha);
     Row {
-        loss: numbers(loss.into_data())[0],
+        loss: numbers(loss)[0],
         mean_alpha: alpha.iter().sum::<f64>() / alpha.len() as f64,
-        gradient_norm: numbers(gradient.into_data()).iter().map(|g| g * g).sum::<f64>().sqrt(),
+        gradient_norm: numbers(gradient).iter().map(|g| g * g).sum::<f64>().sqrt(),
     }
 }

@@ -1,7 +1,8 @@
 use burn::tensor::Tensor;
-use softrast_meta::{tensor, vector};
 use softrast_raster::RasterBackend;
-use softrast_softness::{EdgeSoftness, ScaleSchedule, ScheduledSoftness, Softness, Surrogate};
+use softrast_softness::{
+    EdgeSoftness, ScaleSchedule, ScheduledSoftness, Softness, Surrogate, tensor, vector,
+};
 
 use crate::{Input, LearnConfig};
 

@@ -4,10 +4,10 @@ use burn::{backend::Autodiff, tensor::Tensor};
 use serde_json::{Value, json};
 use softrast_meta::{
     Adam, BilevelProblem, Checkpoint, InnerLoop, Objective, OuterLoop, Progress, Record,
-    TaskDistribution, Validation, numbers, vector,
+    TaskDistribution, Validation,
 };
 use softrast_raster::{RasterBackend, Rasterizer};
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, numbers, vector};
 
 use crate::{
     InverseProblem, LearnConfig, Method, OuterLoss, PhiLayout, Resolution, ScheduledRenderer,

@@ -5,8 +5,9 @@ use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData, Transaction, backend::Backend},
 };
-use softrast_meta::{InnerLoop, descend, numbers};
+use softrast_meta::{InnerLoop, descend};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
+use softrast_softness::numbers;
 
 use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig};
 

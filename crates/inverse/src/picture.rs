@@ -1,9 +1,9 @@
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Tensor, backend::Backend};
 use image::{DynamicImage, GrayImage, Luma, LumaA};
-use softrast_meta::numbers;
+use softrast_softness::{numbers, tensor_on};
 
 /// A gray picture of any size, to be seen as a square image: a target for silhouettes.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +50,7 @@ impl Picture {
 
     /// The same as a tensor, `[1, size, size]`.
     pub fn tensor<B: Backend>(&self, size: usize, device: &B::Device) -> Tensor<B, 3> {
-        let dtype = <B::FloatElem as Element>::dtype();
-        Tensor::from_data(TensorData::new(self.levels(size), [1, size, size]), (device, dtype))
+        tensor_on(self.levels(size), [1, size, size], device)
     }
 }
 

@@ -1,9 +1,8 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use burn::tensor::{Element, Tensor, TensorData};
-use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer};
-use softrast_softness::{EdgeSoftness, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, ScheduledSoftness, numbers, tensor, vector};
 
 use crate::{PhiLayout, Resolution};
 

@@ -53,7 +53,7 @@ mod tests {
     use softrast_raster::HostBackend;
 
     use super::*;
-    use softrast_meta::{numbers, tensor};
+    use softrast_softness::{numbers, tensor};
 
     #[test]
     fn a_smaller_target_has_the_means_of_areas() {

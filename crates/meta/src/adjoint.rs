@@ -6,7 +6,7 @@ use burn::{
 use crate::{
     Objective, Optimizer,
     inner_loop::{allowed, gradient_of},
-    vector::{norm, numbers},
+    numbers,
 };
 
 /// Derivatives of the outer loss by the scene and by the optimiser's state after some step.
@@ -70,4 +70,9 @@ impl<B: Backend> Adjoint<B> {
         let before = Self { theta: by(&theta), state: state.iter().map(by).collect() };
         (before, by(&prepared))
     }
+}
+
+/// Euclidean norm, summed in f64.
+pub(crate) fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

@@ -7,7 +7,7 @@ use burn::{
 
 use crate::{
     Adam, BilevelProblem, InnerLoop, MetaEstimate, Objective, Optimizer, descend,
-    inner_loop::allowed, objective::Lowered, vector::numbers,
+    inner_loop::allowed, numbers, objective::Lowered,
 };
 
 /// An inner loop that moves the softness along with the scene, down the same loss.

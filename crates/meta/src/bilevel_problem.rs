@@ -6,8 +6,8 @@ use burn::{
 };
 
 use crate::{
-    InnerLoop, Objective, Optimizer, OuterSteps, descend, gradient, inner_loop::allowed,
-    objective::Lowered, vector::numbers,
+    InnerLoop, Objective, Optimizer, OuterSteps, descend, gradient, inner_loop::allowed, numbers,
+    objective::Lowered,
 };
 
 /// One instance of a task, to learn a softness on: what is optimised, and how the result is judged.

@@ -1,6 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use crate::vector::numbers;
+use crate::numbers;
 
 /// A meta-gradient and what its making tells.
 #[derive(Clone, Debug)]

@@ -3,10 +3,7 @@ use std::f64::consts::TAU;
 use burn::tensor::{Tensor, backend::Backend};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
-use crate::{
-    MetaEstimate,
-    vector::{numbers, vector},
-};
+use crate::{MetaEstimate, numbers, vector};
 
 /// The mean of `(L(φ + σ ε) - L(φ - σ ε)) / 2σ · ε` over `pairs` normal ε drawn from `seed`.
 ///

@@ -45,7 +45,6 @@ mod record;
 mod sgd;
 mod task_distribution;
 mod unrolled;
-mod vector;
 
 pub use adam::{Adam, AdamState};
 pub use alternating_descent::AlternatingDescent;
@@ -61,8 +60,8 @@ pub use outer_steps::OuterSteps;
 pub use progress::{Best, Progress};
 pub use record::Record;
 pub use sgd::Sgd;
+pub use softrast_softness::{numbers, tensor, vector};
 pub use task_distribution::TaskDistribution;
-pub use vector::{numbers, tensor, vector};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -4,9 +4,8 @@ use burn::tensor::{Tensor, backend::Backend};
 use serde::Serialize;
 
 use crate::{
-    Adam, MetaEstimate, MetaGradient, Optimizer, Progress, Record, TaskDistribution,
-    progress::Best,
-    vector::{norm, numbers, vector},
+    Adam, MetaEstimate, MetaGradient, Optimizer, Progress, Record, TaskDistribution, adjoint::norm,
+    numbers, progress::Best, vector,
 };
 
 /// The outer loop: Adam on the mean meta-gradient of batches of instances.

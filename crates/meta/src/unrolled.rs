@@ -8,7 +8,7 @@ use burn::{
 use crate::{
     BilevelProblem, MetaEstimate, Objective, Optimizer,
     adjoint::{Adjoint, Stored},
-    vector::numbers,
+    numbers,
 };
 
 /// The outer loss where it was taken.

@@ -1,4 +1,5 @@
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_softness::{numbers, tensor_on};
 
 /// Camera depth, in world units, below which a vertex counts as behind the camera. Faces with such
 /// a vertex are not drawn.
@@ -7,6 +8,9 @@ pub const NEAR: f64 = 1e-2;
 /// Vertices farther than this from the origin along an axis, in world units, are moved there: their
 /// squares would leave the range of f32, and their gradients with them.
 const FARTHEST: f64 = 1e15;
+
+/// A line of sight, or an up across it, that is not longer than this has no direction, in world units.
+const SHORTEST: f64 = 1e-12;
 
 /// A camera that looks at the origin, with y up.
 ///
@@ -39,7 +43,7 @@ impl Orbit {
 
     /// The numbers of a camera for each view, `[views, 4]`.
     pub fn tensors<B: Backend>(cameras: &[Self], device: &B::Device) -> Tensor<B, 2> {
-        floats(
+        tensor_on(
             cameras.iter().flat_map(|camera| camera.numbers()).collect(),
             [cameras.len(), 4],
             device,
@@ -54,14 +58,13 @@ impl Orbit {
     pub fn from_tensor<B: Backend>(cameras: Tensor<B, 2>) -> Vec<Self> {
         let [_, four] = cameras.dims();
         assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", cameras.dims());
-        let numbers: Vec<f64> = cameras.into_data().iter().collect();
         let of = |c: &[f64]| Self {
             distance: c[0],
             elevation_deg: c[1],
             azimuth_deg: c[2],
             fov_deg: c[3],
         };
-        numbers.chunks(4).map(of).collect()
+        numbers(cameras).chunks(4).map(of).collect()
     }
 
     fn numbers(&self) -> [f64; 4] {
@@ -94,13 +97,16 @@ impl LookAt {
         let right = unit(cross(self.up, ahead), "a camera looks along its up");
         let rows = [right, cross(ahead, right), ahead];
         let translation = rows.map(|row| -dot(row, self.eye));
-        (floats(rows.concat(), [1, 3, 3], device), floats(translation.to_vec(), [1, 3], device))
+        (
+            tensor_on(rows.concat(), [1, 3, 3], device),
+            tensor_on(translation.to_vec(), [1, 3], device),
+        )
     }
 }
 
 /// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: the vertices of a mesh, for [`project`].
 pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tensor<B, 3> {
-    floats(positions.concat(), [1, positions.len(), 3], device)
+    tensor_on(positions.concat(), [1, positions.len(), 3], device)
 }
 
 /// Rotation from world to camera axes for cameras that look at the origin with y up.
@@ -223,15 +229,6 @@ fn sin_cos<B: Backend, const D: usize>(degrees: Tensor<B, D>) -> [Tensor<B, D>; 
     [radians.clone().sin(), radians.cos()]
 }
 
-fn floats<B: Backend, const D: usize>(
-    values: Vec<f64>,
-    shape: [usize; D],
-    device: &B::Device,
-) -> Tensor<B, D> {
-    let dtype = <B::FloatElem as Element>::dtype();
-    Tensor::from_data(TensorData::new(values, shape), (device, dtype))
-}
-
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| a[k] * b[k]).sum()
 }
@@ -243,6 +240,6 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 /// `a / |a|`; `otherwise` is what is wrong where that is no direction.
 fn unit(a: [f64; 3], otherwise: &str) -> [f64; 3] {
     let length = dot(a, a).sqrt();
-    assert!(length > 1e-12, "{otherwise}");
+    assert!(length > SHORTEST, "{otherwise}");
     a.map(|x| x / length)
 }

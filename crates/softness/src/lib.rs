@@ -38,6 +38,7 @@ mod scheduled;
 mod soft_step;
 mod softness;
 mod support;
+mod tensors;
 
 pub use depth_softness::{DepthSoftness, DepthSoftnessFile, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
@@ -50,6 +51,7 @@ pub use scheduled::{ScheduledSoftness, Surrogate};
 pub use soft_step::SoftStep;
 pub use softness::Softness;
 pub use support::{Support, support};
+pub use tensors::{numbers, tensor, tensor_on, vector};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -1,18 +1,31 @@
-//! Tensors of plain numbers.
+//! Tensors of plain numbers, in the float type of their backend whatever type the device defaults to.
 
 use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
 
-/// A tensor in the float type of its backend, whatever type the device defaults to.
+/// A tensor of these values, row by row.
 ///
 /// # Panics
 ///
 /// If the number of values is not that of the shape.
 pub fn tensor<B: Backend, const D: usize>(values: Vec<f64>, shape: [usize; D]) -> Tensor<B, D> {
-    let dtype = <B::FloatElem as Element>::dtype();
-    Tensor::from_data(TensorData::new(values, shape), (&Default::default(), dtype))
+    tensor_on(values, shape, &Default::default())
 }
 
-/// A vector in the float type of its backend.
+/// The same on a device.
+///
+/// # Panics
+///
+/// If the number of values is not that of the shape.
+pub fn tensor_on<B: Backend, const D: usize>(
+    values: Vec<f64>,
+    shape: [usize; D],
+    device: &B::Device,
+) -> Tensor<B, D> {
+    let dtype = <B::FloatElem as Element>::dtype();
+    Tensor::from_data(TensorData::new(values, shape), (device, dtype))
+}
+
+/// A [`tensor`] with one axis.
 pub fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
     tensor(values.to_vec(), [values.len()])
 }
@@ -20,9 +33,4 @@ pub fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
 /// Numbers of a tensor, row by row.
 pub fn numbers<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
     tensor.into_data().iter().collect()
-}
-
-/// Euclidean norm, summed in f64.
-pub(crate) fn norm(values: &[f64]) -> f64 {
-    values.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
