@@ -20,7 +20,7 @@ pub(crate) fn relative_error(found: &[f64], exact: &[f64]) -> f64 {
 }
 
 fn loss(objective: &impl Objective<B>, theta: &[f64], phi: &[f64]) -> f64 {
-    objective.loss(vector(theta), vector(phi)).into_scalar()
+    objective.loss(vector(theta), vector(phi), 0).into_scalar()
 }
 
 /// Asserts that every entry of the gradient to `theta` is right to 1e-6 of the largest.
@@ -30,7 +30,7 @@ pub(crate) fn check_gradient(
     phi: &[f64],
 ) {
     let leaf = vector::<A>(theta).require_grad();
-    let grads = objective.loss(leaf.clone(), vector(phi)).backward();
+    let grads = objective.loss(leaf.clone(), vector(phi), 0).backward();
     let grad = numbers(leaf.grad(&grads).unwrap());
     let largest = grad.iter().fold(0.0, |largest: f64, g| largest.max(g.abs()));
     for (k, grad) in grad.into_iter().enumerate() {
@@ -56,7 +56,7 @@ pub(crate) fn check_meta_gradient(
     let inner = InnerLoop { optimizer: Adam::new(learning_rate), steps: 2 };
     let leaf = vector::<A>(&[phi]).require_grad();
     let end: Tensor<A, 1> = inner.solve(objective, vector(theta), &leaf);
-    let grads = objective.loss(end, leaf.clone()).backward();
+    let grads = objective.loss(end, leaf.clone(), 0).backward();
     let grad = numbers(leaf.grad(&grads).unwrap())[0];
     let at = |h: f64| {
         let end = inner.solve::<B, _>(objective, vector(theta), &vector(&[phi + h]));

@@ -59,7 +59,7 @@ fn outer_loss<B: Backend>(
     phi: Tensor<B, 1>,
 ) -> Tensor<B, 1> {
     let theta = inner.solve(problem, vector(&shape2d_start()), &phi);
-    problem.loss(theta, phi)
+    problem.loss(theta, phi, inner.steps)
 }
 
 fn meta_gradient(

@@ -2,17 +2,14 @@
 
 use std::{fs, path::PathBuf};
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
+use burn::backend::NdArray;
 use occlusion::Occlusion;
 use pose::Pose;
 use shape2d::Shape2d;
 use shape3d::Shape3d;
 use softrast_cli::{EdgeChoice, Task, Variant};
 use softrast_inverse::{Instances, InverseProblem, LearnConfig, Method, OuterLoss, SolveConfig};
-use softrast_meta::{BilevelProblem, MetaGradient, Objective, TaskDistribution};
+use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::RasterBackend;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 use softrast_tests::{numbers, vector};
@@ -32,24 +29,6 @@ const SINGLE_BOUND: f64 = 2e-2;
 /// Half the distance of a difference, as a share of the parameter's size; see the tests of the 2-D problem.
 const SHARES: [f64; 6] = [1e-6, 3e-6, 3e-7, 1e-5, 1e-7, 1e-4];
 const SEED: u64 = 5;
-
-/// An objective that takes the softness from the vector it is given, under the support and knots that were chosen at
-/// φ, while numbers without a tape mean those at φ themselves.
-struct Followed<P>(P);
-
-impl<B: Backend, P: Objective<B>> Objective<B> for Followed<P> {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
-        self.loss_at(theta, phi, 0)
-    }
-
-    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
-        self.0.loss_from(theta, self.0.prepared(phi, step), step)
-    }
-
-    fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
-        self.0.allowed(theta)
-    }
-}
 
 /// A problem at the size of its images, with a softness and how the result is judged.
 struct Case<'a, P> {
@@ -78,10 +57,7 @@ impl<P: InverseProblem> Case<'_, P> {
         let phi = instances.start();
         let problem = instances.problem(SEED, &vector(&phi));
         let estimate = MetaGradient::Unrolled { clip: None }.estimate(&problem, &vector(&phi), 0);
-        let BilevelProblem { objective, outer_loss, inner, start, outer_steps } = problem;
-        let objective = Followed(objective);
-        let followed = BilevelProblem { objective, outer_loss, inner, start, outer_steps };
-        (phi, numbers(estimate.gradient), move |phi: &[f64]| followed.loss(&vector(phi)))
+        (phi, numbers(estimate.gradient), move |phi: &[f64]| problem.loss(&vector(phi)))
     }
 
     fn check(&self) {

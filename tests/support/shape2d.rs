@@ -69,7 +69,7 @@ fn target<B: Backend>(like: &Tensor<B, 1>) -> Tensor<B, 3> {
 }
 
 impl<B: RasterBackend, S: Softness> Objective<B> for Shape2d<S> {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         let target = target(&theta);
         let corners = theta.reshape([1, 3 * FACES, 2]);
         let depth = corners.zeros_like().narrow(2, 0, 1) + 1.0;

@@ -15,7 +15,7 @@ pub struct Waves {
 pub const WAVES: Waves = Waves { dead: false };
 
 impl<B: Backend> Objective<B> for Waves {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
         let count = theta.dims()[0] - usize::from(self.dead);
         let theta = theta.narrow(0, 0, count);
         let next = Tensor::cat(
@@ -25,10 +25,7 @@ impl<B: Backend> Objective<B> for Waves {
         let off = theta.clone() - 0.2;
         let valley = ((off.clone().exp() + off.neg().exp()) * 0.5).log().sum();
         let [width, tilt] = [0, 1].map(|k| phi.clone().narrow(0, k, 1));
-        valley * width.exp() + (theta.sin() * next).sum() * tilt
-    }
-
-    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
-        self.loss(theta, phi) * (1.0 + 0.1 * step as f64)
+        let loss = valley * width.exp() + (theta.sin() * next).sum() * tilt;
+        loss * (1.0 + 0.1 * step as f64)
     }
 }

@@ -136,20 +136,19 @@ impl PhiLayout {
         self.edge().with_scale(Tensor::cat(parts, 0), scale)
     }
 
-    /// The surrogate and its parameters at a step.
+    /// Parameters of the surrogate at a step, `[P]`.
     pub(crate) fn surrogate<B: RasterBackend>(
         &self,
         learned: &Tensor<B, 1>,
         step: usize,
-    ) -> Option<(EdgeSoftness, Tensor<B, 1>)> {
+    ) -> Option<Tensor<B, 1>> {
         let Surrogate { softness, phi } = self.start.surrogate.as_ref()?;
         let before = self.knots() + self.start.phi.len() - self.replaced();
         let own = learned.clone().narrow(0, before, phi.len());
-        let phi = match self.scale(learned, step) {
+        Some(match self.scale(learned, step) {
             None => own,
             Some(scale) => softness.with_scale(own, scale),
-        };
-        Some((*softness, phi))
+        })
     }
 
     /// Parameters of the problem's own, `[P]`, which may be none.

@@ -27,11 +27,13 @@
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
 
 mod distilled_mlp;
+mod instances;
 mod layout;
 mod learn;
 mod learn_config;
 mod method;
 mod minimize;
+mod objectives;
 mod picture;
 pub mod pose;
 mod problem;
@@ -40,11 +42,13 @@ mod resolution;
 mod targets;
 
 pub use distilled_mlp::{distilled_mlp, mlp_like};
+pub use instances::Instances;
 pub use layout::PhiLayout;
-pub use learn::{Inner, Instances, Learning, Outer, learn};
+pub use learn::{Learning, learn};
 pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
 pub use method::Method;
 pub use minimize::{Iterate, minimize};
+pub use objectives::{Inner, Outer};
 pub use picture::{Picture, save_picture};
 pub use pose::PoseProblem;
 pub use problem::{InverseProblem, SolveConfig};

@@ -1,6 +1,6 @@
 use std::time::{Duration, Instant};
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData, Transaction, backend::Backend},
@@ -9,7 +9,7 @@ use softrast_meta::{InnerLoop, descend};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
 use softrast_softness::numbers;
 
-use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig};
+use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
 
 /// All instances after some steps.
 #[derive(Clone, Debug)]
@@ -50,70 +50,106 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
     mut visit: impl FnMut(&Iterate, &P::Scene<HostBackend>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Iterate> {
     ensure!(!instances.is_empty(), "there is no instance to solve");
-    let SolveConfig { size, steps, learning_rate } = *config;
-    let layout = PhiLayout::new(method.softness.clone(), problem.own_phi(), steps, size);
-    let rasterizer = Rasterizer { tolerance: method.tolerance(), ..Rasterizer::new(size) };
-    let phi = layout.start();
-    let renderer =
-        ScheduledRenderer::new(layout, &phi, rasterizer, method.resolution, problem.faces());
-    let scene = problem.scene::<Autodiff<B>>(instances, size);
-    let host = problem.scene::<HostBackend>(instances, size);
+    let run = Run::<P, B>::new(problem, instances, method, config);
     // Time of drawing, and since when the step has gone on.
     let mut spent: Option<(Duration, Instant)> = None;
     let mut look = |step: usize, leaf: Tensor<Autodiff<B>, 1>| {
         let seconds = spent.map(|(drawing, since)| (drawing + since.elapsed()).as_secs_f64());
         let clock = Instant::now();
-        let image = problem.image(&scene, leaf.clone(), &renderer.at(step));
-        let soft = problem.image_loss(&scene, image.clone());
-        let loss = match problem.regularizer(&scene, leaf.clone()) {
-            Some(regularizer) => soft.clone() + regularizer,
-            None => soft.clone(),
-        };
+        let seen = run.seen(step, leaf);
         // A GPU has only been asked so far, also for the end of the step before.
-        B::sync(&leaf.device())?;
+        B::sync(&seen.theta.device())?;
         let drawing = clock.elapsed();
-        let image = pictures.then(|| of_first(image.inner(), instances.len()));
-        let rows = image.as_ref().map(|image| image.dims()[2]);
-        // One round trip to the device for all of it.
-        let read = Transaction::default().register(leaf.inner()).register(loss.clone().inner());
-        let read = read.register(soft.inner());
-        let read = image.into_iter().fold(read, |read, image| read.register(image));
-        let read: [Option<TensorData>; 4] = {
-            let mut read = read.execute().into_iter();
-            std::array::from_fn(|_| read.next())
-        };
-        let [Some(theta), Some(losses), Some(soft), image] = read else {
-            unreachable!("as many tensors are read as were registered")
-        };
-        let theta = on_host(theta);
-        let hard = problem.image_loss(&host, problem.hard_image(&host, theta.clone()));
-        let image = image
-            .zip(rows)
-            .map(|(image, side)| enlarged(&image.iter().collect::<Vec<f64>>(), side, size));
-        let iterate = Iterate {
-            step,
-            scale: renderer.scale(step),
-            theta,
-            loss: losses.iter().collect(),
-            soft_loss: soft.iter().collect(),
-            hard_loss: numbers(hard),
-            image,
-            seconds,
-        };
-        visit(&iterate, &host)?;
+        let loss = seen.loss.clone();
+        let iterate = Iterate { seconds, ..run.read(step, seen, pictures)? };
+        visit(&iterate, &run.host)?;
         spent = Some((drawing, Instant::now()));
         anyhow::Ok((loss, iterate))
     };
+    let SolveConfig { steps, learning_rate, .. } = *config;
     let inner = InnerLoop { optimizer: problem.optimizer(learning_rate), steps };
     let gradient = |step: usize, theta: &Tensor<B, 1>| {
         let leaf = Tensor::from_inner(theta.clone()).require_grad();
         let (loss, _) = look(step, Tensor::clone(&leaf))?;
         Ok(leaf.grad(&loss.sum().backward()).unwrap_or_else(|| theta.zeros_like()))
     };
-    let allowed = |theta| problem.allowed(&scene, Tensor::from_inner(theta)).inner();
-    let start = problem.start(&scene).inner();
+    let allowed = |theta| problem.allowed(&run.scene, Tensor::from_inner(theta)).inner();
+    let start = problem.start(&run.scene).inner();
     let theta = descend::<B, _, anyhow::Error>(&inner, start, gradient, allowed, |_, _, _| ())?;
     Ok(look(steps, Tensor::from_inner(theta))?.1)
+}
+
+/// Instances that are solved side by side, and what draws them.
+struct Run<'a, P: InverseProblem, B: RasterBackend> {
+    problem: &'a P,
+    instances: usize,
+    size: usize,
+    renderer: ScheduledRenderer,
+    scene: P::Scene<Autodiff<B>>,
+    /// The scene on the CPU.
+    host: P::Scene<HostBackend>,
+}
+
+/// What is seen at a step, on the device.
+struct Seen<B: RasterBackend> {
+    theta: Tensor<B, 1>,
+    image: Tensor<B, 3>,
+    soft_loss: Tensor<B, 1>,
+    /// What is lowered, of each instance, with a tape.
+    loss: Tensor<Autodiff<B>, 1>,
+}
+
+impl<'a, P: InverseProblem, B: RasterBackend> Run<'a, P, B> {
+    fn new(
+        problem: &'a P,
+        instances: &[P::Instance],
+        method: &Method,
+        SolveConfig { size, steps, .. }: &SolveConfig,
+    ) -> Self {
+        let size = *size;
+        let layout = PhiLayout::new(method.softness.clone(), problem.own_phi(), *steps, size);
+        let rasterizer = Rasterizer { tolerance: method.tolerance(), ..Rasterizer::new(size) };
+        let (phi, faces) = (layout.start(), problem.faces());
+        let renderer = ScheduledRenderer::new(layout, &phi, rasterizer, method.resolution, faces);
+        let (scene, host) = (problem.scene(instances, size), problem.scene(instances, size));
+        Self { problem, instances: instances.len(), size, renderer, scene, host }
+    }
+
+    fn seen(&self, step: usize, theta: Tensor<Autodiff<B>, 1>) -> Seen<B> {
+        let Self { problem, scene, renderer, .. } = self;
+        let image = problem.image(scene, theta.clone(), &renderer.at(step));
+        let soft = problem.image_loss(scene, image.clone());
+        let loss = lowered(*problem, scene, theta.clone(), soft.clone());
+        Seen { theta: theta.inner(), image: image.inner(), soft_loss: soft.inner(), loss }
+    }
+
+    /// The numbers of what is seen, with its hard error.
+    fn read(&self, step: usize, seen: Seen<B>, picture: bool) -> anyhow::Result<Iterate> {
+        let image = picture.then(|| of_first(seen.image, self.instances));
+        let rows = image.as_ref().map(|image| image.dims()[2]);
+        // One round trip to the device for all of it.
+        let read = Transaction::default().register(seen.theta).register(seen.loss.inner());
+        let read = read.register(seen.soft_loss);
+        let read = image.into_iter().fold(read, |read, image| read.register(image));
+        let mut read = read.execute().into_iter();
+        let mut next = || read.next().context("fewer tensors were read than were asked for");
+        let (theta, loss, soft_loss) = (on_host(next()?), next()?, next()?);
+        let image = rows.map(|side| {
+            let pixels: Vec<f64> = next()?.iter().collect();
+            anyhow::Ok(enlarged(&pixels, side, self.size))
+        });
+        let hard = self.problem.hard_image(&self.host, theta.clone());
+        Ok(Iterate {
+            step,
+            scale: self.renderer.scale(step),
+            theta,
+            loss: loss.iter().collect(),
+            soft_loss: soft_loss.iter().collect(),
+            hard_loss: numbers(self.problem.image_loss(&self.host, hard)),
+            image: image.transpose()?,
+            seconds: None,
+        })
+    }
 }
 
 /// The views of the first of so many instances.

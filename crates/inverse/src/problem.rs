@@ -119,3 +119,16 @@ pub struct SolveConfig {
     /// Its learning rate.
     pub learning_rate: f64,
 }
+
+/// What is lowered, `[instances]`: the loss of an image at θ, and the regularizer.
+pub(crate) fn lowered<P: InverseProblem, B: RasterBackend>(
+    problem: &P,
+    scene: &P::Scene<B>,
+    theta: Tensor<B, 1>,
+    image_loss: Tensor<B, 1>,
+) -> Tensor<B, 1> {
+    match problem.regularizer(scene, theta) {
+        Some(regularizer) => image_loss + regularizer,
+        None => image_loss,
+    }
+}

@@ -1,14 +1,15 @@
-use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
+use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
 
 use burn::tensor::{Element, Tensor, TensorData};
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer};
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, numbers, tensor, vector};
+use softrast_softness::{EdgeSoftness, ScheduledSoftness, numbers, vector};
 
 use crate::{PhiLayout, Resolution};
 
 /// Draws soft silhouettes of one mesh topology at every step of a run.
 ///
-/// Support and knots follow the softness as in a [`SoftRenderer`]. Tables of steps without a gradient to φ are kept.
+/// Support and knots follow the softness as in a [`SoftRenderer`]. Those of every step are kept, with the tables of steps without a
+/// gradient to φ, as many runs under one softness need them again.
 #[derive(Debug)]
 pub struct ScheduledRenderer {
     layout: PhiLayout,
@@ -20,20 +21,18 @@ pub struct ScheduledRenderer {
     size: usize,
     resolution: Resolution,
     /// What draws silhouettes, if the problem has any: as they are seen, and as their gradient has it, if that is another.
-    renderers: Option<(Edges, Option<Edges>)>,
+    renderers: Vec<SoftRenderer<EdgeSoftness>>,
     /// What was drawn with so far, by [`PhiLayout::stage`].
-    silhouettes: RefCell<BTreeMap<usize, Silhouettes>>,
-    /// Tables of the values, by stage.
-    tables: RefCell<BTreeMap<usize, TensorData>>,
+    kept: RefCell<BTreeMap<usize, Rc<Kept>>>,
 }
 
-type Edges = SoftRenderer<EdgeSoftness>;
-
-/// Silhouettes as they are seen, and those whose gradient stands for theirs, if there are such.
-#[derive(Clone, Debug)]
-struct Silhouettes {
-    seen: Silhouette<EdgeSoftness>,
-    surrogate: Option<Silhouette<EdgeSoftness>>,
+/// What draws at a step, always the same: tables belong to its knots.
+#[derive(Debug)]
+struct Kept {
+    /// One for each renderer.
+    silhouettes: Vec<Silhouette<EdgeSoftness>>,
+    /// Their tables of the values, one below the other, `[rows, 4]`.
+    table: TensorData,
 }
 
 impl ScheduledRenderer {
@@ -47,57 +46,46 @@ impl ScheduledRenderer {
         faces: Option<Arc<[[u32; 3]]>>,
     ) -> Self {
         let (values, own) = layout.softness(phi);
-        let renderers = faces.map(|faces| {
+        let renderers = faces.map_or_else(Vec::new, |faces| {
             let of = |softness, phi| {
                 SoftRenderer::with_rasterizer(rasterizer, faces.clone(), softness, phi)
             };
             let surrogate = values.surrogate.clone().map(|found| of(found.softness, found.phi));
-            (of(values.softness, values.phi.clone()), surrogate)
+            [of(values.softness, values.phi.clone())].into_iter().chain(surrogate).collect()
         });
-        let (silhouettes, tables) = Default::default();
-        let size = rasterizer.size;
-        let phi = phi.to_vec();
-        Self { layout, phi, values, own, size, resolution, renderers, silhouettes, tables }
+        let (size, phi, kept) = (rasterizer.size, phi.to_vec(), RefCell::default());
+        Self { layout, phi, values, own, size, resolution, renderers, kept }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
     pub fn at<B: RasterBackend>(&self, step: usize) -> SoftnessAt<'_, B> {
-        SoftnessAt { renderer: self, step: step.min(self.layout.steps()), phi: Phi::Fixed }
+        SoftnessAt { renderer: self, step: step.min(self.layout.steps()), prepared: None }
     }
 
-    /// The softness at a step by a vector `phi` `[P]` that may be tracked.
-    pub(crate) fn tracked<B: RasterBackend>(
-        &self,
-        step: usize,
-        phi: Tensor<B, 1>,
-    ) -> SoftnessAt<'_, B> {
-        SoftnessAt { renderer: self, step: step.min(self.layout.steps()), phi: Phi::Tracked(phi) }
-    }
-
-    /// The softness at a step from what [`ScheduledRenderer::prepare`] gave.
+    /// The softness at a step from what [`ScheduledRenderer::prepared`] gave.
     pub(crate) fn of_prepared<B: RasterBackend>(
         &self,
         step: usize,
         prepared: Tensor<B, 1>,
     ) -> SoftnessAt<'_, B> {
-        let phi = Phi::Prepared(prepared);
-        SoftnessAt { renderer: self, step: step.min(self.layout.steps()), phi }
+        SoftnessAt { prepared: Some(prepared), ..self.at(step) }
     }
 
     /// All that the image at a step needs of the vector `phi` `[P]`, flat: the table where silhouettes are drawn, else parameters.
-    pub(crate) fn prepare<B: RasterBackend>(
+    pub(crate) fn prepared<B: RasterBackend>(
         &self,
         phi: &Tensor<B, 1>,
         step: usize,
     ) -> Tensor<B, 1> {
         let step = step.min(self.layout.steps());
-        match &self.renderers {
-            Some(_) => self.table(&self.silhouettes::<B>(step), phi, step).flatten(0, 1),
-            None => {
-                let parts = [self.layout.phi(phi, step), self.layout.own(phi)];
-                Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0)
-            }
+        if self.renderers.is_empty() {
+            let parts = [self.layout.phi(phi, step), self.layout.own(phi)];
+            return Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0);
         }
+        let phi = [self.layout.phi(phi, step)].into_iter().chain(self.layout.surrogate(phi, step));
+        let kept = self.kept::<B>(step);
+        let tables = kept.silhouettes.iter().zip(phi).map(|(of, phi)| of.table(phi).flatten(0, 1));
+        Tensor::cat(tables.collect(), 0)
     }
 
     /// Whether these are the numbers that it was made for, as far as the float type of `phi` `[P]` can tell.
@@ -122,60 +110,28 @@ impl ScheduledRenderer {
         self.resolution.side(self.size, width)
     }
 
-    /// What draws at a step, always the same: tables belong to its knots.
-    ///
     /// # Panics
     ///
     /// If the problem has no faces.
-    fn silhouettes<B: RasterBackend>(&self, step: usize) -> Silhouettes {
-        let mut kept = self.silhouettes.borrow_mut();
-        let silhouettes = kept.entry(self.layout.stage(step)).or_insert_with(|| {
-            let renderers = self.renderers.as_ref();
-            let (seen, surrogate) = renderers.expect("a problem that sees silhouettes has faces");
+    fn kept<B: RasterBackend>(&self, step: usize) -> Rc<Kept> {
+        let mut kept = self.kept.borrow_mut();
+        let kept = kept.entry(self.layout.stage(step)).or_insert_with(|| {
+            assert!(!self.renderers.is_empty(), "a problem that sees silhouettes has faces");
             let (part, size) = (self.layout.part(step), self.layout.size());
-            let other = surrogate.as_ref().zip(self.values.surrogate_at(part, size));
-            Silhouettes {
-                seen: seen.prepared::<B>(&self.values.phi_at(part, size)),
-                surrogate: other.map(|(renderer, found)| renderer.prepared::<B>(&found.phi)),
-            }
+            let surrogate = self.values.surrogate_at(part, size).map(|found| found.phi);
+            let phi = [self.values.phi_at(part, size)].into_iter().chain(surrogate);
+            let dtype = <B::FloatElem as Element>::dtype();
+            let mut table = Vec::new();
+            let silhouettes = self.renderers.iter().zip(phi).map(|(renderer, phi)| {
+                let silhouette = renderer.prepared::<B>(&phi);
+                table.extend(silhouette.table_data::<B>(&phi, dtype).iter::<f64>());
+                silhouette
+            });
+            let silhouettes = silhouettes.collect();
+            let rows = table.len() / 4;
+            Rc::new(Kept { silhouettes, table: TensorData::new(table, [rows, 4]) })
         });
-        silhouettes.clone()
-    }
-
-    /// The table of a step `[rows, 4]`, and below it that of the surrogate.
-    fn table<B: RasterBackend>(
-        &self,
-        Silhouettes { seen, surrogate }: &Silhouettes,
-        phi: &Tensor<B, 1>,
-        step: usize,
-    ) -> Tensor<B, 2> {
-        let table = seen.table(self.layout.phi(phi, step));
-        match surrogate.iter().zip(self.layout.surrogate(phi, step)).next() {
-            None => table,
-            Some((surrogate, (_, phi))) => Tensor::cat(vec![table, surrogate.table(phi)], 0),
-        }
-    }
-
-    /// The table of the values.
-    fn fixed_table<B: RasterBackend>(
-        &self,
-        Silhouettes { seen, surrogate }: &Silhouettes,
-        step: usize,
-    ) -> Tensor<B, 2> {
-        let dtype = <B::FloatElem as Element>::dtype();
-        let mut tables = self.tables.borrow_mut();
-        let table = tables.entry(self.layout.stage(step)).or_insert_with(|| {
-            let (part, size) = (self.layout.part(step), self.layout.size());
-            let own = (seen, self.values.phi_at(part, size));
-            let other = surrogate.iter().zip(self.values.surrogate_at(part, size));
-            let pairs = [own].into_iter().chain(other.map(|(of, found)| (of, found.phi)));
-            let tables = pairs
-                .map(|(of, phi)| of.table_data::<B>(&phi, dtype).iter::<f64>().collect::<Vec<_>>());
-            let values = tables.collect::<Vec<_>>().concat();
-            let rows = values.len() / 4;
-            TensorData::new(values, [rows, 4])
-        });
-        Tensor::from_data(table.clone(), (&Default::default(), dtype))
+        kept.clone()
     }
 }
 
@@ -184,18 +140,8 @@ impl ScheduledRenderer {
 pub struct SoftnessAt<'a, B: RasterBackend> {
     renderer: &'a ScheduledRenderer,
     step: usize,
-    phi: Phi<B>,
-}
-
-/// What stands for the softness.
-#[derive(Clone, Debug)]
-enum Phi<B: RasterBackend> {
-    /// The renderer's own values.
-    Fixed,
-    /// A vector, which may be tracked.
-    Tracked(Tensor<B, 1>),
-    /// What was prepared of one.
-    Prepared(Tensor<B, 1>),
+    /// What was prepared of a vector φ; without it, the renderer's own values count.
+    prepared: Option<Tensor<B, 1>>,
 }
 
 impl<B: RasterBackend> SoftnessAt<'_, B> {
@@ -206,48 +152,46 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     ///
     /// If the problem has no faces.
     pub fn silhouette(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
-        let renderer = self.renderer;
-        let silhouettes = renderer.silhouettes::<B>(self.step);
-        let table = match &self.phi {
-            Phi::Fixed => renderer.fixed_table(&silhouettes, self.step),
-            Phi::Tracked(phi) => renderer.table(&silhouettes, phi, self.step),
-            Phi::Prepared(table) => table.clone().reshape([-1, 4]),
+        let kept = self.renderer.kept::<B>(self.step);
+        let table = match &self.prepared {
+            Some(table) => table.clone().reshape([-1, 4]),
+            None => {
+                let options = (&vertices.device(), <B::FloatElem as Element>::dtype());
+                Tensor::from_data(kept.table.clone(), options)
+            }
         };
-        let Silhouettes { seen, surrogate } = silhouettes;
-        let side = renderer.side(self.step);
-        let seen = seen.sized(side);
-        let Some(surrogate) = surrogate else { return seen.coverage_by_table(vertices, table) };
+        let side = self.renderer.side(self.step);
+        let seen = kept.silhouettes[0].clone().sized(side);
+        let Some(surrogate) = kept.silhouettes.get(1) else {
+            return seen.coverage_by_table(vertices, table);
+        };
         let ([rows, _], own) = (table.dims(), seen.profile().knots());
         let below = table.clone().narrow(0, own, rows - own);
-        let surrogate = surrogate.sized(side);
-        seen.coverage_with_surrogate(vertices, table.narrow(0, 0, own), &surrogate, below)
+        let table = table.narrow(0, 0, own);
+        seen.coverage_with_surrogate(vertices, table, &surrogate.clone().sized(side), below)
     }
 
     /// The softness of edges and its parameters `[P]`.
     pub fn edge(&self) -> (EdgeSoftness, Tensor<B, 1>) {
         let ScheduledRenderer { layout, values, .. } = self.renderer;
-        let phi = match &self.phi {
-            Phi::Fixed => vector(&values.phi_at(layout.part(self.step), layout.size())),
-            Phi::Tracked(phi) => layout.phi(phi, self.step),
-            Phi::Prepared(prepared) => prepared.clone().narrow(0, 0, values.phi.len()),
+        let phi = match &self.prepared {
+            Some(prepared) => prepared.clone().narrow(0, 0, values.phi.len()),
+            None => vector(&values.phi_at(layout.part(self.step), layout.size())),
         };
         (layout.edge(), phi)
     }
 
     /// Parameters of the problem's own, `[P]`.
     pub fn own(&self) -> Tensor<B, 1> {
-        match &self.phi {
-            Phi::Fixed => {
-                let own = &self.renderer.own;
-                tensor(own.clone(), [own.len()])
-            }
-            Phi::Tracked(phi) | Phi::Prepared(phi) => self.renderer.layout.own(phi),
+        match &self.prepared {
+            Some(prepared) => self.renderer.layout.own(prepared),
+            None => vector(&self.renderer.own),
         }
     }
 
     /// The number of the stage, where nothing is differentiated by φ: what follows from the softness alone may be kept as long as it
     /// is the same.
     pub fn fixed_stage(&self) -> Option<usize> {
-        matches!(self.phi, Phi::Fixed).then(|| self.renderer.layout.stage(self.step))
+        self.prepared.is_none().then(|| self.renderer.layout.stage(self.step))
     }
 }

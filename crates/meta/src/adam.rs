@@ -10,8 +10,7 @@ use crate::Optimizer;
 ///
 /// `epsilon_root` belongs inside the root: without it a parameter whose gradient has always been
 /// zero makes the meta-gradient NaN (the slope of the root at 0 is infinite). Larger values are
-/// safer but dull small gradients: keep it well below the squared gradients that matter, see
-/// [`Adam::fit_epsilon_root`].
+/// safer but dull small gradients: keep it well below the squared gradients that matter.
 ///
 /// The learning rate may change from step to step: the optimiser is only read.
 ///
@@ -42,13 +41,6 @@ pub struct AdamState<B: Backend, const D: usize> {
     pub step: usize,
 }
 
-/// What [`Adam::fit_epsilon_root`] takes of the typical gradient.
-const ROOT_SHARE: f64 = 1e-4;
-/// Least and largest `epsilon_root` that [`Adam::fit_epsilon_root`] chooses: below, the slope of
-/// the root at zero passes 5e9; above, sharp scenes measurably lose accuracy
-/// (docs/notes.md, Meta-gradients: Adam).
-const ROOT_RANGE: [f64; 2] = [1e-20, 1e-10];
-
 impl Adam {
     /// Adam with betas 0.9 and 0.99, epsilon 1e-8 and `epsilon_root` 1e-16, whose root is epsilon:
     /// it changes a step no more than epsilon does.
@@ -56,23 +48,6 @@ impl Adam {
     /// Source: Wu et al. 2024 for the betas.
     pub fn new(learning_rate: f64) -> Self {
         Self { learning_rate, beta1: 0.9, beta2: 0.99, epsilon: 1e-8, epsilon_root: 1e-16 }
-    }
-
-    /// The same with `epsilon_root` for problems whose first gradient is `grad`:
-    /// `(1e-4 · median |grad|)²`, held within `[1e-20, 1e-10]`.
-    ///
-    /// Source: docs/notes.md, Meta-gradients: Adam.
-    ///
-    /// # Panics
-    ///
-    /// If `grad` is empty.
-    pub fn fit_epsilon_root<B: Backend, const D: usize>(self, grad: &Tensor<B, D>) -> Self {
-        let mut sizes: Vec<f64> = grad.to_data().iter().map(f64::abs).collect();
-        let middle = sizes.len() / 2;
-        let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let [least, largest] = ROOT_RANGE;
-        let root = if median.is_nan() { largest } else { (ROOT_SHARE * median).powi(2) };
-        Self { epsilon_root: root.clamp(least, largest), ..self }
     }
 }
 

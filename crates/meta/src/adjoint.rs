@@ -53,7 +53,7 @@ impl<B: Backend> Adjoint<B> {
         let state: Vec<_> = before.state.into_iter().map(leaf).collect();
 
         let grad = gradient_of(&theta, |theta| {
-            objective.loss_from(theta, Tensor::from_inner(prepared.clone()), before.step)
+            objective.loss(theta, Tensor::from_inner(prepared.clone()), before.step)
         });
         let state_before = optimizer.state(before.step, state.clone());
         let (theta_after, state_after) = optimizer.step(theta.clone(), grad, state_before);

@@ -6,8 +6,10 @@ use burn::{
 };
 
 use crate::{
-    InnerLoop, Objective, Optimizer, OuterSteps, descend, gradient, inner_loop::allowed, numbers,
-    objective::Lowered,
+    InnerLoop, Objective, Optimizer, OuterSteps, descend,
+    inner_loop::{allowed, gradient},
+    numbers,
+    objective::loss_under,
 };
 
 /// One instance of a task, to learn a softness on: what is optimised, and how the result is judged.
@@ -39,11 +41,16 @@ where
         let mut total = 0.0;
         self.walk(phi, |step, theta, _| {
             if at.contains(&step) {
-                let loss = Lowered(&self.outer_loss).loss(theta.clone(), phi.clone());
-                total += numbers(loss).iter().sum::<f64>();
+                total += self.judged(theta, phi, step);
             }
         });
         total / at.len() as f64
+    }
+
+    /// The outer loss of a scene after some steps.
+    pub(crate) fn judged(&self, theta: &Tensor<B, 1>, phi: &Tensor<B, 1>, step: usize) -> f64 {
+        let [theta, phi] = [theta, phi].map(|x| Tensor::from_inner(x.clone()));
+        numbers(loss_under(&self.outer_loss, theta, phi, step).inner()).iter().sum()
     }
 }
 
@@ -60,8 +67,7 @@ impl<B: Backend, P: Objective<Autodiff<Autodiff<B>>>, R, O: Optimizer> BilevelPr
             // On the level of the way back: what the objective detaches, it detaches there.
             Ok(gradient(&self.objective, at, phi, step).inner())
         };
-        let objective = Lowered(&self.objective);
-        let allowed = |theta| allowed(&objective, theta);
+        let allowed = |theta| allowed(&self.objective, Tensor::from_inner(theta)).inner();
         let Ok::<_, Infallible>(_) =
             descend(&self.inner, self.start.clone(), gradient, allowed, see);
     }

@@ -5,7 +5,7 @@ use burn::{
     tensor::{Tensor, backend::Backend},
 };
 
-use crate::{Objective, Optimizer};
+use crate::{Objective, Optimizer, objective::loss_under};
 
 /// A fixed number of steps of an optimiser.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,13 +73,13 @@ pub(crate) fn allowed<B: Backend, P: Objective<Autodiff<B>>>(
 /// Gradient of the loss at inner step `step` to `theta` `[N]`; zero where it does not depend on it.
 ///
 /// On an `Autodiff` backend the gradient is tracked in turn.
-pub fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
+pub(crate) fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
     objective: &P,
     theta: Tensor<B, 1>,
     phi: Tensor<B, 1>,
     step: usize,
 ) -> Tensor<B, 1> {
-    gradient_of(&theta, |theta| objective.loss_at(theta, Tensor::from_inner(phi), step))
+    gradient_of(&theta, |theta| loss_under(objective, theta, Tensor::from_inner(phi), step))
 }
 
 /// Gradient of a loss `[1]` to `theta` `[N]`.

@@ -13,7 +13,7 @@
 //! /// A parabola around φ.
 //! struct Parabola;
 //! impl<B: Backend> Objective<B> for Parabola {
-//!     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+//!     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
 //!         (theta - phi).powi_scalar(2).sum()
 //!     }
 //! }
@@ -47,11 +47,10 @@ mod task_distribution;
 mod unrolled;
 
 pub use adam::{Adam, AdamState};
-pub use alternating_descent::AlternatingDescent;
 pub use bilevel_problem::BilevelProblem;
 pub use checkpoint::{Checkpoint, CheckpointError};
 pub use estimate::MetaEstimate;
-pub use inner_loop::{InnerLoop, descend, gradient};
+pub use inner_loop::{InnerLoop, descend};
 pub use meta_gradient::MetaGradient;
 pub use objective::Objective;
 pub use optimizer::Optimizer;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{
     BilevelProblem, MetaEstimate, Objective, Optimizer, TaskDistribution,
-    alternating_descent::joint, evolution::evolution, unrolled::unrolled,
+    alternating_descent::alternating_descent, evolution::evolution, unrolled::unrolled,
 };
 
 /// How the derivative of the outer loss by the softness is taken.
@@ -60,7 +60,7 @@ impl Default for MetaGradient {
 impl MetaGradient {
     /// The outer loss of `problem` under `phi` `[P]` and its derivative.
     ///
-    /// `seed` is that of the noise of [`Es`](MetaGradient::EvolutionStrategy); all else has none. Memory holds one
+    /// `seed` is that of the noise of an [evolution strategy](MetaGradient::EvolutionStrategy); all else has none. Memory holds one
     /// inner step's tape, and the scene and the optimiser's state before each step walked back.
     ///
     /// # Panics
@@ -85,7 +85,9 @@ impl MetaGradient {
             Self::EvolutionStrategy { sigma, pairs } => {
                 evolution(|phi| problem.loss(phi), phi, sigma, pairs, seed)
             }
-            Self::AlternatingDescent { learning_rate } => joint(problem, phi, learning_rate),
+            Self::AlternatingDescent { learning_rate } => {
+                alternating_descent(problem, phi, learning_rate)
+            }
         }
     }
 

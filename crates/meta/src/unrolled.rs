@@ -7,15 +7,10 @@ use burn::{
 
 use crate::{
     BilevelProblem, MetaEstimate, Objective, Optimizer,
-    adjoint::{Adjoint, Stored},
+    adjoint::{Adjoint, Stored, norm},
     numbers,
+    objective::loss_under,
 };
-
-/// The outer loss where it was taken.
-struct Taken<B: Backend> {
-    step: usize,
-    by_theta: Tensor<B, 1>,
-}
 
 /// The exact derivative of the outer loss by `phi` through the last `depth` inner steps, and where
 /// the outer loss itself depends on `phi`, all of that too.
@@ -37,80 +32,135 @@ where
     R: Objective<Autodiff<B>>,
     O: Optimizer,
 {
-    let optimizer = &problem.inner.optimizer;
+    let Run { mut states, taken, mut estimate } = run(problem, phi, depth);
+    let Some(end) = states.pop() else { return estimate };
+    estimate.stored = states.iter().map(|x| x.theta.dims()[0] * (1 + x.state.len())).sum();
+    let mut back = WayBack::from(&end, taken);
+    if !states.is_empty() {
+        estimate.adjoint_norms.push(back.norm);
+    }
+    let objective = &problem.objective;
+    while let Some(last) = states.last() {
+        let stage = objective.stage(last.step);
+        let mut prepared = Prepared::new(objective, phi, last.step);
+        while let Some(before) = states.pop_if(|x| objective.stage(x.step) == stage) {
+            back = back
+                .over(problem, before, &mut prepared, &mut estimate)
+                .clipped(clip, &mut estimate);
+        }
+        estimate.gradient = estimate.gradient + prepared.by_phi();
+    }
+    estimate
+}
+
+/// What an inner loop leaves for the way back.
+struct Run<B: Backend> {
+    /// The states before the last steps, and the solution, which no step goes on from.
+    states: Vec<Stored<B>>,
+    taken: Vec<Taken<B>>,
+    /// The loss, and its derivative by the softness where the loss itself depends on it.
+    estimate: MetaEstimate<B>,
+}
+
+/// The outer loss where it was taken.
+struct Taken<B: Backend> {
+    step: usize,
+    by_theta: Tensor<B, 1>,
+}
+
+fn run<B, P, R, O>(problem: &BilevelProblem<B, P, R, O>, phi: &Tensor<B, 1>, depth: usize) -> Run<B>
+where
+    B: Backend,
+    P: Objective<Autodiff<Autodiff<B>>>,
+    R: Objective<Autodiff<B>>,
+    O: Optimizer,
+{
     let at = problem.outer_steps.at(problem.inner.steps);
     let share = 1.0 / at.len() as f64;
-    let (mut kept, mut taken) = (VecDeque::new(), Vec::new());
+    let (mut states, mut taken) = (VecDeque::new(), Vec::new());
     let mut estimate = MetaEstimate::without_steps(0.0, phi.zeros_like());
     problem.walk(phi, |step, theta, state| {
         if at.contains(&step) {
-            let (loss, by_theta, by_phi) = derivatives(&problem.outer_loss, theta, phi);
+            let (loss, by_theta, by_phi) = derivatives(&problem.outer_loss, theta, phi, step);
             estimate.loss += share * loss;
             estimate.gradient = estimate.gradient.clone() + by_phi * share;
             taken.push(Taken { step, by_theta: by_theta * share });
         }
-        let state = optimizer.tensors(state.clone());
-        kept.push_back(Stored { step, theta: theta.clone(), state });
-        // The last one is the solution, which no step goes on from.
-        if kept.len() > depth + 1 {
-            kept.pop_front();
+        let state = problem.inner.optimizer.tensors(state.clone());
+        states.push_back(Stored { step, theta: theta.clone(), state });
+        if states.len() > depth + 1 {
+            states.pop_front();
         }
     });
-    let Some(end) = kept.pop_back() else { return estimate };
-    estimate.stored = kept.iter().map(|x| x.theta.dims()[0] * (1 + x.state.len())).sum();
+    Run { states: states.into(), taken, estimate }
+}
 
-    let state = end.state.iter().map(Tensor::zeros_like).collect();
-    let mut adjoint = Adjoint { theta: end.theta.zeros_like(), state };
-    // Not more than the losses put in, if no step amplified it.
-    let mut put_in = 0.0;
-    let mut put = |step: usize, adjoint: &mut Adjoint<B>| {
-        while let Some(loss) = taken.pop_if(|loss| loss.step == step) {
-            let seed = Adjoint { theta: loss.by_theta.clone(), state: Vec::new() };
-            put_in += seed.norm();
-            adjoint.theta = adjoint.theta.clone() + loss.by_theta;
-        }
-        put_in
-    };
-    put(end.step, &mut adjoint);
-    let mut norm = adjoint.norm();
-    if !kept.is_empty() {
-        estimate.adjoint_norms.push(norm);
+/// The adjoint on its way back.
+struct WayBack<B: Backend> {
+    adjoint: Adjoint<B>,
+    norm: f64,
+    /// Losses that it has not come to, in ascending order of steps.
+    left: Vec<Taken<B>>,
+    /// Norms of what the others have put into it, added up.
+    put_in: f64,
+}
+
+impl<B: Backend> WayBack<B> {
+    /// The adjoint at the end of the inner loop.
+    fn from(end: &Stored<B>, taken: Vec<Taken<B>>) -> Self {
+        let state = end.state.iter().map(Tensor::zeros_like).collect();
+        let adjoint = Adjoint { theta: end.theta.zeros_like(), state };
+        Self { adjoint, norm: 0.0, left: taken, put_in: 0.0 }.with_losses_at(end.step)
     }
-    let mut prepared: Option<Prepared<B>> = None;
-    while let Some(before) = kept.pop_back() {
-        let step = before.step;
-        let stage = problem.objective.stage(step);
-        if prepared.as_ref().is_none_or(|prepared| prepared.stage != stage) {
-            let next = Prepared::new(&problem.objective, phi, step, stage);
-            let last = prepared.replace(next).map(Prepared::by_phi);
-            estimate.gradient = last.into_iter().fold(estimate.gradient, |sum, by| sum + by);
+
+    fn with_losses_at(mut self, step: usize) -> Self {
+        while let Some(loss) = self.left.pop_if(|loss| loss.step == step) {
+            self.put_in += norm(&numbers(loss.by_theta.clone()));
+            self.adjoint.theta = self.adjoint.theta + loss.by_theta;
         }
-        let Some(now) = &mut prepared else { break };
-        let (earlier, by_prepared) =
-            adjoint.back(&problem.objective, optimizer, before, &now.value);
-        adjoint = earlier;
-        now.adjoint = now.adjoint.clone() + by_prepared;
+        Self { norm: self.adjoint.norm(), ..self }
+    }
+
+    /// The same before a step.
+    fn over<P, R, O>(
+        self,
+        problem: &BilevelProblem<B, P, R, O>,
+        before: Stored<B>,
+        prepared: &mut Prepared<B>,
+        estimate: &mut MetaEstimate<B>,
+    ) -> Self
+    where
+        P: Objective<Autodiff<Autodiff<B>>>,
+        O: Optimizer,
+    {
+        let (objective, optimizer, step) =
+            (&problem.objective, &problem.inner.optimizer, before.step);
+        let (adjoint, by_prepared) =
+            self.adjoint.back(objective, optimizer, before, &prepared.value);
+        prepared.adjoint = prepared.adjoint.clone() + by_prepared;
         let grown = adjoint.norm();
-        if norm > 0.0 && grown > 0.0 {
-            estimate.adjoint_growth += (grown / norm).log10();
+        if self.norm > 0.0 && grown > 0.0 {
+            estimate.adjoint_growth += (grown / self.norm).log10();
         }
-        let limit = put(step, &mut adjoint);
-        norm = adjoint.norm();
-        estimate.adjoint_norms.push(norm);
-        if let Some(clip) = clip.filter(|clip| norm > clip * limit) {
-            adjoint = adjoint.scale(clip * limit / norm);
-            norm = clip * limit;
-            estimate.clips += 1;
+        let earlier = Self { adjoint, ..self }.with_losses_at(step);
+        estimate.adjoint_norms.push(earlier.norm);
+        earlier
+    }
+
+    /// Not more than `clip` times what the losses put in, which it would keep within if no step amplified it.
+    fn clipped(self, clip: Option<f64>, estimate: &mut MetaEstimate<B>) -> Self {
+        match clip.map(|clip| clip * self.put_in).filter(|limit| self.norm > *limit) {
+            None => self,
+            Some(limit) => {
+                estimate.clips += 1;
+                Self { adjoint: self.adjoint.scale(limit / self.norm), norm: limit, ..self }
+            }
         }
     }
-    let last = prepared.map(Prepared::by_phi);
-    estimate.gradient = last.into_iter().fold(estimate.gradient, |sum, by| sum + by);
-    estimate
 }
 
 /// What some steps in a row need of φ.
 struct Prepared<B: Backend> {
-    stage: usize,
     phi: Tensor<Autodiff<B>, 1>,
     tracked: Tensor<Autodiff<B>, 1>,
     value: Tensor<B, 1>,
@@ -123,12 +173,11 @@ impl<B: Backend> Prepared<B> {
         objective: &P,
         phi: &Tensor<B, 1>,
         step: usize,
-        stage: usize,
     ) -> Self {
         let phi = Tensor::<Autodiff<B>, 1>::from_inner(phi.clone()).require_grad();
         let tracked = objective.prepared(Tensor::from_inner(phi.clone()), step).inner();
         let value = tracked.clone().inner();
-        Self { stage, phi, tracked, adjoint: value.zeros_like(), value }
+        Self { phi, tracked, adjoint: value.zeros_like(), value }
     }
 
     /// The derivative by φ itself.
@@ -143,10 +192,11 @@ fn derivatives<B: Backend>(
     loss: &impl Objective<Autodiff<B>>,
     theta: &Tensor<B, 1>,
     phi: &Tensor<B, 1>,
+    step: usize,
 ) -> (f64, Tensor<B, 1>, Tensor<B, 1>) {
     let leaf = |x: &Tensor<B, 1>| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()).require_grad();
     let (tracked_theta, tracked_phi) = (leaf(theta), leaf(phi));
-    let loss = loss.loss(tracked_theta.clone(), tracked_phi.clone());
+    let loss = loss_under(loss, tracked_theta.clone(), tracked_phi.clone(), step);
     let value = numbers(loss.clone().inner()).iter().sum();
     let grads = loss.backward();
     let by_theta = tracked_theta.grad(&grads).unwrap_or_else(|| theta.zeros_like());

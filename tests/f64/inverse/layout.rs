@@ -42,7 +42,7 @@ fn instances(line: &str, config: &LearnConfig) -> anyhow::Result<Instances<Squar
 fn phi_at(line: &str, input: Input, learned: &[f64], step: usize) -> Vec<f64> {
     let instances = instances(line, &config(input)).unwrap();
     let problem = instances.problem(5, &vector(learned));
-    let phi = vector::<Autodiff<Autodiff<B>>>(learned);
+    let phi = vector::<Autodiff<Autodiff<B>>>(learned).require_grad();
     numbers(problem.objective.prepared(phi, step))
 }
 

@@ -18,7 +18,7 @@ const PHI: f64 = -0.3;
 struct Parabola;
 
 impl<B: Backend> Objective<B> for Parabola {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         let mut pull = vec![0.0; theta.dims()[0]];
         pull[0] = 0.5;
         let off = theta - CENTRE;
@@ -34,7 +34,7 @@ fn meta_gradients(optimizer: impl Optimizer, steps: usize, start: &[f64]) -> [f6
     let phi = vector::<A>(&[PHI]).require_grad();
     let theta = end(&phi);
     [theta.clone(), theta.detach()].map(|theta| {
-        let grads = Parabola.loss(theta, phi.clone()).backward();
+        let grads = Parabola.loss(theta, phi.clone(), steps).backward();
         phi.grad(&grads).unwrap().into_scalar()
     })
 }

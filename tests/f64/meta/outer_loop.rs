@@ -19,7 +19,7 @@ struct Pull {
 }
 
 impl<B: Backend> Objective<B> for Pull {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         let scale = if self.broken { f64::NAN } else { 0.5 };
         (theta.clone() * theta).sum() * phi.exp() * scale
     }
@@ -29,7 +29,7 @@ impl<B: Backend> Objective<B> for Pull {
 struct Distance;
 
 impl<B: Backend> Objective<B> for Distance {
-    fn loss(&self, theta: Tensor<B, 1>, _phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, _phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         (theta.clone() * theta).sum()
     }
 }

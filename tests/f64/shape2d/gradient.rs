@@ -31,7 +31,7 @@ impl Small {
 }
 
 impl<B: RasterBackend> Objective<B> for Small {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         let instance = Instance::seeded(1, TRIANGLES);
         let scene = Scene::<B>::new(&Logo::of(Variant::Original).image(SIZE), &instance, SIZE);
         let image = self.silhouette.coverage(scene.vertices(theta.clone()), phi);

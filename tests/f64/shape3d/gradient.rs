@@ -29,7 +29,7 @@ impl Small {
 }
 
 impl<B: RasterBackend> Objective<B> for Small {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         let instance = Instance { elevation_deg: 30.0, turn: 3 };
         let scene = Scene::<B>::new(&airplane(), &icosphere(0), &instance, SIZE);
         let vertices = scene.vertices(theta);

@@ -48,15 +48,11 @@ impl Triangles {
 }
 
 impl<B: RasterBackend> Objective<B> for Triangles {
-    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>) -> Tensor<B, 1> {
-        let target = tensor(self.target.clone(), [1, SIDE, SIDE]);
-        mse_loss(self.silhouette.coverage(at_depth_2(theta), phi), target)
-    }
-
-    fn loss_at(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
+    fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1> {
         // Only the default family decays here, and its one parameter is the logarithm of the scale.
         let wider = self.wider.get(step).copied().unwrap_or(0.0);
-        self.loss(theta, phi + wider)
+        let target = tensor(self.target.clone(), [1, SIDE, SIDE]);
+        mse_loss(self.silhouette.coverage(at_depth_2(theta), phi + wider), target)
     }
 }
 

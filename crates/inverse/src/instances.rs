@@ -1,0 +1,164 @@
+use std::{cell::RefCell, marker::PhantomData, rc::Rc};
+
+use burn::{backend::Autodiff, tensor::Tensor};
+use softrast_meta::{Adam, BilevelProblem, InnerLoop, TaskDistribution};
+use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, numbers, vector};
+
+use crate::{
+    Inner, InverseProblem, LearnConfig, Method, Outer, OuterLoss, PhiLayout, Resolution,
+    ScheduledRenderer, SolveConfig, objectives::OuterImage,
+};
+
+/// Scale of the softness that judges, in pixels of the image that judges: the least one whose gradient does not depend on where between
+/// the pixels an edge lies.
+const SHARP_PX: f64 = 0.25;
+/// The same for [`OuterLoss::Pixels`], nearly hard: at a quarter of a pixel, edges that run through the middle of pixels cost half of
+/// what they cost the hard image.
+const NEARLY_HARD_PX: f64 = 0.05;
+/// The distribution that a softness is learned on: instances of a problem by seed, each solved as `solve` says.
+pub struct Instances<P: InverseProblem, B: RasterBackend> {
+    pub(crate) problem: Rc<P>,
+    solve: SolveConfig,
+    pub(crate) config: LearnConfig,
+    pub(crate) layout: PhiLayout,
+    tolerance: f64,
+    /// What judges, where it is soft and does not depend on φ.
+    sharp: Option<Rc<ScheduledRenderer>>,
+    /// The renderer of the latest φ.
+    renderer: RefCell<Option<(Vec<f64>, Rc<ScheduledRenderer>)>>,
+    backend: PhantomData<B>,
+}
+
+impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
+    /// Of a problem, whose softness begins with what `method` does.
+    ///
+    /// # Errors
+    ///
+    /// If choices contradict each other.
+    pub fn new(
+        problem: P,
+        method: &Method,
+        solve: &SolveConfig,
+        config: &LearnConfig,
+    ) -> anyhow::Result<Self> {
+        let has_surrogate = method.softness.surrogate.is_some();
+        let own = problem.own_phi();
+        let parameters = method.softness.parameters() + own.len();
+        let config = config.resolved(parameters, has_surrogate)?;
+        let layout = PhiLayout::learned(&method.softness, own, solve.steps, solve.size, &config);
+        let tolerance = method.learning_tolerance(config.differentiates());
+        let sharp = (config.outer_loss != Some(OuterLoss::Hard))
+            .then(|| Rc::new(sharp(&problem, config.finer() * solve.size, &config)));
+        let (problem, solve, renderer) = (Rc::new(problem), *solve, RefCell::new(None));
+        let backend = PhantomData;
+        Ok(Self { problem, solve, config, layout, tolerance, sharp, renderer, backend })
+    }
+
+    /// φ that learning starts from, with the logarithm of the inner learning rate behind it if that is learned.
+    pub fn start(&self) -> Vec<f64> {
+        let rate = self.config.learn_rate.then(|| self.solve.learning_rate.ln());
+        self.layout.start().into_iter().chain(rate).collect()
+    }
+
+    /// The part of φ that is the softness, and what steps the inner loop.
+    pub(crate) fn parted<'a>(&self, phi: &'a [f64]) -> (&'a [f64], Adam) {
+        match phi.split_last().filter(|_| self.config.learn_rate) {
+            Some((rate, softness)) => (softness, self.problem.optimizer(rate.exp())),
+            None => (phi, self.problem.optimizer(self.solve.learning_rate)),
+        }
+    }
+
+    /// What draws under a softness, the latest one kept.
+    fn renderer(&self, phi: &[f64]) -> Rc<ScheduledRenderer> {
+        let mut latest = self.renderer.borrow_mut();
+        match latest.as_ref().filter(|(of, _)| of == phi) {
+            Some((_, renderer)) => renderer.clone(),
+            None => {
+                let rasterizer =
+                    Rasterizer { tolerance: self.tolerance, ..Rasterizer::new(self.solve.size) };
+                let (layout, faces) = (self.layout.clone(), self.problem.faces());
+                let renderer =
+                    ScheduledRenderer::new(layout, phi, rasterizer, Resolution::Full, faces);
+                let renderer = Rc::new(renderer);
+                *latest = Some((phi.to_vec(), renderer.clone()));
+                renderer
+            }
+        }
+    }
+
+    /// The instance of a seed, with the inner loss as the outer one if `own`, else by what the configuration says.
+    fn made(&self, seed: u64, phi: &[f64], own: bool) -> InstanceProblem<P, B> {
+        let (softness, optimizer) = self.parted(phi);
+        let (problem, renderer) = (&self.problem, self.renderer(softness));
+        let instance = problem.instance(seed).expect("instances of all seeds can be made");
+        let instance = std::slice::from_ref(&instance);
+        let finer = if own { 1 } else { self.config.finer() };
+        let outer_scene = problem.scene(instance, finer * self.solve.size);
+        let start = problem.start::<Autodiff<B>>(&outer_scene).inner();
+        let image = match (&self.sharp, own) {
+            (_, true) => OuterImage::Inner(renderer.clone()),
+            (Some(sharp), false) => OuterImage::Sharp(sharp.clone()),
+            (None, false) => OuterImage::Hard,
+        };
+        BilevelProblem {
+            objective: Inner {
+                problem: problem.clone(),
+                scene: problem.scene(instance, self.solve.size),
+                renderer,
+            },
+            outer_loss: Outer { problem: problem.clone(), scene: outer_scene, image },
+            inner: InnerLoop { optimizer, steps: self.solve.steps },
+            start,
+            outer_steps: self.config.outer_steps,
+        }
+    }
+
+    /// The outer loss of a whole run.
+    fn outer_loss(&self, seed: u64, phi: &Tensor<B, 1>, own: bool) -> f64 {
+        let phi = numbers(phi.clone());
+        let (softness, _) = self.parted(&phi);
+        self.made(seed, &phi, own).loss(&vector(softness))
+    }
+
+    fn is_own(&self) -> bool {
+        self.config.outer_loss == Some(OuterLoss::Own)
+    }
+}
+
+/// A narrow logistic for all problems alike.
+///
+/// Judged by a softness that is being learned, wide ones flatter themselves.
+fn sharp<P: InverseProblem>(problem: &P, size: usize, config: &LearnConfig) -> ScheduledRenderer {
+    let pixels = match config.outer_loss {
+        Some(OuterLoss::Pixels) => NEARLY_HARD_PX,
+        _ => SHARP_PX,
+    };
+    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = ScheduledSoftness::constant(logistic, pixels * 2.0 / size as f64);
+    let layout = PhiLayout::new(softness, problem.own_phi(), 0, size);
+    let phi = layout.start();
+    let (rasterizer, faces) = (Rasterizer::new(size), problem.faces());
+    ScheduledRenderer::new(layout, &phi, rasterizer, Resolution::Full, faces)
+}
+
+type InstanceProblem<P, B> = BilevelProblem<B, Inner<P, B>, Outer<P, B>, Adam>;
+
+impl<P: InverseProblem, B: RasterBackend> TaskDistribution<B> for Instances<P, B> {
+    type Objective = Inner<P, B>;
+    type OuterLoss = Outer<P, B>;
+    type Optimizer = Adam;
+
+    fn problem(&self, seed: u64, phi: &Tensor<B, 1>) -> InstanceProblem<P, B> {
+        self.made(seed, &numbers(phi.clone()), self.is_own())
+    }
+
+    fn loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
+        self.outer_loss(seed, phi, self.is_own())
+    }
+
+    /// Never by the inner loss, which the softness could flatter.
+    fn validation_loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
+        self.outer_loss(seed, phi, false)
+    }
+}
