@@ -183,7 +183,6 @@ fn shape3d() {
 }
 
 #[test]
-#[ignore = "inner loops of softrast-meta ignore a surrogate: BilevelProblem::walk differentiates below its level"]
 fn surrogates() {
     let (_pose, pose) = small_pose();
     check_surrogate(Pose::NAME, 16, scales::<Pose>(Some(0.05)), || task::<Pose>(&pose));

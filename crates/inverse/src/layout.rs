@@ -17,6 +17,22 @@ const KNOTS: usize = 3;
 /// First come the knots of the schedule, if the scale moves or is learned apart. Then the parameters of the softness, at scale 1 and
 /// without the logarithm of the scale where there is a schedule, which replaces it. Then those of the surrogate, whole, as it keeps a
 /// ratio to the schedule that is its own. Last come parameters of the problem's own.
+///
+/// ```
+/// use softrast_inverse::PhiLayout;
+/// use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+///
+/// // φ of an Exp is the logarithm of its scale and a shift.
+/// let exp = EdgeSoftness { family: Family::Exp, squared: false };
+/// let softness = ScheduledSoftness::decay(exp, 0.5, 0.125).with_surrogate_scale(1.0);
+/// let layout = PhiLayout::new(softness, vec![7.0], 300, 64);
+/// let [first, last, ratio] = [0.5_f64, 0.125, 2.0].map(f64::ln);
+/// //                           knots     shift, surrogate, own
+/// assert_eq!(layout.start(), [first, last, 0.0, ratio, 0.0, 7.0]);
+/// let (learned, own) = layout.softness(&[first, first, 0.3, ratio, 0.0, 8.0]);
+/// assert!((learned.scale_at(1.0, 64) - 0.5).abs() < 1e-15 && own == [8.0]);
+/// assert_eq!(learned.phi[1], 0.3);
+/// ```
 #[derive(Clone, Debug)]
 pub struct PhiLayout {
     /// Parameters to start from, and what has none.

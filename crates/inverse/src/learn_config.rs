@@ -117,7 +117,8 @@ impl LearnConfig {
         );
         if has_surrogate && (along || outer_loss == OuterLoss::Own) {
             bail!(
-                "a surrogate is learned with --estimator unrolled, truncated:K or es and --outer-loss fixed: all else follows the image's \
+                "a surrogate is learned with --estimator unrolled, truncated:K or es, and with --outer-loss fixed, pixels or hard: all \
+                 else follows the image's \
                  own derivative, which it replaces"
             );
         }

@@ -2,8 +2,8 @@
 //!
 //! An [`InverseProblem`] says what is optimised, how its image is made and what is wrong with an image. A [`Method`] says how edges are
 //! softened over a run. [`minimize`] solves instances of a problem with a method and shows every step; [`learn()`] makes a better method,
-//! by the gradient of what whole runs end with. Both draw through a [`ScheduledRenderer`], which decides when support and knots are
-//! chosen anew. [`PoseProblem`] finds a camera.
+//! by the gradient of what whole runs end with. Both draw through a [`ScheduledRenderer`], with what a `SoftRenderer` of
+//! `softrast-raster` prepares: that decides when support and knots are chosen anew. [`PoseProblem`] finds a camera.
 //!
 //! ```
 //! use burn::backend::NdArray;

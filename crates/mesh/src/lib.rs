@@ -15,7 +15,7 @@
 
 mod airplane;
 mod chair;
-mod clean;
+mod content;
 mod edges;
 mod error;
 mod fox;
