@@ -1,9 +1,9 @@
 use serde_json::{Value, json};
-use softrast_meta::{Adam, Checkpoint, OuterLoop, Progress, Record, Validation};
+use softrast_meta::{Adam, OuterLoop, Progress, Record, Validation};
 use softrast_raster::RasterBackend;
 use softrast_softness::ScheduledSoftness;
 
-use crate::{Instances, InverseProblem, LearnConfig, Method, PhiLayout, SolveConfig};
+use crate::{Checkpoint, Instances, InverseProblem, LearnConfig, Method, PhiLayout, SolveConfig};
 
 /// Largest norm of the mean meta-gradient.
 const CLIP: f64 = 1.0;

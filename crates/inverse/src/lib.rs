@@ -26,6 +26,7 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod checkpoint;
 mod distilled_mlp;
 mod instances;
 mod layout;
@@ -41,6 +42,7 @@ mod renderer;
 mod resolution;
 mod targets;
 
+pub use checkpoint::Checkpoint;
 pub use distilled_mlp::{distilled_mlp, mlp_like};
 pub use instances::Instances;
 pub use layout::PhiLayout;

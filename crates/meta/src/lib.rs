@@ -31,7 +31,6 @@ mod adam;
 mod adjoint;
 mod alternating_descent;
 mod bilevel_problem;
-mod checkpoint;
 mod estimate;
 mod evolution;
 mod inner_loop;
@@ -48,7 +47,6 @@ mod unrolled;
 
 pub use adam::{Adam, AdamState};
 pub use bilevel_problem::BilevelProblem;
-pub use checkpoint::{Checkpoint, CheckpointError};
 pub use estimate::MetaEstimate;
 pub use inner_loop::{InnerLoop, descend};
 pub use meta_gradient::MetaGradient;

@@ -60,30 +60,34 @@ impl Progress {
         self.best.as_ref().map_or(&self.phi, |best| &best.phi)
     }
 
-    /// What keeps learning of `steps` updates from going on from here with `parameters` numbers.
-    pub(crate) fn unsound(&self, steps: usize, parameters: usize) -> Option<String> {
+    /// Whether learning of `steps` updates can go on from here with `parameters` numbers.
+    ///
+    /// # Errors
+    ///
+    /// What keeps it from that.
+    pub fn check(&self, steps: usize, parameters: usize) -> Result<(), String> {
         let Self { step, phi, optimizer, best, seconds, dropped, tried, .. } = self;
         let best_phi = best.iter().map(|best| &best.phi);
         for values in std::iter::once(phi).chain(best_phi).chain(optimizer) {
             if values.len() != parameters {
-                return Some(format!("a vector has {} numbers, not {parameters}", values.len()));
+                return Err(format!("a vector has {} numbers, not {parameters}", values.len()));
             }
             if !values.iter().all(|x| x.is_finite()) {
-                return Some("a vector holds what is no finite number".into());
+                return Err("a vector holds what is no finite number".into());
             }
         }
         let best_step = best.as_ref().map_or(0, |best| best.step);
         if *step > steps || best_step > *step {
-            return Some(format!("step {step} of {steps}, the best after {best_step}, cannot be"));
+            return Err(format!("step {step} of {steps}, the best after {best_step}, cannot be"));
         }
         // Adam remembers two vectors once it has made a step.
         if !(optimizer.is_empty() || optimizer.len() == 2 && *step > 0) {
-            return Some(format!("{} moments after step {step} cannot be", optimizer.len()));
+            return Err(format!("{} moments after step {step} cannot be", optimizer.len()));
         }
         let loss = best.as_ref().map_or(0.0, |best| best.loss);
         if !(loss.is_finite() && seconds.is_finite() && *seconds >= 0.0 && dropped <= tried) {
-            return Some("its losses, times or counts cannot be".into());
+            return Err("its losses, times or counts cannot be".into());
         }
-        None
+        Ok(())
     }
 }

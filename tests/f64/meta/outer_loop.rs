@@ -4,9 +4,10 @@ use burn::{
     backend::NdArray,
     tensor::{Tensor, backend::Backend},
 };
+use softrast_inverse::Checkpoint;
 use softrast_meta::{
-    Adam, Best, BilevelProblem, Checkpoint, InnerLoop, LearnError, MetaGradient, Objective,
-    OuterLoop, OuterSteps, Progress, Record, Sgd, TaskDistribution, Validation,
+    Adam, Best, BilevelProblem, InnerLoop, LearnError, MetaGradient, Objective, OuterLoop,
+    OuterSteps, Progress, Record, Sgd, TaskDistribution, Validation,
 };
 
 type B = NdArray<f64>;

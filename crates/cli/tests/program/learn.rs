@@ -4,8 +4,8 @@ use std::{fs, path::Path, sync::LazyLock};
 
 use proptest::{prelude::*, sample::Index};
 use serde_json::{Value, json};
+use softrast_inverse::Checkpoint;
 use softrast_lab::Failure;
-use softrast_meta::Checkpoint;
 
 use crate::{
     disc::Disc,

@@ -1,6 +1,6 @@
+use anyhow::{anyhow, ensure};
 use serde::{Deserialize, Serialize};
-
-use crate::{OuterLoop, Progress};
+use softrast_meta::{OuterLoop, Progress};
 
 const FORMAT: &str = "softrast learning checkpoint 2";
 
@@ -21,22 +21,6 @@ struct File {
     format: String,
     checksum: String,
     checkpoint: Checkpoint,
-}
-
-/// The text of a checkpoint is not one to go on from.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CheckpointError {
-    /// The text is not that of a checkpoint.
-    #[error("it is no checkpoint, or a damaged one: {0}; remove it to start over")]
-    Damaged(String),
-    /// The checkpoint is of something else.
-    #[error("it belongs to another job: it is for {found}, this is {expected}")]
-    Foreign {
-        /// The job of the checkpoint.
-        found: String,
-        /// The job at hand.
-        expected: String,
-    },
 }
 
 impl Checkpoint {
@@ -61,26 +45,22 @@ impl Checkpoint {
         job: &str,
         outer_loop: &OuterLoop,
         parameters: usize,
-    ) -> Result<Progress, CheckpointError> {
-        let damaged = |reason: String| CheckpointError::Damaged(reason);
+    ) -> anyhow::Result<Progress> {
+        let damaged = |reason: String| {
+            anyhow!("it is no checkpoint, or a damaged one: {reason}; remove it to start over")
+        };
         let file: File = serde_json::from_slice(text).map_err(|e| damaged(e.to_string()))?;
-        if file.format != FORMAT {
-            return Err(damaged(format!("its format is {:?}, expected {FORMAT:?}", file.format)));
-        }
-        let checkpoint = file.checkpoint;
-        let checksum = checkpoint.checksum().map_err(|e| damaged(e.to_string()))?;
-        if file.checksum != checksum {
-            return Err(damaged(format!("its checksum is {}, not {checksum}", file.checksum)));
-        }
-        if checkpoint.job != job {
-            let (found, expected) = (checkpoint.job, job.to_owned());
-            return Err(CheckpointError::Foreign { found, expected });
-        }
-        let progress = checkpoint.progress;
-        match progress.unsound(outer_loop.steps, parameters) {
-            None => Ok(progress),
-            Some(reason) => Err(damaged(reason)),
-        }
+        let File { format, checksum, checkpoint } = file;
+        let sum = checkpoint.checksum().map_err(|e| damaged(e.to_string()))?;
+        let Self { job: found, progress } = checkpoint;
+        ensure!(
+            format == FORMAT,
+            damaged(format!("its format is {format:?}, expected {FORMAT:?}"))
+        );
+        ensure!(checksum == sum, damaged(format!("its checksum is {checksum}, not {sum}")));
+        ensure!(found == job, "it belongs to another job: it is for {found}, this is {job}");
+        progress.check(outer_loop.steps, parameters).map_err(damaged)?;
+        Ok(progress)
     }
 
     /// FNV-1a of the text in short, which is the same before writing and after reading.
