@@ -2,6 +2,10 @@
 
 use crate::mesh::norm;
 
+/// Least slope of a field that a Newton step counts on: flatter fields, as where strokes meet, are
+/// followed in shorter steps.
+const FLATTEST: f64 = 0.5;
+
 /// A box of cubes in which a solid is sampled.
 pub(crate) struct Grid {
     /// Lowest corner of the box.
@@ -122,7 +126,7 @@ fn onto_surface(mut point: [f64; 3], step: f64, field: impl Fn([f64; 3]) -> f64)
             |k: usize, by: f64| [0, 1, 2].map(|j| point[j] + if j == k { by } else { 0.0 });
         let gradient =
             [0, 1, 2].map(|k| (field(shifted(k, h)) - field(shifted(k, -h))) / (2.0 * h));
-        let slope = norm(gradient).max(0.5);
+        let slope = norm(gradient).max(FLATTEST);
         let along = field(point) / (slope * slope);
         point = [0, 1, 2].map(|k| point[k] - along * gradient[k]);
     }

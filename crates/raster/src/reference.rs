@@ -151,31 +151,6 @@ pub fn vjp<B: Backend>(
     Tensor::cat(parts, 0).reshape([views, count, 3])
 }
 
-/// Silhouettes under the T-conorm `max`, `[views, size, size]`: the largest coverage at each pixel.
-///
-/// `max` has no additive generator, so it stays out of the fused op. Its gradient reaches only the
-/// face that wins.
-pub fn maximum<B: Backend>(
-    scene: Scene,
-    vertices: Tensor<B, 3>,
-    softness: &impl Softness,
-    phi: Tensor<B, 1>,
-) -> Tensor<B, 3> {
-    let views = vertices.dims()[0];
-    let parts = chunks(scene, views)
-        .into_iter()
-        .map(|(view, pixels)| {
-            let vertices = vertices.clone().narrow(0, view, 1);
-            let distance =
-                signed_distance(vertices.clone(), scene.faces, places(&vertices, scene, &pixels));
-            let coverage = softness.value(phi.clone(), distance);
-            let hidden = hidden(vertices, scene.faces).expand(coverage.dims());
-            coverage.mask_fill(hidden, 0.0).max_dim(2).reshape([pixels.len()])
-        })
-        .collect();
-    Tensor::cat(parts, 0).reshape([views, scene.size, scene.size])
-}
-
 /// Sums of one chunk: `vertices` `[1, vertices, 3]`, pixels of that view; `[pixels]`.
 fn chunk_sums<B: Backend>(
     scene: Scene,

@@ -12,8 +12,7 @@ const SMALLEST: f64 = 1e-30;
 /// How the coverages of several faces make one: an Archimedean T-conorm `A = g⁻¹(Σ g(s))`.
 ///
 /// Each has an additive generator g, so that a silhouette is a sum over faces whatever the
-/// T-conorm. `max` is the only common one without a generator; it is offered by
-/// [`reference::maximum`](crate::reference::maximum) alone, because it needs no sum.
+/// T-conorm. `max` is the only common one without a generator, so it is not offered.
 ///
 /// Source: Petersen et al. 2022 for the T-conorms; docs/notes.md, T-conorms, for the generators.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,6 +5,9 @@ use burn::tensor::{Tensor, backend::Backend};
 use super::unit_step::UnitStep;
 use crate::math::{atan_ratio, magnitude};
 
+/// Half the tail one scale from the edge. Smaller tails, which are replaced by what has more digits, count as it meanwhile.
+const LEAST_TAIL: f64 = 0.125;
+
 /// `s(x) = 1/2 + atan(x / scale) / π`; φ `[1]` is the logarithm of the scale, in the unit of x.
 ///
 /// Its tails fall like 1 / |x|, too slowly to cull. Source: Petersen et al. 2022, Table 1.
@@ -37,7 +40,7 @@ impl UnitStep for Cauchy {
         let far = size.clone().greater_elem(1.0);
         let (tail, scaled) = tail(size.clone());
         // Both logarithms are of numbers that cannot come near 0 where they are chosen.
-        let near = tail.clone().clamp_min(0.125).log().neg();
+        let near = tail.clone().clamp_min(LEAST_TAIL).log().neg();
         let thick = near.mask_where(far, size.clamp_min(1.0).log() - scaled.log());
         thick.mask_where(below, tail.neg().log1p().neg())
     }
@@ -48,7 +51,7 @@ impl UnitStep for Cauchy {
         let far = size.clone().greater_elem(1.0);
         let (tail, scaled) = tail(size.clone());
         let slope = Self::slope(u);
-        let near = slope.clone() / tail.clone().clamp_min(0.125);
+        let near = slope.clone() / tail.clone().clamp_min(LEAST_TAIL);
         let inverse = size.clamp_min(1.0).recip();
         let rest = (inverse.clone() * inverse.clone() + 1.0) * scaled * PI;
         near.mask_where(far, inverse / rest).mask_where(below, slope / (tail.neg() + 1.0))
