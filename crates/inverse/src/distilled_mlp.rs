@@ -7,7 +7,7 @@ use burn::{
 use softrast_meta::{Adam, Optimizer};
 use softrast_raster::HostBackend;
 use softrast_softness::{
-    EdgeSoftness, Family, Softness, families::Mlp, initial_mlp, numbers, tensor,
+    EdgeSoftness, Family, Softness, families::Mlp, initial_mlp, numbers, vector,
 };
 
 /// The fit reaches so many scales from the edge, and so large a logit. That is far above the 14.1 which an MLP
@@ -45,17 +45,15 @@ pub fn mlp_like(softness: EdgeSoftness, phi: &[f64]) -> Option<Vec<f64>> {
         REACH * (DENSER * share).sinh() / DENSER.sinh()
     };
     let places: Vec<f64> = (0..PLACES).map(place).collect();
-    let counts = places.iter().map(|x| 1.0 / (1.0 + x)).collect();
-    let (places, counts) = (tensor::<A, 1>(places, [PLACES]), tensor::<A, 1>(counts, [PLACES]));
-    let phi = tensor::<A, 1>(phi.to_vec(), [phi.len()]);
+    let counts: Vec<f64> = places.iter().map(|x| 1.0 / (1.0 + x)).collect();
+    let [places, counts, phi] = [&places[..], &counts[..], phi].map(vector::<A>);
     let inside = softness.value(phi.clone(), places.clone());
     let both = inside + softness.value(phi.clone(), places.clone().neg());
     if numbers(both.inner()).into_iter().any(|sum| (sum - 1.0).abs() > SYMMETRIC) {
         return None;
     }
     let aim = logit(&softness, &phi, places.clone()).clamp_max(REACH);
-    let start = initial_mlp(0, 1.0);
-    let mut theta = tensor::<HostBackend, 1>(start.clone(), [start.len()]);
+    let mut theta = vector::<HostBackend>(&initial_mlp(0, 1.0));
     let mut state = Adam::new(RATES[0]).init(&theta);
     for step in 0..STEPS {
         let part = step as f64 / STEPS as f64;
@@ -84,34 +82,26 @@ mod tests {
 
     #[test]
     fn a_distilled_mlp_has_the_logit_of_a_logistic_and_stays_large_beyond() {
-        let phi = distilled_mlp();
-        let phi = tensor::<HostBackend, 1>(phi.clone(), [phi.len()]);
-        let at = |x: f64| numbers(logit(&Mlp, &phi, tensor(vec![x], [1])))[0];
+        let phi = vector::<HostBackend>(&distilled_mlp());
+        let at = |x: f64| numbers(logit(&Mlp, &phi, vector(&[x])))[0];
         for x in [0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 24.0] {
             assert!((at(x) / x - 1.0).abs() < 0.04, "at {x}: {}", at(x));
         }
         assert!(at(100.0) > 20.0, "far: {}", at(100.0));
     }
+
     #[test]
     fn a_symmetric_softness_has_an_mlp_like_it_and_another_has_none() {
-        let like = |family| {
+        let like = |family: Family| {
             let softness = EdgeSoftness { family, squared: false };
-            let phi = softness.default_phi(1.0);
-            (softness, phi.clone(), mlp_like(softness, &phi))
+            mlp_like(softness, &family.default_phi(1.0))
         };
-        let (gauss, phi, mlp) = like(Family::Gauss);
-        let mlp = mlp.unwrap();
-        let values = |softness: &dyn Fn(Tensor<HostBackend, 1>) -> Tensor<HostBackend, 1>| {
-            let places = (-60..=60).map(|k| 0.1 * f64::from(k)).collect();
-            numbers(softness(tensor(places, [121])))
-        };
-        let phi = tensor(phi.clone(), [phi.len()]);
-        let mlp = tensor(mlp.clone(), [mlp.len()]);
-        let pairs = values(&|x| gauss.value(phi.clone(), x))
-            .into_iter()
-            .zip(values(&|x| Mlp.value(mlp.clone(), x)));
-        let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(off < 1e-2, "{off}");
-        assert!(like(Family::Exp).2.is_none());
+        let gauss = vector::<HostBackend>(&Family::Gauss.default_phi(1.0));
+        let mlp = vector::<HostBackend>(&like(Family::Gauss).unwrap());
+        let places: Vec<f64> = (-60..=60).map(|k| 0.1 * f64::from(k)).collect();
+        let places = vector::<HostBackend>(&places);
+        let off = Family::Gauss.value(gauss, places.clone()) - Mlp.value(mlp, places);
+        assert!(numbers(off).into_iter().all(|off| off.abs() < 1e-2));
+        assert!(like(Family::Exp).is_none());
     }
 }

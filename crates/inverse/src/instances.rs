@@ -23,10 +23,10 @@ pub struct Instances<P: InverseProblem, B: RasterBackend> {
     pub(crate) config: LearnConfig,
     pub(crate) layout: PhiLayout,
     tolerance: f64,
-    /// What judges, where it is soft and does not depend on φ.
-    sharp: Option<Rc<ScheduledRenderer>>,
-    /// The renderer of the latest φ.
-    renderer: RefCell<Option<(Vec<f64>, Rc<ScheduledRenderer>)>>,
+    /// What judges, where that does not depend on φ.
+    judge: OuterImage,
+    /// What draws under the latest φ.
+    latest: RefCell<Option<Rc<ScheduledRenderer>>>,
     backend: PhantomData<B>,
 }
 
@@ -48,11 +48,12 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
         let config = config.resolved(parameters, has_surrogate)?;
         let layout = PhiLayout::learned(&method.softness, own, solve.steps, solve.size, &config);
         let tolerance = method.learning_tolerance(config.differentiates());
-        let sharp = (config.outer_loss != Some(OuterLoss::Hard))
-            .then(|| Rc::new(sharp(&problem, config.finer() * solve.size, &config)));
-        let (problem, solve, renderer) = (Rc::new(problem), *solve, RefCell::new(None));
-        let backend = PhantomData;
-        Ok(Self { problem, solve, config, layout, tolerance, sharp, renderer, backend })
+        let judge = match config.outer_loss {
+            Some(OuterLoss::Hard) => OuterImage::Hard,
+            _ => OuterImage::Sharp(sharp(&problem, config.finer() * solve.size, &config).into()),
+        };
+        let (problem, solve, latest) = (Rc::new(problem), *solve, RefCell::new(None));
+        Ok(Self { problem, solve, config, layout, tolerance, judge, latest, backend: PhantomData })
     }
 
     /// φ that learning starts from, with the logarithm of the inner learning rate behind it if that is learned.
@@ -71,20 +72,15 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
 
     /// What draws under a softness, the latest one kept.
     fn renderer(&self, phi: &[f64]) -> Rc<ScheduledRenderer> {
-        let mut latest = self.renderer.borrow_mut();
-        match latest.as_ref().filter(|(of, _)| of == phi) {
-            Some((_, renderer)) => renderer.clone(),
-            None => {
-                let rasterizer =
-                    Rasterizer { tolerance: self.tolerance, ..Rasterizer::new(self.solve.size) };
-                let (layout, faces) = (self.layout.clone(), self.problem.faces());
-                let renderer =
-                    ScheduledRenderer::new(layout, phi, rasterizer, Resolution::Full, faces);
-                let renderer = Rc::new(renderer);
-                *latest = Some((phi.to_vec(), renderer.clone()));
-                renderer
-            }
-        }
+        let mut latest = self.latest.borrow_mut();
+        let kept = latest.take().filter(|renderer| renderer.phi() == phi);
+        let renderer = kept.unwrap_or_else(|| {
+            let full = Rasterizer::new(self.solve.size);
+            let rasterizer = Rasterizer { tolerance: self.tolerance, ..full };
+            let (layout, faces) = (self.layout.clone(), self.problem.faces());
+            ScheduledRenderer::new(layout, phi, rasterizer, Resolution::Full, faces).into()
+        });
+        latest.insert(renderer).clone()
     }
 
     /// The instance of a seed, with the inner loss as the outer one if `own`, else by what the configuration says.
@@ -96,11 +92,7 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
         let finer = if own { 1 } else { self.config.finer() };
         let outer_scene = problem.scene(instance, finer * self.solve.size);
         let start = problem.start::<Autodiff<B>>(&outer_scene).inner();
-        let image = match (&self.sharp, own) {
-            (_, true) => OuterImage::Inner(renderer.clone()),
-            (Some(sharp), false) => OuterImage::Sharp(sharp.clone()),
-            (None, false) => OuterImage::Hard,
-        };
+        let image = if own { OuterImage::Inner(renderer.clone()) } else { self.judge.clone() };
         BilevelProblem {
             objective: Inner {
                 problem: problem.clone(),

@@ -55,6 +55,7 @@ pub struct Outer<P: InverseProblem, B: RasterBackend> {
     pub(crate) image: OuterImage,
 }
 
+#[derive(Clone)]
 pub(crate) enum OuterImage {
     /// By a sharp soft image.
     Sharp(Rc<ScheduledRenderer>),

@@ -13,7 +13,6 @@ use crate::{PhiLayout, Resolution};
 #[derive(Debug)]
 pub struct ScheduledRenderer {
     layout: PhiLayout,
-    /// The vector that it was made for.
     phi: Vec<f64>,
     /// What is drawn where nothing is differentiated by φ.
     values: ScheduledSoftness,
@@ -86,6 +85,11 @@ impl ScheduledRenderer {
         let kept = self.kept::<B>(step);
         let tables = kept.silhouettes.iter().zip(phi).map(|(of, phi)| of.table(phi).flatten(0, 1));
         Tensor::cat(tables.collect(), 0)
+    }
+
+    /// The vector that it was made for.
+    pub(crate) fn phi(&self) -> &[f64] {
+        &self.phi
     }
 
     /// Whether these are the numbers that it was made for, as far as the float type of `phi` `[P]` can tell.
