@@ -44,51 +44,56 @@ pub fn signed_distance<B: Backend>(
     faces: &[[u32; 3]],
     pixels: Tensor<B, 2>,
 ) -> Tensor<B, 3> {
-    let corners = corners(vertices, faces);
+    let [a, b, c] = corners(vertices, faces);
     let count = pixels.dims()[0];
-    let [px, py] = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));
-    let area = {
-        let [a, b, c] = &corners;
-        let (ux, uy) = (b[0].clone() - a[0].clone(), b[1].clone() - a[1].clone());
-        let (vx, vy) = (c[0].clone() - b[0].clone(), c[1].clone() - b[1].clone());
-        ux * vy - uy * vx
-    };
-    let orientation = area.clone().sign().detach();
-    let mut nearest: Option<Tensor<B, 3>> = None;
-    let mut inside = None;
-    for k in 0..3 {
-        let [x, y, _] = &corners[k];
-        let [next_x, next_y, _] = &corners[(k + 1) % 3];
-        let (ex, ey) = (next_x.clone() - x.clone(), next_y.clone() - y.clone());
-        let (wx, wy) = (px.clone() - x.clone(), py.clone() - y.clone());
-        let length2 = ex.clone() * ex.clone() + ey.clone() * ey.clone();
-        let point = length2.clone().lower_elem(POINT);
-        let inverse = length2.mask_fill(point.clone(), 1.0).recip().mask_fill(point, 0.0);
-        let t = ((wx.clone() * ex.clone() + wy.clone() * ey.clone()) * inverse).clamp(0.0, 1.0);
-        let dx = wx.clone() - t.clone() * ex.clone();
-        let dy = wy.clone() - t * ey.clone();
-        let distance2 = dx.clone() * dx + dy.clone() * dy;
-        nearest = Some(match nearest {
-            None => distance2,
-            Some(best) => {
-                let nearer = distance2.clone().lower(best.clone());
-                best.mask_where(nearer, distance2)
-            }
-        });
-        let side = (ex * wy - ey * wx) * orientation.clone();
-        let within = side.greater_equal_elem(0.0);
-        inside = Some(match inside {
-            None => within,
-            Some(inside) => within.bool_and(inside),
-        });
-    }
-    let nearest = nearest.expect("a face has three edges");
-    let flat = orientation.equal_elem(0.0).expand(nearest.dims());
-    let inside = inside.expect("a face has three edges").bool_and(flat.bool_not());
+    let p = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));
+    let area = cross(between(&a, &b), between(&b, &c));
+    let orientation = area.sign().detach();
+    let [ab, bc, ca] = [(&a, &b), (&b, &c), (&c, &a)].map(|(from, to)| edge(&p, from, to));
+    let nearest = lesser(lesser(ab.0, bc.0), ca.0);
+    let within = |side: Tensor<B, 3>| (side * orientation.clone()).greater_equal_elem(0.0);
+    let inside = within(ab.1).bool_and(within(bc.1)).bool_and(within(ca.1));
+    let flat = orientation.clone().equal_elem(0.0).expand(nearest.dims());
+    let inside = inside.bool_and(flat.bool_not());
     // Selected by the argument, so that neither the root nor its gradient meets 0.
     let on_edge = nearest.clone().lower_elem(ON_EDGE);
     let distance = nearest.mask_fill(on_edge.clone(), 1.0).sqrt().mask_fill(on_edge, 0.0);
     distance.clone().neg().mask_where(inside, distance)
+}
+
+/// x and y of places, or of the ways between them.
+type Plane<B> = [Tensor<B, 3>; 2];
+
+/// Squared distance of points to an edge, and a number that is positive on its left.
+fn edge<B: Backend>(
+    p: &Plane<B>,
+    start: &[Tensor<B, 3>; 3],
+    end: &[Tensor<B, 3>; 3],
+) -> (Tensor<B, 3>, Tensor<B, 3>) {
+    let [ex, ey] = between(start, end);
+    let [wx, wy] = [0, 1].map(|k| p[k].clone() - start[k].clone());
+    let length2 = ex.clone() * ex.clone() + ey.clone() * ey.clone();
+    let point = length2.clone().lower_elem(POINT);
+    let inverse = length2.mask_fill(point.clone(), 1.0).recip().mask_fill(point, 0.0);
+    let t = ((wx.clone() * ex.clone() + wy.clone() * ey.clone()) * inverse).clamp(0.0, 1.0);
+    let dx = wx.clone() - t.clone() * ex.clone();
+    let dy = wy.clone() - t * ey.clone();
+    (dx.clone() * dx + dy.clone() * dy, cross([ex, ey], [wx, wy]))
+}
+
+/// From one corner to another.
+fn between<B: Backend>(start: &[Tensor<B, 3>; 3], end: &[Tensor<B, 3>; 3]) -> Plane<B> {
+    [0, 1].map(|k| end[k].clone() - start[k].clone())
+}
+
+fn cross<B: Backend>([ux, uy]: Plane<B>, [vx, vy]: Plane<B>) -> Tensor<B, 3> {
+    ux * vy - uy * vx
+}
+
+/// The lesser of two numbers; where they are the same, the first with all of the gradient.
+fn lesser<B: Backend>(a: Tensor<B, 3>, b: Tensor<B, 3>) -> Tensor<B, 3> {
+    let less = b.clone().lower(a.clone());
+    a.mask_where(less, b)
 }
 
 /// Sums of `g(s(d))` over the faces of each pixel: `[views, size, size]`, top row first.

@@ -95,8 +95,8 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         phi
     }
 
-    /// How many of the leading parameters are logarithms, first that of the scale; 0 for a softness
-    /// without a scale of its own. Provided: 1.
+    /// How many of the leading parameters are logarithms, first that of the scale or of a multiple of
+    /// it; 0 for a softness without a scale of its own. Provided: 1.
     fn logarithms(&self) -> usize {
         1
     }
