@@ -39,6 +39,14 @@ pub enum MeshError {
         /// Name of the file.
         name: String,
     },
+    /// The parser refused text that was cleaned for it.
+    #[error("{name}: {reason}")]
+    Parser {
+        /// Name of the file.
+        name: String,
+        /// What the parser said.
+        reason: String,
+    },
     /// A list of faces is empty.
     #[error("a mesh needs at least one face, found none")]
     Empty,

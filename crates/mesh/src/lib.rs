@@ -15,7 +15,7 @@
 
 mod airplane;
 mod chair;
-mod content;
+mod clean;
 mod edges;
 mod error;
 mod fox;

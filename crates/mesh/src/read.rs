@@ -2,11 +2,7 @@
 
 use std::{fs, io, path::Path};
 
-use crate::{
-    Mesh, MeshError,
-    content::{Content, content},
-    polygon::triangles,
-};
+use crate::{Mesh, MeshError, clean::clean, polygon::triangles};
 
 impl Mesh {
     /// The mesh in the OBJ file at `path`; see [`Mesh::parse`].
@@ -33,9 +29,25 @@ impl Mesh {
     /// number or not finite in 32 bits, an index which is not a number or out of range, or a face
     /// with fewer than three corners.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
-        let Content { positions, polygons } = content(bytes, name)?;
-        let faces = polygons.iter().flat_map(|corners| triangles(&positions, corners)).collect();
-        Ok(Self::from_valid(positions, faces))
+        let clean = clean(bytes, name)?;
+        // The parser numbers vertices as faces first use them. A first polygon that lists them
+        // all keeps the order of the file, and those which no face uses.
+        let all: String = (1..=clean.vertices).map(|vertex| format!(" {vertex}")).collect();
+        let text = format!("f{all}\n{}", clean.text);
+        let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let options = tobj::LoadOptions::default();
+        let (models, _) =
+            tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials).map_err(|reason| {
+                MeshError::Parser { name: name.to_owned(), reason: reason.to_string() }
+            })?;
+
+        let (mut positions, mut faces) = (Vec::new(), Vec::new());
+        for tobj::Model { mesh, .. } in models {
+            positions.extend(mesh.positions.as_chunks().0);
+            let polygons = split(&mesh.indices, &mesh.face_arities);
+            faces.extend(polygons.skip(1).flat_map(|corners| triangles(&positions, corners)));
+        }
+        Self::new(positions, faces)
     }
 }
 
@@ -45,6 +57,17 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
         return Err(io::Error::other("it is a folder or a device, not a file"));
     }
     fs::read(path)
+}
+
+/// The polygons of a parsed model; no `arities` means that all are triangles.
+fn split<'a>(mut indices: &'a [u32], arities: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
+    let mut arities = arities.iter();
+    std::iter::from_fn(move || {
+        let corners = arities.next().map_or(3, |&n| n as usize);
+        let (polygon, rest) = indices.split_at_checked(corners)?;
+        indices = rest;
+        Some(polygon)
+    })
 }
 
 #[cfg(test)]

@@ -1,67 +1,82 @@
-//! What an OBJ file says, checked line by line.
+//! Checks an OBJ file line by line, and keeps what a plain parser needs.
 
 use crate::{LineError, MeshError, mesh::fits_f32, statements::statements};
 
-/// The vertices and polygons of an OBJ file, sound and in its order.
-pub(crate) struct Content {
-    pub(crate) positions: Vec<[f64; 3]>,
-    /// Three or more indices each, counted from 0 and in range.
-    pub(crate) polygons: Vec<Vec<u32>>,
+/// Text of an OBJ file that holds nothing but sound vertices and faces.
+///
+/// `text` has one `v x y z` line for each vertex, in the order of the file, and one `f` line for
+/// each polygon: three or more absolute indices, counted from 1 and in range.
+pub(crate) struct Clean {
+    pub(crate) text: String,
+    pub(crate) vertices: usize,
 }
 
-/// The content of `bytes`, or the first fault in the order of the file.
+/// The clean form of `bytes`, or the first fault in the order of the file.
 ///
 /// Only `v` and `f` matter, in lower case; of a vertex only the first three numbers, of a corner
 /// only the field before the first slash. Other statements are skipped, so no material is opened.
-pub(crate) fn content(bytes: &[u8], name: &str) -> Result<Content, MeshError> {
+pub(crate) fn clean(bytes: &[u8], name: &str) -> Result<Clean, MeshError> {
     // A face may come before its vertices, so their number must be known first.
     let vertices = statements(bytes).filter(|s| s.words().next() == Some("v")).count();
-    let mut content = Content { positions: Vec::with_capacity(vertices), polygons: Vec::new() };
-    let Content { positions, polygons } = &mut content;
+    let (mut text, mut vertices_read, mut faces) = (String::new(), 0, 0);
     for statement in statements(bytes) {
         let mut words = statement.words();
         let checked = match words.next() {
-            Some("v") => vertex(words).map(|position| positions.push(position)),
+            Some("v") => {
+                vertices_read += 1;
+                vertex(words, &mut text)
+            }
             Some("f") => {
-                polygon(words, positions.len(), vertices).map(|polygon| polygons.push(polygon))
+                faces += 1;
+                face(words, vertices_read, vertices, &mut text)
             }
             _ => Ok(()),
         };
         let line = statement.line;
         checked.map_err(|reason| MeshError::Line { name: name.to_owned(), line, reason })?;
     }
-    match polygons.is_empty() {
-        true => Err(MeshError::NoFaces { name: name.to_owned() }),
-        false => Ok(content),
+    if faces == 0 {
+        return Err(MeshError::NoFaces { name: name.to_owned() });
     }
+    Ok(Clean { text, vertices })
 }
 
-/// The three coordinates of a vertex.
-fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], LineError> {
-    let mut found = Vec::with_capacity(3);
+/// Copies three coordinates to `text`.
+fn vertex<'a>(words: impl Iterator<Item = &'a str>, text: &mut String) -> Result<(), LineError> {
+    text.push('v');
+    let mut found = 0;
     for word in words.take(3) {
         let x: f64 = word.parse().map_err(|_| LineError::Number(shown(word)))?;
         if !fits_f32(x) {
             return Err(LineError::NotFinite(shown(word)));
         }
-        found.push(x);
+        text.extend([" ", word]);
+        found += 1;
     }
-    found.try_into().map_err(|found: Vec<f64>| LineError::Coordinates(found.len()))
+    text.push('\n');
+    if found == 3 { Ok(()) } else { Err(LineError::Coordinates(found)) }
 }
 
-/// The vertices of a polygon, counted from 0.
-fn polygon<'a>(
+/// Writes the absolute indices of one polygon to `text`.
+fn face<'a>(
     words: impl Iterator<Item = &'a str>,
     vertices_read: usize,
     vertices: usize,
-) -> Result<Vec<u32>, LineError> {
-    let corners = words.map(|word| corner(word, vertices_read, vertices));
-    let corners = corners.collect::<Result<Vec<_>, _>>()?;
-    if corners.len() < 3 { Err(LineError::Corners(corners.len())) } else { Ok(corners) }
+    text: &mut String,
+) -> Result<(), LineError> {
+    text.push('f');
+    let mut found = 0;
+    for word in words {
+        let index = absolute(word, vertices_read, vertices)?;
+        text.extend([" ", &index.to_string()]);
+        found += 1;
+    }
+    text.push('\n');
+    if found >= 3 { Ok(()) } else { Err(LineError::Corners(found)) }
 }
 
-/// The vertex, counted from 0, that a corner such as `7`, `7/1/2`, `7//2` or `-1` means.
-fn corner(corner: &str, vertices_read: usize, vertices: usize) -> Result<u32, LineError> {
+/// The vertex, counted from 1, that a corner such as `7`, `7/1/2`, `7//2` or `-1` means.
+fn absolute(corner: &str, vertices_read: usize, vertices: usize) -> Result<usize, LineError> {
     let field = corner.split('/').next().unwrap_or(corner);
     let index = || shown(field);
     let (back, digits) = match field.strip_prefix('-') {
@@ -71,12 +86,12 @@ fn corner(corner: &str, vertices_read: usize, vertices: usize) -> Result<u32, Li
     if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
         return Err(LineError::Index(shown(corner)));
     }
-    // A number too long for u32 is out of range as well.
-    let number = digits.parse::<u32>().unwrap_or(u32::MAX);
+    // A number too long for usize is out of range as well.
+    let number = digits.parse().unwrap_or(usize::MAX);
     match (back, number) {
-        (true, 1..) if number as usize <= vertices_read => Ok(vertices_read as u32 - number),
+        (true, 1..) if number <= vertices_read => Ok(vertices_read - number + 1),
         (true, 1..) => Err(LineError::TooFarBack { index: index(), before: vertices_read }),
-        (false, 1..) if number as usize <= vertices => Ok(number - 1),
+        (false, 1..) if number <= vertices => Ok(number),
         _ => Err(LineError::OutOfRange { index: index(), vertices }),
     }
 }
@@ -98,9 +113,9 @@ mod tests {
     fn only_positions_and_absolute_indices_remain() {
         let file = b"o a\nv 1e0 .5 -2 0.1 0.2 0.3\nf 2/9/9 +3// -1\nv 0 0 0 1\nmtllib /dev/zero\n\
             v 1 1 1\nl 1 2\nf -3 -2 -1";
-        let Content { positions, polygons } = content(file, "a.obj").unwrap();
-        assert_eq!(positions, [[1.0, 0.5, -2.0], [0.0; 3], [1.0; 3]]);
-        assert_eq!(polygons, [[1, 2, 0], [0, 1, 2]]);
+        let clean = clean(file, "a.obj").unwrap();
+        assert_eq!(clean.text, "v 1e0 .5 -2\nf 2 3 1\nv 0 0 0\nv 1 1 1\nf 1 2 3\n");
+        assert_eq!(clean.vertices, 3);
     }
 
     #[test]
@@ -119,7 +134,7 @@ mod tests {
             ("v 0 0 -inf", "a.obj:1: coordinate \"-inf\" is not finite in 32-bit floats"),
             ("v 0 0 0", "a.obj: no faces: an OBJ file lists them on lines that start with f"),
         ] {
-            let error = content(file.as_bytes(), "a.obj").map(|c| c.polygons).unwrap_err();
+            let error = clean(file.as_bytes(), "a.obj").map(|c| c.text).unwrap_err();
             assert_eq!(error.to_string(), message);
         }
     }
