@@ -61,7 +61,7 @@ pub fn outputs<B: RasterBackend>() -> Outputs {
 }
 
 /// The vertices of all views on the screen, `[views, vertices, 3]`.
-fn projected<B: Backend>(positions: &[[f64; 3]]) -> Tensor<B, 3> {
+fn projected<B: RasterBackend>(positions: &[[f64; 3]]) -> Tensor<B, 3> {
     let orbits: Vec<f64> =
         AZIMUTHS_DEG.iter().flat_map(|&azimuth| [2.732, 17.0, azimuth, 60.0]).collect();
     let world = tensor(positions.as_flattened(), [1, positions.len(), 3]);

@@ -90,7 +90,7 @@ impl Workload {
     /// # Panics
     ///
     /// If nothing of the mesh can be seen.
-    pub fn by_reference<B: Backend>(&self) -> Row {
+    pub fn by_reference<B: RasterBackend>(&self) -> Row {
         let scene = reference::Scene { faces: self.mesh.faces(), size: self.size };
         let conorm = TConorm::default();
         let phi = self.phi::<B>();
@@ -119,7 +119,7 @@ impl Workload {
     }
 
     /// Vertices of all views on the screen, `[views, vertices, 3]`.
-    fn project<B: Backend>(&self, world: Tensor<B, 3>) -> Tensor<B, 3> {
+    fn project<B: RasterBackend>(&self, world: Tensor<B, 3>) -> Tensor<B, 3> {
         let [distance, elevation, fov] = CAMERA;
         let orbit = |&azimuth| [distance, elevation, azimuth, fov];
         let orbits: Vec<f64> = self.azimuths_deg.iter().flat_map(orbit).collect();
@@ -127,7 +127,7 @@ impl Workload {
     }
 
     /// Mean squared difference of `alpha` `[views, size, size]` to the disk, `[1]`.
-    fn loss<B: Backend>(&self, alpha: Tensor<B, 3>) -> Tensor<B, 1> {
+    fn loss<B: RasterBackend>(&self, alpha: Tensor<B, 3>) -> Tensor<B, 1> {
         let (centre, radius) = DISK;
         let size = self.size as f64;
         // Membership is decided in f64: in f32 the rim would take other pixels.

@@ -64,7 +64,7 @@ impl Workload {
     }
 
     /// Vertices as the op takes them, `[views, vertices, 3]`.
-    pub(crate) fn projected<B: Backend>(&self, dtype: DType) -> Tensor<B, 3> {
+    pub(crate) fn projected<B: RasterBackend>(&self, dtype: DType) -> Tensor<B, 3> {
         project(self.world(dtype), self.cameras(dtype))
     }
 

@@ -1,4 +1,4 @@
-//! `profile_sum` as a burn backend extension: one op with its gradient and the gradient of that.
+//! Fused ops as a burn backend extension: each with its gradient and the gradient of that.
 
 use std::sync::Arc;
 
@@ -12,12 +12,15 @@ use burn::{
         },
     },
     tensor::{
-        DType, Shape, Slice, Tensor, TensorData, TensorMetadata, TensorPrimitive, backend::Backend,
-        ops::FloatTensor, try_read_sync,
+        DType, Element, Shape, Slice, Tensor, TensorData, TensorMetadata, TensorPrimitive,
+        backend::Backend, ops::FloatTensor, try_read_sync,
     },
 };
 
-use crate::kernel::{self, Float, Grid, Inputs};
+use crate::{
+    fused::{self, ElementaryOp, FusedOp, Pass},
+    kernel::{self, Float, Grid, Inputs},
+};
 
 /// What stays the same over the calls of the op: faces, image size and the places of the knots.
 #[derive(Clone, Debug)]
@@ -36,13 +39,9 @@ impl ProfileSum {
     pub(crate) fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
         let [views, _, _] = vertices.dims();
         let data = vertices.swap_dims(1, 2).into_data();
-        self.pairs_of(views, &data)
-    }
-
-    fn pairs_of(&self, views: usize, vertices: &TensorData) -> usize {
-        match vertices.dtype {
-            DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(vertices), &[])),
-            DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(vertices), &[])),
+        match data.dtype {
+            DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
+            DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
             other => panic!("profile_sum works in f32 and f64, found {other:?}"),
         }
     }
@@ -58,101 +57,129 @@ impl ProfileSum {
             views,
         }
     }
+
+    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and a `table` `[rows, 4]`, to sums
+    /// `[views, size, size]`, top row first.
+    pub(crate) fn run<F: Float + Element>(
+        &self,
+        pass: &Pass,
+        slices: &[&[F]],
+        dims: &[Vec<usize>],
+    ) -> TensorData {
+        let views = dims[0][0];
+        let inputs = self.inputs(views, slices[0], slices[1]);
+        let values = match pass {
+            Pass::Forward => {
+                return TensorData::new(kernel::forward(&inputs), [views, self.size, self.size]);
+            }
+            Pass::Vjp { wanted } => kernel::vjp(&inputs, slices[2], [wanted[0], wanted[1]]),
+            Pass::VjpOfVjp { along, wanted } => {
+                let wanted = [wanted[0], wanted[1], wanted[2]];
+                kernel::vjp_of_vjp(&inputs, slices[2], slices[3], [along[0], along[1]], wanted)
+            }
+        };
+        let length = values.len();
+        TensorData::new(values, [length])
+    }
 }
 
-/// A backend that can add up profiles over faces.
+fn slice<F: Element>(data: &TensorData) -> &[F] {
+    data.as_slice().expect("all tensors of a call have one float type")
+}
+
+/// A backend that runs fused ops.
 ///
-/// The defaults run on the host and serve every CPU backend; the implementation for `Autodiff<B>`
-/// makes the op differentiable twice: `forward` differentiates by `B`'s `vjp`, and `vjp` by `B`'s
-/// `vjp_of_vjp`. A third order panics. Saved for the backward pass are the inputs alone.
-///
-/// Shapes: `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units), `table`
-/// `[rows, 4]`, sums `[views, size, size]`, top row first.
+/// By default they run on the host, which serves every CPU backend. The implementation for `Autodiff<B>` makes them differentiable
+/// twice: each pass differentiates by the next one of `B`. A third order panics. Saved for the backward pass are the inputs alone.
 pub trait RasterBackend: Backend {
-    /// Whether the op and little tensors are as quick on the CPU anyway: false where a tensor lies
+    /// Whether ops and little tensors are as quick on the CPU anyway: false where a tensor lies
     /// behind a queue, and what is computed of it in many little ops should come in one piece.
     const ON_HOST: bool = true;
 
-    /// The numbers of a tensor, row by row, for a kernel on the host.
-    fn host_data(tensor: FloatTensor<Self>) -> TensorData {
-        read::<Self>(tensor)
+    /// The numbers of a tensor where they lie, row by row, if that is possible.
+    fn numbers<F: Element>(tensor: &FloatTensor<Self>) -> Option<&[F]> {
+        let _ = tensor;
+        None
     }
 
-    /// Sums of the profile over the faces of each pixel.
-    fn profile_sum(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        host::<Self>(op, vec![vertices, table], Pass::Forward)
-    }
-
-    /// Gradients of `Σ upstream · sums` to vertices and table, as one flat tensor in this order. The
-    /// table's part is 0 unless `wrt_table`.
-    fn profile_sum_vjp(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-        wrt_table: bool,
-    ) -> FloatTensor<Self> {
-        host::<Self>(op, vec![vertices, table, upstream], Pass::Vjp { wrt_table })
-    }
-
-    /// Pullback of `direction`, shaped like the result of [`RasterBackend::profile_sum_vjp`],
-    /// through that function: gradients to vertices, table and upstream, flat, in this order.
-    fn profile_sum_vjp_of_vjp(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-        direction: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        host::<Self>(op, vec![vertices, table, upstream, direction], Pass::VjpOfVjp)
+    /// Runs a pass of an op. Where tensors do not lie on the host, of [`FusedOp::ProfileSum`] only.
+    fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
+        match tensors[0].dtype() {
+            DType::F32 => on_host::<Self, f32>(op, pass, tensors),
+            DType::F64 => on_host::<Self, f64>(op, pass, tensors),
+            other => panic!("fused ops work in f32 and f64, found {other:?}"),
+        }
     }
 }
 
-#[cfg(any(feature = "ndarray", feature = "wgpu"))]
-impl RasterBackend for burn::backend::NdArray<f32> {
-    fn host_data(tensor: FloatTensor<Self>) -> TensorData {
-        ndarray_data::<Self>(tensor)
+/// The numbers of a tensor, or of its copy.
+fn numbers<'a, B: RasterBackend, F: Element>(
+    (tensor, copy): (&'a FloatTensor<B>, &'a Option<TensorData>),
+) -> &'a [F] {
+    match copy {
+        Some(copy) => slice(copy),
+        None => B::numbers(tensor).expect("numbers where they were"),
     }
 }
+
+/// Runs a pass over tensors of one float type on the host.
+fn on_host<B: RasterBackend, F>(
+    op: &FusedOp,
+    pass: &Pass,
+    tensors: Vec<FloatTensor<B>>,
+) -> FloatTensor<B>
+where
+    F: Element + Float + fused::Number<Float = F>,
+{
+    let device = B::float_device(&tensors[0]);
+    let dims: Vec<Vec<usize>> = tensors.iter().map(|tensor| tensor.shape().to_vec()).collect();
+    let read = |tensor: &FloatTensor<B>| {
+        B::numbers::<F>(tensor).is_none().then(|| {
+            try_read_sync(B::float_into_data(tensor.clone()))
+                .expect("the host path reads tensors synchronously")
+                .expect("tensor data can be read")
+        })
+    };
+    let copies: Vec<Option<TensorData>> = tensors.iter().map(read).collect();
+    let slices: Vec<&[F]> = tensors.iter().zip(&copies).map(numbers::<B, F>).collect();
+    B::float_from_data(fused::run(op, pass, &slices, &dims), &device)
+}
+
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]
-impl RasterBackend for burn::backend::NdArray<f64> {
-    fn host_data(tensor: FloatTensor<Self>) -> TensorData {
-        ndarray_data::<Self>(tensor)
+mod ndarray {
+    use burn::{
+        backend::{NdArray, ndarray::NdArrayTensor},
+        tensor::{DType, Element},
+    };
+    use bytemuck::checked::try_cast_slice;
+
+    use super::RasterBackend;
+
+    impl RasterBackend for NdArray<f32> {
+        fn numbers<F: Element>(tensor: &NdArrayTensor) -> Option<&[F]> {
+            in_place(tensor)
+        }
+    }
+    impl RasterBackend for NdArray<f64> {
+        fn numbers<F: Element>(tensor: &NdArrayTensor) -> Option<&[F]> {
+            in_place(tensor)
+        }
+    }
+
+    fn in_place<F: Element>(tensor: &NdArrayTensor) -> Option<&[F]> {
+        match (tensor, F::dtype()) {
+            (NdArrayTensor::F32(array), DType::F32) => {
+                try_cast_slice(array.view().to_slice()?).ok()
+            }
+            (NdArrayTensor::F64(array), DType::F64) => {
+                try_cast_slice(array.view().to_slice()?).ok()
+            }
+            _ => None,
+        }
     }
 }
 #[cfg(feature = "flex")]
 impl RasterBackend for burn::backend::Flex {}
-
-fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
-    try_read_sync(B::float_into_data(tensor))
-        .expect("the host path reads tensors synchronously")
-        .expect("tensor data can be read")
-}
-
-/// Like [`read`], which copies number by number where a tensor is shared.
-#[cfg(any(feature = "ndarray", feature = "wgpu"))]
-fn ndarray_data<B>(tensor: FloatTensor<B>) -> TensorData
-where
-    B: Backend<FloatTensorPrimitive = burn::backend::ndarray::NdArrayTensor>,
-{
-    use burn::backend::ndarray::NdArrayTensor;
-
-    let shape = tensor.shape();
-    let copy = match &tensor {
-        NdArrayTensor::F32(array) => {
-            array.view().as_slice().map(|values| TensorData::new(values.to_vec(), shape))
-        }
-        NdArrayTensor::F64(array) => {
-            array.view().as_slice().map(|values| TensorData::new(values.to_vec(), shape))
-        }
-        _ => None,
-    };
-    copy.unwrap_or_else(|| read::<B>(tensor))
-}
 
 /// Sums `profile(d)` over the faces of each pixel: the one op under every silhouette.
 ///
@@ -174,210 +201,100 @@ pub fn profile_sum<B: RasterBackend>(
     assert_eq!(vertices.dtype(), table.dtype(), "vertices and table differ in float type");
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
-    let sums = B::profile_sum(op, primitive(vertices.swap_dims(1, 2)), primitive(table));
-    Tensor::from_primitive(TensorPrimitive::Float(sums))
+    let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
+    of_primitive(B::run(&FusedOp::ProfileSum(op.clone()), &Pass::Forward, inputs))
 }
 
-fn primitive<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> FloatTensor<B> {
+/// The result of an op that is written for any number. Only where tensors lie on the host.
+pub(crate) fn elementary<B: RasterBackend, const D: usize>(
+    op: ElementaryOp,
+    inputs: Vec<FloatTensor<B>>,
+) -> Tensor<B, D> {
+    of_primitive(B::run(&FusedOp::Elementary(op), &Pass::Forward, inputs))
+}
+
+/// What stands for a tensor below burn's own type.
+pub(crate) fn primitive<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> FloatTensor<B> {
     tensor.into_primitive().tensor()
 }
 
-enum Pass {
-    Forward,
-    Vjp { wrt_table: bool },
-    VjpOfVjp,
-}
-
-/// Runs a pass on the host in the float type of the tensors.
-fn host<B: RasterBackend>(
-    op: &ProfileSum,
-    tensors: Vec<FloatTensor<B>>,
-    pass: Pass,
-) -> FloatTensor<B> {
-    let device = B::float_device(&tensors[0]);
-    let views = tensors[0].shape()[0];
-    let data: Vec<TensorData> = tensors.into_iter().map(B::host_data).collect();
-    B::float_from_data(run(op, views, &data, &pass), &device)
-}
-
-/// Runs a pass in the float type of the data. Not generic, so that the kernels are compiled with
-/// this crate and not again with everything that uses it.
-fn run(op: &ProfileSum, views: usize, data: &[TensorData], pass: &Pass) -> TensorData {
-    match data[0].dtype {
-        DType::F32 => run_in::<f32>(op, views, data, pass),
-        DType::F64 => run_in::<f64>(op, views, data, pass),
-        other => panic!("profile_sum works in f32 and f64, found {other:?}"),
-    }
-}
-
-fn slice<F: burn::tensor::Element>(data: &TensorData) -> &[F] {
-    data.as_slice().expect("all tensors of a call have one float type")
-}
-
-fn run_in<F: Float + burn::tensor::Element>(
-    op: &ProfileSum,
-    views: usize,
-    data: &[TensorData],
-    pass: &Pass,
-) -> TensorData {
-    let slices: Vec<&[F]> = data.iter().map(slice).collect();
-    let inputs = op.inputs(views, slices[0], slices[1]);
-    let flat = |values: Vec<F>| {
-        let length = values.len();
-        TensorData::new(values, [length])
-    };
-    match pass {
-        Pass::Forward => TensorData::new(kernel::forward(&inputs), [views, op.size, op.size]),
-        Pass::Vjp { wrt_table } => flat(kernel::vjp(&inputs, slices[2], *wrt_table)),
-        Pass::VjpOfVjp => flat(kernel::vjp_of_vjp(&inputs, slices[2], slices[3])),
-    }
+fn of_primitive<B: Backend, const D: usize>(tensor: FloatTensor<B>) -> Tensor<B, D> {
+    Tensor::from_primitive(TensorPrimitive::Float(tensor))
 }
 
 /// Cuts a flat tensor into parts of the given shapes.
-fn split<B: Backend, const N: usize>(
-    flat: FloatTensor<B>,
-    shapes: [Shape; N],
-) -> [FloatTensor<B>; N] {
+fn split<B: Backend>(flat: FloatTensor<B>, shapes: &[Shape]) -> Vec<FloatTensor<B>> {
+    if let [shape] = shapes {
+        return vec![B::float_reshape(flat, shape.clone())];
+    }
     let mut start = 0;
-    shapes.map(|shape| {
+    let part = |shape: &Shape| {
         let end = start + shape.num_elements();
         let part = B::float_slice(flat.clone(), &[Slice::from(start..end)]);
         start = end;
-        B::float_reshape(part, shape)
-    })
+        B::float_reshape(part, shape.clone())
+    };
+    shapes.iter().map(part).collect()
 }
 
 impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
     const ON_HOST: bool = B::ON_HOST;
 
-    fn profile_sum(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Sum;
-
-        impl<B: RasterBackend> Backward<B, 2> for Sum {
-            type State = (ProfileSum, FloatTensor<B>, FloatTensor<B>);
-
-            fn backward(
-                self,
-                ops: Ops<Self::State, 2>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (op, vertices, table) = ops.state;
-                let upstream = grads.consume::<B>(&ops.node);
-                let shapes = [vertices.shape(), table.shape()];
-                let wrt_table = ops.parents[1].is_some();
-                let flat = B::profile_sum_vjp(&op, vertices, table, upstream, wrt_table);
-                for (parent, grad) in ops.parents.into_iter().zip(split::<B, 2>(flat, shapes)) {
-                    if let Some(parent) = parent {
-                        grads.register::<B>(parent.id, grad);
-                    }
-                }
-            }
-        }
-
-        let nodes = [vertices.node.clone(), table.node.clone()];
-        match Sum.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => {
-                let (vertices, table) = (vertices.primitive, table.primitive);
-                let sums = B::profile_sum(op, vertices.clone(), table.clone());
-                prep.finish((op.clone(), vertices, table), sums)
-            }
-            OpsKind::UnTracked(prep) => {
-                prep.finish(B::profile_sum(op, vertices.primitive, table.primitive))
-            }
+    fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
+        match tensors.len() {
+            1 => recorded::<B, C, 1>(op, pass, tensors),
+            2 => recorded::<B, C, 2>(op, pass, tensors),
+            3 => recorded::<B, C, 3>(op, pass, tensors),
+            4 => recorded::<B, C, 4>(op, pass, tensors),
+            many => panic!("no op has {many} inputs"),
         }
     }
+}
 
-    fn profile_sum_vjp(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-        wrt_table: bool,
-    ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Vjp;
+/// A pass whose own derivative is the next pass.
+#[derive(Debug)]
+struct Recorded;
 
-        impl<B: RasterBackend> Backward<B, 3> for Vjp {
-            type State = (ProfileSum, FloatTensor<B>, FloatTensor<B>, FloatTensor<B>);
+/// What a pass ran on: the op, the pass and its tensors.
+type State<B> = (FusedOp, Pass, Vec<FloatTensor<B>>);
 
-            fn backward(
-                self,
-                ops: Ops<Self::State, 3>,
-                grads: &mut Gradients,
-                _checkpointer: &mut Checkpointer,
-            ) {
-                let (op, vertices, table, upstream) = ops.state;
-                let direction = grads.consume::<B>(&ops.node);
-                let shapes = [vertices.shape(), table.shape(), upstream.shape()];
-                let flat = B::profile_sum_vjp_of_vjp(&op, vertices, table, upstream, direction);
-                for (parent, grad) in ops.parents.into_iter().zip(split::<B, 3>(flat, shapes)) {
-                    if let Some(parent) = parent {
-                        grads.register::<B>(parent.id, grad);
-                    }
-                }
+impl<B: RasterBackend, const N: usize> Backward<B, N> for Recorded {
+    type State = State<B>;
+
+    fn backward(self, ops: Ops<State<B>, N>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let (op, pass, mut tensors) = ops.state;
+        tensors.push(grads.consume::<B>(&ops.node));
+        let wanted: Vec<bool> = ops.parents.iter().map(Option::is_some).collect();
+        let parents = ops.parents.into_iter().zip(&tensors);
+        let (parents, shapes): (Vec<_>, Vec<_>) =
+            parents.filter_map(|(parent, tensor)| Some((parent?, tensor.shape()))).unzip();
+        let next = match pass {
+            Pass::Forward => Pass::Vjp { wanted },
+            Pass::Vjp { wanted: along } => Pass::VjpOfVjp { along, wanted },
+            Pass::VjpOfVjp { .. } => {
+                panic!("fused ops are differentiable twice, not three times: use the reference")
             }
-        }
-
-        let nodes = [vertices.node.clone(), table.node.clone(), upstream.node.clone()];
-        match Vjp.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => {
-                let state = (
-                    op.clone(),
-                    vertices.primitive.clone(),
-                    table.primitive.clone(),
-                    upstream.primitive.clone(),
-                );
-                let flat = B::profile_sum_vjp(
-                    op,
-                    vertices.primitive,
-                    table.primitive,
-                    upstream.primitive,
-                    wrt_table,
-                );
-                prep.finish(state, flat)
-            }
-            OpsKind::UnTracked(prep) => prep.finish(B::profile_sum_vjp(
-                op,
-                vertices.primitive,
-                table.primitive,
-                upstream.primitive,
-                wrt_table,
-            )),
+        };
+        let gradients = split::<B>(B::run(&op, &next, tensors), &shapes);
+        for (parent, gradient) in parents.into_iter().zip(gradients) {
+            grads.register::<B>(parent.id, gradient);
         }
     }
+}
 
-    fn profile_sum_vjp_of_vjp(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-        direction: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Third;
-
-        impl<B: Backend> Backward<B, 4> for Third {
-            type State = ();
-
-            fn backward(self, _: Ops<(), 4>, _: &mut Gradients, _: &mut Checkpointer) {
-                panic!("profile_sum is differentiable twice, not three times: use the reference");
-            }
+fn recorded<B: RasterBackend, C: CheckpointStrategy, const N: usize>(
+    op: &FusedOp,
+    pass: &Pass,
+    tensors: Vec<FloatTensor<Autodiff<B, C>>>,
+) -> FloatTensor<Autodiff<B, C>> {
+    let nodes: Vec<_> = tensors.iter().map(|tensor| tensor.node.clone()).collect();
+    let nodes: [_; N] = nodes.try_into().expect("as many nodes as tensors");
+    let tensors: Vec<_> = tensors.into_iter().map(|tensor| tensor.primitive).collect();
+    match Backward::<B, N>::prepare::<C>(Recorded, nodes).compute_bound().stateful() {
+        OpsKind::Tracked(prep) => {
+            let result = B::run(op, pass, tensors.clone());
+            prep.finish((op.clone(), pass.clone(), tensors), result)
         }
-
-        let nodes = [&vertices, &table, &upstream, &direction].map(|tensor| tensor.node.clone());
-        let flat = B::profile_sum_vjp_of_vjp(
-            op,
-            vertices.primitive,
-            table.primitive,
-            upstream.primitive,
-            direction.primitive,
-        );
-        Third.prepare::<C>(nodes).compute_bound().stateless(flat)
+        OpsKind::UnTracked(prep) => prep.finish(B::run(op, pass, tensors)),
     }
 }

@@ -1,13 +1,20 @@
 use burn::tensor::{Tensor, backend::Backend};
 use softrast_softness::{numbers, tensor_on};
 
+use crate::{
+    RasterBackend,
+    backend::{elementary, primitive},
+    fused::ElementaryOp,
+    reference,
+};
+
 /// Camera depth, in world units, below which a vertex counts as behind the camera. Faces with such
 /// a vertex are not drawn.
 pub const NEAR: f64 = 1e-2;
 
 /// Vertices farther than this from the origin along an axis, in world units, are moved there: their
 /// squares would leave the range of f32, and their gradients with them.
-const FARTHEST: f64 = 1e15;
+pub(crate) const FARTHEST: f64 = 1e15;
 
 /// A line of sight, or an up across it, that is not longer than this has no direction, in world units.
 const SHORTEST: f64 = 1e-12;
@@ -158,15 +165,14 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 /// # Panics
 ///
 /// If the shapes do not fit.
-pub fn project<B: Backend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tensor<B, 3> {
-    let [views, four] = orbits.dims();
+pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tensor<B, 3> {
+    let [_, four] = orbits.dims();
     assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", orbits.dims());
-    let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([views]);
-    let rotation = view_rotation(column(1), column(2));
-    seen(vertices, rotation, column(3), |camera| {
-        let depth = camera.clone().narrow(1, 2, 1) + column(0).reshape([views, 1, 1]);
-        (camera.narrow(1, 0, 2), depth)
-    })
+    let matrices = match B::ON_HOST {
+        true => elementary(ElementaryOp::OrbitMatrix, vec![primitive(orbits)]),
+        false => reference::orbit_matrices(orbits),
+    };
+    perspective(vertices, matrices)
 }
 
 /// Perspective projection by cameras of any pose.
@@ -177,7 +183,7 @@ pub fn project<B: Backend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tens
 /// # Panics
 ///
 /// If the shapes do not fit.
-pub fn project_from<B: Backend>(
+pub fn project_from<B: RasterBackend>(
     vertices: Tensor<B, 3>,
     rotation: Tensor<B, 3>,
     translation: Tensor<B, 2>,
@@ -187,37 +193,26 @@ pub fn project_from<B: Backend>(
     let (rotations, translations) = (rotation.dims(), translation.dims());
     assert_eq!(rotations, [views, 3, 3], "rotations of {views} views are {rotations:?}");
     assert_eq!(translations, [views, 3], "translations of {views} views are {translations:?}");
-    let focal = focal(fov_deg.clone());
-    seen(vertices, rotation, fov_deg, |camera| {
-        let along = |k: usize, n: usize| translation.clone().narrow(1, k, n).unsqueeze_dim::<3>(2);
-        let xy = camera.clone().narrow(1, 0, 2) + along(0, 2) * focal;
-        (xy, camera.narrow(1, 2, 1) + along(2, 1))
-    })
-}
-
-/// x, y and depth `[views, vertices, 3]` of vertices that are turned, magnified, and then `moved` to where the camera sees them: x and y
-/// times the focal length, and the depth.
-fn seen<B: Backend>(
-    vertices: Tensor<B, 3>,
-    rotation: Tensor<B, 3>,
-    fov_deg: Tensor<B, 1>,
-    moved: impl FnOnce(Tensor<B, 3>) -> (Tensor<B, 3>, Tensor<B, 3>),
-) -> Tensor<B, 3> {
-    let [views, ..] = rotation.dims();
-    let [held, _, three] = vertices.dims();
-    assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
     let focal = focal(fov_deg);
     let zoom = Tensor::cat(vec![focal.clone(), focal.clone(), focal.ones_like()], 1);
-    // One row for each axis: every op then runs along all vertices. The rasterizer wants the rows
-    // too, and turning them back is free.
-    let vertices = vertices.clamp(-FARTHEST, FARTHEST).swap_dims(1, 2);
-    let (xy, depth) = moved((rotation * zoom).matmul(vertices));
-    let xy = xy * depth.clone().clamp_min(NEAR).recip();
-    Tensor::cat(vec![xy, depth], 1).swap_dims(1, 2)
+    let matrices = Tensor::cat(vec![rotation, translation.unsqueeze_dim::<3>(2)], 2) * zoom;
+    perspective(vertices, matrices)
+}
+
+/// What cameras with these matrices `[views, 3, 4]` see: two rows give x and y times the depth, the third gives the depth.
+fn perspective<B: RasterBackend>(vertices: Tensor<B, 3>, matrices: Tensor<B, 3>) -> Tensor<B, 3> {
+    let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
+    assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
+    if !B::ON_HOST {
+        return reference::perspective(vertices, matrices);
+    }
+    // The rasterizer wants one row for each axis, and turning them back is free.
+    let inputs = vec![primitive(vertices), primitive(matrices)];
+    elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2)
 }
 
 /// Distance of the image plane whose image is [-1, 1]², `[views, 1, 1]`.
-fn focal<B: Backend>(fov_deg: Tensor<B, 1>) -> Tensor<B, 3> {
+pub(crate) fn focal<B: Backend>(fov_deg: Tensor<B, 1>) -> Tensor<B, 3> {
     let [views] = fov_deg.dims();
     let [sin, cos] = sin_cos(fov_deg * 0.5);
     (cos / sin).reshape([views, 1, 1])

@@ -26,6 +26,7 @@ mod backend;
 mod backend_choice;
 mod camera;
 mod colour;
+mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod hard;
@@ -41,6 +42,7 @@ pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
 pub use camera::{LookAt, NEAR, Orbit, project, project_from, vertices, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
+pub use fused::{ElementaryOp, FusedOp, Pass};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]

@@ -1,7 +1,14 @@
 use burn::tensor::{Tensor, backend::Backend};
 
+use crate::{
+    RasterBackend,
+    backend::{elementary, primitive},
+    fused::ElementaryOp,
+    reference,
+};
+
 /// Keeps the ratio of two empty images defined.
-const EMPTY: f64 = 1e-6;
+pub(crate) const EMPTY: f64 = 1e-6;
 
 /// `1 - |p ∩ t| / |p ∪ t|` of each view, soft: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
 ///
@@ -9,20 +16,32 @@ const EMPTY: f64 = 1e-6;
 /// images give 1, as an empty one against any other does: such a target cannot be matched.
 ///
 /// Source: docs/notes.md, Losses and errors.
-pub fn iou_loss<B: Backend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
-    let [views, height, width] = image.dims();
-    let sum =
-        |pixels: Tensor<B, 3>| pixels.reshape([views, height * width]).sum_dim(1).reshape([views]);
-    let overlap = image.clone() * target.clone();
-    let union = sum(image + target - overlap.clone());
-    (sum(overlap) / (union + EMPTY)).neg() + 1.0
+pub fn iou_loss<B: RasterBackend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
+    match B::ON_HOST {
+        true => compared(ElementaryOp::Iou, image, target),
+        false => reference::iou_loss(image, target),
+    }
 }
 
 /// Mean squared difference of each view: `[views, height, width]` to `[views]`.
-pub fn mse_loss<B: Backend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
-    let [views, height, width] = image.dims();
-    let difference = image - target;
-    (difference.clone() * difference).reshape([views, height * width]).mean_dim(1).reshape([views])
+pub fn mse_loss<B: RasterBackend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
+    match B::ON_HOST {
+        true => compared(ElementaryOp::SquaredError, image, target),
+        false => reference::mse_loss(image, target),
+    }
+}
+
+/// The loss of each view, in one op; one image may be compared with those of all views.
+fn compared<B: RasterBackend>(
+    loss: ElementaryOp,
+    image: Tensor<B, 3>,
+    target: Tensor<B, 3>,
+) -> Tensor<B, 1> {
+    let ([a, height, width], [b, ..]) = (image.dims(), target.dims());
+    let shape = [a.max(b), height, width];
+    let of_all =
+        |images: Tensor<B, 3>| if images.dims() == shape { images } else { images.expand(shape) };
+    elementary(loss, vec![primitive(of_all(image)), primitive(of_all(target))])
 }
 
 /// Added to squared lengths before they divide or a root is taken, in squared world units.

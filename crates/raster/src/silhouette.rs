@@ -3,7 +3,12 @@ use std::sync::Arc;
 use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
 
-use crate::{HostBackend, NEAR, Profile, ProfileSum, RasterBackend, TConorm, profile_sum};
+use crate::{
+    HostBackend, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
+    backend::{elementary, primitive},
+    fused::ElementaryOp,
+    profile_sum,
+};
 
 /// How silhouettes are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +133,7 @@ impl<S: Softness> Silhouette<S> {
         vertices: Tensor<B, 3>,
         table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
-        self.profile.t_conorm().coverage(self.sums(vertices, table))
+        covered(self.profile.t_conorm(), self.sums(vertices, table))
     }
 
     /// Sums over the faces of each pixel, `[views, size, size]`: what the T-conorm of the profile
@@ -206,11 +211,21 @@ impl<S: Softness> Silhouette<S> {
     ) -> Tensor<B, 3> {
         let shown = profile_sum(&self.op, vertices.clone().detach(), table.detach());
         let felt = profile_sum(&felt.op, vertices, felt_table.detach());
-        self.profile.t_conorm().coverage(shown + (felt.clone() - felt.detach()))
+        covered(self.profile.t_conorm(), shown + (felt.clone() - felt.detach()))
     }
 
     /// Support, knots and error of the table in use.
     pub fn profile(&self) -> &Profile {
         &self.profile
+    }
+}
+
+/// Coverage of sums, in one op for the T-conorm that most use.
+fn covered<B: RasterBackend>(t_conorm: TConorm, sums: Tensor<B, 3>) -> Tensor<B, 3> {
+    match t_conorm {
+        TConorm::Probabilistic if B::ON_HOST => {
+            elementary(ElementaryOp::Coverage, vec![primitive(sums)])
+        }
+        _ => t_conorm.coverage(sums),
     }
 }

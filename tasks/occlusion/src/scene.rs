@@ -1,8 +1,8 @@
 use std::cell::RefCell;
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::Tensor;
 use softrast_meta::tensor;
-use softrast_raster::{Background, blend, hard_colour, mse_loss, nearness};
+use softrast_raster::{Background, RasterBackend, blend, hard_colour, mse_loss, nearness};
 use softrast_softness::{DepthSoftness, EdgeSoftness};
 
 use crate::{Instance, Problem, instance::places};
@@ -22,7 +22,7 @@ const BLACK: [f64; 3] = [0.0; 3];
 /// The optimised θ is `[views, quads]`: the depth of each quad, smaller is nearer. Quads keep their
 /// place in the image, so distances and textures are computed once.
 #[derive(Clone, Debug)]
-pub struct Scene<B: Backend> {
+pub struct Scene<B: RasterBackend> {
     problem: Problem,
     /// Signed distance in NDC, `[views, quads, pixels]`.
     distance: Tensor<B, 3>,
@@ -34,7 +34,7 @@ pub struct Scene<B: Backend> {
     fixed_edges: RefCell<Option<(usize, Tensor<B, 3>)>>,
 }
 
-impl<B: Backend> Scene<B> {
+impl<B: RasterBackend> Scene<B> {
     /// Instances of `problem` on images of `size` × `size` pixels.
     ///
     /// # Panics

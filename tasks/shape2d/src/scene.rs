@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::Tensor;
 use softrast_inverse::Targets;
 use softrast_meta::tensor;
-use softrast_raster::{hard_silhouette, mse_loss};
+use softrast_raster::{RasterBackend, hard_silhouette, mse_loss};
 
 use crate::Instance;
 
@@ -20,14 +20,14 @@ const FROM_CENTROID: f64 = 1.5;
 /// corners move freely. Not as in the released code, whose log-odds keep each coordinate on its
 /// side of the centre.
 #[derive(Clone, Debug)]
-pub struct Scene<B: Backend> {
+pub struct Scene<B: RasterBackend> {
     start: Tensor<B, 1>,
     targets: Targets<B>,
     faces: Arc<[[u32; 3]]>,
     size: usize,
 }
 
-impl<B: Backend> Scene<B> {
+impl<B: RasterBackend> Scene<B> {
     /// The triangles of `instance` and the picture `target` `[size * size]`, top row first, in
     /// [0, 1].
     ///

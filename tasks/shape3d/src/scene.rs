@@ -1,10 +1,10 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::Tensor;
 use softrast_inverse::Targets;
 use softrast_mesh::{Edges, Mesh};
 use softrast_meta::tensor;
-use softrast_raster::{hard_silhouette, iou_loss, project};
+use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, project};
 
 use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
 
@@ -31,7 +31,7 @@ const ON_PLANE: f64 = 1e-6;
 /// and `c = tanh k`, all within -1 to 1. So no vertex crosses the planes through the centre, and a
 /// coordinate that starts at 0 stays at that of the centre. Source: docs/notes.md, 3D shape.
 #[derive(Clone, Debug)]
-pub struct Scene<B: Backend> {
+pub struct Scene<B: RasterBackend> {
     /// `logit |v|` of each coordinate, `[vertices, 3]`; 0 where the sign is 0.
     log_odds: Tensor<B, 2>,
     /// -1, 0 or 1, `[vertices, 3]`.
@@ -44,7 +44,7 @@ pub struct Scene<B: Backend> {
     size: usize,
 }
 
-impl<B: Backend> Scene<B> {
+impl<B: RasterBackend> Scene<B> {
     /// The `instance` with these meshes on images of `size` × `size` pixels.
     pub fn new(target: &Mesh, template: &Mesh, instance: &Instance, size: usize) -> Self {
         let azimuths_deg = (0..VIEWS).map(|view| 360.0 / VIEWS as f64 * view as f64);

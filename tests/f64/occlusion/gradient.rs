@@ -3,9 +3,10 @@
 
 use burn::{
     backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
+    tensor::Tensor,
 };
 use occlusion::{Instance, Problem, Scene};
+use softrast_raster::RasterBackend;
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, tensor};
 
@@ -28,7 +29,7 @@ struct Case {
 }
 
 impl Case {
-    fn scene<T: Backend>(&self) -> Scene<T> {
+    fn scene<T: RasterBackend>(&self) -> Scene<T> {
         let instances: Vec<Instance> =
             (0..VIEWS as u64).map(|seed| Instance::seeded(seed, &self.problem)).collect();
         Scene::new(&self.problem, &instances, SIZE)
@@ -41,7 +42,7 @@ impl Case {
     }
 
     /// Sum of the losses of all views.
-    fn loss<T: Backend>(&self, x: Tensor<T, 1>) -> Tensor<T, 1> {
+    fn loss<T: RasterBackend>(&self, x: Tensor<T, 1>) -> Tensor<T, 1> {
         let scene = self.scene::<T>();
         let (depths, edge) = (VIEWS * self.problem.quads, self.edge.default_phi(1.0).len());
         let theta = x.clone().narrow(0, 0, depths).reshape([VIEWS, self.problem.quads]);

@@ -3,6 +3,7 @@
 mod bad_cases;
 mod camera;
 mod colour;
+mod elementary;
 mod fused;
 mod pytorch3d;
 mod reference;

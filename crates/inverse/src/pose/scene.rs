@@ -1,8 +1,10 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
-use softrast_raster::{Orbit, hard_silhouette, iou_loss, project, vertices, view_rotation};
+use softrast_raster::{
+    Orbit, RasterBackend, hard_silhouette, iou_loss, project, vertices, view_rotation,
+};
 
 use crate::{Targets, pose::PoseInstance};
 
@@ -16,7 +18,7 @@ const HALF_FOV_DEG: [f64; 2] = [1.0, 80.0];
 /// The optimised θ is `[views, 3]`: distance in world units, elevation and azimuth in degrees; with
 /// an optimised field of view `[views, 4]`, the last being half of it in degrees.
 #[derive(Clone, Debug)]
-pub struct PoseScene<B: Backend> {
+pub struct PoseScene<B: RasterBackend> {
     /// The mesh as each target camera sees it, turned but not moved: `[views, vertices, 3]`.
     turned: Tensor<B, 3>,
     /// Field of view of each view in degrees, `[views, 1]`, unless θ holds half of it.
@@ -29,7 +31,7 @@ pub struct PoseScene<B: Backend> {
     size: usize,
 }
 
-impl<B: Backend> PoseScene<B> {
+impl<B: RasterBackend> PoseScene<B> {
     /// Instances of `mesh` on images of `size` × `size` pixels.
     ///
     /// The start's field of view is used as it is, and optimised if `optimise_fov`.

@@ -26,13 +26,13 @@ pub(crate) use topology::Topology;
 use burn::{
     backend::wgpu::{CubeBackend, WgpuRuntime},
     tensor::{
-        TensorMetadata,
+        FloatDType, Slice, TensorMetadata,
         ops::{FloatTensor, FloatTensorOps},
     },
 };
 
-use crate::{ProfileSum, RasterBackend};
-use pass::Pass;
+use crate::{FusedOp, Pass, RasterBackend};
+use pass::Pass as Kernels;
 
 /// Width and height in pixels of the tiles that walk together: one cube of units each.
 const TILE: u32 = 8;
@@ -43,33 +43,66 @@ pub type Wgpu = CubeBackend<WgpuRuntime, f32, i32, u32>;
 impl RasterBackend for Wgpu {
     const ON_HOST: bool = false;
 
-    fn profile_sum(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        let views = vertices.shape()[0];
-        let sums = Pass::new(op, vertices, table, None).sums();
-        Self::float_reshape(sums, [views, op.size, op.size].into())
+    fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
+        let FusedOp::ProfileSum(op) = op else { panic!("on a GPU {op:?} is made of tensor ops") };
+        let mut tensors = tensors.into_iter();
+        let mut next = || tensors.next().expect("all inputs of the pass");
+        let (vertices, table) = (next(), next());
+        let (coordinates, coefficients) = (length(&vertices), length(&table));
+        match pass {
+            Pass::Forward => {
+                let shape = [vertices.shape()[0], op.size, op.size];
+                Self::float_reshape(Kernels::new(op, vertices, table, None).sums(), shape.into())
+            }
+            Pass::Vjp { wanted } => {
+                let flat = Kernels::new(op, vertices, table, None).gradient(next(), wanted[1]);
+                parts(flat, &[coordinates, coefficients], wanted)
+            }
+            Pass::VjpOfVjp { along, wanted } => {
+                let (upstream, direction) = (next(), next());
+                let direction = whole(direction, &[coordinates, coefficients], along);
+                let pixels = length(&upstream);
+                let kernels = Kernels::new(op, vertices, table, Some(direction));
+                let flat = kernels.gradient(upstream, true);
+                parts(flat, &[coordinates, coefficients, pixels], wanted)
+            }
+        }
     }
+}
 
-    fn profile_sum_vjp(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-        wrt_table: bool,
-    ) -> FloatTensor<Self> {
-        Pass::new(op, vertices, table, None).gradient(upstream, wrt_table)
-    }
+fn length(tensor: &FloatTensor<Wgpu>) -> usize {
+    tensor.shape().num_elements()
+}
 
-    fn profile_sum_vjp_of_vjp(
-        op: &ProfileSum,
-        vertices: FloatTensor<Self>,
-        table: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-        direction: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        Pass::new(op, vertices, table, Some(direction)).gradient(upstream, true)
+/// Those parts of a flat tensor that are wanted, flat.
+fn parts(flat: FloatTensor<Wgpu>, lengths: &[usize], wanted: &[bool]) -> FloatTensor<Wgpu> {
+    if wanted.iter().all(|&wanted| wanted) {
+        return flat;
     }
+    let mut start = 0;
+    let mut chosen = Vec::new();
+    for (&length, &wanted) in lengths.iter().zip(wanted) {
+        if wanted {
+            chosen.push(Wgpu::float_slice(flat.clone(), &[Slice::from(start..start + length)]));
+        }
+        start += length;
+    }
+    if chosen.len() == 1 { chosen.remove(0) } else { Wgpu::float_cat(chosen, 0) }
+}
+
+/// The inverse: zeros where a part is missing.
+fn whole(flat: FloatTensor<Wgpu>, lengths: &[usize], there: &[bool]) -> FloatTensor<Wgpu> {
+    if there.iter().all(|&there| there) {
+        return flat;
+    }
+    let device = Wgpu::float_device(&flat);
+    let mut start = 0;
+    let part = |(&length, &there): (&usize, &bool)| {
+        if !there {
+            return Wgpu::float_zeros([length].into(), &device, FloatDType::F32);
+        }
+        start += length;
+        Wgpu::float_slice(flat.clone(), &[Slice::from(start - length..start)])
+    };
+    Wgpu::float_cat(lengths.iter().zip(there).map(part).collect(), 0)
 }

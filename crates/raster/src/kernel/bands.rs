@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 
 use super::{
-    face::{Reach, in_pixels},
-    real::Float,
+    float::Float,
+    lanes::{LANES, Lanes, Plain},
+    reach::{Reach, grown, in_pixels},
+    real::splat,
+    walk::has_avx2,
 };
-
-/// Rows of a band.
-pub(crate) const ROWS: usize = 32;
 
 /// Faces of one view by band, in ascending order of faces.
 #[derive(Debug)]
@@ -45,10 +45,11 @@ impl Bands {
         vertices_per_view: usize,
         faces: &[[u32; 3]],
         size: usize,
+        rows: usize,
         near: f64,
         radius: f64,
     ) -> Self {
-        let count = size.div_ceil(ROWS);
+        let count = size.div_ceil(rows);
         let radius = F::from_f64(0.5 * radius * size as f64);
         let near = F::from_f64(near);
         let view = |vertices: &[F]| {
@@ -56,17 +57,13 @@ impl Bands {
             let (y, z) = rest.split_at(vertices_per_view);
             let place = |((&x, &y), &z)| in_pixels([x, y, z], near, size);
             let places: Vec<_> = x.iter().zip(y).zip(z).map(place).collect();
-            let mut drawn = 0;
-            let corners = |&[a, b, c]: &[u32; 3]| {
-                [places[a as usize], places[b as usize], places[c as usize]]
+            let mut reaches = vec![Reach::NOTHING; faces.len()];
+            let drawn = if has_avx2() {
+                reach_of_faces::<F::Avx2>(&places, faces, radius, size, &mut reaches)
+            } else {
+                reach_of_faces::<Plain<F>>(&places, faces, radius, size, &mut reaches)
             };
-            let reach = |face: &[u32; 3]| {
-                let reach = Reach::around(corners(face), radius, size);
-                drawn += usize::from(reach.is_some());
-                reach.unwrap_or(Reach::NOTHING)
-            };
-            let reaches: Vec<Reach> = faces.iter().map(reach).collect();
-            let (offsets, entries) = by_band(&reaches, count);
+            let (offsets, entries) = by_band(&reaches, count, rows);
             View { offsets, entries, reaches, drawn }
         };
         let views = vertices.par_chunks(3 * vertices_per_view.max(1)).map(view).collect();
@@ -74,11 +71,98 @@ impl Bands {
     }
 }
 
-/// Sorts faces into the bands that they reach.
-fn by_band(reaches: &[Reach], count: usize) -> (Vec<u32>, Vec<u32>) {
+/// Writes the pixels that each face may reach, and counts the faces that are drawn. `places` are those of the vertices in the
+/// image, `radius` is in pixels.
+fn reach_of_faces<L: Lanes>(
+    places: &[[L::Float; 2]],
+    faces: &[[u32; 3]],
+    radius: L::Float,
+    size: usize,
+    reaches: &mut [Reach],
+) -> usize {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<L: Lanes>(
+            places: &[[L::Float; 2]],
+            faces: &[[u32; 3]],
+            radius: L::Float,
+            size: usize,
+            reaches: &mut [Reach],
+        ) -> usize {
+            reach_of_blocks::<L>(places, faces, radius, size, reaches)
+        }
+        if L::NEEDS_AVX2 || has_avx2() {
+            // SAFETY: the feature was just detected, or before there were such vectors.
+            #[allow(unsafe_code)]
+            return unsafe { avx2::<L>(places, faces, radius, size, reaches) };
+        }
+    }
+    reach_of_blocks::<L>(places, faces, radius, size, reaches)
+}
+
+#[inline(always)]
+fn reach_of_blocks<L: Lanes>(
+    places: &[[L::Float; 2]],
+    faces: &[[u32; 3]],
+    radius: L::Float,
+    size: usize,
+    reaches: &mut [Reach],
+) -> usize {
+    let mut drawn = 0;
+    for (faces, reaches) in faces.chunks(LANES).zip(reaches.chunks_mut(LANES)) {
+        let mut corners = [[[L::Float::ZERO; LANES]; 3]; 2];
+        for (lane, face) in faces.iter().enumerate() {
+            for k in 0..3 {
+                let [x, y] = places[face[k] as usize];
+                (corners[0][k][lane], corners[1][k][lane]) = (x, y);
+            }
+        }
+        let [x, y] = &corners;
+        let (columns, rows) = (Range::<L>::new(x, radius, size), Range::<L>::new(y, radius, size));
+        for (lane, reach) in reaches.iter_mut().enumerate() {
+            let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
+            let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
+            // A vertex that is not drawn is at infinity in both.
+            let is_drawn = columns.highest[lane] < L::Float::from_f64(f64::INFINITY);
+            drawn += usize::from(is_drawn);
+            if is_drawn && left < right && top < bottom {
+                *reach = Reach { top, bottom, left, right };
+            }
+        }
+    }
+    drawn
+}
+
+/// Pixels that faces may reach along an axis: first and after the last.
+struct Range<L: Lanes> {
+    start: [i32; LANES],
+    end: [i32; LANES],
+    highest: [L::Float; LANES],
+}
+
+impl<L: Lanes> Range<L> {
+    #[inline(always)]
+    fn new([a, b, c]: &[[L::Float; LANES]; 3], radius: L::Float, size: usize) -> Self {
+        let (a, b, c) = (L::of(a), L::of(b), L::of(c));
+        let highest = a.max(b).max(c);
+        let grown = L::splat(grown(radius, size));
+        let low = a.min(b).min(c) - grown + splat(1.0);
+        let most = splat(size as f64);
+        Self {
+            start: low.max(splat(0.0)).min(most).nearest(),
+            end: (highest + grown).max(splat(0.0)).min(most).nearest(),
+            highest: highest.array(),
+        }
+    }
+}
+
+/// Sorts faces into the bands that they reach, of `rows` each: a power of two.
+fn by_band(reaches: &[Reach], count: usize, rows: usize) -> (Vec<u32>, Vec<u32>) {
+    let shift = rows.trailing_zeros();
     let bands = |reach: &Reach| {
-        let [top, bottom] = [reach.top, reach.bottom].map(|row| row as usize);
-        top / ROWS..bottom.div_ceil(ROWS)
+        let end = (reach.bottom as usize + rows - 1) >> shift;
+        (reach.top as usize) >> shift..end
     };
     let mut offsets = vec![0u32; count + 1];
     for reach in reaches {

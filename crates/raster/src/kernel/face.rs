@@ -1,36 +1,44 @@
-//! One projected triangle: its edges, and the pixels of a row that its support can reach.
+//! Projected triangles, eight at a time: their edges, and the pixels of a row that their support can reach.
 
-use super::real::{Float, Real};
+use super::{
+    float::Float as _,
+    lanes::{LANES, Lanes},
+    reach::{FAR_AWAY, Reach},
+    real::{Float, Real, splat},
+};
 
 /// Edge vectors shorter than this (NDC², squared length) count as a point.
 const POINT: f64 = 1e-30;
-/// Projected coordinates beyond this (NDC) are not drawn: a table reaches no farther.
-const FAR_AWAY: f64 = 1e6;
+/// Edges whose slope is below this bound no column.
+const FLAT: f64 = 1e-3;
+/// Triangles lower than this part of their longest edge count as slivers.
+const SLIVER: f64 = 1e-3;
+/// What makes up for the rounding of a column, in pixels.
+const MARGIN: f64 = 0.01;
 
-/// Faces that are prepared together.
-pub(crate) const BLOCK: usize = 8;
-
-type Lanes<N> = [N; BLOCK];
-
-/// Projected triangles prepared for distances, one a lane; corner k starts edge k.
+/// Triangles prepared for distances, one a lane; corner k starts edge k, and all turn counterclockwise.
 ///
-/// Meshes have faces of a few pixels, so that what a face costs before its first pixel counts. Every
-/// loop runs over the faces of a block, which the compiler turns into straight vector code.
+/// Meshes have faces of a few pixels, so that what a face costs before its first pixel counts.
 pub(crate) struct Faces<T: Real> {
-    x: [Lanes<T>; 3],
-    y: [Lanes<T>; 3],
-    edge_x: [Lanes<T>; 3],
-    edge_y: [Lanes<T>; 3],
-    inverse: [Lanes<T>; 3],
-    /// Sign of the area; 0 for a triangle without area.
-    orientation: Lanes<T::Float>,
-    side_x: [Lanes<T::Float>; 3],
-    side_y: [Lanes<T::Float>; 3],
-    spans: Spans<Lanes<T::Float>>,
+    x: [T::Stored; 3],
+    y: [T::Stored; 3],
+    edge_x: [T::Stored; 3],
+    edge_y: [T::Stored; 3],
+    inverse: [T::Stored; 3],
+    inverse_length: [[Float<T>; LANES]; 3],
+    most: [Float<T>; LANES],
+    /// Whether some are slivers or have no area.
+    pub(crate) slivers: bool,
+    /// Whether corners 1 and 2 have changed places: above 0 where they have.
+    turned: [Float<T>; LANES],
+    // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
+    // out of reach.
+    low: [[Float<T>; LANES]; 3],
+    high: [[Float<T>; LANES]; 3],
+    tilt: [[Float<T>; LANES]; 3],
 }
 
-/// One of them.
-#[derive(Clone, Copy)]
+/// One of them, in all lanes.
 pub(crate) struct Face<T: Real> {
     pub(crate) x: [T; 3],
     pub(crate) y: [T; 3],
@@ -38,253 +46,130 @@ pub(crate) struct Face<T: Real> {
     pub(crate) edge_y: [T; 3],
     /// One over the squared length of each edge; 0 for an edge that is a point.
     pub(crate) inverse: [T; 3],
-    /// The edges as they run counterclockwise; 0 for a triangle without area.
-    pub(crate) side_x: [T::Float; 3],
-    pub(crate) side_y: [T::Float; 3],
+    /// One over the length of each edge.
+    pub(crate) inverse_length: [T::Lanes; 3],
     /// What the least of the three edge functions may be at most: -1 for a triangle without area,
     /// which has no inside.
-    pub(crate) most: T::Float,
-}
-
-/// The three edges of a face as limits on x in a given row.
-#[derive(Clone, Copy)]
-pub(crate) struct Spans<F> {
-    // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
-    // out of reach.
-    low: [F; 3],
-    high: [F; 3],
-    tilt: [F; 3],
+    pub(crate) most: T::Lanes,
 }
 
 impl<T: Real> Faces<T> {
-    /// Prepares triangles with the given corners (NDC) for pixels no farther than `radius` outside.
+    /// Prepares triangles with these corners (NDC) for pixels no farther than `radius` outside.
     #[inline(always)]
-    pub(crate) fn new(x: [Lanes<T>; 3], y: [Lanes<T>; 3], radius: T::Float) -> Self {
-        let (zero, one) = (T::Float::ZERO, T::Float::ONE);
-        let nothing = [[T::ZERO; BLOCK]; 3];
-        let (mut edge_x, mut edge_y, mut inverse) = (nothing, nothing, nothing);
-        for k in 0..3 {
-            for i in 0..BLOCK {
-                let (ex, ey) = (x[(k + 1) % 3][i] - x[k][i], y[(k + 1) % 3][i] - y[k][i]);
-                let length2 = ex * ex + ey * ey;
-                let some = length2.value() > T::Float::from_f64(POINT);
-                let recip = if some { length2 } else { T::ONE }.recip();
-                inverse[k][i] = if some { recip } else { T::ZERO };
-                (edge_x[k][i], edge_y[k][i]) = (ex, ey);
-            }
-        }
-        let mut orientation = [zero; BLOCK];
-        for i in 0..BLOCK {
-            let unit = |some: bool| if some { one } else { zero };
-            let area = edge_x[0][i].value() * edge_y[1][i].value()
-                - edge_y[0][i].value() * edge_x[1][i].value();
-            orientation[i] = unit(area > zero) - unit(area < zero);
-        }
+    pub(crate) fn new(x: [T; 3], y: [T; 3], radius: Float<T>) -> Self {
+        let zero = splat::<T::Lanes>(0.0);
+        let area = (x[1] - x[0]).value() * (y[2] - y[0]).value()
+            - (y[1] - y[0]).value() * (x[2] - x[0]).value();
+        let turned = area.less(zero);
+        let x = [x[0], T::choose(turned, x[2], x[1]), T::choose(turned, x[1], x[2])];
+        let y = [y[0], T::choose(turned, y[2], y[1]), T::choose(turned, y[1], y[2])];
+        let area = area.max(area.neg());
+        let solid = zero.less(area);
+        let mut longest = zero;
+        let pick = <T::Lanes as Lanes>::pick;
+        let none = [T::Stored::default(); 3];
+        let nothing = [[Float::<T>::ZERO; LANES]; 3];
         let mut faces = Self {
-            x,
-            y,
-            edge_x,
-            edge_y,
-            inverse,
-            orientation,
-            side_x: [[zero; BLOCK]; 3],
-            side_y: [[zero; BLOCK]; 3],
-            spans: Spans {
-                low: [[zero; BLOCK]; 3],
-                high: [[zero; BLOCK]; 3],
-                tilt: [[zero; BLOCK]; 3],
-            },
+            x: none,
+            y: none,
+            edge_x: none,
+            edge_y: none,
+            inverse: none,
+            inverse_length: nothing,
+            most: pick(solid, splat(1.0), splat(-1.0)).array(),
+            slivers: false,
+            turned: splat::<T::Lanes>(1.0).only(turned).array(),
+            low: nothing,
+            high: nothing,
+            tilt: nothing,
         };
-        faces.limit(radius);
-        faces
-    }
-
-    /// Finds the limits for pixels no farther than `radius` outside the faces.
-    #[inline(always)]
-    fn limit(&mut self, radius: T::Float) {
-        let (zero, one) = (T::Float::ZERO, T::Float::ONE);
-        let never = T::Float::from_f64(FAR_AWAY);
-        // The bound is of no use for an edge that is all but horizontal, or for a face without area.
-        let flat = T::Float::from_f64(1e-3);
         for k in 0..3 {
-            for i in 0..BLOCK {
-                let ex = self.edge_x[k][i].value() * self.orientation[i];
-                let ey = self.edge_y[k][i].value() * self.orientation[i];
-                (self.side_x[k][i], self.side_y[k][i]) = (ex, ey);
-                // ex (py - y) - ey (px - x) >= -radius |e|, solved for px.
-                let useless = ey * ey <= flat * flat * ex * ex;
-                let tilt = ex * if useless { one } else { ey }.recip();
-                let reach = radius * (one + tilt * tilt).sqrt();
-                let bound = self.x[k][i].value() - tilt * self.y[k][i].value();
-                self.spans.tilt[k][i] = if useless { zero } else { tilt };
-                self.spans.low[k][i] = if (ey < zero) & !useless { bound - reach } else { -never };
-                self.spans.high[k][i] = if (ey > zero) & !useless { bound + reach } else { never };
-            }
+            let (edge_x, edge_y) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
+            let length2 = edge_x * edge_x + edge_y * edge_y;
+            let some = splat::<T::Lanes>(POINT).less(length2.value());
+            let inverse = T::choose(some, length2, T::constant(splat(1.0))).inverse().masked(some);
+            (faces.x[k], faces.y[k]) = (x[k].store(), y[k].store());
+            (faces.edge_x[k], faces.edge_y[k]) = (edge_x.store(), edge_y.store());
+            faces.inverse[k] = inverse.store();
+            faces.inverse_length[k] = inverse.value().sqrt().array();
+            longest = length2.value().max(longest);
+
+            // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for an edge
+            // that is all but horizontal, or for a face without area.
+            let (ex, ey) = (edge_x.value().only(solid), edge_y.value().only(solid));
+            let flat = splat::<T::Lanes>(FLAT * FLAT) * ex * ex;
+            let useful = flat.less(ey * ey);
+            let tilt = (ex * Lanes::recip(pick(useful, ey, splat(1.0)))).only(useful);
+            let reach = T::Lanes::splat(radius) * (splat::<T::Lanes>(1.0) + tilt * tilt).sqrt();
+            let bound = x[k].value() - tilt * y[k].value();
+            let never = splat::<T::Lanes>(FAR_AWAY);
+            let low = pick(ey.less(zero), bound - reach, never.neg());
+            let high = pick(zero.less(ey), bound + reach, never);
+            faces.tilt[k] = tilt.array();
+            faces.low[k] = pick(useful, low, never.neg()).array();
+            faces.high[k] = pick(useful, high, never).array();
         }
+        let stout = (splat::<T::Lanes>(SLIVER) * longest).less(area);
+        faces.slivers = pick(stout, zero, splat(1.0)).sum() > Float::<T>::ZERO;
+        faces
     }
 
     /// The face of a lane.
     #[inline(always)]
     pub(crate) fn face(&self, lane: usize) -> Face<T> {
-        let flat = self.orientation[lane] == T::Float::ZERO;
         Face {
             x: of_lane(&self.x, lane),
             y: of_lane(&self.y, lane),
             edge_x: of_lane(&self.edge_x, lane),
             edge_y: of_lane(&self.edge_y, lane),
             inverse: of_lane(&self.inverse, lane),
-            side_x: of_lane(&self.side_x, lane),
-            side_y: of_lane(&self.side_y, lane),
-            most: if flat { -T::Float::ONE } else { T::Float::ONE },
+            inverse_length: [
+                T::Lanes::splat(self.inverse_length[0][lane % LANES]),
+                T::Lanes::splat(self.inverse_length[1][lane % LANES]),
+                T::Lanes::splat(self.inverse_length[2][lane % LANES]),
+            ],
+            most: T::Lanes::splat(self.most[lane % LANES]),
         }
     }
 
-    /// The limits of a lane.
+    /// The corners of a lane as they were given, by their places here.
     #[inline(always)]
-    pub(crate) fn spans(&self, lane: usize) -> Spans<T::Float> {
-        let Spans { low, high, tilt } = &self.spans;
-        Spans { low: of_lane(low, lane), high: of_lane(high, lane), tilt: of_lane(tilt, lane) }
+    pub(crate) fn corners(&self, lane: usize) -> [usize; 3] {
+        if self.turned[lane % LANES] > Float::<T>::ZERO { [0, 2, 1] } else { [0, 1, 2] }
+    }
+
+    /// Columns that all three edges of a lane allow in the rows at heights `y`, within the columns of
+    /// `reach`: first column and the one after the last.
+    #[inline(always)]
+    pub(crate) fn columns(
+        &self,
+        lane: usize,
+        y: &[Float<T>; LANES],
+        reach: Reach,
+        size: usize,
+    ) -> ([i32; LANES], [i32; LANES]) {
+        let y = <T::Lanes as Lanes>::of(y);
+        let lane = lane % LANES;
+        let number = |column: u32| -> T::Lanes { splat(f64::from(column)) };
+        let (left, right) = (number(reach.left), number(reach.right));
+        let (mut low, mut high) = (splat::<T::Lanes>(-2.0), splat::<T::Lanes>(2.0));
+        for k in 0..3 {
+            let shift = T::Lanes::splat(self.tilt[k][lane]) * y;
+            low = (T::Lanes::splat(self.low[k][lane]) + shift).max(low);
+            high = (T::Lanes::splat(self.high[k][lane]) + shift).min(high);
+        }
+        // The first centre at or after low, and the one after the last at or before high.
+        let half = splat::<T::Lanes>(0.5 * size as f64);
+        let middle = 0.5 * (size as f64 - 1.0) + 0.5;
+        let low = low * half + splat(middle - MARGIN);
+        let high = high * half + splat(middle + MARGIN);
+        let (starts, ends) = (low.max(left).min(right), high.min(right).max(splat(0.0)));
+        (starts.nearest(), ends.nearest())
     }
 }
 
 /// What three edges or corners have in a lane. Written out: `map` on an array is a call.
 #[inline(always)]
-fn of_lane<N: Copy>([a, b, c]: &[Lanes<N>; 3], lane: usize) -> [N; 3] {
-    [a[lane], b[lane], c[lane]]
-}
-
-/// Where a vertex lies in a `size` px image: column and row, whole numbers at the centres of
-/// pixels, the top row first. Infinite for a vertex whose faces are not drawn: one nearer than
-/// `near`, behind the camera, not finite, or farther than 1e6 NDC away.
-#[inline(always)]
-pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: usize) -> [F; 2] {
-    let far = F::from_f64(FAR_AWAY);
-    let half = F::from_f64(0.5 * size as f64);
-    let middle = F::from_f64(0.5 * (size as f64 - 1.0));
-    // Written so that NaN is not drawn either.
-    let drawn = (z >= near) & (x <= far) & (x >= -far) & (y <= far) & (y >= -far);
-    let place = |at: F| if drawn { at * half + middle } else { F::from_f64(f64::INFINITY) };
-    [place(x), place(-y)]
-}
-
-/// Pixels that a face may reach: rows and columns as half-open ranges, top row first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Reach {
-    pub(crate) top: u32,
-    pub(crate) bottom: u32,
-    pub(crate) left: u32,
-    pub(crate) right: u32,
-}
-
-impl Reach {
-    /// No pixel.
-    pub(crate) const NOTHING: Self = Self { top: 0, bottom: 0, left: 0, right: 0 };
-
-    /// Pixels of a `size` px image no farther than `radius` pixels from the bounding box of three
-    /// corners, given as [`in_pixels`] does; `None` where one of them is not drawn.
-    #[inline(always)]
-    pub(crate) fn around<F: Float>(corners: [[F; 2]; 3], radius: F, size: usize) -> Option<Self> {
-        let size = F::from_f64(size as f64);
-        // More than places of pixels are rounded by.
-        let grown = radius + size * F::from_f64(1e-6) + F::from_f64(0.5);
-        let least = |a: F, b: F| if a < b { a } else { b };
-        let largest = |a: F, b: F| if a > b { a } else { b };
-        let limit = |at: F| least(largest(at, F::ZERO), size).nearest() as u32;
-        let highest =
-            |axis: usize| largest(largest(corners[0][axis], corners[1][axis]), corners[2][axis]);
-        let range = |axis: usize| {
-            let low = least(least(corners[0][axis], corners[1][axis]), corners[2][axis]);
-            (limit(low - grown + F::ONE), limit(highest(axis) + grown))
-        };
-        if highest(0) == F::from_f64(f64::INFINITY) {
-            return None;
-        }
-        let ((left, right), (top, bottom)) = (range(0), range(1));
-        let some = left < right && top < bottom;
-        Some(if some { Self { top, bottom, left, right } } else { Self::NOTHING })
-    }
-}
-
-/// Rows that [`Spans::columns`] handles at once.
-pub(crate) const SPANS: usize = 8;
-
-impl<F: Float> Spans<F> {
-    /// Columns that all three edges allow in the rows at heights `y`, within the columns of
-    /// `reach`: first column and the one after the last.
-    #[inline(always)]
-    pub(crate) fn columns(
-        &self,
-        y: &[F; SPANS],
-        reach: Reach,
-        size: usize,
-    ) -> ([i32; SPANS], [i32; SPANS]) {
-        let half = F::from_f64(0.5 * size as f64);
-        let middle = F::from_f64(0.5 * (size as f64 - 1.0));
-        // A hundredth of a pixel makes up for rounding.
-        let margin = F::from_f64(0.01);
-        let point_five = F::from_f64(0.5);
-        let limits = [F::from_f64(f64::from(reach.left)), F::from_f64(f64::from(reach.right))];
-        let mut starts = [0; SPANS];
-        let mut ends = [0; SPANS];
-        for i in 0..SPANS {
-            let (mut low, mut high) = (-F::ONE - F::ONE, F::ONE + F::ONE);
-            for k in 0..3 {
-                let shift = self.tilt[k] * y[i];
-                let (l, h) = (self.low[k] + shift, self.high[k] + shift);
-                low = if l > low { l } else { low };
-                high = if h < high { h } else { high };
-            }
-            // The first centre at or after low, and the one after the last at or before high.
-            let low = low * half + middle - margin + point_five;
-            let high = high * half + middle + margin + point_five;
-            let low = if low > limits[0] { low } else { limits[0] };
-            let high = if high < limits[1] { high } else { limits[1] };
-            starts[i] = if low < limits[1] { low } else { limits[1] }.nearest();
-            ends[i] = if high > F::ZERO { high } else { F::ZERO }.nearest();
-        }
-        (starts, ends)
-    }
-}
-
-/// Calls `fill(row, start, end)` for the pixels whose centre a face over `vertices`
-/// `[3, vertices]` covers (edges included).
-pub(crate) fn inside_spans<F: Float>(
-    vertices: &[F],
-    face: &[u32; 3],
-    near: f64,
-    size: usize,
-    mut fill: impl FnMut(usize, usize, usize),
-) {
-    // Exact decisions: the edge functions of the corners as given, in f64.
-    let count = vertices.len() / 3;
-    let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize].to_f64()));
-    let Some(reach) = Reach::around(corners.map(|at| in_pixels(at, near, size)), 0.0, size) else {
-        return;
-    };
-    let edges = [0, 1, 2].map(|k| {
-        let ([x, y, _], [to_x, to_y, _]) = (corners[k], corners[(k + 1) % 3]);
-        [x, y, to_x - x, to_y - y]
-    });
-    let area = edges[0][2] * edges[1][3] - edges[0][3] * edges[1][2];
-    if area == 0.0 {
-        return;
-    }
-    let (left, right) = (reach.left as usize, reach.right as usize);
-    for row in reach.top as usize..reach.bottom as usize {
-        let py = pixel_centre(size - 1 - row, size);
-        let covers = |column: &usize| {
-            let px = pixel_centre(*column, size);
-            let side = |&[x, y, ex, ey]: &[f64; 4]| ex * (py - y) - ey * (px - x);
-            edges.iter().all(|edge| area.signum() * side(edge) >= 0.0)
-        };
-        let Some(start) = (left..right).find(covers) else { continue };
-        let end = (start..right).find(|column| !covers(column)).unwrap_or(right);
-        fill(row, start, end);
-    }
-}
-
-/// Centre of pixel `index` along an axis in NDC; rows count from the bottom here.
-#[inline]
-pub(crate) fn pixel_centre(index: usize, size: usize) -> f64 {
-    (2.0 * index as f64 + 1.0 - size as f64) / size as f64
+fn of_lane<T: Real>([a, b, c]: &[T::Stored; 3], lane: usize) -> [T; 3] {
+    [T::of_lane(a, lane), T::of_lane(b, lane), T::of_lane(c, lane)]
 }

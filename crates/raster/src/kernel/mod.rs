@@ -7,17 +7,21 @@
 //! the image and its gradient, dual numbers give both second-order products.
 
 mod bands;
-mod batch;
 mod face;
+mod float;
+mod lanes;
+mod list;
 mod pair;
 mod pairs;
+mod reach;
 mod real;
 mod sum;
 mod table;
 mod walk;
 
-pub(crate) use face::inside_spans;
+pub(crate) use float::Float;
 pub(crate) use pairs::pairs;
-pub(crate) use real::Float;
+pub(crate) use reach::inside_spans;
+pub(crate) use real::Dual;
 pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};
 pub(crate) use table::Grid;

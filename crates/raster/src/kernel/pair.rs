@@ -1,9 +1,12 @@
-//! The arithmetic of one pixel and one face, generic over the number.
+//! The arithmetic of eight pixels and one face.
 
-use super::{face::Face, real::Real};
+use super::{
+    face::Face,
+    lanes::Lanes,
+    real::{Mask, Real, splat},
+};
 
-/// Closest point of a triangle's boundary to a pixel.
-#[derive(Clone, Copy)]
+/// Closest points of a triangle's boundary to eight pixels.
 pub(crate) struct Closest<T: Real> {
     /// Squared distance to it, NDC².
     pub(crate) distance2: T,
@@ -12,47 +15,117 @@ pub(crate) struct Closest<T: Real> {
     pub(crate) dy: T,
     /// Its barycentric weights.
     pub(crate) weights: [T; 3],
-    /// At least 0 where the pixel lies in the triangle, edges included.
-    pub(crate) inside: T::Float,
+    /// Where the pixel lies in the triangle, edges included.
+    pub(crate) inside: Mask<T>,
 }
 
-/// Closest boundary point, by projection onto each edge. No inverted matrix, no square root, no
-/// division: slivers, points and pixels on an edge all give finite numbers.
+/// Closest boundary points to the pixels at `px`, `py` (NDC), by projection onto edges. No inverted matrix, no division:
+/// slivers, points and pixels on an edge all give finite numbers.
+///
+/// Without `SLIVERS`, only onto the edge whose line has the least signed distance: it has the closest point. For let p be the
+/// pixel, q its closest point at distance d. If q is the foot on an edge, no line of the triangle that q is inside of
+/// can be more than d beyond p. If q is a corner, so is it on both of its edges, and p - q a sum of their outward normals with
+/// factors from 0 up: the larger of its products with these two normals is at least that with the third, which is minus their
+/// sum weighted by the lengths of the edges. Rounding confuses edges only where they are all but parallel.
 #[inline(always)]
-pub(crate) fn closest<T: Real>(face: &Face<T>, px: T::Float, py: T::Float) -> Closest<T> {
-    let (zero, one) = (T::Float::ZERO, T::Float::ONE);
-    let mut best = [T::ZERO; 3];
-    let mut along = T::ZERO;
-    let mut from = [zero; 3];
-    let mut inside = face.most;
-    for k in 0..3 {
-        let wx = T::constant(px) - face.x[k];
-        let wy = T::constant(py) - face.y[k];
-        let t = (wx * face.edge_x[k] + wy * face.edge_y[k]) * face.inverse[k];
-        let t = if t.value() > zero { t } else { T::ZERO };
-        let t = if t.value() < one { t } else { T::ONE };
-        let dx = wx - t * face.edge_x[k];
-        let dy = wy - t * face.edge_y[k];
-        let distance2 = dx * dx + dy * dy;
-        let side = face.side_x[k] * wy.value() - face.side_y[k] * wx.value();
-        inside = if side < inside { side } else { inside };
-        let nearer = k == 0 || distance2.value() < best[0].value();
-        best = [
-            if nearer { distance2 } else { best[0] },
-            if nearer { dx } else { best[1] },
-            if nearer { dy } else { best[2] },
-        ];
-        along = if nearer { t } else { along };
-        for (j, start) in from.iter_mut().enumerate() {
-            *start = if nearer { if j == k { one } else { zero } } else { *start };
-        }
+pub(crate) fn closest<T: Real, const SLIVERS: bool>(
+    face: &Face<T>,
+    px: T::Lanes,
+    py: T::Lanes,
+) -> Closest<T> {
+    let a = Edge::seen_from(face, 0, px, py);
+    let b = Edge::seen_from(face, 1, px, py);
+    let c = Edge::seen_from(face, 2, px, py);
+    let side = a.side.min(b.side).min(c.side).min(face.most);
+    let inside = splat::<T::Lanes>(0.0).at_most(side);
+    let (second, third, point);
+    if SLIVERS {
+        let points = [a.point(), b.point(), c.point()];
+        let [first, other, last] = &points;
+        second = other.distance2.value().less(first.distance2.value());
+        let nearer = Point::choose(second, other, first);
+        third = last.distance2.value().less(nearer.distance2.value());
+        point = Point::choose(third, last, &nearer);
+    } else {
+        second = b.line.less(a.line);
+        third = c.line.less(b.line.min(a.line));
+        point = Edge::choose(third, &c, &Edge::choose(second, &b, &a)).point();
     }
     // Corner k starts edge k and ends edge k - 1.
-    let rest = T::ONE - along;
-    let mut weights = [T::ZERO; 3];
-    for k in 0..3 {
-        weights[k] = rest.scale(from[k]) + along.scale(from[(k + 2) % 3]);
+    let (zero, along) = (T::constant(splat(0.0)), point.along);
+    let rest = T::constant(splat(1.0)) - along;
+    let weights = [
+        T::choose(third, along, T::choose(second, zero, rest)),
+        T::choose(third, zero, T::choose(second, rest, along)),
+        T::choose(third, rest, along.masked(second)),
+    ];
+    Closest { distance2: point.distance2, dx: point.dx, dy: point.dy, weights, inside }
+}
+
+/// An edge as pixels see it.
+struct Edge<T: Real> {
+    /// From its first corner to the pixel.
+    wx: T,
+    wy: T,
+    /// From its first corner to its second.
+    x: T,
+    y: T,
+    /// One over its squared length.
+    inverse: T,
+    /// Twice the area of the triangle that edge and pixel make: above 0 on the inner side.
+    side: T::Lanes,
+    /// Signed distance to its line.
+    line: T::Lanes,
+}
+
+/// The closest point of an edge.
+struct Point<T: Real> {
+    distance2: T,
+    dx: T,
+    dy: T,
+    /// Its place on the edge, 0 to 1.
+    along: T,
+}
+
+impl<T: Real> Edge<T> {
+    #[inline(always)]
+    fn seen_from(face: &Face<T>, k: usize, px: T::Lanes, py: T::Lanes) -> Self {
+        let (x, y) = (face.edge_x[k], face.edge_y[k]);
+        let (wx, wy) = (T::constant(px) - face.x[k], T::constant(py) - face.y[k]);
+        let side = x.value() * wy.value() - y.value() * wx.value();
+        Self { wx, wy, x, y, inverse: face.inverse[k], side, line: side * face.inverse_length[k] }
     }
-    let [distance2, dx, dy] = best;
-    Closest { distance2, dx, dy, weights, inside }
+
+    #[inline(always)]
+    fn choose(mask: Mask<T>, yes: &Self, no: &Self) -> Self {
+        let pick = <T::Lanes as Lanes>::pick;
+        Self {
+            wx: T::choose(mask, yes.wx, no.wx),
+            wy: T::choose(mask, yes.wy, no.wy),
+            x: T::choose(mask, yes.x, no.x),
+            y: T::choose(mask, yes.y, no.y),
+            inverse: T::choose(mask, yes.inverse, no.inverse),
+            side: pick(mask, yes.side, no.side),
+            line: pick(mask, yes.line, no.line),
+        }
+    }
+
+    #[inline(always)]
+    fn point(&self) -> Point<T> {
+        let along = ((self.wx * self.x + self.wy * self.y) * self.inverse).clamped();
+        let (dx, dy) = (self.wx - along * self.x, self.wy - along * self.y);
+        Point { distance2: dx * dx + dy * dy, dx, dy, along }
+    }
+}
+
+impl<T: Real> Point<T> {
+    #[inline(always)]
+    fn choose(mask: Mask<T>, yes: &Self, no: &Self) -> Self {
+        Self {
+            distance2: T::choose(mask, yes.distance2, no.distance2),
+            dx: T::choose(mask, yes.dx, no.dx),
+            dy: T::choose(mask, yes.dy, no.dy),
+            along: T::choose(mask, yes.along, no.along),
+        }
+    }
 }

@@ -3,29 +3,33 @@
 use rayon::prelude::*;
 
 use super::{
-    face::BLOCK,
-    real::Float,
+    float::Float,
+    lanes::{LANES, Plain},
+    list::within,
     sum::Inputs,
-    walk::{Place, Runs, Scene},
+    walk::Scene,
 };
 
 /// Number of pixel-face pairs over all views that one walk visits; the table is not read.
 pub(crate) fn pairs<F: Float>(inputs: &Inputs<F>) -> usize {
     let bands = inputs.bands();
-    let scene = Scene::new(inputs.vertices, inputs.faces, &[], inputs.grid, inputs.size);
+    let scene: Scene<Plain<F>> = inputs.scene([&[]; 2]);
     let views = bands.views.len();
     let in_view = |(index, view)| {
-        let vertices = scene.view(index, views);
         let in_band = |band: usize| {
-            let place = Place { vertices, view, band };
+            let place = scene.place(view, index, views, band);
             let mut pairs = 0;
-            for numbers in view.faces(band).chunks(BLOCK) {
+            for numbers in place.view.faces(band).chunks(LANES) {
                 let faces = place.faces(&scene, numbers);
                 for (lane, &number) in numbers.iter().enumerate() {
-                    let reach = view.reaches[number as usize];
-                    let runs = Runs::new(&faces.spans(lane), reach, scene.band_rows(band), &scene);
-                    for (start, end) in runs.rows.clone().map(|row| runs.columns(row)) {
-                        pairs += end.saturating_sub(start);
+                    let reach = place.view.reaches[number as usize];
+                    let rows = within(scene.band_rows(band), reach);
+                    for row in rows.clone().step_by(LANES) {
+                        let heights = scene.heights(row);
+                        let (starts, ends) = faces.columns(lane, heights, reach, scene.size);
+                        let lengths =
+                            starts.iter().zip(ends).map(|(start, end)| (end - start).max(0));
+                        pairs += lengths.take(rows.end - row).sum::<i32>() as usize;
                     }
                 }
             }

@@ -1,123 +1,125 @@
-//! The numbers that kernels run on: floats, and dual numbers over floats.
+//! The numbers that kernels run on: vectors of floats, and dual numbers over them.
 
-use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+use std::ops::{Add, Mul, Sub};
 
-/// Arithmetic shared by floats and dual numbers. Kernels branch on [`Real::value`] only.
+use super::lanes::{LANES, Lanes, Places};
+
+/// Arithmetic shared by vectors and dual numbers over them. Kernels compare [`Real::value`] only.
 pub(crate) trait Real:
-    Copy
-    + Send
-    + Sync
-    + 'static
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// The float below.
-    type Float: Float;
-    /// The number zero.
-    const ZERO: Self;
-    /// The number one.
-    const ONE: Self;
-    /// A number that does not depend on any input.
-    fn constant(value: Self::Float) -> Self;
-    /// The number without its derivative.
-    fn value(self) -> Self::Float;
+    /// The vectors below.
+    type Lanes: Lanes;
+    /// The same in memory.
+    type Stored: Copy + Default;
+    /// Whether numbers have tangents. Then the tangents are what a kernel gives back.
+    const DUAL: bool;
+    /// Numbers with these tangents, which are left aside where there are none.
+    fn new(value: Self::Lanes, tangent: Self::Lanes) -> Self;
+    /// Numbers that do not depend on any input.
+    fn constant(value: Self::Lanes) -> Self;
+    /// The numbers without their derivatives.
+    fn value(self) -> Self::Lanes;
+    /// What a kernel gives back of a result: the derivatives if there are any, else the values.
+    fn output(self) -> Self::Lanes;
     /// `factor * self` for a factor that does not depend on any input.
-    fn scale(self, factor: Self::Float) -> Self;
+    fn scale(self, factor: Self::Lanes) -> Self;
     /// `1 / self`.
-    fn recip(self) -> Self;
+    fn inverse(self) -> Self;
+    /// `yes` where the mask holds, else `no`.
+    fn choose(mask: Mask<Self>, yes: Self, no: Self) -> Self;
+    /// `self` where the mask holds, else 0.
+    fn masked(self, mask: Mask<Self>) -> Self;
+    /// No less than 0 and no more than 1.
+    fn clamped(self) -> Self;
+    /// To memory.
+    fn store(self) -> Self::Stored;
+    /// The number of one lane, in all lanes.
+    fn of_lane(stored: &Self::Stored, lane: usize) -> Self;
+    /// Rows of a table, column by column. `tangents` belongs to dual numbers.
+    fn rows(table: Table<Self>, at: &Places) -> [Self; 4];
 }
 
-/// `f32` or `f64`, with the view of their bits that the profile table is indexed by.
-pub(crate) trait Float: Real<Float = Self> + PartialOrd + Default + std::fmt::Debug {
-    /// Nearest float.
-    fn from_f64(value: f64) -> Self;
-    /// To double precision.
-    fn to_f64(self) -> f64;
-    /// Where `self` (at least 0, below 4) lies on the piecewise logarithmic grid of a table:
-    /// the cell's index (not yet limited to the table), its lower end and the inverse of its width.
-    fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self);
-    /// Square root.
-    fn sqrt(self) -> Self;
-    /// Nearest integer, for numbers in [0, 2^22].
-    fn nearest(self) -> i32;
+/// One float of a [`Real`].
+pub(crate) type Float<T> = <<T as Real>::Lanes as Lanes>::Float;
+/// Which lanes of a [`Real`].
+pub(crate) type Mask<T> = <<T as Real>::Lanes as Lanes>::Mask;
+
+/// Rows of a profile table, and their tangents where numbers have any.
+pub(crate) struct Table<'a, T: Real> {
+    pub(crate) values: &'a [[Float<T>; 4]],
+    pub(crate) tangents: &'a [[Float<T>; 4]],
 }
 
-macro_rules! float {
-    ($float:ty, $bits:ty, $mantissa:expr, $bias:expr) => {
-        impl Real for $float {
-            type Float = Self;
-            const ZERO: Self = 0.0;
-            const ONE: Self = 1.0;
-            #[inline(always)]
-            fn constant(value: Self) -> Self {
-                value
-            }
-            #[inline(always)]
-            fn value(self) -> Self {
-                self
-            }
-            #[inline(always)]
-            fn scale(self, factor: Self) -> Self {
-                factor * self
-            }
-            #[inline(always)]
-            fn recip(self) -> Self {
-                1.0 / self
-            }
-        }
+impl<T: Real> Clone for Table<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T: Real> Copy for Table<'_, T> {}
 
-        impl Float for $float {
-            #[inline(always)]
-            fn from_f64(value: f64) -> Self {
-                value as Self
-            }
-            #[inline(always)]
-            fn to_f64(self) -> f64 {
-                f64::from(self)
-            }
-            #[inline(always)]
-            fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self) {
-                // Exponent and leading mantissa bits count the cells; what remains is the place
-                // within the cell.
-                let raw = self.to_bits();
-                let shift = $mantissa - bits;
-                let lower = Self::from_bits((raw >> shift) << shift);
-                let first = ($bias - octaves) << bits;
-                let index = (raw >> shift) as i32 - first as i32 + 1;
-                let exponent = raw >> $mantissa;
-                let inverse_width =
-                    Self::from_bits((2 * $bias + bits as $bits - exponent) << $mantissa);
-                (index, lower, inverse_width)
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                self.sqrt()
-            }
-            #[inline(always)]
-            fn nearest(self) -> i32 {
-                // Adding 2^mantissa leaves the integer in the low bits; a cast would check its range
-                // number by number.
-                let shift = (1u64 << $mantissa) as Self;
-                ((self + shift).to_bits() - shift.to_bits()) as i32
-            }
-        }
-    };
+impl<L: Lanes> Real for L {
+    type Lanes = L;
+    type Stored = [L::Float; LANES];
+    const DUAL: bool = false;
+    #[inline(always)]
+    fn new(value: L, _: L) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn constant(value: L) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn value(self) -> L {
+        self
+    }
+    #[inline(always)]
+    fn output(self) -> L {
+        self
+    }
+    #[inline(always)]
+    fn scale(self, factor: L) -> Self {
+        factor * self
+    }
+    #[inline(always)]
+    fn inverse(self) -> Self {
+        Lanes::recip(self)
+    }
+    #[inline(always)]
+    fn choose(mask: L::Mask, yes: L, no: L) -> Self {
+        L::pick(mask, yes, no)
+    }
+    #[inline(always)]
+    fn masked(self, mask: L::Mask) -> Self {
+        Lanes::only(self, mask)
+    }
+    #[inline(always)]
+    fn clamped(self) -> Self {
+        self.max(splat(0.0)).min(splat(1.0))
+    }
+    #[inline(always)]
+    fn store(self) -> [L::Float; LANES] {
+        self.array()
+    }
+    #[inline(always)]
+    fn of_lane(stored: &[L::Float; LANES], lane: usize) -> Self {
+        L::splat(stored[lane % LANES])
+    }
+    #[inline(always)]
+    fn rows(table: Table<Self>, at: &Places) -> [Self; 4] {
+        L::rows(table.values, at)
+    }
 }
 
-float!(f32, u32, 23, 127);
-float!(f64, u64, 52, 1023);
-
-/// A number with its derivative along one direction of the inputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Dual<F> {
-    pub(crate) value: F,
-    pub(crate) tangent: F,
+/// Numbers with their derivatives along one direction of the inputs.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Dual<L> {
+    pub(crate) value: L,
+    pub(crate) tangent: L,
 }
 
-impl<F: Float> Add for Dual<F> {
+impl<L: Add<Output = L>> Add for Dual<L> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -125,7 +127,7 @@ impl<F: Float> Add for Dual<F> {
     }
 }
 
-impl<F: Float> Sub for Dual<F> {
+impl<L: Sub<Output = L>> Sub for Dual<L> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -133,7 +135,7 @@ impl<F: Float> Sub for Dual<F> {
     }
 }
 
-impl<F: Float> Mul for Dual<F> {
+impl<L: Copy + Add<Output = L> + Mul<Output = L>> Mul for Dual<L> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -144,40 +146,78 @@ impl<F: Float> Mul for Dual<F> {
     }
 }
 
-impl<F: Float> Neg for Dual<F> {
-    type Output = Self;
+impl<L: Lanes> Real for Dual<L> {
+    type Lanes = L;
+    type Stored = Dual<[L::Float; LANES]>;
+    const DUAL: bool = true;
     #[inline(always)]
-    fn neg(self) -> Self {
-        Self { value: -self.value, tangent: -self.tangent }
-    }
-}
-
-impl<F: Float> AddAssign for Dual<F> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<F: Float> Real for Dual<F> {
-    type Float = F;
-    const ZERO: Self = Self { value: F::ZERO, tangent: F::ZERO };
-    const ONE: Self = Self { value: F::ONE, tangent: F::ZERO };
-    #[inline(always)]
-    fn constant(value: F) -> Self {
-        Self { value, tangent: F::ZERO }
+    fn new(value: L, tangent: L) -> Self {
+        Self { value, tangent }
     }
     #[inline(always)]
-    fn value(self) -> F {
+    fn constant(value: L) -> Self {
+        Self { value, tangent: splat(0.0) }
+    }
+    #[inline(always)]
+    fn value(self) -> L {
         self.value
     }
     #[inline(always)]
-    fn scale(self, factor: F) -> Self {
+    fn output(self) -> L {
+        self.tangent
+    }
+    #[inline(always)]
+    fn scale(self, factor: L) -> Self {
         Self { value: factor * self.value, tangent: factor * self.tangent }
     }
     #[inline(always)]
-    fn recip(self) -> Self {
-        let value = self.value.recip();
-        Self { value, tangent: -(value * value * self.tangent) }
+    fn inverse(self) -> Self {
+        let value = Lanes::recip(self.value);
+        Self { value, tangent: (value * value * self.tangent).neg() }
     }
+    #[inline(always)]
+    fn choose(mask: L::Mask, yes: Self, no: Self) -> Self {
+        Self {
+            value: L::pick(mask, yes.value, no.value),
+            tangent: L::pick(mask, yes.tangent, no.tangent),
+        }
+    }
+    #[inline(always)]
+    fn masked(self, mask: L::Mask) -> Self {
+        Self { value: self.value.only(mask), tangent: self.tangent.only(mask) }
+    }
+    #[inline(always)]
+    fn clamped(self) -> Self {
+        let tangent = self.tangent.only(splat::<L>(0.0).less(self.value));
+        let tangent = tangent.only(self.value.less(splat(1.0)));
+        Self { value: self.value.clamped(), tangent }
+    }
+    #[inline(always)]
+    fn store(self) -> Self::Stored {
+        Dual { value: self.value.array(), tangent: self.tangent.array() }
+    }
+    #[inline(always)]
+    fn of_lane(stored: &Self::Stored, lane: usize) -> Self {
+        Self {
+            value: L::splat(stored.value[lane % LANES]),
+            tangent: L::splat(stored.tangent[lane % LANES]),
+        }
+    }
+    #[inline(always)]
+    fn rows(table: Table<Self>, at: &Places) -> [Self; 4] {
+        let [a, b, c, d] = L::rows(table.values, at);
+        let [da, db, dc, dd] = L::rows(table.tangents, at);
+        [
+            Self { value: a, tangent: da },
+            Self { value: b, tangent: db },
+            Self { value: c, tangent: dc },
+            Self { value: d, tangent: dd },
+        ]
+    }
+}
+
+/// The same known number in all lanes.
+#[inline(always)]
+pub(crate) fn splat<L: Lanes>(value: f64) -> L {
+    L::splat(super::float::Float::from_f64(value))
 }

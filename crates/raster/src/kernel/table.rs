@@ -1,6 +1,14 @@
 //! Where a squared distance lies in a profile table.
 
-use super::real::Float;
+use super::{
+    float::Float,
+    lanes::Lanes,
+    real::{Mask, Real, splat},
+};
+
+/// Largest rate at which a place in a cell moves with the squared distance, in NDC⁻². Reached only
+/// next to the edge under a softness narrower than f32 can tell from a step.
+const STEEPEST: f64 = 1e30;
 
 /// Places of the cells of a profile table: two one-sided tables over the squared distance that
 /// meet at the edge of the face.
@@ -64,7 +72,7 @@ impl Grid {
     }
 }
 
-/// A [`Grid`] prepared for look-ups in one float type.
+/// A [`Grid`] prepared for look-ups.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lookup<F> {
     inverse_outer: F,
@@ -77,16 +85,13 @@ pub(crate) struct Lookup<F> {
     cells: i32,
 }
 
-/// Place of a squared distance: row of the table, and the affine map to the place in the cell.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Place<F> {
-    pub(crate) row: u32,
-    /// `t = (y - start) * rate`, in [0, 1] within the cell.
-    pub(crate) start: F,
-    pub(crate) rate: F,
-    /// Whether the cell is counted from the far end. Then `start` is `1 - y` where the cell starts, so
-    /// that `t = (start - (1 - y)) * rate` keeps its digits.
-    pub(crate) far: bool,
+/// Places of squared distances in a table.
+pub(crate) struct Place<T: Real> {
+    pub(crate) row: <T::Lanes as Lanes>::Index,
+    /// Places within the cells, in [0, 1].
+    pub(crate) t: T,
+    /// Rates at which they change with the squared distance.
+    pub(crate) rate: T::Lanes,
 }
 
 impl<F: Float> Lookup<F> {
@@ -109,94 +114,104 @@ impl<F: Float> Lookup<F> {
         self.far > 0
     }
 
-    /// Place of the squared distance `d2`, scaled: `y = d2 * inverse` of its side.
-    #[inline(always)]
-    pub(crate) fn inverse(&self, inside: bool) -> F {
-        if inside { self.inverse_inner } else { self.inverse_outer }
-    }
-
-    /// Place of `y` (not negative; NaN counts as far away) on the given side. `FAR` is
+    /// Places of squared distances (not negative; NaN counts as far away) on the inner side where the mask holds. `FAR` is
     /// [`Lookup::has_far_cells`].
     #[inline(always)]
-    pub(crate) fn place<const FAR: bool>(&self, y: F, inside: bool) -> Place<F> {
-        let two = F::from_f64(2.0);
-        let y = if y < two { y } else { two };
-        let (index, lower, inverse_width) = y.cell(self.octaves, self.bits);
-        let first = index <= 0;
-        let index = if first { 0 } else { index };
-        let index = if index > self.cells { self.cells } else { index };
-        let mut place = Place {
-            row: index as u32,
-            start: if first { F::ZERO } else { lower },
-            rate: if first { self.innermost } else { inverse_width },
-            far: false,
-        };
-        if FAR && y > F::from_f64(0.5) {
-            let z = if y < F::ONE { F::ONE - y } else { F::ZERO };
-            let (index, lower, inverse_width) = z.cell(self.far + 1, self.bits);
-            let last = index <= 0;
-            let row = self.cells - 1 - if last { 0 } else { index };
-            let rate = if last { self.outermost } else { inverse_width };
-            let start = if last { F::ZERO } else { lower } + rate.recip();
-            let row = if y < F::ONE { row } else { self.cells };
-            place = Place { row: row as u32, start, rate, far: true };
+    pub(crate) fn place<T: Real, const FAR: bool>(&self, distance2: T, inside: Mask<T>) -> Place<T>
+    where
+        T::Lanes: Lanes<Float = F>,
+    {
+        let pick = <T::Lanes as Lanes>::pick;
+        let pick_index = <T::Lanes as Lanes>::pick_index;
+        let index = <T::Lanes as Lanes>::index;
+        let one = splat::<T::Lanes>(1.0);
+        let inverse =
+            pick(inside, T::Lanes::splat(self.inverse_inner), T::Lanes::splat(self.inverse_outer));
+        let scaled = distance2.scale(inverse);
+        let y = scaled.value();
+        let (cell, lower, inverse_width) = y.cell(self.octaves, self.bits);
+        let first = T::Lanes::not_positive(cell);
+        let mut row = T::Lanes::limited(cell, self.cells);
+        let start = pick(first, splat(0.0), lower);
+        let mut rate = pick(first, T::Lanes::splat(self.innermost), inverse_width);
+        let mut along = scaled - T::constant(start);
+        if FAR {
+            let z = (one - y).only(y.less(one));
+            let (cell, lower, inverse_width) = z.cell(self.far + 1, self.bits);
+            let last = T::Lanes::not_positive(cell);
+            let far_rate = pick(last, T::Lanes::splat(self.outermost), inverse_width);
+            // Counted from where the cell starts, 1 - y keeps its digits.
+            let start = pick(last, splat(0.0), lower) + Lanes::recip(far_rate);
+            let far_row =
+                T::Lanes::minus(index(self.cells - 1), T::Lanes::limited(cell, self.cells));
+            let far_row = pick_index(y.less(one), far_row, index(self.cells));
+            let far = splat::<T::Lanes>(0.5).less(y);
+            row = pick_index(far, far_row, row);
+            rate = pick(far, far_rate, rate);
+            let from_end = T::constant(start) - (T::constant(one) - scaled);
+            along = T::choose(far, from_end, along);
         }
-        place.row += if inside { self.cells as u32 + 1 } else { 0 };
-        place
+        // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
+        let t = along.scale(rate).masked(y.less(one));
+        let side = pick_index(inside, index(self.cells + 1), index(0));
+        let rate = (rate * inverse).min(splat(STEEPEST));
+        Place { row: T::Lanes::plus(row, side), t, rate }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::lanes::{LANES, Plain};
+
+    /// Row and place within the cell of `y` outside.
+    fn place<F: Float>(grid: &Grid, y: F) -> (usize, f64) {
+        let inside = [false; LANES];
+        let (lookup, y) = (Lookup::new(grid), Plain::splat(y));
+        let place: Place<Plain<F>> = match grid.far {
+            0 => lookup.place::<_, false>(y, inside),
+            _ => lookup.place::<_, true>(y, inside),
+        };
+        (place.row[0] as usize, place.t.array()[0].to_f64())
+    }
 
     #[test]
     fn every_place_lies_between_the_knots_of_its_cell() {
-        let grid = Grid { outer: 1.0, inner: 1.0, octaves: 12, far: 0, bits: 3 };
-        let knots = grid.knots();
-        assert_eq!(knots.len(), grid.cells() + 1);
-        let lookup = Lookup::<f32>::new(&grid);
-        for i in 0..20_000 {
-            let y = (f64::from(i) / 10_000.0).powi(3) * 0.2;
-            let place = lookup.place::<false>(y as f32, false);
-            let row = place.row as usize;
-            if y >= 1.0 {
-                assert_eq!(row, grid.tail());
-                continue;
+        let near = Grid { outer: 1.0, inner: 1.0, octaves: 12, far: 0, bits: 3 };
+        let both = Grid { outer: 1.0, inner: 1.0, octaves: 7, far: 9, bits: 2 };
+        for grid in [near, both] {
+            let knots = grid.knots();
+            assert_eq!(knots.len(), grid.cells() + 1);
+            assert!(knots.is_sorted());
+            for i in 0..20_000 {
+                let y = (f64::from(i) / 10_000.0).powi(3) * 0.2;
+                let (row, t) = place(&grid, y as f32);
+                if y >= 1.0 {
+                    assert_eq!(row, grid.tail());
+                    continue;
+                }
+                assert!((0.0..=1.0 + 1e-6).contains(&t), "y {y} row {row} t {t}");
+                let wanted = (y - knots[row]) / (knots[row + 1] - knots[row]);
+                assert!((t - wanted).abs() < 2e-4, "y {y} row {row} t {t} instead of {wanted}");
             }
-            let t = (y as f32 - place.start) * place.rate;
-            assert!((0.0..=1.0).contains(&t), "y {y} row {row} t {t}");
-            assert!(knots[row] <= y * (1.0 + 1e-7) && y <= knots[row + 1] * (1.0 + 1e-7));
-            assert_eq!(lookup.place::<false>(y as f32, true).row as usize, row + grid.cells() + 1);
         }
     }
 
     #[test]
-    fn cells_of_both_ends_meet_in_the_middle() {
-        let grid = Grid { outer: 1.0, inner: 1.0, octaves: 7, far: 9, bits: 2 };
-        let knots = grid.knots();
-        assert_eq!(knots.len(), grid.cells() + 1);
-        assert!(knots.is_sorted());
-        let lookup = Lookup::<f32>::new(&grid);
-        let middles = knots.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
-        for y in middles.chain(knots[..grid.cells()].iter().copied()) {
-            let place = lookup.place::<true>(y as f32, false);
-            let row = place.row as usize;
-            let from = if place.far { 1.0 - y as f32 } else { y as f32 };
-            let t = f64::from((from - place.start).abs() * place.rate);
-            let wanted = (y - knots[row]) / (knots[row + 1] - knots[row]);
-            assert!((t - wanted).abs() < 1e-4, "y {y} row {row} t {t} instead of {wanted}");
-        }
+    fn the_inner_side_has_rows_of_its_own() {
+        let grid = Grid { outer: 1.0, inner: 0.5, octaves: 4, far: 0, bits: 2 };
+        let y = Plain::splat(0.3f64);
+        let inside =
+            Lookup::new(&grid).place::<_, false>(y.scale(Plain::splat(0.25)), [true; LANES]);
+        assert_eq!(inside.row[0] as usize, place(&grid, 0.3f64).0 + grid.cells() + 1);
     }
 
     #[test]
     fn infinity_and_nan_fall_into_the_tail() {
         for far in [0, 5] {
             let grid = Grid { outer: 1.0, inner: 1.0, octaves: 4, far, bits: 2 };
-            let lookup = Lookup::<f64>::new(&grid);
             for y in [f64::INFINITY, f64::NAN, 1.0, 1e300] {
-                let place = if far > 0 { Lookup::place::<true> } else { Lookup::place::<false> };
-                assert_eq!(place(&lookup, y, false).row as usize, grid.tail());
+                assert_eq!(place(&grid, y), (grid.tail(), 0.0));
             }
         }
     }

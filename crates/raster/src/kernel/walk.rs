@@ -3,89 +3,141 @@
 use std::ops::Range;
 
 use super::{
-    bands::{ROWS, View},
-    batch::{Batch, GROUP},
-    face::{BLOCK, Face, Faces, Reach, SPANS, Spans, pixel_centre},
-    real::{Float, Real},
-    table::{Grid, Lookup},
+    bands::View,
+    face::Faces,
+    float::Float as _,
+    lanes::{GROUP, LANES, Lanes, Places},
+    list::{Chunk, LISTED, List},
+    pair::closest,
+    reach::pixel_centre,
+    real::{Float, Real, Table, splat},
+    table::{Grid, Lookup, Place as Cell},
 };
+
+/// Chunks by which adding up follows geometry: while one waits for the table, the arithmetic of the
+/// other goes on.
+const BEHIND: usize = 4;
+/// Chunks between the two, and room for more: a power of two.
+const RING: usize = 8;
+
+/// Chunks whose gradients are added up lane by lane: fewer terms in a row keep more digits.
+const TOGETHER: usize = 16;
 
 /// Everything a traversal reads, in one number type.
 pub(crate) struct Scene<'a, T: Real> {
     /// `[views, 3, vertices]`: x and y in NDC, depth.
-    pub(crate) vertices: &'a [T],
+    pub(crate) vertices: &'a [Float<T>],
+    /// Their tangents, where numbers have any.
+    pub(crate) tangents: &'a [Float<T>],
     pub(crate) faces: &'a [[u32; 3]],
     /// Cubic coefficients of each cell, `[grid.rows()]`.
-    pub(crate) table: &'a [[T; 4]],
+    pub(crate) table: Table<'a, T>,
     pub(crate) grid: Grid,
     pub(crate) size: usize,
-    lookup: Lookup<T::Float>,
+    /// Rows of a band.
+    pub(crate) rows: usize,
+    lookup: Lookup<Float<T>>,
     /// Centres of the columns, with a group more than the image has.
-    centres: Vec<T::Float>,
-    /// Centres of the rows, likewise.
-    heights: Vec<T::Float>,
+    centres: Vec<Float<T>>,
+    /// Centres of the rows, with a vector more.
+    heights: Vec<Float<T>>,
 }
 
 /// Which band of which view.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<'a, T> {
+pub(crate) struct Place<'a, F> {
     /// `[3, vertices]`.
-    pub(crate) vertices: &'a [T],
+    pub(crate) vertices: &'a [F],
+    /// The same, or nothing.
+    pub(crate) tangents: &'a [F],
     pub(crate) view: &'a View,
     pub(crate) band: usize,
 }
 
-impl<T: Real> Place<'_, T> {
-    /// A block of faces of the scene, given by their numbers, as this view sees them; the last one
-    /// fills it up.
+impl<F: super::float::Float> Place<'_, F> {
+    /// Up to [`LANES`] faces of the scene, given by their numbers, as this view sees them; the last one
+    /// fills them up.
     #[inline(always)]
-    pub(crate) fn faces(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T> {
-        let (xs, rest) = self.vertices.split_at(self.vertices.len() / 3);
-        let mut corners = [[[T::ZERO; BLOCK]; 3]; 2];
-        for lane in 0..BLOCK {
+    pub(crate) fn faces<T: Real>(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T>
+    where
+        T::Lanes: Lanes<Float = F>,
+    {
+        let mut values = [[[F::ZERO; LANES]; 3]; 2];
+        let mut tangents = [[[F::ZERO; LANES]; 3]; 2];
+        let count = self.vertices.len() / 3;
+        let (xs, ys) = (&self.vertices[..count], &self.vertices[count..2 * count]);
+        for lane in 0..LANES {
             let face = scene.faces[numbers[lane.min(numbers.len() - 1)] as usize];
             for k in 0..3 {
                 let vertex = face[k] as usize;
-                (corners[0][k][lane], corners[1][k][lane]) = (xs[vertex], rest[vertex]);
+                (values[0][k][lane], values[1][k][lane]) = (xs[vertex], ys[vertex]);
+                if T::DUAL {
+                    tangents[0][k][lane] = self.tangents[vertex];
+                    tangents[1][k][lane] = self.tangents[count + vertex];
+                }
             }
         }
-        let [x, y] = corners;
-        Faces::new(x, y, T::Float::from_f64(scene.grid.outer))
+        let [x, y] = values;
+        let [dx, dy] = tangents;
+        let x = [lanes(&x[0], &dx[0]), lanes(&x[1], &dx[1]), lanes(&x[2], &dx[2])];
+        let y = [lanes(&y[0], &dy[0]), lanes(&y[1], &dy[1]), lanes(&y[2], &dy[2])];
+        Faces::new(x, y, F::from_f64(scene.grid.outer))
     }
 }
 
+#[inline(always)]
+fn lanes<T: Real>(values: &[Float<T>; LANES], tangents: &[Float<T>; LANES]) -> T {
+    T::new(T::Lanes::of(values), T::Lanes::of(tangents))
+}
+
 /// What one band gives back.
-pub(crate) struct BandGradient<T: Real> {
+pub(crate) struct BandGradient<F> {
     /// For each face of the band, the gradient to x and y of its three corners.
-    pub(crate) corners: Vec<[T; 6]>,
-    pub(crate) table: Vec<[T; 4]>,
+    pub(crate) corners: Vec<[F; 6]>,
+    pub(crate) table: Vec<[F; 4]>,
 }
 
 impl<'a, T: Real> Scene<'a, T> {
     pub(crate) fn new(
-        vertices: &'a [T],
+        vertices: [&'a [Float<T>]; 2],
         faces: &'a [[u32; 3]],
-        table: &'a [[T; 4]],
+        table: Table<'a, T>,
         grid: Grid,
         size: usize,
+        rows: usize,
     ) -> Self {
-        let centre = |column| T::Float::from_f64(pixel_centre(column, size));
+        let centre = |column| Float::<T>::from_f64(pixel_centre(column, size));
+        let [vertices, tangents] = vertices;
         Self {
             vertices,
+            tangents,
             faces,
             table,
             grid,
             size,
+            rows,
             lookup: Lookup::new(&grid),
             centres: (0..size + GROUP).map(centre).collect(),
-            heights: (0..size + SPANS).map(|row| -centre(row)).collect(),
+            heights: (0..size + LANES).map(|row| -centre(row)).collect(),
         }
     }
 
-    /// Vertices of view `index` of `views`, `[3, vertices]`.
-    pub(crate) fn view(&self, index: usize, views: usize) -> &'a [T] {
-        let length = self.vertices.len() / views;
-        &self.vertices[index * length..(index + 1) * length]
+    /// A band of view `index` of `views`.
+    pub(crate) fn place<'b>(
+        &self,
+        view: &'b View,
+        index: usize,
+        views: usize,
+        band: usize,
+    ) -> Place<'b, Float<T>>
+    where
+        'a: 'b,
+    {
+        let of_view = |numbers: &'a [Float<T>]| {
+            let length = numbers.len() / views;
+            &numbers[index * length..(index + 1) * length]
+        };
+        Place { vertices: of_view(self.vertices), tangents: of_view(self.tangents), view, band }
     }
 
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.
@@ -93,203 +145,282 @@ impl<'a, T: Real> Scene<'a, T> {
         self.size + GROUP
     }
 
+    /// Numbers of a band: its rows, and a group for pixels on which nothing depends.
+    pub(crate) fn band_length(&self, band: usize) -> usize {
+        self.band_rows(band).len() * self.stride() + GROUP
+    }
+
     /// Rows of the image that band `band` holds.
-    pub(crate) fn band_rows(&self, band: usize) -> std::ops::Range<usize> {
-        band * ROWS..((band + 1) * ROWS).min(self.size)
+    pub(crate) fn band_rows(&self, band: usize) -> Range<usize> {
+        band * self.rows..((band + 1) * self.rows).min(self.size)
+    }
+
+    /// Centres of a row of the image and those below it.
+    #[inline(always)]
+    pub(crate) fn heights(&self, row: usize) -> &[Float<T>; LANES] {
+        self.heights[row..row + LANES].try_into().expect("as many heights as lanes")
+    }
+
+    /// The constant outside the support.
+    #[inline(always)]
+    fn tail(&self) -> T {
+        let tail = self.grid.tail();
+        let tangent = if T::DUAL { self.table.tangents[tail][0] } else { Float::<T>::ZERO };
+        T::new(T::Lanes::splat(self.table.values[tail][0]), T::Lanes::splat(tangent))
     }
 }
 
-/// One walk over the pairs of a band. `upstream` and `image` are `[rows, stride]`.
+/// One walk over the pairs of a band. `upstream` and `image` are `[rows, stride]` and a group more.
 #[inline(always)]
 fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
     scene: &Scene<T>,
-    place: Place<T>,
-    upstream: &[T::Float],
-    image: &mut [T],
-    gradient: &mut BandGradient<T>,
+    place: Place<Float<T>>,
+    upstream: &[Float<T>],
+    image: &mut [Float<T>],
+    gradient: &mut BandGradient<Float<T>>,
 ) {
-    let mut batch = Batch::new();
-    let mut sink = Sink { image, gradient, visited: T::Float::ZERO };
-    let rows = scene.band_rows(place.band);
-    let listed = place.view.faces(place.band);
-    for (block, numbers) in listed.chunks(BLOCK).enumerate() {
-        let faces = place.faces(scene, numbers);
-        for (lane, &number) in numbers.iter().enumerate() {
-            let face = faces.face(lane);
-            let reach = place.view.reaches[number as usize];
-            let runs = Runs::new(&faces.spans(lane), reach, rows.clone(), scene);
-            let sums =
-                sink.visit::<IMAGE, GRADIENT, TABLE>(scene, &face, &runs, upstream, &mut batch);
-            if GRADIENT {
-                sink.gradient.corners[BLOCK * block + lane] = sums;
+    let mut list = List::new();
+    let mut walker =
+        Walker { scene, upstream, image, gradient, visited: splat(0.0), tail: scene.tail() };
+    for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
+        list.fill(scene, &place, numbers);
+        let slivers = list.faces.iter().any(|faces| faces.slivers);
+        match (scene.lookup.has_far_cells(), slivers) {
+            (false, false) => {
+                walker.take::<IMAGE, GRADIENT, TABLE, false, false>(&list, k * LISTED)
             }
+            (false, true) => walker.take::<IMAGE, GRADIENT, TABLE, false, true>(&list, k * LISTED),
+            (true, _) => walker.take::<IMAGE, GRADIENT, TABLE, true, true>(&list, k * LISTED),
         }
     }
     if TABLE {
-        sink.gradient.table[scene.grid.tail()][0] += T::constant(-sink.visited);
-    }
-}
-
-/// The pixels of a band that a face may reach, row by row.
-pub(crate) struct Runs {
-    /// Rows of the image.
-    pub(crate) rows: Range<usize>,
-    /// First row of the band.
-    band: usize,
-    starts: [[i32; SPANS]; ROWS / SPANS],
-    ends: [[i32; SPANS]; ROWS / SPANS],
-}
-
-impl Runs {
-    /// Those of a face with these limits among `rows`, which is a band.
-    #[inline(always)]
-    pub(crate) fn new<T: Real>(
-        spans: &Spans<T::Float>,
-        reach: Reach,
-        rows: Range<usize>,
-        scene: &Scene<T>,
-    ) -> Self {
-        let band = rows.start;
-        let rows = rows.start.max(reach.top as usize)..rows.end.min(reach.bottom as usize);
-        let mut runs = Self {
-            rows: rows.clone(),
-            band,
-            starts: [[0; SPANS]; ROWS / SPANS],
-            ends: [[0; SPANS]; ROWS / SPANS],
-        };
-        for (k, row) in rows.step_by(SPANS).enumerate() {
-            let heights = scene.heights[row..row + SPANS].try_into().expect("heights are padded");
-            (runs.starts[k], runs.ends[k]) = spans.columns(heights, reach, scene.size);
-        }
-        runs
-    }
-
-    /// First column and the one after the last in a row of `rows`; there may be none between.
-    #[inline(always)]
-    pub(crate) fn columns(&self, row: usize) -> (usize, usize) {
-        let k = row - self.rows.start;
-        (self.starts.as_flattened()[k] as usize, self.ends.as_flattened()[k] as usize)
+        let visited = walker.visited.sum();
+        gradient.table[scene.grid.tail()][0] += -visited;
     }
 }
 
 /// Where the pairs of a band go.
-struct Sink<'a, T: Real> {
-    image: &'a mut [T],
-    gradient: &'a mut BandGradient<T>,
-    /// Sum of `upstream` over the pairs, each of which replaced a tail.
-    visited: T::Float,
+struct Walker<'a, 's, T: Real> {
+    scene: &'a Scene<'s, T>,
+    upstream: &'a [Float<T>],
+    image: &'a mut [Float<T>],
+    gradient: &'a mut BandGradient<Float<T>>,
+    /// Sums of `upstream` over the pairs, each of which replaced a tail.
+    visited: T::Lanes,
+    tail: T,
 }
 
-impl<T: Real> Sink<'_, T> {
-    /// Takes all pixels of a face; gives the gradient to x and y of its corners.
-    #[inline(always)]
-    fn visit<const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
-        &mut self,
-        scene: &Scene<T>,
-        face: &Face<T>,
-        runs: &Runs,
-        upstream: &[T::Float],
-        batch: &mut Batch<T>,
-    ) -> [T; 6] {
-        let mut sums = [T::ZERO; 6];
-        let mut first = (runs.rows.start - runs.band) * scene.stride();
-        for row in runs.rows.clone() {
-            let (mut start, end) = runs.columns(row);
-            while start < end {
-                let (centres, height) = (&scene.centres[start..], scene.heights[row]);
-                batch.push::<GRADIENT>(centres, height, first + start, upstream);
-                start += GROUP;
-                if batch.is_full() {
-                    self.take::<IMAGE, GRADIENT, TABLE>(scene, face, batch, &mut sums);
-                }
-            }
-            first += scene.stride();
-        }
-        if !batch.is_empty() {
-            self.take::<IMAGE, GRADIENT, TABLE>(scene, face, batch, &mut sums);
-        }
-        if GRADIENT {
-            for sum in &mut sums {
-                *sum = sum.scale(T::Float::from_f64(-2.0));
-            }
-        }
-        sums
-    }
+/// Chunks whose geometry is known: closest points, their weights, and their places in the table.
+struct Ring<T: Real> {
+    dx: [T; RING],
+    dy: [T; RING],
+    weights: [[T; 3]; RING],
+    t: [T; RING],
+    row: [Places; RING],
+    rate: [T::Lanes; RING],
+}
 
+impl<T: Real> Walker<'_, '_, T> {
+    /// Takes the chunks of a list, whose first face is number `first` of the band.
     #[inline(always)]
-    fn take<const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
+    fn take<
+        const IMAGE: bool,
+        const GRADIENT: bool,
+        const TABLE: bool,
+        const FAR: bool,
+        const SLIVERS: bool,
+    >(
         &mut self,
-        scene: &Scene<T>,
-        face: &Face<T>,
-        batch: &mut Batch<T>,
-        sums: &mut [T; 6],
+        list: &List<T>,
+        first: usize,
     ) {
-        batch.places::<GRADIENT>(face, &scene.lookup);
-        batch.fetch(scene.table);
-        if IMAGE {
-            batch.add_values(self.image, scene.table[scene.grid.tail()][0]);
+        let zero = T::constant(splat(0.0));
+        let mut ring = Ring {
+            dx: [zero; RING],
+            dy: [zero; RING],
+            weights: [[zero; 3]; RING],
+            t: [zero; RING],
+            row: [Places::FIRST; RING],
+            rate: [splat(0.0); RING],
+        };
+        let mut sums = [splat::<T::Lanes>(0.0); 6];
+        let mut face = usize::MAX;
+        let (chunks, owners) = list.chunks();
+        for ahead in 0..chunks.len() + BEHIND {
+            if ahead < chunks.len() {
+                let owner = owners[ahead] as usize;
+                self.geometry::<GRADIENT, FAR, SLIVERS>(
+                    &mut ring,
+                    ahead % RING,
+                    list,
+                    owner,
+                    &chunks[ahead],
+                );
+            }
+            if ahead < BEHIND {
+                continue;
+            }
+            let (chunk, owner) = (&chunks[ahead - BEHIND], owners[ahead - BEHIND] as usize);
+            let slot = (ahead - BEHIND) % RING;
+            if GRADIENT && (owner != face || ahead % TOGETHER == 0) {
+                self.corners(list, first, face, &sums);
+                face = owner;
+                sums = [splat(0.0); 6];
+            }
+            let cubic = T::rows(self.scene.table, &ring.row[slot]);
+            if IMAGE {
+                self.value(&ring, slot, cubic, chunk);
+            }
+            if GRADIENT {
+                self.pull::<TABLE>(&ring, slot, cubic, chunk, &mut sums);
+            }
         }
         if GRADIENT {
-            batch.add_corners(sums);
+            self.corners(list, first, face, &sums);
         }
+    }
+
+    /// Closest points of a chunk and their places in the table; `GRADIENT` keeps what the gradient
+    /// needs of them.
+    #[inline(always)]
+    fn geometry<const GRADIENT: bool, const FAR: bool, const SLIVERS: bool>(
+        &self,
+        ring: &mut Ring<T>,
+        slot: usize,
+        list: &List<T>,
+        owner: usize,
+        [low, high]: &Chunk<Float<T>>,
+    ) {
+        let face = list.faces[owner / LANES].face(owner % LANES);
+        let px = T::Lanes::of_groups(self.centres(low.column), self.centres(high.column));
+        let py = T::Lanes::of_halves(low.y, high.y);
+        let point = closest::<T, SLIVERS>(&face, px, py);
+        let Cell { row, t, rate } =
+            self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
+        ring.row[slot] = T::Lanes::places(row, self.scene.table.values.len());
+        ring.t[slot] = t;
+        if GRADIENT {
+            (ring.dx[slot], ring.dy[slot]) = (point.dx, point.dy);
+            (ring.weights[slot], ring.rate[slot]) = (point.weights, rate);
+        }
+    }
+
+    #[inline(always)]
+    fn centres(&self, column: u32) -> &[Float<T>; GROUP] {
+        let group = &self.scene.centres[column as usize..column as usize + GROUP];
+        group.try_into().expect("a group of columns")
+    }
+
+    /// Adds `profile - tail` to the pixels of a chunk.
+    #[inline(always)]
+    fn value(
+        &mut self,
+        ring: &Ring<T>,
+        slot: usize,
+        [a, b, c, d]: [T; 4],
+        [low, high]: &Chunk<Float<T>>,
+    ) {
+        let t = ring.t[slot];
+        let value = a + t * (b + t * (c + t * d)) - self.tail;
+        value.output().add_to_groups(self.image, [low.at, high.at]);
+    }
+
+    /// Adds to the gradient of a face, without its factor -2, and to that of the table.
+    #[inline(always)]
+    fn pull<const TABLE: bool>(
+        &mut self,
+        ring: &Ring<T>,
+        slot: usize,
+        [_, b, c, d]: [T; 4],
+        [low, high]: &Chunk<Float<T>>,
+        sums: &mut [T::Lanes; 6],
+    ) {
+        let upstream = T::Lanes::of_groups(self.group(low.at), self.group(high.at));
+        let t = ring.t[slot];
+        let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
+        let pull = slope.scale(ring.rate[slot] * upstream);
+        let (x, y) = (pull * ring.dx[slot], pull * ring.dy[slot]);
+        let [w0, w1, w2] = ring.weights[slot];
+        sums[0] += (x * w0).output();
+        sums[1] += (y * w0).output();
+        sums[2] += (x * w1).output();
+        sums[3] += (y * w1).output();
+        sums[4] += (x * w2).output();
+        sums[5] += (y * w2).output();
         if TABLE {
-            batch.add_table(&mut self.gradient.table, &mut self.visited);
+            let one = T::constant(upstream);
+            let (first, second) = (one * t, one * t * t);
+            let powers = [one, first, second, second * t];
+            let columns =
+                [powers[0].output(), powers[1].output(), powers[2].output(), powers[3].output()];
+            T::Lanes::add_to_rows(&mut self.gradient.table, &ring.row[slot], columns);
+            self.visited += one.output();
         }
-        batch.clear();
+    }
+
+    #[inline(always)]
+    fn group(&self, at: u32) -> &[Float<T>; GROUP] {
+        self.upstream[at as usize..at as usize + GROUP].try_into().expect("a group of pixels")
+    }
+
+    /// Adds to the gradient of a face.
+    #[inline(always)]
+    fn corners(&mut self, list: &List<T>, first: usize, face: usize, sums: &[T::Lanes; 6]) {
+        if face == usize::MAX {
+            return;
+        }
+        let order = list.faces[face / LANES].corners(face % LANES);
+        let corners = &mut self.gradient.corners[first + face];
+        let factor = Float::<T>::from_f64(-2.0);
+        for k in 0..3 {
+            corners[2 * order[k]] += sums[2 * k].sum() * factor;
+            corners[2 * order[k] + 1] += sums[2 * k + 1].sum() * factor;
+        }
     }
 }
 
-/// Compiles a walk for the instruction sets that matter and picks one at run time. Products and
-/// sums are never contracted, so that every set gives the same bits.
+/// Lets tests walk as on a machine without AVX2.
+#[cfg(test)]
+pub(crate) static PORTABLE: std::sync::atomic::AtomicBool =
+    std::sync::atomic::AtomicBool::new(false);
+
+/// Whether this machine has AVX2.
+pub(crate) fn has_avx2() -> bool {
+    #[cfg(test)]
+    if PORTABLE.load(std::sync::atomic::Ordering::SeqCst) {
+        return false;
+    }
+    #[cfg(target_arch = "x86_64")]
+    return is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// Compiles a walk for AVX2 and for what every machine has, and picks one at run time. Products and
+/// sums are never contracted, so that both give the same bits.
 macro_rules! dispatched {
     ($name:ident, $image:literal, $gradient:literal, $table:literal) => {
         pub(crate) fn $name<T: Real>(
             scene: &Scene<T>,
-            place: Place<T>,
-            upstream: &[T::Float],
-            image: &mut [T],
-            gradient: &mut BandGradient<T>,
+            place: Place<Float<T>>,
+            upstream: &[Float<T>],
+            image: &mut [Float<T>],
+            gradient: &mut BandGradient<Float<T>>,
         ) {
             #[cfg(target_arch = "x86_64")]
             {
-                #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-                fn avx512<T: Real>(
-                    scene: &Scene<T>,
-                    place: Place<T>,
-                    upstream: &[T::Float],
-                    image: &mut [T],
-                    gradient: &mut BandGradient<T>,
-                ) {
-                    walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
-                }
                 #[target_feature(enable = "avx2")]
                 fn avx2<T: Real>(
                     scene: &Scene<T>,
-                    place: Place<T>,
-                    upstream: &[T::Float],
-                    image: &mut [T],
-                    gradient: &mut BandGradient<T>,
+                    place: Place<Float<T>>,
+                    upstream: &[Float<T>],
+                    image: &mut [Float<T>],
+                    gradient: &mut BandGradient<Float<T>>,
                 ) {
                     walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
                 }
-                let has = |name: &str| match name {
-                    "avx512" => {
-                        is_x86_feature_detected!("avx512f")
-                            && is_x86_feature_detected!("avx512vl")
-                            && is_x86_feature_detected!("avx512dq")
-                            && is_x86_feature_detected!("avx512bw")
-                    }
-                    _ => is_x86_feature_detected!("avx2"),
-                };
-                if has("avx512") {
-                    // SAFETY: the features were just detected.
-                    #[allow(unsafe_code)]
-                    unsafe {
-                        return avx512(scene, place, upstream, image, gradient);
-                    }
-                }
-                if has("avx2") {
-                    // SAFETY: the feature was just detected.
+                if T::Lanes::NEEDS_AVX2 || has_avx2() {
+                    // SAFETY: the feature was just detected, or before there were such vectors.
                     #[allow(unsafe_code)]
                     unsafe {
                         return avx2(scene, place, upstream, image, gradient);
@@ -303,8 +434,6 @@ macro_rules! dispatched {
 
 dispatched!(walk_image, true, false, false);
 dispatched!(walk_gradient, false, true, false);
+dispatched!(walk_image_and_gradient, true, true, false);
 dispatched!(walk_gradient_and_table, false, true, true);
 dispatched!(walk_everything, true, true, true);
-
-#[cfg(all(test, target_arch = "x86_64"))]
-mod tests;

@@ -2,6 +2,8 @@
 //!
 //! Slow (about 1.3 kB of traffic a pair) and simple; every faster path is tested against it.
 
+mod step;
+
 use burn::{
     backend::Autodiff,
     tensor::{Int, Tensor, TensorData, backend::Backend},
@@ -9,6 +11,7 @@ use burn::{
 use softrast_softness::Softness;
 
 use crate::{NEAR, TConorm};
+pub use step::{iou_loss, mse_loss, orbit_matrices, perspective};
 
 /// Squared edge lengths below this (NDC²) count as a point.
 const POINT: f64 = 1e-30;

@@ -1,0 +1,218 @@
+//! What is done to every pixel of an image, and the losses that compare two.
+
+use rayon::prelude::*;
+
+use super::{Elementary, number::Number};
+use crate::{kernel::Float, loss::EMPTY};
+
+/// Pixels that one task takes; sums of them are added in order, whatever the number of threads.
+const PIXELS: usize = 8192;
+/// Sums that run beside each other.
+const BESIDE: usize = 16;
+
+/// `1 - exp(-sums)`, the coverage of the probabilistic sum; any shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coverage;
+
+impl Elementary for Coverage {
+    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
+        dims[0].clone()
+    }
+
+    fn forward<N: Number>(&self, inputs: &[&[N]], _: &[Vec<usize>]) -> Vec<N> {
+        let minus = -N::Float::ONE;
+        mapped(inputs[0], inputs[0], |sum, _| N::of(1.0) - sum.scale(minus).exp())
+    }
+
+    fn vjp<N: Number>(
+        &self,
+        inputs: &[&[N]],
+        _: &[Vec<usize>],
+        upstream: &[N::Float],
+        _: &[bool],
+    ) -> Vec<N> {
+        let minus = -N::Float::ONE;
+        mapped(inputs[0], upstream, |sum, u| sum.scale(minus).exp().scale(u))
+    }
+}
+
+/// `of` each pair, many at a time, to `out`.
+fn map_to<A: Copy + Sync, B: Copy + Sync, C: Copy + Send>(
+    out: &mut [C],
+    a: &[A],
+    b: &[B],
+    of: impl Fn(A, B) -> C + Copy + Sync,
+) {
+    let block = |(out, (a, b)): (&mut [C], (&[A], &[B]))| {
+        // What it holds is then known not to change, and the loop becomes vectors.
+        let own = of;
+        for (out, (&a, &b)) in out.iter_mut().zip(a.iter().zip(b)) {
+            *out = own(a, b);
+        }
+    };
+    match out.len() {
+        0..=PIXELS => block((out, (a, b))),
+        _ => {
+            let inputs = a.par_chunks(PIXELS).zip(b.par_chunks(PIXELS));
+            out.par_chunks_mut(PIXELS).zip(inputs).for_each(block);
+        }
+    }
+}
+
+/// The same as a vector.
+fn mapped<A: Copy + Sync, B: Copy + Sync, N: Number>(
+    a: &[A],
+    b: &[B],
+    of: impl Fn(A, B) -> N + Copy + Sync,
+) -> Vec<N> {
+    let mut out = vec![N::of(0.0); a.len()];
+    map_to(&mut out, a, b, of);
+    out
+}
+
+/// Sum over pairs of `of` each, in an order of its own that does not depend on the number of threads.
+fn summed<N: Number, const K: usize>(
+    a: &[N],
+    b: &[N],
+    of: impl Fn(N, N) -> [N; K] + Sync,
+) -> [N; K] {
+    let zero = N::of(0.0);
+    let block = |(a, b): (&[N], &[N])| {
+        let mut sums = [[zero; BESIDE]; K];
+        for (a, b) in a.chunks(BESIDE).zip(b.chunks(BESIDE)) {
+            for (i, (&a, &b)) in a.iter().zip(b).enumerate() {
+                let terms = of(a, b);
+                for k in 0..K {
+                    sums[k][i] = sums[k][i] + terms[k];
+                }
+            }
+        }
+        sums.map(|sums| sums.into_iter().fold(zero, |total, sum| total + sum))
+    };
+    let blocks: Vec<_> = match a.len() {
+        0..=PIXELS => vec![block((a, b))],
+        _ => a.par_chunks(PIXELS).zip(b.par_chunks(PIXELS)).map(block).collect(),
+    };
+    let mut totals = [zero; K];
+    for sums in blocks {
+        for k in 0..K {
+            totals[k] = totals[k] + sums[k];
+        }
+    }
+    totals
+}
+
+/// Two images of each view, `[views, height, width]`, and what compares them.
+fn views<'a, N: Number>(
+    inputs: &'a [&'a [N]],
+    dims: &[Vec<usize>],
+) -> impl IndexedParallelIterator<Item = (&'a [N], &'a [N])> {
+    let pixels = (dims[0][1] * dims[0][2]).max(1);
+    inputs[0].par_chunks(pixels).zip(inputs[1].par_chunks(pixels))
+}
+
+/// The gradients of views to both images, as they are wanted: `of` gives for a view what maps its pixels to the two.
+fn gradients<N: Number, G: Fn(N, N) -> N + Copy + Sync>(
+    inputs: &[&[N]],
+    dims: &[Vec<usize>],
+    wanted: &[bool],
+    of: impl Fn(usize, &[N], &[N]) -> [G; 2] + Sync,
+) -> Vec<N> {
+    let of_image = inputs[0].len();
+    let pixels = (dims[0][1] * dims[0][2]).max(1);
+    let mut gradient = vec![N::of(0.0); of_image * wanted.iter().filter(|&&wanted| wanted).count()];
+    let images = [0, 1].into_iter().filter(|&which| wanted[which]);
+    for (which, image) in images.zip(gradient.chunks_mut(of_image.max(1))) {
+        let pairs = views(inputs, dims).enumerate();
+        image.par_chunks_mut(pixels).zip(pairs).for_each(|(out, (view, (a, b)))| {
+            let maps = of(view, a, b);
+            map_to(out, a, b, maps[which]);
+        });
+    }
+    gradient
+}
+
+/// Mean squared difference of each view; see [`crate::mse_loss`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SquaredError;
+
+impl Elementary for SquaredError {
+    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
+        vec![dims[0][0]]
+    }
+
+    fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
+        let part = N::Float::ONE / N::Float::from_f64((dims[0][1] * dims[0][2]) as f64);
+        let of_view = |(a, b)| {
+            let [sum] = summed(a, b, |a: N, b: N| [(a - b) * (a - b)]);
+            sum.scale(part)
+        };
+        views(inputs, dims).map(of_view).collect()
+    }
+
+    fn vjp<N: Number>(
+        &self,
+        inputs: &[&[N]],
+        dims: &[Vec<usize>],
+        upstream: &[N::Float],
+        wanted: &[bool],
+    ) -> Vec<N> {
+        let part = N::Float::from_f64(2.0) / N::Float::from_f64((dims[0][1] * dims[0][2]) as f64);
+        gradients(inputs, dims, wanted, |view, _, _| {
+            [part, -part].map(|part| {
+                let factor = part * upstream[view];
+                move |a: N, b: N| (a - b).scale(factor)
+            })
+        })
+    }
+}
+
+/// One less the overlap over the union of each view; see [`crate::iou_loss`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Iou;
+
+impl Iou {
+    /// Overlap, and one over the union.
+    fn of<N: Number>(a: &[N], b: &[N]) -> [N; 2] {
+        let [overlap, union] = summed(a, b, |a: N, b: N| {
+            let both = a * b;
+            [both, a + b - both]
+        });
+        [overlap, (union + N::of(EMPTY)).recip()]
+    }
+}
+
+impl Elementary for Iou {
+    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
+        vec![dims[0][0]]
+    }
+
+    fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
+        let of_view = |(a, b)| {
+            let [overlap, inverse] = Self::of(a, b);
+            N::of(1.0) - overlap * inverse
+        };
+        views(inputs, dims).map(of_view).collect()
+    }
+
+    fn vjp<N: Number>(
+        &self,
+        inputs: &[&[N]],
+        dims: &[Vec<usize>],
+        upstream: &[N::Float],
+        wanted: &[bool],
+    ) -> Vec<N> {
+        gradients(inputs, dims, wanted, |view, a, b| {
+            let [overlap, inverse] = Self::of(a, b);
+            // d(-overlap / union) = -(1 / union) d overlap + (overlap / union²) d union.
+            let to_overlap = inverse.scale(-upstream[view]);
+            let to_union = (overlap * inverse * inverse).scale(upstream[view]);
+            [false, true].map(|second| {
+                move |a: N, b: N| {
+                    let other = if second { a } else { b };
+                    to_overlap * other + to_union * (N::of(1.0) - other)
+                }
+            })
+        })
+    }
+}

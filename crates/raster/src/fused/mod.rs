@@ -1,0 +1,176 @@
+//! Ops that run in one piece on the host, with their first and second derivatives.
+//!
+//! Each is written once, for a pass forward and one back. Run over dual numbers, the two give the second order. What a step does
+//! around the rasterizer would else be a hundred small tensor ops, which take longer than the rasterizer.
+
+mod camera;
+mod image;
+mod number;
+
+use burn::tensor::{Element, TensorData};
+
+use camera::{OrbitMatrix, Perspective};
+use image::{Coverage, Iou, SquaredError};
+pub(crate) use number::Number;
+
+use crate::{
+    ProfileSum,
+    kernel::{Dual, Float},
+};
+
+/// An op with derivatives of its own.
+#[derive(Clone, Debug)]
+pub enum FusedOp {
+    /// See [`crate::profile_sum`].
+    ProfileSum(ProfileSum),
+    /// One that is written for any number.
+    #[doc(hidden)]
+    Elementary(ElementaryOp),
+}
+
+/// Those that are written for any number.
+#[derive(Clone, Copy, Debug)]
+pub enum ElementaryOp {
+    /// Orbits to matrices.
+    OrbitMatrix,
+    /// Points to what cameras see.
+    Perspective,
+    /// Sums to coverage.
+    Coverage,
+    /// Mean squared difference.
+    SquaredError,
+    /// One less the overlap over the union.
+    Iou,
+}
+
+/// What is asked of an op with some inputs.
+///
+/// Gradients come back flat, one after the other, in the order of the inputs, and only those that are wanted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// The result.
+    Forward,
+    /// The gradient of `Σ upstream · result`; the upstream stands behind the inputs.
+    Vjp {
+        /// To which inputs.
+        wanted: Vec<bool>,
+    },
+    /// The gradient of `Σ direction · gradient`; the direction stands behind inputs and upstream.
+    VjpOfVjp {
+        /// What the gradient consists of.
+        along: Vec<bool>,
+        /// To which of the inputs, and whether to the upstream.
+        wanted: Vec<bool>,
+    },
+}
+
+/// An op that is written for any number. `dims` are the shapes of the inputs.
+trait Elementary: Sync {
+    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize>;
+
+    fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N>;
+
+    /// The gradients that are wanted, one after the other.
+    fn vjp<N: Number>(
+        &self,
+        inputs: &[&[N]],
+        dims: &[Vec<usize>],
+        upstream: &[N::Float],
+        wanted: &[bool],
+    ) -> Vec<N>;
+}
+
+/// Runs a pass over numbers of one float type. `dims` are the shapes of all `slices`.
+pub(crate) fn run<F>(op: &FusedOp, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
+where
+    F: Element + Float + Number<Float = F>,
+{
+    use ElementaryOp::{
+        Coverage as C, Iou as I, OrbitMatrix as O, Perspective as P, SquaredError as E,
+    };
+
+    match op {
+        FusedOp::ProfileSum(op) => op.run(pass, slices, dims),
+        FusedOp::Elementary(O) => elementary(&OrbitMatrix, pass, slices, dims),
+        FusedOp::Elementary(P) => elementary(&Perspective, pass, slices, dims),
+        FusedOp::Elementary(C) => elementary(&Coverage, pass, slices, dims),
+        FusedOp::Elementary(E) => elementary(&SquaredError, pass, slices, dims),
+        FusedOp::Elementary(I) => elementary(&Iou, pass, slices, dims),
+    }
+}
+
+fn elementary<F>(
+    op: &impl Elementary,
+    pass: &Pass,
+    slices: &[&[F]],
+    dims: &[Vec<usize>],
+) -> TensorData
+where
+    F: Element + Float + Number<Float = F>,
+{
+    match pass {
+        Pass::Forward => TensorData::new(op.forward(slices, dims), op.shape(dims)),
+        Pass::Vjp { wanted } => {
+            let (upstream, inputs) = slices.split_last().expect("an upstream");
+            flat(op.vjp(inputs, dims, upstream, wanted))
+        }
+        Pass::VjpOfVjp { along, wanted } => {
+            let [inputs @ .., upstream, direction] = slices else { panic!("a direction") };
+            let mut direction = *direction;
+            let dual = |(input, &along): (&&[F], &bool)| -> Vec<Dual<F>> {
+                if !along {
+                    return input.iter().map(|&value| Dual::constant(value)).collect();
+                }
+                let (own, rest) = direction.split_at(input.len());
+                direction = rest;
+                let number = |(&value, &tangent)| Dual { value, tangent };
+                input.iter().zip(own).map(number).collect()
+            };
+            let duals: Vec<_> = inputs.iter().zip(along).map(dual).collect();
+            let duals: Vec<_> = duals.iter().map(Vec::as_slice).collect();
+            let (to_upstream, wanted) = wanted.split_last().expect("one for the upstream");
+            // The Hessian is symmetric: to the inputs, it is the derivative of the gradient along the direction.
+            let mut gradient = Vec::new();
+            if wanted.contains(&true) {
+                gradient = op.vjp(&duals, dims, upstream, wanted);
+            }
+            if *to_upstream {
+                gradient.extend(op.forward(&duals, dims));
+            }
+            flat(gradient.into_iter().map(|number| number.tangent).collect())
+        }
+    }
+}
+
+fn flat<F: Element>(values: Vec<F>) -> TensorData {
+    let length = values.len();
+    TensorData::new(values, [length])
+}
+
+/// Parts of a tensor `[1 or views, ..]`, one for each view.
+#[derive(Clone, Copy)]
+struct Views<'a, N> {
+    numbers: &'a [N],
+    length: usize,
+    shared: bool,
+}
+
+impl<'a, N> Views<'a, N> {
+    fn new(numbers: &'a [N], dims: &[usize]) -> Self {
+        let length = dims[1..].iter().product();
+        Self { numbers, length, shared: dims[0] == 1 }
+    }
+
+    fn range(&self, view: usize) -> std::ops::Range<usize> {
+        let start = if self.shared { 0 } else { view * self.length };
+        start..start + self.length
+    }
+
+    fn of(&self, view: usize) -> &'a [N] {
+        &self.numbers[self.range(view)]
+    }
+
+    fn of_mut<'b>(&self, numbers: &'b mut [N], view: usize) -> &'b mut [N] {
+        &mut numbers[self.range(view)]
+    }
+}

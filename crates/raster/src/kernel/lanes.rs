@@ -1,0 +1,369 @@
+//! Eight numbers that are computed together.
+//!
+//! Every operation is one that all machines round alike, and none is contracted. So explicit vectors
+//! ([`x86`]) and plain arrays ([`Plain`]) give the same bits.
+//!
+//! Loops run over numbers of lanes: an iterator's closure is a function without the features of its caller, and is not turned
+//! into vectors.
+#![allow(clippy::needless_range_loop, clippy::assign_op_pattern)]
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod x86;
+
+use std::ops::{Add, AddAssign, Mul, Sub};
+
+use super::float::Float;
+
+/// Numbers in a vector.
+pub(crate) const LANES: usize = 8;
+/// Neighbours of a row that always come together: half a vector.
+pub(crate) const GROUP: usize = LANES / 2;
+
+/// A vector of [`LANES`] floats.
+pub(crate) trait Lanes:
+    Copy
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + AddAssign
+    + 'static
+{
+    /// One of the numbers.
+    type Float: Float;
+    /// Whether something holds, lane by lane.
+    type Mask: Copy;
+    /// Whole numbers.
+    type Index: Copy;
+    /// Whether this needs AVX2.
+    const NEEDS_AVX2: bool;
+
+    /// The same number in all lanes.
+    fn splat(value: Self::Float) -> Self;
+    /// The numbers of an array.
+    fn of(values: &[Self::Float; LANES]) -> Self;
+    /// The numbers as an array.
+    fn array(self) -> [Self::Float; LANES];
+    /// Two groups of neighbours.
+    fn of_groups(low: &[Self::Float; GROUP], high: &[Self::Float; GROUP]) -> Self;
+    /// One number for each of two groups.
+    fn of_halves(low: Self::Float, high: Self::Float) -> Self;
+    /// Adds the first half to one group of numbers, then the second to another or the same.
+    fn add_to_groups(self, numbers: &mut [Self::Float], at: [u32; 2]);
+
+    /// `1 / self`.
+    fn recip(self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// `-self`.
+    fn neg(self) -> Self;
+    /// `self` where it is less, else `other`.
+    fn min(self, other: Self) -> Self;
+    /// `self` where it is greater, else `other`.
+    fn max(self, other: Self) -> Self;
+    /// Where `self < other`.
+    fn less(self, other: Self) -> Self::Mask;
+    /// Where `self <= other`.
+    fn at_most(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask holds, else `no`.
+    fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// `self` where the mask holds, else 0.
+    fn only(self, mask: Self::Mask) -> Self;
+    /// The sum of all lanes, halves first.
+    fn sum(self) -> Self::Float;
+    /// Nearest whole numbers, for numbers in [0, 2^22].
+    fn nearest(self) -> [i32; LANES];
+
+    /// See [`Float::cell`].
+    fn cell(self, octaves: u32, bits: u32) -> (Self::Index, Self, Self);
+    /// The same whole number in all lanes.
+    fn index(value: i32) -> Self::Index;
+    /// Where a whole number is 0 or less.
+    fn not_positive(index: Self::Index) -> Self::Mask;
+    /// Whole numbers no less than 0 and no greater than `most`.
+    fn limited(index: Self::Index, most: i32) -> Self::Index;
+    /// Sums and differences of whole numbers.
+    fn plus(a: Self::Index, b: Self::Index) -> Self::Index;
+    /// `a - b`.
+    fn minus(a: Self::Index, b: Self::Index) -> Self::Index;
+    /// `yes` where the mask holds, else `no`.
+    fn pick_index(mask: Self::Mask, yes: Self::Index, no: Self::Index) -> Self::Index;
+    /// Places in a table of so many rows. One behind its end is the last row.
+    fn places(index: Self::Index, rows: usize) -> Places;
+    /// The rows of a table at some places, column by column.
+    fn rows(table: &[[Self::Float; 4]], at: &Places) -> [Self; 4];
+    /// Adds to the rows of a table at some places, lane by lane.
+    fn add_to_rows(table: &mut [[Self::Float; 4]], at: &Places, columns: [Self; 4]);
+}
+
+/// Rows of a table, one for each lane.
+#[derive(Clone, Copy)]
+pub(crate) struct Places {
+    /// Each below `rows`.
+    at: [u32; LANES],
+    /// What the table has at least.
+    rows: usize,
+}
+
+impl Places {
+    /// The first row of a table with one row or more.
+    pub(crate) const FIRST: Self = Self { at: [0; LANES], rows: 1 };
+}
+
+/// A vector as an array: what every machine has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plain<F>([F; LANES]);
+
+macro_rules! operator {
+    ($trait:ident, $function:ident, $operator:tt) => {
+        impl<F: Float> $trait for Plain<F> {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(mut self, other: Self) -> Self {
+                for i in 0..LANES {
+                    self.0[i] = self.0[i] $operator other.0[i];
+                }
+                self
+            }
+        }
+    };
+}
+
+operator!(Add, add, +);
+operator!(Sub, sub, -);
+operator!(Mul, mul, *);
+
+impl<F: Float> AddAssign for Plain<F> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<F: Float> Lanes for Plain<F> {
+    type Float = F;
+    type Mask = [bool; LANES];
+    type Index = [i32; LANES];
+    const NEEDS_AVX2: bool = false;
+
+    #[inline(always)]
+    fn splat(value: F) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    fn of(values: &[F; LANES]) -> Self {
+        Self(*values)
+    }
+
+    #[inline(always)]
+    fn array(self) -> [F; LANES] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn of_groups(low: &[F; GROUP], high: &[F; GROUP]) -> Self {
+        let mut lanes = [low[0]; LANES];
+        for i in 0..GROUP {
+            (lanes[i], lanes[i + GROUP]) = (low[i], high[i]);
+        }
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    fn of_halves(low: F, high: F) -> Self {
+        Self([low, low, low, low, high, high, high, high])
+    }
+
+    #[inline(always)]
+    fn add_to_groups(self, numbers: &mut [F], at: [u32; 2]) {
+        for (half, at) in at.into_iter().enumerate() {
+            let group = &mut numbers[at as usize..at as usize + GROUP];
+            for i in 0..GROUP {
+                group[i] += self.0[half * GROUP + i];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn recip(mut self) -> Self {
+        for i in 0..LANES {
+            self.0[i] = F::ONE / self.0[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn sqrt(mut self) -> Self {
+        for i in 0..LANES {
+            self.0[i] = self.0[i].sqrt();
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for i in 0..LANES {
+            self.0[i] = -self.0[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn min(mut self, other: Self) -> Self {
+        for i in 0..LANES {
+            self.0[i] = if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] };
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn max(mut self, other: Self) -> Self {
+        for i in 0..LANES {
+            self.0[i] = if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] };
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> [bool; LANES] {
+        let mut mask = [false; LANES];
+        for i in 0..LANES {
+            mask[i] = self.0[i] < other.0[i];
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn at_most(self, other: Self) -> [bool; LANES] {
+        let mut mask = [false; LANES];
+        for i in 0..LANES {
+            mask[i] = self.0[i] <= other.0[i];
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn pick(mask: [bool; LANES], yes: Self, mut no: Self) -> Self {
+        for i in 0..LANES {
+            no.0[i] = if mask[i] { yes.0[i] } else { no.0[i] };
+        }
+        no
+    }
+
+    #[inline(always)]
+    fn only(self, mask: [bool; LANES]) -> Self {
+        Self::pick(mask, self, Self::splat(F::ZERO))
+    }
+
+    #[inline(always)]
+    fn sum(self) -> F {
+        let mut lanes = self.0;
+        let mut width = LANES / 2;
+        while width > 0 {
+            for i in 0..width {
+                lanes[i] += lanes[i + width];
+            }
+            width /= 2;
+        }
+        lanes[0]
+    }
+
+    #[inline(always)]
+    fn nearest(self) -> [i32; LANES] {
+        let mut whole = [0; LANES];
+        for i in 0..LANES {
+            whole[i] = self.0[i].nearest();
+        }
+        whole
+    }
+
+    #[inline(always)]
+    fn cell(self, octaves: u32, bits: u32) -> ([i32; LANES], Self, Self) {
+        let (mut index, mut lower, mut inverse) = ([0; LANES], self.0, self.0);
+        for i in 0..LANES {
+            (index[i], lower[i], inverse[i]) = self.0[i].cell(octaves, bits);
+        }
+        (index, Self(lower), Self(inverse))
+    }
+
+    #[inline(always)]
+    fn index(value: i32) -> [i32; LANES] {
+        [value; LANES]
+    }
+
+    #[inline(always)]
+    fn not_positive(index: [i32; LANES]) -> [bool; LANES] {
+        let mut mask = [false; LANES];
+        for i in 0..LANES {
+            mask[i] = index[i] <= 0;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn limited(mut index: [i32; LANES], most: i32) -> [i32; LANES] {
+        for i in 0..LANES {
+            let least = if index[i] > 0 { index[i] } else { 0 };
+            index[i] = if least < most { least } else { most };
+        }
+        index
+    }
+
+    #[inline(always)]
+    fn plus(mut a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
+        for i in 0..LANES {
+            a[i] += b[i];
+        }
+        a
+    }
+
+    #[inline(always)]
+    fn minus(mut a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
+        for i in 0..LANES {
+            a[i] -= b[i];
+        }
+        a
+    }
+
+    #[inline(always)]
+    fn pick_index(mask: [bool; LANES], yes: [i32; LANES], mut no: [i32; LANES]) -> [i32; LANES] {
+        for i in 0..LANES {
+            no[i] = if mask[i] { yes[i] } else { no[i] };
+        }
+        no
+    }
+
+    #[inline(always)]
+    fn places(index: [i32; LANES], rows: usize) -> Places {
+        let mut at = [0; LANES];
+        for i in 0..LANES {
+            at[i] = (index[i] as u32).min((rows - 1) as u32);
+        }
+        Places { at, rows }
+    }
+
+    #[inline(always)]
+    fn rows(table: &[[F; 4]], at: &Places) -> [Self; 4] {
+        let mut columns = [[F::ZERO; LANES]; 4];
+        for i in 0..LANES {
+            let row = table[at.at[i] as usize];
+            for k in 0..4 {
+                columns[k][i] = row[k];
+            }
+        }
+        let [a, b, c, d] = columns;
+        [Self(a), Self(b), Self(c), Self(d)]
+    }
+
+    #[inline(always)]
+    fn add_to_rows(table: &mut [[F; 4]], at: &Places, columns: [Self; 4]) {
+        for i in 0..LANES {
+            let row = &mut table[at.at[i] as usize];
+            for k in 0..4 {
+                row[k] += columns[k].0[i];
+            }
+        }
+    }
+}

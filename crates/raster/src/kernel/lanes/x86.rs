@@ -1,0 +1,288 @@
+//! Eight `f32` in a vector of AVX2.
+//!
+//! Values of this type come to be only behind a check that the machine has AVX2
+//! ([`has_avx2`](super::super::walk::has_avx2)), and all is inlined into functions that are compiled for it.
+#![allow(unsafe_code)]
+
+use std::{
+    arch::x86_64::*,
+    ops::{Add, AddAssign, Mul, Sub},
+};
+
+use super::{GROUP, LANES, Lanes, Places};
+
+/// Eight `f32`.
+#[derive(Clone, Copy, Debug)]
+#[repr(transparent)]
+pub(crate) struct F32x8(__m256);
+
+macro_rules! operator {
+    ($trait:ident, $function:ident, $intrinsic:ident) => {
+        impl $trait for F32x8 {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                // SAFETY: there is no value of this type without AVX2.
+                Self(unsafe { $intrinsic(self.0, other.0) })
+            }
+        }
+    };
+}
+
+operator!(Add, add, _mm256_add_ps);
+operator!(Sub, sub, _mm256_sub_ps);
+operator!(Mul, mul, _mm256_mul_ps);
+
+impl AddAssign for F32x8 {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+// SAFETY, of every block below that says nothing else: the intrinsics need AVX2 alone, and without it
+// nothing of this type is ever made. Memory is reached through arrays and slices of the right length.
+impl Lanes for F32x8 {
+    type Float = f32;
+    type Mask = __m256;
+    type Index = __m256i;
+    const NEEDS_AVX2: bool = true;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+
+    #[inline(always)]
+    fn of(values: &[f32; LANES]) -> Self {
+        Self(unsafe { _mm256_loadu_ps(values.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f32; LANES] {
+        let mut values = [0.0; LANES];
+        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), self.0) };
+        values
+    }
+
+    #[inline(always)]
+    fn of_groups(low: &[f32; GROUP], high: &[f32; GROUP]) -> Self {
+        Self(unsafe { _mm256_set_m128(_mm_loadu_ps(high.as_ptr()), _mm_loadu_ps(low.as_ptr())) })
+    }
+
+    #[inline(always)]
+    fn of_halves(low: f32, high: f32) -> Self {
+        Self(unsafe { _mm256_set_m128(_mm_set1_ps(high), _mm_set1_ps(low)) })
+    }
+
+    #[inline(always)]
+    fn add_to_groups(self, numbers: &mut [f32], at: [u32; 2]) {
+        let halves =
+            unsafe { [_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0)] };
+        let low = numbers[at[0] as usize..at[0] as usize + GROUP].as_mut_ptr();
+        unsafe { _mm_storeu_ps(low, _mm_add_ps(_mm_loadu_ps(low), halves[0])) };
+        let high = numbers[at[1] as usize..at[1] as usize + GROUP].as_mut_ptr();
+        unsafe { _mm_storeu_ps(high, _mm_add_ps(_mm_loadu_ps(high), halves[1])) };
+    }
+
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self(unsafe { _mm256_div_ps(_mm256_set1_ps(1.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(unsafe { _mm256_sqrt_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(unsafe { _mm256_xor_ps(self.0, _mm256_set1_ps(-0.0)) })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> __m256 {
+        unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) }
+    }
+
+    #[inline(always)]
+    fn at_most(self, other: Self) -> __m256 {
+        unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0) }
+    }
+
+    #[inline(always)]
+    fn pick(mask: __m256, yes: Self, no: Self) -> Self {
+        Self(unsafe { _mm256_blendv_ps(no.0, yes.0, mask) })
+    }
+
+    #[inline(always)]
+    fn only(self, mask: __m256) -> Self {
+        Self(unsafe { _mm256_and_ps(self.0, mask) })
+    }
+
+    #[inline(always)]
+    fn sum(self) -> f32 {
+        unsafe {
+            let four =
+                _mm_add_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps::<1>(two, two)))
+        }
+    }
+
+    #[inline(always)]
+    fn nearest(self) -> [i32; LANES] {
+        let mut whole = [0; LANES];
+        // SAFETY: the array holds a whole vector; it need not be aligned.
+        unsafe { _mm256_storeu_si256(whole.as_mut_ptr().cast(), _mm256_cvtps_epi32(self.0)) };
+        whole
+    }
+
+    #[inline(always)]
+    fn cell(self, octaves: u32, bits: u32) -> (__m256i, Self, Self) {
+        unsafe {
+            let raw = _mm256_castps_si256(self.0);
+            let shift = _mm_cvtsi32_si128(23 - bits as i32);
+            let cells = _mm256_srl_epi32(raw, shift);
+            let lower = _mm256_castsi256_ps(_mm256_sll_epi32(cells, shift));
+            let first = ((127 - octaves as i32) << bits) - 1;
+            let index = _mm256_sub_epi32(cells, _mm256_set1_epi32(first));
+            let exponent = _mm256_srli_epi32::<23>(raw);
+            let inverse = _mm256_sub_epi32(_mm256_set1_epi32(254 + bits as i32), exponent);
+            (index, Self(lower), Self(_mm256_castsi256_ps(_mm256_slli_epi32::<23>(inverse))))
+        }
+    }
+
+    #[inline(always)]
+    fn index(value: i32) -> __m256i {
+        unsafe { _mm256_set1_epi32(value) }
+    }
+
+    #[inline(always)]
+    fn not_positive(index: __m256i) -> __m256 {
+        unsafe { _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(1), index)) }
+    }
+
+    #[inline(always)]
+    fn limited(index: __m256i, most: i32) -> __m256i {
+        unsafe {
+            let least = _mm256_max_epi32(index, _mm256_setzero_si256());
+            _mm256_min_epi32(least, _mm256_set1_epi32(most))
+        }
+    }
+
+    #[inline(always)]
+    fn plus(a: __m256i, b: __m256i) -> __m256i {
+        unsafe { _mm256_add_epi32(a, b) }
+    }
+
+    #[inline(always)]
+    fn minus(a: __m256i, b: __m256i) -> __m256i {
+        unsafe { _mm256_sub_epi32(a, b) }
+    }
+
+    #[inline(always)]
+    fn pick_index(mask: __m256, yes: __m256i, no: __m256i) -> __m256i {
+        unsafe { _mm256_blendv_epi8(no, yes, _mm256_castps_si256(mask)) }
+    }
+
+    #[inline(always)]
+    fn places(index: __m256i, rows: usize) -> Places {
+        assert!(rows > 0, "a table has rows");
+        let mut at = [0; LANES];
+        // SAFETY: the array holds a whole vector; it need not be aligned.
+        unsafe {
+            let last = _mm256_set1_epi32((rows - 1) as i32);
+            _mm256_storeu_si256(at.as_mut_ptr().cast(), _mm256_min_epu32(index, last));
+        }
+        Places { at, rows }
+    }
+
+    #[inline(always)]
+    fn rows(table: &[[f32; 4]], places: &Places) -> [Self; 4] {
+        assert!(places.rows <= table.len(), "places of another table");
+        // SAFETY: every place is below `places.rows`, so the table has that row.
+        unsafe {
+            let [a, b, c, d] = transposed([
+                pair_of_rows(table, places, 0),
+                pair_of_rows(table, places, 1),
+                pair_of_rows(table, places, 2),
+                pair_of_rows(table, places, 3),
+            ]);
+            [Self(a), Self(b), Self(c), Self(d)]
+        }
+    }
+
+    #[inline(always)]
+    fn add_to_rows(table: &mut [[f32; 4]], places: &Places, [a, b, c, d]: [Self; 4]) {
+        assert!(places.rows <= table.len(), "places of another table");
+        // SAFETY: every place is below `places.rows`, so the table has that row.
+        unsafe {
+            let [a, b, c, d] = transposed([a.0, b.0, c.0, d.0]);
+            add_to_row(table, places.at[0], _mm256_castps256_ps128(a));
+            add_to_row(table, places.at[1], _mm256_castps256_ps128(b));
+            add_to_row(table, places.at[2], _mm256_castps256_ps128(c));
+            add_to_row(table, places.at[3], _mm256_castps256_ps128(d));
+            add_to_row(table, places.at[4], _mm256_extractf128_ps::<1>(a));
+            add_to_row(table, places.at[5], _mm256_extractf128_ps::<1>(b));
+            add_to_row(table, places.at[6], _mm256_extractf128_ps::<1>(c));
+            add_to_row(table, places.at[7], _mm256_extractf128_ps::<1>(d));
+        }
+    }
+}
+
+/// The row of lane `k` in the lower half and that of lane `k + 4` in the upper one.
+///
+/// # Safety
+///
+/// The table must have both rows, and `k` be below 4.
+#[inline(always)]
+unsafe fn pair_of_rows(table: &[[f32; 4]], places: &Places, k: usize) -> __m256 {
+    let [low, high] = [places.at[k], places.at[k + GROUP]];
+    // SAFETY: the caller has checked both places.
+    unsafe {
+        let low = _mm_loadu_ps(table.get_unchecked(low as usize).as_ptr());
+        let high = _mm_loadu_ps(table.get_unchecked(high as usize).as_ptr());
+        _mm256_set_m128(high, low)
+    }
+}
+
+/// Adds to a row of a table.
+///
+/// # Safety
+///
+/// The table must have the row.
+#[inline(always)]
+unsafe fn add_to_row(table: &mut [[f32; 4]], at: u32, numbers: __m128) {
+    // SAFETY: the caller has checked the place.
+    unsafe {
+        let row = table.get_unchecked_mut(at as usize).as_mut_ptr();
+        _mm_storeu_ps(row, _mm_add_ps(_mm_loadu_ps(row), numbers));
+    }
+}
+
+/// Rows to columns, in each half.
+#[inline(always)]
+fn transposed([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    // SAFETY: there is no vector without AVX2.
+    unsafe {
+        let ab = [_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b)];
+        let cd = [_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d)];
+        [
+            _mm256_shuffle_ps::<0x44>(ab[0], cd[0]),
+            _mm256_shuffle_ps::<0xee>(ab[0], cd[0]),
+            _mm256_shuffle_ps::<0x44>(ab[1], cd[1]),
+            _mm256_shuffle_ps::<0xee>(ab[1], cd[1]),
+        ]
+    }
+}

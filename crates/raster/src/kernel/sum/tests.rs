@@ -1,0 +1,62 @@
+//! Every instruction set that walks are compiled for gives the same bits.
+
+use std::sync::atomic::Ordering;
+
+use super::*;
+use crate::kernel::walk::PORTABLE;
+
+const VERTICES: usize = 60;
+const FACES: u32 = 90;
+
+/// All that the three passes give, over random triangles of all kinds, some of them slivers, points or without area.
+fn passes<F: Float>(size: usize, views: usize, far: u32) -> Vec<F> {
+    let grid = Grid { outer: 0.3, inner: 0.2, octaves: 12, far, bits: 2 };
+    let wave = |k: usize, step: f64| (step * k as f64).sin();
+    let numbers = |count: usize, step: f64| -> Vec<F> {
+        (0..count).map(|k| F::from_f64(wave(k, step))).collect()
+    };
+    let vertex = |k: usize| if k % (3 * VERTICES) < 2 * VERTICES { wave(k, 1.7) } else { 2.0 };
+    let vertices: Vec<F> = (0..3 * VERTICES * views).map(|k| F::from_f64(vertex(k))).collect();
+    let table = numbers(4 * grid.rows(), 0.7);
+    let corner = |k: u32| k % VERTICES as u32;
+    // Every seventh face is a line, every eleventh a point.
+    let face = |f: u32| match (f % 7, f % 11) {
+        (0, _) => [corner(f), corner(f + 1), corner(f)],
+        (_, 0) => [corner(f); 3],
+        _ => [corner(f), corner(7 * f + 3), corner(11 * f + 8)],
+    };
+    let faces: Vec<_> = (0..FACES).map(face).collect();
+    let inputs =
+        Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, views };
+    let upstream = numbers(views * size * size, 0.3);
+    let direction = numbers(vertices.len() + table.len(), 2.3);
+    let mut all = forward(&inputs);
+    all.extend(vjp(&inputs, &upstream, [true, false]));
+    all.extend(vjp(&inputs, &upstream, [true; 2]));
+    all.extend(vjp_of_vjp(&inputs, &upstream, &direction, [true; 2], [true; 3]));
+    let along = &direction[..vertices.len()];
+    all.extend(vjp_of_vjp(&inputs, &upstream, along, [true, false], [true, false, true]));
+    all
+}
+
+fn assert_same_bits<F: Float>() {
+    for (size, views) in [(50, 1), (33, 5), (100, 3)] {
+        for far in [0, 9] {
+            let fast = passes::<F>(size, views, far);
+            PORTABLE.store(true, Ordering::SeqCst);
+            let portable = passes::<F>(size, views, far);
+            PORTABLE.store(false, Ordering::SeqCst);
+            assert!(fast.iter().all(|x| x.to_f64().is_finite()), "{size} px, {views} views, {far}");
+            assert!(
+                format!("{fast:?}") == format!("{portable:?}"),
+                "{size} px, {views} views, {far}"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    assert_same_bits::<f32>();
+    assert_same_bits::<f64>();
+}
