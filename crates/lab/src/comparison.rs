@@ -88,39 +88,20 @@ impl Comparison {
         json.into()
     }
 
-    pub(crate) fn text(&self) -> Vec<String> {
+    /// Which seeds both have solved, and how often the second succeeded there.
+    fn head(&self) -> String {
         let [successes, runs] = self.successes;
-        let mut lines = vec![format!("  against {}, on the same {runs} seeds:", self.titles[1])];
-        for (difference, second) in self.differences.iter().zip(&self.errors) {
-            let [low, high] = difference.ci95.map(short);
-            lines.push(format!(
-                "    {:<20} {} there; difference {}, 95 % interval {low} to {high}: {}; better on {:.0} % of seeds, worse on {:.0} %",
-                difference.metric.name,
-                short(second.last),
-                short(difference.mean),
-                difference.verdict(),
-                difference.first_better * 100.0,
-                difference.second_better * 100.0,
-            ));
-        }
+        let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
         let rate = successes as f64 / runs as f64 * 100.0;
-        lines.push(format!("    {:<20} {rate:.1} % of runs there", "success"));
-        lines
+        format!(
+            "on the same {runs} seeds, at the last step; it succeeds in {rate:.1} % of runs, 95 % interval {low:.1} to {high:.1} %"
+        )
     }
 
-    pub(crate) fn section(&self, report: &mut Report) {
-        let [first, second] = &self.titles;
-        let [successes, runs] = self.successes;
-        let mut table = Table::new([
-            "Error",
-            "First",
-            "Second",
-            "Mean difference",
-            "95 % interval",
-            "First better",
-            "Second better",
-            "First is",
-        ]);
+    fn table(&self) -> Table {
+        let head = ["Error", "First", "Second", "Mean difference", "95 % interval"];
+        let shares = ["First better", "Second better", "First is"];
+        let mut table = Table::new(head.into_iter().chain(shares));
         for (difference, error) in self.differences.iter().zip(&self.errors) {
             let [low, high] = difference.ci95.map(short);
             table.push([
@@ -134,17 +115,23 @@ impl Comparison {
                 difference.verdict().to_owned(),
             ]);
         }
+        table
+    }
+
+    pub(crate) fn text(&self) -> Vec<String> {
+        let mut lines = vec![format!("  against {}, {}:", self.titles[1], self.head())];
+        lines.extend(self.table().lines());
+        lines
+    }
+
+    pub(crate) fn section(&self, report: &mut Report) {
+        let [first, second] = &self.titles;
         report.heading(&format!("Against {second}"));
-        report.paragraph(&format!(
-            "On the same {runs} seeds, at the last step. A difference below 0 means that the first method ({first}) has the smaller \
-             error. On the charts it is blue, the second ({second}) is orange."
-        ));
-        report.table(&table);
-        let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
+        report.paragraph(&format!("The second method {}.", self.head()));
+        report.table(&self.table());
         report.note(&format!(
-            "Success of the second: {:.1} % of runs, 95 % interval {low:.1} to {high:.1} %. Intervals are by the bootstrap over the \
-             seeds.",
-            successes as f64 / runs as f64 * 100.0,
+            "A difference below 0 means that the first method ({first}) has the smaller error. On the charts it is blue, the second \
+             ({second}) is orange. Intervals are by the bootstrap over the seeds, that of the success by Wilson."
         ));
     }
 }

@@ -1,16 +1,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{Metric, Run, bootstrap_mean_interval, mean};
-
-/// Samples behind a confidence interval, and the seed that draws them.
-const RESAMPLES: usize = 10_000;
-const RESAMPLING_SEED: u64 = 0;
-
-/// 95 % interval of a mean, as all results have it.
-pub fn mean_interval(values: &[f64]) -> [f64; 2] {
-    bootstrap_mean_interval(values, RESAMPLES, RESAMPLING_SEED)
-}
+use crate::{Metric, Run, mean, mean_interval};
 
 /// One error over all runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -164,18 +164,7 @@ impl Summary {
         let line = |name: &str, text: String| format!("  {name:<22} {text}");
         let mut lines: Vec<String> =
             self.partial.iter().map(|partial| line("stopped", partial.of("runs"))).collect();
-        for error in &self.errors {
-            let [initial, last, best] = [error.initial, error.last, error.best].map(short);
-            let interval = error.ci95.map(|ends| ends.map(short));
-            let interval = interval.map(|[low, high]| format!("; 95 % interval {low} to {high}"));
-            let unit = match error.metric.unit {
-                "" => String::new(),
-                unit => format!(" {unit}"),
-            };
-            let interval = interval.unwrap_or_default();
-            let text = format!("{initial} -> {last}{unit} (best {best}{interval})");
-            lines.push(line(error.metric.name, text));
-        }
+        lines.extend(self.table().lines());
         lines.push(line("returned", self.returned.in_words(self.successes[1])));
         lines.push(line("success", self.success(success_means)));
         lines.push(line("time", self.time()));
@@ -189,8 +178,7 @@ impl Summary {
         format!("{:.1} s, {ms} ms per step{}", self.seconds, memory.unwrap_or_default())
     }
 
-    /// The results as a section of a page.
-    pub fn section(&self, report: &mut Report, runs: &[Run], success_means: &str) {
+    fn table(&self) -> Table {
         let interval = self.many.then_some("95 % interval of the end");
         let head = ["Error", "Start", "End", "Lowest"].into_iter().chain(interval);
         let mut table = Table::new(head);
@@ -200,8 +188,13 @@ impl Summary {
                 error.ci95.map(|[low, high]| format!("{} to {}", short(low), short(high)));
             table.push([error.metric.title()].into_iter().chain(numbers).chain(interval));
         }
+        table
+    }
+
+    /// The results as a section of a page.
+    pub fn section(&self, report: &mut Report, runs: &[Run], success_means: &str) {
         report.heading("Results");
-        report.table(&table);
+        report.table(&self.table());
         report.labelled("Returned", &self.returned.in_words(self.successes[1]));
         report.labelled("Success", &self.success(success_means));
         let means = if self.successes[1] > 1 { " All are means over the runs." } else { "" };
