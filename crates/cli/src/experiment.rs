@@ -1,7 +1,7 @@
 use std::rc::Rc;
 
 use serde_json::{Map, Value, json};
-use softrast_inverse::{Iterate, Method, SolveConfig, minimize};
+use softrast_inverse::{Iterate, Method, Resolution, SolveConfig, minimize};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
 use softrast_raster::{BackendChoice, HostBackend, RasterBackend, compiled_backends, on_backend};
 use softrast_softness::{Softness, Surrogate};
@@ -30,7 +30,7 @@ pub struct TaskExperiment<T: Task> {
 }
 
 impl<T: Task> TaskExperiment<T> {
-    /// The task and the method that flags ask for; `solves` one instance or many, and does not look for a method.
+    /// The task and the method that flags ask for.
     ///
     /// # Errors
     ///
@@ -39,19 +39,19 @@ impl<T: Task> TaskExperiment<T> {
         args: &T::Args,
         common: &Common,
         method_args: &MethodArgs,
-        solves: Purpose,
+        purpose: Purpose,
     ) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(common.backend.as_deref())?;
-        let is_solved = solves != Purpose::Finding;
+        let learned_by_default = purpose != Purpose::Finding;
         let family = match method_args.softness {
             Some(SoftnessChoice::Family(family)) => Some(family),
             _ => None,
         };
-        let learned = learned_name(method_args, T::NAME, is_solved);
+        let learned = learned_name(method_args, T::NAME, learned_by_default);
         let edges = EdgeChoice { family, learned, schedule: method_args.schedule };
         let task = T::new(args, common.variant, &edges)?;
-        let mut method = method_args.method(T::NAME, &T::SCALES, is_solved)?;
+        let mut method = method_args.method(T::NAME, &T::SCALES, learned_by_default)?;
         if !T::MOVES_EDGES {
             refuse_what_edges_that_stay_do_not_know(method_args)?;
             method.softness.surrogate = None;
@@ -67,7 +67,7 @@ impl<T: Task> TaskExperiment<T> {
             variant: common.variant,
             description: task.description(),
             backend,
-            starts: T::starts(args, solves == Purpose::Solving),
+            starts: T::starts(args, purpose == Purpose::Solving),
             name: task.method_name(&method.name),
             metrics: T::measures().metrics(),
             task: Rc::new(task),
@@ -318,10 +318,7 @@ pub fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
 
 fn refuse_what_edges_that_stay_do_not_know(method: &MethodArgs) -> anyhow::Result<()> {
     let given = [
-        (
-            method.resolution.is_some_and(|asked| asked != softrast_inverse::Resolution::Full),
-            "--resolution",
-        ),
+        (method.resolution.is_some_and(|asked| asked != Resolution::Full), "--resolution"),
         (method.tolerance.is_some(), "--tolerance"),
         (method.surrogate_scale.is_some(), "--surrogate-scale"),
     ];

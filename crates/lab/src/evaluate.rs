@@ -1,8 +1,9 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use crate::{
-    Batch, Cache, Encoded, Error, Experiment, Progress, Run,
+    Batch, Cache, Encoded, Error, Experiment, Progress, Role, Run,
     cache::{Finished, key},
+    place,
 };
 
 /// Runs experiments, and recalls what an earlier call has finished.
@@ -74,6 +75,29 @@ impl Runner {
             }
         }
         Ok((evaluations, false))
+    }
+
+    /// Runs one experiment on all seeds, and scores each run as `of` does, which gets the place of the score among the metrics; none
+    /// where the numbers do not stay finite. `label` stands beside the progress bar.
+    ///
+    /// # Errors
+    ///
+    /// Those of the experiment and of the cache; [`Error::Interrupted`] if the user stopped it.
+    pub(crate) fn score(
+        &mut self,
+        experiment: &dyn Experiment,
+        seeds: &[u64],
+        label: &str,
+        of: impl Fn(&Run, usize) -> Option<f64>,
+    ) -> anyhow::Result<(Vec<Option<f64>>, Evaluation)> {
+        let (evaluations, stopped) = self.evaluate(&[experiment], seeds, false, Some(label))?;
+        if stopped {
+            return Err(Error::Interrupted.into());
+        }
+        let score = place(experiment.metrics(), Role::Score);
+        let evaluation = evaluations.into_iter().next().unwrap_or_default();
+        let finite = |run: &Run| of(run, score).filter(|_| run.broke_at.is_none());
+        Ok((evaluation.runs.iter().map(finite).collect(), evaluation))
     }
 
     /// Whether the runs of all seeds are finished.

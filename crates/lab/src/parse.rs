@@ -1,4 +1,9 @@
-//! Parsers of flags, one for each kind of number.
+//! Parsers of flags: one for each kind of number, and one for names.
+
+use serde::{
+    Deserialize,
+    de::{IntoDeserializer, value::Error},
+};
 
 /// A positive, finite number.
 ///
@@ -46,6 +51,15 @@ pub fn count(text: &str) -> Result<usize, String> {
 /// What was expected.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| "expected a whole number from 0".into())
+}
+
+/// The variant of an enum that has this name in the results.
+///
+/// # Errors
+///
+/// What names there are.
+pub fn named<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, String> {
+    T::deserialize(text.into_deserializer()).map_err(|error: Error| error.to_string())
 }
 
 #[cfg(test)]

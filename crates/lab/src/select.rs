@@ -3,9 +3,9 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::{
-    Error, Experiment, Role, Run, Runner,
+    Experiment, Run, Runner,
     format::{short, short_or_none},
-    mean, place,
+    mean,
     report::{Report, Table},
 };
 
@@ -92,22 +92,13 @@ impl Runner {
                 continue;
             }
             let clock = Instant::now();
-            let (evaluations, stopped) =
-                self.evaluate(&[experiment.as_ref()], seeds, false, Some(&flags))?;
-            if stopped {
-                return Err(Error::Interrupted.into());
-            }
+            let returned = |run: &Run, score| run.returned(score).map(|point| point.values[score]);
+            let (errors, tried) = self.score(experiment.as_ref(), seeds, &flags, returned)?;
             if !known {
                 spent.push(clock.elapsed().as_secs_f64());
                 budget.left -= spent[spent.len() - 1];
             }
-            let score = place(experiment.metrics(), Role::Score);
-            let error = |run: &Run| {
-                let finite = run.broke_at.is_none();
-                run.returned(score).filter(|_| finite).map(|point| point.values[score])
-            };
-            let errors: Vec<_> = evaluations[0].runs.iter().map(error).collect();
-            reasons.push(Reason::new(flags, with, errors, evaluations[0].seconds_per_run()));
+            reasons.push(Reason::new(flags, with, errors, tried.seconds_per_run()));
             answers.push(answer);
         }
         let selection = Selection::among(of, reasons);

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 use crate::{
     Comparison, ErrorSummary, Evaluation, Experiment, Role, Run,
     error_summary::{errors_of, nested},
-    format::{counted, short},
+    format::{counted, line, short},
     mean, median, peak_rss_mib, place,
     report::{Report, Table},
     wilson_interval,
@@ -161,13 +161,12 @@ impl Summary {
 
     /// A few lines for people.
     pub fn text(&self, success_means: &str) -> Vec<String> {
-        let line = |name: &str, text: String| format!("  {name:<22} {text}");
         let mut lines: Vec<String> =
-            self.partial.iter().map(|partial| line("stopped", partial.of("runs"))).collect();
+            self.partial.iter().map(|partial| line("stopped", &partial.of("runs"))).collect();
         lines.extend(self.table().lines());
-        lines.push(line("returned", self.returned.in_words(self.successes[1])));
-        lines.push(line("success", self.success(success_means)));
-        lines.push(line("time", self.time()));
+        lines.push(line("returned", &self.returned.in_words(self.successes[1])));
+        lines.push(line("success", &self.success(success_means)));
+        lines.push(line("time", &self.time()));
         lines.extend(self.against.iter().flat_map(Comparison::text));
         lines
     }

@@ -195,6 +195,12 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("search --search-runs 0", 2, "from 1"),
         ("search --schedule static --scale 1 --learning-rate 1", 2, "nothing to choose from"),
         ("search --seed 999999", 2, "seeds 1000000 to 1000007"),
+        ("search --softness auto", 2, "--softness auto goes with solve and evaluate"),
+        ("learn --softness auto", 2, "--softness auto goes with solve and evaluate"),
+        ("evaluate --against auto", 2, "--against: --softness auto goes with"),
+        ("learn --backend flex", 2, "learn is compiled for ndarray alone"),
+        ("learn --outer-loss soft", 2, "expected one of `fixed`, `pixels`, `hard`, `own`"),
+        ("learn --inner 3", 2, "unexpected argument '--inner'"),
     ];
     let root = tempfile::tempdir().unwrap();
     for (line, code, says) in cases {
