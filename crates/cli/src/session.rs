@@ -20,10 +20,6 @@ pub(crate) struct Session {
 
 impl Session {
     /// The folder for the results.
-    ///
-    /// # Errors
-    ///
-    /// If it cannot be written.
     pub(crate) fn folder(&self) -> anyhow::Result<OutputFolder> {
         Ok(OutputFolder::open(&self.out)?)
     }
@@ -46,10 +42,6 @@ impl Session {
 
     /// Writes the page, and the JSON if it has a `file` of its own, beside what `folder` holds, and says where they are. `beside` says
     /// what lies beside the page.
-    ///
-    /// # Errors
-    ///
-    /// Those of the folder.
     pub(crate) fn finish(
         &self,
         mut folder: OutputFolder,

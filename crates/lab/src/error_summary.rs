@@ -4,24 +4,23 @@ use serde_json::{Map, Value, json};
 use crate::{Metric, Run, mean, mean_interval};
 
 /// One error over all runs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ErrorSummary {
-    /// Which one.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct ErrorSummary {
     #[serde(skip)]
-    pub metric: Metric,
+    pub(crate) metric: Metric,
     /// Mean before the first step.
-    pub initial: f64,
+    pub(crate) initial: f64,
     /// Mean after the last step.
     #[serde(rename = "final")]
-    pub last: f64,
+    pub(crate) last: f64,
     /// Mean over the runs of the lowest over all steps.
-    pub best: f64,
+    pub(crate) best: f64,
     /// 95 % interval of the mean of `last`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub ci95: Option<[f64; 2]>,
+    pub(crate) ci95: Option<[f64; 2]>,
     /// `last` of every run, in the order of the seeds.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub per_run: Option<Vec<f64>>,
+    pub(crate) per_run: Option<Vec<f64>>,
 }
 
 /// The errors among metrics and their places, those of a group one after the other.

@@ -33,9 +33,8 @@ mod summary;
 pub mod sweep;
 
 pub use cache::Cache;
-pub use comparison::{Comparison, Difference, paired};
+pub use comparison::{Comparison, paired};
 pub use error::{Error, Failure, INTERRUPTED, found};
-pub use error_summary::ErrorSummary;
 pub use evaluate::{Evaluation, Runner, seeds, was_interrupted};
 pub use files::{OutputFolder, write_atomically};
 pub use machine::{machine, peak_rss_mib};
@@ -44,5 +43,5 @@ pub use picture::{Encoded, contact_sheet, difference, png, rgb_from_gray, rgb_fr
 pub use progress::{Progress, stop_on_ctrl_c};
 pub use run::{Batch, Experiment, Pictures, Point, Run, best_point};
 pub use statistics::{mean, mean_interval, median, quantile, wilson_interval};
-pub use summary::{Partial, Returned, Summary, headline};
+pub use summary::{Partial, Summary, headline};
 pub use sweep::check_held_out;

@@ -61,24 +61,3 @@ pub fn seed(text: &str) -> Result<u64, String> {
 pub fn named<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, String> {
     T::deserialize(text.into_deserializer()).map_err(|error: Error| error.to_string())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_out_of_range_and_words_are_refused() {
-        assert_eq!(
-            (positive("1e-3"), share("0.5"), count("7"), seed("0")),
-            (Ok(1e-3), Ok(0.5), Ok(7), Ok(0))
-        );
-        for wrong in ["0", "-1", "inf", "nan", "x", ""] {
-            assert!(
-                positive(wrong).is_err() && share(wrong).is_err() && count(wrong).is_err(),
-                "{wrong}"
-            );
-        }
-        assert!(share("1").is_err() && count("1000001").is_err() && seed("-1").is_err());
-        assert_eq!(whole::<2, 4>("5"), Err("expected a whole number from 2 to 4".into()));
-    }
-}

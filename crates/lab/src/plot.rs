@@ -6,6 +6,7 @@ use anyhow::anyhow;
 use plotters::{coord::Shift, prelude::*};
 
 pub use crate::axis::Axis;
+use crate::axis::MarkedAxis;
 
 const WIDTH: u32 = 900;
 const HEIGHT: u32 = 380;
@@ -168,40 +169,50 @@ impl Plot {
             .bold_line_style(GRID)
             .light_line_style(LIGHT)
             .draw()?;
-        let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
-        let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
-        let front = self.front.iter().map(|point| place(*point)).filter(shown);
-        chart.draw_series(LineSeries::new(front, BEHIND.stroke_width(1)))?;
+        let front = self.front.iter().map(|[x, y]| (self.x.place(*x), self.y.place(*y)));
+        let shown = front.filter(|(x, y)| x.is_finite() && y.is_finite());
+        chart.draw_series(LineSeries::new(shown, BEHIND.stroke_width(1)))?;
         for series in &self.series {
-            let colour = series.rgb();
-            let end = |k: usize| {
-                let pairs = series.points.iter().zip(&series.band);
-                pairs.map(move |(point, band)| place([point[0], band[k]])).filter(shown)
-            };
-            let band: Vec<_> = end(0).chain(end(1).collect::<Vec<_>>().into_iter().rev()).collect();
-            if band.len() > 2 {
-                chart.draw_series([Polygon::new(band, colour.mix(0.12))])?;
-            }
-            let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
-            if let [point] = points[..] {
-                let mark = EmptyElement::at(point) + series.mark_at((0, 0));
-                chart.draw_series([mark])?;
-                if series.marked {
-                    chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
-                }
-                if series.boxed {
-                    let corners = [(-14, -14), (14, 14)];
-                    let frame = Rectangle::new(corners, BLACK.stroke_width(1));
-                    chart.draw_series([EmptyElement::at(point) + frame])?;
-                }
-            } else if series.dashed {
-                let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
-                chart.draw_series(line)?;
-            } else {
-                chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
-            }
+            self.draw_series(series, &mut chart)?;
         }
         self.legend(&legend)
+    }
+
+    fn draw_series<DB: DrawingBackend>(
+        &self,
+        series: &Series,
+        chart: &mut ChartContext<DB, Cartesian2d<MarkedAxis, MarkedAxis>>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
+        let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        let colour = series.rgb();
+        let end = |k: usize| {
+            let pairs = series.points.iter().zip(&series.band);
+            pairs.map(move |(point, band)| place([point[0], band[k]])).filter(shown)
+        };
+        let band: Vec<_> = end(0).chain(end(1).collect::<Vec<_>>().into_iter().rev()).collect();
+        if band.len() > 2 {
+            chart.draw_series([Polygon::new(band, colour.mix(0.12))])?;
+        }
+        let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
+        if let [point] = points[..] {
+            let mark = EmptyElement::at(point) + series.mark_at((0, 0));
+            chart.draw_series([mark])?;
+            if series.marked {
+                chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
+            }
+            if series.boxed {
+                let corners = [(-14, -14), (14, 14)];
+                let frame = Rectangle::new(corners, BLACK.stroke_width(1));
+                chart.draw_series([EmptyElement::at(point) + frame])?;
+            }
+        } else if series.dashed {
+            let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
+            chart.draw_series(line)?;
+        } else {
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
+        }
+        Ok(())
     }
 
     /// As much as the names of all methods need.

@@ -28,34 +28,29 @@ pub struct Candidate<A> {
 #[derive(Clone, Debug, Serialize)]
 pub struct Selection {
     /// What is asked for, such as `softness`.
-    pub of: &'static str,
-    /// Place of the chosen answer among the reasons.
-    pub chosen: usize,
-    /// Place of the one with the least error.
-    pub best: usize,
+    of: &'static str,
+    /// Places among the reasons: of the chosen answer, and of the one with the least error.
+    chosen: usize,
+    best: usize,
     /// All that were tried, the cheapest first.
-    pub reasons: Vec<Reason>,
+    reasons: Vec<Reason>,
 }
 
 /// An answer and what speaks for or against it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Reason {
-    /// The flags that give it.
-    pub flags: String,
-    /// What it computes with.
-    pub with: String,
+struct Reason {
+    flags: String,
+    with: String,
     /// Error of what each seed returns, in their order; none where it is not finite.
-    pub errors: Vec<Option<f64>>,
+    errors: Vec<Option<f64>>,
     /// Time of the steps of one run.
-    pub seconds: f64,
+    seconds: f64,
     /// Mean error; none if a run has no finite one.
-    pub mean: Option<f64>,
-    /// Mean difference from the best.
-    pub above_best: Option<f64>,
-    /// Standard error of that difference.
-    pub standard_error: Option<f64>,
-    /// What follows from that.
-    pub verdict: &'static str,
+    mean: Option<f64>,
+    /// Mean difference from the best, and its standard error.
+    above_best: Option<f64>,
+    standard_error: Option<f64>,
+    verdict: &'static str,
 }
 
 /// Time that is left for trials.
@@ -139,8 +134,7 @@ impl Selection {
         Some(Self { of, chosen, best, reasons })
     }
 
-    /// The reason of what is chosen.
-    pub fn answer(&self) -> &Reason {
+    fn answer(&self) -> &Reason {
         &self.reasons[self.chosen]
     }
 

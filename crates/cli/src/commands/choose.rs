@@ -32,10 +32,6 @@ const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 const RUNS: usize = 8;
 
 /// Finds the cheapest way to solve the task that is as good as the best, and gives its reasons.
-///
-/// # Errors
-///
-/// Those of the task, of the cache and of the output folder, and if no method gave finite numbers.
 pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyhow::Result<Output> {
     let Choose { mut shared, auto, training, resume } = flags;
     shared.method.reconcile().map_err(Error::usage)?;
@@ -75,10 +71,6 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
 }
 
 /// What `--softness auto` stands for.
-///
-/// # Errors
-///
-/// Those of the task, and if no method gave finite numbers.
 pub(crate) fn chosen<T: Task>(
     shared: &Shared<T::Args>,
     budget: Option<f64>,

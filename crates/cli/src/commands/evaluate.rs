@@ -13,10 +13,6 @@ use crate::{
 };
 
 /// Solves one instance.
-///
-/// # Errors
-///
-/// Those of the task and of the output folder.
 pub(crate) fn solve<T: Task>(session: &Session, flags: Solve<T::Args>) -> anyhow::Result<Output> {
     let Solve { mut shared, auto } = flags;
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
@@ -24,11 +20,6 @@ pub(crate) fn solve<T: Task>(session: &Session, flags: Solve<T::Args>) -> anyhow
 }
 
 /// Solves many instances with one method or two.
-///
-/// # Errors
-///
-/// Those of the task, of the cache and of the output folder; [`Error::Interrupted`] if the user stopped the work before any run was
-/// finished.
 pub(crate) fn evaluate<T: Task>(
     session: &Session,
     flags: Evaluate<T::Args>,
@@ -89,12 +80,13 @@ fn run<T: Task>(
     let mut summary = finished.summary(many)?;
     let partial = Partial { finished: summary.successes[1], asked: seeds.len() };
     summary.partial = stopped.then_some(partial);
-    summary.against = other.map(|(second, evaluation)| {
+    if let Some((second, evaluation)) = other {
         let titles = [title(first, second), title(second, first)];
-        let mut about = second.about("evaluate");
+        let mut about = second.about();
         about.retain(|key, _| ["softness", "parameters", "settings"].contains(&key.as_str()));
-        Comparison::new(titles, about, first, finished.evaluation, evaluation)
-    });
+        let against = Comparison::new(titles, about, first, finished.evaluation, evaluation)?;
+        summary.against = Some(Box::new(against));
+    }
     let other = other.map(|(experiment, evaluation)| Finished { experiment, evaluation });
     write(session, folder, &finished, other.as_ref(), &summary, None)
 }

@@ -34,10 +34,6 @@ use crate::{
 ///
 /// Every outer step leaves a line in `learn.jsonl` and then a checkpoint, so that a program that was killed at any moment goes on with
 /// `--resume` as though it had not been.
-///
-/// # Errors
-///
-/// Those of the task and of the output folder; if learning cannot go on.
 pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow::Result<Output> {
     let Learn { shared: Shared { args, mut common, mut method }, learn, resume } = flags;
     method.reconcile().map_err(Error::usage)?;
@@ -50,7 +46,7 @@ pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow
         return Err(Error::usage(message));
     }
     let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Finding)?;
-    let (about, identity) = (experiment.about(session.command), experiment.identity());
+    let (about, identity) = (experiment.about(), experiment.identity());
     let TaskExperiment { task, method, solve, .. } = experiment;
     let own_start = task.own_phi();
     let task = std::rc::Rc::into_inner(task).context("a task has one owner")?;

@@ -25,7 +25,7 @@ pub(super) struct Finished<'a, T: Task> {
 impl<T: Task> Finished<'_, T> {
     pub(super) fn summary(&self, many: bool) -> anyhow::Result<Summary> {
         let Self { experiment, evaluation } = self;
-        let mut summary = Summary::new(*experiment, evaluation, many)?;
+        let mut summary = Summary::new(*experiment, &evaluation.runs, evaluation.seconds, many)?;
         let (settings, size) = (experiment.settings(), experiment.solve.size);
         summary.warnings.extend(diagnostics(&settings, size, &evaluation.runs));
         Ok(summary)
@@ -66,7 +66,7 @@ pub(super) fn write<T: Task>(
     let (parameters, steps) = (experiment.parameters(), experiment.solve.steps);
     let head = headline(&what, experiment.name(), parameters, steps, &summary.seeds());
     let page = page(first, &convergences, summary, &head, search)?;
-    let mut json = summary.json(&experiment.about(session.command), success);
+    let mut json = summary.json(&experiment.about(), success);
     json.extend(search.map(|search| ("search".to_owned(), search.json())));
     let mut text = vec![head];
     text.extend(search.into_iter().flat_map(Sweep::text));
@@ -104,8 +104,8 @@ fn page<T: Task>(
     }
     let means = " A line is the mean of all runs, the band around it the 95 % interval of the mean, by the bootstrap.";
     report.note(&format!("All errors should fall to 0.{}", if summary.many { means } else { "" }));
-    let mut about = experiment.about("");
-    about.retain(|key, value| !value.is_object() && !["task", "command"].contains(&key.as_str()));
+    let mut about = experiment.about();
+    about.retain(|_, value| !value.is_object());
     settings_section(&mut report, [&about, &experiment.settings()]);
     report.note(
         "The softness is the smooth step that stands for the hard edge of a face, so that the image changes smoothly with the scene; \

@@ -1,6 +1,6 @@
 use serde_json::{Map, Value, json};
 use softrast_lab::{
-    Error, Evaluation, Experiment, Partial, Run, Runner, check_held_out,
+    Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, check_held_out,
     format::exact,
     program::Output,
     report::Report,
@@ -31,11 +31,6 @@ const RATE: usize = 2;
 const OWN: usize = 3;
 
 /// Searches for the best setting, then evaluates it on seeds that the search never saw.
-///
-/// # Errors
-///
-/// Those of the task, of the cache and of the output folder; [`Error::Interrupted`] if the user stopped the work before any setting was
-/// finished.
 pub(crate) fn search<T: Task>(
     session: &Session,
     mut flags: Search<T::Args>,
@@ -81,15 +76,7 @@ pub(crate) fn search<T: Task>(
     folder.stage("search.csv", sweep.csv().as_bytes())?;
     folder.stage("search.json", &serde_json::to_vec_pretty(&sweep.json())?)?;
     if evaluation.runs.is_empty() {
-        let mut report = Report::new(T::NAME, T::ABOUT);
-        sweep.section(&mut report, "learning-rate");
-        let json = json!({ "partial": sweep.done(), "search": sweep.json() });
-        let mut text = vec![format!("{}: search stopped early", T::NAME)];
-        text.extend(sweep.text());
-        let partial = Some(format!("{}, no held-out run", sweep.done().of("settings")));
-        let output = Output { json, text, warnings: sweep.warnings(), partial };
-        let beside = "search.json and search.csv hold every setting tried";
-        return session.finish(folder, report, beside, None, output);
+        return stopped_early::<T>(session, folder, &sweep);
     }
     let finished = Finished { experiment: &found, evaluation: &evaluation };
     let mut summary = finished.summary(true)?;
@@ -97,6 +84,28 @@ pub(crate) fn search<T: Task>(
     let partial = Partial { finished: evaluation.runs.len(), asked: held_out.len() };
     summary.partial = stopped.then_some(partial);
     write(session, folder, &finished, None, &summary, Some(&sweep))
+}
+
+/// Writes what a search found that ended before the first run on other seeds.
+fn stopped_early<T: Task>(
+    session: &Session,
+    folder: OutputFolder,
+    sweep: &Sweep,
+) -> anyhow::Result<Output> {
+    let mut report = Report::new(T::NAME, T::ABOUT);
+    sweep.section(&mut report, "learning-rate");
+    let json = json!({ "partial": sweep.done(), "search": sweep.json() });
+    let mut text = vec![format!("{}: search stopped early", T::NAME)];
+    text.extend(sweep.text());
+    let partial = Some(format!("{}, no held-out run", sweep.done().of("settings")));
+    let output = Output { json, text, warnings: sweep.warnings(), partial };
+    session.finish(
+        folder,
+        report,
+        "search.json and search.csv hold every setting tried",
+        None,
+        output,
+    )
 }
 
 /// Evaluates what was found, and says whether the user cut that short.
