@@ -106,9 +106,7 @@ mod tests {
             Point { step, values }
         };
         let curve = points.into_iter().enumerate().map(point).collect();
-        let (seed, success, broke_at, pictures) = (0, true, None, None);
-        let (step_seconds, warnings) = (Vec::new(), Vec::new());
-        let run = Run { seed, curve, success, step_seconds, warnings, broke_at, pictures };
+        let run = Run { curve, ..Run::default() };
         let mut settings = Map::new();
         if surrogate {
             settings.insert("surrogate_scale".into(), 1e-8.into());

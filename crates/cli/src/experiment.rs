@@ -1,14 +1,14 @@
 use std::rc::Rc;
 
 use serde_json::{Map, Value, json};
-use softrast_inverse::{Iterate, Method, SolveConfig, minimize};
+use softrast_inverse::{Iterate, Method, Resolution, SolveConfig, minimize};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
 use softrast_raster::{BackendChoice, HostBackend, RasterBackend, compiled_backends, on_backend};
 use softrast_softness::{Softness, Surrogate};
 
 use crate::{
     Common, Description, EdgeChoice, MethodArgs, SoftnessChoice, Task, Variant, learned_name,
-    task::{Ended, HARD, theta_of},
+    task::{Ended, HARD, PARAMETER, theta_of},
 };
 
 /// A task with a method to solve it.
@@ -30,7 +30,7 @@ pub struct TaskExperiment<T: Task> {
 }
 
 impl<T: Task> TaskExperiment<T> {
-    /// The task and the method that flags ask for; `solves` one instance or many, and does not look for a method.
+    /// The task and the method that flags ask for.
     ///
     /// # Errors
     ///
@@ -39,19 +39,19 @@ impl<T: Task> TaskExperiment<T> {
         args: &T::Args,
         common: &Common,
         method_args: &MethodArgs,
-        solves: Purpose,
+        purpose: Purpose,
     ) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(common.backend.as_deref())?;
-        let is_solved = solves != Purpose::Finding;
+        let learned_by_default = purpose != Purpose::Finding;
         let family = match method_args.softness {
             Some(SoftnessChoice::Family(family)) => Some(family),
             _ => None,
         };
-        let learned = learned_name(method_args, T::NAME, is_solved);
+        let learned = learned_name(method_args, T::NAME, learned_by_default);
         let edges = EdgeChoice { family, learned, schedule: method_args.schedule };
         let task = T::new(args, common.variant, &edges)?;
-        let mut method = method_args.method(T::NAME, &T::SCALES, is_solved)?;
+        let mut method = method_args.method(T::NAME, &T::SCALES, learned_by_default)?;
         if !T::MOVES_EDGES {
             refuse_what_edges_that_stay_do_not_know(method_args)?;
             method.softness.surrogate = None;
@@ -67,7 +67,7 @@ impl<T: Task> TaskExperiment<T> {
             variant: common.variant,
             description: task.description(),
             backend,
-            starts: T::starts(args, solves == Purpose::Solving),
+            starts: T::starts(args, purpose == Purpose::Solving),
             name: task.method_name(&method.name),
             metrics: T::measures().metrics(),
             task: Rc::new(task),
@@ -108,11 +108,9 @@ impl<T: Task> TaskExperiment<T> {
         settings
     }
 
-    /// What the results say first.
-    pub fn about(&self, command: &str) -> Map<String, Value> {
+    /// What the results say of it.
+    pub fn about(&self) -> Map<String, Value> {
         let about = json!({
-            "task": T::NAME,
-            "command": command,
             "variant": self.variant.name(),
             "softness": self.name,
             "parameters": self.parameters(),
@@ -147,7 +145,9 @@ impl<T: Task> TaskExperiment<T> {
             if all.is_empty() {
                 let targets = self.task.targets(scene);
                 let target = targets.chunks(targets.len() / instances.len());
-                all = target.map(|target| Solved::new(target.to_vec())).collect();
+                let solved =
+                    |target: &[f64]| Solved { target: target.to_vec(), ..Solved::default() };
+                all = target.map(solved).collect();
             }
             let thetas = theta_of(&iterate.theta, instances.len());
             let errors = self.task.errors(instances, scene, iterate);
@@ -159,10 +159,10 @@ impl<T: Task> TaskExperiment<T> {
             for (k, (solved, errors)) in all.iter_mut().zip(errors).enumerate() {
                 let at = [iterate.loss[k], iterate.soft_loss[k], errors[0], iterate.scale];
                 let values = [&at[..], &[iterate.hard_loss[k]], &errors[1..]].concat();
-                solved.curve.push(Point { step: iterate.step, values });
+                solved.run.curve.push(Point { step: iterate.step, values });
                 // The steps of a batch are shared by its runs.
                 let share = iterate.seconds.map(|time| time / instances.len() as f64);
-                solved.step_seconds.extend(share);
+                solved.run.step_seconds.extend(share);
                 solved.theta.clone_from(&thetas[k]);
             }
             if let Some(image) = &iterate.image {
@@ -179,10 +179,10 @@ impl<T: Task> TaskExperiment<T> {
     /// Keeps an image as the result, if no step before had a lower error of the hard one, and as a frame if so asked.
     fn keep_picture(&self, solved: &mut Solved, image: &[f64], frame: bool) {
         let size = self.solve.size;
-        let step = solved.curve.len() - 1;
-        let best = best_point(&solved.curve, HARD).is_none_or(|best| best.step == step);
+        let step = solved.run.curve.len() - 1;
+        let best = best_point(&solved.run.curve, HARD).is_none_or(|best| best.step == step);
         let now = || self.task.picture(image, size);
-        let pictures = solved.pictures.get_or_insert_with(|| Pictures {
+        let pictures = solved.run.pictures.get_or_insert_with(|| Pictures {
             target: self.task.picture(&solved.target, size),
             start: now(),
             result: now(),
@@ -197,17 +197,16 @@ impl<T: Task> TaskExperiment<T> {
     }
 
     fn run_of(&self, seed: u64, instance: &T::Instance, solved: Solved) -> Run {
-        let Solved { target, curve, step_seconds, theta, pictures } = solved;
-        let returned = best_point(&curve, HARD);
+        let Solved { run, target, theta } = solved;
+        let returned = best_point(&run.curve, HARD);
         let hard = returned.map_or(f64::INFINITY, |point| point.values[HARD]);
-        let errors = returned.map(|point| {
-            [&[point.values[crate::task::PARAMETER]], &point.values[HARD + 1..]].concat()
+        let success = returned.is_some_and(|point| {
+            let errors = [&[point.values[PARAMETER]], &point.values[HARD + 1..]].concat();
+            self.task.is_success(hard, &errors)
         });
-        let success = errors.is_some_and(|errors| self.task.is_success(hard, &errors));
         let size = self.solve.size;
         let ended = Ended { seed, instance, target: &target, size, hard, theta: &theta };
-        let warnings = self.task.warnings(&ended);
-        Run { seed, curve, success, step_seconds, warnings, broke_at: None, pictures }
+        Run { seed, success, warnings: self.task.warnings(&ended), ..run }
     }
 }
 
@@ -228,19 +227,15 @@ impl<T: Task> Experiment for TaskExperiment<T> {
     }
 
     fn identity(&self) -> Value {
-        json!({
-            "version": env!("CARGO_PKG_VERSION"),
-            "task": T::NAME,
-            "variant": self.variant,
-            "method": self.method,
-            "softness": self.name,
-            "backend": self.backend.title(),
-            "steps": self.solve.steps,
-            "size": self.solve.size,
-            "faces": self.description.faces,
-            "settings": self.settings(),
-            "starts": self.starts,
-        })
+        let mut identity = self.about();
+        identity.remove("parameters");
+        identity.extend([
+            ("version".to_owned(), env!("CARGO_PKG_VERSION").into()),
+            ("task".to_owned(), T::NAME.into()),
+            ("method".to_owned(), json!(self.method)),
+            ("starts".to_owned(), self.starts.into()),
+        ]);
+        identity.into()
     }
 
     fn metrics(&self) -> &[Metric] {
@@ -275,7 +270,7 @@ impl<T: Task> Experiment for TaskExperiment<T> {
             }
         }
         let runs = kept.into_iter().enumerate().map(|(k, mut solved)| {
-            solved.pictures = solved.pictures.filter(|_| k == 0);
+            solved.run.pictures = solved.run.pictures.filter(|_| k == 0);
             self.run_of(batch.seeds[k], &instances[k], solved)
         });
         Ok(runs.collect())
@@ -283,24 +278,19 @@ impl<T: Task> Experiment for TaskExperiment<T> {
 }
 
 /// One instance, solved from one start.
+#[derive(Default)]
 struct Solved {
+    /// Without its seed and a verdict.
+    run: Run,
     target: Vec<f64>,
-    curve: Vec<Point>,
-    step_seconds: Vec<f64>,
     /// After the last step.
     theta: Vec<f64>,
-    pictures: Option<Pictures>,
 }
 
 impl Solved {
-    fn new(target: Vec<f64>) -> Self {
-        let (curve, step_seconds, theta) = (Vec::new(), Vec::new(), Vec::new());
-        Self { target, curve, step_seconds, theta, pictures: None }
-    }
-
     /// Error of the hard image that is returned: what can be told without knowing the answer.
     fn hard(&self) -> f64 {
-        best_point(&self.curve, HARD).map_or(f64::INFINITY, |point| point.values[HARD])
+        best_point(&self.run.curve, HARD).map_or(f64::INFINITY, |point| point.values[HARD])
     }
 }
 
@@ -318,10 +308,7 @@ pub fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
 
 fn refuse_what_edges_that_stay_do_not_know(method: &MethodArgs) -> anyhow::Result<()> {
     let given = [
-        (
-            method.resolution.is_some_and(|asked| asked != softrast_inverse::Resolution::Full),
-            "--resolution",
-        ),
+        (method.resolution.is_some_and(|asked| asked != Resolution::Full), "--resolution"),
         (method.tolerance.is_some(), "--tolerance"),
         (method.surrogate_scale.is_some(), "--surrogate-scale"),
     ];

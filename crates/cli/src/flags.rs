@@ -239,10 +239,6 @@ impl MethodArgs {
     }
 
     /// Fills in what one flag says about another.
-    ///
-    /// # Errors
-    ///
-    /// If two contradict each other.
     pub(crate) fn reconcile(&mut self) -> Result<(), String> {
         match (self.schedule, self.scale_end) {
             (Some(Schedule::Static), Some(_)) => {

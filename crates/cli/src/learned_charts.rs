@@ -42,12 +42,16 @@ pub(crate) fn learned_charts(
     )];
     if learned.schedule.is_some() {
         let series = both.map(|(name, softness)| {
+            let squared = softness.softness.squared;
+            let width = |scale: f64| pixels * if squared { scale.sqrt() } else { scale };
             let scale =
-                |step: usize| [step as f64, pixels * softness.scale_at(layout.part(step), size)];
+                |step: usize| [step as f64, width(softness.scale_at(layout.part(step), size))];
             let points = (0..layout.steps().max(1)).map(scale).collect();
             Series { name: name.into(), points, ..Series::default() }
         });
-        let axes = Plot::new(Axis::linear("inner step"), Axis::logarithmic("scale (pixels)"));
+        let name = if learned.softness.squared { "root of the scale" } else { "scale" };
+        let scale = Axis::logarithmic(&format!("{name} (pixels)"));
+        let axes = Plot::new(Axis::linear("inner step"), scale);
         let chart = Plot { series: series.into(), ..axes };
         charts.push((chart, "The scale of the softness over the inner steps."));
     }

@@ -6,15 +6,18 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("a program needs a backend: turn on one of the features ndarray, flex and wgpu");
 
+mod command_line;
 mod commands;
 mod diagnostics;
 mod experiment;
 mod flags;
+mod learn_args;
 mod learned_charts;
 mod method;
 mod paper;
 mod presets;
 mod program;
+mod session;
 mod task;
 
 /// Images come and go by the thousand, each too large for the system's allocator to keep: it maps their pages anew every time, which

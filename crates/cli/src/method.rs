@@ -18,8 +18,8 @@ pub struct Scales {
 }
 
 impl MethodArgs {
-    /// The method that the flags ask for on a task. Where they say nothing of the softness, something that `solves` takes what comes
-    /// with the program for the task; else it is a logistic.
+    /// The method that the flags ask for on a task. Where they say nothing of the softness, it is what comes with the program for the
+    /// task if that is `learned_by_default`; else it is a logistic.
     ///
     /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are squared, so that they mean the same
     /// widths.
@@ -27,13 +27,23 @@ impl MethodArgs {
     /// # Errors
     ///
     /// If a softness file cannot be used or none comes with the program that is asked for, or flags contradict each other.
-    pub fn method(&self, task: &str, scales: &Scales, solves: bool) -> anyhow::Result<Method> {
+    pub fn method(
+        &self,
+        task: &str,
+        scales: &Scales,
+        learned_by_default: bool,
+    ) -> anyhow::Result<Method> {
         let (name, softness) = match &self.softness {
+            Some(SoftnessChoice::Auto) => {
+                return Err(Error::usage(
+                    "--softness auto goes with solve and evaluate, and not behind --against: name a family or a file",
+                ));
+            }
             Some(SoftnessChoice::File(file)) => {
                 self.check_goes_with_file()?;
                 (file.display().to_string(), self.of_file(ScheduledSoftness::load(file)?, task)?)
             }
-            choice => match learned_name(self, task, solves) {
+            choice => match learned_name(self, task, learned_by_default) {
                 Some(learned) => {
                     self.check_goes_with_file()?;
                     let called =
@@ -157,16 +167,20 @@ impl Scales {
     }
 }
 
-/// The name of what flags mean among what comes with the program, whether it is there or not: they say so, or they say nothing and
-/// there is one for the task.
-pub(crate) fn learned_name(method: &MethodArgs, task: &str, solves: bool) -> Option<String> {
+/// The name of what flags mean among what comes with the program, whether it is there or not: they say so, or they say nothing,
+/// there is one for the task and it is `learned_by_default`.
+pub(crate) fn learned_name(
+    method: &MethodArgs,
+    task: &str,
+    learned_by_default: bool,
+) -> Option<String> {
     match &method.softness {
         Some(SoftnessChoice::Learned(None)) => Some(task.to_owned()),
         Some(SoftnessChoice::Learned(Some(kind))) => Some(learned_kind(task, kind)),
         Some(_) => None,
         None => {
             let there = || ScheduledSoftness::learned(task).is_ok();
-            (solves && method.is_silent() && there()).then(|| task.to_owned())
+            (learned_by_default && method.is_silent() && there()).then(|| task.to_owned())
         }
     }
 }
@@ -232,7 +246,7 @@ mod tests {
     fn what_comes_with_the_program_is_used_where_nothing_is_said_and_something_is_solved() {
         let silent = MethodArgs::default();
         let name =
-            |args: &MethodArgs, task, solves| args.method(task, &SCALES, solves).unwrap().name;
+            |args: &MethodArgs, task, default| args.method(task, &SCALES, default).unwrap().name;
         assert_eq!(name(&silent, "pose", true), "learned");
         assert_eq!(name(&silent, "pose", false), "logistic");
         assert_eq!(name(&silent, "none", true), "logistic");
@@ -280,6 +294,7 @@ mod tests {
             ("learned", "no softness learned comes with the program for"),
             ("learned-x", "no softness learned-x comes"),
             ("learned-pose --scale 0.1", "holds its own parameters"),
+            ("auto", "goes with solve and evaluate"),
         ] {
             let error = method(line).unwrap_err();
             assert!(matches!(error.downcast_ref(), Some(Error::Usage(_))));

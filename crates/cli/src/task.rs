@@ -60,8 +60,8 @@ pub trait Task: InverseProblem + Sized {
         1
     }
 
-    /// Starts that a run may try; `solves` one instance, not many by a protocol.
-    fn starts(_args: &Self::Args, _solves: bool) -> usize {
+    /// Starts that a run may try: of `one_instance`, or of many by a protocol.
+    fn starts(_args: &Self::Args, _one_instance: bool) -> usize {
         1
     }
 

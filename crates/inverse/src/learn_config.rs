@@ -1,5 +1,5 @@
 use anyhow::{bail, ensure};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use softrast_meta::{MetaGradient, OuterSteps};
 
 /// How a softness is learned.
@@ -37,7 +37,7 @@ pub struct LearnConfig {
 }
 
 /// What judges the result of an inner loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OuterLoss {
     /// A fixed narrow softness on a finer image, which no learned softness can flatter.
@@ -51,7 +51,7 @@ pub enum OuterLoss {
 }
 
 /// What a softness whose scale stays is a function of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Input {
     /// The distance in NDC, as in the paper.

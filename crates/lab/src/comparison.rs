@@ -2,47 +2,34 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    ErrorSummary, Evaluation, Experiment, Metric, Run,
+    Evaluation, Experiment, Metric, Run, Summary,
     error_summary::{errors_of, nested},
     format::short,
     mean, mean_interval,
     report::{Report, Table},
-    wilson_interval,
 };
 
 /// A second experiment on the same seeds, and how the first differs from it.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// What to call the two.
-    pub titles: [String; 2],
-    /// What is known of the second, for the results.
-    pub about: Map<String, Value>,
-    /// Its errors, on the seeds that both have solved.
-    pub errors: Vec<ErrorSummary>,
-    /// The errors of the first at the last step less those of the second, seed by seed.
-    pub differences: Vec<Difference>,
-    /// How many of its runs succeeded, of how many.
-    pub successes: [usize; 2],
-    /// Wall time of its runs.
-    pub seconds: f64,
+    titles: [String; 2],
+    about: Map<String, Value>,
+    /// On the seeds that both have solved.
+    second: Summary,
+    differences: Vec<Difference>,
 }
 
-/// How two experiments differ in one error; below 0 the first is the better one.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Difference {
-    /// Which error.
+/// How two experiments differ in one error at the last step; below 0 the first is the better one.
+#[derive(Clone, Debug, Serialize)]
+struct Difference {
     #[serde(skip)]
-    pub metric: Metric,
-    /// Mean over the seeds.
-    pub mean: f64,
-    /// 95 % interval of the mean.
-    pub ci95: [f64; 2],
-    /// Share of the seeds on which the first has the smaller error.
-    pub first_better: f64,
-    /// Share of the seeds on which the second has.
-    pub second_better: f64,
-    /// In the order of the seeds.
-    pub per_run: Vec<f64>,
+    metric: Metric,
+    mean: f64,
+    ci95: [f64; 2],
+    /// Shares of the seeds on which either has the smaller error.
+    first_better: f64,
+    second_better: f64,
+    per_run: Vec<f64>,
 }
 
 /// Mean of the differences of two lists, place by place, and its 95 % interval.
@@ -54,74 +41,45 @@ pub fn paired(values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
 impl Comparison {
     /// Compares two experiments on the seeds that both have solved, which come first in both. `titles` tell them apart, `about` is
     /// what the results say of the second.
+    ///
+    /// # Errors
+    ///
+    /// If a run of the second has no finite number even before its first step.
     pub fn new(
         titles: [String; 2],
         about: Map<String, Value>,
         experiment: &dyn Experiment,
         first: &Evaluation,
         second: &Evaluation,
-    ) -> Self {
+    ) -> anyhow::Result<Self> {
         let runs = first.runs.len().min(second.runs.len());
         let (first, others) = (&first.runs[..runs], &second.runs[..runs]);
-        let errors: Vec<(usize, Metric)> = errors_of(experiment.metrics()).collect();
-        let difference = |&(k, metric): &(usize, Metric)| Difference::new(metric, k, first, others);
-        Self {
-            titles,
-            about,
-            errors: errors.iter().map(|&(k, m)| ErrorSummary::new(m, k, others, true)).collect(),
-            differences: errors.iter().map(difference).collect(),
-            successes: [others.iter().filter(|run| run.success).count(), runs],
-            seconds: second.seconds,
-        }
+        let second = Summary::new(experiment, others, second.seconds, true)?;
+        let errors = errors_of(experiment.metrics());
+        let differences = errors.map(|(k, metric)| Difference::new(metric, k, first, others));
+        Ok(Self { titles, about, second, differences: differences.collect() })
     }
 
     pub(crate) fn json(&self) -> Value {
-        let [successes, runs] = self.successes;
         let mut json = self.about.clone();
-        json.insert("runs".into(), runs.into());
-        json.extend(nested(self.errors.iter().map(|error| (&error.metric, json!(error)))));
-        json.insert("success_rate".into(), (successes as f64 / runs as f64).into());
-        json.insert("success_ci95".into(), json!(wilson_interval(successes, runs)));
-        json.insert("seconds".into(), self.seconds.into());
+        json.extend(self.second.outcome());
+        json.insert("seconds".into(), self.second.seconds.into());
         let differences = self.differences.iter().map(|one| (&one.metric, json!(one)));
         json.insert("difference".into(), nested(differences).into());
         json.into()
     }
 
-    pub(crate) fn text(&self) -> Vec<String> {
-        let [successes, runs] = self.successes;
-        let mut lines = vec![format!("  against {}, on the same {runs} seeds:", self.titles[1])];
-        for (difference, second) in self.differences.iter().zip(&self.errors) {
-            let [low, high] = difference.ci95.map(short);
-            lines.push(format!(
-                "    {:<20} {} there; difference {}, 95 % interval {low} to {high}: {}; better on {:.0} % of seeds, worse on {:.0} %",
-                difference.metric.name,
-                short(second.last),
-                short(difference.mean),
-                difference.verdict(),
-                difference.first_better * 100.0,
-                difference.second_better * 100.0,
-            ));
-        }
-        let rate = successes as f64 / runs as f64 * 100.0;
-        lines.push(format!("    {:<20} {rate:.1} % of runs there", "success"));
-        lines
+    /// Which seeds both have solved, and how often the second succeeded there.
+    fn head(&self) -> String {
+        let (runs, success) = (self.second.successes[1], self.second.success_share());
+        format!("on the same {runs} seeds, at the last step; it succeeds in {success}")
     }
 
-    pub(crate) fn section(&self, report: &mut Report) {
-        let [first, second] = &self.titles;
-        let [successes, runs] = self.successes;
-        let mut table = Table::new([
-            "Error",
-            "First",
-            "Second",
-            "Mean difference",
-            "95 % interval",
-            "First better",
-            "Second better",
-            "First is",
-        ]);
-        for (difference, error) in self.differences.iter().zip(&self.errors) {
+    fn table(&self) -> Table {
+        let head = ["Error", "First", "Second", "Mean difference", "95 % interval"];
+        let shares = ["First better", "Second better", "First is"];
+        let mut table = Table::new(head.into_iter().chain(shares));
+        for (difference, error) in self.differences.iter().zip(&self.second.errors) {
             let [low, high] = difference.ci95.map(short);
             table.push([
                 error.metric.title(),
@@ -134,17 +92,23 @@ impl Comparison {
                 difference.verdict().to_owned(),
             ]);
         }
+        table
+    }
+
+    pub(crate) fn text(&self) -> Vec<String> {
+        let mut lines = vec![format!("  against {}, {}:", self.titles[1], self.head())];
+        lines.extend(self.table().lines());
+        lines
+    }
+
+    pub(crate) fn section(&self, report: &mut Report) {
+        let [first, second] = &self.titles;
         report.heading(&format!("Against {second}"));
-        report.paragraph(&format!(
-            "On the same {runs} seeds, at the last step. A difference below 0 means that the first method ({first}) has the smaller \
-             error. On the charts it is blue, the second ({second}) is orange."
-        ));
-        report.table(&table);
-        let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
+        report.paragraph(&format!("The second method {}.", self.head()));
+        report.table(&self.table());
         report.note(&format!(
-            "Success of the second: {:.1} % of runs, 95 % interval {low:.1} to {high:.1} %. Intervals are by the bootstrap over the \
-             seeds.",
-            successes as f64 / runs as f64 * 100.0,
+            "A difference below 0 means that the first method ({first}) has the smaller error. On the charts it is blue, the second \
+             ({second}) is orange. Intervals are by the bootstrap over the seeds, that of the success by Wilson."
         ));
     }
 }

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt::Write};
 use crate::{
     Metric, Point, Role, Run, mean,
     plot::{Axis, Plot, Series},
-    statistics::Resampling,
+    statistics::mean_intervals,
 };
 
 /// Samples behind the interval at a step: fewer than behind those of the results, because there are as many as steps and they are
@@ -41,17 +41,12 @@ impl Convergence {
         for point in runs.iter().flat_map(|run| &run.curve) {
             steps.entry(point.step).or_default().push(point);
         }
-        let mut resampling = Resampling::new(runs.len(), RESAMPLES, 0);
         let row = |(step, points): (usize, Vec<&Point>)| {
-            if points.len() != resampling.values() {
-                resampling = Resampling::new(points.len(), RESAMPLES, 0);
-            }
-            let spread = |k: usize| {
-                let values: Vec<f64> = points.iter().map(|point| point.values[k]).collect();
-                let [low, high] = resampling.mean_interval(&values);
-                [mean(&values), low, high]
-            };
-            (step, points.len(), (0..metrics.len()).map(spread).collect())
+            let values = |k: usize| points.iter().map(|point| point.values[k]).collect();
+            let lists: Vec<Vec<f64>> = (0..metrics.len()).map(values).collect();
+            let intervals = mean_intervals(&lists, RESAMPLES).into_iter().zip(&lists);
+            let spreads = intervals.map(|([low, high], list)| [mean(list), low, high]).collect();
+            (step, points.len(), spreads)
         };
         Self { rows: steps.into_iter().map(row).collect() }
     }

@@ -85,26 +85,3 @@ fn one_line(text: &str) -> String {
     });
     paragraphs.filter(|paragraph| !paragraph.is_empty()).collect::<Vec<_>>().join("; ")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use anyhow::Context;
-
-    #[test]
-    fn a_chain_of_causes_becomes_one_line() {
-        let error = Err::<(), _>(anyhow::anyhow!("no such\nfile")).context("cannot read a.obj");
-        let failure = Failure::from(error.unwrap_err());
-        assert_eq!(failure.to_string(), "error: cannot read a.obj: no such file");
-        assert_eq!(failure.code, 1);
-    }
-
-    #[test]
-    fn a_usage_error_keeps_its_code_below_a_context() {
-        let error = Err::<(), _>(Error::Usage("no range 1-2".into())).context("--range");
-        assert_eq!(
-            Failure::from(error.unwrap_err()),
-            Failure { code: 2, message: "--range: no range 1-2 (see --help)".into() }
-        );
-    }
-}

@@ -1,36 +1,26 @@
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{Metric, Run, bootstrap_mean_interval, mean};
-
-/// Samples behind a confidence interval, and the seed that draws them.
-const RESAMPLES: usize = 10_000;
-const RESAMPLING_SEED: u64 = 0;
-
-/// 95 % interval of a mean, as all results have it.
-pub fn mean_interval(values: &[f64]) -> [f64; 2] {
-    bootstrap_mean_interval(values, RESAMPLES, RESAMPLING_SEED)
-}
+use crate::{Metric, Run, mean, mean_interval};
 
 /// One error over all runs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ErrorSummary {
-    /// Which one.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct ErrorSummary {
     #[serde(skip)]
-    pub metric: Metric,
+    pub(crate) metric: Metric,
     /// Mean before the first step.
-    pub initial: f64,
+    pub(crate) initial: f64,
     /// Mean after the last step.
     #[serde(rename = "final")]
-    pub last: f64,
+    pub(crate) last: f64,
     /// Mean over the runs of the lowest over all steps.
-    pub best: f64,
+    pub(crate) best: f64,
     /// 95 % interval of the mean of `last`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub ci95: Option<[f64; 2]>,
+    pub(crate) ci95: Option<[f64; 2]>,
     /// `last` of every run, in the order of the seeds.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub per_run: Option<Vec<f64>>,
+    pub(crate) per_run: Option<Vec<f64>>,
 }
 
 /// The errors among metrics and their places, those of a group one after the other.

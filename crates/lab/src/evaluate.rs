@@ -1,8 +1,9 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use crate::{
-    Batch, Cache, Encoded, Error, Experiment, Progress, Run,
+    Batch, Cache, Encoded, Error, Experiment, Progress, Role, Run,
     cache::{Finished, key},
+    mean, place,
 };
 
 /// Runs experiments, and recalls what an earlier call has finished.
@@ -27,7 +28,7 @@ pub struct Evaluation {
 impl Evaluation {
     /// Wall time of the steps of a run, mean over the runs.
     pub fn seconds_per_run(&self) -> f64 {
-        self.runs.iter().map(Run::seconds).sum::<f64>() / self.runs.len().max(1) as f64
+        mean(&self.runs.iter().map(Run::seconds).collect::<Vec<_>>())
     }
 }
 
@@ -76,10 +77,29 @@ impl Runner {
         Ok((evaluations, false))
     }
 
+    /// Runs one experiment on all seeds, and scores each run as `of` does, which gets the place of the score among the metrics; none
+    /// where the numbers do not stay finite. `label` stands beside the progress bar.
+    pub(crate) fn score(
+        &mut self,
+        experiment: &dyn Experiment,
+        seeds: &[u64],
+        label: &str,
+        of: impl Fn(&Run, usize) -> Option<f64>,
+    ) -> anyhow::Result<(Vec<Option<f64>>, Evaluation)> {
+        let (evaluations, stopped) = self.evaluate(&[experiment], seeds, false, Some(label))?;
+        if stopped {
+            return Err(Error::Interrupted.into());
+        }
+        let score = place(experiment.metrics(), Role::Score);
+        let evaluation = evaluations.into_iter().next().unwrap_or_default();
+        let finite = |run: &Run| of(run, score).filter(|_| run.broke_at.is_none());
+        Ok((evaluation.runs.iter().map(finite).collect(), evaluation))
+    }
+
     /// Whether the runs of all seeds are finished.
     pub(crate) fn is_finished(&self, experiment: &dyn Experiment, seeds: &[u64]) -> bool {
         let kept_as = key(&experiment.identity());
-        seeds.iter().all(|&seed| self.cache.get(&kept_as, seed, |_| true).is_some())
+        seeds.iter().all(|&seed| self.cache.get(&kept_as, seed).is_some())
     }
 
     /// The runs of some seeds: from the cache, or made together.
@@ -95,11 +115,12 @@ impl Runner {
         let mut finished = BTreeMap::new();
         for &seed in seeds {
             let needs_pictures = pictures && seed == seeds[0];
-            let suits = |found: &Finished| {
+            let suits = |found: &&Finished| {
                 found.run.fits(seed, metrics, steps)
                     && (found.pictures.is_some() || !needs_pictures)
             };
-            finished.extend(self.cache.get(&kept_as, seed, suits).map(|found| (seed, found)));
+            let found = self.cache.get(&kept_as, seed).filter(suits);
+            finished.extend(found.map(|found| (seed, found.clone())));
         }
         self.progress.skip(finished.len(), steps);
         let missing: Vec<u64> =

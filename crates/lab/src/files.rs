@@ -151,15 +151,6 @@ mod tests {
     }
 
     #[test]
-    fn nothing_stays_behind_without_a_commit() {
-        let root = tempfile::tempdir().unwrap();
-        let mut folder = OutputFolder::open(&root.path().join("a/b")).unwrap();
-        folder.stage("r.json", b"half").unwrap();
-        drop(folder);
-        assert!(names(root.path()).is_empty());
-    }
-
-    #[test]
     fn a_folder_that_cannot_be_written_is_refused_and_leaves_nothing() {
         let root = tempfile::tempdir().unwrap();
         fs::write(root.path().join("file"), "").unwrap();

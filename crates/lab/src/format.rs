@@ -28,6 +28,11 @@ pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
+/// A line for a terminal: what it is about, and that.
+pub fn line(name: &str, text: &str) -> String {
+    format!("  {name:<22} {text}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,6 +7,7 @@
 //!
 //! Nothing here knows of rendering: it sees seeds, numbers and RGB images.
 
+mod axis;
 mod cache;
 mod comparison;
 pub mod curves;
@@ -30,12 +31,10 @@ mod statistics;
 mod summary;
 /// Grid search.
 pub mod sweep;
-mod ticks;
 
 pub use cache::Cache;
-pub use comparison::{Comparison, Difference, paired};
+pub use comparison::{Comparison, paired};
 pub use error::{Error, Failure, INTERRUPTED, found};
-pub use error_summary::{ErrorSummary, mean_interval};
 pub use evaluate::{Evaluation, Runner, seeds, was_interrupted};
 pub use files::{OutputFolder, write_atomically};
 pub use machine::{machine, peak_rss_mib};
@@ -43,6 +42,6 @@ pub use metric::{Metric, Role, place};
 pub use picture::{Encoded, contact_sheet, difference, png, rgb_from_gray, rgb_from_planes};
 pub use progress::{Progress, stop_on_ctrl_c};
 pub use run::{Batch, Experiment, Pictures, Point, Run, best_point};
-pub use statistics::{bootstrap_mean_interval, mean, median, quantile, wilson_interval};
-pub use summary::{Partial, Returned, Summary, headline};
+pub use statistics::{mean, mean_interval, median, quantile, wilson_interval};
+pub use summary::{Partial, Summary, headline};
 pub use sweep::check_held_out;

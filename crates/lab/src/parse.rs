@@ -1,4 +1,9 @@
-//! Parsers of flags, one for each kind of number.
+//! Parsers of flags: one for each kind of number, and one for names.
+
+use serde::{
+    Deserialize,
+    de::{IntoDeserializer, value::Error},
+};
 
 /// A positive, finite number.
 ///
@@ -48,23 +53,11 @@ pub fn seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| "expected a whole number from 0".into())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_out_of_range_and_words_are_refused() {
-        assert_eq!(
-            (positive("1e-3"), share("0.5"), count("7"), seed("0")),
-            (Ok(1e-3), Ok(0.5), Ok(7), Ok(0))
-        );
-        for wrong in ["0", "-1", "inf", "nan", "x", ""] {
-            assert!(
-                positive(wrong).is_err() && share(wrong).is_err() && count(wrong).is_err(),
-                "{wrong}"
-            );
-        }
-        assert!(share("1").is_err() && count("1000001").is_err() && seed("-1").is_err());
-        assert_eq!(whole::<2, 4>("5"), Err("expected a whole number from 2 to 4".into()));
-    }
+/// The variant of an enum that has this name in the results.
+///
+/// # Errors
+///
+/// What names there are.
+pub fn named<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, String> {
+    T::deserialize(text.into_deserializer()).map_err(|error: Error| error.to_string())
 }

@@ -23,11 +23,7 @@ const WHITE: Rgb<u8> = Rgb([255; 3]);
 ///
 /// If the number of values is not `width * height`.
 pub fn rgb_from_gray(values: &[f64], width: usize, height: usize) -> RgbImage {
-    assert_eq!(values.len(), width * height, "an image of {width} x {height} needs as many values");
-    RgbImage::from_fn(width as u32, height as u32, |x, y| {
-        let value = values[y as usize * width + x as usize];
-        Rgb([level(value); 3])
-    })
+    rgb_from_planes(&values.repeat(3), width, height)
 }
 
 /// A coloured image as RGB: `values` `[3 * height * width]`, first all of red, then green, then

@@ -5,7 +5,8 @@ use std::fmt::Write;
 use anyhow::anyhow;
 use plotters::{coord::Shift, prelude::*};
 
-use crate::ticks::Ticks;
+pub use crate::axis::Axis;
+use crate::axis::MarkedAxis;
 
 const WIDTH: u32 = 900;
 const HEIGHT: u32 = 380;
@@ -43,15 +44,6 @@ pub struct Plot {
     pub from_zero: bool,
 }
 
-/// Name with unit, and whether it is divided in decades.
-#[derive(Clone, Debug)]
-pub struct Axis {
-    /// Name with unit.
-    pub name: String,
-    /// Whether it is divided in decades; values must be positive then, others are left out.
-    pub logarithmic: bool,
-}
-
 /// A line or a mark.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
@@ -87,56 +79,15 @@ pub enum Mark {
     Square,
 }
 
-impl Axis {
-    /// One of even steps.
-    pub fn linear(name: &str) -> Self {
-        Self { name: name.to_owned(), logarithmic: false }
-    }
-
-    /// One of decades.
-    pub fn logarithmic(name: &str) -> Self {
-        Self { name: name.to_owned(), logarithmic: true }
-    }
-
-    fn place(&self, value: f64) -> f64 {
-        if self.logarithmic { value.log10() } else { value }
-    }
-
-    fn label(&self, place: f64) -> String {
-        let value = if self.logarithmic { 10f64.powf(place) } else { place };
-        match value.abs() {
-            0.0 => "0".into(),
-            1e-3..1e5 => {
-                let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
-                let text = format!("{value:.digits$}");
-                match text.contains('.') {
-                    true => text.trim_end_matches('0').trim_end_matches('.').into(),
-                    false => text,
-                }
-            }
-            _ => format!("{value:.0e}"),
-        }
-    }
-
-    /// Least and largest place with some room.
-    fn range(&self, values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
-        let places = values.map(|value| self.place(value)).filter(|place| place.is_finite());
-        let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
-            [low.min(place), high.max(place)]
-        });
-        if low > high {
-            return 0.0..1.0;
-        }
-        let room = (0.04 * (high - low)).max(1e-3 * high.abs()).max(1e-9);
-        low - room..high + room
-    }
-}
-
 impl Series {
+    fn rgb(&self) -> RGBColor {
+        let [r, g, b] = self.colour;
+        RGBColor(r, g, b)
+    }
+
     /// Its mark around a place in pixels: filled where nothing moves, open where the scale does.
     fn mark_at<DB: DrawingBackend>(&self, at: (i32, i32)) -> DynElement<'static, DB, (i32, i32)> {
-        let [r, g, b] = self.colour;
-        let colour = RGBColor(r, g, b);
+        let colour = self.rgb();
         let style = if self.dashed { colour.stroke_width(2) } else { colour.filled() };
         match self.mark {
             Mark::Dot => Circle::new(at, 5, style).into_dyn(),
@@ -202,13 +153,11 @@ impl Plot {
         let zero = (self.from_zero && !self.y.logarithmic).then_some(0.0);
         let heights = points().map(|point| point[1]).chain(bands.copied()).chain(zero);
         let (across, up) = (self.x.range(points().map(|point| point[0])), self.y.range(heights));
-        let [x, y] = [(&self.x, across, 7), (&self.y, up, 6)]
-            .map(|(axis, range, most)| Ticks::new(range.clone(), axis.logarithmic, most).on(range));
         let mut chart = ChartBuilder::on(&panel)
             .margin(14)
             .x_label_area_size(46)
             .y_label_area_size(78)
-            .build_cartesian_2d(x, y)?;
+            .build_cartesian_2d(self.x.over(across, 7), self.y.over(up, 6))?;
         chart
             .configure_mesh()
             .x_desc(&self.x.name)
@@ -220,41 +169,50 @@ impl Plot {
             .bold_line_style(GRID)
             .light_line_style(LIGHT)
             .draw()?;
-        let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
-        let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
-        let front = self.front.iter().map(|point| place(*point)).filter(shown);
-        chart.draw_series(LineSeries::new(front, BEHIND.stroke_width(1)))?;
+        let front = self.front.iter().map(|[x, y]| (self.x.place(*x), self.y.place(*y)));
+        let shown = front.filter(|(x, y)| x.is_finite() && y.is_finite());
+        chart.draw_series(LineSeries::new(shown, BEHIND.stroke_width(1)))?;
         for series in &self.series {
-            let [r, g, b] = series.colour;
-            let colour = RGBColor(r, g, b);
-            let end = |k: usize| {
-                let pairs = series.points.iter().zip(&series.band);
-                pairs.map(move |(point, band)| place([point[0], band[k]])).filter(shown)
-            };
-            let band: Vec<_> = end(0).chain(end(1).collect::<Vec<_>>().into_iter().rev()).collect();
-            if band.len() > 2 {
-                chart.draw_series([Polygon::new(band, colour.mix(0.12))])?;
-            }
-            let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
-            if let [point] = points[..] {
-                let mark = EmptyElement::at(point) + series.mark_at((0, 0));
-                chart.draw_series([mark])?;
-                if series.marked {
-                    chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
-                }
-                if series.boxed {
-                    let corners = [(-14, -14), (14, 14)];
-                    let frame = Rectangle::new(corners, BLACK.stroke_width(1));
-                    chart.draw_series([EmptyElement::at(point) + frame])?;
-                }
-            } else if series.dashed {
-                let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
-                chart.draw_series(line)?;
-            } else {
-                chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
-            }
+            self.draw_series(series, &mut chart)?;
         }
         self.legend(&legend)
+    }
+
+    fn draw_series<DB: DrawingBackend>(
+        &self,
+        series: &Series,
+        chart: &mut ChartContext<DB, Cartesian2d<MarkedAxis, MarkedAxis>>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let place = |[x, y]: [f64; 2]| (self.x.place(x), self.y.place(y));
+        let shown = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+        let colour = series.rgb();
+        let end = |k: usize| {
+            let pairs = series.points.iter().zip(&series.band);
+            pairs.map(move |(point, band)| place([point[0], band[k]])).filter(shown)
+        };
+        let band: Vec<_> = end(0).chain(end(1).collect::<Vec<_>>().into_iter().rev()).collect();
+        if band.len() > 2 {
+            chart.draw_series([Polygon::new(band, colour.mix(0.12))])?;
+        }
+        let points: Vec<_> = series.points.iter().map(|p| place(*p)).filter(shown).collect();
+        if let [point] = points[..] {
+            let mark = EmptyElement::at(point) + series.mark_at((0, 0));
+            chart.draw_series([mark])?;
+            if series.marked {
+                chart.draw_series([Circle::new(point, 10, colour.stroke_width(1))])?;
+            }
+            if series.boxed {
+                let corners = [(-14, -14), (14, 14)];
+                let frame = Rectangle::new(corners, BLACK.stroke_width(1));
+                chart.draw_series([EmptyElement::at(point) + frame])?;
+            }
+        } else if series.dashed {
+            let line = DashedLineSeries::new(points, 7, 4, colour.stroke_width(2));
+            chart.draw_series(line)?;
+        } else {
+            chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
+        }
+        Ok(())
     }
 
     /// As much as the names of all methods need.
@@ -268,9 +226,7 @@ impl Plot {
     ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
         let named = self.series.iter().filter(|series| !series.name.is_empty());
         for (row, series) in named.enumerate() {
-            let [r, g, b] = series.colour;
-            let (colour, y) = (RGBColor(r, g, b), 26 + ROW * row as i32);
-            let style = colour.stroke_width(3);
+            let (style, y) = (series.rgb().stroke_width(3), 26 + ROW * row as i32);
             // A dashed line as long as its name allows: two dashes.
             let dashes = if series.dashed { vec![(0, 8), (13, 21)] } else { vec![(0, 21)] };
             match series.points.len() {

@@ -38,6 +38,13 @@ impl Report {
         self.add(format!("<p class=\"note\">{}</p>", escape(text)));
     }
 
+    /// How far the work came, if the user stopped it.
+    pub fn stopped(&mut self, finished: Option<&str>) {
+        let line =
+            finished.map(|finished| format!("Stopped: {finished}; --resume goes on from them"));
+        self.warnings(line.as_slice());
+    }
+
     /// Lines in boxes that catch the eye.
     pub fn warnings(&mut self, lines: &[String]) {
         for line in lines {

@@ -58,7 +58,7 @@ impl Batch {
 }
 
 /// One run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// What it was drawn from.
     pub seed: u64,
@@ -148,16 +148,8 @@ mod tests {
 
     fn run(values: &[f64]) -> Run {
         let curve = values.iter().enumerate().map(|(step, &x)| Point { step, values: vec![x] });
-        let (step_seconds, warnings) = (vec![0.1; values.len() - 1], Vec::new());
-        Run {
-            seed: 3,
-            curve: curve.collect(),
-            success: true,
-            step_seconds,
-            warnings,
-            broke_at: None,
-            pictures: None,
-        }
+        let step_seconds = vec![0.1; values.len() - 1];
+        Run { seed: 3, curve: curve.collect(), success: true, step_seconds, ..Run::default() }
     }
 
     #[test]

@@ -3,9 +3,9 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::{
-    Error, Experiment, Role, Run, Runner,
+    Experiment, Run, Runner,
     format::{short, short_or_none},
-    mean, place,
+    mean,
     report::{Report, Table},
 };
 
@@ -28,34 +28,29 @@ pub struct Candidate<A> {
 #[derive(Clone, Debug, Serialize)]
 pub struct Selection {
     /// What is asked for, such as `softness`.
-    pub of: &'static str,
-    /// Place of the chosen answer among the reasons.
-    pub chosen: usize,
-    /// Place of the one with the least error.
-    pub best: usize,
+    of: &'static str,
+    /// Places among the reasons: of the chosen answer, and of the one with the least error.
+    chosen: usize,
+    best: usize,
     /// All that were tried, the cheapest first.
-    pub reasons: Vec<Reason>,
+    reasons: Vec<Reason>,
 }
 
 /// An answer and what speaks for or against it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Reason {
-    /// The flags that give it.
-    pub flags: String,
-    /// What it computes with.
-    pub with: String,
+struct Reason {
+    flags: String,
+    with: String,
     /// Error of what each seed returns, in their order; none where it is not finite.
-    pub errors: Vec<Option<f64>>,
+    errors: Vec<Option<f64>>,
     /// Time of the steps of one run.
-    pub seconds: f64,
+    seconds: f64,
     /// Mean error; none if a run has no finite one.
-    pub mean: Option<f64>,
-    /// Mean difference from the best.
-    pub above_best: Option<f64>,
-    /// Standard error of that difference.
-    pub standard_error: Option<f64>,
-    /// What follows from that.
-    pub verdict: &'static str,
+    mean: Option<f64>,
+    /// Mean difference from the best, and its standard error.
+    above_best: Option<f64>,
+    standard_error: Option<f64>,
+    verdict: &'static str,
 }
 
 /// Time that is left for trials.
@@ -92,22 +87,13 @@ impl Runner {
                 continue;
             }
             let clock = Instant::now();
-            let (evaluations, stopped) =
-                self.evaluate(&[experiment.as_ref()], seeds, false, Some(&flags))?;
-            if stopped {
-                return Err(Error::Interrupted.into());
-            }
+            let returned = |run: &Run, score| run.returned(score).map(|point| point.values[score]);
+            let (errors, tried) = self.score(experiment.as_ref(), seeds, &flags, returned)?;
             if !known {
                 spent.push(clock.elapsed().as_secs_f64());
                 budget.left -= spent[spent.len() - 1];
             }
-            let score = place(experiment.metrics(), Role::Score);
-            let error = |run: &Run| {
-                let finite = run.broke_at.is_none();
-                run.returned(score).filter(|_| finite).map(|point| point.values[score])
-            };
-            let errors: Vec<_> = evaluations[0].runs.iter().map(error).collect();
-            reasons.push(Reason::new(flags, with, errors, evaluations[0].seconds_per_run()));
+            reasons.push(Reason::new(flags, with, errors, tried.seconds_per_run()));
             answers.push(answer);
         }
         let selection = Selection::among(of, reasons);
@@ -148,8 +134,7 @@ impl Selection {
         Some(Self { of, chosen, best, reasons })
     }
 
-    /// The reason of what is chosen.
-    pub fn answer(&self) -> &Reason {
+    fn answer(&self) -> &Reason {
         &self.reasons[self.chosen]
     }
 

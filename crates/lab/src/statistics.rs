@@ -31,49 +31,31 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[below] + (sorted[above] - sorted[below]) * (position - below as f64)
 }
 
-/// 95 % interval of the mean by the percentile bootstrap: `[low, high]`.
+/// Samples behind the confidence interval of a result.
+const RESAMPLES: usize = 10_000;
+
+/// 95 % interval of a mean, as all results have it: `[low, high]`. One value gives an interval of no width; none gives NaN.
+pub fn mean_interval(values: &[f64]) -> [f64; 2] {
+    mean_intervals(&[values.to_vec()], RESAMPLES)[0]
+}
+
+/// 95 % intervals of the means of lists of one length, by the percentile bootstrap with the same samples for all.
 ///
-/// Draws `resamples` samples of the same length with replacement, and gives the 2.5 % and 97.5 %
-/// quantiles of their means. One value gives an interval of no width; none gives NaN.
-pub fn bootstrap_mean_interval(values: &[f64], resamples: usize, seed: u64) -> [f64; 2] {
-    Resampling::new(values.len(), resamples, seed).mean_interval(values)
-}
-
-/// Samples with replacement that are drawn once, for many lists of the same length.
-pub(crate) struct Resampling {
-    values: usize,
-    /// Places in the list, one row of `values` per sample.
-    draws: Vec<usize>,
-}
-
-impl Resampling {
-    /// `resamples` samples of a list of `values`.
-    pub(crate) fn new(values: usize, resamples: usize, seed: u64) -> Self {
-        let mut random = StdRng::seed_from_u64(seed);
-        let draws = (0..resamples * values).map(|_| random.random_range(0..values)).collect();
-        Self { values, draws }
+/// Draws `resamples` samples of that length with replacement, and gives the 2.5 % and 97.5 % quantiles of their means.
+pub(crate) fn mean_intervals(lists: &[Vec<f64>], resamples: usize) -> Vec<[f64; 2]> {
+    let count = lists.first().map_or(0, Vec::len);
+    if count == 0 {
+        return vec![[f64::NAN; 2]; lists.len()];
     }
-
-    /// Length of the lists.
-    pub(crate) fn values(&self) -> usize {
-        self.values
-    }
-
-    /// 2.5 % and 97.5 % quantiles of the means of the samples; NaN of nothing.
-    ///
-    /// # Panics
-    ///
-    /// If the list does not have the length that the samples were drawn for.
-    pub(crate) fn mean_interval(&self, values: &[f64]) -> [f64; 2] {
-        assert_eq!(values.len(), self.values, "the samples were drawn for another length");
-        if values.is_empty() {
-            return [f64::NAN; 2];
+    let mut random = StdRng::seed_from_u64(0);
+    let mut means = vec![Vec::with_capacity(resamples); lists.len()];
+    for _ in 0..resamples {
+        let drawn: Vec<usize> = (0..count).map(|_| random.random_range(0..count)).collect();
+        for (list, means) in lists.iter().zip(&mut means) {
+            means.push(drawn.iter().map(|&place| list[place]).sum::<f64>() / count as f64);
         }
-        let sum = |draws: &[usize]| draws.iter().map(|&place| values[place]).sum::<f64>();
-        let means = self.draws.chunks(self.values).map(|draws| sum(draws) / self.values as f64);
-        let means: Vec<f64> = means.collect();
-        [quantile(&means, 0.025), quantile(&means, 0.975)]
     }
+    means.iter().map(|means| [0.025, 0.975].map(|q| quantile(means, q))).collect()
 }
 
 /// 95 % interval of a rate of which `successes` of `trials` were seen: `[low, high]`.
@@ -124,17 +106,17 @@ mod tests {
     #[test]
     fn bootstrap_interval_of_two_values_is_their_range() {
         // Means are 0, 1/2 and 1 with probabilities 1/4, 1/2 and 1/4.
-        assert_eq!(bootstrap_mean_interval(&[0.0, 1.0], 10_000, 1), [0.0, 1.0]);
-        assert_eq!(bootstrap_mean_interval(&[3.0], 10_000, 1), [3.0, 3.0]);
+        assert_eq!(mean_interval(&[0.0, 1.0]), [0.0, 1.0]);
+        assert_eq!(mean_interval(&[3.0]), [3.0, 3.0]);
     }
 
     #[test]
     fn bootstrap_interval_of_many_values_nears_the_normal_one() {
         let values: Vec<f64> = (0..400).map(|k| (k % 2) as f64).collect();
         // Standard error is 0.5 / sqrt(400) = 0.025.
-        let [low, high] = bootstrap_mean_interval(&values, 10_000, 3);
+        let [low, high] = mean_interval(&values);
         assert!((low - (0.5 - 0.049)).abs() < 0.003, "{low}");
         assert!((high - (0.5 + 0.049)).abs() < 0.003, "{high}");
-        assert_eq!([low, high], bootstrap_mean_interval(&values, 10_000, 3));
+        assert_eq!(mean_intervals(&[vec![0.0; 400], values], 10_000)[1], [low, high]);
     }
 }

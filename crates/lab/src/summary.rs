@@ -2,9 +2,9 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Comparison, ErrorSummary, Evaluation, Experiment, Role, Run,
-    error_summary::{errors_of, nested},
-    format::{counted, short},
+    Comparison, Experiment, Role, Run,
+    error_summary::{ErrorSummary, errors_of, nested},
+    format::{counted, line, short},
     mean, median, peak_rss_mib, place,
     report::{Report, Table},
     wilson_interval,
@@ -13,39 +13,37 @@ use crate::{
 /// What the runs of one experiment came to.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// All errors, in the order of the metrics.
-    pub errors: Vec<ErrorSummary>,
-    /// The step that each run returns.
-    pub returned: Returned,
+    pub(crate) errors: Vec<ErrorSummary>,
+    returned: Returned,
     /// How many runs succeeded, of how many.
     pub successes: [usize; 2],
     /// First of the seeds.
     pub seed: u64,
     /// Whether there are intervals and values of each run.
     pub many: bool,
-    /// Wall time of all runs, with errors and pictures, in seconds.
-    pub seconds: f64,
+    /// Wall time of all runs, with errors and pictures.
+    pub(crate) seconds: f64,
     /// Wall time of a step of a run, median, and of all steps of a run, mean.
-    pub step_seconds: [f64; 2],
+    step_seconds: [f64; 2],
     /// What the user should know, each line once.
     pub warnings: Vec<String>,
     /// Finished runs of how many, where the user stopped the program.
     pub partial: Option<Partial>,
     /// Another experiment on the same seeds.
-    pub against: Option<Comparison>,
+    pub against: Option<Box<Comparison>>,
 }
 
 /// Which step of its runs a program returns: the one where the score is least.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Returned {
+#[derive(Clone, Debug, Serialize)]
+struct Returned {
     /// Name of the score.
-    pub by: &'static str,
+    by: &'static str,
     /// Its value there, mean over the runs.
-    pub error: f64,
+    error: f64,
     /// The step, median over the runs.
-    pub step: f64,
+    step: f64,
     /// Steps of a run.
-    pub of: usize,
+    of: usize,
 }
 
 /// How much of the work is finished.
@@ -65,17 +63,17 @@ impl Partial {
 }
 
 impl Summary {
-    /// Of a finished or partial evaluation; `many` asks for intervals.
+    /// Of finished runs and their wall time; `many` asks for intervals.
     ///
     /// # Errors
     ///
     /// If a run has no finite number even before its first step.
     pub fn new(
         experiment: &dyn Experiment,
-        evaluation: &Evaluation,
+        runs: &[Run],
+        seconds: f64,
         many: bool,
     ) -> anyhow::Result<Self> {
-        let (runs, metrics) = (&evaluation.runs, experiment.metrics());
         if let Some(run) = runs.iter().find(|run| run.curve.is_empty()) {
             anyhow::bail!(
                 "seed {}: the errors are not finite numbers before the first step: check that the target is in view and that the \
@@ -83,8 +81,9 @@ impl Summary {
                 run.seed
             );
         }
-        let errors = errors_of(metrics);
+        let errors = errors_of(experiment.metrics());
         let steps: Vec<f64> = runs.iter().flat_map(|run| run.step_seconds.clone()).collect();
+        let per_run: Vec<f64> = runs.iter().map(Run::seconds).collect();
         let mut warnings: Vec<String> = Vec::new();
         for warning in runs.iter().flat_map(|run| &run.warnings) {
             if !warnings.contains(warning) {
@@ -97,31 +96,32 @@ impl Summary {
             successes: [runs.iter().filter(|run| run.success).count(), runs.len()],
             seed: runs.first().map_or(0, |run| run.seed),
             many,
-            seconds: evaluation.seconds,
-            step_seconds: [median(&steps), evaluation.seconds_per_run()],
+            seconds,
+            step_seconds: [median(&steps), mean(&per_run)],
             warnings,
             partial: None,
             against: None,
         })
     }
 
-    /// Share of runs that succeeded.
-    pub fn success_rate(&self) -> f64 {
-        self.successes[0] as f64 / self.successes[1].max(1) as f64
+    /// What stands in the results of any runs: how many they are, their errors, how often they succeeded.
+    pub(crate) fn outcome(&self) -> Map<String, Value> {
+        let [successes, runs] = self.successes;
+        let mut json = nested(self.errors.iter().map(|error| (&error.metric, json!(error))));
+        json.insert("runs".into(), runs.into());
+        json.insert("success_rate".into(), (successes as f64 / runs.max(1) as f64).into());
+        if self.many {
+            json.insert("success_ci95".into(), json!(wilson_interval(successes, runs)));
+        }
+        json
     }
 
     /// As it stands in `result.json`, behind what `about` says of what was run.
     pub fn json(&self, about: &Map<String, Value>, success_means: &str) -> Map<String, Value> {
         let mut json = about.clone();
+        json.extend(self.outcome());
         json.insert("seed".into(), self.seed.into());
-        json.insert("runs".into(), self.successes[1].into());
-        json.extend(nested(self.errors.iter().map(|error| (&error.metric, json!(error)))));
         json.insert("returned".into(), json!(self.returned));
-        json.insert("success_rate".into(), self.success_rate().into());
-        if self.many {
-            let [successes, runs] = self.successes;
-            json.insert("success_ci95".into(), json!(wilson_interval(successes, runs)));
-        }
         json.insert("success_means".into(), success_means.into());
         let [step_median, per_run] = self.step_seconds;
         let seconds =
@@ -134,18 +134,21 @@ impl Summary {
         json
     }
 
-    /// How often the runs succeeded and what that means.
-    pub fn success(&self, means: &str) -> String {
+    /// How many of the runs succeeded.
+    pub(crate) fn success_share(&self) -> String {
         let [successes, runs] = self.successes;
         let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
-        match (self.many, successes) {
-            (false, 0) => format!("no (asked: {means})"),
-            (false, _) => format!("yes (asked: {means})"),
-            (true, _) => format!(
-                "{:.1} % of runs, 95 % interval {low:.1} to {high:.1} % (asked: {means})",
-                self.success_rate() * 100.0
-            ),
-        }
+        let rate = successes as f64 / runs.max(1) as f64 * 100.0;
+        format!("{rate:.1} % of runs, 95 % interval {low:.1} to {high:.1} %")
+    }
+
+    fn success(&self, means: &str) -> String {
+        let succeeded = match self.successes[0] {
+            _ if self.many => self.success_share(),
+            0 => "no".to_owned(),
+            _ => "yes".to_owned(),
+        };
+        format!("{succeeded} (asked: {means})")
     }
 
     /// Which seeds were run.
@@ -161,25 +164,13 @@ impl Summary {
 
     /// A few lines for people.
     pub fn text(&self, success_means: &str) -> Vec<String> {
-        let line = |name: &str, text: String| format!("  {name:<22} {text}");
         let mut lines: Vec<String> =
-            self.partial.iter().map(|partial| line("stopped", partial.of("runs"))).collect();
-        for error in &self.errors {
-            let [initial, last, best] = [error.initial, error.last, error.best].map(short);
-            let interval = error.ci95.map(|ends| ends.map(short));
-            let interval = interval.map(|[low, high]| format!("; 95 % interval {low} to {high}"));
-            let unit = match error.metric.unit {
-                "" => String::new(),
-                unit => format!(" {unit}"),
-            };
-            let interval = interval.unwrap_or_default();
-            let text = format!("{initial} -> {last}{unit} (best {best}{interval})");
-            lines.push(line(error.metric.name, text));
-        }
-        lines.push(line("returned", self.returned.in_words(self.successes[1])));
-        lines.push(line("success", self.success(success_means)));
-        lines.push(line("time", self.time()));
-        lines.extend(self.against.iter().flat_map(Comparison::text));
+            self.partial.iter().map(|partial| line("stopped", &partial.of("runs"))).collect();
+        lines.extend(self.table().lines());
+        lines.push(line("returned", &self.returned.in_words(self.successes[1])));
+        lines.push(line("success", &self.success(success_means)));
+        lines.push(line("time", &self.time()));
+        lines.extend(self.against.iter().flat_map(|against| against.text()));
         lines
     }
 
@@ -189,8 +180,7 @@ impl Summary {
         format!("{:.1} s, {ms} ms per step{}", self.seconds, memory.unwrap_or_default())
     }
 
-    /// The results as a section of a page.
-    pub fn section(&self, report: &mut Report, runs: &[Run], success_means: &str) {
+    fn table(&self) -> Table {
         let interval = self.many.then_some("95 % interval of the end");
         let head = ["Error", "Start", "End", "Lowest"].into_iter().chain(interval);
         let mut table = Table::new(head);
@@ -200,8 +190,13 @@ impl Summary {
                 error.ci95.map(|[low, high]| format!("{} to {}", short(low), short(high)));
             table.push([error.metric.title()].into_iter().chain(numbers).chain(interval));
         }
+        table
+    }
+
+    /// The results as a section of a page.
+    pub fn section(&self, report: &mut Report, runs: &[Run], success_means: &str) {
         report.heading("Results");
-        report.table(&table);
+        report.table(&self.table());
         report.labelled("Returned", &self.returned.in_words(self.successes[1]));
         report.labelled("Success", &self.success(success_means));
         let means = if self.successes[1] > 1 { " All are means over the runs." } else { "" };

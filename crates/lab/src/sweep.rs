@@ -2,10 +2,10 @@ use anyhow::Context;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Error, Experiment, Partial, Role, Run, Runner,
+    Error, Experiment, Partial, Run, Runner,
     evaluate::was_interrupted,
-    format::{exact, short, short_or_none},
-    mean, mean_interval, place, quantile,
+    format::{exact, line, short, short_or_none},
+    mean, mean_interval, quantile,
     report::{Report, Table},
 };
 
@@ -17,8 +17,6 @@ pub const TRAINING_SEED: u64 = 1_000_000;
 pub struct SearchSpace {
     /// The axes.
     pub axes: Vec<Axis>,
-    /// Values of the fine grid between the best value and each of its neighbours, evenly spaced in the logarithm.
-    pub between: usize,
     /// Whether there is such a combination.
     pub valid: fn(&GridPoint) -> bool,
 }
@@ -38,35 +36,34 @@ pub type GridPoint = Vec<Option<f64>>;
 /// A grid point and how it did on the training seeds.
 #[derive(Clone, Debug)]
 pub struct Cell {
-    /// Whether it is of the fine grid.
-    pub fine: bool,
     /// The values.
     pub point: GridPoint,
+    /// Whether it is of the fine grid.
+    fine: bool,
     /// The score of each seed at the last step; none where the numbers did not stay finite.
-    pub scores: Vec<Option<f64>>,
+    scores: Vec<Option<f64>>,
     /// How many runs succeeded.
-    pub successes: usize,
+    successes: usize,
     /// Wall time of the runs.
-    pub seconds: f64,
+    seconds: f64,
 }
 
-/// What a search found.
+/// A grid search and what it found.
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// What it could try.
-    pub space: SearchSpace,
-    /// What it tried; one of them has finite numbers at least.
-    pub cells: Vec<Cell>,
     /// The flags of the best cell, with all that they need.
     pub best_flags: String,
-    /// Name and unit of the score.
-    pub score: [&'static str; 2],
-    /// First of the seeds, and how many they are.
-    pub seeds: [u64; 2],
-    /// There where the user stopped it.
-    pub partial: Option<Partial>,
     /// The score of the best at the last step of runs on other seeds.
     pub held_out: Vec<f64>,
+    space: SearchSpace,
+    /// Name and unit.
+    score: [&'static str; 2],
+    /// Training seeds.
+    seeds: Vec<u64>,
+    /// What it has tried so far.
+    cells: Vec<Cell>,
+    /// Whether the user stopped it.
+    stopped: bool,
 }
 
 const CRITERION: &str = "lowest mean of the score over the training seeds, at the last step, among the settings with the fewest \
@@ -75,21 +72,18 @@ const CRITERION: &str = "lowest mean of the score over the training seeds, at th
 impl SearchSpace {
     /// The coarse grid.
     pub fn coarse(&self) -> Vec<GridPoint> {
-        self.product(&self.axes.iter().map(|axis| axis.values.clone()).collect::<Vec<_>>())
+        self.product(self.axes.iter().map(|axis| axis.values.clone()))
     }
 
     /// The fine grid around a point of the coarse one, without what was tried before.
-    pub fn fine(&self, best: &GridPoint, tried: &[GridPoint]) -> Vec<GridPoint> {
-        let around = |(axis, best): (&Axis, &Option<f64>)| match best {
-            Some(best) => between(axis, *best, self.between),
-            None => vec![None],
-        };
-        let mut all = self.product(&self.axes.iter().zip(best).map(around).collect::<Vec<_>>());
+    fn fine(&self, best: &GridPoint, tried: &[GridPoint]) -> Vec<GridPoint> {
+        let mut all =
+            self.product(self.axes.iter().zip(best).map(|(axis, best)| axis.around(*best)));
         all.retain(|point| !tried.contains(point));
         all
     }
 
-    fn product(&self, choices: &[Vec<Option<f64>>]) -> Vec<GridPoint> {
+    fn product(&self, choices: impl Iterator<Item = Vec<Option<f64>>>) -> Vec<GridPoint> {
         let mut all = vec![Vec::new()];
         for values in choices {
             let longer = |point: GridPoint| {
@@ -108,36 +102,22 @@ impl SearchSpace {
         };
         self.axes.iter().zip(point).filter_map(flag).collect::<Vec<_>>().join(" ")
     }
-
-    /// The flags, without dashes, whose best value is the smallest or largest of several that were tried.
-    fn at_edge(&self, best: &GridPoint, cells: &[Cell]) -> Vec<&'static str> {
-        let edge = |(k, axis): (usize, &Axis)| {
-            let tried = || cells.iter().filter_map(|cell| cell.point[k]);
-            let ends = [tried().fold(f64::INFINITY, f64::min), tried().fold(0.0, f64::max)];
-            let several = axis.values.iter().flatten().count() > 1;
-            (several && best[k].is_some_and(|x| ends.contains(&x))).then_some(axis.flag)
-        };
-        self.axes.iter().enumerate().filter_map(edge).collect()
-    }
 }
 
-/// Values around `best`, one of those of the axis and itself among them; beyond the first and the last they go on as on the other
-/// side.
-fn between(axis: &Axis, best: f64, between: usize) -> Vec<Option<f64>> {
-    let coarse: Vec<f64> = axis.values.iter().copied().flatten().collect();
-    let at = coarse.iter().position(|&x| x == best);
-    let ratio =
-        |low: Option<usize>, high: Option<usize>| Some(coarse.get(high?)? / coarse.get(low?)?);
-    let up = ratio(at, at.map(|k| k + 1));
-    let down = ratio(at.and_then(|k| k.checked_sub(1)), at);
-    let (Some(up), Some(down)) = (up.or(down), down.or(up)) else {
-        return vec![Some(best)];
-    };
-    let steps = between as i32 + 1;
-    let part = |ratio: f64, k: i32| rounded(best * ratio.powf(f64::from(k) / f64::from(steps)));
-    let below = (1..steps).rev().map(|k| part(down, -k));
-    let above = (1..steps).map(|k| part(up, k));
-    below.chain([best]).chain(above).map(Some).collect()
+impl Axis {
+    /// One of its values, and those halfway to its neighbours in the logarithm; beyond the first and the last the axis goes on as on
+    /// the other side.
+    fn around(&self, best: Option<f64>) -> Vec<Option<f64>> {
+        let near = |best: f64| {
+            let coarse: Vec<f64> = self.values.iter().copied().flatten().collect();
+            let at = coarse.iter().position(|&x| x == best)?;
+            let up = coarse.get(at + 1).map(|next| next / best);
+            let down = at.checked_sub(1).map(|before| best / coarse[before]);
+            let (below, above) = (best / down.or(up)?.sqrt(), best * up.or(down)?.sqrt());
+            Some(vec![Some(rounded(below)), Some(best), Some(rounded(above))])
+        };
+        best.and_then(near).unwrap_or_else(|| vec![best])
+    }
 }
 
 /// To three digits, so that a value found can be typed.
@@ -147,7 +127,7 @@ pub fn rounded(x: f64) -> f64 {
 
 impl Cell {
     /// Mean score over the runs that stayed finite.
-    pub fn mean(&self) -> Option<f64> {
+    fn mean(&self) -> Option<f64> {
         let finite: Vec<f64> = self.scores.iter().copied().flatten().collect();
         (!finite.is_empty()).then(|| mean(&finite))
     }
@@ -156,26 +136,33 @@ impl Cell {
         self.scores.iter().filter(|score| score.is_none()).count()
     }
 
+    /// What is known of it, in the order of the columns of a table.
+    fn fields(&self, space: &SearchSpace) -> Vec<(String, Value)> {
+        let mut fields = vec![("grid".into(), if self.fine { "fine" } else { "coarse" }.into())];
+        let values = space.axes.iter().zip(&self.point);
+        fields.extend(values.map(|(axis, value)| (axis.flag.replace('-', "_"), json!(value))));
+        let runs = self.scores.len();
+        let rate = self.successes as f64 / runs.max(1) as f64;
+        fields.extend([
+            ("mean".into(), json!(self.mean())),
+            ("n".into(), (runs - self.broken()).into()),
+            ("non_finite".into(), self.broken().into()),
+            ("success_rate".into(), rate.into()),
+            ("seconds".into(), self.seconds.into()),
+        ]);
+        fields
+    }
+
     fn json(&self, space: &SearchSpace) -> Value {
-        let mut json = Map::new();
-        json.insert("grid".into(), if self.fine { "fine" } else { "coarse" }.into());
-        for (axis, value) in space.axes.iter().zip(&self.point) {
-            json.insert(axis.flag.replace('-', "_"), json!(value));
-        }
-        json.insert("mean".into(), json!(self.mean()));
-        json.insert("n".into(), (self.scores.len() - self.broken()).into());
-        json.insert("non_finite".into(), self.broken().into());
-        let rate = self.successes as f64 / self.scores.len().max(1) as f64;
-        json.insert("success_rate".into(), rate.into());
+        let mut json = Map::from_iter(self.fields(space));
         json.insert("per_run".into(), json!(self.scores));
-        json.insert("seconds".into(), self.seconds.into());
         json.into()
     }
 }
 
 /// The cell with the fewest runs that went wrong, and of these the one with the lowest mean.
-pub fn best(cells: &[Cell]) -> Option<&Cell> {
-    let finite = cells.iter().filter_map(|cell| Some((cell, cell.broken(), cell.mean()?)));
+fn best<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<&'a Cell> {
+    let finite = cells.filter_map(|cell| Some((cell, cell.broken(), cell.mean()?)));
     let best = finite.min_by(|(_, a_bad, a), (_, b_bad, b)| a_bad.cmp(b_bad).then(a.total_cmp(b)));
     best.map(|(cell, ..)| cell)
 }
@@ -183,114 +170,133 @@ pub fn best(cells: &[Cell]) -> Option<&Cell> {
 /// Makes the experiment of a grid point.
 pub type MakePoint<'a> = dyn FnMut(&GridPoint) -> anyhow::Result<Box<dyn Experiment>> + 'a;
 
-impl Runner {
-    /// Tries the coarse grid and the fine one around its best on `seeds`, and says whether the user cut that short.
+impl Sweep {
+    /// One that has not tried anything yet; `score` has a name and a unit.
+    pub fn new(space: SearchSpace, score: [&'static str; 2], seeds: Vec<u64>) -> Self {
+        let (best_flags, held_out, cells) = (String::new(), Vec::new(), Vec::new());
+        Self { best_flags, held_out, space, score, seeds, cells, stopped: false }
+    }
+
+    /// Tries the coarse grid and the fine one around its best, until it is through or the user stops it, and returns the best cell.
     ///
     /// `each` are the steps of a run, `later` those of all runs that follow the search, for the progress bar.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the cache, and if no point gave finite numbers.
-    pub fn sweep(
+    /// Those of the experiments and of the cache; if no point gave finite numbers; [`Error::Interrupted`] if none has yet.
+    pub fn run(
         &mut self,
-        space: &SearchSpace,
-        seeds: &[u64],
+        runner: &mut Runner,
         [each, later]: [usize; 2],
         make: &mut MakePoint<'_>,
-    ) -> anyhow::Result<(Vec<Cell>, bool)> {
-        let mut cells = Vec::new();
+    ) -> anyhow::Result<&Cell> {
         for fine in [false, true] {
-            self.progress.expect(expected(space, &cells) * each * seeds.len() + later);
-            let points = if fine { fine_points(space, &cells)? } else { space.coarse() };
+            runner.progress.expect(self.done().asked * each * self.seeds.len() + later);
+            let points = if fine { self.fine_points()? } else { self.space.coarse() };
             for (k, point) in points.iter().enumerate() {
                 let grid = if fine { "fine" } else { "coarse" };
                 let label = format!("{grid} grid, setting {} of {}", k + 1, points.len());
-                match self.cell(point, seeds, &label, make) {
-                    Ok(cell) => cells.push(Cell { fine, ..cell }),
-                    Err(stopped) if was_interrupted(&stopped) => return Ok((cells, true)),
+                match self.cell(runner, point, fine, &label, make) {
+                    Ok(cell) => self.cells.push(cell),
+                    Err(stopped) if was_interrupted(&stopped) => {
+                        self.stopped = true;
+                        return self.best().ok_or(stopped);
+                    }
                     Err(failed) => {
-                        let flags = space.flags(point);
-                        return Err(failed).with_context(|| {
-                            format!("training seeds from {} on with {flags}", seeds[0])
-                        });
+                        let flags = self.space.flags(point);
+                        let seed = self.seeds[0];
+                        let context = format!("training seeds from {seed} on with {flags}");
+                        return Err(failed.context(context));
                     }
                 }
             }
         }
-        Ok((cells, false))
+        self.best().context("the coarse grid has a best point")
     }
 
     fn cell(
-        &mut self,
+        &self,
+        runner: &mut Runner,
         point: &GridPoint,
-        seeds: &[u64],
+        fine: bool,
         label: &str,
         make: &mut MakePoint<'_>,
     ) -> anyhow::Result<Cell> {
         let experiment = make(point)?;
-        let (evaluations, stopped) =
-            self.evaluate(&[experiment.as_ref()], seeds, false, Some(label))?;
-        if stopped {
-            return Err(Error::Interrupted.into());
-        }
-        let (runs, seconds) = (&evaluations[0].runs, evaluations[0].seconds);
-        let score = place(experiment.metrics(), Role::Score);
-        let last =
-            |run: &Run| Some(run.curve.last()?.values[score]).filter(|_| run.broke_at.is_none());
-        let successes = runs.iter().filter(|run| run.success).count();
-        let (point, scores) = (point.clone(), runs.iter().map(last).collect());
-        Ok(Cell { fine: false, point, scores, successes, seconds })
+        let last = |run: &Run, score: usize| run.curve.last().map(|point| point.values[score]);
+        let (scores, tried) = runner.score(experiment.as_ref(), &self.seeds, label, last)?;
+        let successes = tried.runs.iter().filter(|run| run.success).count();
+        Ok(Cell { point: point.clone(), fine, scores, successes, seconds: tried.seconds })
     }
-}
 
-fn fine_points(space: &SearchSpace, cells: &[Cell]) -> anyhow::Result<Vec<GridPoint>> {
-    let best = best(cells).context(
-        "the numbers stop being finite with every setting: try a smaller --learning-rates",
-    )?;
-    let tried: Vec<GridPoint> = cells.iter().map(|cell| cell.point.clone()).collect();
-    Ok(space.fine(&best.point, &tried))
-}
+    /// The fine grid around the best of the coarse one.
+    fn fine_points(&self) -> anyhow::Result<Vec<GridPoint>> {
+        let coarse = self.cells.iter().filter(|cell| !cell.fine);
+        let best = best(coarse.clone()).context(
+            "the numbers stop being finite with every setting: try a smaller --learning-rates",
+        )?;
+        let tried: Vec<GridPoint> = coarse.map(|cell| cell.point.clone()).collect();
+        Ok(self.space.fine(&best.point, &tried))
+    }
 
-/// How many points there are in all; the most that there may be before the coarse grid is finished, because the fine one depends on
-/// its best.
-pub fn expected(space: &SearchSpace, cells: &[Cell]) -> usize {
-    let coarse = space.coarse();
-    let fine = match cells.len() < coarse.len() {
-        true => coarse.iter().map(|best| space.fine(best, &coarse).len()).max(),
-        false => fine_points(space, &cells[..coarse.len()]).ok().map(|fine| fine.len()),
-    };
-    coarse.len() + fine.unwrap_or(0)
-}
+    /// How many points are tried, of how many in all: the most that there may be before the coarse grid is finished, because the fine
+    /// one depends on its best.
+    pub fn done(&self) -> Partial {
+        let coarse = self.space.coarse();
+        let fine = match self.cells.len() < coarse.len() {
+            true => coarse.iter().map(|best| self.space.fine(best, &coarse).len()).max(),
+            false => self.fine_points().ok().map(|fine| fine.len()),
+        };
+        Partial { finished: self.cells.len(), asked: coarse.len() + fine.unwrap_or(0) }
+    }
 
-impl Sweep {
+    /// The same, where the user stopped it.
+    pub fn partial(&self) -> Option<Partial> {
+        self.stopped.then(|| self.done())
+    }
+
+    fn best(&self) -> Option<&Cell> {
+        best(self.cells.iter())
+    }
+
+    /// The flags, without dashes, whose best value is the smallest or largest of several that were tried.
+    fn at_edge(&self) -> Vec<&'static str> {
+        let Some(best) = self.best() else { return Vec::new() };
+        let edge = |(k, axis): (usize, &Axis)| {
+            let tried = || self.cells.iter().filter_map(|cell| cell.point[k]);
+            let ends = [tried().fold(f64::INFINITY, f64::min), tried().fold(0.0, f64::max)];
+            let several = axis.values.iter().flatten().count() > 1;
+            (several && best.point[k].is_some_and(|x| ends.contains(&x))).then_some(axis.flag)
+        };
+        self.space.axes.iter().enumerate().filter_map(edge).collect()
+    }
+
     /// What the user should know.
     pub fn warnings(&self) -> Vec<String> {
-        let best = best(&self.cells).filter(|_| self.partial.is_none());
-        let edges = best.map(|best| self.space.at_edge(&best.point, &self.cells));
+        let edges = if self.stopped { Vec::new() } else { self.at_edge() };
         let warning = |flag: &str| {
             format!(
                 "the best --{flag} lies at the edge of what was tried, and may lie beyond: give --scales, --learning-rates or the \
                  flag itself"
             )
         };
-        edges.unwrap_or_default().into_iter().map(warning).collect()
+        edges.into_iter().map(warning).collect()
     }
 
     /// As it stands in `search.json`.
     pub fn json(&self) -> Value {
-        let [seed, runs] = self.seeds;
         let held_out = (!self.held_out.is_empty()).then(|| {
             let (values, ends) = (&self.held_out, mean_interval(&self.held_out));
             json!({ "runs": values.len(), "mean": mean(values), "ci95": ends })
         });
-        let mut best = best(&self.cells).map_or(Value::Null, |cell| cell.json(&self.space));
+        let mut best = self.best().map_or(Value::Null, |cell| cell.json(&self.space));
         best["flags"] = self.best_flags.as_str().into();
         json!({
             "score": { "name": self.score[0], "unit": self.score[1] },
             "criterion": CRITERION,
-            "training_seed": seed,
-            "training_runs": runs,
-            "partial": self.partial,
+            "training_seed": self.seeds[0],
+            "training_runs": self.seeds.len(),
+            "partial": self.partial(),
             "best": best,
             "held_out": held_out,
             "seconds": self.cells.iter().map(|cell| cell.seconds).sum::<f64>(),
@@ -302,48 +308,41 @@ impl Sweep {
     /// All cells as CSV, one row each: `grid`, a column for every axis, `mean,n,non_finite,success_rate,seconds`; what has no value is
     /// empty.
     pub fn csv(&self) -> String {
-        let columns = self.space.axes.iter().map(|axis| axis.flag.replace('-', "_"));
-        let columns: Vec<String> = ["grid".to_owned()].into_iter().chain(columns).collect();
-        let end = ["mean", "n", "non_finite", "success_rate", "seconds"];
-        let mut text = format!("{},{}\n", columns.join(","), end.join(","));
-        for cell in &self.cells {
-            let json = cell.json(&self.space);
-            let field = |name: &str| match &json[name] {
-                Value::Null => String::new(),
-                Value::String(text) => text.clone(),
-                number => number.as_f64().map_or_else(|| number.to_string(), exact),
-            };
-            let fields: Vec<String> =
-                columns.iter().map(|c| field(c)).chain(end.map(field)).collect();
-            text += &format!("{}\n", fields.join(","));
+        let text = |value: &Value| match value {
+            Value::Null => String::new(),
+            Value::String(text) => text.clone(),
+            number => number.as_f64().map_or_else(|| number.to_string(), exact),
+        };
+        let rows = self.cells.iter().map(|cell| cell.fields(&self.space));
+        let (mut head, mut body) = (Vec::new(), String::new());
+        for row in rows {
+            let values: Vec<String> = row.iter().map(|(_, value)| text(value)).collect();
+            body += &format!("{}\n", values.join(","));
+            head = row.into_iter().map(|(name, _)| name).collect();
         }
-        text
+        format!("{}\n{body}", head.join(","))
     }
 
     fn head(&self) -> String {
         let fine = self.cells.iter().filter(|cell| cell.fine).count();
-        let ([first, runs], coarse) = (self.seeds, self.cells.len() - fine);
+        let coarse = self.cells.len() - fine;
+        let (first, last) = (self.seeds[0], self.seeds[self.seeds.len() - 1]);
         let seconds: f64 = self.cells.iter().map(|cell| cell.seconds).sum();
         format!(
-            "{coarse} settings of a coarse grid and {fine} of a fine one, each on the training seeds {first} to {}, {seconds:.1} s",
-            first + runs - 1
+            "{coarse} settings of a coarse grid and {fine} of a fine one, each on the training seeds {first} to {last}, {seconds:.1} s"
         )
     }
 
-    fn best_mean(&self) -> String {
-        short_or_none(best(&self.cells).and_then(Cell::mean))
+    fn best_score(&self) -> String {
+        let mean = short_or_none(self.best().and_then(Cell::mean));
+        format!("{} {mean} on the training seeds", self.score[0])
     }
 
     /// A few lines for people.
     pub fn text(&self) -> Vec<String> {
-        let line = |name: &str, text: String| format!("  {name:<22} {text}");
-        let mut lines = vec![line("searched", self.head())];
-        lines.extend(self.partial.map(|partial| line("stopped", partial.of("settings"))));
-        lines.push(line("best", self.best_flags.clone()));
-        lines.push(line(
-            "",
-            format!("{} {} on the training seeds", self.score[0], self.best_mean()),
-        ));
+        let mut lines = vec![line("searched", &self.head())];
+        lines.extend(self.partial().map(|partial| line("stopped", &partial.of("settings"))));
+        lines.extend([line("best", &self.best_flags), line("", &self.best_score())]);
         lines
     }
 
@@ -353,7 +352,7 @@ impl Sweep {
         report.heading("Search");
         report.paragraph(&format!("{}. The best setting:", self.head()));
         report.code(&self.best_flags);
-        report.paragraph(&format!("Its {score} is {} on the training seeds.", self.best_mean()));
+        report.paragraph(&format!("It has {}.", self.best_score()));
         if !self.held_out.is_empty() {
             let [low, high] = mean_interval(&self.held_out).map(short);
             report.paragraph(&format!(
@@ -384,7 +383,7 @@ impl Sweep {
         rows.dedup();
         let means: Vec<f64> = self.cells.iter().filter_map(Cell::mean).collect();
         let (low, high) = (quantile(&means, 0.0), quantile(&means, 0.75));
-        let chosen = best(&self.cells).map(|cell| cell.point.clone());
+        let chosen = self.best().map(|cell| &cell.point);
         let named = |value: &Option<f64>| value.map_or_else(|| "-".into(), exact);
         let others = self.space.axes.iter().map(|axis| axis.flag).filter(|flag| *flag != across);
         let mut table = Table::new(others.map(str::to_owned).chain(columns.iter().map(named)));
@@ -395,7 +394,7 @@ impl Sweep {
             let label = |cell: &Cell| {
                 let star = if cell.broken() > 0 { " *" } else { "" };
                 let text = format!("{}{star}", short_or_none(cell.mean()));
-                if Some(&cell.point) == chosen.as_ref() { format!("**{text}**") } else { text }
+                if Some(&cell.point) == chosen { format!("**{text}**") } else { text }
             };
             let shade = |cell: &Cell| {
                 Some(((cell.mean()? - low) / (high - low).max(1e-300)).clamp(0.0, 1.0))
@@ -438,12 +437,18 @@ mod tests {
         let mut ends = axis("scale-end", &[0.01, 0.1, 1.0]);
         ends.values.insert(0, None);
         let axes = vec![axis("scale", &[0.01, 0.1, 1.0]), ends, axis("rate", &[0.1, 1.0])];
-        SearchSpace { axes, between: 1, valid: |point| point[1].is_none() || point[1] < point[0] }
+        SearchSpace { axes, valid: |point| point[1].is_none() || point[1] < point[0] }
     }
 
-    fn cell(point: GridPoint, scores: &[f64]) -> Cell {
-        let scores = scores.iter().map(|&x| Some(x).filter(|x| x.is_finite())).collect();
-        Cell { fine: false, point, scores, successes: 0, seconds: 1.0 }
+    fn tried(cells: &[(f64, [f64; 2])]) -> Sweep {
+        let cell = |&(scale, scores): &(f64, [f64; 2])| {
+            let scores = scores.map(|x| Some(x).filter(|x| x.is_finite())).to_vec();
+            let point = vec![Some(scale), None, Some(1.0)];
+            Cell { fine: false, point, scores, successes: 0, seconds: 1.0 }
+        };
+        let mut sweep = Sweep::new(space(), ["error", ""], vec![TRAINING_SEED]);
+        sweep.cells = cells.iter().map(cell).collect();
+        sweep
     }
 
     #[test]
@@ -465,31 +470,25 @@ mod tests {
 
     #[test]
     fn values_lie_between_the_neighbours_and_go_on_beyond_an_end() {
-        let around = |coarse: &[f64], best, n| {
+        let around = |coarse: &[f64], best| {
             let values = coarse.iter().copied().map(Some).collect();
-            let found = between(&Axis { flag: "x", values }, best, n);
+            let found = Axis { flag: "x", values }.around(Some(best));
             found.into_iter().flatten().collect::<Vec<_>>()
         };
         let coarse = [0.01, 0.1, 10.0];
-        assert_eq!(around(&coarse, 0.1, 1), [0.0316, 0.1, 1.0]);
-        assert_eq!(around(&coarse, 10.0, 1), [1.0, 10.0, 100.0]);
-        assert_eq!(around(&[1e-3, 1.0, 1e3], 1.0, 2), [0.01, 0.1, 1.0, 10.0, 100.0]);
-        assert_eq!((around(&[0.5], 0.5, 2), around(&coarse, 0.1, 0)), (vec![0.5], vec![0.1]));
+        assert_eq!(around(&coarse, 0.1), [0.0316, 0.1, 1.0]);
+        assert_eq!(around(&coarse, 10.0), [1.0, 10.0, 100.0]);
+        assert_eq!(around(&[0.5], 0.5), [0.5]);
     }
 
     #[test]
     fn the_best_cell_has_no_failures_before_it_has_a_low_mean() {
-        let point = |x| vec![Some(x), None, Some(1.0)];
-        let cells = [
-            cell(point(1.0), &[0.1, f64::NAN]),
-            cell(point(0.1), &[0.4, 0.4]),
-            cell(point(0.01), &[0.3, 0.3]),
-        ];
-        assert_eq!(best(&cells).unwrap().point, point(0.01));
-        assert_eq!(best(&cells[..1]).unwrap().point, point(1.0));
-        assert!(best(&[cell(point(1.0), &[f64::NAN])]).is_none());
-        assert_eq!(space().at_edge(&point(0.01), &cells), ["scale", "rate"]);
-        assert_eq!(space().at_edge(&point(0.1), &cells), ["rate"]);
+        let cells = [(1.0, [0.1, f64::NAN]), (0.1, [0.4, 0.4]), (0.01, [0.3, 0.3])];
+        let best = |cells| tried(cells).best().map(|cell| cell.point[0].unwrap());
+        assert_eq!((best(&cells), best(&cells[..1])), (Some(0.01), Some(1.0)));
+        assert_eq!(best(&[(1.0, [f64::NAN; 2])]), None);
+        assert_eq!(tried(&cells).at_edge(), ["scale", "rate"]);
+        assert_eq!(tried(&[cells[0], cells[1], (0.01, [0.5; 2])]).at_edge(), ["rate"]);
     }
 
     #[test]

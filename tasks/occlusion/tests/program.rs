@@ -211,7 +211,7 @@ fn a_file_with_a_surrogate_does_what_it_does_without() {
 }
 
 /// A few outer steps on small scenes.
-const LEARN: &str = "learn --outer 3 --inner 6 --batch 2 --validation-runs 2 --size 10";
+const LEARN: &str = "learn --outer 3 --steps 6 --batch 2 --validation-runs 2 --size 10";
 
 #[test]
 fn a_learned_softness_is_one_that_the_task_accepts() {

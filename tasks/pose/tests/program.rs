@@ -202,7 +202,7 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
 #[test]
 fn the_inner_learning_rate_is_learned_too_if_asked_for() {
     let out = tempfile::tempdir().unwrap();
-    let line = "learn --outer 1 --inner 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
+    let line = "learn --outer 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
                 --softness gauss --scale 0.02 --learning-rate 0.2 --learn-rate";
     run_in(out.path(), line).unwrap();
     let steps = fs::read_to_string(out.path().join("learn.jsonl")).unwrap();
@@ -219,7 +219,7 @@ fn the_inner_learning_rate_is_learned_too_if_asked_for() {
 #[test]
 fn a_surrogate_is_learned_kept_and_named() {
     let out = tempfile::tempdir().unwrap();
-    let line = "learn --outer 1 --inner 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
+    let line = "learn --outer 1 --steps 2 --batch 1 --validation-runs 1 --size 8 --estimator es \
                 --softness gauss --scale 0.02 --surrogate-scale 0.2 --learning-rate 0.2";
     let json = run_in(out.path(), line).unwrap();
     assert_eq!(

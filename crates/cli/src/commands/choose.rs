@@ -3,7 +3,7 @@ use serde_json::json;
 use softrast_inverse::Resolution;
 use softrast_lab::{
     Cache, Error, Experiment, Progress, Runner, check_held_out,
-    format::{counted, exact},
+    format::{counted, exact, line},
     program::Output,
     report::Report,
     seeds,
@@ -14,8 +14,9 @@ use softrast_softness::Family;
 
 use super::ended;
 use crate::{
-    Init, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment,
-    program::{Choose, Session, Shared},
+    Detail, Init, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment,
+    command_line::{Choose, Shared},
+    session::Session,
 };
 
 /// Methods from the least complex one on: parameters of the family first, then whether the scale moves.
@@ -25,79 +26,62 @@ const FAMILIES: [Family; 5] =
     [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp];
 /// Images are not tried below this many pixels a side.
 const FEWEST: usize = 8;
-/// Largest errors of a pixel, the last being what tasks take if nobody says otherwise.
+/// Largest errors of a pixel, from what a decay has if nobody says otherwise to what a softness has that stays.
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 /// Training seeds that every answer is tried on where nobody says.
 const RUNS: usize = 8;
 
 /// Finds the cheapest way to solve the task that is as good as the best, and gives its reasons.
-///
-/// # Errors
-///
-/// Those of the task, of the cache and of the output folder, and if no method gave finite numbers.
 pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyhow::Result<Output> {
     let Choose { mut shared, auto, training, resume } = flags;
     shared.method.reconcile().map_err(Error::usage)?;
-    let mut folder = session.folder()?;
+    let folder = session.folder()?;
     let mut runner = session.runner(&folder, resume.resume)?;
     let training = seeds(TRAINING_SEED, training.search_runs);
     let found = find::<T>(&shared, auto.budget, &training, &mut runner);
     runner.progress.finish();
-    let (chosen, stages, lasted) = found.map_err(|error| ended(error, runner.cache.kept()))?;
-    let score = T::measures().hard;
-    let variant = shared.common.variant.name();
+    let found = found.map_err(|error| ended(error, runner.cache.kept()))?;
+    let (score, variant) = (T::measures().hard, shared.common.variant.name());
     let head = format!(
         "{} ({variant}): the cheapest within one standard error of the best, by {score} of what is returned on {} training seeds",
         T::NAME,
         training.len()
     );
-    let line = |name: &str, text: &str| format!("  {name:<12} {text}");
     let mut text = vec![head.clone()];
-    text.extend(stages.iter().flat_map(|stage| stage.table().lines()));
-    text.push(line("chosen", &chosen.flags));
-    text.push(line("price", &chosen.price));
-    text.push(line("report", &session.out.join("report.html").display().to_string()));
+    text.extend(found.stages.iter().flat_map(|stage| stage.table().lines()));
+    text.extend([line("chosen", &found.flags()), line("price", &found.price())]);
     let unfinished = "the time budget ended before everything was tried";
-    let warnings: Vec<String> = (!lasted).then(|| unfinished.to_owned()).into_iter().collect();
+    let warnings: Vec<String> = (!found.whole).then(|| unfinished.to_owned()).into_iter().collect();
     let json = json!({
-        "task": T::NAME,
-        "command": session.command,
         "variant": variant,
         "score": score,
         "training_seed": TRAINING_SEED,
         "training_runs": training.len(),
-        "flags": chosen.flags,
-        "price": chosen.price,
-        "choice": { "stages": stages, "whole": lasted },
+        "flags": found.flags(),
+        "price": found.price(),
+        "choice": { "stages": found.stages, "whole": found.whole },
         "warnings": warnings,
-        "out": session.out,
     });
-    folder.stage("choose.json", &serde_json::to_vec_pretty(&json)?)?;
     let mut report = Report::new(T::NAME, "What is enough");
     report.paragraph(&format!("{head}."));
-    section(&stages, &mut report);
-    let page = report.finish(&session.again, "choose.json holds all errors");
-    folder.stage("report.html", page.as_bytes())?;
-    folder.commit(&[])?;
-    Ok(Output { json, text, warnings, partial: None })
+    section(&found.stages, &mut report);
+    let output = Output { json, text, warnings, partial: None };
+    let beside = "choose.json holds all errors";
+    session.finish(folder, report, beside, Some("choose.json"), output)
 }
 
 /// What `--softness auto` stands for.
-///
-/// # Errors
-///
-/// Those of the task, and if no method gave finite numbers.
 pub(crate) fn chosen<T: Task>(
     shared: &Shared<T::Args>,
     budget: Option<f64>,
     session: &Session,
-) -> anyhow::Result<Chosen<T::Args>> {
+) -> anyhow::Result<Found<T::Args>> {
     let progress = Progress::of_program(session.quiet);
     let mut runner = Runner { progress, cache: Cache::in_memory() };
     let training = seeds(TRAINING_SEED, RUNS);
     let found = find::<T>(shared, budget, &training, &mut runner);
     runner.progress.finish();
-    Ok(found?.0)
+    found
 }
 
 /// Asks one question after the other, each with the answers to those before: the least complex softness, then the fewest pixels to
@@ -108,7 +92,7 @@ fn find<T: Task>(
     budget: Option<f64>,
     training: &[u64],
     runner: &mut Runner,
-) -> anyhow::Result<(Chosen<T::Args>, Vec<Selection>, bool)> {
+) -> anyhow::Result<Found<T::Args>> {
     if shared.method.surrogate_scale.is_some() {
         return Err(Error::usage(
             "--surrogate-scale does not go with choose or --softness auto, whose methods have none",
@@ -116,8 +100,8 @@ fn find<T: Task>(
     }
     check_held_out(training, &[shared.common.seed])?;
     // Not the learned one, which is none of the methods that there are to choose from.
-    let mut now = Answer { args: shared.args.clone(), method: shared.method.clone() };
-    now.method.softness = None;
+    let method = MethodArgs { softness: None, ..shared.method.clone() };
+    let mut now = Answer { flags: String::new(), args: shared.args.clone(), method };
     let mut budget = Budget { left: budget.unwrap_or(f64::INFINITY), lasted: true };
     let (mut stages, mut runs): (Vec<Selection>, usize) = (Vec::new(), 0);
     for of in ["softness", "resolution", "tolerance", "detail"] {
@@ -133,9 +117,9 @@ fn find<T: Task>(
             _ => Vec::new(),
         };
         let mut candidates = Vec::new();
-        for (flags, answer) in answers {
+        for answer in answers {
             let experiment = make(&answer)?;
-            let with = with(of, &experiment);
+            let (with, flags) = (with(of, &experiment), answer.flags.clone());
             candidates.push(Candidate { flags, with, experiment: Box::new(experiment), answer });
         }
         if candidates.len() < 2 {
@@ -149,27 +133,42 @@ fn find<T: Task>(
         now = answer;
         stages.push(stage);
     }
-    let (flags, price) = (chosen_flags(&stages), price(&stages));
-    let Answer { args, method } = now;
-    Ok((Chosen { args, method, flags, price }, stages, budget.lasted))
+    Ok(Found { answer: now, stages, whole: budget.lasted })
 }
 
-/// The flags of an answer.
+/// The answer to all questions, with its reasons.
+pub(crate) struct Found<A> {
+    pub(crate) answer: Answer<A>,
+    stages: Vec<Selection>,
+    /// Whether the time was enough for all answers.
+    whole: bool,
+}
+
+impl<A> Found<A> {
+    pub(super) fn flags(&self) -> String {
+        chosen_flags(&self.stages)
+    }
+
+    pub(super) fn price(&self) -> String {
+        price(&self.stages)
+    }
+}
+
+/// What flags ask for.
 #[derive(Clone)]
-struct Answer<A> {
-    args: A,
-    method: MethodArgs,
+pub(crate) struct Answer<A> {
+    /// Those that answer the last question.
+    flags: String,
+    pub(crate) args: A,
+    pub(crate) method: MethodArgs,
 }
 
 impl<A: Clone> Answer<A> {
-    fn with(&self, change: impl FnOnce(&mut MethodArgs)) -> Self {
-        let mut answer = self.clone();
-        change(&mut answer.method);
+    /// The same with an answer to the next question.
+    fn with(&self, flags: String, change: impl FnOnce(&mut Self)) -> Self {
+        let mut answer = Self { flags, ..self.clone() };
+        change(&mut answer);
         answer
-    }
-
-    fn moves(&self) -> bool {
-        self.method.schedule == Some(Schedule::Decay)
     }
 }
 
@@ -188,7 +187,7 @@ fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
 }
 
 /// The softness families and how their scale moves, at the scales of the task.
-fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<(String, Answer<A>)> {
+fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
     let paths = |family| [(family, Schedule::Static), (family, Schedule::Decay)];
     let mut all: Vec<_> = FAMILIES.into_iter().flat_map(paths).collect();
     // Both static ones of one parameter come before those that move.
@@ -198,67 +197,54 @@ fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<(String, Answer<A>)> {
         // A random start reaches the whole image, and takes over twenty times as long as a logistic.
         let init = (family == Family::Mlp).then_some(Init::Fitted);
         let from = if init.is_some() { " --init fitted" } else { "" };
-        let answer = now.with(|method| {
-            method.softness = Some(SoftnessChoice::Family(family));
-            (method.schedule, method.init) = (Some(schedule), init);
-            (method.scale, method.scale_end) = (None, None);
-        });
-        (format!("--softness {family}{from} --schedule {name}"), answer)
+        now.with(format!("--softness {family}{from} --schedule {name}"), |answer| {
+            answer.method = MethodArgs {
+                softness: Some(SoftnessChoice::Family(family)),
+                schedule: Some(schedule),
+                init,
+                scale: None,
+                scale_end: None,
+                ..answer.method.clone()
+            };
+        })
     };
     all.into_iter().map(answer).collect()
 }
 
 /// Resolutions of images of `size`, the fewest pixels first; none if one was asked for. Where the scale moves, so may the resolution.
-fn resolutions<A: Clone>(now: &Answer<A>, size: usize) -> Vec<(String, Answer<A>)> {
+fn resolutions<A: Clone>(now: &Answer<A>, size: usize) -> Vec<Answer<A>> {
     if now.method.resolution.is_some() {
         return Vec::new();
     }
     let smaller: Vec<usize> =
         Resolution::sides(size).skip(1).take_while(|&side| side >= FEWEST).collect();
-    let auto = (now.moves() && !smaller.is_empty()).then_some(Resolution::Auto);
+    let moves = now.method.schedule == Some(Schedule::Decay);
+    let auto = (moves && !smaller.is_empty()).then_some(Resolution::Auto);
     let smaller = smaller.into_iter().rev().map(Resolution::Side);
     let answer = |resolution: Resolution| {
-        let answer = now.with(|method| method.resolution = Some(resolution));
-        (format!("--resolution {resolution}"), answer)
+        let flags = format!("--resolution {resolution}");
+        now.with(flags, |answer| answer.method.resolution = Some(resolution))
     };
     smaller.chain(auto).chain([Resolution::Full]).map(answer).collect()
 }
 
 /// Tolerances of culling, the largest first; none if one was asked for.
-fn tolerances<A: Clone>(now: &Answer<A>) -> Vec<(String, Answer<A>)> {
-    if now.method.tolerance.is_some() {
-        return Vec::new();
-    }
+fn tolerances<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
+    let asked = now.method.tolerance.is_some();
+    let tolerances = TOLERANCES.into_iter().filter(|_| !asked);
     let answer = |tolerance: f64| {
-        let answer = now.with(|method| method.tolerance = Some(tolerance));
-        (format!("--tolerance {}", exact(tolerance)), answer)
+        let flags = format!("--tolerance {}", exact(tolerance));
+        now.with(flags, |answer| answer.method.tolerance = Some(tolerance))
     };
-    TOLERANCES.into_iter().map(answer).collect()
+    tolerances.map(answer).collect()
 }
 
 /// Details of the task's mesh, the coarsest first; none if it has none to choose.
-fn details<T: Task>(now: &Answer<T::Args>, task: &T) -> Vec<(String, Answer<T::Args>)> {
-    let Some(detail) = task.detail(&now.args) else { return Vec::new() };
-    let answer = |value: usize| {
-        let mut answer = now.clone();
-        (detail.set)(&mut answer.args, value);
-        (format!("--{} {value}", detail.flag), answer)
-    };
-    detail.values.iter().copied().map(answer).collect()
-}
-
-/// The flags of a method and what they are for, where both come from a choice.
-pub(crate) struct Chosen<A> {
-    pub(crate) args: A,
-    pub(crate) method: MethodArgs,
-    pub(crate) flags: String,
-    pub(crate) price: String,
-}
-
-impl<A> Chosen<A> {
-    pub(super) fn in_words(&self) -> String {
-        format!("{}: {}", self.flags, self.price)
-    }
+fn details<T: Task>(now: &Answer<T::Args>, task: &T) -> Vec<Answer<T::Args>> {
+    let Some(Detail { flag, values, set }) = task.detail(&now.args) else { return Vec::new() };
+    let answer =
+        |value: usize| now.with(format!("--{flag} {value}"), |answer| set(&mut answer.args, value));
+    values.into_iter().map(answer).collect()
 }
 
 #[cfg(test)]
@@ -267,26 +253,29 @@ mod tests {
 
     use super::*;
 
-    fn flags(answers: &[(String, Answer<()>)]) -> Vec<&str> {
-        answers.iter().map(|(flags, _)| flags.as_str()).collect()
+    fn flags(answers: &[Answer<()>]) -> Vec<&str> {
+        answers.iter().map(|answer| answer.flags.as_str()).collect()
     }
 
     #[test]
     fn the_cheapest_comes_first_and_what_is_asked_for_is_not_asked() {
-        let still = Answer { args: (), method: MethodArgs::default() };
+        let still = Answer { flags: String::new(), args: (), method: MethodArgs::default() };
         let sides = ["8", "16", "32", "full"].map(|name| format!("--resolution {name}"));
         assert_eq!(flags(&resolutions(&still, 64)), sides);
-        let moving = still.with(|method| method.schedule = Some(Schedule::Decay));
+        let change = |change: fn(&mut MethodArgs)| {
+            still.with(String::new(), |answer| change(&mut answer.method))
+        };
+        let moving = change(|method| method.schedule = Some(Schedule::Decay));
         let expected = ["--resolution 9", "--resolution auto", "--resolution full"];
         assert_eq!(flags(&resolutions(&moving, 18)), expected);
         assert_eq!(flags(&resolutions(&moving, 15)), ["--resolution full"]);
-        let asked = moving.with(|method| method.resolution = Some(Resolution::Auto));
+        let asked = change(|method| method.resolution = Some(Resolution::Auto));
         assert!(resolutions(&asked, 64).is_empty());
         let all = tolerances(&moving);
-        assert_eq!(all[3].0, "--tolerance 1e-5");
-        assert_eq!(all[0].1.method.tolerance, Some(Method::usual_tolerance(true)));
+        assert_eq!(all[3].flags, "--tolerance 1e-5");
+        assert_eq!(all[0].method.tolerance, Some(Method::usual_tolerance(true)));
         let softnesses = softnesses(&moving);
-        assert_eq!(softnesses[1].0, "--softness gauss --schedule static");
-        assert_eq!(softnesses[9].0, "--softness mlp --init fitted --schedule decay");
+        assert_eq!(softnesses[1].flags, "--softness gauss --schedule static");
+        assert_eq!(softnesses[9].flags, "--softness mlp --init fitted --schedule decay");
     }
 }

@@ -1,17 +1,18 @@
 use anyhow::Context;
 use softrast_lab::{Comparison, Error, Evaluation, Experiment, Partial, program::Output, seeds};
 
-use super::{Before, Finished, choose::chosen, ended, write};
+use super::{
+    choose::chosen,
+    ended, in_words,
+    runs::{Finished, write},
+};
 use crate::{
     Purpose, SoftnessChoice, Task, TaskExperiment,
-    program::{Auto, Evaluate, Session, Shared, Solve},
+    command_line::{Auto, Evaluate, Shared, Solve},
+    session::Session,
 };
 
 /// Solves one instance.
-///
-/// # Errors
-///
-/// Those of the task and of the output folder.
 pub(crate) fn solve<T: Task>(session: &Session, flags: Solve<T::Args>) -> anyhow::Result<Output> {
     let Solve { mut shared, auto } = flags;
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
@@ -19,11 +20,6 @@ pub(crate) fn solve<T: Task>(session: &Session, flags: Solve<T::Args>) -> anyhow
 }
 
 /// Solves many instances with one method or two.
-///
-/// # Errors
-///
-/// Those of the task, of the cache and of the output folder; [`Error::Interrupted`] if the user stopped the work before any run was
-/// finished.
 pub(crate) fn evaluate<T: Task>(
     session: &Session,
     flags: Evaluate<T::Args>,
@@ -51,9 +47,9 @@ fn prepared<T: Task>(
 ) -> anyhow::Result<TaskExperiment<T>> {
     shared.method.reconcile().map_err(Error::usage)?;
     if shared.method.softness == Some(SoftnessChoice::Auto) {
-        let choice = chosen::<T>(shared, auto.budget, session)?;
-        eprintln!("--softness auto is {}", choice.in_words());
-        (shared.args, shared.method) = (choice.args, choice.method);
+        let found = chosen::<T>(shared, auto.budget, session)?;
+        eprintln!("--softness auto is {}: {}", found.flags(), found.price());
+        (shared.args, shared.method) = (found.answer.args, found.answer.method);
     }
     TaskExperiment::new(&shared.args, &shared.common, &shared.method, purpose)
 }
@@ -84,14 +80,15 @@ fn run<T: Task>(
     let mut summary = finished.summary(many)?;
     let partial = Partial { finished: summary.successes[1], asked: seeds.len() };
     summary.partial = stopped.then_some(partial);
-    summary.against = other.map(|(second, evaluation)| {
+    if let Some((second, evaluation)) = other {
         let titles = [title(first, second), title(second, first)];
-        let mut about = second.about("evaluate");
+        let mut about = second.about();
         about.retain(|key, _| ["softness", "parameters", "settings"].contains(&key.as_str()));
-        Comparison::new(titles, about, first, finished.evaluation, evaluation)
-    });
+        let against = Comparison::new(titles, about, first, finished.evaluation, evaluation)?;
+        summary.against = Some(Box::new(against));
+    }
     let other = other.map(|(experiment, evaluation)| Finished { experiment, evaluation });
-    write(session, folder, &finished, other.as_ref(), &summary, &Before::nothing())
+    write(session, folder, &finished, other.as_ref(), &summary, None)
 }
 
 /// The name of a method, and where the other has the same what else is different.
@@ -99,12 +96,8 @@ fn title<T: Task>(one: &TaskExperiment<T>, other: &TaskExperiment<T>) -> String 
     if one.name() != other.name() {
         return one.name().to_owned();
     }
-    let others = other.settings();
-    let settings = one.settings();
+    let (settings, others) = (one.settings(), other.settings());
     let differs = settings.iter().filter(|(key, value)| others.get(*key) != Some(value));
-    let named = differs.map(|(key, value)| {
-        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        format!("{} {value}", key.replace('_', " "))
-    });
+    let named = differs.map(|setting| in_words(setting).join(" "));
     [one.name().to_owned()].into_iter().chain(named).collect::<Vec<_>>().join(", ")
 }

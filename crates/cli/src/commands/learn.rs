@@ -5,7 +5,9 @@ use std::{
 };
 
 use anyhow::Context;
-use serde_json::{Value, json};
+use burn::tensor::backend::Backend;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
 use softrast_inverse::Learning;
 use softrast_lab::{
     Error, Experiment, OutputFolder, Progress,
@@ -13,48 +15,46 @@ use softrast_lab::{
     peak_rss_mib,
     plot::{Axis, Plot, Series},
     program::Output,
-    report::{Report, Table},
+    report::Report,
     write_atomically,
 };
 use softrast_meta::Record;
-use softrast_raster::{BackendChoice, HostBackend};
+use softrast_raster::HostBackend;
 use softrast_softness::ScheduledSoftness;
 
+use super::settings_section;
 use crate::{
     Purpose, Task, TaskExperiment, Variant,
+    command_line::{Learn, Shared},
     learned_charts::learned_charts,
-    program::{Learn, Session, Shared},
+    session::Session,
 };
 
 /// Learns a softness, and writes it with a report.
 ///
 /// Every outer step leaves a line in `learn.jsonl` and then a checkpoint, so that a program that was killed at any moment goes on with
 /// `--resume` as though it had not been.
-///
-/// # Errors
-///
-/// Those of the task and of the output folder; if learning cannot go on.
 pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow::Result<Output> {
     let Learn { shared: Shared { args, mut common, mut method }, learn, resume } = flags;
     method.reconcile().map_err(Error::usage)?;
     if method.resolution.is_some() {
         return Err(Error::usage("learn draws at --size: leave out --resolution"));
     }
-    common.steps = learn.inner.or(common.steps);
-    if common.backend.take().is_some_and(|asked| asked != BackendChoice::NdArray.name()) {
-        return Err(Error::usage("learn computes on the CPU: leave out --backend"));
+    let host = HostBackend::name(&Default::default());
+    if common.backend.take().is_some_and(|asked| asked != host) {
+        let message = format!("learn is compiled for {host} alone: leave out --backend");
+        return Err(Error::usage(message));
     }
     let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Finding)?;
-    let config = learn.config(common.seed);
-    let (about, settings) = (experiment.about("learn"), experiment.settings());
-    let identity = experiment.identity();
-    let TaskExperiment { task, method, solve, description, .. } = experiment;
+    let (about, identity) = (experiment.about(), experiment.identity());
+    let TaskExperiment { task, method, solve, .. } = experiment;
     let own_start = task.own_phi();
     let task = std::rc::Rc::into_inner(task).context("a task has one owner")?;
+    let config = learn.config(common.seed);
     let learning = Learning::<T, HostBackend>::new(task, &method, &solve, &config);
     let mut learning = learning.map_err(|error| Error::usage(error.to_string()))?;
     let job = json!({ "task": T::NAME, "method": identity, "learned": learning.identity() });
-    let mut folder = session.folder()?;
+    let folder = session.folder()?;
     let mut log = Log::new(&folder, resume.resume, &mut learning, &job.to_string())?;
     let mut progress = Progress::of_program(session.quiet);
     let stopped = walk(&mut learning, &mut log, &mut progress);
@@ -62,60 +62,78 @@ pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow
     let kept = "learning stopped; what was learned before is kept, and --resume goes on from it";
     let stopped = stopped.context(kept)?;
 
-    let (done, updates) = (log.updates(), learning.config().updates);
-    let start = log.validations().first().map(|point| point[1]);
     let (mut softness, own) = learning.learned();
-    softness.note = Some(note(session, &learning, done, start));
+    softness.note = Some(note(session, &learning, &log));
     softness.task = Some(T::NAME.to_owned());
     // The rate is one for the original variant.
     softness.learning_rate = softness.learning_rate.filter(|_| common.variant == Variant::Original);
-    let files = files(&learning, &softness, &own)?;
+    let learned = Learned { softness, own: [own_start, own], stopped };
+    write(session, folder, &learning, &log, &about, &learned)
+}
+
+/// What came of learning.
+struct Learned {
+    softness: ScheduledSoftness,
+    /// Parameters of the task's own softness, before and after.
+    own: [Vec<f64>; 2],
+    /// Whether the user stopped it.
+    stopped: bool,
+}
+
+/// Writes what was learned, and says so.
+fn write<T: Task>(
+    session: &Session,
+    mut folder: OutputFolder,
+    learning: &Learning<T, HostBackend>,
+    log: &Log,
+    about: &Map<String, Value>,
+    learned: &Learned,
+) -> anyhow::Result<Output> {
+    let Learned { softness, own: [own_start, own], stopped } = learned;
+    let (done, updates) = (log.updates(), learning.config().updates);
     let partial = stopped.then(|| format!("{done} of {updates} outer steps are done and kept"));
-    let best = learning.progress().best.as_ref();
-    let parameters = learning.progress().phi.len();
-    let result = json!({
-        "task": T::NAME,
-        "command": session.command,
-        "partial": partial,
-        "softness": about["softness"],
-        "parameters": parameters,
-        "outer_steps": done,
-        "start_validation_loss": start,
-        "best": best.map(|best| json!({ "step": best.step, "validation_loss": best.loss })),
-        "instances": { "tried": learning.progress().tried, "dropped": learning.progress().dropped },
-        "seconds": learning.progress().seconds,
-        "peak_memory_mib": peak_rss_mib(),
-        "inner_steps": solve.steps,
-        "size": solve.size,
-        "faces": description.faces,
-        "config": learning.config(),
-        "settings": settings,
-        "files": files.iter().map(|(name, _)| session.out.join(name)).collect::<Vec<_>>(),
-        "out": session.out,
-    });
-    let text = text::<T>(session, &result, &files);
-    let mut report = Report::new(T::NAME, T::ABOUT);
-    let begun = partial.iter().map(|done| format!("Stopped: {done}; --resume goes on from them"));
-    report.warnings(&begun.collect::<Vec<_>>());
-    report.heading("Learning");
-    text.iter().for_each(|line| report.paragraph(line));
-    report.chart(&losses(&log).svg()?, LOSSES);
-    for (plot, caption) in learned_charts(learning.layout(), &softness) {
-        report.chart(&plot.svg()?, caption);
-    }
-    if let Some((plot, caption)) = learning.problem().own_chart(&own_start, &own) {
-        report.chart(&plot.svg()?, caption);
-    }
-    settings_table(&mut report, &result);
-    let beside = "learn.json holds the result, learn.jsonl every outer step; softness.json is for --softness of any task";
+    let files = files(learning, softness, own)?;
     for (name, content) in &files {
         folder.stage(name, content.as_bytes())?;
     }
-    folder.stage("report.html", report.finish(&session.again, beside).as_bytes())?;
-    folder.stage("learn.json", &serde_json::to_vec_pretty(&result)?)?;
-    folder.commit(&[])?;
-    let warnings = warnings(&learning);
-    Ok(Output { json: result, text, warnings, partial })
+    let files: Vec<PathBuf> = files.iter().map(|(name, _)| session.out.join(name)).collect();
+    let progress = learning.progress();
+    let best = progress.best.as_ref();
+    let result = json!({
+        "partial": partial,
+        "softness": about["softness"],
+        "parameters": progress.phi.len(),
+        "outer_steps": done,
+        "start_validation_loss": log.start(),
+        "best": best.map(|best| json!({ "step": best.step, "validation_loss": best.loss })),
+        "instances": { "tried": progress.tried, "dropped": progress.dropped },
+        "seconds": progress.seconds,
+        "peak_memory_mib": peak_rss_mib(),
+        "inner_steps": about["steps"],
+        "size": about["size"],
+        "faces": about["faces"],
+        "config": learning.config(),
+        "settings": about["settings"],
+        "files": files,
+    });
+    let mut text = text::<T>(&result);
+    text.extend(files.iter().map(|file| file.display().to_string()));
+    let mut report = Report::new(T::NAME, T::ABOUT);
+    report.stopped(partial.as_deref());
+    report.heading("Learning");
+    text.iter().for_each(|line| report.paragraph(line));
+    report.chart(&losses(log).svg()?, LOSSES);
+    let charts = learned_charts(learning.layout(), softness).into_iter();
+    for (plot, caption) in charts.chain(learning.problem().own_chart(own_start, own)) {
+        report.chart(&plot.svg()?, caption);
+    }
+    let settings = ["config", "settings"].map(|key| result[key].as_object());
+    if let [Some(config), Some(settings)] = settings {
+        settings_section(&mut report, [config, settings]);
+    }
+    let beside = "learn.json holds the result, learn.jsonl every outer step; softness.json is for --softness of any task";
+    let output = Output { json: result, text, warnings: warnings(learning), partial };
+    session.finish(folder, report, beside, Some("learn.json"), output)
 }
 
 /// Takes outer steps until learning has finished, or the user stops it: then true.
@@ -150,10 +168,12 @@ struct Log {
     steps: Vec<Point>,
 }
 
+/// What the charts need of a record.
+#[derive(Deserialize)]
 struct Point {
     step: usize,
     loss: Option<f64>,
-    validation: Option<f64>,
+    validation_loss: Option<f64>,
 }
 
 impl Log {
@@ -179,11 +199,9 @@ impl Log {
             // A step that came after the checkpoint was written will come again, and the line behind the last line feed was being
             // written when the program was killed.
             for line in String::from_utf8_lossy(&text).split_inclusive('\n') {
-                let point = serde_json::from_str(line).ok().and_then(|record| point(&record));
-                let point = point.filter(|point| point.step < next && line.ends_with('\n'));
-                if let Some(point) =
-                    point.filter(|point| log.steps.iter().all(|p| p.step < point.step))
-                {
+                let Ok(point) = serde_json::from_str::<Point>(line) else { continue };
+                let follows = log.steps.last().is_none_or(|last| last.step < point.step);
+                if follows && point.step < next && line.ends_with('\n') {
                     log.steps.push(point);
                     kept += line;
                 }
@@ -215,52 +233,35 @@ impl Log {
         let checkpoint = learning.checkpoint(&self.job)?;
         write_atomically(&self.checkpoint, checkpoint.as_bytes())
             .with_context(|| format!("cannot write {:?}", self.checkpoint))?;
-        let &Record { step, loss, validation_loss: validation, .. } = record;
-        self.steps.push(Point { step, loss, validation });
+        let &Record { step, loss, validation_loss, .. } = record;
+        self.steps.push(Point { step, loss, validation_loss });
         Ok(())
     }
 
     fn updates(&self) -> usize {
-        self.steps
-            .iter()
-            .filter(|point| point.loss.is_some())
-            .map(|p| p.step + 1)
-            .max()
-            .unwrap_or(0)
+        let last = self.steps.iter().rfind(|point| point.loss.is_some());
+        last.map_or(0, |point| point.step + 1)
     }
 
-    fn losses(&self) -> Vec<[f64; 2]> {
-        let point = |point: &Point| Some([point.step as f64, point.loss?]);
-        self.steps.iter().filter_map(point).collect()
+    /// The validation loss of the start.
+    fn start(&self) -> Option<f64> {
+        self.steps.iter().find_map(|point| point.validation_loss)
     }
 
-    fn validations(&self) -> Vec<[f64; 2]> {
-        let point = |point: &Point| Some([point.step as f64, point.validation?]);
-        self.steps.iter().filter_map(point).collect()
+    fn curve(&self, of: impl Fn(&Point) -> Option<f64>) -> Vec<[f64; 2]> {
+        self.steps.iter().filter_map(|point| Some([point.step as f64, of(point)?])).collect()
     }
-}
-
-fn point(record: &Value) -> Option<Point> {
-    Some(Point {
-        step: usize::try_from(record["step"].as_u64()?).ok()?,
-        loss: record["loss"].as_f64(),
-        validation: record["validation_loss"].as_f64(),
-    })
 }
 
 /// Where a softness comes from, for its file.
-fn note<T: Task>(
-    session: &Session,
-    learning: &Learning<T, HostBackend>,
-    updates: usize,
-    start: Option<f64>,
-) -> String {
-    let from = start.map(|loss| format!(", from a validation loss of {}", short(loss)));
+fn note<T: Task>(session: &Session, learning: &Learning<T, HostBackend>, log: &Log) -> String {
+    let from = log.start().map(|loss| format!(", from a validation loss of {}", short(loss)));
     let progress = learning.progress();
     let best = progress.best.as_ref();
     let best = best.map(|best| format!("; validation loss {:.6} after {}", best.loss, best.step));
     format!(
-        "learned in {updates} outer steps on seeds from {}{} by: {}{}; {:.0} s",
+        "learned in {} outer steps on seeds from {}{} by: {}{}; {:.0} s",
+        log.updates(),
         learning.config().seed,
         from.unwrap_or_default(),
         session.again,
@@ -282,7 +283,7 @@ fn files<T: Task>(
     Ok([Some((name, text)), own].into_iter().flatten().collect())
 }
 
-fn text<T: Task>(session: &Session, result: &Value, files: &[(&str, String)]) -> Vec<String> {
+fn text<T: Task>(result: &Value) -> Vec<String> {
     let mut lines = vec![format!(
         "{}: learned {} parameters of {} in {} outer steps of {} inner ones, {:.1} s",
         T::NAME,
@@ -300,8 +301,6 @@ fn text<T: Task>(session: &Session, result: &Value, files: &[(&str, String)]) ->
             short(loss)
         ));
     }
-    lines.extend(files.iter().map(|(name, _)| session.out.join(name).display().to_string()));
-    lines.push(format!("report: {}", session.out.join("report.html").display()));
     lines
 }
 
@@ -330,21 +329,14 @@ const LOSSES: &str = "Mean outer loss of the batch of each outer step, whose ins
 
 /// The loss over the outer steps.
 fn losses(log: &Log) -> Plot {
-    let series = [("batch", log.losses()), ("validation", log.validations())];
+    let curves = [
+        ("batch", log.curve(|point| point.loss)),
+        ("validation", log.curve(|point| point.validation_loss)),
+    ];
     let series =
-        series.map(|(name, points)| Series { name: name.into(), points, ..Series::default() });
+        curves.map(|(name, points)| Series { name: name.into(), points, ..Series::default() });
     Plot {
         series: series.into(),
         ..Plot::new(Axis::linear("outer step"), Axis::linear("outer loss"))
     }
-}
-
-fn settings_table(report: &mut Report, result: &Value) {
-    let rows = ["config", "settings"].iter().filter_map(|key| result[key].as_object()).flatten();
-    let row = |(key, value): (&String, &Value)| {
-        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        [key.replace('_', " "), value]
-    };
-    report.heading("Settings");
-    report.table(&Table::pairs(rows.map(row)));
 }

@@ -1,18 +1,22 @@
 use serde_json::{Map, Value, json};
 use softrast_lab::{
-    Error, Evaluation, Experiment, Partial, Run, check_held_out,
+    Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, check_held_out,
     format::exact,
     program::Output,
     report::Report,
     seeds,
-    sweep::{Axis, GridPoint, SearchSpace, Sweep, TRAINING_SEED, best, expected, rounded},
+    sweep::{Axis, GridPoint, SearchSpace, Sweep, TRAINING_SEED, rounded},
     was_interrupted,
 };
 
-use super::{Before, Finished, ended, write};
+use super::{
+    ended,
+    runs::{Finished, write},
+};
 use crate::{
     MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment, Variant,
-    program::{Search, Session, Shared},
+    command_line::{Search, Shared},
+    session::Session,
     task::HARD,
 };
 
@@ -27,11 +31,6 @@ const RATE: usize = 2;
 const OWN: usize = 3;
 
 /// Searches for the best setting, then evaluates it on seeds that the search never saw.
-///
-/// # Errors
-///
-/// Those of the task, of the cache and of the output folder; [`Error::Interrupted`] if the user stopped the work before any setting was
-/// finished.
 pub(crate) fn search<T: Task>(
     session: &Session,
     mut flags: Search<T::Args>,
@@ -59,71 +58,69 @@ pub(crate) fn search<T: Task>(
     check_held_out(&training, &held_out)?;
     let mut folder = session.folder()?;
     let mut runner = session.runner(&folder, flags.resume.resume)?;
-    let steps = [base.steps(), base.steps() * held_out.len()];
-    let tried = runner.sweep(&space, &training, steps, &mut |point| {
-        Ok(Box::new(make(point)?) as Box<dyn Experiment>)
-    });
-    runner.progress.finish();
-    let (cells, stopped) = tried.map_err(|error| ended(error, runner.cache.kept()))?;
-    let best_point = best(&cells).ok_or(Error::Interrupted)?.point.clone();
-    let partial = Partial { finished: cells.len(), asked: expected(&space, &cells) };
     let score = base.metrics()[HARD];
-    let mut sweep = Sweep {
-        best_flags: all_flags(common.variant, method, &space, &best_point),
-        space,
-        cells,
-        score: [score.name, score.unit],
-        seeds: [training[0], training.len() as u64],
-        partial: stopped.then_some(partial),
-        held_out: Vec::new(),
-    };
-    let found = make(&best_point)?;
-    let (evaluation, cut) = match stopped {
-        true => (Evaluation::default(), true),
-        false => match runner.evaluate(&[&found], &held_out, true, None) {
-            Ok((mut evaluations, cut)) => (evaluations.remove(0), cut),
-            Err(stopped) if was_interrupted(&stopped) => (Evaluation::default(), true),
-            Err(failed) => return Err(ended(failed, runner.cache.kept())),
-        },
-    };
+    let mut sweep = Sweep::new(space.clone(), [score.name, score.unit], training);
+    let steps = [base.steps(), base.steps() * held_out.len()];
+    let tried = sweep
+        .run(&mut runner, steps, &mut |point| Ok(Box::new(make(point)?) as Box<dyn Experiment>));
     runner.progress.finish();
+    let best = tried.map_err(|error| ended(error, runner.cache.kept()))?.point.clone();
+    sweep.best_flags = all_flags(common.variant, method, &space, &best);
+    let found = make(&best)?;
+    let (evaluation, stopped) = match sweep.partial() {
+        Some(_) => (Evaluation::default(), true),
+        None => on_held_out(&mut runner, &found, &held_out)?,
+    };
     let last = |run: &Run| run.curve.last().map_or(f64::NAN, |point| point.values[HARD]);
     sweep.held_out = evaluation.runs.iter().map(last).collect();
     folder.stage("search.csv", sweep.csv().as_bytes())?;
     folder.stage("search.json", &serde_json::to_vec_pretty(&sweep.json())?)?;
-    let across = |report: &mut Report| sweep.section(report, "learning-rate");
     if evaluation.runs.is_empty() {
-        let mut report = Report::new(T::NAME, T::ABOUT);
-        across(&mut report);
-        let page =
-            report.finish(&session.again, "search.json and search.csv hold every setting tried");
-        folder.stage("report.html", page.as_bytes())?;
-        folder.commit(&[])?;
-        let partial = sweep.partial.unwrap_or(partial);
-        let json = json!({
-            "task": T::NAME,
-            "command": session.command,
-            "partial": partial,
-            "search": sweep.json(),
-            "out": session.out,
-        });
-        let mut text = vec![format!("{}: search stopped early", T::NAME)];
-        text.extend(sweep.text());
-        let partial = Some(format!("{}, no held-out run", partial.of("settings")));
-        return Ok(Output { json, text, warnings: sweep.warnings(), partial });
+        return stopped_early::<T>(session, folder, &sweep);
     }
     let finished = Finished { experiment: &found, evaluation: &evaluation };
     let mut summary = finished.summary(true)?;
     summary.warnings.extend(sweep.warnings());
     let partial = Partial { finished: evaluation.runs.len(), asked: held_out.len() };
-    summary.partial = cut.then_some(partial);
-    let before = Before {
-        json: Map::from_iter([("search".to_owned(), sweep.json())]),
-        text: sweep.text(),
-        section: &across,
-        beside: ", search.json and search.csv every setting tried",
-    };
-    write(session, folder, &finished, None, &summary, &before)
+    summary.partial = stopped.then_some(partial);
+    write(session, folder, &finished, None, &summary, Some(&sweep))
+}
+
+/// Writes what a search found that ended before the first run on other seeds.
+fn stopped_early<T: Task>(
+    session: &Session,
+    folder: OutputFolder,
+    sweep: &Sweep,
+) -> anyhow::Result<Output> {
+    let mut report = Report::new(T::NAME, T::ABOUT);
+    sweep.section(&mut report, "learning-rate");
+    let json = json!({ "partial": sweep.done(), "search": sweep.json() });
+    let mut text = vec![format!("{}: search stopped early", T::NAME)];
+    text.extend(sweep.text());
+    let partial = Some(format!("{}, no held-out run", sweep.done().of("settings")));
+    let output = Output { json, text, warnings: sweep.warnings(), partial };
+    session.finish(
+        folder,
+        report,
+        "search.json and search.csv hold every setting tried",
+        None,
+        output,
+    )
+}
+
+/// Evaluates what was found, and says whether the user cut that short.
+fn on_held_out<T: Task>(
+    runner: &mut Runner,
+    found: &TaskExperiment<T>,
+    seeds: &[u64],
+) -> anyhow::Result<(Evaluation, bool)> {
+    let evaluated = runner.evaluate(&[found], seeds, true, None);
+    runner.progress.finish();
+    match evaluated {
+        Ok((mut evaluations, stopped)) => Ok((evaluations.remove(0), stopped)),
+        Err(stopped) if was_interrupted(&stopped) => Ok((Evaluation::default(), true)),
+        Err(failed) => Err(ended(failed, runner.cache.kept())),
+    }
 }
 
 /// What is tried: what the command line fixes is fixed, what it lists is tried, the rest is a grid around the task's own numbers.
@@ -164,7 +161,7 @@ fn space<T: Task>(
     ];
     axes.extend(base.task.own_axis(args).map(|own| axis(own.flag, some(&own.values))));
     let valid = |point: &GridPoint| point[END].is_none() || point[END] < point[SCALE];
-    let space = SearchSpace { axes, between: 1, valid };
+    let space = SearchSpace { axes, valid };
     if space.coarse().len() < 2 {
         return Err(Error::usage(
             "there is nothing to choose from: fix less, or list more with --scales and --learning-rates",

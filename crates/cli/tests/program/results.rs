@@ -52,6 +52,7 @@ fn solve_is_the_default_and_writes_every_file() {
     for key in ["parameters", "seed", "runs", "steps", "size", "faces", "success_rate"] {
         assert!(json[key].is_number(), "{key}");
     }
+    assert!(json["peak_memory_mib"].is_number() || !cfg!(target_os = "linux"));
     for key in ["total", "step_median", "per_run"] {
         assert!(json["seconds"][key].is_number(), "{key}");
     }
@@ -175,6 +176,7 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("--scale -0.1", 2, "positive"),
         ("--scale inf", 2, "positive"),
         ("--learning-rate NaN", 2, "positive"),
+        ("--tolerance 1", 2, "above 0 and below 1"),
         ("--size 0", 2, "from 1 to 4096"),
         ("--steps 0", 2, "from 1"),
         ("--steps 1.5", 2, "from 1"),
@@ -195,6 +197,12 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("search --search-runs 0", 2, "from 1"),
         ("search --schedule static --scale 1 --learning-rate 1", 2, "nothing to choose from"),
         ("search --seed 999999", 2, "seeds 1000000 to 1000007"),
+        ("search --softness auto", 2, "--softness auto goes with solve and evaluate"),
+        ("learn --softness auto", 2, "--softness auto goes with solve and evaluate"),
+        ("evaluate --against auto", 2, "--against: --softness auto goes with"),
+        ("learn --backend flex", 2, "learn is compiled for ndarray alone"),
+        ("learn --outer-loss soft", 2, "expected one of `fixed`, `pixels`, `hard`, `own`"),
+        ("learn --inner 3", 2, "unexpected argument '--inner'"),
     ];
     let root = tempfile::tempdir().unwrap();
     for (line, code, says) in cases {

@@ -1,0 +1,140 @@
+//! The commands of a task and their flags.
+
+use clap::{Args, Parser, Subcommand};
+use softrast_lab::parse::{count, positive};
+
+use crate::{Common, MethodArgs, learn_args::LearnArgs};
+
+/// Everything on the command line of a task.
+#[derive(Debug, Parser)]
+#[command(subcommand_required = true)]
+pub(crate) struct CommandLine<A: Args> {
+    #[command(subcommand)]
+    pub(crate) command: Command<A>,
+}
+
+/// What a program can be asked to do; `solve` if nothing else is said.
+#[derive(Clone, Debug, Subcommand)]
+pub(crate) enum Command<A: Args> {
+    /// Solve one instance and show it; what is done where no command is named
+    Solve(Solve<A>),
+    /// Solve many seeds and give means with confidence intervals
+    Evaluate(Evaluate<A>),
+    /// Find the best scale and learning rate on training seeds, then evaluate them on others
+    Search(Search<A>),
+    /// Find the simplest softness, the fewest pixels, the largest tolerance and the coarsest mesh that are as good as the best
+    Choose(Choose<A>),
+    /// Learn the softness on training seeds, by the gradient of what a whole run ends with
+    Learn(Learn<A>),
+}
+
+impl<A: Args> Command<A> {
+    /// Its name, and the flags that every command has.
+    pub(crate) fn shared(&self) -> (&'static str, &Shared<A>) {
+        match self {
+            Self::Solve(Solve { shared, .. }) => ("solve", shared),
+            Self::Evaluate(Evaluate { shared, .. }) => ("evaluate", shared),
+            Self::Search(Search { shared, .. }) => ("search", shared),
+            Self::Choose(Choose { shared, .. }) => ("choose", shared),
+            Self::Learn(Learn { shared, .. }) => ("learn", shared),
+        }
+    }
+}
+
+/// Flags that every command has.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Shared<A: Args> {
+    #[command(flatten)]
+    pub(crate) args: A,
+    #[command(flatten)]
+    pub(crate) common: Common,
+    #[command(flatten)]
+    pub(crate) method: MethodArgs,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Solve<A: Args> {
+    #[command(flatten)]
+    pub(crate) shared: Shared<A>,
+    #[command(flatten)]
+    pub(crate) auto: Auto,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Evaluate<A: Args> {
+    #[command(flatten)]
+    pub(crate) shared: Shared<A>,
+    /// Number of seeds
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub(crate) runs: Option<usize>,
+    /// Second method for the same seeds, with flags of its own in quotes: "gauss --scale 0.01"
+    #[arg(long, value_name = "NAME|FILE.json", value_parser = MethodArgs::parse)]
+    pub(crate) against: Option<MethodArgs>,
+    #[command(flatten)]
+    pub(crate) resume: Resume,
+    #[command(flatten)]
+    pub(crate) auto: Auto,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Search<A: Args> {
+    #[command(flatten)]
+    pub(crate) shared: Shared<A>,
+    /// Number of seeds to evaluate what is found on
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub(crate) runs: Option<usize>,
+    /// Scales to try; each pair of a wider and a narrower one is a decay
+    #[arg(long, value_name = "X,X...", value_delimiter = ',', value_parser = positive)]
+    pub(crate) scales: Vec<f64>,
+    /// Learning rates to try
+    #[arg(long, value_name = "X,X...", value_delimiter = ',', value_parser = positive)]
+    pub(crate) learning_rates: Vec<f64>,
+    #[command(flatten)]
+    pub(crate) training: Training,
+    #[command(flatten)]
+    pub(crate) resume: Resume,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Choose<A: Args> {
+    #[command(flatten)]
+    pub(crate) shared: Shared<A>,
+    #[command(flatten)]
+    pub(crate) auto: Auto,
+    #[command(flatten)]
+    pub(crate) training: Training,
+    #[command(flatten)]
+    pub(crate) resume: Resume,
+}
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Learn<A: Args> {
+    #[command(flatten)]
+    pub(crate) shared: Shared<A>,
+    #[command(flatten)]
+    pub(crate) learn: LearnArgs,
+    #[command(flatten)]
+    pub(crate) resume: Resume,
+}
+
+/// How long may be looked for a method.
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Auto {
+    /// Seconds that choosing a method may take [default: no limit]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub(crate) budget: Option<f64>,
+}
+
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Training {
+    /// Training seeds, counted from 1000000, that every setting is tried on
+    #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
+    pub(crate) search_runs: usize,
+}
+
+#[derive(Args, Clone, Copy, Debug)]
+pub(crate) struct Resume {
+    /// Go on from what an interrupted call has finished
+    #[arg(long)]
+    pub(crate) resume: bool,
+}

@@ -1,0 +1,134 @@
+//! What runs came to, as files, a page, JSON and lines.
+
+use softrast_lab::{
+    Evaluation, Experiment, OutputFolder, Summary,
+    curves::{Convergence, charts, convergence_csv, csv},
+    headline,
+    program::Output,
+    report::Report,
+    sweep::Sweep,
+};
+
+use super::settings_section;
+use crate::{
+    Task, TaskExperiment,
+    diagnostics::diagnostics,
+    session::{RESULT, Session},
+};
+
+/// An experiment and what it came to.
+pub(super) struct Finished<'a, T: Task> {
+    pub(super) experiment: &'a TaskExperiment<T>,
+    pub(super) evaluation: &'a Evaluation,
+}
+
+impl<T: Task> Finished<'_, T> {
+    pub(super) fn summary(&self, many: bool) -> anyhow::Result<Summary> {
+        let Self { experiment, evaluation } = self;
+        let mut summary = Summary::new(*experiment, &evaluation.runs, evaluation.seconds, many)?;
+        let (settings, size) = (experiment.settings(), experiment.solve.size);
+        summary.warnings.extend(diagnostics(&settings, size, &evaluation.runs));
+        Ok(summary)
+    }
+
+    fn convergence(&self) -> Convergence {
+        Convergence::new(self.experiment.metrics(), &self.evaluation.runs)
+    }
+}
+
+/// Writes all files that tell of runs, which `folder` may have others beside, and says what they tell. `search` is what led to the
+/// method.
+pub(super) fn write<T: Task>(
+    session: &Session,
+    mut folder: OutputFolder,
+    first: &Finished<'_, T>,
+    second: Option<&Finished<'_, T>>,
+    summary: &Summary,
+    search: Option<&Sweep>,
+) -> anyhow::Result<Output> {
+    let Finished { experiment, evaluation } = first;
+    let (metrics, success) = (experiment.metrics(), &experiment.description.success);
+    let all = [Some(first), second].into_iter().flatten();
+    let convergences: Vec<_> = all.map(Finished::convergence).collect();
+    if let Some(pictures) = &evaluation.pictures {
+        folder.stage("before_after.png", &pictures.before_after)?;
+        folder.stage("animation.gif", &pictures.animation)?;
+    }
+    folder.stage("curve.csv", csv(metrics, &evaluation.runs).as_bytes())?;
+    if summary.many {
+        let named: Vec<_> = ["method", "against"].into_iter().zip(&convergences).collect();
+        folder.stage("convergence.csv", convergence_csv(metrics, &named).as_bytes())?;
+    }
+    if let Some(second) = second {
+        folder.stage("against_curve.csv", csv(metrics, &second.evaluation.runs).as_bytes())?;
+    }
+    let what = format!("{} ({})", T::NAME, experiment.variant.name());
+    let (parameters, steps) = (experiment.parameters(), experiment.solve.steps);
+    let head = headline(&what, experiment.name(), parameters, steps, &summary.seeds());
+    let page = page(first, &convergences, summary, &head, search)?;
+    let mut json = summary.json(&experiment.about(), success);
+    json.extend(search.map(|search| ("search".to_owned(), search.json())));
+    let mut text = vec![head];
+    text.extend(search.into_iter().flat_map(Sweep::text));
+    text.extend(summary.text(success));
+    let (warnings, partial) = (summary.warnings.clone(), summary.partial.map(|p| p.of("runs")));
+    let output = Output { json: json.into(), text, warnings, partial };
+    let tried = search.map_or("", |_| ", search.json and search.csv every setting tried");
+    let beside = format!(
+        "result.json holds all results, curve.csv every error of every run after every step{tried}"
+    );
+    session.finish(folder, page, &beside, Some(RESULT), output)
+}
+
+fn page<T: Task>(
+    first: &Finished<'_, T>,
+    convergences: &[Convergence],
+    summary: &Summary,
+    head: &str,
+    search: Option<&Sweep>,
+) -> anyhow::Result<Report> {
+    let Finished { experiment, evaluation } = first;
+    let mut report = Report::new(T::NAME, T::ABOUT);
+    report.paragraph(&format!("{head}."));
+    let stopped = summary.partial.map(|partial| partial.of("runs"));
+    report.stopped(stopped.as_deref());
+    report.warnings(&summary.warnings);
+    if let Some(search) = search {
+        search.section(&mut report, "learning-rate");
+    }
+    summary.section(&mut report, &evaluation.runs, &experiment.description.success);
+    pictures(&mut report, summary, evaluation);
+    report.heading("Convergence");
+    for plot in charts(experiment.metrics(), convergences) {
+        report.chart(&plot.svg()?, "");
+    }
+    let means = " A line is the mean of all runs, the band around it the 95 % interval of the mean, by the bootstrap.";
+    report.note(&format!("All errors should fall to 0.{}", if summary.many { means } else { "" }));
+    let mut about = experiment.about();
+    about.retain(|_, value| !value.is_object());
+    settings_section(&mut report, [&about, &experiment.settings()]);
+    report.note(
+        "The softness is the smooth step that stands for the hard edge of a face, so that the image changes smoothly with the scene; \
+         its scale is the width of that step.",
+    );
+    Ok(report)
+}
+
+fn pictures(report: &mut Report, summary: &Summary, evaluation: &Evaluation) {
+    let Some(pictures) = &evaluation.pictures else { return };
+    let which = match summary.many {
+        false => String::new(),
+        true => format!(" Shown is seed {}, the first.", summary.seed),
+    };
+    report.heading("Pictures");
+    report.picture(
+        &pictures.before_after,
+        &format!(
+            "From left to right: the target, the image before the first step, the image of the step that is returned, and the \
+             difference of target and result: red where the target is brighter, blue where the result is brighter, white where \
+             they agree.{which}"
+        ),
+    );
+    let caption = "The image during the optimisation (right) beside its target (left).";
+    report.picture(&pictures.animation, caption);
+}

@@ -1,0 +1,136 @@
+use std::ops::Range;
+
+use plotters::coord::{
+    ranged1d::{DefaultFormatting, KeyPointHint, Ranged},
+    types::RangedCoordf64,
+};
+
+/// Name with unit, and whether it is divided in decades.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Name with unit.
+    pub name: String,
+    /// Whether it is divided in decades; values must be positive then, others are left out.
+    pub logarithmic: bool,
+}
+
+impl Axis {
+    /// One of even steps.
+    pub fn linear(name: &str) -> Self {
+        Self { name: name.to_owned(), logarithmic: false }
+    }
+
+    /// One of decades.
+    pub fn logarithmic(name: &str) -> Self {
+        Self { name: name.to_owned(), logarithmic: true }
+    }
+
+    pub(crate) fn place(&self, value: f64) -> f64 {
+        if self.logarithmic { value.log10() } else { value }
+    }
+
+    pub(crate) fn label(&self, place: f64) -> String {
+        let value = if self.logarithmic { 10f64.powf(place) } else { place };
+        match value.abs() {
+            0.0 => "0".into(),
+            1e-3..1e5 => {
+                let digits = (2 - value.abs().log10().floor() as i32).clamp(0, 5) as usize;
+                let text = format!("{value:.digits$}");
+                match text.contains('.') {
+                    true => text.trim_end_matches('0').trim_end_matches('.').into(),
+                    false => text,
+                }
+            }
+            _ => format!("{value:.0e}"),
+        }
+    }
+
+    /// Least and largest place with some room.
+    pub(crate) fn range(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
+        let places = values.map(|value| self.place(value)).filter(|place| place.is_finite());
+        let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+            [low.min(place), high.max(place)]
+        });
+        if low > high {
+            return 0.0..1.0;
+        }
+        let room = (0.04 * (high - low)).max(1e-3 * high.abs()).max(1e-9);
+        low - room..high + room
+    }
+
+    /// The axis over a range of places, with about `most` numbers and light marks between them.
+    ///
+    /// A linear axis is marked at round numbers, a logarithmic one at decades; over less than two decades at 1, 2 and 5 times a power
+    /// of ten, and over a range too narrow for these at round numbers again.
+    pub(crate) fn over(&self, range: Range<f64>, most: usize) -> MarkedAxis {
+        let round = |range: Range<f64>| RangedCoordf64::from(range).key_points(most);
+        let multiples = |of: &[u32]| -> Vec<f64> {
+            let powers = range.start.floor() as i32..=range.end.floor() as i32;
+            let places = powers
+                .flat_map(|power| of.iter().map(move |k| f64::from(power) + f64::from(*k).log10()));
+            places.filter(|place| range.contains(place)).collect()
+        };
+        let decades = multiples(&[1]);
+        let few = multiples(&[1, 2, 5]);
+        let (numbers, light) = match decades.len() {
+            _ if !self.logarithmic => (round(range.clone()), Vec::new()),
+            0 | 1 if few.len() > 1 => (few, multiples(&[3, 4, 6, 7, 8, 9])),
+            0 | 1 => {
+                let values = round(10f64.powf(range.start)..10f64.powf(range.end));
+                (values.into_iter().map(f64::log10).collect(), Vec::new())
+            }
+            count if count <= most => (decades, multiples(&[2, 3, 4, 5, 6, 7, 8, 9])),
+            count => {
+                let every = count.div_ceil(most) as i32;
+                decades.into_iter().partition(|power| *power as i32 % every == 0)
+            }
+        };
+        MarkedAxis { range: range.into(), numbers, light }
+    }
+}
+
+/// A range with marks of its own. The combinator of plotters for that has no labels over floats.
+pub(crate) struct MarkedAxis {
+    range: RangedCoordf64,
+    numbers: Vec<f64>,
+    light: Vec<f64>,
+}
+
+impl Ranged for MarkedAxis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        self.range.map(value, limit)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let light = hint.weight().allow_light_points();
+        if light { self.light.clone() } else { self.numbers.clone() }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.range()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marks(range: Range<f64>) -> [Vec<f64>; 2] {
+        let axis = Axis::logarithmic("x").over(range, 6);
+        [axis.numbers, axis.light]
+            .map(|places| places.iter().map(|p| (10f64.powf(*p) * 1e6).round() / 1e6).collect())
+    }
+
+    #[test]
+    fn a_logarithmic_axis_is_marked_at_decades_or_at_what_divides_them() {
+        let [numbers, light] = marks(-2.2..0.4);
+        assert_eq!(numbers, [0.01, 0.1, 1.0]);
+        assert_eq!((&light[..4], light.len()), (&[0.007, 0.008, 0.009, 0.02][..], 3 + 8 + 8 + 1));
+        assert_eq!(marks(-0.5..6.5)[0], [1.0, 1e2, 1e4, 1e6]);
+        assert_eq!(marks(-1.2..-0.2), [vec![0.1, 0.2, 0.5], vec![0.07, 0.08, 0.09, 0.3, 0.4, 0.6]]);
+        assert_eq!(marks(1.21f64.log10()..1.29f64.log10())[0], [1.22, 1.24, 1.26, 1.28]);
+    }
+}
