@@ -1,7 +1,7 @@
 //! What serves every experiment that is run on seeds, whatever it is about.
 //!
 //! An [`Experiment`] is something that can be run on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same
-//! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. [`Runner::sweep`] tries a
+//! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. [`sweep::Sweep`] tries a
 //! grid, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
 //! [`report::Report`] writes pages.
 //!
