@@ -63,7 +63,12 @@ impl Axis {
     /// A linear axis is marked at round numbers, a logarithmic one at decades; over less than two decades at 1, 2 and 5 times a power
     /// of ten, and over a range too narrow for these at round numbers again.
     pub(crate) fn over(&self, range: Range<f64>, most: usize) -> MarkedAxis {
-        let round = |range: Range<f64>| RangedCoordf64::from(range).key_points(most);
+        let round = |range: Range<f64>| {
+            // The mark at 0 comes with what rounding leaves of it.
+            let least = 1e-9 * (range.end - range.start);
+            let marks = RangedCoordf64::from(range).key_points(most).into_iter();
+            marks.map(|mark| if mark.abs() < least { 0.0 } else { mark }).collect::<Vec<_>>()
+        };
         let multiples = |of: &[u32]| -> Vec<f64> {
             let powers = range.start.floor() as i32..=range.end.floor() as i32;
             let places = powers
@@ -132,5 +137,13 @@ mod tests {
         assert_eq!(marks(-0.5..6.5)[0], [1.0, 1e2, 1e4, 1e6]);
         assert_eq!(marks(-1.2..-0.2), [vec![0.1, 0.2, 0.5], vec![0.07, 0.08, 0.09, 0.3, 0.4, 0.6]]);
         assert_eq!(marks(1.21f64.log10()..1.29f64.log10())[0], [1.22, 1.24, 1.26, 1.28]);
+    }
+
+    #[test]
+    fn a_linear_axis_is_marked_at_round_numbers() {
+        let axis = Axis::linear("x");
+        let numbers = axis.over(-0.65..0.65, 7).numbers;
+        let labels: Vec<String> = numbers.iter().map(|number| axis.label(*number)).collect();
+        assert_eq!(labels, ["-0.6", "-0.4", "-0.2", "0", "0.2", "0.4", "0.6"]);
     }
 }

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use softrast_inverse::Learning;
 use softrast_lab::{
     Error, Experiment, OutputFolder, Progress,
-    format::{short, short_or_none},
+    format::{line, short, short_or_none},
     peak_rss_mib,
     plot::{Axis, Plot, Series},
     program::Output,
@@ -117,11 +117,11 @@ fn write<T: Task>(
         "files": files,
     });
     let mut text = text::<T>(&result);
-    text.extend(files.iter().map(|file| file.display().to_string()));
+    text.extend(files.iter().map(|file| line("learned", &file.display().to_string())));
     let mut report = Report::new(T::NAME, T::ABOUT);
     report.stopped(partial.as_deref());
     report.heading("Learning");
-    text.iter().for_each(|line| report.paragraph(line));
+    text.iter().for_each(|text| report.paragraph(text.trim()));
     report.chart(&losses(log).svg()?, LOSSES);
     let charts = learned_charts(learning.layout(), softness).into_iter();
     for (plot, caption) in charts.chain(learning.problem().own_chart(own_start, own)) {
@@ -296,10 +296,9 @@ fn text<T: Task>(result: &Value) -> Vec<String> {
     if let Some(loss) = result["best"]["validation_loss"].as_f64() {
         let start = short_or_none(result["start_validation_loss"].as_f64());
         let step = &result["best"]["step"];
-        lines.push(format!(
-            "validation loss {start} at the start, {} at the best, after {step} updates",
-            short(loss)
-        ));
+        let best = short(loss);
+        let losses = format!("{start} at the start, {best} at the best, after {step} updates");
+        lines.push(line("validation loss", &losses));
     }
     lines
 }
