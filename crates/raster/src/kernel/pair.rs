@@ -22,11 +22,8 @@ pub(crate) struct Closest<T: Real> {
 /// Closest boundary points to the pixels at `px`, `py` (NDC), by projection onto edges. No inverted matrix, no division:
 /// slivers, points and pixels on an edge all give finite numbers.
 ///
-/// Without `SLIVERS`, only onto the edge whose line has the least signed distance: it has the closest point. For let p be the
-/// pixel, q its closest point at distance d. If q is the foot on an edge, no line of the triangle that q is inside of
-/// can be more than d beyond p. If q is a corner, so is it on both of its edges, and p - q a sum of their outward normals with
-/// factors from 0 up: the larger of its products with these two normals is at least that with the third, which is minus their
-/// sum weighted by the lengths of the edges. Rounding confuses edges only where they are all but parallel.
+/// Without `SLIVERS`, only onto the edge whose line has the least signed distance: it holds the closest point. docs/notes.md, Nearest
+/// edge, has the proof. Rounding confuses edges only where they are all but parallel.
 #[inline(always)]
 pub(crate) fn closest<T: Real, const SLIVERS: bool>(
     face: &Face<T>,
@@ -127,5 +124,57 @@ impl<T: Real> Point<T> {
             dy: T::choose(mask, yes.dy, no.dy),
             along: T::choose(mask, yes.along, no.along),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::{
+        face::Faces,
+        float::Float,
+        lanes::{LANES, Plain},
+    };
+
+    /// Distances from pixels to triangles by both ways, and what both say of the inside.
+    fn both<F: Float>(triangle: [[f64; 2]; 3], pixels: &[[f64; 2]]) -> (bool, Vec<[(f64, bool); 2]>) {
+        let axis = |k: usize| triangle.map(|corner| Plain::splat(F::from_f64(corner[k])));
+        let faces = Faces::<Plain<F>>::new(axis(0), axis(1), F::from_f64(0.1));
+        let face = faces.face(0);
+        let at = |x: f64| Plain::splat(F::from_f64(x));
+        let of = |point: Closest<Plain<F>>| {
+            (point.distance2.array()[0].to_f64().sqrt(), point.inside[LANES - 1])
+        };
+        let ways = |&[x, y]: &[f64; 2]| {
+            [of(closest::<_, true>(&face, at(x), at(y))), of(closest::<_, false>(&face, at(x), at(y)))]
+        };
+        (faces.slivers, pixels.iter().map(ways).collect())
+    }
+
+    fn assert_same<F: Float>(bound: f64) {
+        let wave = |k: usize| (1.7 * k as f64).sin();
+        let pixels: Vec<_> = (0..400).map(|k| [2.0 * wave(3 * k + 1), 2.0 * wave(5 * k)]).collect();
+        let mut stout = 0;
+        for k in 0..600 {
+            let [a, b] = [[wave(k), wave(2 * k + 7)], [wave(5 * k + 1), wave(7 * k + 3)]];
+            // The third corner comes as near to the first edge as triangles that are no slivers allow.
+            let height = 10f64.powf(-3.5 * (k as f64 / 600.0));
+            let along = 1.5 * wave(11 * k);
+            let (x, y) = (b[0] - a[0], b[1] - a[1]);
+            let c = [a[0] + along * x - height * y, a[1] + along * y + height * x];
+            let (slivers, ways) = both::<F>([a, b, c], &pixels);
+            stout += usize::from(!slivers);
+            for [all, one] in ways.into_iter().filter(|_| !slivers) {
+                assert!((all.0 - one.0).abs() <= bound, "{k}: {} instead of {}", one.0, all.0);
+                assert_eq!(all.1, one.1);
+            }
+        }
+        assert!((300..600).contains(&stout), "{stout} are no slivers");
+    }
+
+    #[test]
+    fn the_edge_with_the_least_signed_distance_is_the_nearest() {
+        assert_same::<f64>(1e-12);
+        assert_same::<f32>(2e-6);
     }
 }
