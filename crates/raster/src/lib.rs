@@ -16,7 +16,8 @@
 //! let corners = Tensor::<NdArray, 3>::from_floats(corners, &Default::default());
 //! let renderer = SoftRenderer::new(&[[0, 1, 2]], 3, Family::Logistic, 0.01);
 //! let alpha: Vec<f32> = renderer.silhouette(corners).into_data().iter().collect();
-//! assert!(alpha[4] > 0.99 && alpha[0] < 0.01); // the pixel in the middle, and that at the top left
+//! // The pixel in the middle, and that at the top left.
+//! assert!(alpha[4] > 0.99 && alpha[0] < 0.01);
 //! ```
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
@@ -42,6 +43,7 @@ pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
 pub use camera::{LookAt, NEAR, Orbit, project, project_from, vertices, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
+#[doc(hidden)]
 pub use fused::{ElementaryOp, FusedOp, Pass};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;

@@ -137,7 +137,10 @@ mod tests {
     };
 
     /// Distances from pixels to triangles by both ways, and what both say of the inside.
-    fn both<F: Float>(triangle: [[f64; 2]; 3], pixels: &[[f64; 2]]) -> (bool, Vec<[(f64, bool); 2]>) {
+    fn both<F: Float>(
+        triangle: [[f64; 2]; 3],
+        pixels: &[[f64; 2]],
+    ) -> (bool, Vec<[(f64, bool); 2]>) {
         let axis = |k: usize| triangle.map(|corner| Plain::splat(F::from_f64(corner[k])));
         let faces = Faces::<Plain<F>>::new(axis(0), axis(1), F::from_f64(0.1));
         let face = faces.face(0);
@@ -146,7 +149,10 @@ mod tests {
             (point.distance2.array()[0].to_f64().sqrt(), point.inside[LANES - 1])
         };
         let ways = |&[x, y]: &[f64; 2]| {
-            [of(closest::<_, true>(&face, at(x), at(y))), of(closest::<_, false>(&face, at(x), at(y)))]
+            [
+                of(closest::<_, true>(&face, at(x), at(y))),
+                of(closest::<_, false>(&face, at(x), at(y))),
+            ]
         };
         (faces.slivers, pixels.iter().map(ways).collect())
     }
