@@ -79,7 +79,7 @@ impl<B: RasterBackend, S: Softness> Objective<B> for Shape2d<S> {
             Drawing::Reference(softness) => {
                 let conorm = TConorm::default();
                 let faces = faces();
-                let scene = reference::Scene { faces: &faces, size: SIZE };
+                let scene = reference::Scene { faces: &faces, size: SIZE.into() };
                 conorm.coverage(reference::sums(scene, vertices, softness, conorm, phi))
             }
         };

@@ -91,7 +91,7 @@ impl Workload {
     ///
     /// If nothing of the mesh can be seen.
     pub fn by_reference<B: RasterBackend>(&self) -> Row {
-        let scene = reference::Scene { faces: self.mesh.faces(), size: self.size };
+        let scene = reference::Scene { faces: self.mesh.faces(), size: self.size.into() };
         let conorm = TConorm::default();
         let phi = self.phi::<B>();
         let world = Tensor::<Autodiff<B>, 3>::from_inner(self.world()).require_grad();

@@ -52,7 +52,7 @@ impl ScheduledRenderer {
             let surrogate = values.surrogate.clone().map(|found| of(found.softness, found.phi));
             [of(values.softness, values.phi.clone())].into_iter().chain(surrogate).collect()
         });
-        let (size, phi, kept) = (rasterizer.size, phi.to_vec(), RefCell::default());
+        let (size, phi, kept) = (rasterizer.size.shorter(), phi.to_vec(), RefCell::default());
         Self { layout, phi, values, own, size, resolution, renderers, kept }
     }
 

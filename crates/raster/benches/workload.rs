@@ -81,7 +81,7 @@ impl Workload {
         dtype: DType,
     ) -> (Silhouette<EdgeSoftness>, Tensor<B, 2>) {
         let rasterizer =
-            Rasterizer { size: self.size, tolerance, t_conorm: TConorm::Probabilistic };
+            Rasterizer { size: self.size.into(), tolerance, t_conorm: TConorm::Probabilistic };
         let silhouette = rasterizer.prepare(&self.faces, self.softness, &self.phi::<B>(dtype));
         let table = silhouette.table(self.phi(dtype));
         (silhouette, table)

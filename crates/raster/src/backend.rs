@@ -18,7 +18,8 @@ use burn::{
 };
 
 use crate::{
-    fused::{self, ElementaryOp, FusedOp, Pass},
+    ImageSize,
+    fused::{ElementaryOp, FusedOp, HostFloat, Pass},
     kernel::{self, Float, Grid, Inputs},
 };
 
@@ -27,7 +28,7 @@ use crate::{
 pub struct ProfileSum {
     pub(crate) faces: Arc<[[u32; 3]]>,
     pub(crate) grid: Grid,
-    pub(crate) size: usize,
+    pub(crate) size: ImageSize,
     pub(crate) near: f64,
     #[cfg(feature = "wgpu")]
     pub(crate) topology: crate::gpu::Topology,
@@ -40,8 +41,8 @@ impl ProfileSum {
         let [views, _, _] = vertices.dims();
         let data = vertices.swap_dims(1, 2).into_data();
         match data.dtype {
-            DType::F32 => kernel::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
-            DType::F64 => kernel::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
+            DType::F32 => f32::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
+            DType::F64 => f64::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
             other => panic!("profile_sum works in f32 and f64, found {other:?}"),
         }
     }
@@ -58,8 +59,8 @@ impl ProfileSum {
         }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and a `table` `[rows, 4]`, to sums
-    /// `[views, size, size]`, top row first.
+    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and `tables` `[1 or views, rows, 4]`, to sums
+    /// `[views, height, width]`, top row first.
     pub(crate) fn run<F: Float + Element>(
         &self,
         pass: &Pass,
@@ -70,7 +71,10 @@ impl ProfileSum {
         let inputs = self.inputs(views, slices[0], slices[1]);
         let values = match pass {
             Pass::Forward => {
-                return TensorData::new(kernel::forward(&inputs), [views, self.size, self.size]);
+                return TensorData::new(
+                    kernel::forward(&inputs),
+                    [views, self.size.height, self.size.width],
+                );
             }
             Pass::Vjp { wanted } => kernel::vjp(&inputs, slices[2], [wanted[0], wanted[1]]),
             Pass::VjpOfVjp { along, wanted } => {
@@ -123,14 +127,11 @@ fn numbers<'a, B: RasterBackend, F: Element>(
 }
 
 /// Runs a pass over tensors of one float type on the host.
-fn on_host<B: RasterBackend, F>(
+fn on_host<B: RasterBackend, F: HostFloat>(
     op: &FusedOp,
     pass: &Pass,
     tensors: Vec<FloatTensor<B>>,
-) -> FloatTensor<B>
-where
-    F: Element + Float + fused::Number<Float = F>,
-{
+) -> FloatTensor<B> {
     let device = B::float_device(&tensors[0]);
     let dims: Vec<Vec<usize>> = tensors.iter().map(|tensor| tensor.shape().to_vec()).collect();
     let read = |tensor: &FloatTensor<B>| {
@@ -142,7 +143,7 @@ where
     };
     let copies: Vec<Option<TensorData>> = tensors.iter().map(read).collect();
     let slices: Vec<&[F]> = tensors.iter().zip(&copies).map(numbers::<B, F>).collect();
-    B::float_from_data(fused::run(op, pass, &slices, &dims), &device)
+    B::float_from_data(F::run(op, pass, &slices, &dims), &device)
 }
 
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]
@@ -184,20 +185,25 @@ impl RasterBackend for burn::backend::Flex {}
 /// Sums `profile(d)` over the faces of each pixel: the one op under every silhouette.
 ///
 /// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth, which only decides
-/// whether a face is drawn. `table` `[rows, 4]` comes from [`Profile::table`](crate::Profile::table)
-/// of the profile that `op` was made for. The result is `[views, size, size]`, top row first.
+/// whether a face is drawn. `table` comes from [`Profile::table`](crate::Profile::table) of the profile that `op` was made for:
+/// `[rows, 4]`, or `[views, rows, 4]` for one of each view. The result is `[views, height, width]`, top row first.
 ///
 /// # Panics
 ///
 /// If the shapes do not fit or the float types differ.
-pub fn profile_sum<B: RasterBackend>(
+pub fn profile_sum<B: RasterBackend, const D: usize>(
     op: &ProfileSum,
     vertices: Tensor<B, 3>,
-    table: Tensor<B, 2>,
+    table: Tensor<B, D>,
 ) -> Tensor<B, 3> {
-    let [_, count, three] = vertices.dims();
+    let [views, count, three] = vertices.dims();
     assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
-    assert_eq!(table.dims(), [op.grid.rows(), 4], "the table belongs to another profile");
+    let (found, rows) = (table.dims(), op.grid.rows());
+    let fits = found[..] == [rows, 4] || found[..] == [views, rows, 4];
+    assert!(
+        fits,
+        "a table of this profile is [{rows}, 4] or [{views}, {rows}, 4], found {found:?}"
+    );
     assert_eq!(vertices.dtype(), table.dtype(), "vertices and table differ in float type");
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);

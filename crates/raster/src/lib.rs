@@ -31,6 +31,7 @@ mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod hard;
+mod image_size;
 mod kernel;
 mod loss;
 mod profile;
@@ -50,6 +51,7 @@ pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use gpu::adapter_name;
 pub use hard::hard_silhouette;
+pub use image_size::ImageSize;
 pub use loss::{flatness, iou_loss, mse_loss};
 pub use profile::Profile;
 pub use silhouette::{Rasterizer, Silhouette};

@@ -81,15 +81,27 @@ impl Profile {
         tolerance: f64,
         device: &B::Device,
     ) -> Self {
+        Self::for_all::<B>(softness, t_conorm, &[phi], faces, tolerance, device)
+    }
+
+    /// [`Profile::new`] for several parameters `phi`, none of which is off by more.
+    pub(crate) fn for_all<B: Backend>(
+        softness: &impl Softness,
+        t_conorm: TConorm,
+        phi: &[&[f64]],
+        faces: usize,
+        tolerance: f64,
+        device: &B::Device,
+    ) -> Self {
         Self::chosen::<B>(softness, t_conorm, phi, faces, tolerance, &FAR, device)
     }
 
-    /// [`Profile::new`] with the choice of octaves at the end of the support; none of them if `far`
+    /// [`Profile::for_all`] with the choice of octaves at the end of the support; none of them if `far`
     /// is empty, for look-ups that know none.
     pub(crate) fn chosen<B: Backend>(
         softness: &impl Softness,
         t_conorm: TConorm,
-        phi: &[f64],
+        phi: &[&[f64]],
         faces: usize,
         tolerance: f64,
         far: &[u32],
@@ -97,25 +109,32 @@ impl Profile {
     ) -> Self {
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         assert!(faces > 0, "a profile needs at least one face");
+        assert!(!phi.is_empty(), "a profile needs parameters");
         let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
-        let support = {
+        let radii = |phi: &[f64]| {
             // The T-conorm bends the optical depth: ask for the depth that makes up the excess.
             let limits = support::<B>(softness, phi, excess, device);
             let depth = depth_of_excess(t_conorm, limits.left, excess);
-            support::<B>(softness, phi, depth, device)
+            let support = support::<B>(softness, phi, depth, device);
+            // Deep inside, what counts is the light left, which knows nothing of the number of faces.
+            let shallow = support_inside::<B>(softness, phi, tolerance / 2.0, device);
+            [support.outer, support.inner.min(shallow)]
         };
-        // Deep inside, what counts is the light left, which knows nothing of the number of faces.
-        let shallow = support_inside::<B>(softness, phi, tolerance / 2.0, device);
+        let larger = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.max(c), b.max(d)];
+        let [outer, inner] = phi.iter().map(|phi| radii(phi)).fold([0.0; 2], larger);
         let radius = |r: f64| r.clamp(NARROWEST, EVERYWHERE);
         let mut grid = Grid {
-            outer: radius(support.outer),
-            inner: radius(support.inner.min(shallow)),
+            outer: radius(outer),
+            inner: radius(inner),
             octaves: OCTAVES[0],
             far: 0,
             bits: *BITS.start(),
         };
         let error = |grid: Grid| {
-            interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, faces, device)
+            let of = |&phi: &&[f64]| {
+                interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, faces, device)
+            };
+            phi.iter().map(of).fold(Reached::NOTHING, Reached::larger)
         };
         // The innermost cell decides the octaves, all others the cells in an octave.
         for octaves in OCTAVES {
@@ -255,6 +274,14 @@ struct Reached {
     rest: f64,
 }
 
+impl Reached {
+    const NOTHING: Self = Self { innermost: 0.0, rest: 0.0 };
+
+    fn larger(self, other: Self) -> Self {
+        Self { innermost: self.innermost.max(other.innermost), rest: self.rest.max(other.rest) }
+    }
+}
+
 /// Compares the cubics of a grid with the profile itself at four places in each cell.
 fn interpolation_error<B: Backend>(
     softness: &impl Softness,
@@ -292,7 +319,7 @@ fn interpolation_error<B: Backend>(
     }
     let (exact, _) = t_conorm.profile(softness, tensor(phi.to_vec()), tensor(distances));
     let exact = numbers(exact);
-    let mut reached = Reached { innermost: 0.0, rest: 0.0 };
+    let mut reached = Reached::NOTHING;
     let per_side = places.len() * grid.cells();
     let steepest = steepest(t_conorm);
     // What rounding alone makes of a value.

@@ -4,7 +4,7 @@ use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
 
 use crate::{
-    HostBackend, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
+    HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
     backend::{elementary, primitive},
     fused::ElementaryOp,
     profile_sum,
@@ -13,8 +13,8 @@ use crate::{
 /// How silhouettes are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rasterizer {
-    /// Width and height of the image in pixels.
-    pub size: usize,
+    /// Height and width of the image in pixels.
+    pub size: ImageSize,
     /// Largest error of any pixel against evaluating every pixel-face pair; see [`Profile::new`].
     pub tolerance: f64,
     /// How the coverages of several faces make one.
@@ -25,8 +25,9 @@ impl Rasterizer {
     /// The largest error of a pixel unless asked for another.
     pub const TOLERANCE: f64 = 1e-5;
 
-    /// A rasterizer for `size` × `size` images with the probabilistic sum and the default tolerance.
-    pub fn new(size: usize) -> Self {
+    /// A rasterizer for images of `size` pixels, a square or `[height, width]`, with the probabilistic sum and the default tolerance.
+    pub fn new(size: impl Into<ImageSize>) -> Self {
+        let size = size.into();
         Self { size, tolerance: Self::TOLERANCE, t_conorm: TConorm::Probabilistic }
     }
 
@@ -49,30 +50,47 @@ impl Rasterizer {
         if !B::ON_HOST {
             // Without a word between host and GPU for every attempt.
             type Host = burn::backend::NdArray<f32>;
-            return self.prepare_on::<Host, S>(faces, softness, &values, false);
+            return self.prepare_on::<Host, S>(faces, softness, &[&values], false);
         }
-        self.prepare_on::<B, S>(faces, softness, &values, B::ON_HOST)
+        self.prepare_on::<B, S>(faces, softness, &[&values], B::ON_HOST)
     }
 
-    /// [`Rasterizer::prepare`] from plain numbers, for drawing on the CPU (`on_host`) or on a GPU; `H` is where support and knots are
-    /// chosen, in f64 if it has that.
+    /// [`Rasterizer::prepare`] for a softness of which each view has parameters of its own: `phi` `[views, parameters]`. Support and knots
+    /// are such that all of them keep the tolerance.
     ///
     /// # Panics
     ///
-    /// If `faces` or the image is empty, or `phi` has the wrong length.
+    /// If `faces`, the image or `phi` is empty, or a row of `phi` has the wrong length.
+    pub fn prepare_by_view<B: RasterBackend, S: Softness>(
+        &self,
+        faces: &Arc<[[u32; 3]]>,
+        softness: S,
+        phi: &Tensor<B, 2>,
+    ) -> Silhouette<S> {
+        let ([_, parameters], values) = (phi.dims(), phi.to_data().iter().collect::<Vec<f64>>());
+        let rows: Vec<&[f64]> = values.chunks(parameters.max(1)).collect();
+        self.prepare_on::<HostBackend, S>(faces, softness, &rows, B::ON_HOST)
+    }
+
+    /// [`Rasterizer::prepare`] from plain numbers, for drawing on the CPU (`on_host`) or on a GPU, with any of these `phi`; `H` is where
+    /// support and knots are chosen, in f64 if it has that.
+    ///
+    /// # Panics
+    ///
+    /// If `faces`, the image or `phi` is empty, or a `phi` has the wrong length.
     pub fn prepare_on<H: Backend, S: Softness>(
         &self,
         faces: &Arc<[[u32; 3]]>,
         softness: S,
-        phi: &[f64],
+        phi: &[&[f64]],
         on_host: bool,
     ) -> Silhouette<S> {
-        assert!(self.size > 0, "an image needs at least one pixel");
+        assert!(self.size.pixels() > 0, "an image needs at least one pixel");
         let Self { t_conorm, tolerance, .. } = *self;
         let (faces, device) = (faces.clone(), Default::default());
         let count = faces.len();
         let profile = match on_host {
-            true => Profile::new::<H>(&softness, t_conorm, phi, count, tolerance, &device),
+            true => Profile::for_all::<H>(&softness, t_conorm, phi, count, tolerance, &device),
             // The look-up of a GPU knows no cells that are counted from the far end.
             false => Profile::chosen::<H>(&softness, t_conorm, phi, count, tolerance, &[], &device),
         };
@@ -97,7 +115,7 @@ pub struct Silhouette<S> {
 }
 
 impl<S: Softness> Silhouette<S> {
-    /// Coverage `[views, size, size]` in [0, 1], top row first.
+    /// Coverage `[views, height, width]` in [0, 1], top row first.
     ///
     /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as
     /// [`project`](crate::project) returns them; `phi` `[parameters]` belongs to the softness. Both
@@ -115,6 +133,13 @@ impl<S: Softness> Silhouette<S> {
         self.profile.table(&self.softness, phi)
     }
 
+    /// Tables of a softness of which each view has parameters of its own, `[views, rows, 4]` from `phi` `[views, parameters]`; see
+    /// [`Rasterizer::prepare_by_view`].
+    pub fn table_by_view<B: Backend>(&self, phi: Tensor<B, 2>) -> Tensor<B, 3> {
+        let table = |phi: Tensor<B, 2>| self.table(phi.squeeze_dim::<1>(0));
+        Tensor::stack(phi.split(1, 0).into_iter().map(table).collect(), 0)
+    }
+
     /// The numbers of the table of plain parameters, for drawing on `B` with vertices of this float type.
     ///
     /// For a GPU it is computed on the CPU in f64: the GPU then gets it in one piece, instead of some sixty small kernels over a few
@@ -127,22 +152,22 @@ impl<S: Softness> Silhouette<S> {
         self.table(phi).into_data()
     }
 
-    /// Like [`Silhouette::coverage`], from a table.
-    pub fn coverage_by_table<B: RasterBackend>(
+    /// Like [`Silhouette::coverage`], from a table `[rows, 4]`, or from one of each view `[views, rows, 4]`.
+    pub fn coverage_by_table<B: RasterBackend, const D: usize>(
         &self,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, 2>,
+        table: Tensor<B, D>,
     ) -> Tensor<B, 3> {
         covered(self.profile.t_conorm(), self.sums(vertices, table))
     }
 
-    /// Sums over the faces of each pixel, `[views, size, size]`: what the T-conorm of the profile
+    /// Sums over the faces of each pixel, `[views, height, width]`: what the T-conorm of the profile
     /// turns into coverage. Arguments are those of [`Silhouette::coverage_by_table`].
     #[doc(hidden)]
-    pub fn sums<B: RasterBackend>(
+    pub fn sums<B: RasterBackend, const D: usize>(
         &self,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, 2>,
+        table: Tensor<B, D>,
     ) -> Tensor<B, 3> {
         profile_sum(&self.op, vertices, table)
     }
@@ -159,15 +184,15 @@ impl<S: Softness> Silhouette<S> {
         &self.softness
     }
 
-    /// The same on images of `size` × `size` pixels: neither support nor knots depend on it.
+    /// The same on images of another size: neither support nor knots depend on it.
     ///
     /// # Panics
     ///
-    /// If `size` is 0.
+    /// If the image is empty.
     #[must_use]
-    pub fn sized(mut self, size: usize) -> Self {
-        assert!(size > 0, "an image needs at least one pixel");
-        self.op.size = size;
+    pub fn sized(mut self, size: impl Into<ImageSize>) -> Self {
+        self.op.size = size.into();
+        assert!(self.op.size.pixels() > 0, "an image needs at least one pixel");
         self
     }
 

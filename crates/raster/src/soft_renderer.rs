@@ -3,7 +3,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
 
-use crate::{HostBackend, RasterBackend, Rasterizer, Silhouette, TConorm};
+use crate::{HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm};
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
 const SAME: f64 = 1e-12;
@@ -62,13 +62,13 @@ struct Table {
 }
 
 impl<S: Softness> SoftRenderer<S> {
-    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` × `size` pixels, under a softness of this `scale`
-    /// (NDC, or NDC² if squared; one pixel is `2 / size`), the probabilistic sum and [`Rasterizer::TOLERANCE`].
+    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under a softness
+    /// of this `scale` (NDC, or NDC² if squared; one pixel is 2 over the shorter side), the probabilistic sum and [`Rasterizer::TOLERANCE`].
     ///
     /// # Panics
     ///
     /// If `faces` or the image is empty, or `scale` is not positive.
-    pub fn new(faces: &[[u32; 3]], size: usize, softness: S, scale: f64) -> Self {
+    pub fn new(faces: &[[u32; 3]], size: impl Into<ImageSize>, softness: S, scale: f64) -> Self {
         let phi = softness.default_phi(scale);
         Self::with_rasterizer(Rasterizer::new(size), faces.into(), softness, phi)
     }
@@ -84,7 +84,7 @@ impl<S: Softness> SoftRenderer<S> {
         softness: S,
         phi: Vec<f64>,
     ) -> Self {
-        assert!(rasterizer.size > 0, "an image needs at least one pixel");
+        assert!(rasterizer.size.pixels() > 0, "an image needs at least one pixel");
         assert!(!faces.is_empty(), "a silhouette needs at least one face");
         check(&softness, &phi);
         Self { rasterizer, faces, softness, phi, surrogate: None, kept: Arc::default() }
@@ -137,7 +137,7 @@ impl<S: Softness> SoftRenderer<S> {
         self.phi = phi;
     }
 
-    /// Coverage `[views, size, size]` in [0, 1], top row first, under the renderer's own parameters.
+    /// Coverage `[views, height, width]` in [0, 1], top row first, under the renderer's own parameters.
     ///
     /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. It
     /// receives gradients, to second order on `Autodiff<Autodiff<B>>`.
@@ -178,7 +178,7 @@ impl<S: Softness> SoftRenderer<S> {
         }
         let (faces, softness) = (&self.faces, self.softness.clone());
         let silhouette =
-            self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, phi, B::ON_HOST);
+            self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, &[phi], B::ON_HOST);
         let prepared = silhouette.clone();
         kept.prepared =
             Some(Prepared { phi: phi.to_vec(), on_host: B::ON_HOST, silhouette: prepared });
@@ -235,11 +235,16 @@ impl SoftRenderer<EdgeSoftness> {
     /// # Panics
     ///
     /// If `faces` or the image is empty.
-    pub fn scheduled(faces: &[[u32; 3]], size: usize, softness: &ScheduledSoftness) -> Self {
-        let phi = softness.phi_at(0.0, size);
-        let mut renderer =
-            Self::with_rasterizer(Rasterizer::new(size), faces.into(), softness.softness, phi);
-        renderer.surrogate = softness.surrogate_at(0.0, size).map(|Surrogate { softness, phi }| {
+    pub fn scheduled(
+        faces: &[[u32; 3]],
+        size: impl Into<ImageSize>,
+        softness: &ScheduledSoftness,
+    ) -> Self {
+        let rasterizer = Rasterizer::new(size);
+        let side = rasterizer.size.shorter();
+        let phi = softness.phi_at(0.0, side);
+        let mut renderer = Self::with_rasterizer(rasterizer, faces.into(), softness.softness, phi);
+        renderer.surrogate = softness.surrogate_at(0.0, side).map(|Surrogate { softness, phi }| {
             let (rasterizer, faces) = (renderer.rasterizer, renderer.faces.clone());
             Box::new(Self::with_rasterizer(rasterizer, faces, softness, phi))
         });
@@ -252,10 +257,10 @@ impl SoftRenderer<EdgeSoftness> {
     ///
     /// If `part` is not in [0, 1], or the softness is another one.
     pub fn move_to(&mut self, softness: &ScheduledSoftness, part: f64) {
-        let size = self.rasterizer.size;
+        let side = self.rasterizer.size.shorter();
         assert_eq!(self.softness, softness.softness, "the softness of a renderer stays the same");
-        self.set_phi(softness.phi_at(part, size));
-        if let Some((own, now)) = self.surrogate.as_mut().zip(softness.surrogate_at(part, size)) {
+        self.set_phi(softness.phi_at(part, side));
+        if let Some((own, now)) = self.surrogate.as_mut().zip(softness.surrogate_at(part, side)) {
             own.set_phi(now.phi);
         }
     }

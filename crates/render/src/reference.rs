@@ -63,7 +63,7 @@ fn in_parts(
         scene.faces.chunks((PART / pixels).clamp(1, scene.faces.len())).collect();
     let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(parts.len() as u64) };
     let part = |faces: &&[[u32; 3]]| {
-        let result = of(reference::Scene { faces, size: scene.size });
+        let result = of(reference::Scene { faces, size: scene.size.into() });
         bar.inc(1);
         result
     };

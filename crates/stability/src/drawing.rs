@@ -70,7 +70,7 @@ impl<'a> Drawing<'a> {
         let phi = self.softness.phi_at(1.0, self.size);
         let phi = tensor::<Autodiff<Exact>, 1>(phi.clone(), [phi.len()]);
         let softness = self.softness.softness;
-        let scene = reference::Scene { faces: &self.flat.faces, size: self.size };
+        let scene = reference::Scene { faces: &self.flat.faces, size: self.size.into() };
         drawn::<Exact>(self.flat, self.size, &weights(self.size), |vertices| {
             conorm.coverage(reference::sums(scene, vertices, &softness, conorm, phi))
         })

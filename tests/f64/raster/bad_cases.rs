@@ -23,7 +23,7 @@ fn render(corners: &[[f64; 3]], softness: EdgeSoftness, scale: f64) -> (Vec<f64>
     let shaped = vertices.clone().reshape([1, corners.len() as i64, 3]);
     let image = silhouette.coverage(shaped.clone(), phi.clone());
     let grads = (image.clone() * image.clone()).sum().backward();
-    let scene = reference::Scene { faces: &faces, size: SIZE };
+    let scene = reference::Scene { faces: &faces, size: SIZE.into() };
     let sums = reference::sums(scene, shaped, &softness, TConorm::Probabilistic, phi.clone());
     let exact = TConorm::Probabilistic.coverage(sums).inner().reshape([SIZE * SIZE]);
     let image = numbers(image.inner().reshape([SIZE * SIZE]));

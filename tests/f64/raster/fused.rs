@@ -25,7 +25,7 @@ fn fused<T: RasterBackend>(
     vertices: Tensor<T, 3>,
     phi: Tensor<T, 1>,
 ) -> Tensor<T, 3> {
-    let rasterizer = Rasterizer { size: SIZE, tolerance: 1e-9, t_conorm };
+    let rasterizer = Rasterizer { size: SIZE.into(), tolerance: 1e-9, t_conorm };
     rasterizer.prepare(faces, softness, &phi).coverage(vertices, phi)
 }
 
@@ -36,7 +36,7 @@ fn dense<T: Backend>(
     vertices: Tensor<T, 3>,
     phi: Tensor<T, 1>,
 ) -> Tensor<T, 3> {
-    let scene = reference::Scene { faces, size: SIZE };
+    let scene = reference::Scene { faces, size: SIZE.into() };
     t_conorm.coverage(reference::sums(scene, vertices, &softness, t_conorm, phi))
 }
 

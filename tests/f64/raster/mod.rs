@@ -5,6 +5,7 @@ mod camera;
 mod colour;
 mod elementary;
 mod fused;
+mod images;
 mod pytorch3d;
 mod reference;
 mod soft_renderer;

@@ -30,7 +30,7 @@ fn off(
     phi: &[f64],
 ) -> [f64; 2] {
     let drawn = numbers(renderer.silhouette_with(shaped(vertices), &vector(phi)));
-    let scene = reference::Scene { faces, size: SIZE };
+    let scene = reference::Scene { faces, size: SIZE.into() };
     let t_conorm = TConorm::Probabilistic;
     let sums = reference::sums(scene, shaped(vertices), &softness, t_conorm, vector(phi));
     let exact = numbers(t_conorm.coverage(sums));

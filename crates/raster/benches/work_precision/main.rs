@@ -119,7 +119,7 @@ fn error_of_exact(workload: &Workload) -> f64 {
     };
     let (silhouette, table) = part.prepare::<B64>(EXACT, DType::F64);
     let vertices = part.projected::<B64>(DType::F64);
-    let scene = reference::Scene { faces: &faces, size: part.size };
+    let scene = reference::Scene { faces: &faces, size: part.size.into() };
     let t_conorm = TConorm::Probabilistic;
     let sums = reference::sums(scene, vertices.clone(), &SOFTNESS, t_conorm, part.phi(DType::F64));
     let image = silhouette.coverage_by_table(vertices, table);

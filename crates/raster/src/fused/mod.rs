@@ -15,7 +15,7 @@ pub(crate) use number::Number;
 
 use crate::{
     ProfileSum,
-    kernel::{Dual, Float},
+    kernel::{self, Dual, Float, Inputs},
 };
 
 /// An op with derivatives of its own.
@@ -80,8 +80,39 @@ trait Elementary: Sync {
     ) -> Vec<N>;
 }
 
-/// Runs a pass over numbers of one float type. `dims` are the shapes of all `slices`.
-pub(crate) fn run<F>(op: &FusedOp, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
+/// Floats of the ops that run on the host.
+pub(crate) trait HostFloat: Element + Float + Number<Float = Self> {
+    /// Runs a pass. `dims` are the shapes of all `slices`.
+    fn run(op: &FusedOp, pass: &Pass, slices: &[&[Self]], dims: &[Vec<usize>]) -> TensorData;
+
+    /// Number of pixel-face pairs that a walk visits.
+    fn pairs(inputs: &Inputs<Self>) -> usize;
+}
+
+macro_rules! host_float {
+    ($float:ty) => {
+        // Functions that are not generic, so that the kernels are compiled here and not again in every crate that draws.
+        impl HostFloat for $float {
+            fn run(
+                op: &FusedOp,
+                pass: &Pass,
+                slices: &[&[Self]],
+                dims: &[Vec<usize>],
+            ) -> TensorData {
+                run(op, pass, slices, dims)
+            }
+
+            fn pairs(inputs: &Inputs<Self>) -> usize {
+                kernel::pairs(inputs)
+            }
+        }
+    };
+}
+
+host_float!(f32);
+host_float!(f64);
+
+fn run<F>(op: &FusedOp, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
 where
     F: Element + Float + Number<Float = F>,
 {

@@ -12,8 +12,9 @@ use super::reach::Reach;
 pub(super) struct Cells {
     /// Width and height of a cell in pixels.
     pub(super) side: u32,
-    /// Cells in a row of the image.
+    /// Cells in a row of the image, and in a column.
     pub(super) per_row: u32,
+    pub(super) per_column: u32,
     /// Words of a cell, each for 32 faces.
     pub(super) words: u32,
     pub(super) face_count: u32,
@@ -25,8 +26,8 @@ pub(super) struct Cells {
 impl Cells {
     /// First word of the cell of a pixel.
     pub(super) fn first_word(self, view: u32, column: u32, row: u32) -> u32 {
-        let cell = (view * self.per_row + row / self.side) * self.per_row + column / self.side;
-        cell * self.words
+        let row = view * self.per_column + row / self.side;
+        (row * self.per_row + column / self.side) * self.words
     }
 
     /// Faces that the view draws.
@@ -44,6 +45,7 @@ pub(super) fn fill_cells(
     face_count: u32,
     words: u32,
     per_row: u32,
+    per_column: u32,
     side: u32,
     jobs: u32,
 ) {
@@ -54,8 +56,8 @@ pub(super) fn fill_cells(
     let word = job % words;
     let cell = job / words;
     let column = cell % per_row * side;
-    let row = cell / per_row % per_row * side;
-    let view = cell / (per_row * per_row);
+    let row = cell / per_row % per_column * side;
+    let view = cell / (per_row * per_column);
     let mut bits = 0u32;
     for bit in 0..32u32 {
         let face = 32 * word + bit;

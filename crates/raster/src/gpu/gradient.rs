@@ -4,8 +4,9 @@
 use cubecl::prelude::*;
 
 use super::{
+    frame::Frame,
     pair::{Cubic, Face, Lookup},
-    reach::{Reach, pixel_centre},
+    reach::Reach,
 };
 
 /// Units that share a face.
@@ -23,10 +24,10 @@ pub(super) fn sum_faces(
     upstream: &Array<f32>,
     gradient: &mut Array<f32>,
     lookup: Lookup,
+    frame: Frame,
     face_count: u32,
     jobs: u32,
     table_offset: u32,
-    size: u32,
     first_view: u32,
     #[comptime] second: bool,
 ) {
@@ -35,6 +36,7 @@ pub(super) fn sum_faces(
         terminate!();
     }
     let view = job as u32 / face_count + first_view;
+    let rows = lookup.first_row(view);
     let reach = Reach::load(reaches, job);
     let stride = comptime!(if second { 12usize } else { 6usize });
     let face = Face::new(corners, stride * job, second);
@@ -54,9 +56,9 @@ pub(super) fn sum_faces(
     while pixel < end {
         let column = reach.left + pixel % width;
         let row = reach.top + pixel / width;
-        let g = upstream[((view * size + row) * size + column) as usize];
-        let pair = face.pair(pixel_centre(column, size), -pixel_centre(row, size), lookup);
-        let cubic = Cubic::new(table, pair.row, direction, table_offset, second);
+        let g = upstream[frame.pixel(view, row, column) as usize];
+        let pair = face.pair(frame.column_centre(column), frame.row_centre(row), lookup);
+        let cubic = Cubic::new(table, rows + pair.row, direction, table_offset, second);
         let pull = pair.slope(cubic).scale(-2.0f32 * g);
         let x = pull.mul(pair.dx);
         let y = pull.mul(pair.dy);

@@ -5,11 +5,12 @@ use cubecl::prelude::*;
 use super::{
     TILE,
     cells::Cells,
+    frame::Frame,
     pair::{Cubic, Face, Lookup},
-    reach::{Reach, pixel_centre},
+    reach::Reach,
 };
 
-/// Writes the sum of each pixel to `sums`, from `offset` on.
+/// Writes the sum of each pixel to `sums`, all views being at `offset`.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn sum_pixels(
@@ -21,20 +22,22 @@ pub(super) fn sum_pixels(
     sums: &mut Array<f32>,
     of_cells: Cells,
     lookup: Lookup,
+    frame: Frame,
     table_offset: u32,
-    size: u32,
+    first_view: u32,
     offset: u32,
     #[comptime] second: bool,
 ) {
     let column = CUBE_POS_X * TILE + UNIT_POS_X;
     let row = CUBE_POS_Y * TILE + UNIT_POS_Y;
     let view = CUBE_POS_Z;
-    if column >= size || row >= size {
+    if column >= frame.width || row >= frame.height {
         terminate!();
     }
-    let px = pixel_centre(column, size);
-    let py = -pixel_centre(row, size);
-    let tail = Cubic::new(table, lookup.cells, direction, table_offset, second).first();
+    let px = frame.column_centre(column);
+    let py = frame.row_centre(row);
+    let rows = lookup.first_row(first_view + view);
+    let tail = Cubic::new(table, rows + lookup.cells, direction, table_offset, second).first();
     let drawn = f32::cast_from(of_cells.drawn(reaches, view));
     let mut sum = 0.0f32;
     let first_word = of_cells.first_word(view, column, row);
@@ -47,11 +50,11 @@ pub(super) fn sum_pixels(
             let face = (view * of_cells.face_count + face) as usize;
             if Reach::load(reaches, face).holds(column, row) {
                 let pair = Face::new(corners, stride * face, second).pair(px, py, lookup);
-                let cubic = Cubic::new(table, pair.row, direction, table_offset, second);
+                let cubic = Cubic::new(table, rows + pair.row, direction, table_offset, second);
                 sum += pair.value(cubic).sub(tail).stored(second);
             }
         }
     }
-    let at = (offset + (view * size + row) * size + column) as usize;
+    let at = (offset + frame.pixel(first_view + view, row, column)) as usize;
     sums[at] = sum + tail.scale(drawn).stored(second);
 }

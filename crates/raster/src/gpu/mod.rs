@@ -11,6 +11,7 @@
 mod adapter;
 mod cells;
 mod dual;
+mod frame;
 mod gradient;
 mod image;
 mod pair;
@@ -51,7 +52,7 @@ impl RasterBackend for Wgpu {
         let (coordinates, coefficients) = (length(&vertices), length(&table));
         match pass {
             Pass::Forward => {
-                let shape = [vertices.shape()[0], op.size, op.size];
+                let shape = [vertices.shape()[0], op.size.height, op.size.width];
                 Self::float_reshape(Kernels::new(op, vertices, table, None).sums(), shape.into())
             }
             Pass::Vjp { wanted } => {

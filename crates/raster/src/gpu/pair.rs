@@ -24,6 +24,16 @@ pub(super) struct Lookup {
     pub(super) bits: u32,
     /// Cells of one side, without its tail.
     pub(super) cells: u32,
+    /// Rows from the table of a view to that of the next; 0 where all have one.
+    pub(super) stride: u32,
+}
+
+#[cube]
+impl Lookup {
+    /// First row of the table of a view.
+    pub(super) fn first_row(self, view: u32) -> u32 {
+        view * self.stride
+    }
 }
 
 /// One edge of a face.

@@ -13,6 +13,7 @@ use burn_cubecl::{
 use super::{
     TILE,
     cells::{CellsLaunch, fill_cells},
+    frame::FrameLaunch,
     gradient::{UNITS, sum_faces, sum_vertices},
     image::sum_pixels,
     pair::LookupLaunch,
@@ -20,7 +21,7 @@ use super::{
     table::{sum_cubics, sum_tables},
     topology::OnDevice,
 };
-use crate::ProfileSum;
+use crate::{ImageSize, ProfileSum};
 
 type Buffer = CubeTensor<WgpuRuntime>;
 
@@ -37,8 +38,10 @@ pub(super) struct Pass<'a> {
     client: ComputeClient<WgpuRuntime>,
     /// `[views, 3, vertices]`.
     vertices: Buffer,
-    /// `[rows, 4]`.
+    /// `[rows, 4]`, or `[views, rows, 4]`.
     table: Buffer,
+    /// Whether each view has a table of its own.
+    by_view: bool,
     /// Derivatives of both, flat and in this order, in a pass of second order.
     direction: Option<Buffer>,
     topology: OnDevice,
@@ -57,6 +60,14 @@ struct Culled {
     cells: Buffer,
 }
 
+/// Tables of the units that add up the gradient to one.
+struct Partial {
+    cubes: usize,
+    units: usize,
+    /// `[units, rows, 4]`.
+    tables: Buffer,
+}
+
 impl<'a> Pass<'a> {
     pub(super) fn new(
         op: &'a ProfileSum,
@@ -69,14 +80,17 @@ impl<'a> Pass<'a> {
         let (views, vertex_count) = (vertices.shape()[0], vertices.shape()[2]);
         let topology = op.topology.on(&op.faces, vertex_count, &client, &device);
         let mut side = TILE as usize;
-        while op.size.div_ceil(side).pow(2) * words(op) * 4 > BUFFER {
+        while op.size.height.div_ceil(side) * op.size.width.div_ceil(side) * words(op) * 4 > BUFFER
+        {
             side *= 2;
         }
+        let by_view = table.shape().num_elements() > 4 * op.grid.rows();
         Self {
             op,
             client,
             vertices: into_contiguous(vertices),
             table: into_contiguous(table),
+            by_view,
             direction: direction.map(into_contiguous),
             topology,
             views,
@@ -85,7 +99,7 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// Sums of the profile, flat: `[views * size * size]`.
+    /// Sums of the profile, flat: `[views * height * width]`.
     pub(super) fn sums(&self) -> Buffer {
         let sums = self.buffer(self.pixels(), DType::F32);
         for culled in self.culled() {
@@ -98,7 +112,9 @@ impl<'a> Pass<'a> {
     /// derivative, and behind it that of the sums.
     pub(super) fn gradient(&self, upstream: Buffer, wrt_table: bool) -> Buffer {
         let upstream = into_contiguous(upstream);
-        let (coordinates, coefficients) = (3 * self.views * self.vertex_count, 4 * self.rows());
+        let tables = if self.by_view { self.views } else { 1 };
+        let coordinates = 3 * self.views * self.vertex_count;
+        let coefficients = 4 * self.rows() * tables;
         let sums = if self.second() { self.pixels() } else { 0 };
         let length = coordinates + coefficients + sums;
         // Where the table has no part, its gradient stays 0.
@@ -107,38 +123,57 @@ impl<'a> Pass<'a> {
         } else {
             self.zeros(length)
         };
-        let tiles = self.views * self.op.size.div_ceil(TILE as usize).pow(2);
-        let cube = (TILE * TILE) as usize;
-        let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, tiles.max(1));
-        let partial = wrt_table.then(|| self.zeros(cubes * cube * coefficients));
+        let shared = (wrt_table && !self.by_view).then(|| self.partial(self.views));
         for culled in self.culled() {
             self.write_corners(&culled, &upstream, &gradient);
-            if let Some(partial) = &partial {
-                self.add_cubics(&culled, &upstream, partial, cubes);
+            if let Some(partial) = &shared {
+                self.add_cubics(&culled, &upstream, partial, 0..culled.views);
+            } else if wrt_table {
+                for view in 0..culled.views {
+                    let partial = self.partial(1);
+                    self.add_cubics(&culled, &upstream, &partial, view..view + 1);
+                    let rows = (culled.first_view + view) * self.rows();
+                    self.add_up(partial, &gradient, coordinates + 4 * rows);
+                }
             }
             if self.second() {
                 self.write_sums(&culled, &gradient, coordinates + coefficients);
             }
         }
-        if let Some(partial) = partial {
-            sum_tables::launch(
-                &self.client,
-                self.cubes(coefficients, CUBE),
-                CubeDim::new_1d(CUBE),
-                partial.into_array_arg(),
-                gradient.clone().into_array_arg(),
-                (cubes * cube) as u32,
-                coefficients as u32,
-                coordinates as u32,
-            );
+        if let Some(partial) = shared {
+            self.add_up(partial, &gradient, coordinates);
         }
         gradient
+    }
+
+    /// Tables for the units of [`sum_cubics`] over some views.
+    fn partial(&self, views: usize) -> Partial {
+        let ImageSize { height, width } = self.op.size;
+        let tiles = views * height.div_ceil(TILE as usize) * width.div_ceil(TILE as usize);
+        let (cube, coefficients) = ((TILE * TILE) as usize, 4 * self.rows());
+        let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, tiles.max(1));
+        Partial { cubes, units: cubes * cube, tables: self.zeros(cubes * cube * coefficients) }
+    }
+
+    /// Adds up the tables of all units into `gradient`, from `offset` on.
+    fn add_up(&self, partial: Partial, gradient: &Buffer, offset: usize) {
+        let coefficients = 4 * self.rows();
+        sum_tables::launch(
+            &self.client,
+            self.cubes(coefficients, CUBE),
+            CubeDim::new_1d(CUBE),
+            partial.tables.into_array_arg(),
+            gradient.clone().into_array_arg(),
+            partial.units as u32,
+            coefficients as u32,
+            offset as u32,
+        );
     }
 
     /// The views in parts whose buffers all fit, culled one after the other.
     fn culled(&self) -> impl Iterator<Item = Culled> {
         let faces = self.op.faces.len();
-        let largest = (4 * self.stride() * faces).max(4 * self.per_row().pow(2) * words(self.op));
+        let largest = (4 * self.stride() * faces).max(4 * self.cells_per_view() * words(self.op));
         // A launch counts at most 65535 cubes along an axis.
         let step = (BUFFER / largest).clamp(1, 65535);
         (0..self.views).step_by(step).map(move |first| {
@@ -161,11 +196,11 @@ impl<'a> Pass<'a> {
             self.topology.faces.clone().into_array_arg(),
             corners.clone().into_array_arg(),
             reaches.clone().into_array_arg(),
+            self.frame(),
             first_view as u32,
             self.vertex_count as u32,
             faces as u32,
             jobs as u32,
-            self.op.size as u32,
             (self.op.near as f32).to_bits(),
             self.op.grid.outer as f32,
             self.second(),
@@ -178,7 +213,7 @@ impl<'a> Pass<'a> {
             faces as u32,
             CUBE,
         );
-        let words = views * self.per_row().pow(2) * words(self.op);
+        let words = views * self.cells_per_view() * words(self.op);
         let cells = self.buffer(words, DType::U32);
         fill_cells::launch(
             &self.client,
@@ -189,6 +224,7 @@ impl<'a> Pass<'a> {
             faces as u32,
             self::words(self.op) as u32,
             self.per_row() as u32,
+            self.per_column() as u32,
             self.side as u32,
             words as u32,
         );
@@ -197,11 +233,11 @@ impl<'a> Pass<'a> {
 
     /// Writes the sums of the views to `out`, all views being at `offset`.
     fn write_sums(&self, culled: &Culled, out: &Buffer, offset: usize) {
-        let size = self.op.size;
-        let tiles = size.div_ceil(TILE as usize) as u32;
+        let ImageSize { height, width } = self.op.size;
+        let [across, down] = [width, height].map(|side| side.div_ceil(TILE as usize) as u32);
         sum_pixels::launch(
             &self.client,
-            CubeCount::Static(tiles, tiles, culled.views as u32),
+            CubeCount::Static(across, down, culled.views as u32),
             CubeDim::new_2d(TILE, TILE),
             culled.corners.clone().into_array_arg(),
             culled.reaches.clone().into_array_arg(),
@@ -211,9 +247,10 @@ impl<'a> Pass<'a> {
             out.clone().into_array_arg(),
             self.cells(culled),
             self.lookup(),
+            self.frame(),
             self.table_offset(),
-            size as u32,
-            (offset + culled.first_view * size * size) as u32,
+            culled.first_view as u32,
+            offset as u32,
             self.second(),
         );
     }
@@ -234,10 +271,10 @@ impl<'a> Pass<'a> {
             upstream.clone().into_array_arg(),
             of_faces.clone().into_array_arg(),
             self.lookup(),
+            self.frame(),
             faces as u32,
             jobs as u32,
             self.table_offset(),
-            self.op.size as u32,
             culled.first_view as u32,
             self.second(),
         );
@@ -256,21 +293,29 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// Adds the gradient to the table of the views to `partial`.
-    fn add_cubics(&self, culled: &Culled, upstream: &Buffer, partial: &Buffer, cubes: usize) {
+    /// Adds the gradient to the table of some of the culled views to `partial`.
+    fn add_cubics(
+        &self,
+        culled: &Culled,
+        upstream: &Buffer,
+        partial: &Partial,
+        views: std::ops::Range<usize>,
+    ) {
         sum_cubics::launch(
             &self.client,
-            CubeCount::Static(cubes as u32, 1, 1),
+            CubeCount::Static(partial.cubes as u32, 1, 1),
             CubeDim::new_2d(TILE, TILE),
             culled.corners.clone().into_array_arg(),
             culled.reaches.clone().into_array_arg(),
             culled.cells.clone().into_array_arg(),
             upstream.clone().into_array_arg(),
-            partial.clone().into_array_arg(),
+            partial.tables.clone().into_array_arg(),
             self.cells(culled),
             self.lookup(),
-            self.op.size as u32,
+            self.frame(),
             culled.first_view as u32,
+            views.start as u32,
+            views.len() as u32,
             self.second(),
         );
     }
@@ -295,7 +340,7 @@ impl<'a> Pass<'a> {
     }
 
     fn pixels(&self) -> usize {
-        self.views * self.op.size * self.op.size
+        self.views * self.op.size.pixels()
     }
 
     fn rows(&self) -> usize {
@@ -304,13 +349,28 @@ impl<'a> Pass<'a> {
 
     /// Cells in a row of the image.
     fn per_row(&self) -> usize {
-        self.op.size.div_ceil(self.side)
+        self.op.size.width.div_ceil(self.side)
+    }
+
+    /// Cells in a column of the image.
+    fn per_column(&self) -> usize {
+        self.op.size.height.div_ceil(self.side)
+    }
+
+    fn cells_per_view(&self) -> usize {
+        self.per_row() * self.per_column()
+    }
+
+    fn frame(&self) -> FrameLaunch<WgpuRuntime> {
+        let ImageSize { height, width } = self.op.size;
+        FrameLaunch::new(height as u32, width as u32, height.min(width) as u32)
     }
 
     fn cells(&self, culled: &Culled) -> CellsLaunch<WgpuRuntime> {
         CellsLaunch::new(
             self.side as u32,
             self.per_row() as u32,
+            self.per_column() as u32,
             words(self.op) as u32,
             self.op.faces.len() as u32,
             culled.views as u32,
@@ -326,6 +386,7 @@ impl<'a> Pass<'a> {
             grid.octaves,
             grid.bits,
             grid.cells() as u32,
+            if self.by_view { grid.rows() as u32 } else { 0 },
         )
     }
 

@@ -2,6 +2,8 @@
 
 use cubecl::prelude::*;
 
+use super::frame::Frame;
+
 /// Projected coordinates beyond 1e6 NDC are not drawn. As bits: floats of one sign are ordered as
 /// their bits are, and a shader may assume that no float is NaN, but not that no integer is.
 const FAR_AWAY_BITS: u32 = 1e6f32.to_bits();
@@ -47,13 +49,6 @@ impl Reach {
     }
 }
 
-/// Centre of pixel `index` along an axis, in NDC; rows count from the bottom here.
-#[cube]
-pub(super) fn pixel_centre(index: u32, size: u32) -> f32 {
-    f32::cast_from(2i32 * i32::cast_from(index) + 1i32 - i32::cast_from(size))
-        / f32::cast_from(size)
-}
-
 /// Whether a corner may be drawn: `x` and `y` not far away, `z` not nearer than the float with the
 /// bits `near`; false for NaN.
 #[cube]
@@ -64,24 +59,24 @@ fn is_drawn(x: f32, y: f32, z: f32, near: u32) -> bool {
     x <= FAR_AWAY_BITS && y <= FAR_AWAY_BITS && z >= near && z <= INFINITY_BITS
 }
 
-/// First pixel whose centre lies at or after `low` (NDC).
+/// First pixel of an axis of `side` pixels whose centre lies at or after `low` (NDC).
 #[cube]
-fn first_pixel(low: f32, size: u32) -> u32 {
-    let size = f32::cast_from(size);
-    let place = ((low + 1.0f32) * size - 1.0f32) * 0.5f32 - MARGIN;
+fn first_pixel(low: f32, side: u32, shorter: u32) -> u32 {
+    let side = f32::cast_from(side);
+    let place = (low * f32::cast_from(shorter) + side - 1.0f32) * 0.5f32 - MARGIN;
     let place = select(place > 0.0f32, place, 0.0f32);
-    let place = select(place < size, place, size);
+    let place = select(place < side, place, side);
     let whole = u32::cast_from(place);
     select(f32::cast_from(whole) < place, whole + 1u32, whole)
 }
 
 /// The pixel after the last whose centre lies at or before `high` (NDC).
 #[cube]
-fn end_pixel(high: f32, size: u32) -> u32 {
-    let size = f32::cast_from(size);
-    let place = ((high + 1.0f32) * size + 1.0f32) * 0.5f32 + MARGIN;
+fn end_pixel(high: f32, side: u32, shorter: u32) -> u32 {
+    let side = f32::cast_from(side);
+    let place = (high * f32::cast_from(shorter) + side + 1.0f32) * 0.5f32 + MARGIN;
     let place = select(place > 0.0f32, place, 0.0f32);
-    u32::cast_from(select(place < size, place, size))
+    u32::cast_from(select(place < side, place, side))
 }
 
 #[cube]
@@ -108,11 +103,11 @@ pub(super) fn prepare(
     faces: &Array<u32>,
     corners: &mut Array<f32>,
     reaches: &mut Array<u32>,
+    frame: Frame,
     first_view: u32,
     vertex_count: u32,
     face_count: u32,
     jobs: u32,
-    size: u32,
     near: u32,
     radius: f32,
     #[comptime] second: bool,
@@ -150,10 +145,10 @@ pub(super) fn prepare(
     }
     let drawn =
         is_drawn(ax, ay, az, near) && is_drawn(bx, by, bz, near) && is_drawn(cx, cy, cz, near);
-    let left = first_pixel(least(ax, bx, cx) - radius, size);
-    let right = end_pixel(largest(ax, bx, cx) + radius, size);
-    let top = first_pixel(-largest(ay, by, cy) - radius, size);
-    let bottom = end_pixel(-least(ay, by, cy) + radius, size);
+    let left = first_pixel(least(ax, bx, cx) - radius, frame.width, frame.shorter);
+    let right = end_pixel(largest(ax, bx, cx) + radius, frame.width, frame.shorter);
+    let top = first_pixel(-largest(ay, by, cy) - radius, frame.height, frame.shorter);
+    let bottom = end_pixel(-least(ay, by, cy) + radius, frame.height, frame.shorter);
     let seen = drawn && left < right && top < bottom;
     let hidden = select(drawn, 0u32, 1u32);
     reaches[4 * job] = select(seen, left, hidden);

@@ -1,4 +1,4 @@
-//! The gradient of the table: summed over the pairs of some pixels, then over all.
+//! The gradient of a table: summed over the pairs of some pixels, then over all.
 
 use cubecl::prelude::*;
 
@@ -6,11 +6,12 @@ use super::{
     TILE,
     cells::Cells,
     dual::Dual,
+    frame::Frame,
     pair::{Face, Lookup},
-    reach::{Reach, pixel_centre},
+    reach::Reach,
 };
 
-/// Adds the gradient of the table, every unit to a table of its own over the pixels that it walks:
+/// Adds the gradient of the table of some `views` from `start` on, every unit to a table of its own over the pixels that it walks:
 /// there is no order of units on which a sum could depend. `partial` is `[units, rows, 4]`.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
@@ -22,26 +23,29 @@ pub(super) fn sum_cubics(
     partial: &mut Array<f32>,
     of_cells: Cells,
     lookup: Lookup,
-    size: u32,
+    frame: Frame,
     first_view: u32,
+    start: u32,
+    views: u32,
     #[comptime] second: bool,
 ) {
     #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
-    let across = (size + TILE - 1u32) / TILE;
-    let tiles = of_cells.views * across * across;
+    let across = (frame.width + TILE - 1u32) / TILE;
+    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
+    let down = (frame.height + TILE - 1u32) / TILE;
+    let tiles = views * across * down;
     let rows = 2u32 * (lookup.cells + 1u32);
     let own = ABSOLUTE_POS as u32 * rows * 4u32;
     let stride = comptime!(if second { 12usize } else { 6usize });
     let mut tile = CUBE_POS as u32;
     while tile < tiles {
         let column = tile % across * TILE + UNIT_POS_X;
-        let row = tile / across % across * TILE + UNIT_POS_Y;
-        let view = tile / (across * across);
-        if column < size && row < size {
-            let px = pixel_centre(column, size);
-            let py = -pixel_centre(row, size);
-            let pixel = ((first_view + view) * size + row) * size + column;
-            let g = upstream[pixel as usize];
+        let row = tile / across % down * TILE + UNIT_POS_Y;
+        let view = start + tile / (across * down);
+        if column < frame.width && row < frame.height {
+            let px = frame.column_centre(column);
+            let py = frame.row_centre(row);
+            let g = upstream[frame.pixel(first_view + view, row, column) as usize];
             let first_word = of_cells.first_word(view, column, row);
             // Every pair that is not in the tail replaces one.
             let mut in_tail = of_cells.drawn(reaches, view);

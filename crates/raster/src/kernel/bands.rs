@@ -9,6 +9,7 @@ use super::{
     real::splat,
     walk::has_avx2,
 };
+use crate::ImageSize;
 
 /// Faces of one view by band, in ascending order of faces.
 #[derive(Debug)]
@@ -44,13 +45,13 @@ impl Bands {
         vertices: &[F],
         vertices_per_view: usize,
         faces: &[[u32; 3]],
-        size: usize,
+        size: ImageSize,
         rows: usize,
         near: f64,
         radius: f64,
     ) -> Self {
-        let count = size.div_ceil(rows);
-        let radius = F::from_f64(0.5 * radius * size as f64);
+        let count = size.height.div_ceil(rows);
+        let radius = F::from_f64(0.5 * radius * size.shorter() as f64);
         let near = F::from_f64(near);
         let view = |vertices: &[F]| {
             let (x, rest) = vertices.split_at(vertices_per_view);
@@ -77,7 +78,7 @@ fn reach_of_faces<L: Lanes>(
     places: &[[L::Float; 2]],
     faces: &[[u32; 3]],
     radius: L::Float,
-    size: usize,
+    size: ImageSize,
     reaches: &mut [Reach],
 ) -> usize {
     #[cfg(target_arch = "x86_64")]
@@ -87,7 +88,7 @@ fn reach_of_faces<L: Lanes>(
             places: &[[L::Float; 2]],
             faces: &[[u32; 3]],
             radius: L::Float,
-            size: usize,
+            size: ImageSize,
             reaches: &mut [Reach],
         ) -> usize {
             reach_of_blocks::<L>(places, faces, radius, size, reaches)
@@ -106,7 +107,7 @@ fn reach_of_blocks<L: Lanes>(
     places: &[[L::Float; 2]],
     faces: &[[u32; 3]],
     radius: L::Float,
-    size: usize,
+    size: ImageSize,
     reaches: &mut [Reach],
 ) -> usize {
     let mut drawn = 0;
@@ -119,7 +120,8 @@ fn reach_of_blocks<L: Lanes>(
             }
         }
         let [x, y] = &corners;
-        let (columns, rows) = (Range::<L>::new(x, radius, size), Range::<L>::new(y, radius, size));
+        let columns = Range::<L>::new(x, radius, size.width);
+        let rows = Range::<L>::new(y, radius, size.height);
         for (lane, reach) in reaches.iter_mut().enumerate() {
             let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
             let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
@@ -143,12 +145,12 @@ struct Range<L: Lanes> {
 
 impl<L: Lanes> Range<L> {
     #[inline(always)]
-    fn new([a, b, c]: &[[L::Float; LANES]; 3], radius: L::Float, size: usize) -> Self {
+    fn new([a, b, c]: &[[L::Float; LANES]; 3], radius: L::Float, side: usize) -> Self {
         let (a, b, c) = (L::of(a), L::of(b), L::of(c));
         let highest = a.max(b).max(c);
-        let grown = L::splat(grown(radius, size));
+        let grown = L::splat(grown(radius, side));
         let low = a.min(b).min(c) - grown + splat(1.0);
-        let most = splat(size as f64);
+        let most = splat(side as f64);
         Self {
             start: low.max(splat(0.0)).min(most).nearest(),
             end: (highest + grown).max(splat(0.0)).min(most).nearest(),

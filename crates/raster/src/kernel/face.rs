@@ -6,6 +6,7 @@ use super::{
     reach::{FAR_AWAY, Reach},
     real::{Float, Real, splat},
 };
+use crate::ImageSize;
 
 /// Edge vectors shorter than this (NDC², squared length) count as a point.
 const POINT: f64 = 1e-30;
@@ -146,21 +147,21 @@ impl<T: Real> Faces<T> {
         lane: usize,
         y: &[Float<T>; LANES],
         reach: Reach,
-        size: usize,
+        size: ImageSize,
     ) -> ([i32; LANES], [i32; LANES]) {
         let y = <T::Lanes as Lanes>::of(y);
         let lane = lane % LANES;
         let number = |column: u32| -> T::Lanes { splat(f64::from(column)) };
         let (left, right) = (number(reach.left), number(reach.right));
-        let (mut low, mut high) = (splat::<T::Lanes>(-2.0), splat::<T::Lanes>(2.0));
+        let (mut low, mut high) = (splat::<T::Lanes>(-FAR_AWAY), splat::<T::Lanes>(FAR_AWAY));
         for k in 0..3 {
             let shift = T::Lanes::splat(self.tilt[k][lane]) * y;
             low = (T::Lanes::splat(self.low[k][lane]) + shift).max(low);
             high = (T::Lanes::splat(self.high[k][lane]) + shift).min(high);
         }
         // The first centre at or after low, and the one after the last at or before high.
-        let half = splat::<T::Lanes>(0.5 * size as f64);
-        let middle = 0.5 * (size as f64 - 1.0) + 0.5;
+        let half = splat::<T::Lanes>(0.5 * size.shorter() as f64);
+        let middle = 0.5 * (size.width as f64 - 1.0) + 0.5;
         let low = low * half + splat(middle - MARGIN);
         let high = high * half + splat(middle + MARGIN);
         let (starts, ends) = (low.max(left).min(right), high.min(right).max(splat(0.0)));

@@ -59,7 +59,7 @@ impl<T: Real> List<T> {
 
     /// Lists the pixels of some faces of a band, given by their numbers.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &Place<Float<T>>, numbers: &[u32]) {
+    pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &Place<T>, numbers: &[u32]) {
         self.faces.clear();
         self.owners.clear();
         let mut listed = 0;

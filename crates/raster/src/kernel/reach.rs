@@ -1,28 +1,33 @@
 //! Where faces lie in the image: decided face by face, on plain floats.
 
 use super::float::Float;
+use crate::ImageSize;
 
 /// Projected coordinates beyond this (NDC) are not drawn: a table reaches no farther.
 pub(crate) const FAR_AWAY: f64 = 1e6;
 
-/// Where a vertex lies in a `size` px image: column and row, whole numbers at the centres of
+/// Where a vertex lies in the image: column and row, whole numbers at the centres of
 /// pixels, the top row first. Infinite for a vertex whose faces are not drawn: one nearer than
 /// `near`, behind the camera, not finite, or farther than 1e6 NDC away.
 #[inline(always)]
-pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: usize) -> [F; 2] {
+pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: ImageSize) -> [F; 2] {
     let far = F::from_f64(FAR_AWAY);
-    let half = F::from_f64(0.5 * size as f64);
-    let middle = F::from_f64(0.5 * (size as f64 - 1.0));
+    let half = F::from_f64(0.5 * size.shorter() as f64);
+    let middle = |side: usize| F::from_f64(0.5 * (side as f64 - 1.0));
     // Written so that NaN is not drawn either.
     let drawn = (z >= near) & (x <= far) & (x >= -far) & (y <= far) & (y >= -far);
-    let place = |at: F| if drawn { at * half + middle } else { F::from_f64(f64::INFINITY) };
-    [place(x), place(-y)]
+    let place = |at: F, side: usize| match drawn {
+        true => at * half + middle(side),
+        false => F::from_f64(f64::INFINITY),
+    };
+    [place(x, size.width), place(-y, size.height)]
 }
 
-/// How far from its bounding box a face reaches the centres of pixels, with more than places of pixels are rounded by.
+/// How far from its bounding box a face reaches the centres of pixels along an axis of this many, with more than their places are rounded
+/// by.
 #[inline(always)]
-pub(crate) fn grown<F: Float>(radius: F, size: usize) -> F {
-    radius + F::from_f64(size as f64 * 1e-6) + F::from_f64(0.5)
+pub(crate) fn grown<F: Float>(radius: F, side: usize) -> F {
+    radius + F::from_f64(side as f64 * 1e-6) + F::from_f64(0.5)
 }
 
 /// Pixels that a face may reach: rows and columns as half-open ranges, top row first.
@@ -38,25 +43,30 @@ impl Reach {
     /// No pixel.
     pub(crate) const NOTHING: Self = Self { top: 0, bottom: 0, left: 0, right: 0 };
 
-    /// Pixels of a `size` px image no farther than `radius` pixels from the bounding box of three
+    /// Pixels of an image no farther than `radius` pixels from the bounding box of three
     /// corners, given as [`in_pixels`] does; `None` where one of them is not drawn.
     #[inline(always)]
-    pub(crate) fn around<F: Float>(corners: [[F; 2]; 3], radius: F, size: usize) -> Option<Self> {
-        let grown = grown(radius, size);
-        let size = F::from_f64(size as f64);
+    pub(crate) fn around<F: Float>(
+        corners: [[F; 2]; 3],
+        radius: F,
+        size: ImageSize,
+    ) -> Option<Self> {
         let least = |a: F, b: F| if a < b { a } else { b };
         let largest = |a: F, b: F| if a > b { a } else { b };
-        let limit = |at: F| least(largest(at, F::ZERO), size).nearest() as u32;
+        let limit = |at: F, side: usize| {
+            least(largest(at, F::ZERO), F::from_f64(side as f64)).nearest() as u32
+        };
         let highest =
             |axis: usize| largest(largest(corners[0][axis], corners[1][axis]), corners[2][axis]);
-        let range = |axis: usize| {
+        let range = |axis: usize, side: usize| {
             let low = least(least(corners[0][axis], corners[1][axis]), corners[2][axis]);
-            (limit(low - grown + F::ONE), limit(highest(axis) + grown))
+            let grown = grown(radius, side);
+            (limit(low - grown + F::ONE, side), limit(highest(axis) + grown, side))
         };
         if highest(0) == F::from_f64(f64::INFINITY) {
             return None;
         }
-        let ((left, right), (top, bottom)) = (range(0), range(1));
+        let ((left, right), (top, bottom)) = (range(0, size.width), range(1, size.height));
         let some = left < right && top < bottom;
         Some(if some { Self { top, bottom, left, right } } else { Self::NOTHING })
     }
@@ -68,7 +78,7 @@ pub(crate) fn inside_spans<F: Float>(
     vertices: &[F],
     face: &[u32; 3],
     near: f64,
-    size: usize,
+    size: ImageSize,
     mut fill: impl FnMut(usize, usize, usize),
 ) {
     // Exact decisions: the edge functions of the corners as given, in f64.
@@ -87,9 +97,9 @@ pub(crate) fn inside_spans<F: Float>(
     }
     let (left, right) = (reach.left as usize, reach.right as usize);
     for row in reach.top as usize..reach.bottom as usize {
-        let py = pixel_centre(size - 1 - row, size);
+        let py = size.row_centre(row);
         let covers = |column: &usize| {
-            let px = pixel_centre(*column, size);
+            let px = size.column_centre(*column);
             let side = |&[x, y, ex, ey]: &[f64; 4]| ex * (py - y) - ey * (px - x);
             edges.iter().all(|edge| area.signum() * side(edge) >= 0.0)
         };
@@ -97,10 +107,4 @@ pub(crate) fn inside_spans<F: Float>(
         let end = (start..right).find(|column| !covers(column)).unwrap_or(right);
         fill(row, start, end);
     }
-}
-
-/// Centre of pixel `index` along an axis in NDC; rows count from the bottom here.
-#[inline]
-pub(crate) fn pixel_centre(index: usize, size: usize) -> f64 {
-    (2.0 * index as f64 + 1.0 - size as f64) / size as f64
 }

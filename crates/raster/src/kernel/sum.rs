@@ -14,17 +14,18 @@ use super::{
         walk_image, walk_image_and_gradient,
     },
 };
+use crate::ImageSize;
 
 /// The inputs of the op in one float type.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, F> {
     /// `[views, 3, vertices]`.
     pub(crate) vertices: &'a [F],
-    /// `[grid.rows(), 4]`.
+    /// `[1 or views, grid.rows(), 4]`.
     pub(crate) table: &'a [F],
     pub(crate) faces: &'a [[u32; 3]],
     pub(crate) grid: Grid,
-    pub(crate) size: usize,
+    pub(crate) size: ImageSize,
     pub(crate) near: f64,
     pub(crate) views: usize,
 }
@@ -42,13 +43,14 @@ impl<F: Float> Inputs<'_, F> {
         T: Real,
         T::Lanes: super::lanes::Lanes<Float = F>,
     {
-        let table = Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
+        let tables =
+            Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
         let rows = rows_of_bands(self.views);
-        Scene::new([self.vertices, tangents[0]], self.faces, table, self.grid, self.size, rows)
+        Scene::new([self.vertices, tangents[0]], self.faces, tables, self.grid, self.size, rows)
     }
 }
 
-/// Sums of the profile, `[views, size, size]`.
+/// Sums of the profile, `[views, height, width]`.
 pub(crate) fn forward<F: Float>(inputs: &Inputs<F>) -> Vec<F> {
     let bands = inputs.bands();
     if has_avx2() {
@@ -58,7 +60,7 @@ pub(crate) fn forward<F: Float>(inputs: &Inputs<F>) -> Vec<F> {
     }
 }
 
-/// Gradients of `Σ upstream S` to vertices and table, as they are wanted, flat and in this order.
+/// Gradients of `Σ upstream S` to vertices and tables, as they are wanted, flat and in this order.
 pub(crate) fn vjp<F: Float>(inputs: &Inputs<F>, upstream: &[F], wanted: [bool; 2]) -> Vec<F> {
     let bands = inputs.bands();
     let wanted = [wanted[0], wanted[1], false];
@@ -70,7 +72,7 @@ pub(crate) fn vjp<F: Float>(inputs: &Inputs<F>, upstream: &[F], wanted: [bool; 2
 }
 
 /// Pullback of `direction` (like the result of [`vjp`], which consists of what is `along`) through [`vjp`]: gradients to vertices,
-/// table and upstream, as they are wanted, flat and in this order.
+/// tables and upstream, as they are wanted, flat and in this order.
 ///
 /// The Hessian is symmetric, so the first two are the derivative of the gradient along the
 /// direction, and the third is the derivative of the image along it: one walk with dual numbers.
@@ -98,56 +100,49 @@ pub(crate) fn vjp_of_vjp<F: Float>(
     }
 }
 
-/// Runs the image part of a walk over all bands; `[views, size, size]`.
+/// Runs the image part of a walk over all bands; `[views, height, width]`.
 fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<real::Float<T>> {
-    let size = scene.size;
     let views = bands.views.len();
-    let mut image = vec![real::Float::<T>::ZERO; views * size * size];
-    image.par_chunks_mut(size * size).zip(&bands.views).enumerate().for_each(
+    let pixels = scene.size.pixels();
+    let mut image = vec![real::Float::<T>::ZERO; views * pixels];
+    image.par_chunks_mut(pixels).zip(&bands.views).enumerate().for_each(
         |(index, (image, view))| {
-            image.par_chunks_mut(scene.rows * size).enumerate().for_each(|(band, image)| {
-                let mut none = BandGradient { corners: Vec::new(), table: Vec::new() };
-                let place = scene.place(view, index, views, band);
-                let mut padded = vec![empty(scene, view); scene.band_length(band)];
-                walk_image(scene, place, &[], &mut padded, &mut none);
-                trim(&padded, image, scene);
-            });
+            image.par_chunks_mut(scene.rows * scene.size.width).enumerate().for_each(
+                |(band, image)| {
+                    let mut none = BandGradient { corners: Vec::new(), table: Vec::new() };
+                    let place = scene.place(view, index, views, band);
+                    let mut padded = vec![place.empty(&scene.grid); scene.band_length(band)];
+                    walk_image(scene, place, &[], &mut padded, &mut none);
+                    trim(&padded, image, scene);
+                },
+            );
         },
     );
     image
 }
 
-/// A pixel that no face reaches.
-fn empty<T: Real>(scene: &Scene<T>, view: &View) -> real::Float<T> {
-    let rows = if T::DUAL { scene.table.tangents } else { scene.table.values };
-    rows[scene.grid.tail()][0] * drawn(view)
-}
-
 /// Rows of a band as they stand in the image.
 fn trim<T: Real>(padded: &[real::Float<T>], image: &mut [real::Float<T>], scene: &Scene<T>) {
-    for (row, padded) in image.chunks_exact_mut(scene.size).zip(padded.chunks(scene.stride())) {
-        row.copy_from_slice(&padded[..scene.size]);
+    let width = scene.size.width;
+    for (row, padded) in image.chunks_exact_mut(width).zip(padded.chunks(scene.stride())) {
+        row.copy_from_slice(&padded[..width]);
     }
 }
 
 /// Rows of the image as they stand in a band, followed by zeros.
 fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, band: usize) -> Vec<real::Float<T>> {
     let mut padded = vec![real::Float::<T>::ZERO; scene.band_length(band)];
-    for (padded, row) in padded.chunks_mut(scene.stride()).zip(rows.chunks(scene.size)) {
-        padded[..scene.size].copy_from_slice(row);
+    let width = scene.size.width;
+    for (padded, row) in padded.chunks_mut(scene.stride()).zip(rows.chunks(width)) {
+        padded[..width].copy_from_slice(row);
     }
     padded
-}
-
-/// Faces drawn in a view, as a factor.
-fn drawn<F: Float>(view: &View) -> F {
-    F::from_f64(view.drawn as f64)
 }
 
 /// What a view or a band gives back: gradients, and its rows of the image.
 type Walked<F> = (BandGradient<F>, Vec<F>);
 
-/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and table, and the sums, as they are wanted, flat
+/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and tables, and the sums, as they are wanted, flat
 /// and in this order. The third row of each view's vertices is 0, because a silhouette does not see
 /// depth. Of dual numbers all that comes back are tangents.
 fn gradient<T: Real>(
@@ -158,7 +153,7 @@ fn gradient<T: Real>(
 ) -> Vec<real::Float<T>> {
     let zero = real::Float::<T>::ZERO;
     let views = bands.views.len();
-    let pixels = scene.size * scene.size;
+    let (pixels, width) = (scene.size.pixels(), scene.size.width);
     let table_rows = if wrt_table { scene.grid.rows() } else { 0 };
     let walk = match (with_image, wrt_table) {
         (true, true) => walk_everything,
@@ -169,16 +164,16 @@ fn gradient<T: Real>(
     let in_band = |index: usize, band: usize| {
         let view = &bands.views[index];
         let rows = scene.band_rows(band);
-        let mut image =
-            if with_image { vec![empty(scene, view); scene.band_length(band)] } else { vec![] };
+        let place = scene.place(view, index, views, band);
+        let empty = || vec![place.empty(&scene.grid); scene.band_length(band)];
+        let mut image = if with_image { empty() } else { vec![] };
         let mut gradient = BandGradient {
             corners: vec![[zero; 6]; view.faces(band).len()],
             table: vec![[zero; 4]; table_rows],
         };
-        let of_band =
-            index * pixels + rows.start * scene.size..index * pixels + rows.end * scene.size;
+        let of_band = index * pixels + rows.start * width..index * pixels + rows.end * width;
         let upstream = pad(&upstream[of_band], scene, band);
-        walk(scene, scene.place(view, index, views, band), &upstream, &mut image, &mut gradient);
+        walk(scene, place, &upstream, &mut image, &mut gradient);
         (gradient, image)
     };
     let count = scene.vertices.len();
@@ -193,14 +188,15 @@ fn gradient<T: Real>(
             gather(scene, &bands.views[index], upstream, walked, total)
         })
         .collect();
-    let mut table = vec![[zero; 4]; table_rows];
-    for (part, _) in &per_view {
-        for (total, part) in table.iter_mut().zip(part) {
+    let mut tables = vec![[zero; 4]; if wrt_table { scene.tables.values.len() } else { 0 }];
+    for (index, (part, _)) in per_view.iter().enumerate() {
+        let first = if tables.len() > table_rows { index * table_rows } else { 0 };
+        for (total, part) in tables[first..].iter_mut().zip(part) {
             total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
         }
     }
     let mut flat = if wrt_vertices { vertices } else { Vec::new() };
-    flat.extend_from_slice(table.as_flattened());
+    flat.extend_from_slice(tables.as_flattened());
     for (_, image) in per_view {
         flat.extend(image);
     }
@@ -230,13 +226,13 @@ fn gather<T: Real>(
             total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
         }
         for row in rows.chunks_exact(scene.stride()) {
-            image.extend_from_slice(&row[..scene.size]);
+            image.extend_from_slice(&row[..scene.size.width]);
         }
     }
     // The upstream has no tangent.
     if !table.is_empty() && !T::DUAL {
         let sum = upstream.iter().fold(zero, |sum, &g| sum + g);
-        table[scene.grid.tail()][0] += drawn::<real::Float<T>>(view) * sum;
+        table[scene.grid.tail()][0] += real::Float::<T>::from_f64(view.drawn as f64) * sum;
     }
     (table, image)
 }

@@ -9,10 +9,10 @@ use super::{
     lanes::{GROUP, LANES, Lanes, Places},
     list::{Chunk, LISTED, List},
     pair::closest,
-    reach::pixel_centre,
     real::{Float, Real, Table, splat},
     table::{Grid, Lookup, Place as Cell},
 };
+use crate::ImageSize;
 
 /// Chunks by which adding up follows geometry: while one waits for the table, the arithmetic of the
 /// other goes on.
@@ -30,10 +30,10 @@ pub(crate) struct Scene<'a, T: Real> {
     /// Their tangents, where numbers have any.
     pub(crate) tangents: &'a [Float<T>],
     pub(crate) faces: &'a [[u32; 3]],
-    /// Cubic coefficients of each cell, `[grid.rows()]`.
-    pub(crate) table: Table<'a, T>,
+    /// Cubic coefficients of each cell, `[1 or views, grid.rows()]`.
+    pub(crate) tables: Table<'a, T>,
     pub(crate) grid: Grid,
-    pub(crate) size: usize,
+    pub(crate) size: ImageSize,
     /// Rows of a band.
     pub(crate) rows: usize,
     lookup: Lookup<Float<T>>,
@@ -45,25 +45,24 @@ pub(crate) struct Scene<'a, T: Real> {
 
 /// Which band of which view.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<'a, F> {
+pub(crate) struct Place<'a, T: Real> {
     /// `[3, vertices]`.
-    pub(crate) vertices: &'a [F],
+    pub(crate) vertices: &'a [Float<T>],
     /// The same, or nothing.
-    pub(crate) tangents: &'a [F],
+    pub(crate) tangents: &'a [Float<T>],
+    /// `[grid.rows()]`.
+    pub(crate) table: Table<'a, T>,
     pub(crate) view: &'a View,
     pub(crate) band: usize,
 }
 
-impl<F: super::float::Float> Place<'_, F> {
+impl<T: Real> Place<'_, T> {
     /// Up to [`LANES`] faces of the scene, given by their numbers, as this view sees them; the last one
     /// fills them up.
     #[inline(always)]
-    pub(crate) fn faces<T: Real>(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T>
-    where
-        T::Lanes: Lanes<Float = F>,
-    {
-        let mut values = [[[F::ZERO; LANES]; 3]; 2];
-        let mut tangents = [[[F::ZERO; LANES]; 3]; 2];
+    pub(crate) fn faces(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T> {
+        let mut values = [[[Float::<T>::ZERO; LANES]; 3]; 2];
+        let mut tangents = [[[Float::<T>::ZERO; LANES]; 3]; 2];
         let count = self.vertices.len() / 3;
         let (xs, ys) = (&self.vertices[..count], &self.vertices[count..2 * count]);
         for lane in 0..LANES {
@@ -81,7 +80,21 @@ impl<F: super::float::Float> Place<'_, F> {
         let [dx, dy] = tangents;
         let x = [lanes(&x[0], &dx[0]), lanes(&x[1], &dx[1]), lanes(&x[2], &dx[2])];
         let y = [lanes(&y[0], &dy[0]), lanes(&y[1], &dy[1]), lanes(&y[2], &dy[2])];
-        Faces::new(x, y, F::from_f64(scene.grid.outer))
+        Faces::new(x, y, Float::<T>::from_f64(scene.grid.outer))
+    }
+
+    /// The constant outside the support.
+    #[inline(always)]
+    fn tail(&self, grid: &Grid) -> T {
+        let tail = grid.tail();
+        let tangent = if T::DUAL { self.table.tangents[tail][0] } else { Float::<T>::ZERO };
+        T::new(T::Lanes::splat(self.table.values[tail][0]), T::Lanes::splat(tangent))
+    }
+
+    /// A pixel that no face reaches.
+    pub(crate) fn empty(&self, grid: &Grid) -> Float<T> {
+        let rows = if T::DUAL { self.table.tangents } else { self.table.values };
+        rows[grid.tail()][0] * Float::<T>::from_f64(self.view.drawn as f64)
     }
 }
 
@@ -101,24 +114,24 @@ impl<'a, T: Real> Scene<'a, T> {
     pub(crate) fn new(
         vertices: [&'a [Float<T>]; 2],
         faces: &'a [[u32; 3]],
-        table: Table<'a, T>,
+        tables: Table<'a, T>,
         grid: Grid,
-        size: usize,
+        size: ImageSize,
         rows: usize,
     ) -> Self {
-        let centre = |column| Float::<T>::from_f64(pixel_centre(column, size));
+        let number = Float::<T>::from_f64;
         let [vertices, tangents] = vertices;
         Self {
             vertices,
             tangents,
             faces,
-            table,
+            tables,
             grid,
             size,
             rows,
             lookup: Lookup::new(&grid),
-            centres: (0..size + GROUP).map(centre).collect(),
-            heights: (0..size + LANES).map(|row| -centre(row)).collect(),
+            centres: (0..size.width + GROUP).map(|k| number(size.column_centre(k))).collect(),
+            heights: (0..size.height + LANES).map(|row| number(size.row_centre(row))).collect(),
         }
     }
 
@@ -129,7 +142,7 @@ impl<'a, T: Real> Scene<'a, T> {
         index: usize,
         views: usize,
         band: usize,
-    ) -> Place<'b, Float<T>>
+    ) -> Place<'b, T>
     where
         'a: 'b,
     {
@@ -137,12 +150,21 @@ impl<'a, T: Real> Scene<'a, T> {
             let length = numbers.len() / views;
             &numbers[index * length..(index + 1) * length]
         };
-        Place { vertices: of_view(self.vertices), tangents: of_view(self.tangents), view, band }
+        let rows = self.grid.rows();
+        let first = if self.tables.values.len() > rows { index * rows } else { 0 };
+        let of_table =
+            |all: &'a [[Float<T>; 4]]| &all[first.min(all.len())..(first + rows).min(all.len())];
+        let table = Table {
+            values: of_table(self.tables.values),
+            tangents: of_table(self.tables.tangents),
+        };
+        let [vertices, tangents] = [self.vertices, self.tangents].map(of_view);
+        Place { vertices, tangents, table, view, band }
     }
 
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.
     pub(crate) fn stride(&self) -> usize {
-        self.size + GROUP
+        self.size.width + GROUP
     }
 
     /// Numbers of a band: its rows, and a group for pixels on which nothing depends.
@@ -152,7 +174,7 @@ impl<'a, T: Real> Scene<'a, T> {
 
     /// Rows of the image that band `band` holds.
     pub(crate) fn band_rows(&self, band: usize) -> Range<usize> {
-        band * self.rows..((band + 1) * self.rows).min(self.size)
+        band * self.rows..((band + 1) * self.rows).min(self.size.height)
     }
 
     /// Centres of a row of the image and those below it.
@@ -160,28 +182,27 @@ impl<'a, T: Real> Scene<'a, T> {
     pub(crate) fn heights(&self, row: usize) -> &[Float<T>; LANES] {
         self.heights[row..row + LANES].try_into().expect("as many heights as lanes")
     }
-
-    /// The constant outside the support.
-    #[inline(always)]
-    fn tail(&self) -> T {
-        let tail = self.grid.tail();
-        let tangent = if T::DUAL { self.table.tangents[tail][0] } else { Float::<T>::ZERO };
-        T::new(T::Lanes::splat(self.table.values[tail][0]), T::Lanes::splat(tangent))
-    }
 }
 
 /// One walk over the pairs of a band. `upstream` and `image` are `[rows, stride]` and a group more.
 #[inline(always)]
 fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
     scene: &Scene<T>,
-    place: Place<Float<T>>,
+    place: Place<T>,
     upstream: &[Float<T>],
     image: &mut [Float<T>],
     gradient: &mut BandGradient<Float<T>>,
 ) {
     let mut list = List::new();
-    let mut walker =
-        Walker { scene, upstream, image, gradient, visited: splat(0.0), tail: scene.tail() };
+    let mut walker = Walker {
+        scene,
+        table: place.table,
+        upstream,
+        image,
+        gradient,
+        visited: splat(0.0),
+        tail: place.tail(&scene.grid),
+    };
     for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
         list.fill(scene, &place, numbers);
         let slivers = list.faces.iter().any(|faces| faces.slivers);
@@ -202,6 +223,7 @@ fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
 /// Where the pairs of a band go.
 struct Walker<'a, 's, T: Real> {
     scene: &'a Scene<'s, T>,
+    table: Table<'a, T>,
     upstream: &'a [Float<T>],
     image: &'a mut [Float<T>],
     gradient: &'a mut BandGradient<Float<T>>,
@@ -267,7 +289,7 @@ impl<T: Real> Walker<'_, '_, T> {
                 face = owner;
                 sums = [splat(0.0); 6];
             }
-            let cubic = T::rows(self.scene.table, &ring.row[slot]);
+            let cubic = T::rows(self.table, &ring.row[slot]);
             if IMAGE {
                 self.value(&ring, slot, cubic, chunk);
             }
@@ -297,7 +319,7 @@ impl<T: Real> Walker<'_, '_, T> {
         let point = closest::<T, SLIVERS>(&face, px, py);
         let Cell { row, t, rate } =
             self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
-        ring.row[slot] = T::Lanes::places(row, self.scene.table.values.len());
+        ring.row[slot] = T::Lanes::places(row, self.table.values.len());
         ring.t[slot] = t;
         if GRADIENT {
             (ring.dx[slot], ring.dy[slot]) = (point.dx, point.dy);
@@ -402,7 +424,7 @@ macro_rules! dispatched {
     ($name:ident, $image:literal, $gradient:literal, $table:literal) => {
         pub(crate) fn $name<T: Real>(
             scene: &Scene<T>,
-            place: Place<Float<T>>,
+            place: Place<T>,
             upstream: &[Float<T>],
             image: &mut [Float<T>],
             gradient: &mut BandGradient<Float<T>>,
@@ -412,7 +434,7 @@ macro_rules! dispatched {
                 #[target_feature(enable = "avx2")]
                 fn avx2<T: Real>(
                     scene: &Scene<T>,
-                    place: Place<Float<T>>,
+                    place: Place<T>,
                     upstream: &[Float<T>],
                     image: &mut [Float<T>],
                     gradient: &mut BandGradient<Float<T>>,

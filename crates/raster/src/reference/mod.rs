@@ -10,7 +10,7 @@ use burn::{
 };
 use softrast_softness::Softness;
 
-use crate::{NEAR, TConorm};
+use crate::{ImageSize, NEAR, TConorm};
 pub use step::{iou_loss, mse_loss, orbit_matrices, perspective};
 
 /// Squared edge lengths below this (NDC²) count as a point.
@@ -21,13 +21,13 @@ const ON_EDGE: f64 = 1e-24;
 /// Pixel-face pairs that one chunk of [`sums`] and [`vjp`] may hold.
 const PAIRS: usize = 1 << 18;
 
-/// What to draw: faces over the vertices of every view, on a square image.
+/// What to draw: faces over the vertices of every view, on an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
     /// Corners of each face, as vertex numbers.
     pub faces: &'a [[u32; 3]],
-    /// Width and height of the image in pixels.
-    pub size: usize,
+    /// Height and width of the image in pixels.
+    pub size: ImageSize,
 }
 
 /// Signed distances from pixels to faces in NDC, positive inside: `[views, pixels, faces]`.
@@ -99,7 +99,7 @@ fn lesser<B: Backend>(a: Tensor<B, 3>, b: Tensor<B, 3>) -> Tensor<B, 3> {
     a.mask_where(less, b)
 }
 
-/// Sums of `g(s(d))` over the faces of each pixel: `[views, size, size]`, top row first.
+/// Sums of `g(s(d))` over the faces of each pixel: `[views, height, width]`, top row first.
 ///
 /// Computed in chunks of pixels of one view, so that memory stays bounded; under autodiff the tape
 /// still holds all chunks, see [`vjp`] for a gradient that does not. Faces with a vertex nearer than
@@ -120,11 +120,11 @@ pub fn sums<B: Backend>(
             chunk_sums(scene, vertices, softness, t_conorm, phi.clone(), &pixels)
         })
         .collect();
-    Tensor::cat(parts, 0).reshape([views, scene.size, scene.size])
+    Tensor::cat(parts, 0).reshape([views, scene.size.height, scene.size.width])
 }
 
 /// Gradient of `Σ upstream · sums` to the vertices `[views, vertices, 3]`, chunk by chunk: memory
-/// is that of one chunk. `upstream` is `[views, size, size]`.
+/// is that of one chunk. `upstream` is `[views, height, width]`.
 ///
 /// # Panics
 ///
@@ -139,7 +139,7 @@ pub fn vjp<B: Backend>(
 ) -> Tensor<B, 3> {
     let [views, count, _] = vertices.dims();
     let phi = Tensor::<Autodiff<B>, 1>::from_inner(phi);
-    let upstream = upstream.reshape([views * scene.size * scene.size]);
+    let upstream = upstream.reshape([views * scene.size.pixels()]);
     let mut start = 0;
     let mut totals: Vec<Option<Tensor<B, 3>>> = vec![None; views];
     for (view, pixels) in chunks(scene, views) {
@@ -202,11 +202,14 @@ fn places<B: Backend>(
     scene: Scene,
     pixels: &std::ops::Range<usize>,
 ) -> Tensor<B, 2> {
-    let size = scene.size as f64;
-    let centre = |index: usize| (2.0 * index as f64 + 1.0 - size) / size;
+    let ImageSize { height, width } = scene.size;
+    let half = height.min(width) as f64 / 2.0;
     let place = |pixel: usize| {
-        let (row, column) = (pixel / scene.size, pixel % scene.size);
-        [centre(column), centre(scene.size - 1 - row)]
+        let (row, column) = (pixel / width, pixel % width);
+        [
+            (column as f64 + 0.5 - width as f64 / 2.0) / half,
+            (height as f64 / 2.0 - row as f64 - 0.5) / half,
+        ]
     };
     let places: Vec<f64> = pixels.clone().flat_map(place).collect();
     let data = TensorData::new(places, [pixels.len(), 2]);
@@ -215,7 +218,7 @@ fn places<B: Backend>(
 
 /// Views and pixel ranges of at most [`PAIRS`] pairs.
 fn chunks(scene: Scene, views: usize) -> Vec<(usize, std::ops::Range<usize>)> {
-    let pixels = scene.size * scene.size;
+    let pixels = scene.size.pixels();
     let step = (PAIRS / scene.faces.len().max(1)).clamp(1, pixels);
     let ranges = move || (0..pixels).step_by(step).map(move |at| at..(at + step).min(pixels));
     (0..views).flat_map(|view| ranges().map(move |range| (view, range))).collect()

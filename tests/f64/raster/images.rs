@@ -1,0 +1,136 @@
+//! Images that are no squares, and a softness of which each view has parameters of its own.
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
+use softrast_raster::{ImageSize, Rasterizer, TConorm, hard_silhouette, reference};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tests::vector;
+
+use super::triangles::triangles;
+
+type B = NdArray<f64>;
+type A = Autodiff<B>;
+type AA = Autodiff<A>;
+
+const TOLERANCE: f64 = 1e-9;
+const SCALES: [f64; 3] = [0.03, 0.05, 0.08];
+
+fn numbers<const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
+    tensor.into_data().iter().collect()
+}
+
+fn assert_same(name: &str, found: &[f64], expected: &[f64], bound: f64) {
+    let length = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+    let error = length(&mut found.iter().zip(expected).map(|(a, b)| a - b));
+    let size = length(&mut expected.iter().copied());
+    assert!(size > 0.0 && error <= bound * size, "{name}: off by {:e}", error / size);
+}
+
+/// Image, gradients and their derivatives of some views, whose rows of `phi` `[views, parameters]` are each used for one.
+fn passes(
+    vertices: &[f64],
+    phi: &[f64],
+    views: usize,
+    image: impl Fn(Tensor<AA, 3>, Tensor<AA, 2>) -> Tensor<AA, 3>,
+) -> [Vec<f64>; 5] {
+    let (inner_vertices, inner_phi) =
+        (vector::<A>(vertices).require_grad(), vector::<A>(phi).require_grad());
+    let outer = |inner: &Tensor<A, 1>| Tensor::<AA, 1>::from_inner(inner.clone()).require_grad();
+    let (outer_vertices, outer_phi) = (outer(&inner_vertices), outer(&inner_phi));
+    let shaped = outer_vertices.clone().reshape([views as i32, -1, 3]);
+    let image = image(shaped, outer_phi.clone().reshape([views as i32, -1]));
+    let wave = |count: usize| -> Vec<f64> { (0..count).map(|i| (0.37 * i as f64).sin()).collect() };
+    let flat = image.flatten::<1>(0, 2);
+    let weights = vector::<AA>(&wave(flat.dims()[0]));
+    let gradients = (flat.clone() * flat.clone() * weights).sum().backward();
+    let to_vertices = outer_vertices.grad(&gradients).expect("a gradient to the vertices");
+    let to_phi = outer_phi.grad(&gradients).expect("a gradient to the parameters");
+    let product = (to_vertices.clone() * vector(&wave(vertices.len()))).sum()
+        + (to_phi.clone() * vector(&wave(phi.len()))).sum();
+    let again = product.backward();
+    [
+        numbers(flat.inner().inner()),
+        numbers(to_vertices.inner()),
+        numbers(to_phi.inner()),
+        numbers(inner_vertices.grad(&again).expect("second order to the vertices")),
+        numbers(inner_phi.grad(&again).expect("second order to the parameters")),
+    ]
+}
+
+#[test]
+fn any_image_and_any_parameters_of_views_agree_with_the_reference_to_second_order() {
+    let (one, faces) = triangles(7, 12);
+    // Three views that differ.
+    let vertices: Vec<f64> = (0..3)
+        .flat_map(|view| one.iter().map(move |x| x * (1.0 - 0.1 * f64::from(view))))
+        .collect();
+    for (family, size) in [(Family::Logistic, [7, 16]), (Family::Exp, [16, 5])] {
+        let softness = EdgeSoftness { family, squared: false };
+        let phi: Vec<f64> = SCALES.iter().flat_map(|&scale| softness.default_phi(scale)).collect();
+        let fused = |vertices, phi: Tensor<AA, 2>| {
+            let rasterizer = Rasterizer { tolerance: TOLERANCE, ..Rasterizer::new(size) };
+            let silhouette = rasterizer.prepare_by_view(&faces, softness, &phi);
+            silhouette.coverage_by_table(vertices, silhouette.table_by_view(phi))
+        };
+        let dense = |vertices: Tensor<AA, 3>, phi: Tensor<AA, 2>| {
+            let scene = reference::Scene { faces: &faces, size: size.into() };
+            let conorm = TConorm::Probabilistic;
+            let view = |view: usize| {
+                let vertices = vertices.clone().narrow(0, view, 1);
+                let phi = phi.clone().narrow(0, view, 1).squeeze_dim::<1>(0);
+                conorm.coverage(reference::sums(scene, vertices, &softness, conorm, phi))
+            };
+            Tensor::cat((0..3).map(view).collect(), 0)
+        };
+        let (found, expected) =
+            (passes(&vertices, &phi, 3, fused), passes(&vertices, &phi, 3, dense));
+        let bounds = [1e-8, 1e-6, 2e-6, 1e-4, 1e-4];
+        for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert_same(&format!("{family}, quantity {k}"), found, expected, bounds[k]);
+        }
+    }
+}
+
+#[test]
+fn a_lower_image_shows_the_middle_of_a_square_one() {
+    const SIDE: usize = 16;
+    let (values, faces) = triangles(7, 12);
+    let softness = EdgeSoftness { family: Family::Gauss, squared: false };
+    // The lower image has half as many rows, so that a pixel of it is twice as large.
+    let drawn = |size: ImageSize, factor: f64| {
+        let along = |(k, x): (usize, &f64)| if k % 3 < 2 { factor * x } else { *x };
+        let values: Vec<f64> = values.iter().enumerate().map(along).collect();
+        let vertices = vector::<B>(&values).reshape([1, -1, 3]);
+        let phi = vector(&softness.default_phi(0.05 * factor));
+        let rasterizer = Rasterizer { tolerance: TOLERANCE, ..Rasterizer::new(size) };
+        let soft = rasterizer.prepare(&faces, softness, &phi).coverage(vertices.clone(), phi);
+        [numbers(soft), numbers(hard_silhouette(vertices, &faces, size))]
+    };
+    let square = drawn(SIDE.into(), 1.0);
+    let rows = SIDE * SIDE / 4..3 * SIDE * SIDE / 4;
+    let columns = |image: &[f64]| -> Vec<f64> {
+        let row = |row: &[f64]| row[SIDE / 4..3 * SIDE / 4].to_vec();
+        image.chunks(SIDE).flat_map(row).collect()
+    };
+    for (found, whole) in drawn([SIDE / 2, SIDE].into(), 2.0).iter().zip(&square) {
+        assert_same("a low image", found, &whole[rows.clone()], 1e-8);
+    }
+    for (found, whole) in drawn([SIDE, SIDE / 2].into(), 2.0).iter().zip(&square) {
+        assert_same("a narrow image", found, &columns(whole), 1e-8);
+    }
+}
+
+#[test]
+#[should_panic(expected = "or [2, ")]
+fn tables_of_another_number_of_views_are_refused() {
+    let (values, faces) = triangles(7, 3);
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let phi = vector::<B>(&[softness.default_phi(0.03), softness.default_phi(0.05)].concat());
+    let phi = phi.reshape([2, -1]);
+    let silhouette = Rasterizer::new(8).prepare_by_view(&faces, softness, &phi);
+    let vertices = vector::<B>(&values).reshape([1, -1, 3]).repeat_dim(0, 2);
+    let tables = silhouette.table_by_view(Tensor::cat(vec![phi.clone(), phi], 0));
+    silhouette.coverage_by_table(vertices, tables);
+}
