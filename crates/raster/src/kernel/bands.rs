@@ -93,8 +93,13 @@ fn reach_of_faces<L: Lanes>(
         ) -> usize {
             reach_of_blocks::<L>(places, faces, radius, size, reaches)
         }
-        if L::NEEDS_AVX2 || has_avx2() {
-            // SAFETY: the feature was just detected, or before there were such vectors.
+        if L::NEEDS_AVX2 {
+            // SAFETY: the feature was detected before there were such vectors.
+            #[allow(unsafe_code)]
+            return unsafe { avx2::<L>(places, faces, radius, size, reaches) };
+        }
+        if L::GAINS_AVX2 && has_avx2() {
+            // SAFETY: the feature was just detected.
             #[allow(unsafe_code)]
             return unsafe { avx2::<L>(places, faces, radius, size, reaches) };
         }

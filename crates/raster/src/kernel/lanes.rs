@@ -38,6 +38,8 @@ pub(crate) trait Lanes:
     type Index: Copy;
     /// Whether this needs AVX2.
     const NEEDS_AVX2: bool;
+    /// Whether what uses this is compiled for machines with AVX2 as well.
+    const GAINS_AVX2: bool;
 
     /// The same number in all lanes.
     fn splat(value: Self::Float) -> Self;
@@ -146,6 +148,8 @@ impl<F: Float> Lanes for Plain<F> {
     type Mask = [bool; LANES];
     type Index = [i32; LANES];
     const NEEDS_AVX2: bool = false;
+    // Floats of 32 bits have vectors of their own there.
+    const GAINS_AVX2: bool = size_of::<F>() == 8;
 
     #[inline(always)]
     fn splat(value: F) -> Self {

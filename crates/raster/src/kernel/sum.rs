@@ -155,18 +155,18 @@ fn gradient<T: Real>(
     let views = bands.views.len();
     let (pixels, width) = (scene.size.pixels(), scene.size.width);
     let table_rows = if wrt_table { scene.grid.rows() } else { 0 };
-    let walk = match (with_image, wrt_table) {
-        (true, true) => walk_everything,
-        (true, false) => walk_image_and_gradient,
-        (false, true) => walk_gradient_and_table,
-        (false, false) => walk_gradient,
+    // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
+    let walk = if T::DUAL {
+        if wrt_table { walk_everything } else { walk_image_and_gradient }
+    } else {
+        if wrt_table { walk_gradient_and_table } else { walk_gradient }
     };
     let in_band = |index: usize, band: usize| {
         let view = &bands.views[index];
         let rows = scene.band_rows(band);
         let place = scene.place(view, index, views, band);
         let empty = || vec![place.empty(&scene.grid); scene.band_length(band)];
-        let mut image = if with_image { empty() } else { vec![] };
+        let mut image = if T::DUAL { empty() } else { vec![] };
         let mut gradient = BandGradient {
             corners: vec![[zero; 6]; view.faces(band).len()],
             table: vec![[zero; 4]; table_rows],
@@ -197,8 +197,8 @@ fn gradient<T: Real>(
     }
     let mut flat = if wrt_vertices { vertices } else { Vec::new() };
     flat.extend_from_slice(tables.as_flattened());
-    for (_, image) in per_view {
-        flat.extend(image);
+    if with_image {
+        per_view.iter().for_each(|(_, image)| flat.extend_from_slice(image));
     }
     flat
 }

@@ -441,11 +441,17 @@ macro_rules! dispatched {
                 ) {
                     walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
                 }
-                if T::Lanes::NEEDS_AVX2 || has_avx2() {
-                    // SAFETY: the feature was just detected, or before there were such vectors.
+                // Two questions, so that the compiler leaves out what no machine asks for.
+                if T::Lanes::NEEDS_AVX2 {
+                    // SAFETY: the feature was detected before there were such vectors.
                     #[allow(unsafe_code)]
-                    unsafe {
-                        return avx2(scene, place, upstream, image, gradient);
+                    return unsafe { avx2(scene, place, upstream, image, gradient) };
+                }
+                if T::Lanes::GAINS_AVX2 {
+                    if has_avx2() {
+                        // SAFETY: the feature was just detected.
+                        #[allow(unsafe_code)]
+                        return unsafe { avx2(scene, place, upstream, image, gradient) };
                     }
                 }
             }

@@ -47,6 +47,7 @@ impl Lanes for F32x8 {
     type Mask = __m256;
     type Index = __m256i;
     const NEEDS_AVX2: bool = true;
+    const GAINS_AVX2: bool = true;
 
     #[inline(always)]
     fn splat(value: f32) -> Self {
