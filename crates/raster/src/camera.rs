@@ -38,7 +38,7 @@ pub struct Orbit {
     pub elevation_deg: f64,
     /// Angle around the vertical axis: at 0 the camera stands at -z, at 90 at +x.
     pub azimuth_deg: f64,
-    /// Whole field of view, from one side of the image to the other; below 180.
+    /// Whole field of view along the shorter side of the image; below 180.
     pub fov_deg: f64,
 }
 
@@ -88,7 +88,7 @@ pub struct LookAt {
     pub target: [f64; 3],
     /// Which way is up; not along the line of sight.
     pub up: [f64; 3],
-    /// Whole field of view, from one side of the image to the other; below 180.
+    /// Whole field of view along the shorter side of the image; below 180.
     pub fov_deg: f64,
 }
 
@@ -153,7 +153,7 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 /// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates.
 /// `orbits` `[views, 4]` holds for each view the distance in world units, then elevation, azimuth
 /// and the whole field of view in degrees, as [`Orbit::tensor`] makes it. The result is `[views,
-/// vertices, 3]`: x and y in NDC (the image is [-1, 1]², x right, y up) and the camera depth in world
+/// vertices, 3]`: x and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera depth in world
 /// units.
 ///
 /// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
@@ -211,7 +211,7 @@ fn perspective<B: RasterBackend>(vertices: Tensor<B, 3>, matrices: Tensor<B, 3>)
     elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2)
 }
 
-/// Distance of the image plane whose image is [-1, 1]², `[views, 1, 1]`.
+/// Distance of the image plane in NDC, `[views, 1, 1]`.
 pub(crate) fn focal<B: Backend>(fov_deg: Tensor<B, 1>) -> Tensor<B, 3> {
     let [views] = fov_deg.dims();
     let [sin, cos] = sin_cos(fov_deg * 0.5);

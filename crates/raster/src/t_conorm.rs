@@ -112,7 +112,7 @@ impl TConorm {
         let density = || softness.density(phi.clone(), x.clone());
         let hazard = || softness.hazard(phi.clone(), x.clone());
         match self {
-            Self::Probabilistic => (q(), hazard()),
+            Self::Probabilistic => softness.depth_and_hazard(phi, x).into(),
             Self::Einstein => {
                 let s = s();
                 let slope = (hazard() + density() / (s.clone() + 1.0)) * 0.5;

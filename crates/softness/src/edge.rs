@@ -60,6 +60,15 @@ impl Softness for EdgeSoftness {
         self.by_distance(hazard, x)
     });
 
+    fn depth_and_hazard<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        let [depth, hazard] = self.family.depth_and_hazard(phi, self.argument(x.clone()));
+        [depth, self.by_distance(hazard, x)]
+    }
+
     fn parameters(&self) -> usize {
         self.family.parameters()
     }

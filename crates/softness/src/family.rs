@@ -69,6 +69,14 @@ impl Softness for Family {
     curve!(self.optical_depth(phi, x) => families!(dispatch self.optical_depth(phi, x)));
     curve!(self.hazard(phi, x) => families!(dispatch self.hazard(phi, x)));
 
+    fn depth_and_hazard<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        families!(dispatch self.depth_and_hazard(phi, x))
+    }
+
     fn default_phi(&self, scale: f64) -> Vec<f64> {
         families!(dispatch self.default_phi(scale))
     }

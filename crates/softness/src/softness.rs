@@ -84,6 +84,17 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         slope(x, |x| self.optical_depth::<Autodiff<B>, D>(Tensor::from_inner(phi), x))
     }
 
+    /// Optical depth and hazard, each of the shape of `x`: what the table of a silhouette needs of every knot.
+    ///
+    /// Provided: one after the other. Override it where both share most of their work.
+    fn depth_and_hazard<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        [self.optical_depth(phi.clone(), x.clone()), self.hazard(phi, x)]
+    }
+
     /// Parameters to start from; `scale` is in the unit of x. Provided: its logarithm, then 0.
     ///
     /// # Panics

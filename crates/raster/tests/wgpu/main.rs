@@ -16,7 +16,7 @@ use burn::{
 };
 use products::{Path, Products, Scene, tensor};
 use softrast_mesh::{Mesh, fox, icosphere};
-use softrast_raster::{Rasterizer, Wgpu, adapter_name, project};
+use softrast_raster::{ImageSize, Rasterizer, Wgpu, adapter_name, project};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 
 /// Says which adapter the test runs on, or that it does not.
@@ -32,9 +32,9 @@ fn adapter() -> bool {
 fn seen(
     mesh: &Mesh,
     (elevation, azimuths): (f64, &[f64]),
-    size: usize,
+    size: impl Into<ImageSize>,
     softness: EdgeSoftness,
-    scale: f64,
+    scales: &[f64],
 ) -> Scene {
     let positions = mesh.positions();
     let world: Tensor<NdArray<f64>, 3> =
@@ -45,9 +45,9 @@ fn seen(
         vertices: project(world, orbits).into_data().iter().collect(),
         views: azimuths.len(),
         faces: mesh.faces().into(),
-        size,
+        size: size.into(),
         softness,
-        scale,
+        scales: scales.to_vec(),
     }
 }
 
@@ -63,7 +63,7 @@ fn random(softness: EdgeSoftness, scale: f64) -> Scene {
         sliver[6] += 0.03;
         sliver[7] -= 0.02;
     }
-    Scene { vertices, views: 1, faces, size: 12, softness, scale }
+    Scene { vertices, views: 1, faces, size: 12.into(), softness, scales: vec![scale] }
 }
 
 #[test]
@@ -105,11 +105,22 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
         return;
     }
     let squared = EdgeSoftness { family: Family::Logistic, squared: true };
-    let sphere = seen(&icosphere(2), (17.3, &[4.1, 108.3, 211.9]), 32, squared, 1e-3);
-    let fox = seen(&fox(), (17.3, &[171.7]), 50, squared, 1e-3);
+    let sphere = seen(&icosphere(2), (17.3, &[4.1, 108.3, 211.9]), 32, squared, &[1e-3]);
+    let fox = seen(&fox(), (17.3, &[171.7]), 50, squared, &[1e-3]);
     // A tail that is not 0 on the far side.
     let tail = random(EdgeSoftness { family: Family::Mlp, squared: false }, 0.05);
-    for (name, scene) in [("a sphere", sphere), ("a fox", fox), ("a tail", tail)] {
+    // No squares, and a softness of each view.
+    let (azimuths, scales) = ([4.1, 108.3, 211.9], [1e-3, 2e-3, 5e-4]);
+    let [low, high] = [[20, 43], [51, 30]]
+        .map(|size| seen(&icosphere(2), (17.3, &azimuths), size, squared, &scales));
+    let scenes = [
+        ("a sphere", sphere),
+        ("a fox", fox),
+        ("a tail", tail),
+        ("a low image", low),
+        ("a high image", high),
+    ];
+    for (name, scene) in scenes {
         let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
         let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);
         found.assert_close(&expected, name);
@@ -146,7 +157,7 @@ fn the_same_numbers_come_out_every_time() {
         return;
     }
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let scene = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
+    let scene = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, &[0.02]);
     let [first, second] = [(); 2].map(|()| Products::new::<Wgpu>(&scene, DType::F32, Path::Fused));
     assert_eq!(first, second);
 }

@@ -6,7 +6,7 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor, TensorData, backend::Backend},
 };
-use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
+use softrast_raster::{ImageSize, RasterBackend, Rasterizer, TConorm, reference};
 use softrast_softness::{EdgeSoftness, Softness};
 
 /// What is drawn, and how softly.
@@ -15,9 +15,10 @@ pub(crate) struct Scene {
     pub(crate) vertices: Vec<f64>,
     pub(crate) views: usize,
     pub(crate) faces: Arc<[[u32; 3]]>,
-    pub(crate) size: usize,
+    pub(crate) size: ImageSize,
     pub(crate) softness: EdgeSoftness,
-    pub(crate) scale: f64,
+    /// Of each view, or of all.
+    pub(crate) scales: Vec<f64>,
 }
 
 /// Who draws it, and what beside the vertices is an input.
@@ -64,13 +65,19 @@ impl Products {
     pub(crate) fn new<T: RasterBackend>(scene: &Scene, dtype: DType, path: Path) -> Self {
         let Scene { views, size, softness, .. } = *scene;
         let count = scene.vertices.len() / 3 / views;
-        let phi = softness.default_phi(scene.scale);
+        let phis: Vec<_> = scene.scales.iter().map(|&scale| softness.default_phi(scale)).collect();
+        let phi = phis[0].clone();
         // Far below what is asked for, and the same on every backend.
         let rasterizer = Rasterizer { tolerance: 1e-7, ..Rasterizer::new(size) };
-        let exact = |phi: &[f64]| tensor::<NdArray<f64>, 1>(phi, [phi.len()], DType::F64);
-        let silhouette = rasterizer.prepare(&scene.faces, softness, &exact(&phi));
-        let table = numbers(silhouette.table(exact(&phi)));
-        let wider = numbers(silhouette.table(exact(&softness.default_phi(1.01 * scene.scale))));
+        let exact = |phis: &[f64]| {
+            tensor::<NdArray<f64>, 2>(phis, [scene.scales.len(), phi.len()], DType::F64)
+        };
+        let silhouette = rasterizer.prepare_by_view(&scene.faces, softness, &exact(&phis.concat()));
+        let of_scales = |factor: f64| {
+            let phis = scene.scales.iter().flat_map(|scale| softness.default_phi(factor * scale));
+            numbers(silhouette.table_by_view(exact(&phis.collect::<Vec<f64>>())))
+        };
+        let (table, wider) = (of_scales(1.0), of_scales(1.01));
         let (other_values, along) = match path {
             Path::Table => (&table, wider.iter().zip(&table).map(|(b, a)| b - a).collect()),
             _ => (&phi, vec![1.0; phi.len()]),
@@ -85,7 +92,12 @@ impl Products {
         let image = match path {
             Path::Fused => silhouette.coverage(shaped, other.clone()),
             Path::Table => {
-                silhouette.coverage_by_table(shaped, other.clone().reshape([table.len() / 4, 4]))
+                let rows = table.len() / 4 / scene.scales.len();
+                let tables = other.clone().reshape([scene.scales.len(), rows, 4]);
+                match scene.scales.len() {
+                    1 => silhouette.coverage_by_table(shaped, tables.squeeze_dim::<2>(0)),
+                    _ => silhouette.coverage_by_table(shaped, tables),
+                }
             }
             Path::Reference => {
                 let t_conorm = TConorm::Probabilistic;
@@ -94,8 +106,9 @@ impl Products {
                 t_conorm.coverage(sums)
             }
         };
-        let weights: Vec<f64> = (0..views * size * size).map(|i| (0.37 * i as f64).sin()).collect();
-        let weights = tensor(&weights, [views, size, size], dtype);
+        let weights: Vec<f64> =
+            (0..views * size.pixels()).map(|i| (0.37 * i as f64).sin()).collect();
+        let weights = tensor(&weights, [views, size.height, size.width], dtype);
         let plain = numbers(image.clone());
         let grads = (image.clone() * image * weights).sum().backward();
         let to_vertices = vertices.grad(&grads).expect("a gradient to the vertices");
@@ -110,7 +123,9 @@ impl Products {
         let mut products = vec![numbers(to_vertices), numbers(to_other), numbers(mixed)];
         if path == Path::Table {
             for product in &mut products[1..] {
-                *product = vec![product.iter().zip(&along).map(|(g, x)| g * x).sum()];
+                let rows = along.len() / scene.scales.len();
+                let of_view = |(g, x): (&[f64], &[f64])| g.iter().zip(x).map(|(g, x)| g * x).sum();
+                *product = product.chunks(rows).zip(along.chunks(rows)).map(of_view).collect();
             }
         }
         if path == Path::Table {

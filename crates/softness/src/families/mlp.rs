@@ -31,10 +31,13 @@ fn linear<B: Backend>((h, dh): Dual<B>, weight: Tensor<B, 2>) -> Dual<B> {
 }
 
 fn tanh<B: Backend>((h, dh): Dual<B>) -> Dual<B> {
-    // sech² from exp(-2 |h|): 1 - tanh² has no digits left where the unit saturates.
-    let decay = (magnitude(h.clone()) * -2.0).exp();
+    // Both from exp(-2 |h|): 1 - tanh² has no digits left where the unit saturates.
+    let below = h.clone().lower_elem(0.0);
+    let decay = (magnitude(h) * -2.0).exp();
     let upper = (decay.clone() + 1.0).recip();
-    (h.tanh(), dh * decay * upper.clone() * upper * 4.0)
+    let size = (decay.clone().neg() + 1.0) * upper.clone();
+    let value = size.clone().mask_where(below, size.neg());
+    (value, dh * decay * upper.clone() * upper * 4.0)
 }
 
 impl Mlp {
@@ -103,7 +106,16 @@ impl Softness for Mlp {
 
     curve!(self.optical_depth(phi, x) => Logistic::depth(Self::logit(&phi, x)));
     curve!(self.hazard(phi, x) => {
-        let (logit, slope) = Self::logit_and_slope(&phi, x);
-        Logistic::depth_slope(logit) * slope
+        let [_, hazard] = self.depth_and_hazard(phi, x);
+        hazard
     });
+
+    fn depth_and_hazard<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        let (logit, slope) = Self::logit_and_slope(&phi, x);
+        [Logistic::depth(logit.clone()), Logistic::depth_slope(logit) * slope]
+    }
 }
