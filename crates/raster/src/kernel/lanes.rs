@@ -37,8 +37,10 @@ pub(crate) trait Lanes:
     /// Whole numbers.
     type Index: Copy;
     /// Whether this needs AVX2.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     const NEEDS_AVX2: bool;
     /// Whether what uses this is compiled for machines with AVX2 as well.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     const GAINS_AVX2: bool;
 
     /// The same number in all lanes.
@@ -105,6 +107,7 @@ pub(crate) struct Places {
     /// Each below `rows`.
     at: [u32; LANES],
     /// What the table has at least.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     rows: usize,
 }
 
