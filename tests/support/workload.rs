@@ -17,7 +17,7 @@ const SCALE: f64 = 1e-4;
 /// Distance (world units), elevation and field of view (degrees) of every camera.
 const CAMERA: [f64; 3] = [2.732, 0.0, 60.0];
 /// Centre and radius of the disk that images are compared with, in NDC.
-const DISK: ([f64; 2], f64) = ([-0.1, 0.05], 0.5);
+const DISK: ([f64; 2], f64) = ([0.1, 0.05], 0.5);
 
 /// A mesh seen from several sides, compared with the image of a disk.
 #[derive(Clone, Debug)]

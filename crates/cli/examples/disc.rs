@@ -7,7 +7,9 @@ use std::{process::ExitCode, sync::Arc};
 use burn::tensor::Tensor;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::{Map, json};
-use softrast_cli::{Description, EdgeChoice, Measures, Scales, Schedule, Task, Variant, theta_of};
+use softrast_cli::{
+    Description, EdgeChoice, Measures, NoArgs, Scales, Schedule, Task, Variant, theta_of,
+};
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, Targets};
 use softrast_mesh::icosphere;
 use softrast_meta::{numbers, tensor};
@@ -125,6 +127,7 @@ impl Task for Disc {
     const ABOUT: &'static str = "Moves a ball until its silhouette is where it should be";
     const SCALES: Scales = Scales { schedule: Schedule::Static, decay: [0.1, 0.02], fixed: 0.05 };
     type Args = Args;
+    type Pictures = NoArgs;
 
     fn new(args: &Args, _variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
         let ball = icosphere(1);

@@ -8,16 +8,16 @@ use crate::{Common, MethodArgs, learn_args::LearnArgs};
 /// Everything on the command line of a task.
 #[derive(Debug, Parser)]
 #[command(subcommand_required = true)]
-pub(crate) struct CommandLine<A: Args> {
+pub(crate) struct CommandLine<A: Args, P: Args> {
     #[command(subcommand)]
-    pub(crate) command: Command<A>,
+    pub(crate) command: Command<A, P>,
 }
 
 /// What a program can be asked to do; `solve` if nothing else is said.
 #[derive(Clone, Debug, Subcommand)]
-pub(crate) enum Command<A: Args> {
+pub(crate) enum Command<A: Args, P: Args> {
     /// Solve one instance and show it; what is done where no command is named
-    Solve(Solve<A>),
+    Solve(Box<Solve<A, P>>),
     /// Solve many seeds and give means with confidence intervals
     Evaluate(Evaluate<A>),
     /// Find the best scale and learning rate on training seeds, then evaluate them on others
@@ -28,11 +28,11 @@ pub(crate) enum Command<A: Args> {
     Learn(Learn<A>),
 }
 
-impl<A: Args> Command<A> {
+impl<A: Args, P: Args> Command<A, P> {
     /// Its name, and the flags that every command has.
     pub(crate) fn shared(&self) -> (&'static str, &Shared<A>) {
         match self {
-            Self::Solve(Solve { shared, .. }) => ("solve", shared),
+            Self::Solve(solve) => ("solve", &solve.shared),
             Self::Evaluate(Evaluate { shared, .. }) => ("evaluate", shared),
             Self::Search(Search { shared, .. }) => ("search", shared),
             Self::Choose(Choose { shared, .. }) => ("choose", shared),
@@ -53,7 +53,9 @@ pub(crate) struct Shared<A: Args> {
 }
 
 #[derive(Args, Clone, Debug)]
-pub(crate) struct Solve<A: Args> {
+pub(crate) struct Solve<A: Args, P: Args> {
+    #[command(flatten)]
+    pub(crate) pictures: P,
     #[command(flatten)]
     pub(crate) shared: Shared<A>,
     #[command(flatten)]

@@ -11,6 +11,7 @@ mod commands;
 mod diagnostics;
 mod experiment;
 mod flags;
+mod given;
 mod learn_args;
 mod learned_charts;
 mod method;
@@ -27,6 +28,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pub use experiment::{Purpose, TaskExperiment, backend};
 pub use flags::{Common, Init, MethodArgs, Schedule, SoftnessChoice, Variant, usual_args};
+pub use given::{Answer, Given, seen_by};
 use method::learned_name;
 pub use method::{Scales, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};

@@ -28,12 +28,12 @@ pub fn main<T: Task>() -> ExitCode {
 /// was touched then. What a user who stops it has finished is written and printed before, as partial.
 pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let words = with_command::<T>(words);
-    let command = CommandLine::<T::Args>::command()
+    let command = CommandLine::<T::Args, T::Pictures>::command()
         .name(T::NAME)
         .version(env!("CARGO_PKG_VERSION"))
         .about(T::ABOUT)
         .after_help("Without a command: solve. `COMMAND --help` lists the flags of a command.");
-    let line = parse::<CommandLine<T::Args>>(command.clone(), &words, stdout);
+    let line = parse::<CommandLine<T::Args, T::Pictures>>(command.clone(), &words, stdout);
     let Some(line) = line.map_err(|failure| with_owner(failure, &command))? else {
         return Ok(());
     };
@@ -42,7 +42,7 @@ pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<
     let out = out.clone().unwrap_or_else(|| PathBuf::from("out").join(T::NAME));
     let session = Session { again: repeated(T::NAME, &words), command, task: T::NAME, out, quiet };
     let output = match line.command {
-        Command::Solve(flags) => commands::evaluate::solve::<T>(&session, flags)?,
+        Command::Solve(flags) => commands::evaluate::solve::<T>(&session, *flags)?,
         Command::Evaluate(flags) => commands::evaluate::evaluate::<T>(&session, flags)?,
         Command::Search(flags) => commands::search::search::<T>(&session, flags)?,
         Command::Choose(flags) => commands::choose::choose::<T>(&session, flags)?,
@@ -71,7 +71,7 @@ fn with_owner(mut failure: Failure, command: &clap::Command) -> Failure {
 /// The words with `solve` in them if they name no command.
 fn with_command<T: Task>(mut words: Vec<OsString>) -> Vec<OsString> {
     let general = ["-h", "--help", "-V", "--version", "help"];
-    let command = CommandLine::<T::Args>::command();
+    let command = CommandLine::<T::Args, T::Pictures>::command();
     let known = |word: &str| general.contains(&word) || command.find_subcommand(word).is_some();
     let named = words.get(1).and_then(|word| word.to_str()).is_some_and(known);
     if !named {

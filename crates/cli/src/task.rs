@@ -6,7 +6,7 @@ use softrast_lab::{Metric, Role, plot::Plot, rgb_from_gray};
 use softrast_raster::HostBackend;
 use softrast_softness::Family;
 
-use crate::{Paper, Scales, Schedule, Variant};
+use crate::{Answer, Given, Paper, Scales, Schedule, Variant};
 
 /// An [`InverseProblem`] that has a program: what it is called, which flags it has, how results are measured and shown.
 pub trait Task: InverseProblem + Sized {
@@ -30,6 +30,17 @@ pub trait Task: InverseProblem + Sized {
 
     /// Flags that only this task has; [`NoArgs`] for none.
     type Args: clap::Args + Clone;
+
+    /// Flags of `solve` for pictures that the user gives; [`NoArgs`] where it takes none.
+    type Pictures: clap::Args + Clone;
+
+    /// What comes of the pictures that the flags name; nothing if they name none.
+    fn solve_given(
+        _given: &Given<'_, Self>,
+        _pictures: &Self::Pictures,
+    ) -> Option<anyhow::Result<Answer>> {
+        None
+    }
 
     /// The task in a variant. `edges` are there for what follows from their softness, as that of depths.
     ///

@@ -41,6 +41,7 @@ mod problem;
 mod renderer;
 mod resolution;
 mod targets;
+mod view;
 
 pub use checkpoint::Checkpoint;
 pub use distilled_mlp::{distilled_mlp, mlp_like};
@@ -57,6 +58,7 @@ pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
 pub use targets::Targets;
+pub use view::{Lens, View, camera_json, load_pose, load_views, mask_iou, silhouette_pixels};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -3,9 +3,10 @@ use std::path::Path;
 use anyhow::{Context, ensure};
 use burn::tensor::{Tensor, backend::Backend};
 use image::{DynamicImage, GrayImage, Luma, LumaA};
+use softrast_raster::ImageSize;
 use softrast_softness::{numbers, tensor_on};
 
-/// A gray picture of any size, to be seen as a square image: a target for silhouettes.
+/// A gray picture of any size: a target for silhouettes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// From 0 to 1, row by row from the top.
@@ -36,6 +37,79 @@ impl Picture {
         Ok(Self::of(&open(path.as_ref())?, level))
     }
 
+    /// Height and width in pixels.
+    pub fn size(&self) -> ImageSize {
+        [self.levels.len() / self.width, self.width].into()
+    }
+
+    /// All pixels, row by row from the top.
+    pub fn pixels(&self) -> &[f64] {
+        &self.levels
+    }
+
+    /// With black for white.
+    #[must_use]
+    pub fn inverted(self) -> Self {
+        Self { levels: self.levels.iter().map(|level| 1.0 - level).collect(), ..self }
+    }
+
+    /// White from this level on, black below.
+    #[must_use]
+    pub fn thresholded(self, level: f64) -> Self {
+        let levels = self.levels.iter().map(|&x| f64::from(u8::from(x >= level))).collect();
+        Self { levels, ..self }
+    }
+
+    /// Without specks: a pixel that is white or black among mostly others becomes as they are.
+    #[must_use]
+    pub fn despeckled(&self) -> Self {
+        let (width, height) = (self.width, self.levels.len() / self.width);
+        let majority = |k: usize| {
+            let (x, y) = (k % width, k / width);
+            let around = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+            let all = around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x));
+            let (sum, count) =
+                all.fold((0.0, 0.0), |(sum, count), k| (sum + self.levels[k], count + 1.0));
+            let most = sum >= 0.5 * count;
+            if (self.levels[k] >= 0.5) == most { self.levels[k] } else { f64::from(u8::from(most)) }
+        };
+        Self { levels: (0..self.levels.len()).map(majority).collect(), width }
+    }
+
+    /// The least square around all that is at least half white, in the middle of it: its left, its top and its extent in pixels. None if
+    /// there is nothing.
+    ///
+    /// A pixel counts if most of the nine around it are white too, unless none is like that: specks do not.
+    pub fn square(&self) -> Option<[f64; 3]> {
+        let height = self.levels.len() / self.width;
+        let white = |x: usize, y: usize| {
+            x < self.width && y < height && self.levels[y * self.width + x] >= 0.5
+        };
+        let firmly = |[x, y]: &[usize; 2]| {
+            let around = (0..9).map(|k| ((x + k % 3).wrapping_sub(1), (y + k / 3).wrapping_sub(1)));
+            around.filter(|&(x, y)| white(x, y)).count() >= 5
+        };
+        let all = || {
+            let pixels = (0..self.levels.len()).map(|k| [k % self.width, k / self.width]);
+            pixels.filter(|&[x, y]| white(x, y))
+        };
+        let [low, high] = bounds(all().filter(firmly)).or_else(|| bounds(all()))?;
+        let extent = [0, 1].map(|k| (high[k] - low[k] + 1) as f64);
+        let longest = extent[0].max(extent[1]);
+        let corner = [0, 1].map(|k| low[k] as f64 + (extent[k] - longest) / 2.0);
+        Some([corner[0], corner[1], longest])
+    }
+
+    /// A square of it, given by its left, its top and its extent in pixels, on `side` × `side` pixels: the mean of the picture over the
+    /// area of each, black outside, and how much of each the picture covers.
+    pub fn part(&self, [left, top, extent]: [f64; 3], side: usize) -> [Vec<f64>; 2] {
+        let (height, cell) = (self.levels.len() / self.width, extent / side as f64);
+        let columns = shares(self.width, left, cell, side);
+        let rows = shares(height, top, cell, side);
+        let mean = |level: &dyn Fn(usize) -> f64| means(&columns, &rows, self.width, level);
+        [mean(&|at| self.levels[at]), mean(&|_| 1.0)]
+    }
+
     fn of(picture: &DynamicImage, level: impl Fn(&LumaA<u16>) -> f64) -> Self {
         let levels = picture.to_luma_alpha16().pixels().map(level).collect();
         Self { levels, width: picture.width() as usize }
@@ -45,7 +119,11 @@ impl Picture {
     ///
     /// The longer side of a picture takes up the whole image; the rest is black. Each pixel is the mean of the picture over its area.
     pub fn levels(&self, size: usize) -> Vec<f64> {
-        resized(&self.levels, self.width, size)
+        let (width, height) = (self.width as f64, (self.levels.len() / self.width) as f64);
+        let longest = width.max(height);
+        let (left, top) = ((width - longest) / 2.0, (height - longest) / 2.0);
+        let [levels, _] = self.part([left, top, longest], size);
+        levels
     }
 
     /// The same as a tensor, `[1, size, size]`.
@@ -84,32 +162,43 @@ fn open(path: &Path) -> anyhow::Result<DynamicImage> {
         .with_context(|| format!("{} is no picture that can be read", path.display()))
 }
 
-fn resized(levels: &[f64], width: usize, size: usize) -> Vec<f64> {
-    let height = levels.len() / width;
-    let longest = width.max(height) as f64;
-    let (columns, rows) = (shares(width, longest, size), shares(height, longest, size));
-    let pixel = |pixel: usize| {
-        let (column, row) = (&columns[pixel % size], &rows[pixel / size]);
+/// Least and largest of places, along each axis.
+fn bounds(mut places: impl Iterator<Item = [usize; 2]>) -> Option<[[usize; 2]; 2]> {
+    let first = places.next()?;
+    Some(places.fold([first; 2], |[low, high], at| {
+        [[0, 1].map(|k| low[k].min(at[k])), [0, 1].map(|k| high[k].max(at[k]))]
+    }))
+}
+
+/// Means over cells, row by row, of what a picture of this width has at each place.
+fn means(
+    columns: &[Shares],
+    rows: &[Shares],
+    width: usize,
+    level: impl Fn(usize) -> f64,
+) -> Vec<f64> {
+    let cells = rows.iter().flat_map(|row| columns.iter().map(move |column| (row, column)));
+    let mean = |(row, column): (&Shares, &Shares)| {
         let along = |&(y, share): &(usize, f64)| {
-            share * column.iter().map(|&(x, part)| part * levels[y * width + x]).sum::<f64>()
+            share * column.iter().map(|&(x, part)| part * level(y * width + x)).sum::<f64>()
         };
         row.iter().map(along).sum()
     };
-    (0..size * size).map(pixel).collect()
+    cells.map(mean).collect()
 }
 
-/// For each of `size` cells which of `count` picture elements it holds, and what share of the cell
-/// they fill. The elements sit in the middle of `longest`, which the cells share evenly.
-fn shares(count: usize, longest: f64, size: usize) -> Vec<Vec<(usize, f64)>> {
-    let cell = longest / size as f64;
-    let margin = (longest - count as f64) / 2.0;
+/// Which picture elements a cell holds, and what share of it they fill.
+type Shares = Vec<(usize, f64)>;
+
+/// The shares of cells of this length, of which the first begins at `from`, in `count` picture elements of length 1 from 0 on.
+fn shares(count: usize, from: f64, cell: f64, cells: usize) -> Vec<Shares> {
     let of_cell = |k: usize| {
-        let (from, to) = (k as f64 * cell - margin, (k + 1) as f64 * cell - margin);
+        let (from, to) = (from + k as f64 * cell, from + (k + 1) as f64 * cell);
         let (first, last) = (from.max(0.0) as usize, (to.max(0.0).ceil() as usize).min(count));
         let share = |x: usize| ((x + 1) as f64).min(to) - (x as f64).max(from);
         (first..last).map(|x| (x, share(x) / cell)).filter(|&(_, share)| share > 0.0).collect()
     };
-    (0..size).map(of_cell).collect()
+    (0..cells).map(of_cell).collect()
 }
 
 #[cfg(test)]
@@ -146,6 +235,23 @@ mod tests {
         let expected: Vec<f64> =
             (0..16).map(|k| f64::from(u8::from((4..12).contains(&k)))).collect();
         assert_close(&luminance_of(picture, 4), &expected);
+    }
+
+    #[test]
+    fn a_part_is_black_where_it_leaves_the_picture_and_says_how_much_of_it_does() {
+        let levels = vec![0.0, 0.0, 0.0, 1.0, 1.0, 0.0];
+        let picture = Picture { levels, width: 3 };
+        assert_eq!(picture.square(), Some([0.0, 0.5, 2.0]));
+        let [levels, covered] = picture.part([0.0, 0.5, 2.0], 2);
+        assert_close(&levels, &[0.5, 0.5, 0.5, 0.5]);
+        assert_close(&covered, &[1.0, 1.0, 0.5, 0.5]);
+        let speckled =
+            |x, y| Luma([if x * y == 36 || (x > 1 && x < 5 && y < 5) { 255 } else { 0 }]);
+        let speckled =
+            Picture::of(&GrayImage::from_fn(9, 9, speckled).into(), |p| f64::from(p.0[0]));
+        assert_eq!(speckled.square(), Some([1.0, 0.0, 5.0]));
+        assert_eq!(picture.clone().thresholded(2.0).square(), None);
+        assert_eq!(picture.inverted().square(), Some([0.0, -0.5, 3.0]));
     }
 
     #[test]

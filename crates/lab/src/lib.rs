@@ -3,9 +3,9 @@
 //! An [`Experiment`] is something that can be run on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same
 //! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. A [`Sweep`](sweep::Sweep) tries a
 //! grid, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
-//! [`report::Report`] writes pages.
+//! [`report::Report`] writes pages, on which a [`Viewer`] turns a mesh.
 //!
-//! Nothing here knows of rendering: it sees seeds, numbers and RGB images.
+//! Nothing here knows of rendering: it sees seeds, numbers, RGB images, and meshes as plain numbers.
 
 mod axis;
 mod cache;
@@ -31,6 +31,7 @@ mod statistics;
 mod summary;
 /// Grid search.
 pub mod sweep;
+mod viewer;
 
 pub use cache::Cache;
 pub use comparison::{Comparison, paired};
@@ -39,9 +40,12 @@ pub use evaluate::{Evaluation, Runner, seeds, was_interrupted};
 pub use files::{OutputFolder, write_atomically};
 pub use machine::{machine, peak_rss_mib};
 pub use metric::{Metric, Role, place};
-pub use picture::{Encoded, contact_sheet, difference, png, rgb_from_gray, rgb_from_planes};
+pub use picture::{
+    Encoded, contact_sheet, difference, overlay, png, rgb_from_gray, rgb_from_planes,
+};
 pub use progress::{Progress, stop_on_ctrl_c};
 pub use run::{Batch, Experiment, Pictures, Point, Run, best_point};
 pub use statistics::{mean, mean_interval, median, quantile, wilson_interval};
 pub use summary::{Partial, Summary, headline};
 pub use sweep::check_held_out;
+pub use viewer::{Viewer, ViewerView};

@@ -183,9 +183,39 @@ mod as_base64 {
     }
 }
 
+/// A silhouette over a mask of the same shape, row by row, from 0 to 1: grey where both are, orange where only the mask is, blue where only
+/// the silhouette is.
+///
+/// # Panics
+///
+/// If they have no pixels or differ in number.
+pub fn overlay(silhouette: &[f64], mask: &[f64], width: usize) -> RgbImage {
+    const BOTH: [f64; 3] = [150.0, 160.0, 170.0];
+    const MASK: [f64; 3] = [240.0, 130.0, 20.0];
+    const SILHOUETTE: [f64; 3] = [30.0, 110.0, 220.0];
+    assert_eq!(silhouette.len(), mask.len(), "a silhouette and a mask of different size");
+    RgbImage::from_fn(width as u32, (mask.len() / width) as u32, |x, y| {
+        let pixel = y as usize * width + x as usize;
+        let [drawn, mask] = [silhouette[pixel], mask[pixel]].map(|level| level.clamp(0.0, 1.0));
+        Rgb([0, 1, 2].map(|k| {
+            let with = drawn * BOTH[k] + (1.0 - drawn) * MASK[k];
+            let without = drawn * SILHOUETTE[k] + (1.0 - drawn) * 250.0;
+            (mask * with + (1.0 - mask) * without).round() as u8
+        }))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_overlay_tells_apart_what_both_and_what_only_one_of_them_has() {
+        let image = overlay(&[1.0, 1.0, 0.0, 0.0], &[1.0, 0.0, 1.0, 0.0], 2);
+        let at = |x, y| image.get_pixel(x, y).0;
+        assert_eq!([at(0, 0), at(1, 0)], [[150, 160, 170], [30, 110, 220]]);
+        assert_eq!([at(0, 1), at(1, 1)], [[240, 130, 20], [250; 3]]);
+    }
 
     fn plain(width: u32, height: u32, level: u8) -> RgbImage {
         RgbImage::from_pixel(width, height, Rgb([level; 3]))

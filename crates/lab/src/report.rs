@@ -4,18 +4,21 @@ use std::fmt::Write;
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 
+use crate::viewer;
+
 /// A page that grows section by section.
 #[derive(Clone, Debug)]
 pub struct Report {
     title: String,
     about: String,
     body: String,
+    pub(crate) has_viewer: bool,
 }
 
 impl Report {
     /// An empty page; `about` is what it is about, in a line without a full stop.
     pub fn new(title: &str, about: &str) -> Self {
-        Self { title: escape(title), about: escape(about), body: String::new() }
+        Self { title: escape(title), about: escape(about), body: String::new(), has_viewer: false }
     }
 
     /// A heading.
@@ -75,21 +78,21 @@ impl Report {
 
     /// A picture, PNG or GIF, with what is to be seen in it.
     pub fn picture(&mut self, bytes: &[u8], caption: &str) {
-        let kind = if bytes.starts_with(b"GIF") { "gif" } else { "png" };
-        let (data, caption) = (STANDARD.encode(bytes), escape(caption));
-        // The caption stands for the picture to those who cannot see it.
-        let image = format!("<img alt=\"{caption}\" src=\"data:image/{kind};base64,{data}\">");
-        self.figure(&image, &caption);
+        self.figure(&image(bytes, caption), &escape(caption));
     }
 
-    fn figure(&mut self, content: &str, caption: &str) {
+    /// `content` and `caption` are HTML.
+    pub(crate) fn figure(&mut self, content: &str, caption: &str) {
         self.add(format!("<figure>\n{content}\n<figcaption>{caption}</figcaption>\n</figure>"));
     }
 
     /// The page. `command` makes it again, `beside` says what lies beside it.
     pub fn finish(self, command: &str, beside: &str) -> String {
-        let Self { title, about, body } = self;
+        let Self { title, about, body, has_viewer } = self;
         let [command, beside] = [command, beside].map(escape);
+        let viewer_style = if has_viewer { viewer::STYLE } else { "" };
+        let script = format!("<script>\n{}</script>\n", viewer::SCRIPT);
+        let script = if has_viewer { &script } else { "" };
         format!(
             "<!DOCTYPE html>
 <html lang=\"en\">
@@ -97,7 +100,7 @@ impl Report {
 <meta charset=\"utf-8\">
 <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">
 <title>{title}: softrast report</title>
-<style>{STYLE}</style>
+<style>{STYLE}{viewer_style}</style>
 </head>
 <body>
 <h1>{title}</h1>
@@ -105,7 +108,7 @@ impl Report {
 {body}<h2>Run it again</h2>
 <pre>{command}</pre>
 <p class=\"note\">Beside this page: {beside}.</p>
-</body>
+{script}</body>
 </html>
 "
         )
@@ -118,11 +121,11 @@ impl Report {
 }
 
 const STYLE: &str = "
-body { max-width: 56rem; margin: 2rem auto 4rem; padding: 0 1rem; color: #1f2328;
+body { overflow-wrap: anywhere; max-width: 56rem; margin: 2rem auto 4rem; padding: 0 1rem; color: #1f2328;
   background: #fff; font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', sans-serif; }
 h1 { margin-bottom: 0; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #d8dee4; }
 .about { margin-top: 0; font-size: 1.15rem; color: #57606a; }
-table { border-collapse: collapse; } th, td { padding: .3rem .9rem .3rem 0; text-align: left; }
+table { border-collapse: collapse; display: block; overflow-x: auto; } th, td { overflow-wrap: normal; padding: .3rem .9rem .3rem 0; text-align: left; }
 tr { border-bottom: 1px solid #eaeef2; } th { color: #57606a; font-weight: 600; }
 td.number { text-align: right; font-variant-numeric: tabular-nums; }
 td[style] { padding: .3rem .6rem; }
@@ -134,8 +137,15 @@ pre { background: #f6f8fa; padding: .7rem .9rem; overflow-x: auto; }
 summary { cursor: pointer; }
 ";
 
+/// A picture, PNG or GIF, as an element. The caption stands for it to those who cannot see it.
+pub(crate) fn image(bytes: &[u8], caption: &str) -> String {
+    let kind = if bytes.starts_with(b"GIF") { "gif" } else { "png" };
+    let (data, caption) = (STANDARD.encode(bytes), escape(caption));
+    format!("<img alt=\"{caption}\" src=\"data:image/{kind};base64,{data}\">")
+}
+
 /// Text as HTML.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let text = text.replace('&', "&amp;").replace('<', "&lt;");
     text.replace('>', "&gt;").replace('"', "&quot;")
 }

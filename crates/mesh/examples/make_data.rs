@@ -7,7 +7,7 @@ use softrast_mesh::{airplane, chair, fox};
 fn main() -> Result<(), softrast_mesh::MeshError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/meshes");
     for (name, mesh) in [("fox", fox()), ("airplane", airplane()), ("chair", chair())] {
-        mesh.write_obj(folder.join(name).with_extension("obj"))?;
+        mesh.save(folder.join(name).with_extension("obj"))?;
     }
     Ok(())
 }

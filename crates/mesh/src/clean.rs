@@ -1,6 +1,11 @@
 //! Checks an OBJ file line by line, and keeps what a plain parser needs.
 
-use crate::{LineError, MeshError, mesh::fits_f32, statements::statements};
+use crate::{
+    Fault,
+    error::{Trouble, shown},
+    mesh::fits_f32,
+    statements::statements,
+};
 
 /// Text of an OBJ file that holds nothing but sound vertices and faces.
 ///
@@ -15,7 +20,7 @@ pub(crate) struct Clean {
 ///
 /// Only `v` and `f` matter, in lower case; of a vertex only the first three numbers, of a corner
 /// only the field before the first slash. Other statements are skipped, so no material is opened.
-pub(crate) fn clean(bytes: &[u8], name: &str) -> Result<Clean, MeshError> {
+pub(crate) fn clean(bytes: &[u8]) -> Result<Clean, Trouble> {
     // A face may come before its vertices, so their number must be known first.
     let vertices = statements(bytes).filter(|s| s.words().next() == Some("v")).count();
     let (mut text, mut vertices_read, mut faces) = (String::new(), 0, 0);
@@ -33,28 +38,28 @@ pub(crate) fn clean(bytes: &[u8], name: &str) -> Result<Clean, MeshError> {
             _ => Ok(()),
         };
         let line = statement.line;
-        checked.map_err(|reason| MeshError::Line { name: name.to_owned(), line, reason })?;
+        checked.map_err(|reason| Trouble::Line(line, reason))?;
     }
     if faces == 0 {
-        return Err(MeshError::NoFaces { name: name.to_owned() });
+        return Err(Trouble::NoFaces("an OBJ file lists them on lines that start with f"));
     }
     Ok(Clean { text, vertices })
 }
 
 /// Copies three coordinates to `text`.
-fn vertex<'a>(words: impl Iterator<Item = &'a str>, text: &mut String) -> Result<(), LineError> {
+fn vertex<'a>(words: impl Iterator<Item = &'a str>, text: &mut String) -> Result<(), Fault> {
     text.push('v');
     let mut found = 0;
     for word in words.take(3) {
-        let x: f64 = word.parse().map_err(|_| LineError::Number(shown(word)))?;
+        let x: f64 = word.parse().map_err(|_| Fault::Number(shown(word)))?;
         if !fits_f32(x) {
-            return Err(LineError::NotFinite(shown(word)));
+            return Err(Fault::NotFinite(shown(word)));
         }
         text.extend([" ", word]);
         found += 1;
     }
     text.push('\n');
-    if found == 3 { Ok(()) } else { Err(LineError::Coordinates(found)) }
+    if found == 3 { Ok(()) } else { Err(Fault::Coordinates(found)) }
 }
 
 /// Writes the absolute indices of one polygon to `text`.
@@ -63,7 +68,7 @@ fn face<'a>(
     vertices_read: usize,
     vertices: usize,
     text: &mut String,
-) -> Result<(), LineError> {
+) -> Result<(), Fault> {
     text.push('f');
     let mut found = 0;
     for word in words {
@@ -72,11 +77,11 @@ fn face<'a>(
         found += 1;
     }
     text.push('\n');
-    if found >= 3 { Ok(()) } else { Err(LineError::Corners(found)) }
+    if found >= 3 { Ok(()) } else { Err(Fault::Corners(found)) }
 }
 
 /// The vertex, counted from 1, that a corner such as `7`, `7/1/2`, `7//2` or `-1` means.
-fn absolute(corner: &str, vertices_read: usize, vertices: usize) -> Result<usize, LineError> {
+fn absolute(corner: &str, vertices_read: usize, vertices: usize) -> Result<usize, Fault> {
     let field = corner.split('/').next().unwrap_or(corner);
     let index = || shown(field);
     let (back, digits) = match field.strip_prefix('-') {
@@ -84,24 +89,15 @@ fn absolute(corner: &str, vertices_read: usize, vertices: usize) -> Result<usize
         None => (false, field.strip_prefix('+').unwrap_or(field)),
     };
     if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
-        return Err(LineError::Index(shown(corner)));
+        return Err(Fault::Index(shown(corner)));
     }
     // A number too long for usize is out of range as well.
     let number = digits.parse().unwrap_or(usize::MAX);
     match (back, number) {
         (true, 1..) if number <= vertices_read => Ok(vertices_read - number + 1),
-        (true, 1..) => Err(LineError::TooFarBack { index: index(), before: vertices_read }),
+        (true, 1..) => Err(Fault::TooFarBack { index: index(), before: vertices_read }),
         (false, 1..) if number <= vertices => Ok(number),
-        _ => Err(LineError::OutOfRange { index: index(), vertices }),
-    }
-}
-
-/// A word as an error message shows it: not longer than a line can bear.
-fn shown(word: &str) -> String {
-    const LONGEST: usize = 40;
-    match word.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}...", &word[..end]),
-        None => word.to_owned(),
+        _ => Err(Fault::OutOfRange { index: index(), vertices }),
     }
 }
 
@@ -113,7 +109,7 @@ mod tests {
     fn only_positions_and_absolute_indices_remain() {
         let file = b"o a\nv 1e0 .5 -2 0.1 0.2 0.3\nf 2/9/9 +3// -1\nv 0 0 0 1\nmtllib /dev/zero\n\
             v 1 1 1\nl 1 2\nf -3 -2 -1";
-        let clean = clean(file, "a.obj").unwrap();
+        let Ok(clean) = clean(file) else { panic!("a sound file") };
         assert_eq!(clean.text, "v 1e0 .5 -2\nf 2 3 1\nv 0 0 0\nv 1 1 1\nf 1 2 3\n");
         assert_eq!(clean.vertices, 3);
     }
@@ -134,8 +130,8 @@ mod tests {
             ("v 0 0 -inf", "a.obj:1: coordinate \"-inf\" is not finite in 32-bit floats"),
             ("v 0 0 0", "a.obj: no faces: an OBJ file lists them on lines that start with f"),
         ] {
-            let error = clean(file.as_bytes(), "a.obj").map(|c| c.text).unwrap_err();
-            assert_eq!(error.to_string(), message);
+            let trouble = clean(file.as_bytes()).err().unwrap();
+            assert_eq!(trouble.of_file("a.obj").to_string(), message);
         }
     }
 }

@@ -1,6 +1,11 @@
 //! What can be wrong with a mesh or its file, each as one line of text.
 
-use std::{io, path::PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use crate::format::ending;
 
 /// Why a mesh could not be made, read or written.
 ///
@@ -23,7 +28,22 @@ pub enum MeshError {
         /// What the operating system said.
         reason: io::Error,
     },
-    /// A line of an OBJ file cannot be used.
+    /// The file's name has no ending of a format that is read.
+    #[error(
+        "{name}: {}meshes are read from files that end in .obj, .ply, .stl or .glb",
+        advice(name)
+    )]
+    UnknownFormat {
+        /// Name of the file.
+        name: String,
+    },
+    /// The path has no ending of a format that is written; what was there before is untouched.
+    #[error("{}: meshes are written to files that end in .obj, .ply or .glb", path.display())]
+    NotWritten {
+        /// The file asked for.
+        path: PathBuf,
+    },
+    /// A line of a text file, or of the header of a PLY file, cannot be used.
     #[error("{name}:{line}: {reason}")]
     Line {
         /// Name of the file.
@@ -31,13 +51,25 @@ pub enum MeshError {
         /// Physical line on which the statement starts, counted from 1.
         line: usize,
         /// What is wrong there.
-        reason: LineError,
+        reason: Fault,
     },
-    /// An OBJ file without faces: empty, a point cloud, or not an OBJ file at all.
-    #[error("{name}: no faces: an OBJ file lists them on lines that start with f")]
+    /// A part of a file that has no lines cannot be used.
+    #[error("{name}: {part}: {reason}")]
+    Part {
+        /// Name of the file.
+        name: String,
+        /// Which part, such as `vertex 3`, `triangle 0` or `accessor 2`; all count from 0.
+        part: String,
+        /// What is wrong there.
+        reason: Fault,
+    },
+    /// A file without faces: empty, a point cloud, or not of its format at all.
+    #[error("{name}: no faces: {expected}")]
     NoFaces {
         /// Name of the file.
         name: String,
+        /// Where a file of this format has its faces.
+        expected: &'static str,
     },
     /// The parser refused text that was cleaned for it.
     #[error("{name}: {reason}")]
@@ -68,10 +100,16 @@ pub enum MeshError {
     },
 }
 
-/// What is wrong with one line of an OBJ file.
+/// What to do with the file `name`, if its format has a sibling that is read.
+fn advice(name: &str) -> &'static str {
+    let gltf = ending(Path::new(name)).is_some_and(|ending| ending == "gltf");
+    if gltf { "export it as one .glb file: " } else { "" }
+}
+
+/// What is wrong at one place of a file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum LineError {
-    /// A `v` line with fewer than three coordinates.
+pub enum Fault {
+    /// A vertex with fewer than three coordinates.
     #[error("fewer than three coordinates: found {0}")]
     Coordinates(usize),
     /// A coordinate that does not read as a number.
@@ -80,18 +118,18 @@ pub enum LineError {
     /// A coordinate that is NaN, infinite, or infinite once rounded to 32 bits.
     #[error("coordinate {0:?} is not finite in 32-bit floats")]
     NotFinite(String),
-    /// An `f` line with fewer than three corners.
+    /// A face with fewer than three corners.
     #[error("fewer than three corners: found {0}")]
     Corners(usize),
     /// A corner whose first field is not a whole number.
     #[error("bad index: {0:?} does not start with a vertex number")]
     Index(String),
-    /// An index of a vertex that the file does not have.
+    /// An index of a vertex that the file, or this part of it, does not have.
     #[error("index {index} is out of range: the file has {vertices} vertices")]
     OutOfRange {
-        /// The index as written: counted from 1.
+        /// The index as written: counted from 1 in OBJ files, from 0 in all others.
         index: String,
-        /// How many vertices the whole file has.
+        /// How many vertices there are.
         vertices: usize,
     },
     /// A negative index that reaches back past the first vertex.
@@ -102,4 +140,49 @@ pub enum LineError {
         /// How many vertices have been read up to here.
         before: usize,
     },
+    /// The file ends before this part of it is complete.
+    #[error("the file ends before it is complete")]
+    Truncated,
+    /// What the format does not allow, or what is not read, in plain words.
+    #[error("{0}")]
+    Format(String),
+}
+
+impl Fault {
+    /// Words from a file or a library may break the line; the message stays on one.
+    pub(crate) fn format(reason: impl Into<String>) -> Self {
+        Self::Format(reason.into().replace(char::is_control, " "))
+    }
+}
+
+/// What is wrong with the content of a file whose name the reader does not know.
+pub(crate) enum Trouble {
+    Line(usize, Fault),
+    Part(String, Fault),
+    NoFaces(&'static str),
+}
+
+impl Trouble {
+    /// A part and what is wrong there, in plain words.
+    pub(crate) fn part(part: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Part(part.into(), Fault::format(reason))
+    }
+
+    pub(crate) fn of_file(self, name: &str) -> MeshError {
+        let name = name.to_owned();
+        match self {
+            Self::Line(line, reason) => MeshError::Line { name, line, reason },
+            Self::Part(part, reason) => MeshError::Part { name, part, reason },
+            Self::NoFaces(expected) => MeshError::NoFaces { name, expected },
+        }
+    }
+}
+
+/// A word of a file as an error message shows it: not longer than a line can bear.
+pub(crate) fn shown(word: &str) -> String {
+    const LONGEST: usize = 40;
+    match word.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &word[..end]),
+        None => word.to_owned(),
+    }
 }

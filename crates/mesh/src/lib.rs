@@ -1,8 +1,9 @@
-//! Triangle meshes for softrast: a careful OBJ reader and writer, and small generators.
+//! Triangle meshes for softrast: a careful reader of OBJ, PLY, STL and GLB, a
+//! writer of all but STL, and small generators.
 //!
 //! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
 //! has at least one face. Whatever breaks these rules is a [`MeshError`] of one line that names
-//! the file, the line and the reason. Nothing here depends on burn.
+//! the file, the place and the reason. Nothing here depends on burn.
 //!
 //! ```
 //! use softrast_mesh::{Mesh, icosphere};
@@ -18,13 +19,21 @@ mod chair;
 mod clean;
 mod edges;
 mod error;
+mod format;
 mod fox;
+mod glb;
+mod gltf;
 mod icosphere;
 mod mesh;
 mod normalized;
+mod obj;
+mod placement;
+mod ply;
+mod ply_header;
 mod polygon;
 mod read;
 mod statements;
+mod stl;
 mod stroke;
 mod surface_net;
 mod write;
@@ -32,7 +41,7 @@ mod write;
 pub use airplane::airplane;
 pub use chair::chair;
 pub use edges::Edges;
-pub use error::{LineError, MeshError};
+pub use error::{Fault, MeshError};
 pub use fox::fox;
 pub use icosphere::icosphere;
 pub use mesh::Mesh;

@@ -1,5 +1,7 @@
 //! A triangle mesh that is valid by construction.
 
+use std::collections::BTreeMap;
+
 use crate::MeshError;
 
 /// Vertices and the triangles between them.
@@ -33,6 +35,26 @@ impl Mesh {
             }
         }
         Ok(Self { positions, faces })
+    }
+
+    /// The same surface with each triangle cut into four, at the middles of its edges.
+    #[must_use]
+    pub fn subdivided(&self) -> Self {
+        let mut positions = self.positions.clone();
+        let mut middles = BTreeMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                let [p, q] = [a, b].map(|v| self.positions[v as usize]);
+                positions.push([0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0));
+                (positions.len() - 1) as u32
+            })
+        };
+        let cut = |&[a, b, c]: &[u32; 3]| {
+            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        };
+        let faces = self.faces.iter().flat_map(cut).collect();
+        Self { positions, faces }
     }
 
     /// The vertices, in world units.

@@ -1,89 +1,86 @@
-//! Reading an OBJ file.
+//! Reading a mesh, in the format that the name of its file ends in.
 
 use std::{fs, io, path::Path};
 
-use crate::{Mesh, MeshError, clean::clean, polygon::triangles};
+use crate::{Mesh, MeshError, format::Format, glb, obj, ply, stl};
 
 impl Mesh {
-    /// The mesh in the OBJ file at `path`; see [`Mesh::parse`].
+    /// The mesh in the file at `path`: OBJ, PLY, STL or GLB by its ending; see [`Mesh::parse`].
     ///
     /// # Errors
     ///
     /// If the path is not a regular file or cannot be read, or for the reasons of [`Mesh::parse`].
     pub fn load(path: impl AsRef<Path>) -> Result<Mesh, MeshError> {
         let path = path.as_ref();
-        let bytes = read(path).map_err(|reason| MeshError::Read { path: path.into(), reason })?;
-        Self::parse(&bytes, &path.display().to_string())
+        let unreadable = |reason| MeshError::Read { path: path.into(), reason };
+        regular(path).map_err(unreadable)?;
+        let name = path.display().to_string();
+        // The ending comes before the bytes: a film may be large.
+        let format = format_of(path, &name)?;
+        format.parse(&fs::read(path).map_err(unreadable)?, &name)
     }
 
-    /// The mesh in `bytes`, the content of an OBJ file; `name` is what errors call it.
+    /// The mesh in `bytes`, the content of a file called `name`.
     ///
-    /// Vertices keep their number and order. Polygons are cut into triangles by clipping ears,
-    /// which keeps their winding and the area of concave ones; degenerate faces stay. Objects and
-    /// groups are merged. Materials are never opened; normals, texture coordinates, colours,
-    /// lines and points are ignored.
+    /// The name's ending, in any case, says the format: `.obj`, `.ply` (text, or binary in either
+    /// order of bytes), `.stl` (text or binary) or `.glb` (binary glTF 2.0). Errors begin with the
+    /// name.
+    ///
+    /// Of every format only positions and faces are read: normals, texture coordinates, colours,
+    /// materials, lines and points are ignored, no other file is opened, and objects and groups are
+    /// merged. Vertices keep their number and order, and degenerate faces stay. Polygons (OBJ, PLY)
+    /// are cut into triangles by clipping ears, which keeps their winding and the area of concave
+    /// ones. Numbers in text are read to 64 bits.
+    ///
+    /// STL files repeat each vertex for each triangle. Corners at equal coordinates, to the last
+    /// bit and with -0 equal to 0, become one vertex, in the order of first use: so closed surfaces
+    /// are closed.
+    ///
+    /// Of a GLB file all triangles, strips and fans of the default scene are read (of the first
+    /// scene if none is the default, of all nodes if there is no scene), moved as their nodes say;
+    /// where a node mirrors, the winding is turned. Each node brings a copy of its mesh's vertices.
+    /// Skins, morph targets and animations are ignored: the mesh is as it is modelled.
     ///
     /// # Errors
     ///
-    /// If there are no faces, or at the first line that has a coordinate which is missing, not a
-    /// number or not finite in 32 bits, an index which is not a number or out of range, or a face
-    /// with fewer than three corners.
+    /// If the name has another ending, if there are no faces, or at the first part of the file
+    /// that is not as its format says, such as a coordinate which is missing, not a number or not
+    /// finite in 32 bits, an index which is out of range, a face with fewer than three corners, or
+    /// an end that comes too early. Compressed GLB files, and those that need other files, are
+    /// refused.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
-        let clean = clean(bytes, name)?;
-        // The parser numbers vertices as faces first use them. A first polygon that lists them
-        // all keeps the order of the file, and those which no face uses.
-        let all: String = (1..=clean.vertices).map(|vertex| format!(" {vertex}")).collect();
-        let text = format!("f{all}\n{}", clean.text);
-        let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-        let options = tobj::LoadOptions::default();
-        let (models, _) =
-            tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials).map_err(|reason| {
-                MeshError::Parser { name: name.to_owned(), reason: reason.to_string() }
-            })?;
-
-        let (mut positions, mut faces) = (Vec::new(), Vec::new());
-        for tobj::Model { mesh, .. } in models {
-            positions.extend(mesh.positions.as_chunks().0);
-            let polygons = split(&mesh.indices, &mesh.face_arities);
-            faces.extend(polygons.skip(1).flat_map(|corners| triangles(&positions, corners)));
-        }
-        Self::new(positions, faces)
+        format_of(Path::new(name), name)?.parse(bytes, name)
     }
 }
 
-/// The bytes of a regular file: reading a device could take for ever.
-fn read(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is a folder or a device, not a file"));
+impl Format {
+    fn parse(self, bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
+        let parsed = match self {
+            Self::Obj => return obj::parse(bytes, name),
+            Self::Ply => ply::parse(bytes),
+            Self::Stl => stl::parse(bytes),
+            Self::Glb => glb::parse(bytes),
+        };
+        let (positions, faces) = parsed.map_err(|trouble| trouble.of_file(name))?;
+        Mesh::new(positions, faces)
     }
-    fs::read(path)
 }
 
-/// The polygons of a parsed model; no `arities` means that all are triangles.
-fn split<'a>(mut indices: &'a [u32], arities: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
-    let mut arities = arities.iter();
-    std::iter::from_fn(move || {
-        let corners = arities.next().map_or(3, |&n| n as usize);
-        let (polygon, rest) = indices.split_at_checked(corners)?;
-        indices = rest;
-        Some(polygon)
-    })
+fn format_of(path: &Path, name: &str) -> Result<Format, MeshError> {
+    Format::of(path).ok_or_else(|| MeshError::UnknownFormat { name: name.to_owned() })
+}
+
+/// An error unless `path` is a regular file: reading a device could take for ever.
+fn regular(path: &Path) -> io::Result<()> {
+    if fs::metadata(path)?.is_file() {
+        return Ok(());
+    }
+    Err(io::Error::other("it is a folder or a device, not a file"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn vertices_keep_the_order_of_the_file() {
-        for count in 1..6 {
-            let lines = (0..count).map(|x| format!("v {x} 0.1 0\n")).collect::<String>();
-            let mesh = Mesh::parse(format!("{lines}f -1 1 1").as_bytes(), "a.obj").unwrap();
-            let expected = (0..count).map(|x| [f64::from(x), 0.1, 0.0]).collect::<Vec<_>>();
-            assert_eq!(mesh.positions(), expected);
-            assert_eq!(mesh.faces(), [[count - 1, 0, 0]]);
-        }
-    }
 
     #[test]
     fn missing_file_and_folder_are_errors_of_one_line() {

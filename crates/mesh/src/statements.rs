@@ -42,7 +42,7 @@ pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement> {
 }
 
 /// Takes the next physical line off `rest`, without its end.
-fn next_line<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+pub(crate) fn next_line<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     if rest.is_empty() {
         return None;
     }

@@ -1,6 +1,6 @@
 //! Turns a solid, given as a function that is negative inside, into one seamless surface.
 
-use crate::mesh::norm;
+use crate::{Mesh, MeshError, mesh::norm};
 
 /// Least slope of a field that a Newton step counts on: flatter fields, as where strokes meet, are
 /// followed in shorter steps.
@@ -14,6 +14,31 @@ pub(crate) struct Grid {
     pub(crate) step: f64,
     /// Number of cubes along x, y and z.
     pub(crate) cubes: [usize; 3],
+}
+
+impl Mesh {
+    /// The surface of a solid within a box (lowest and highest corner, world units), with so many cells along the longest side of that:
+    /// closed, and counterclockwise from outside.
+    ///
+    /// `field` is negative inside the solid, positive on the sides of the box, and grows about like a distance.
+    ///
+    /// # Errors
+    ///
+    /// If nothing in the box is inside, or the box has no extent.
+    pub fn of_solid(
+        [low, high]: [[f64; 3]; 2],
+        cells: usize,
+        field: impl Fn([f64; 3]) -> f64,
+    ) -> Result<Self, MeshError> {
+        let sides = [0, 1, 2].map(|k| high[k] - low[k]);
+        let step = sides.iter().copied().fold(0.0, f64::max) / cells.max(1) as f64;
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(MeshError::Empty);
+        }
+        let cubes = sides.map(|side| (side / step).ceil() as usize);
+        let (positions, faces) = surface_net(&Grid { low, step, cubes }, field);
+        Self::new(positions, faces)
+    }
 }
 
 /// Vertices and triangles of the surface where `field` is zero, counterclockwise from outside.
@@ -155,6 +180,15 @@ fn moved(mut corner: [usize; 3], axis: usize, by: isize) -> [usize; 3] {
 mod tests {
     use super::*;
     use crate::mesh::{cross, dot};
+
+    #[test]
+    fn a_solid_is_a_mesh_and_nothing_is_none() {
+        let bounds = [[-1.5, -1.5, -1.2], [1.5, 1.5, 1.2]];
+        let ball = Mesh::of_solid(bounds, 20, |p| norm(p) - 1.0).unwrap();
+        assert!((ball.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.02);
+        assert!(matches!(Mesh::of_solid(bounds, 20, |_| 1.0), Err(MeshError::Empty)));
+        assert!(matches!(Mesh::of_solid([[0.0; 3]; 2], 20, |_| -1.0), Err(MeshError::Empty)));
+    }
 
     #[test]
     fn net_of_a_ball_is_a_sphere_that_looks_outward() {

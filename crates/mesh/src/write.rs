@@ -1,30 +1,61 @@
-//! Writing an OBJ file.
+//! Writing a mesh, in the format that the path ends in.
 
 use std::{
-    fmt, fs,
+    fs,
     io::{self, Write},
     path::Path,
 };
 
-use crate::{Mesh, MeshError};
+use crate::{Mesh, MeshError, format::Format, glb, obj::Obj, ply};
 
 impl Mesh {
-    /// Writes the mesh to an OBJ file at `path`, which [`Mesh::load`] reads back without change.
+    /// The text of an OBJ file, with as many digits as the numbers need.
+    pub fn to_obj(&self) -> String {
+        Obj(self).to_string()
+    }
+
+    /// The bytes of a PLY file: binary, little endian, coordinates in 64 bits, so nothing is lost.
+    pub fn to_ply(&self) -> Vec<u8> {
+        ply::bytes(self)
+    }
+
+    /// The bytes of a GLB file (binary glTF 2.0) with one mesh and a grey, two-sided material.
     ///
-    /// The file appears whole or not at all: it is written under another name in the same folder,
-    /// then renamed. Numbers have as many digits as they need.
+    /// Coordinates are rounded to 32 bits: the format has no others.
+    ///
+    /// # Panics
+    ///
+    /// If the file would have 4 GiB or more, which the format cannot say.
+    pub fn to_glb(&self) -> Vec<u8> {
+        glb::bytes(self)
+    }
+
+    /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its ending, in any case.
+    ///
+    /// [`Mesh::load`] reads OBJ and PLY back without change, GLB with coordinates rounded to 32
+    /// bits. The file appears whole or not at all: it is written under another name in the same
+    /// folder, then renamed.
     ///
     /// # Errors
     ///
-    /// If the folder is missing, or the file cannot be written.
-    pub fn write_obj(&self, path: impl AsRef<Path>) -> Result<(), MeshError> {
+    /// If the path has another ending, the folder is missing, or the file cannot be written.
+    ///
+    /// # Panics
+    ///
+    /// If a GLB file would have 4 GiB or more.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), MeshError> {
         let path = path.as_ref();
-        write(path, &Obj(self).to_string())
-            .map_err(|reason| MeshError::Write { path: path.into(), reason })
+        let bytes = match Format::of(path) {
+            Some(Format::Obj) => self.to_obj().into_bytes(),
+            Some(Format::Ply) => self.to_ply(),
+            Some(Format::Glb) => self.to_glb(),
+            Some(Format::Stl) | None => return Err(MeshError::NotWritten { path: path.into() }),
+        };
+        write(path, &bytes).map_err(|reason| MeshError::Write { path: path.into(), reason })
     }
 }
 
-fn write(path: &Path, text: &str) -> io::Result<()> {
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     #[cfg_attr(not(unix), allow(unused_mut, reason = "permissions are for unix"))]
     let mut builder = tempfile::Builder::new();
@@ -32,25 +63,10 @@ fn write(path: &Path, text: &str) -> io::Result<()> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(fs::canonicalize(folder.unwrap_or(Path::new(".")))?)?;
-    file.write_all(text.as_bytes())?;
+    file.write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path)?;
     Ok(())
-}
-
-/// A mesh as the text of an OBJ file.
-pub(crate) struct Obj<'a>(pub(crate) &'a Mesh);
-
-impl fmt::Display for Obj<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for [x, y, z] in self.0.positions() {
-            writeln!(f, "v {x} {y} {z}")?;
-        }
-        for [a, b, c] in self.0.faces().iter().map(|face| face.map(|v| u64::from(v) + 1)) {
-            writeln!(f, "f {a} {b} {c}")?;
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -63,18 +79,20 @@ mod tests {
             vec![[0.1, -1e-42, 3e38], [1.0 / 3.0, -0.0, 1e30], [5e-324, 2.0, 16777216.5]];
         let mesh = Mesh::new(positions, vec![[2, 0, 1], [1, 1, 1]]).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.obj");
-        for _overwrite in 0..2 {
-            mesh.write_obj(&path).unwrap();
-            assert_eq!(Mesh::load(&path).unwrap(), mesh);
+        for name in ["a.obj", "a.PLY"] {
+            let path = folder.path().join(name);
+            for _overwrite in 0..2 {
+                mesh.save(&path).unwrap();
+                assert_eq!(Mesh::load(&path).unwrap(), mesh);
+            }
         }
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]
     fn missing_folder_is_named() {
         let mesh = Mesh::new(vec![[0.0; 3]], vec![[0, 0, 0]]).unwrap();
-        let message = mesh.write_obj("no/such/folder.obj").unwrap_err().to_string();
+        let message = mesh.save("no/such/folder.obj").unwrap_err().to_string();
         assert!(message.starts_with("no/such/folder.obj: cannot be written: "), "{message}");
     }
 }

@@ -6,8 +6,8 @@ use proptest::{collection::vec, prelude::*, sample};
 use softrast_mesh::{Mesh, icosphere};
 
 /// Reads `bytes` and checks what every mesh promises.
-fn read(bytes: &[u8]) {
-    match Mesh::parse(bytes, "a.obj") {
+fn read(bytes: &[u8], name: &str) {
+    match Mesh::parse(bytes, name) {
         Ok(mesh) => {
             Mesh::new(mesh.positions().to_vec(), mesh.faces().to_vec()).expect("a valid mesh");
             let normalized = mesh.normalized();
@@ -16,7 +16,8 @@ fn read(bytes: &[u8]) {
         }
         Err(error) => {
             let message = error.to_string();
-            assert!(message.starts_with("a.obj:") && message.lines().count() == 1, "{message:?}");
+            let one_line = !message.contains(char::is_control);
+            assert!(message.starts_with(&format!("{name}:")) && one_line, "{message:?}");
         }
     }
 }
@@ -69,17 +70,51 @@ fn pieces() -> impl Strategy<Value = Vec<u8>> {
     vec(piece, 0..60).prop_map(|pieces| pieces.concat().into_bytes())
 }
 
+fn text_of_ply(mesh: &Mesh) -> Vec<u8> {
+    let rows = mesh.to_obj().replace("v ", "");
+    let (vertices, _) = rows.split_once('f').expect("faces");
+    let faces: String = mesh.faces().iter().map(|[a, b, c]| format!("3 {a} {b} {c}\n")).collect();
+    let header = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+        element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        mesh.positions().len(),
+        mesh.faces().len()
+    );
+    (header + vertices + &faces).into_bytes()
+}
+
+fn text_of_stl(mesh: &Mesh) -> Vec<u8> {
+    let facets = mesh.triangles().map(|corners| {
+        let vertices = corners.map(|[x, y, z]| format!("vertex {x} {y} {z}\n")).concat();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    });
+    format!("solid\n{}endsolid\n", facets.collect::<String>()).into_bytes()
+}
+
+#[test]
+fn the_ending_names_the_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |name: &str| Mesh::parse(b"", name).unwrap_err().to_string();
+    let read = "meshes are read from files that end in .obj, .ply, .stl or .glb";
+    assert_eq!(message("a.off"), format!("a.off: {read}"));
+    assert_eq!(message("a.gltf"), format!("a.gltf: export it as one .glb file: {read}"));
+    let path = folder.path().join("a.stl");
+    let error = icosphere(0).save(&path).unwrap_err().to_string();
+    assert!(error.ends_with("a.stl: meshes are written to files that end in .obj, .ply or .glb"));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn random_bytes_never_break_the_reader(bytes in vec(any::<u8>(), 0..400)) {
-        read(&bytes);
+        read(&bytes, "a.obj");
     }
 
     #[test]
     fn random_pieces_never_break_the_reader(bytes in pieces()) {
-        read(&bytes);
+        read(&bytes, "a.obj");
     }
 
     #[test]
@@ -98,7 +133,52 @@ proptest! {
                 }
             }
         }
-        read(&bytes);
+        read(&bytes, "a.obj");
+    }
+
+    #[test]
+    fn changed_ply_stl_and_glb_files_never_break_the_reader(
+        format in 0..4usize,
+        changes in vec((any::<sample::Index>(), any::<u8>(), 0..4), 1..6),
+    ) {
+        let sphere = icosphere(0);
+        let (name, mut bytes) = match format {
+            0 => ("a.ply", sphere.to_ply()),
+            1 => ("a.ply", text_of_ply(&sphere)),
+            2 => ("a.glb", sphere.to_glb()),
+            _ => ("a.stl", text_of_stl(&sphere)),
+        };
+        read(&bytes, name);
+        for (place, byte, kind) in changes {
+            if !bytes.is_empty() {
+                // Half of the changes are in the header, where most is decided.
+                let length = if byte % 2 == 0 { bytes.len() } else { bytes.len().min(300) };
+                let place = place.index(length);
+                match kind {
+                    0 => bytes[place] = byte,
+                    1 => bytes[place] = b"0123456789-. \n[]{}\","[usize::from(byte) % 20],
+                    2 => bytes.insert(place, byte),
+                    _ => bytes.truncate(place),
+                }
+            }
+        }
+        read(&bytes, name);
+    }
+
+    #[test]
+    fn what_is_written_is_read_back(
+        positions in vec([-1e38..1e38f64, -1e-3..1e-3, -1e3..1e3], 1..9),
+        corners in vec(any::<[sample::Index; 3]>(), 1..9),
+    ) {
+        let count = positions.len();
+        let faces = corners.iter().map(|face| face.map(|corner| corner.index(count) as u32)).collect();
+        let mesh = Mesh::new(positions, faces).unwrap();
+        prop_assert_eq!(&Mesh::parse(mesh.to_obj().as_bytes(), "a.obj").unwrap(), &mesh);
+        prop_assert_eq!(&Mesh::parse(&mesh.to_ply(), "a.ply").unwrap(), &mesh);
+        let glb = Mesh::parse(&mesh.to_glb(), "a.glb").unwrap();
+        let rounded = mesh.positions().iter().map(|p| p.map(|x| f64::from(x as f32)));
+        prop_assert_eq!(glb.positions(), rounded.collect::<Vec<_>>());
+        prop_assert_eq!(glb.faces(), mesh.faces());
     }
 
     #[test]

@@ -16,6 +16,6 @@ fn whoever_can_read_other_files_can_read_a_written_mesh() {
     let folder = tempfile::tempdir().unwrap();
     let [plain, mesh] = ["plain.obj", "mesh.obj"].map(|name| folder.path().join(name));
     fs::write(&plain, "").unwrap();
-    icosphere(0).write_obj(&mesh).unwrap();
+    icosphere(0).save(&mesh).unwrap();
     assert_eq!(mode(&mesh), mode(&plain));
 }

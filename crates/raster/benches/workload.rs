@@ -97,11 +97,11 @@ pub(crate) fn tensor<B: Backend, const D: usize>(
     Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), dtype))
 }
 
-/// A disk of radius 0.5 at (-0.1, 0.05), hard-edged at pixel centres.
+/// A disk of radius 0.5 at (0.1, 0.05), hard-edged at pixel centres.
 pub(crate) fn disk(size: usize) -> Vec<f64> {
     let centre = |index: usize| (2.0 * index as f64 + 1.0 - size as f64) / size as f64;
     let covered = |pixel: usize| {
-        let (x, y) = (centre(pixel % size) + 0.1, centre(size - 1 - pixel / size) - 0.05);
+        let (x, y) = (centre(pixel % size) - 0.1, centre(size - 1 - pixel / size) - 0.05);
         f64::from(u8::from(x * x + y * y <= 0.25))
     };
     (0..size * size).map(covered).collect()

@@ -36,7 +36,7 @@ pub struct Orbit {
     pub distance: f64,
     /// Angle above the ground.
     pub elevation_deg: f64,
-    /// Angle around the vertical axis: at 0 the camera stands at -z, at 90 at +x.
+    /// Angle around the vertical axis: at 0 the camera stands at -z with +x on the left, at 90 at +x.
     pub azimuth_deg: f64,
     /// Whole field of view along the shorter side of the image; below 180.
     pub fov_deg: f64,
@@ -79,38 +79,6 @@ impl Orbit {
     }
 }
 
-/// A camera that stands anywhere and looks anywhere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LookAt {
-    /// Where it stands, in world units.
-    pub eye: [f64; 3],
-    /// What is in the middle of its image.
-    pub target: [f64; 3],
-    /// Which way is up; not along the line of sight.
-    pub up: [f64; 3],
-    /// Whole field of view along the shorter side of the image; below 180.
-    pub fov_deg: f64,
-}
-
-impl LookAt {
-    /// Rotation `[1, 3, 3]` and translation `[1, 3]` from world to camera axes, as [`project_from`] takes them.
-    ///
-    /// # Panics
-    ///
-    /// If the camera stands at its target, or looks along `up`.
-    pub fn pose<B: Backend>(&self, device: &B::Device) -> (Tensor<B, 3>, Tensor<B, 2>) {
-        let ahead =
-            unit([0, 1, 2].map(|k| self.target[k] - self.eye[k]), "a camera stands at its target");
-        let right = unit(cross(self.up, ahead), "a camera looks along its up");
-        let rows = [right, cross(ahead, right), ahead];
-        let translation = rows.map(|row| -dot(row, self.eye));
-        (
-            tensor_on(rows.concat(), [1, 3, 3], device),
-            tensor_on(translation.to_vec(), [1, 3], device),
-        )
-    }
-}
-
 /// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: the vertices of a mesh, for [`project`].
 pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tensor<B, 3> {
     tensor_on(positions.concat(), [1, positions.len(), 3], device)
@@ -119,7 +87,7 @@ pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tenso
 /// Rotation from world to camera axes for cameras that look at the origin with y up.
 ///
 /// `elevation` and `azimuth` are `[views]` in degrees; the result is `[views, 3, 3]` with rows x
-/// (right), y (up) and z (ahead). Both angles 0 give the identity: the camera stands at -z and looks
+/// (left), y (up) and z (ahead), as PyTorch3D has them. Both angles 0 give the identity: the camera stands at -z and looks
 /// along +z.
 ///
 /// Past the pole (|elevation| > 90°) the view rolls by half a turn, as `look_at` does. At the pole
@@ -175,32 +143,11 @@ pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -
     perspective(vertices, matrices)
 }
 
-/// Perspective projection by cameras of any pose.
-///
-/// `rotation` `[views, 3, 3]` and `translation` `[views, 3]` go from world to camera axes (x right, y up, z ahead): a point p is seen at
-/// `R p + t`. `fov_deg` `[views]` is the whole field of view in degrees. All else is as with [`project`].
-///
-/// # Panics
-///
-/// If the shapes do not fit.
-pub fn project_from<B: RasterBackend>(
-    vertices: Tensor<B, 3>,
-    rotation: Tensor<B, 3>,
-    translation: Tensor<B, 2>,
-    fov_deg: Tensor<B, 1>,
-) -> Tensor<B, 3> {
-    let [views] = fov_deg.dims();
-    let (rotations, translations) = (rotation.dims(), translation.dims());
-    assert_eq!(rotations, [views, 3, 3], "rotations of {views} views are {rotations:?}");
-    assert_eq!(translations, [views, 3], "translations of {views} views are {translations:?}");
-    let focal = focal(fov_deg);
-    let zoom = Tensor::cat(vec![focal.clone(), focal.clone(), focal.ones_like()], 1);
-    let matrices = Tensor::cat(vec![rotation, translation.unsqueeze_dim::<3>(2)], 2) * zoom;
-    perspective(vertices, matrices)
-}
-
 /// What cameras with these matrices `[views, 3, 4]` see: two rows give x and y times the depth, the third gives the depth.
-fn perspective<B: RasterBackend>(vertices: Tensor<B, 3>, matrices: Tensor<B, 3>) -> Tensor<B, 3> {
+pub(crate) fn perspective<B: RasterBackend>(
+    vertices: Tensor<B, 3>,
+    matrices: Tensor<B, 3>,
+) -> Tensor<B, 3> {
     let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
     assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
     if !B::ON_HOST {
@@ -224,16 +171,16 @@ fn sin_cos<B: Backend, const D: usize>(degrees: Tensor<B, D>) -> [Tensor<B, D>; 
     [radians.clone().sin(), radians.cos()]
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| a[k] * b[k]).sum()
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
 }
 
 /// `a / |a|`; `otherwise` is what is wrong where that is no direction.
-fn unit(a: [f64; 3], otherwise: &str) -> [f64; 3] {
+pub(crate) fn unit(a: [f64; 3], otherwise: &str) -> [f64; 3] {
     let length = dot(a, a).sqrt();
     assert!(length > SHORTEST, "{otherwise}");
     a.map(|x| x / length)

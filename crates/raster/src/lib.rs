@@ -34,6 +34,7 @@ mod hard;
 mod image_size;
 mod kernel;
 mod loss;
+mod pinhole;
 mod profile;
 pub mod reference;
 mod silhouette;
@@ -42,7 +43,7 @@ mod t_conorm;
 
 pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
-pub use camera::{LookAt, NEAR, Orbit, project, project_from, vertices, view_rotation};
+pub use camera::{NEAR, Orbit, project, vertices, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
 #[doc(hidden)]
 pub use fused::{ElementaryOp, FusedOp, Pass};
@@ -53,6 +54,7 @@ pub use gpu::adapter_name;
 pub use hard::hard_silhouette;
 pub use image_size::ImageSize;
 pub use loss::{flatness, iou_loss, mse_loss};
+pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
 pub use profile::Profile;
 pub use silhouette::{Rasterizer, Silhouette};
 pub use soft_renderer::SoftRenderer;

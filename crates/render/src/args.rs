@@ -9,8 +9,8 @@ use softrast_softness::Family;
 #[derive(Debug, Parser)]
 #[command(name = "render", version, allow_negative_numbers = true)]
 pub(crate) struct Args {
-    /// Mesh to draw
-    #[arg(value_name = "MESH.obj")]
+    /// Mesh to draw: OBJ, PLY, STL or GLB
+    #[arg(value_name = "MESH")]
     pub(crate) mesh: PathBuf,
 
     /// Width and height of the image, in pixels

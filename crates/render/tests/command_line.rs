@@ -10,7 +10,7 @@ use softrast_mesh::icosphere;
 
 fn mesh(folder: &Path) -> String {
     let path = folder.join("sphere.obj");
-    icosphere(1).write_obj(&path).expect("the folder can be written");
+    icosphere(1).save(&path).expect("the folder can be written");
     path.to_str().expect("a path in ASCII").to_owned()
 }
 

@@ -4,8 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Description, EdgeChoice, Ended, Measures, OwnAxis, Paper, Scales, Schedule, Task, Variant,
-    theta_of,
+    Description, EdgeChoice, Ended, Measures, NoArgs, OwnAxis, Paper, Scales, Schedule, Task,
+    Variant, theta_of,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{
@@ -133,6 +133,7 @@ impl Task for Occlusion {
     const MOVES_EDGES: bool = false;
 
     type Args = Args;
+    type Pictures = NoArgs;
 
     fn new(args: &Args, variant: Variant, edges: &EdgeChoice) -> anyhow::Result<Self> {
         Ok(Self { problem: Problem::of(variant), depth: Depth::new(args, edges)?, variant })

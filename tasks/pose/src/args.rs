@@ -5,8 +5,8 @@ use clap::ValueEnum;
 /// Flags that only POSE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh to view, centred and with the longest side of its box scaled to 2 [default: the project's own fox]
-    #[arg(long, value_name = "FILE.obj")]
+    /// Mesh to view (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
+    #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
 
     /// Take the mesh as it stands, as the paper's experiments do

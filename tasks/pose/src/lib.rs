@@ -22,10 +22,12 @@ mod args;
 mod error;
 mod paper;
 mod picture;
+mod pictures;
 mod released;
 mod task;
 
 pub use args::{Args, Instances, Range};
 pub use error::PoseError;
+pub use pictures::Pictures;
 pub use released::released24;
 pub use task::Pose;

@@ -4,7 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Description, EdgeChoice, Ended, Measures, Paper, Scales, Schedule, Task, Variant, theta_of,
+    Answer, Description, EdgeChoice, Ended, Given, Measures, Paper, Scales, Schedule, Task,
+    Variant, theta_of,
 };
 use softrast_inverse::{
     InverseProblem, Iterate, PoseProblem, SoftnessAt, SolveConfig,
@@ -16,7 +17,8 @@ use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 
 use crate::{
-    Args, Instances, PoseError, Range, paper::PAPER, picture::outlined, released::released24,
+    Args, Instances, Pictures, PoseError, Range, paper::PAPER, picture::outlined,
+    pictures::solve_pictures, released::released24,
 };
 
 /// A run succeeds when the camera ends at most this far from the target.
@@ -126,6 +128,11 @@ impl Task for Pose {
     const FITS: f64 = 0.1;
 
     type Args = Args;
+    type Pictures = Pictures;
+
+    fn solve_given(given: &Given<'_, Self>, pictures: &Pictures) -> Option<anyhow::Result<Answer>> {
+        pictures.asked().then(|| solve_pictures(given, pictures))
+    }
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
         let (mesh, mesh_name) = mesh(args)?;
@@ -250,7 +257,7 @@ impl Task for Pose {
 }
 
 /// The mesh to view and its name.
-fn mesh(args: &Args) -> anyhow::Result<(Mesh, String)> {
+pub(crate) fn mesh(args: &Args) -> anyhow::Result<(Mesh, String)> {
     let (mesh, name) = match &args.mesh {
         None => (fox(), "fox".to_owned()),
         Some(path) => (Mesh::load(path)?, path.display().to_string()),

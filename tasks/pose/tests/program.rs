@@ -139,7 +139,7 @@ fn a_mesh_that_fills_the_view_is_said_to_do_so() {
     let mesh = folder.path().join("ball.obj");
     let ball = icosphere(1);
     let large = ball.positions().iter().map(|p| p.map(|x| 2.2 * x)).collect();
-    Mesh::new(large, ball.faces().to_vec()).unwrap().write_obj(&mesh).unwrap();
+    Mesh::new(large, ball.faces().to_vec()).unwrap().save(&mesh).unwrap();
     let json = run(&format!("--size 16 --steps 3 --raw --mesh {}", mesh.display())).unwrap();
     assert_finite(&json);
     assert!(warnings(&json).contains("fills the whole target image"), "{json}");

@@ -152,8 +152,8 @@ pub(crate) struct PredictArgs {
     #[arg(long, value_name = "FILE", default_value = "out/reconstruct/checkpoint.bin")]
     pub(crate) checkpoint: PathBuf,
 
-    /// Mesh to write.
-    #[arg(long, value_name = "FILE.obj")]
+    /// Mesh to write: OBJ, PLY or GLB by its ending.
+    #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
 }
 

@@ -91,8 +91,10 @@ impl Shapes for NpzFolder {
     }
 
     fn picture(&self, class: usize, shape: usize, view: usize) -> anyhow::Result<Vec<u8>> {
-        let planes = self.images[class].part(shape, [view, VIEWS])?;
+        let mut planes = self.images[class].part(shape, [view, VIEWS])?;
         debug_assert_eq!(planes.len(), PICTURE);
+        // The axes of their cameras are left-handed, which shows the shapes mirrored.
+        planes.chunks_mut(SIZE).for_each(<[u8]>::reverse);
         Ok(planes)
     }
 

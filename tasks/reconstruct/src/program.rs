@@ -140,7 +140,7 @@ fn predict_mesh<B: RasterBackend>(
     let vertices = predict(&network, &template, &[picture], device).remove(0);
     let mesh = softrast_mesh::Mesh::new(vertices, template.faces().to_vec())
         .context("the network gives no mesh: train it anew")?;
-    mesh.write_obj(&args.out)?;
+    mesh.save(&args.out)?;
     let [vertices, faces] = [template.vertices(), mesh.faces().len()];
     let text = vec![format!("{vertices} vertices, {faces} faces: {}", args.out.display())];
     let json = json!({ "vertices": vertices, "faces": faces, "mesh": args.out });

@@ -29,7 +29,7 @@ pub fn orbit(view: usize) -> [f64; 4] {
 pub(crate) fn axes(view: usize) -> [[f64; 3]; 3] {
     let [_, elevation, azimuth, _] = orbit(view).map(f64::to_radians);
     let ([se, ce], [sa, ca]) = ([elevation.sin(), elevation.cos()], [azimuth.sin(), azimuth.cos()]);
-    [[ca, 0.0, sa], [-se * sa, ce, se * ca], [-ce * sa, -se, ce * ca]]
+    [[-ca, 0.0, -sa], [-se * sa, ce, se * ca], [-ce * sa, -se, ce * ca]]
 }
 
 /// Light that a surface with the unit `normal` sends to the camera with these [`axes`], 0 to 1: from

@@ -3,7 +3,8 @@ use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 use burn::tensor::Tensor;
 use serde_json::json;
 use softrast_cli::{
-    Description, Detail, EdgeChoice, Ended, Measures, Paper, Scales, Schedule, Task, Variant,
+    Description, Detail, EdgeChoice, Ended, Measures, NoArgs, Paper, Scales, Schedule, Task,
+    Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_meta::numbers;
@@ -103,6 +104,7 @@ impl Task for Shape2d {
         Scales { schedule: Schedule::Static, decay: [0.02, 0.002], fixed: 0.002 };
 
     type Args = Args;
+    type Pictures = NoArgs;
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
         let usual_triangles = match variant {

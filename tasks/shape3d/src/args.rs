@@ -3,16 +3,16 @@ use std::path::PathBuf;
 /// Flags that only 3D SHAPE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh whose silhouettes are the target, centred and with the longest side of its box scaled to 1 [default: our airplane, or chair]
-    #[arg(long, value_name = "FILE.obj")]
+    /// Mesh whose silhouettes are the target (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 1 [default: our airplane, or chair]
+    #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
 
     /// Take the target mesh as it stands, as the paper's experiments do
     #[arg(long, requires = "mesh")]
     pub raw: bool,
 
-    /// Mesh that is deformed, centred and with the longest side scaled to 1 [default: a sphere]
-    #[arg(long, value_name = "FILE.obj", conflicts_with = "detail")]
+    /// Mesh that is deformed (OBJ, PLY, STL or GLB), centred and with the longest side scaled to 1 [default: a sphere]
+    #[arg(long, value_name = "FILE", conflicts_with = "detail")]
     pub template: Option<PathBuf>,
 
     /// How finely the sphere is divided: 162, 642 or 2,562 vertices [default: 3]

@@ -26,6 +26,7 @@ mod nearest;
 mod paper;
 mod scene;
 mod task;
+mod views;
 
 pub use args::Args;
 pub use chamfer::Chamfer;
@@ -34,3 +35,4 @@ pub use instance::Instance;
 pub use laplacian::Laplacian;
 pub use scene::{Scene, VIEWS};
 pub use task::Shape3d;
+pub use views::{Begin, Views};

@@ -4,7 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Description, Detail, EdgeChoice, Ended, Measures, Paper, Scales, Schedule, Task, Variant,
+    Answer, Description, Detail, EdgeChoice, Ended, Given, Measures, Paper, Scales, Schedule, Task,
+    Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{contact_sheet, rgb_from_gray};
@@ -13,11 +14,12 @@ use softrast_meta::{Adam, numbers};
 use softrast_raster::{HostBackend, RasterBackend};
 
 use crate::{
-    Args, Chamfer, Instance, Scene,
+    Args, Chamfer, Instance, Scene, Views,
     args::{DETAIL, DETAILS},
     instance::ELEVATIONS_DEG,
     paper::PAPER,
     scene::{DISTANCE, VIEWS},
+    views::solve_views,
 };
 
 /// A run succeeds when its hard `IoU` loss ends below this.
@@ -118,6 +120,11 @@ impl Task for Shape3d {
     const SCALES: Scales = Scales { schedule: Schedule::Decay, decay: [0.03, 0.003], fixed: 0.003 };
 
     type Args = Args;
+    type Pictures = Views;
+
+    fn solve_given(given: &Given<'_, Self>, flags: &Views) -> Option<anyhow::Result<Answer>> {
+        solve_views(given, flags)
+    }
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
         let (target, target_name) = target(variant, args)?;

@@ -2,7 +2,7 @@
 
 use burn::{backend::NdArray, tensor::Tensor};
 use proptest::prelude::*;
-use softrast_raster::{LookAt, NEAR, Orbit, project, project_from, view_rotation};
+use softrast_raster::{NEAR, project, view_rotation};
 use softrast_tests::numbers;
 
 type B = NdArray<f64>;
@@ -24,8 +24,8 @@ fn looked_at(vertex: [f64; 3], [distance, elevation, azimuth, fov]: [f64; 4]) ->
     let [e, a, half] = [elevation, azimuth, fov / 2.0].map(f64::to_radians);
     let eye = [e.cos() * a.sin(), e.sin(), -e.cos() * a.cos()].map(|x| distance * x);
     let z = unit(eye.map(|x| -x));
-    let x = unit(cross([0.0, 1.0, 0.0], z));
-    let y = cross(z, x);
+    let x = unit(cross(z, [0.0, 1.0, 0.0]));
+    let y = cross(x, z);
     let from = [0, 1, 2].map(|k| vertex[k] - eye[k]);
     let depth = dot(z, from);
     let divisor = depth.max(NEAR) * half.tan();
@@ -41,7 +41,7 @@ fn projected(vertex: [f64; 3], orbit: [f64; 4]) -> Vec<f64> {
 #[test]
 fn a_camera_without_angles_looks_along_z() {
     let found = projected([0.5, -1.0, 1.0], [3.0, 0.0, 0.0, 90.0]);
-    for (found, expected) in found.into_iter().zip([0.125, -0.25, 4.0]) {
+    for (found, expected) in found.into_iter().zip([-0.125, -0.25, 4.0]) {
         assert!((found - expected).abs() < 1e-15, "{found}, not {expected}");
     }
 }
@@ -62,29 +62,6 @@ proptest! {
         let orbit = [distance, elevation, azimuth, fov];
         let expected = looked_at(vertex, orbit);
         for (found, expected) in projected(vertex, orbit).into_iter().zip(expected) {
-            prop_assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()));
-        }
-    }
-
-    #[test]
-    fn a_camera_that_looks_at_the_origin_sees_what_one_in_orbit_sees(
-        vertex in [-2.0..2.0, -2.0..2.0, -2.0..2.0],
-        distance in 0.1..10.0,
-        elevation_deg in -85.0..85.0,
-        azimuth_deg in -400.0..400.0,
-        fov_deg in 2.0..160.0,
-    ) {
-        let orbit = Orbit { distance, elevation_deg, azimuth_deg, fov_deg };
-        let (e, a) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
-        let eye = [e.cos() * a.sin(), e.sin(), -e.cos() * a.cos()].map(|x| distance * x);
-        let camera = LookAt { eye, target: [0.0; 3], up: [0.0, 1.0, 0.0], fov_deg };
-        let device = Default::default();
-        let vertices = Tensor::<B, 1>::from_data(vertex, &device).reshape([1, 1, 3]);
-        let (rotation, translation) = camera.pose(&device);
-        let fov = Tensor::from_data([fov_deg], &device);
-        let found = numbers(project_from(vertices.clone(), rotation, translation, fov));
-        let expected = numbers(project(vertices, orbit.tensor(&device)));
-        for (found, expected) in found.into_iter().zip(expected) {
             prop_assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()));
         }
     }

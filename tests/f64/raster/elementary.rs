@@ -4,7 +4,7 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::Tensor,
 };
-use softrast_raster::{iou_loss, mse_loss, project, project_from, reference, view_rotation};
+use softrast_raster::{iou_loss, mse_loss, project, reference};
 use softrast_softness::{numbers, vector};
 
 type B = NdArray<f64>;
@@ -81,20 +81,6 @@ fn projection_is_that_of_tensor_ops() {
         let finite = orders(projected, &scene(meshes)).concat();
         assert!(finite.iter().all(|x| x.is_finite()));
     }
-}
-
-#[test]
-fn cameras_of_any_pose_see_what_orbits_see() {
-    let posed: Of = |x| {
-        let (vertices, orbits) = parts(x);
-        let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([VIEWS]);
-        let rotation = view_rotation(column(1), column(2));
-        let distance = column(0).reshape([VIEWS, 1]);
-        let beside = distance.clone() * 0.0;
-        let translation = Tensor::cat(vec![beside.clone(), beside, distance], 1);
-        project_from(vertices, rotation, translation, column(3)).flatten::<1>(0, 2).clamp(-1e3, 1e3)
-    };
-    assert_same(posed, |x| projected(x).clamp(-1e3, 1e3), &scene(1));
 }
 
 /// Two images of each view.

@@ -9,12 +9,19 @@ use super::{
 use crate::{
     Purpose, SoftnessChoice, Task, TaskExperiment,
     command_line::{Auto, Evaluate, Shared, Solve},
+    given::solve_given,
     session::Session,
 };
 
-/// Solves one instance.
-pub(crate) fn solve<T: Task>(session: &Session, flags: Solve<T::Args>) -> anyhow::Result<Output> {
-    let Solve { mut shared, auto } = flags;
+/// Solves one instance, or what the user gives.
+pub(crate) fn solve<T: Task>(
+    session: &Session,
+    flags: Solve<T::Args, T::Pictures>,
+) -> anyhow::Result<Output> {
+    let Solve { pictures, mut shared, auto } = flags;
+    if let Some(answer) = solve_given::<T>(session, &mut shared, &pictures) {
+        return answer;
+    }
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
     run(session, &first, None, &[shared.common.seed], false, false)
 }

@@ -5,9 +5,13 @@
 //! Sec. 5.1; docs/notes.md, Pose.
 
 mod instance;
+mod masks;
 mod problem;
 mod scene;
+mod search;
 
 pub use instance::PoseInstance;
+pub use masks::{MaskPose, MaskPoses, MaskScene};
 pub use problem::PoseProblem;
 pub use scene::{PoseScene, nearest_distance};
+pub use search::{FoundPose, PoseSearch};

@@ -13,7 +13,7 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OrbitMatrix;
 
-/// The rotation of an orbit by its elevation and azimuth, row by row: x, y and z of the camera, see
+/// The rotation of an orbit by its elevation and azimuth, row by row: left, up and ahead of the camera, see
 /// [`crate::view_rotation`].
 fn rotation<N: Number>(elevation: N, azimuth: N) -> [[N; 3]; 3] {
     let ((sin_e, cos_e), (sin_a, cos_a)) = (elevation.sin_cos(), azimuth.sin_cos());
@@ -34,9 +34,10 @@ fn matrix<N: Number>(orbit: &[N]) -> [[N; 4]; 3] {
     let (sin, cos) = orbit[3].scale(degree).scale(N::Float::from_f64(0.5)).sin_cos();
     let focal = cos * sin.recip();
     let zero = N::of(0.0);
-    let row = |k: usize| rotation[k].map(|number| if k < 2 { number * focal } else { number });
+    let row = |k: usize, gain: N| rotation[k].map(|number| number * gain);
     let with = |[a, b, c]: [N; 3], shift| [a, b, c, shift];
-    [with(row(0), zero), with(row(1), zero), with(row(2), orbit[0])]
+    let right = row(0, focal.scale(-N::Float::ONE));
+    [with(right, zero), with(row(1, focal), zero), with(rotation[2], orbit[0])]
 }
 
 impl Elementary for OrbitMatrix {

@@ -14,7 +14,8 @@ pub fn orbit_matrices<B: Backend>(orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     let [views, _] = orbits.dims();
     let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([views]);
     let focal = focal(column(3));
-    let zoom = Tensor::cat(vec![focal.clone(), focal.clone(), focal.ones_like()], 1);
+    // The rotation has x left, an image has it right.
+    let zoom = Tensor::cat(vec![focal.clone().neg(), focal.clone(), focal.ones_like()], 1);
     let rotation = view_rotation(column(1), column(2)) * zoom;
     let distance = column(0).reshape([views, 1, 1]);
     let beside = distance.clone() * 0.0;

@@ -88,7 +88,7 @@ pub(super) const CASES: &[Case] = &[
 fn with_body<R>(mesh: &Mesh, work: impl FnOnce(Args) -> anyhow::Result<R>) -> anyhow::Result<R> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("body.obj");
-    mesh.write_obj(&path)?;
+    mesh.save(&path)?;
     work(Args { mesh: Some(path), raw: true, ..Args::default() })
 }
 

@@ -161,7 +161,7 @@ fn scales(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 fn airplane(tested: &Tested, config: Config, limit: f64) -> anyhow::Result<Vec<Trial>> {
     let folder = tempfile::tempdir()?;
     let sphere = folder.path().join("sphere.obj");
-    icosphere(1).write_obj(&sphere)?;
+    icosphere(1).save(&sphere)?;
     let args = shape3d::Args { template: Some(sphere), ..shape3d::Args::default() };
     Ok(with_limit(trials::<Shape3d>(tested, args, &config, HARD)?, limit))
 }

@@ -34,7 +34,10 @@ pub(crate) fn class(folder: &Path, name: &str, of: usize, split: Split, method: 
     let mut voxels = Vec::new();
     for shape in 0..2 {
         for view in 0..VIEWS {
-            images.extend(shapes.picture(of, shape, view).unwrap());
+            // Files of that layout show the shapes mirrored.
+            let mut planes = shapes.picture(of, shape, view).unwrap();
+            planes.chunks_mut(64).for_each(<[u8]>::reverse);
+            images.extend(planes);
         }
         let cells = shapes.voxels(of, shape).unwrap();
         voxels.extend(cells.in_file_order().iter().map(|&full| u8::from(full)));

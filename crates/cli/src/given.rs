@@ -1,0 +1,135 @@
+//! `solve` for pictures that the user gives.
+
+use std::path::Path;
+
+use softrast_inverse::{Method, Picture};
+use softrast_lab::{
+    Error, Progress, ViewerView, png, program::Output, report::Report, rgb_from_gray,
+};
+use softrast_raster::{BackendChoice, Pinhole};
+
+use crate::{
+    Common, MethodArgs, SoftnessChoice, Task, backend,
+    command_line::Shared,
+    session::{RESULT, Session},
+};
+
+/// The flags that every `solve` has, for pictures that the user gives.
+pub struct Given<'a, T: Task> {
+    /// Those of the task.
+    pub args: &'a T::Args,
+    /// What is solved, and where results go.
+    pub common: &'a Common,
+    method: &'a MethodArgs,
+    session: &'a Session,
+}
+
+/// What came of pictures that the user gave.
+pub struct Answer {
+    /// Its page.
+    pub page: Report,
+    /// What is said, to people and programs.
+    pub output: Output,
+    /// Names and contents of files beside the page.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// What they are, in a line.
+    pub beside: String,
+}
+
+impl<T: Task> Given<'_, T> {
+    /// The softness, as always without a word: what was learned on the task.
+    ///
+    /// # Errors
+    ///
+    /// If flags contradict each other or a file cannot be used.
+    pub fn method(&self) -> anyhow::Result<Method> {
+        if self.method.softness == Some(SoftnessChoice::Auto) {
+            return Err(Error::usage(
+                "--softness auto needs seeds to choose on: with pictures of your own name a family or a file",
+            ));
+        }
+        self.method.method(T::NAME, &T::SCALES, true)
+    }
+
+    /// Whether the command line says which softness.
+    pub fn names_softness(&self) -> bool {
+        !self.method.is_silent()
+    }
+
+    /// The learning rate of the command line.
+    pub fn learning_rate(&self) -> Option<f64> {
+        self.method.learning_rate
+    }
+
+    /// Where results go.
+    pub fn folder(&self) -> &Path {
+        &self.session.out
+    }
+
+    /// The backend, set up.
+    ///
+    /// # Errors
+    ///
+    /// If there is none of that name or no adapter for it.
+    pub fn backend(&self) -> anyhow::Result<BackendChoice> {
+        backend(self.common.backend.as_deref())
+    }
+
+    /// Progress over so many steps, which ends on Ctrl-C.
+    ///
+    /// # Errors
+    ///
+    /// If the user has stopped the program.
+    pub fn progress(&self, steps: usize) -> anyhow::Result<Progress> {
+        let mut progress = Progress::of_program(self.common.quiet);
+        progress.expect(steps);
+        progress.begin(T::NAME.to_owned(), 1, steps)?;
+        Ok(progress)
+    }
+}
+
+/// A camera and the mask that it took, for a page that shows them with a mesh.
+///
+/// # Errors
+///
+/// If the mask cannot be encoded.
+pub fn seen_by(
+    name: String,
+    camera: &Pinhole,
+    mask: &Picture,
+    note: String,
+) -> anyhow::Result<ViewerView> {
+    let Pinhole { rotation, translation, focal, centre, size } = *camera;
+    let mask_png = png(&rgb_from_gray(mask.pixels(), mask.size().width, mask.size().height))?;
+    Ok(ViewerView {
+        name,
+        rotation,
+        translation,
+        focal,
+        centre,
+        width: size.width,
+        height: size.height,
+        mask_png,
+        note,
+    })
+}
+
+/// What the task makes of the pictures, if the flags name some.
+pub(crate) fn solve_given<T: Task>(
+    session: &Session,
+    shared: &mut Shared<T::Args>,
+    pictures: &T::Pictures,
+) -> Option<anyhow::Result<Output>> {
+    if let Err(wrong) = shared.method.reconcile() {
+        return Some(Err(Error::usage(wrong)));
+    }
+    let Shared { args, common, method } = shared;
+    let given = Given { args, common, method, session };
+    let answer = T::solve_given(&given, pictures)?;
+    Some(answer.and_then(|answer| {
+        let Answer { page, output, files, beside } = answer;
+        let mut folder = session.folder()?;
+        files.iter().try_for_each(|(name, bytes)| folder.stage(name, bytes))?;
+        session.finish(folder, page, &beside, Some(RESULT), output)
+    }))
+}

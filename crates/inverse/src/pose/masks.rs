@@ -1,0 +1,257 @@
+use std::sync::Arc;
+
+use anyhow::Context;
+use burn::tensor::Tensor;
+use softrast_mesh::Mesh;
+use softrast_raster::{
+    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, iou_loss, project_pinhole,
+    turned, vertices,
+};
+use softrast_softness::{numbers, tensor};
+
+use crate::{InverseProblem, Picture, SoftnessAt, SolveConfig, Targets};
+
+/// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
+const CLEARANCE: f64 = 1.05;
+/// Most that the logarithm of a distance or a focal length may move.
+const FARTHEST: f64 = 3.0;
+
+/// A mask, the part of it that is looked at, and a camera to start from.
+#[derive(Clone, Debug)]
+pub struct MaskPose {
+    /// The picture.
+    pub mask: Arc<Picture>,
+    /// Left, top and extent of the square of it that is looked at, in pixels.
+    pub square: [f64; 3],
+    /// The camera before the first step, for the whole picture.
+    pub start: Pinhole,
+}
+
+/// Finds the camera of any pose from which a mesh has the silhouette of a mask.
+///
+/// θ holds for each instance a turn of the camera as a tangent vector in radians, where the middle of the mesh is seen (x and y, in
+/// radii of the mesh), and the logarithm of its depth, all from the start on; with an optimised focal length also its logarithm. The loss
+/// is the soft `IoU` loss over the part of the picture that is looked at; what lies outside of the picture does not count.
+#[derive(Clone, Debug)]
+pub struct MaskPoses {
+    mesh: Mesh,
+    middle: [f64; 3],
+    radius: f64,
+    optimise_fov: bool,
+    instances: Vec<MaskPose>,
+}
+
+impl MaskPoses {
+    /// Poses of a mesh, number `k` of them as the instance of seed `k`.
+    pub fn new(mesh: &Mesh, instances: Vec<MaskPose>, optimise_fov: bool) -> Self {
+        let (middle, radius) = ball(mesh);
+        Self { mesh: mesh.clone(), middle, radius, optimise_fov, instances }
+    }
+}
+
+/// The middle of the box of a mesh, and how far its farthest vertex is from there.
+pub(crate) fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
+    let corners = || mesh.triangles().flatten();
+    let bound = |k: usize, of: fn(f64, f64) -> f64| corners().map(|p| p[k]).reduce(of);
+    let [low, high] = [f64::min as fn(f64, f64) -> f64, f64::max]
+        .map(|of| [0, 1, 2].map(|k| bound(k, of).unwrap_or(0.0)));
+    let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
+    let distance = |p: [f64; 3]| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
+    (middle, corners().map(distance).fold(0.0, f64::max))
+}
+
+impl InverseProblem for MaskPoses {
+    type Instance = MaskPose;
+    type Scene<B: RasterBackend> = MaskScene<B>;
+
+    fn instance(&self, seed: u64) -> anyhow::Result<MaskPose> {
+        let instance = usize::try_from(seed).ok().and_then(|k| self.instances.get(k));
+        instance.cloned().with_context(|| format!("there are {} poses", self.instances.len()))
+    }
+
+    fn scene<B: RasterBackend>(&self, instances: &[MaskPose], size: usize) -> MaskScene<B> {
+        MaskScene::new(self, instances, size)
+    }
+
+    fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
+        Some(self.mesh.faces().into())
+    }
+
+    fn start<B: RasterBackend>(&self, scene: &MaskScene<B>) -> Tensor<B, 1> {
+        let [views, numbers] = scene.shape();
+        tensor(vec![0.0; views * numbers], [views * numbers])
+    }
+
+    fn allowed<B: RasterBackend>(&self, scene: &MaskScene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        scene.allowed(theta)
+    }
+
+    fn image<B: RasterBackend>(
+        &self,
+        scene: &MaskScene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 3> {
+        softness.silhouette(scene.project(theta))
+    }
+
+    fn hard_image<B: RasterBackend>(
+        &self,
+        scene: &MaskScene<B>,
+        theta: Tensor<B, 1>,
+    ) -> Tensor<B, 3> {
+        hard_silhouette(scene.project(theta), &scene.faces, scene.cameras.size)
+    }
+
+    fn image_loss<B: RasterBackend>(
+        &self,
+        scene: &MaskScene<B>,
+        image: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        let target = scene.targets.of(&image);
+        let image = match &scene.covered {
+            Some(covered) => image.clone() * covered.of(&image),
+            None => image,
+        };
+        iou_loss(image, target)
+    }
+
+    fn defaults(&self) -> SolveConfig {
+        SolveConfig { size: 64, steps: 100, learning_rate: 0.03 }
+    }
+}
+
+/// Instances of [`MaskPoses`] that are solved together, one view each.
+#[derive(Clone, Debug)]
+pub struct MaskScene<B: RasterBackend> {
+    vertices: Tensor<B, 3>,
+    faces: Arc<[[u32; 3]]>,
+    /// Cameras at the start, for what is looked at.
+    cameras: Pinholes<B>,
+    /// The middle of the mesh `[views, 3, 1]`, in the world.
+    middle: Tensor<B, 3>,
+    /// Where cameras see it at the start, `[views, 2]`, as x and y at depth 1; its depth `[views, 1]`; the radius of the mesh at that depth.
+    seen: Tensor<B, 2>,
+    depth: Tensor<B, 2>,
+    radius: Tensor<B, 2>,
+    /// Least logarithm of the depth against the start, `[views, 1]`.
+    nearest: Tensor<B, 2>,
+    optimise_fov: bool,
+    targets: Targets<B>,
+    /// How much of each pixel the picture covers, unless that is all of every pixel.
+    covered: Option<Targets<B>>,
+}
+
+impl<B: RasterBackend> MaskScene<B> {
+    fn new(problem: &MaskPoses, instances: &[MaskPose], size: usize) -> Self {
+        let (views, device) = (instances.len(), Default::default());
+        let MaskPoses { mesh, middle, radius, optimise_fov, .. } = problem;
+        let cropped = |of: &MaskPose| {
+            let [left, top, extent] = of.square;
+            of.start.cropped([left, top], [extent; 2], size)
+        };
+        let cameras: Vec<Pinhole> = instances.iter().map(cropped).collect();
+        let seen: Vec<[f64; 3]> = cameras.iter().map(|camera| camera.seen(*middle)).collect();
+        let column = |of: &dyn Fn(&[f64; 3]) -> f64| {
+            tensor::<B, 2>(seen.iter().map(of).collect(), [views, 1])
+        };
+        let at = seen.iter().flat_map(|[x, y, z]| [x / z, y / z]);
+        let nearest = |&[_, _, z]: &[f64; 3]| {
+            (CLEARANCE * radius / z).ln().clamp(-FARTHEST, FARTHEST).min(0.0)
+        };
+        let parts = instances.iter().map(|of| of.mask.part(of.square, size));
+        let (levels, covered): (Vec<_>, Vec<_>) = parts.map(|[a, b]| (a, b)).unzip();
+        let images = |of: Vec<Vec<f64>>| tensor::<B, 3>(of.concat(), [views, size, size]);
+        let whole = covered.iter().flatten().all(|&share| share > 1.0 - 1e-9);
+        Self {
+            vertices: vertices(mesh.positions(), &device),
+            faces: mesh.faces().into(),
+            cameras: Pinholes::new(&cameras, &device),
+            middle: tensor::<B, 3>(middle.repeat(views), [views, 3, 1]),
+            seen: tensor(at.collect(), [views, 2]),
+            depth: column(&|p| p[2]),
+            radius: column(&|p| radius / p[2]),
+            nearest: column(&nearest),
+            optimise_fov: *optimise_fov,
+            targets: Targets::new(images(levels)),
+            covered: (!whole).then(|| Targets::new(images(covered))),
+        }
+    }
+
+    /// Views, and numbers of θ for each.
+    fn shape(&self) -> [usize; 2] {
+        [self.depth.dims()[0], if self.optimise_fov { 7 } else { 6 }]
+    }
+
+    /// Cameras at θ, for what is looked at.
+    fn cameras(&self, theta: Tensor<B, 1>) -> Pinholes<B> {
+        let theta = theta.reshape(self.shape());
+        let part = |start: usize, length: usize| theta.clone().narrow(1, start, length);
+        let zoom = self.optimise_fov.then(|| part(6, 1));
+        // A longer lens is farther away, so that what is seen stays as large.
+        let farther = zoom.iter().fold(part(5, 1), |sum, zoom| sum + zoom.clone());
+        let depth = self.depth.clone() * farther.exp();
+        let beside = (self.seen.clone() + part(3, 2) * self.radius.clone()) * depth.clone();
+        let Pinholes { rotation, intrinsics, size, .. } = self.cameras.clone();
+        let rotation = turned(part(0, 3), rotation);
+        let middle = rotation.clone().matmul(self.middle.clone()).squeeze_dim::<2>(2);
+        let translation = Tensor::cat(vec![beside, depth], 1) - middle;
+        let intrinsics = match zoom {
+            None => intrinsics,
+            Some(zoom) => {
+                let focal = intrinsics.clone().narrow(1, 0, 2) * zoom.exp();
+                Tensor::cat(vec![focal, intrinsics.narrow(1, 2, 2)], 1)
+            }
+        };
+        Pinholes { rotation, translation, intrinsics, size }
+    }
+
+    fn project(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+        project_pinhole(self.vertices.clone(), &self.cameras(theta))
+    }
+
+    /// The mesh stays in front of the camera, and nothing grows without end.
+    fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        let theta = theta.reshape(self.shape());
+        let depth =
+            theta.clone().narrow(1, 5, 1).max_pair(self.nearest.clone()).clamp_max(FARTHEST);
+        let mut columns = vec![theta.clone().narrow(1, 0, 5), depth];
+        if self.optimise_fov {
+            columns.push(theta.narrow(1, 6, 1).clamp(-FARTHEST, FARTHEST));
+        }
+        Tensor::cat(columns, 1).flatten(0, 1)
+    }
+}
+
+impl MaskScene<HostBackend> {
+    /// The cameras at θ for the whole pictures of these instances.
+    pub fn found(&self, theta: Tensor<HostBackend, 1>, instances: &[MaskPose]) -> Vec<Pinhole> {
+        let Pinholes { rotation, translation, intrinsics, .. } = self.cameras(theta);
+        let (r, t, k) = (numbers(rotation), numbers(translation), numbers(intrinsics));
+        let camera = |(view, of): (usize, &MaskPose)| {
+            let r = &r[9 * view..9 * view + 9];
+            let side = self.cameras.size.width as f64;
+            let gain = side / of.square[2];
+            Pinhole {
+                rotation: orthonormal([0, 1, 2].map(|i| [r[3 * i], r[3 * i + 1], r[3 * i + 2]])),
+                translation: [0, 1, 2].map(|i| t[3 * view + i]),
+                focal: match self.optimise_fov {
+                    true => [0, 1].map(|i| k[4 * view + i] / gain),
+                    false => of.start.focal,
+                },
+                ..of.start
+            }
+        };
+        instances.iter().enumerate().map(camera).collect()
+    }
+}
+
+/// A rotation without the rounding of f32.
+fn orthonormal([x, y, _]: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+    let unit = |a: [f64; 3]| a.map(|value| value / dot(a, a).sqrt());
+    let x = unit(x);
+    let along = dot(x, y);
+    let y = unit([0, 1, 2].map(|k| y[k] - along * x[k]));
+    [x, y, [(1, 2), (2, 0), (0, 1)].map(|(i, j)| x[i] * y[j] - x[j] * y[i])]
+}

@@ -1,0 +1,238 @@
+//! A mesh on a page that can be turned, zoomed, and seen through the cameras that saw it.
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use serde_json::{Value, json};
+
+use crate::report::{Report, escape, image};
+
+pub(crate) const STYLE: &str = include_str!("viewer.css");
+pub(crate) const SCRIPT: &str = include_str!("viewer.js");
+
+/// A mesh and the cameras that see it, to be turned and zoomed on a page.
+///
+/// Vertices and faces take 16 characters of the page each: a closed mesh of 200 000 faces makes a page of 5 MB, which opens in a second.
+/// From a million faces on there is only the picture.
+#[derive(Clone, Debug, Default)]
+pub struct Viewer {
+    /// Vertices in world units; the page keeps them as f32.
+    pub positions: Vec<[f64; 3]>,
+    /// Triangles as indices of `positions`. Both sides are drawn, so their orientation does not matter.
+    pub faces: Vec<[u32; 3]>,
+    /// In the order in which the page offers them; there may be none.
+    pub views: Vec<ViewerView>,
+}
+
+/// A pinhole camera with the mask that the mesh should fill in it.
+///
+/// A point `p` of the world is at `c = rotation · p + translation` in the camera, with x to the right, y down and z ahead, and is seen at
+/// `focal · c.xy / c.z + centre` in the image.
+#[derive(Clone, Debug, Default)]
+pub struct ViewerView {
+    /// What the page calls it.
+    pub name: String,
+    /// Rows of the rotation from world to camera.
+    pub rotation: [[f64; 3]; 3],
+    /// World units.
+    pub translation: [f64; 3],
+    /// Along x and y, in pixels.
+    pub focal: [f64; 2],
+    /// Principal point in pixels; (0, 0) is the outer corner of the first pixel.
+    pub centre: [f64; 2],
+    /// Width of the image in pixels.
+    pub width: usize,
+    /// Height of the image in pixels.
+    pub height: usize,
+    /// The target mask as a gray PNG, inside from 128 on. It is stretched over the image, so it may be smaller; empty if there is none.
+    pub mask_png: Vec<u8>,
+    /// What is to be said about the view, such as "intersection over union 0.97, held out".
+    pub note: String,
+}
+
+impl Report {
+    /// A mesh to be turned and zoomed, and the outlines of the target masks over it.
+    ///
+    /// The PNG `fallback_png` is what those see who have no WebGL or no scripts. It is all that there is to see if the mesh has no faces or a
+    /// million, or if a number is not finite.
+    ///
+    /// # Panics
+    ///
+    /// If a face refers to a vertex that there is not, or a view has an image without pixels.
+    pub fn viewer(&mut self, viewer: &Viewer, fallback_png: &[u8], caption: &str) {
+        viewer.check();
+        if !viewer.can_be_drawn() {
+            return self.picture(fallback_png, caption);
+        }
+        let (image, data) = (image(fallback_png, caption), viewer.json());
+        let script = format!("<script type=\"application/json\">{data}</script>");
+        let content = format!("<div class=\"viewer\">\n{image}\n{script}\n</div>");
+        self.figure(&content, &escape(caption));
+        self.has_viewer = true;
+    }
+}
+
+impl Viewer {
+    fn check(&self) {
+        let vertices = self.positions.len();
+        for (k, face) in self.faces.iter().enumerate() {
+            let inside = face.iter().all(|&vertex| (vertex as usize) < vertices);
+            assert!(inside, "face {k} is {face:?}, but there are {vertices} vertices");
+        }
+        for ViewerView { name, width, height, .. } in &self.views {
+            assert!(width * height > 0, "view {name:?} has {width} x {height} pixels");
+        }
+    }
+
+    fn can_be_drawn(&self) -> bool {
+        let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
+        let is_camera = |view: &ViewerView| {
+            let ViewerView { rotation, translation, focal, centre, .. } = view;
+            let numbers = [rotation.as_flattened(), translation, focal, centre];
+            numbers.into_iter().all(finite) && focal.iter().all(|&f| f > 0.0)
+        };
+        let has_faces =
+            (1..1_000_000).contains(&self.faces.len()) && finite(self.positions.as_flattened());
+        has_faces && self.views.iter().all(is_camera)
+    }
+
+    /// JSON that may stand in a script element.
+    fn json(&self) -> String {
+        let positions = self.positions.as_flattened().iter();
+        let faces = self.faces.as_flattened().iter();
+        let data = json!({
+            "positions": base64(positions.flat_map(|&x| (x as f32).to_le_bytes())),
+            "faces": base64(faces.flat_map(|index| index.to_le_bytes())),
+            "views": self.views.iter().map(ViewerView::json).collect::<Vec<_>>(),
+        });
+        // A name may hold `</script>`; outside of strings, JSON has no such sign.
+        data.to_string().replace('<', "\\u003c")
+    }
+}
+
+impl ViewerView {
+    fn json(&self) -> Value {
+        let Self { name, rotation, translation, focal, centre, width, height, mask_png, note } =
+            self;
+        json!({
+            "name": name,
+            "rotation": rotation,
+            "translation": translation,
+            "focal": focal,
+            "centre": centre,
+            "width": width,
+            "height": height,
+            "mask": STANDARD.encode(mask_png),
+            "note": note,
+        })
+    }
+}
+
+fn base64(bytes: impl Iterator<Item = u8>) -> String {
+    STANDARD.encode(bytes.collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+
+    fn triangle() -> Viewer {
+        let view = ViewerView {
+            name: "front </script><b> & \"x\"".into(),
+            rotation: UPRIGHT,
+            translation: [0.0, 0.25, 3.0],
+            focal: [90.0, 80.0],
+            centre: [32.5, 24.0],
+            width: 64,
+            height: 48,
+            mask_png: vec![1, 2, 3],
+            note: "IoU <0.97>".into(),
+        };
+        let positions = vec![[0.1, -2.0, 3e4], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        Viewer { positions, faces: vec![[0, 1, 2], [2, 1, 0]], views: vec![view] }
+    }
+
+    fn page(viewers: &[Viewer]) -> String {
+        let mut report = Report::new("t", "a");
+        for viewer in viewers {
+            report.viewer(viewer, b"PNG", "A <mesh>");
+        }
+        report.finish("c", "b")
+    }
+
+    fn data(page: &str) -> Vec<Value> {
+        let opening = "<script type=\"application/json\">";
+        let texts = page.split(opening).skip(1).map(|rest| rest.split("</script>").next().unwrap());
+        texts.map(|text| serde_json::from_str(text).unwrap()).collect()
+    }
+
+    /// Numbers of four bytes each.
+    fn words(value: &Value) -> Vec<[u8; 4]> {
+        let bytes = STANDARD.decode(value.as_str().unwrap()).unwrap();
+        bytes.chunks_exact(4).map(|word| word.try_into().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_page_holds_all_of_the_mesh_and_its_views() {
+        let data = &data(&page(&[triangle()]))[0];
+        let positions: Vec<_> =
+            words(&data["positions"]).into_iter().map(f32::from_le_bytes).collect();
+        assert_eq!(positions, [0.1, -2.0, 3e4, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        let faces: Vec<_> = words(&data["faces"]).into_iter().map(u32::from_le_bytes).collect();
+        assert_eq!(faces, [0, 1, 2, 2, 1, 0]);
+        let view = json!({
+            "name": "front </script><b> & \"x\"", "note": "IoU <0.97>", "mask": "AQID",
+            "rotation": UPRIGHT, "translation": [0.0, 0.25, 3.0], "focal": [90.0, 80.0],
+            "centre": [32.5, 24.0], "width": 64, "height": 48,
+        });
+        assert_eq!(data["views"], json!([view]));
+    }
+
+    #[test]
+    fn names_and_captions_cannot_end_what_they_are_in() {
+        let page = page(&[triangle()]);
+        assert_eq!(page.matches("</script>").count(), 2, "one of the data, one of the code");
+        assert!(!page.contains("</script><b>") && !page.contains("<mesh>"));
+        assert!(page.contains("<img alt=\"A &lt;mesh&gt;\" src=\"data:image/png;base64,UE5H\">"));
+        assert!(page.contains("<figcaption>A &lt;mesh&gt;</figcaption>"));
+        assert!(!SCRIPT.contains("</script") && !STYLE.contains("</style"));
+    }
+
+    #[test]
+    fn several_on_a_page_share_the_script_and_have_no_ids() {
+        let mut other = triangle();
+        other.views.clear();
+        let page = page(&[triangle(), other]);
+        assert_eq!(page.matches("<div class=\"viewer\">").count(), 2);
+        assert_eq!([page.matches(SCRIPT).count(), page.matches(STYLE).count()], [1, 1]);
+        assert_eq!(data(&page)[1]["views"], json!([]));
+        assert!(!page.contains(" id=") && !SCRIPT.contains(".id ="));
+    }
+
+    #[test]
+    fn a_page_without_viewer_has_no_script() {
+        let page = page(&[]);
+        assert!(!page.contains("<script") && !page.contains(".viewer"));
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_a_picture() {
+        let mut cases = [(); 4].map(|()| triangle());
+        cases[0].faces.clear();
+        cases[1].positions[1][2] = f64::NAN;
+        cases[2].views[0].translation[0] = f64::INFINITY;
+        cases[3].views[0].focal[1] = 0.0;
+        for case in cases {
+            let page = page(&[case]);
+            assert!(page.contains("<img alt=") && !page.contains("<script"), "{page}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "face 1 is [2, 1, 3], but there are 3 vertices")]
+    fn a_face_of_a_missing_vertex_panics() {
+        let mut viewer = triangle();
+        viewer.faces[1][2] = 3;
+        page(&[viewer]);
+    }
+}

@@ -1,0 +1,28 @@
+//! The formats of mesh files, known by the ending of a file's name.
+
+use std::path::Path;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    Obj,
+    Ply,
+    Stl,
+    Glb,
+}
+
+impl Format {
+    pub(crate) fn of(path: &Path) -> Option<Self> {
+        match ending(path)?.as_str() {
+            "obj" => Some(Self::Obj),
+            "ply" => Some(Self::Ply),
+            "stl" => Some(Self::Stl),
+            "glb" => Some(Self::Glb),
+            _ => None,
+        }
+    }
+}
+
+/// What follows the last dot of the file's name, in lower case.
+pub(crate) fn ending(path: &Path) -> Option<String> {
+    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+}

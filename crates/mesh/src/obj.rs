@@ -1,0 +1,70 @@
+//! An OBJ file: its content in two steps, cleaned and then parsed, and its text.
+
+use std::{fmt, path::Path};
+
+use crate::{Mesh, MeshError, clean::clean, polygon::triangles};
+
+/// The mesh in `bytes`; see [`Mesh::parse`].
+pub(crate) fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
+    let clean = clean(bytes).map_err(|trouble| trouble.of_file(name))?;
+    // The parser numbers vertices as faces first use them. A first polygon that lists them
+    // all keeps the order of the file, and those which no face uses.
+    let all: String = (1..=clean.vertices).map(|vertex| format!(" {vertex}")).collect();
+    let text = format!("f{all}\n{}", clean.text);
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let options = tobj::LoadOptions::default();
+    let (models, _) =
+        tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials).map_err(|reason| {
+            MeshError::Parser { name: name.to_owned(), reason: reason.to_string() }
+        })?;
+
+    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    for tobj::Model { mesh, .. } in models {
+        positions.extend(mesh.positions.as_chunks().0);
+        let polygons = split(&mesh.indices, &mesh.face_arities);
+        faces.extend(polygons.skip(1).flat_map(|corners| triangles(&positions, corners)));
+    }
+    Mesh::new(positions, faces)
+}
+
+/// The polygons of a parsed model; no `arities` means that all are triangles.
+fn split<'a>(mut indices: &'a [u32], arities: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
+    let mut arities = arities.iter();
+    std::iter::from_fn(move || {
+        let corners = arities.next().map_or(3, |&n| n as usize);
+        let (polygon, rest) = indices.split_at_checked(corners)?;
+        indices = rest;
+        Some(polygon)
+    })
+}
+
+/// A mesh as the text of an OBJ file.
+pub(crate) struct Obj<'a>(pub(crate) &'a Mesh);
+
+impl fmt::Display for Obj<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for [x, y, z] in self.0.positions() {
+            writeln!(f, "v {x} {y} {z}")?;
+        }
+        for [a, b, c] in self.0.faces().iter().map(|face| face.map(|v| u64::from(v) + 1)) {
+            writeln!(f, "f {a} {b} {c}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_keep_the_order_of_the_file() {
+        for count in 1..6 {
+            let lines = (0..count).map(|x| format!("v {x} 0.1 0\n")).collect::<String>();
+            let mesh = Mesh::parse(format!("{lines}f -1 1 1").as_bytes(), "a.obj").unwrap();
+            let expected = (0..count).map(|x| [f64::from(x), 0.1, 0.0]).collect::<Vec<_>>();
+            assert_eq!(mesh.positions(), expected);
+            assert_eq!(mesh.faces(), [[count - 1, 0, 0]]);
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! A PLY file: text or binary, read and written.
+//!
+//! Read by code of our own: the crates for it read the numbers of text as 32 bits if the header
+//! says float, keep every property of every vertex, and loop as often as the header of an element
+//! without properties claims.
+
+use std::slice::ChunksExact;
+
+use crate::{
+    Fault, Mesh,
+    error::{Trouble, shown},
+    mesh::fits_f32,
+    ply_header::{Element, Encoding, Header, Number, Property},
+    polygon::triangles,
+    statements::next_line,
+};
+
+/// Positions and faces.
+pub(crate) type Parts = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
+const NO_FACES: Trouble = Trouble::NoFaces("a PLY file lists them in its element face");
+
+/// The mesh in `bytes`; see [`Mesh::parse`].
+pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
+    let Header { encoding, elements, lines } = Header::read(&mut bytes)?;
+    let vertices = element(&elements, "vertex")?.map_or(0, |vertex| vertex.count);
+    if let Some(strips) = element(&elements, "tristrips")?.filter(|strips| strips.count > 0) {
+        let reason = "tristrips are not read: export the mesh with faces";
+        return Err(Trouble::Line(strips.line, Fault::format(reason)));
+    }
+    if element(&elements, "face")?.is_none_or(|face| face.count == 0) {
+        return Err(NO_FACES);
+    }
+
+    let mut body = Body { rest: bytes, encoding, line: lines };
+    let (mut positions, mut corners, mut polygons) = (Vec::new(), Vec::new(), Vec::new());
+    for element in &elements {
+        match element.name.as_str() {
+            "vertex" => {
+                let wanted = ["x", "y", "z"].map(|axis| [axis, axis]);
+                let columns = columns(element, wanted, |p| p.list.is_none(), "number")?;
+                body.rows(element, &columns, |[x, y, z]| {
+                    let position = [x[0], y[0], z[0]];
+                    finite(position)?;
+                    positions.push(position);
+                    Ok(())
+                })?;
+            }
+            "face" => {
+                let wanted = [["vertex_indices", "vertex_index"]];
+                let whole = |p: &Property| p.list.is_some() && p.number.is_whole();
+                let columns = columns(element, wanted, whole, "list of whole numbers")?;
+                body.rows(element, &columns, |[indices]| {
+                    if indices.len() < 3 {
+                        return Err(Fault::Corners(indices.len()));
+                    }
+                    for &index in indices {
+                        corners.push(vertex(index, vertices)?);
+                    }
+                    polygons.push(indices.len());
+                    Ok(())
+                })?;
+            }
+            _ => body.rows(element, &[], |[]| Ok(()))?,
+        }
+    }
+
+    let mut faces = Vec::new();
+    let mut rest = corners.as_slice();
+    for corners in polygons {
+        let (polygon, after) = rest.split_at(corners);
+        faces.extend(triangles(&positions, polygon));
+        rest = after;
+    }
+    Ok((positions, faces))
+}
+
+/// The one element called `name`, if any.
+fn element<'a>(elements: &'a [Element], name: &str) -> Result<Option<&'a Element>, Trouble> {
+    let mut all = elements.iter().filter(|element| element.name == name);
+    let first = all.next();
+    match all.next() {
+        Some(second) => {
+            let reason = Fault::format(format!("the header has a second element {name}"));
+            Err(Trouble::Line(second.line, reason))
+        }
+        None => Ok(first),
+    }
+}
+
+/// Where `element` has the properties `wanted`, each under either of two names.
+fn columns<const N: usize>(
+    element: &Element,
+    wanted: [[&str; 2]; N],
+    fits: impl Fn(&Property) -> bool,
+    kind: &str,
+) -> Result<[usize; N], Trouble> {
+    let mut columns = [0; N];
+    for (column, names) in columns.iter_mut().zip(wanted) {
+        let named = |p: &Property| names.contains(&p.name.as_str()) && fits(p);
+        *column = element.properties.iter().position(named).ok_or_else(|| {
+            let reason = format!("element {} has no {kind} {}", element.name, names[0]);
+            Trouble::Line(element.line, Fault::format(reason))
+        })?;
+    }
+    Ok(columns)
+}
+
+/// An error unless all of `position` is finite in 32 bits.
+pub(crate) fn finite(position: [f64; 3]) -> Result<(), Fault> {
+    match position.iter().find(|&&x| !fits_f32(x)) {
+        Some(x) => Err(Fault::NotFinite(shown(&format!("{x:?}")))),
+        None => Ok(()),
+    }
+}
+
+/// A corner's vertex; `index` is a whole number of at most 32 bits, or was text.
+fn vertex(index: f64, vertices: u64) -> Result<u32, Fault> {
+    if index >= 0.0 && index < vertices as f64 && index <= f64::from(u32::MAX) {
+        return Ok(index as u32);
+    }
+    Err(Fault::OutOfRange { index: index.to_string(), vertices: vertices as usize })
+}
+
+/// What follows the header, up to where it has been read.
+struct Body<'a> {
+    rest: &'a [u8],
+    encoding: Encoding,
+    /// Number of the latest line; text only.
+    line: usize,
+}
+
+impl<'a> Body<'a> {
+    /// Gives the values of the properties `columns` of each row of `element` to `take`.
+    fn rows<const N: usize>(
+        &mut self,
+        element: &Element,
+        columns: &[usize; N],
+        mut take: impl FnMut([&[f64]; N]) -> Result<(), Fault>,
+    ) -> Result<(), Trouble> {
+        let ascii = self.encoding == Encoding::Ascii;
+        let least: usize =
+            element.properties.iter().map(|p| p.list.unwrap_or(p.number).size()).sum();
+        // Whatever the count of what has no properties, there is nothing to read.
+        if least == 0 {
+            return Ok(());
+        }
+        // A text has at least a digit and a blank for each value, but for the last blank.
+        let least = if ascii { 2 * element.properties.len() } else { least } as u64;
+        let room = self.rest.len() as u64 + u64::from(ascii);
+        if element.count.checked_mul(least).is_none_or(|bytes| bytes > room) {
+            let Element { name, count, .. } = element;
+            let rest = self.rest.len();
+            let reason = format!("{count} do not fit into the {rest} bytes after what is before");
+            return Err(Trouble::part(format!("element {name}"), reason));
+        }
+        let mut values: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
+        for row in 0..element.count {
+            values.iter_mut().for_each(Vec::clear);
+            let read = match self.encoding {
+                Encoding::Ascii => self.text_row(element, columns, &mut values),
+                _ => self.binary_row(element, columns, &mut values),
+            };
+            let taken = read.and_then(|()| take(values.each_ref().map(Vec::as_slice)));
+            taken.map_err(|fault| match fault {
+                fault if ascii && fault != Fault::Truncated => Trouble::Line(self.line, fault),
+                fault => Trouble::Part(format!("{} {row}", element.name), fault),
+            })?;
+        }
+        Ok(())
+    }
+
+    /// The next line that is not blank.
+    fn text_row(
+        &mut self,
+        element: &Element,
+        columns: &[usize],
+        values: &mut [Vec<f64>],
+    ) -> Result<(), Fault> {
+        let line = loop {
+            let line = next_line(&mut self.rest).ok_or(Fault::Truncated)?;
+            self.line += 1;
+            if !line.trim_ascii().is_empty() {
+                break String::from_utf8_lossy(line);
+            }
+        };
+        let mut words = line.split_ascii_whitespace();
+        let missing =
+            |name: &str| Fault::format(format!("the line ends before {name} is complete"));
+        for (p, Property { name, list, number }) in element.properties.iter().enumerate() {
+            let mut word = || words.next().ok_or_else(|| missing(name));
+            let count = match list {
+                Some(_) => length(parsed(word()?, true)?)?,
+                None => 1,
+            };
+            let column = columns.iter().position(|&column| column == p);
+            for _ in 0..count {
+                let word = word()?;
+                if let Some(column) = column {
+                    values[column].push(parsed(word, list.is_some() && number.is_whole())?);
+                }
+            }
+        }
+        match words.next() {
+            Some(word) => Err(Fault::format(format!("{:?} is one value too many", shown(word)))),
+            None => Ok(()),
+        }
+    }
+
+    fn binary_row(
+        &mut self,
+        element: &Element,
+        columns: &[usize],
+        values: &mut [Vec<f64>],
+    ) -> Result<(), Fault> {
+        for (p, Property { list, number, .. }) in element.properties.iter().enumerate() {
+            let count = match list {
+                Some(list) => length(self.bytes(1, *list)?.map(|n| self.number(n, *list)).sum())?,
+                None => 1,
+            };
+            let numbers = self.bytes(count, *number)?;
+            if let Some(column) = columns.iter().position(|&column| column == p) {
+                values[column].extend(numbers.map(|bytes| self.number(bytes, *number)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes `count` numbers off the body, each as its bytes.
+    fn bytes(&mut self, count: usize, number: Number) -> Result<ChunksExact<'a, u8>, Fault> {
+        let size = number.size();
+        let taken = count.checked_mul(size).and_then(|length| self.rest.split_at_checked(length));
+        let (bytes, rest) = taken.ok_or(Fault::Truncated)?;
+        self.rest = rest;
+        Ok(bytes.chunks_exact(size))
+    }
+
+    /// The value of as many bytes as `number` takes.
+    fn number(&self, bytes: &[u8], number: Number) -> f64 {
+        let mut low = [0; 8];
+        low[..bytes.len()].copy_from_slice(bytes);
+        if self.encoding == Encoding::BigEndian {
+            low[..bytes.len()].reverse();
+        }
+        let [a, b, c, d, ..] = low;
+        match number {
+            Number::I8 => i8::from_le_bytes([a]).into(),
+            Number::U8 => a.into(),
+            Number::I16 => i16::from_le_bytes([a, b]).into(),
+            Number::U16 => u16::from_le_bytes([a, b]).into(),
+            Number::I32 => i32::from_le_bytes([a, b, c, d]).into(),
+            Number::U32 => u32::from_le_bytes([a, b, c, d]).into(),
+            Number::F32 => f32::from_le_bytes([a, b, c, d]).into(),
+            Number::F64 => f64::from_le_bytes(low),
+        }
+    }
+}
+
+/// The value of a word; `whole` of an index or a length.
+fn parsed(word: &str, whole: bool) -> Result<f64, Fault> {
+    if whole {
+        let not_whole = |_| Fault::format(format!("{:?} is not a whole number", shown(word)));
+        return word.parse::<i64>().map(|n| n as f64).map_err(not_whole);
+    }
+    word.parse().map_err(|_| Fault::Number(shown(word)))
+}
+
+/// Of a list; the caller finds out whether the file has as many entries.
+fn length(entries: f64) -> Result<usize, Fault> {
+    if entries < 0.0 {
+        return Err(Fault::format(format!("a list cannot have {entries} entries")));
+    }
+    Ok(entries as usize)
+}
+
+/// See [`Mesh::to_ply`].
+pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
+    let (positions, faces) = (mesh.positions(), mesh.faces());
+    let mut file = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\n\
+        property double y\nproperty double z\nelement face {}\n\
+        property list uchar uint vertex_indices\nend_header\n",
+        positions.len(),
+        faces.len()
+    )
+    .into_bytes();
+    file.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for corners in faces {
+        file.push(3);
+        file.extend(corners.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    file
+}

@@ -1,0 +1,177 @@
+//! The header of a PLY file: which elements it has, of which properties, in which encoding.
+
+use crate::{
+    Fault,
+    error::{Trouble, shown},
+    statements::next_line,
+};
+
+/// Of two bytes or more, those of numbers are in an order that binary files name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Encoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+#[derive(Debug)]
+pub(crate) struct Header {
+    pub(crate) encoding: Encoding,
+    pub(crate) elements: Vec<Element>,
+    /// How many lines the header has: the body starts on the next.
+    pub(crate) lines: usize,
+}
+
+#[derive(Debug)]
+pub(crate) struct Element {
+    pub(crate) name: String,
+    /// As the header claims; nothing has checked it yet.
+    pub(crate) count: u64,
+    pub(crate) properties: Vec<Property>,
+    /// Line of the header, from 1.
+    pub(crate) line: usize,
+}
+
+#[derive(Debug)]
+pub(crate) struct Property {
+    pub(crate) name: String,
+    /// Type of the number of entries, if it is a list.
+    pub(crate) list: Option<Number>,
+    pub(crate) number: Number,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Number {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Number {
+    fn of(name: &str) -> Result<Self, Fault> {
+        Ok(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return Err(Fault::format(format!("{:?} is not a type of PLY", shown(name)))),
+        })
+    }
+
+    pub(crate) fn is_whole(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// How many bytes it takes in a binary file.
+    pub(crate) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+impl Header {
+    /// Takes the header off `bytes`.
+    pub(crate) fn read(bytes: &mut &[u8]) -> Result<Self, Trouble> {
+        let (mut lines, mut encoding, mut elements) = (0, None, Vec::new());
+        loop {
+            lines += 1;
+            let last = bytes.is_empty();
+            let line = String::from_utf8_lossy(next_line(bytes).unwrap_or_default());
+            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            let done = match (lines, words.as_slice()) {
+                (1, ["ply"]) => Ok(false),
+                (1, _) => Err(Fault::format("not a PLY file: its first line is not \"ply\"")),
+                (_, ["end_header"]) => Ok(true),
+                _ if last => Err(Fault::format("the file ends before end_header")),
+                (_, words) => statement(words, lines, &mut encoding, &mut elements).map(|()| false),
+            };
+            let at = |fault| Trouble::Line(lines, fault);
+            if done.map_err(at)? {
+                let missing =
+                    || at(Fault::format("the header has no line that starts with format"));
+                return Ok(Self { encoding: encoding.ok_or_else(missing)?, elements, lines });
+            }
+        }
+    }
+}
+
+fn statement(
+    words: &[&str],
+    line: usize,
+    encoding: &mut Option<Encoding>,
+    elements: &mut Vec<Element>,
+) -> Result<(), Fault> {
+    match *words {
+        [] | ["comment" | "obj_info", ..] => {}
+        ["format", "ascii", "1.0"] => *encoding = Some(Encoding::Ascii),
+        ["format", "binary_little_endian", "1.0"] => *encoding = Some(Encoding::LittleEndian),
+        ["format", "binary_big_endian", "1.0"] => *encoding = Some(Encoding::BigEndian),
+        ["element", name, count] => {
+            let not_whole = |_| Fault::format(format!("{:?} is not a count", shown(count)));
+            let count = count.parse().map_err(not_whole)?;
+            elements.push(Element { name: shown(name), count, properties: Vec::new(), line });
+        }
+        ["property", "list", count, number, name] => {
+            let list = Number::of(count)?;
+            if !list.is_whole() {
+                return Err(Fault::format("the length of a list must be of a whole type"));
+            }
+            add(elements, name, Some(list), Number::of(number)?)?;
+        }
+        ["property", number, name] => add(elements, name, None, Number::of(number)?)?,
+        _ => {
+            let text = shown(&words.join(" "));
+            return Err(Fault::format(format!(
+                "{text:?} does not belong in the header of PLY 1.0"
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn add(
+    elements: &mut [Element],
+    name: &str,
+    list: Option<Number>,
+    number: Number,
+) -> Result<(), Fault> {
+    let before = || Fault::format("a property comes before the first element");
+    let element = elements.last_mut().ok_or_else(before)?;
+    element.properties.push(Property { name: shown(name), list, number });
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn header_ends_right_before_the_body_whatever_ends_its_lines() {
+        for end in ["\n", "\r\n", "\r"] {
+            let lines = ["ply", "format binary_big_endian 1.0", "comment a b", "element face 2"];
+            let more = ["property list uint8 int vertex_indices", "end_header"];
+            let text = lines.into_iter().chain(more).map(|line| line.to_owned() + end);
+            let file = text.collect::<String>() + "body";
+            let mut rest = file.as_bytes();
+            let Ok(header) = Header::read(&mut rest) else { panic!("a sound header") };
+            assert_eq!((rest, header.lines), (b"body".as_slice(), 6));
+            assert_eq!(header.encoding, Encoding::BigEndian);
+            assert_eq!((header.elements[0].count, header.elements[0].line), (2, 4));
+            let property = &header.elements[0].properties[0];
+            assert_eq!((property.list, property.number), (Some(Number::U8), Number::I32));
+        }
+    }
+}

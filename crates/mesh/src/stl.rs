@@ -1,0 +1,150 @@
+//! An STL file, text or binary.
+//!
+//! Read by code of our own: the crate for it rounds the numbers of text to 32 bits, and takes every
+//! file that starts with "solid" for text.
+
+use std::collections::HashMap;
+
+use crate::{
+    Fault,
+    error::{Trouble, shown},
+    ply::{Parts, finite},
+    statements::next_line,
+};
+
+/// A binary file starts with as many bytes of any content, then the number of triangles.
+const HEADER: usize = 80;
+/// Each has a normal, three corners of three 32-bit floats, and two bytes of any content.
+const TRIANGLE: usize = 50;
+const NORMAL: usize = 12;
+
+const NO_FACES: Trouble = Trouble::NoFaces("an STL file is a list of triangles, this one is empty");
+
+/// The mesh in `bytes`; see [`Mesh::parse`](crate::Mesh::parse).
+pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
+    let mut surface = Surface::default();
+    let starts_like_text = bytes.trim_ascii_start().get(..5).is_some_and(|word| {
+        // A binary file may start with this word as well, but text has no zeros.
+        word.eq_ignore_ascii_case(b"solid") && !bytes[..bytes.len().min(1024)].contains(&0)
+    });
+    if starts_like_text && claimed(bytes) != Some(bytes.len() as u64) {
+        text(bytes, &mut surface)?;
+    } else {
+        binary(bytes, &mut surface)?;
+    }
+    if surface.faces.is_empty() { Err(NO_FACES) } else { Ok((surface.positions, surface.faces)) }
+}
+
+/// The number of triangles that a binary file names.
+fn count(bytes: &[u8]) -> Option<u32> {
+    let count = bytes.get(HEADER..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*count))
+}
+
+/// The length that a binary file should have, in bytes.
+fn claimed(bytes: &[u8]) -> Option<u64> {
+    Some((HEADER + 4) as u64 + TRIANGLE as u64 * u64::from(count(bytes)?))
+}
+
+fn binary(bytes: &[u8], surface: &mut Surface) -> Result<(), Trouble> {
+    let length = bytes.len();
+    let Some((count, claimed)) = count(bytes).zip(claimed(bytes)) else {
+        let reason = format!("neither text that starts with solid nor 84 bytes long: {length}");
+        return Err(Trouble::part("header", reason));
+    };
+    if claimed > length as u64 {
+        let reason = format!("{count} triangles take {claimed} bytes, but the file has {length}");
+        return Err(Trouble::part("header", reason));
+    }
+    let triangles = bytes[HEADER + 4..].chunks_exact(TRIANGLE).take(count as usize);
+    for (number, triangle) in triangles.enumerate() {
+        let floats = triangle[NORMAL..].as_chunks().0.iter().map(|&x| f32::from_le_bytes(x).into());
+        let floats: Vec<f64> = floats.collect();
+        let &[a, b, c] = floats.as_chunks().0 else { unreachable!("nine floats in 38 bytes") };
+        let add = surface.add([a, b, c]);
+        add.map_err(|fault| Trouble::Part(format!("triangle {number}"), fault))?;
+    }
+    Ok(())
+}
+
+fn text(mut bytes: &[u8], surface: &mut Surface) -> Result<(), Trouble> {
+    let (mut line, mut corners, mut solids) = (0, None, 0);
+    while let Some(words) = next_line(&mut bytes) {
+        line += 1;
+        statement(&String::from_utf8_lossy(words), &mut solids, &mut corners, surface)
+            .map_err(|fault| Trouble::Line(line, fault))?;
+    }
+    let open = match (&corners, solids) {
+        (None, 0) => return Ok(()),
+        (Some(_), _) => "facet",
+        (None, _) => "solid",
+    };
+    let reason = format!("the file ends before end{open}");
+    Err(Trouble::Line(line, Fault::format(reason)))
+}
+
+/// One line: `solids` counts those that are open, `corners` are those of a facet that is.
+fn statement(
+    line: &str,
+    solids: &mut usize,
+    corners: &mut Option<Vec<[f64; 3]>>,
+    surface: &mut Surface,
+) -> Result<(), Fault> {
+    let mut words = line.split_ascii_whitespace();
+    let Some(word) = words.next() else { return Ok(()) };
+    let misplaced = || Err(Fault::format(format!("{:?} does not belong here", shown(word))));
+    match (word.to_ascii_lowercase().as_str(), &mut *corners) {
+        ("solid", None) if *solids == 0 => *solids = 1,
+        ("endsolid", None) if *solids == 1 => *solids = 0,
+        ("facet", None) if *solids == 1 => *corners = Some(Vec::new()),
+        ("outer" | "endloop", Some(_)) => {}
+        ("vertex", Some(corners)) => corners.push(position(words)?),
+        ("endfacet", Some(found)) => {
+            let &[a, b, c] = found.as_slice() else {
+                let reason = format!("a facet has three corners: found {}", found.len());
+                return Err(Fault::format(reason));
+            };
+            surface.add([a, b, c])?;
+            *corners = None;
+        }
+        _ => return misplaced(),
+    }
+    Ok(())
+}
+
+fn position<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], Fault> {
+    let mut position = [0.0; 3];
+    for (found, x) in position.iter_mut().enumerate() {
+        let word = words.next().ok_or(Fault::Coordinates(found))?;
+        *x = word.parse().map_err(|_| Fault::Number(shown(word)))?;
+    }
+    finite(position)?;
+    Ok(position)
+}
+
+/// Triangles that share the corners which lie at one place.
+#[derive(Default)]
+struct Surface {
+    positions: Vec<[f64; 3]>,
+    faces: Vec<[u32; 3]>,
+    vertices: HashMap<[u64; 3], u32>,
+}
+
+impl Surface {
+    fn add(&mut self, triangle: [[f64; 3]; 3]) -> Result<(), Fault> {
+        let mut face = [0; 3];
+        for (corner, position) in face.iter_mut().zip(triangle) {
+            finite(position)?;
+            // Adding 0 makes 0 of -0.
+            let place = position.map(|x| (x + 0.0).to_bits());
+            let next = u32::try_from(self.positions.len());
+            let next = next.map_err(|_| Fault::format("more vertices than 32 bits can number"))?;
+            *corner = *self.vertices.entry(place).or_insert_with(|| {
+                self.positions.push(position);
+                next
+            });
+        }
+        self.faces.push(face);
+        Ok(())
+    }
+}

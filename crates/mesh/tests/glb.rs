@@ -1,0 +1,186 @@
+//! GLB files as programs write them, and as they should not.
+
+use serde_json::{Value, json};
+use softrast_mesh::Mesh;
+
+fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
+    let mut json = json.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut file = b"glTF".to_vec();
+    let word = |length: usize| (length as u32).to_le_bytes();
+    file.extend([word(2), word(28 + json.len() + bin.len()), word(json.len())].concat());
+    file.extend([b"JSON", json.as_slice(), &word(bin.len()), b"BIN\0", bin].concat());
+    file
+}
+
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+/// One mesh: four corners of a square at z = 0 to 3, twelve bytes each, then `indices`.
+fn square(indices: &[u8], component: u32, count: usize, mode: u32) -> (Value, Vec<u8>) {
+    let corners = [0., 0., 0., 1., 0., 1., 1., 1., 2., 0., 1., 3.];
+    let json = json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": mode}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": component, "count": count, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": indices.len()},
+        ],
+        "buffers": [{"byteLength": 48 + indices.len()}],
+    });
+    (json, [floats(&corners).as_slice(), indices].concat())
+}
+
+fn bytes() -> (Value, Vec<u8>) {
+    square(&[0, 1, 2, 0, 2, 3], 5121, 6, 4)
+}
+
+fn faces((json, bin): (Value, Vec<u8>)) -> Vec<[u32; 3]> {
+    Mesh::parse(&glb(&json, &bin), "a.glb").expect("a sound file").faces().to_vec()
+}
+
+#[test]
+fn indices_have_8_16_or_32_bits_or_are_left_out() {
+    let two = [[0, 1, 2], [0, 2, 3]];
+    assert_eq!(faces(bytes()), two);
+    let short: Vec<u8> = [0u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()).collect();
+    assert_eq!(faces(square(&short, 5123, 6, 4)), two);
+    let long: Vec<u8> = [0u32, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()).collect();
+    assert_eq!(faces(square(&long, 5125, 6, 4)), two);
+    let (mut json, bin) = bytes();
+    json["meshes"][0]["primitives"][0].as_object_mut().unwrap().remove("indices");
+    json["accessors"][0]["count"] = json!(3);
+    assert_eq!(faces((json, bin)), [[0, 1, 2]]);
+}
+
+#[test]
+fn strips_and_fans_are_triangles_of_one_side() {
+    assert_eq!(faces(square(&[0, 1, 3, 2], 5121, 4, 5)), [[0, 1, 3], [1, 2, 3]]);
+    assert_eq!(faces(square(&[0, 1, 2, 3], 5121, 4, 6)), [[0, 1, 2], [0, 2, 3]]);
+    // Lines have no surface.
+    let (json, bin) = square(&[0, 1, 2, 3], 5121, 4, 1);
+    let error = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap_err().to_string();
+    assert!(error.starts_with("a.glb: no faces: "), "{error}");
+}
+
+#[test]
+fn nodes_place_meshes_and_mirrors_keep_their_outside() {
+    let (mut json, bin) = bytes();
+    json["scenes"][0]["nodes"] = json!([1, 2]);
+    json["nodes"] = json!([
+        {"mesh": 0, "translation": [0, 0, 1]},
+        {"children": [0], "scale": [2, 1, 1], "translation": [5, 0, 0]},
+        {"mesh": 0, "scale": [-1, 1, 1]},
+    ]);
+    let mesh = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap();
+    assert_eq!(mesh.positions()[1], [7.0, 0.0, 2.0]);
+    assert_eq!(mesh.positions()[5], [-1.0, 0.0, 1.0]);
+    assert_eq!(mesh.faces(), [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]]);
+}
+
+#[test]
+fn parts_share_vertices_that_lie_between_other_data() {
+    let (mut json, bin) = bytes();
+    json["bufferViews"][0]["byteStride"] = json!(16);
+    json["bufferViews"][0]["byteLength"] = json!(64);
+    json["bufferViews"][1]["byteOffset"] = json!(64);
+    let spread: Vec<u8> = bin[..48].chunks(12).flat_map(|p| [p, &[255; 4]].concat()).collect();
+    let primitive = json["meshes"][0]["primitives"][0].clone();
+    json["meshes"][0]["primitives"] = json!([primitive, primitive]);
+    let mesh = Mesh::parse(&glb(&json, &[&spread, &bin[48..]].concat()), "a.glb").unwrap();
+    assert_eq!(mesh.positions()[3], [0.0, 1.0, 3.0]);
+    assert_eq!((mesh.positions().len(), mesh.faces().len()), (4, 4));
+}
+
+#[test]
+fn quantised_and_sparse_positions_are_read() {
+    let (mut json, bin) = bytes();
+    json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+    json["accessors"][0] = json!({
+        "bufferView": 2, "componentType": 5120, "normalized": true, "count": 4, "type": "VEC3",
+        "sparse": {
+            "count": 1,
+            "indices": {"bufferView": 3, "componentType": 5121},
+            "values": {"bufferView": 4},
+        },
+    });
+    json["bufferViews"].as_array_mut().unwrap().extend([
+        json!({"buffer": 0, "byteOffset": 56, "byteLength": 16, "byteStride": 4}),
+        json!({"buffer": 0, "byteOffset": 72, "byteLength": 1}),
+        json!({"buffer": 0, "byteOffset": 76, "byteLength": 3}),
+    ]);
+    let mut bin = [bin, vec![0; 2]].concat();
+    bin.extend([0, 0, 0, 9, 127, 0, 0, 9, 127, 127, 0, 9, 0, 127, 0, 9]);
+    bin.extend([2, 0, 0, 0, 129, 127, 127]);
+    let mesh = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap();
+    assert_eq!(mesh.positions(), [[0., 0., 0.], [1., 0., 0.], [-1., 1., 1.], [0., 1., 0.]]);
+}
+
+#[test]
+fn bad_files_are_one_line_that_names_the_place() {
+    let with = |change: fn(&mut Value)| {
+        let (mut json, bin) = bytes();
+        change(&mut json);
+        glb(&json, &bin)
+    };
+    let whole = with(|_| ());
+    let mut of_version_1 = whole.clone();
+    of_version_1[4] = 1;
+    let mut huge_chunk = whole.clone();
+    huge_chunk[12..16].fill(255);
+    let cases: [(Vec<u8>, &str); 15] = [
+        (b"{}".to_vec(), "header: not a GLB file: it does not start with glTF"),
+        (of_version_1, "header: glTF 1 is not read: export it as glTF 2.0"),
+        (whole[..9].to_vec(), "header: the file ends before it is complete"),
+        (huge_chunk, "chunk 0: the file ends before it is complete"),
+        (
+            with(|j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"])),
+            "JSON chunk: compressed by KHR_draco_mesh_compression: export it without compression",
+        ),
+        (
+            with(|j| j["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"])),
+            "JSON chunk: needs the extension EXT_mesh_gpu_instancing, which is not read",
+        ),
+        (
+            with(|j| j["buffers"][0]["uri"] = json!("a.bin")),
+            "node 0, mesh 0, primitive 0, accessor 0: buffer 0 lies outside of the binary chunk: export it as one .glb file",
+        ),
+        (
+            with(|j| j["nodes"][0]["children"] = json!([0])),
+            "node 0: it is in the tree of nodes more than once",
+        ),
+        (with(|j| j["nodes"][0]["mesh"] = json!(1)), "node 0, mesh 1: there is none"),
+        (with(|j| j["scene"] = json!(3)), "scene 3: there is none"),
+        (
+            with(|j| j["accessors"][1]["count"] = json!(9)),
+            "node 0, mesh 0, primitive 0, accessor 1: 9 entries reach beyond the binary chunk or buffer view 1",
+        ),
+        (
+            with(|j| j["accessors"][1]["count"] = json!(5)),
+            "node 0, mesh 0, primitive 0: 5 corners do not make whole triangles",
+        ),
+        (
+            with(|j| j["accessors"][0]["count"] = json!(3)),
+            "node 0, mesh 0, primitive 0: index 3 is out of range: the file has 3 vertices",
+        ),
+        (
+            with(|j| j["nodes"][0]["scale"] = json!([1e39, 1, 1])),
+            "node 0, mesh 0, primitive 0, vertex 1: coordinate \"1e39\" is not finite in 32-bit floats",
+        ),
+        (
+            with(|j| j["accessors"][1]["componentType"] = json!(5126)),
+            "node 0, mesh 0, primitive 0, accessor 1: indices are single whole numbers of 8, 16 or 32 bits without a sign",
+        ),
+    ];
+    for (file, message) in cases {
+        let error = Mesh::parse(&file, "a.glb").expect_err(message).to_string();
+        assert_eq!(error, format!("a.glb: {message}"));
+    }
+}

@@ -1,0 +1,94 @@
+//! PLY files as programs write them, and as they should not.
+
+use softrast_mesh::Mesh;
+
+const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+    element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+const POSITIONS: [[f32; 3]; 4] =
+    [[0.0, 0.0, 0.5], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+/// A quad and a triangle, numbers in the byte order that `format` names.
+fn binary(format: &str, float: fn(f32) -> [u8; 4], int: fn(i32) -> [u8; 4]) -> Vec<u8> {
+    let mut file = format!("ply\nformat {format} 1.0\n{HEADER}").into_bytes();
+    for position in POSITIONS {
+        file.extend(position.into_iter().flat_map(float));
+        file.push(255);
+    }
+    for corners in [&[0, 1, 2, 3][..], &[2, 1, 0]] {
+        file.push(corners.len() as u8);
+        file.extend(corners.iter().copied().flat_map(int));
+    }
+    file
+}
+
+#[test]
+fn text_and_both_byte_orders_say_the_same() {
+    let text = format!(
+        "ply\nformat ascii 1.0\ncomment made by hand\n{HEADER}0 0 .5 255\n1 0 0 0\n\n1 1 0 0\n0 1 0 7\n4 0 1 2 3\n3 2 1 0\n"
+    );
+    let little = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+    let big = binary("binary_big_endian", f32::to_be_bytes, i32::to_be_bytes);
+    for file in [text.clone().into_bytes(), text.replace('\n', "\r\n").into_bytes(), little, big] {
+        let mesh = Mesh::parse(&file, "a.ply").unwrap();
+        assert_eq!(mesh.positions(), POSITIONS.map(|p| p.map(f64::from)));
+        assert_eq!(mesh.faces().len(), 3);
+        assert_eq!(mesh.faces()[2], [2, 1, 0]);
+        assert!(
+            (mesh.area() - Mesh::parse(text.as_bytes(), "a.ply").unwrap().area()).abs() < 1e-12
+        );
+    }
+}
+
+#[test]
+fn faces_may_come_first_and_other_elements_and_lists_are_skipped() {
+    let file = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar float uv\n\
+        property list uint8 uint vertex_index\nproperty int flags\nelement edge 1\nproperty int a\n\
+        element vertex 3\nproperty double nx\nproperty double z\nproperty double y\nproperty double x\n\
+        end_header\n2 .5 .5 3 0 1 2 9\n4\n0 3 2 1\n0 6 5 4\n0 9 9 1e-3\n";
+    let mesh = Mesh::parse(file.as_bytes(), "a.ply").unwrap();
+    assert_eq!(mesh.positions(), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [1e-3, 9.0, 9.0]]);
+    assert_eq!(mesh.faces(), [[0, 1, 2]]);
+}
+
+#[test]
+fn bad_files_are_one_line_that_names_the_place() {
+    let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let whole = format!("{head}{body}");
+    let with = |from: &str, to: &str| whole.replacen(from, to, 1);
+    let little = binary("binary_little_endian", f32::to_le_bytes, i32::to_le_bytes);
+    let cases: [(Vec<u8>, &str); 15] = [
+        (b"obj".to_vec(), "1: not a PLY file: its first line is not \"ply\""),
+        (with("float z", "half z").into(), "6: \"half\" is not a type of PLY"),
+        (
+            with("ascii 1.0", "ascii 2.0").into(),
+            "2: \"format ascii 2.0\" does not belong in the header of PLY 1.0",
+        ),
+        (
+            with("format ascii 1.0\n", "").into(),
+            "8: the header has no line that starts with format",
+        ),
+        (with("vertex 3", "vertex x").into(), "3: \"x\" is not a count"),
+        (with("end_header\n", "").into(), "9: \"0 0 0\" does not belong in the header of PLY 1.0"),
+        (with("property float z\n", "").into(), "3: element vertex has no number z"),
+        (with("face 1", "face 0").into(), " no faces: a PLY file lists them in its element face"),
+        (
+            with("face 1", "face 900000000").into(),
+            " element face: 900000000 do not fit into the 8 bytes after what is before",
+        ),
+        (
+            with("0 1 0\n", "0 nan 0\n").into(),
+            "12: coordinate \"NaN\" is not finite in 32-bit floats",
+        ),
+        (with("3 0 1 2", "2 0 1").into(), "13: fewer than three corners: found 2"),
+        (with("3 0 1 2", "3 0 1 3").into(), "13: index 3 is out of range: the file has 3 vertices"),
+        (with("3 0 1 2", "3 0 1 1.5").into(), "13: \"1.5\" is not a whole number"),
+        (with("3 0 1 2", "3 0 1").into(), "13: the line ends before vertex_indices is complete"),
+        (little[..little.len() - 1].to_vec(), " face 1: the file ends before it is complete"),
+    ];
+    for (file, message) in cases {
+        let error = Mesh::parse(&file, "a.ply").expect_err(message).to_string();
+        assert_eq!(error, format!("a.ply:{message}"));
+    }
+}

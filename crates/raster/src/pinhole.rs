@@ -1,0 +1,363 @@
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_softness::tensor_on;
+
+use crate::{
+    ImageSize, Orbit, RasterBackend,
+    camera::{cross, dot, perspective, unit},
+};
+
+/// How far from a right angle, a unit length or the middle of an image still counts as none at all.
+const EXACT: f64 = 1e-6;
+/// Entries of `R Rᵀ` that are farther than this from the identity make R no rotation: files hold few digits.
+const ROUNDED: f64 = 1e-3;
+
+/// A calibrated camera that stands anywhere, as OpenCV has it.
+///
+/// Its axes are x right, y down and z ahead: it sees a point p of the world at `c = R p + t`, in the pixel `(fx x / z + cx, fy y / z +
+/// cy)`. The corner of the first pixel is (0, 0) and its middle (½, ½), as with instant-ngp, nerfstudio and COLMAP; what OpenCV itself
+/// calibrates counts from the middle of the first pixel, so add ½ to its cx and cy. There is no skew and no distortion.
+///
+/// ```
+/// # use burn::backend::NdArray;
+/// use softrast_raster::{Pinhole, Pinholes, project_pinhole, vertices};
+///
+/// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, [150, 200]);
+/// let device = Default::default();
+/// let corners = vertices::<NdArray>(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], &device);
+/// let seen = project_pinhole(corners, &Pinholes::new(&[camera], &device)); // [1, 2, 3]
+/// let x: Vec<f32> = seen.into_data().to_vec().unwrap();
+/// assert!(x[0].abs() < 1e-6 && x[3] > 0.0, "the origin is in the middle, +x to the right");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    /// R, row by row, from world to camera axes.
+    pub rotation: [[f64; 3]; 3],
+    /// t, in world units.
+    pub translation: [f64; 3],
+    /// fx and fy, in pixels.
+    pub focal: [f64; 2],
+    /// cx and cy, in pixels.
+    pub centre: [f64; 2],
+    /// Height and width of the image.
+    pub size: ImageSize,
+}
+
+/// What is wrong with a [`Pinhole`].
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PinholeError {
+    /// A number of it is infinite or NaN.
+    #[error("the camera has a number that is not finite")]
+    NotFinite,
+    /// R changes lengths or angles.
+    #[error("R is no rotation: R Rᵀ is off the identity by {0:.2e}")]
+    NoRotation(f64),
+    /// R is a reflection.
+    #[error(
+        "R mirrors the world (its determinant is -1): the sign of one or of all its axes is wrong"
+    )]
+    Mirrors,
+    /// It would see nothing.
+    #[error("the focal lengths are {0} and {1} pixels: they must be positive")]
+    NoFocalLength(f64, f64),
+    /// It has no pixels.
+    #[error("the image has no pixels")]
+    NoPixels,
+}
+
+impl Pinhole {
+    /// A camera at `eye` that has `target` in the middle of its image, with `up` upwards; its whole field of view along the shorter side
+    /// of the image is `fov_deg`.
+    ///
+    /// # Panics
+    ///
+    /// If the camera stands at its target, or looks along `up`.
+    pub fn look_at(
+        eye: [f64; 3],
+        target: [f64; 3],
+        up: [f64; 3],
+        fov_deg: f64,
+        size: impl Into<ImageSize>,
+    ) -> Self {
+        let ahead = unit([0, 1, 2].map(|k| target[k] - eye[k]), "a camera stands at its target");
+        let right = unit(cross(ahead, up), "a camera looks along its up");
+        let rotation = [right, cross(ahead, right), ahead];
+        Self::of_view(rotation, eye, fov_deg, size.into())
+    }
+
+    /// The camera of an orbit, for an image of this size.
+    pub fn of_orbit(orbit: &Orbit, size: impl Into<ImageSize>) -> Self {
+        let [elevation, azimuth] = [orbit.elevation_deg, orbit.azimuth_deg].map(f64::to_radians);
+        let ((se, ce), (sa, ca)) = (elevation.sin_cos(), azimuth.sin_cos());
+        // As with `view_rotation`: past a pole the view rolls by half a turn.
+        let roll = if ce < 0.0 { -1.0 } else { 1.0 };
+        let rotation = [
+            [-ca, 0.0, -sa].map(|x| roll * x),
+            [se * sa, -ce, -se * ca].map(|x| roll * x),
+            [-ce * sa, -se, ce * ca],
+        ];
+        let eye = rotation[2].map(|x| -orbit.distance * x);
+        Self::of_view(rotation, eye, orbit.fov_deg, size.into())
+    }
+
+    /// The orbit that sees the same, if there is one: it looks at the origin without a roll, its pixels are square and its principal point
+    /// is in the middle, all to 1e-6.
+    pub fn orbit(&self) -> Option<Orbit> {
+        let ([right, down, ahead], t) = (self.rotation, self.translation);
+        let ([fx, fy], [cx, cy], size) = (self.focal, self.centre, self.size);
+        let distance = t[2];
+        let exact = [t[0] / distance, t[1] / distance, right[1], fx / fy - 1.0]
+            .into_iter()
+            .chain([2.0 * cx / size.width as f64 - 1.0, 2.0 * cy / size.height as f64 - 1.0]);
+        let fits = distance > 0.0 && down[1] <= 0.0;
+        let found = fits && exact.into_iter().all(|x| x.abs() < EXACT);
+        found.then(|| Orbit {
+            distance,
+            elevation_deg: (-ahead[1]).clamp(-1.0, 1.0).asin().to_degrees(),
+            // Of the two rows that hold it, the one that does so at a pole too.
+            azimuth_deg: (-right[2]).atan2(-right[0]).to_degrees(),
+            fov_deg: 2.0 * (size.shorter() as f64 / (2.0 * fx)).atan().to_degrees(),
+        })
+    }
+
+    /// From a camera-to-world matrix with x right, y up and z behind, as OpenGL, Blender, NeRF, instant-ngp and nerfstudio have it.
+    pub fn from_opengl(
+        camera_to_world: &[[f64; 4]; 4],
+        focal: [f64; 2],
+        centre: [f64; 2],
+        size: impl Into<ImageSize>,
+    ) -> Self {
+        let axis = |k: usize, sign: f64| [0, 1, 2].map(|row| sign * camera_to_world[row][k]);
+        let rotation = [axis(0, 1.0), axis(1, -1.0), axis(2, -1.0)];
+        let eye = [0, 1, 2].map(|row| camera_to_world[row][3]);
+        Self { rotation, translation: moved(rotation, eye), focal, centre, size: size.into() }
+    }
+
+    /// The camera-to-world matrix that [`Pinhole::from_opengl`] takes.
+    pub fn to_opengl(&self) -> [[f64; 4]; 4] {
+        let ([x, y, z], eye) = (self.rotation, self.eye());
+        let row = |k: usize| [x[k], -y[k], -z[k], eye[k]];
+        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    /// From PyTorch3D's `R` and `T`, for row vectors (`X R + T`) and axes x left, y up and z ahead, with the focal lengths and the
+    /// principal point in its NDC, as `PerspectiveCameras` has them.
+    pub fn from_pytorch3d(
+        r: &[[f64; 3]; 3],
+        t: [f64; 3],
+        focal_ndc: [f64; 2],
+        principal_ndc: [f64; 2],
+        size: impl Into<ImageSize>,
+    ) -> Self {
+        let size = size.into();
+        let (half, signs) = (size.shorter() as f64 / 2.0, [-1.0, -1.0, 1.0]);
+        let row = |k: usize| [0, 1, 2].map(|j| signs[k] * r[j][k]);
+        let middle = [size.width, size.height].map(|pixels| pixels as f64 / 2.0);
+        Self {
+            rotation: [row(0), row(1), row(2)],
+            translation: [0, 1, 2].map(|k| signs[k] * t[k]),
+            focal: focal_ndc.map(|f| half * f),
+            centre: [0, 1].map(|k| middle[k] - half * principal_ndc[k]),
+            size,
+        }
+    }
+
+    /// `R`, `T`, focal lengths and principal point as [`Pinhole::from_pytorch3d`] takes them.
+    pub fn to_pytorch3d(&self) -> ([[f64; 3]; 3], [f64; 3], [f64; 2], [f64; 2]) {
+        let (half, signs) = (self.size.shorter() as f64 / 2.0, [-1.0, -1.0, 1.0]);
+        let row = |j: usize| [0, 1, 2].map(|k| signs[k] * self.rotation[k][j]);
+        let middle = [self.size.width, self.size.height].map(|pixels| pixels as f64 / 2.0);
+        (
+            [row(0), row(1), row(2)],
+            [0, 1, 2].map(|k| signs[k] * self.translation[k]),
+            self.focal.map(|f| f / half),
+            [0, 1].map(|k| (middle[k] - self.centre[k]) / half),
+        )
+    }
+
+    /// Where it stands, in world units.
+    pub fn eye(&self) -> [f64; 3] {
+        let (r, t) = (&self.rotation, &self.translation);
+        [0, 1, 2].map(|k| -(0..3).map(|row| r[row][k] * t[row]).sum::<f64>())
+    }
+
+    /// A point of the world along its axes.
+    pub fn seen(&self, point: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|k| dot(self.rotation[k], point) + self.translation[k])
+    }
+
+    /// Column and row of the pixel where it sees a point, and the depth.
+    pub fn pixel(&self, point: [f64; 3]) -> [f64; 3] {
+        let [x, y, z] = self.seen(point);
+        let ([fx, fy], [cx, cy]) = (self.focal, self.centre);
+        [fx * x / z + cx, fy * y / z + cy, z]
+    }
+
+    /// Whether it is a camera.
+    ///
+    /// # Errors
+    ///
+    /// If R is no rotation, to a thousandth, or a focal length is not positive, or there are no pixels, or a number is not finite.
+    pub fn check(&self) -> Result<(), PinholeError> {
+        let r = self.rotation;
+        let numbers = r.as_flattened().iter().chain(&self.translation).chain(&self.focal);
+        if !numbers.chain(&self.centre).all(|x| x.is_finite()) {
+            return Err(PinholeError::NotFinite);
+        }
+        let product = (0..9).map(|k| (k / 3, k % 3));
+        let off = product.map(|(i, j)| (dot(r[i], r[j]) - f64::from(u8::from(i == j))).abs());
+        let off = off.fold(0.0, f64::max);
+        if off > ROUNDED {
+            return Err(PinholeError::NoRotation(off));
+        }
+        if dot(cross(r[0], r[1]), r[2]) < 0.0 {
+            return Err(PinholeError::Mirrors);
+        }
+        let [fx, fy] = self.focal;
+        if fx <= 0.0 || fy <= 0.0 {
+            return Err(PinholeError::NoFocalLength(fx, fy));
+        }
+        if self.size.pixels() == 0 {
+            return Err(PinholeError::NoPixels);
+        }
+        Ok(())
+    }
+
+    /// The camera that sees a rectangle of its image, enlarged or reduced to another size: the corner of the rectangle and its extent are
+    /// columns and rows in pixels.
+    #[must_use]
+    pub fn cropped(&self, corner: [f64; 2], extent: [f64; 2], size: impl Into<ImageSize>) -> Self {
+        let size = size.into();
+        let gain = [size.width as f64 / extent[0], size.height as f64 / extent[1]];
+        Self {
+            focal: [0, 1].map(|k| gain[k] * self.focal[k]),
+            centre: [0, 1].map(|k| gain[k] * (self.centre[k] - corner[k])),
+            size,
+            ..*self
+        }
+    }
+
+    /// A camera at `eye` with its principal point in the middle.
+    fn of_view(rotation: [[f64; 3]; 3], eye: [f64; 3], fov_deg: f64, size: ImageSize) -> Self {
+        let focal = size.shorter() as f64 / (2.0 * (fov_deg / 2.0).to_radians().tan());
+        let centre = [size.width, size.height].map(|pixels| pixels as f64 / 2.0);
+        let translation = moved(rotation, eye);
+        Self { rotation, translation, focal: [focal; 2], centre, size }
+    }
+}
+
+/// t of a camera at `eye`.
+fn moved(rotation: [[f64; 3]; 3], eye: [f64; 3]) -> [f64; 3] {
+    rotation.map(|row| -dot(row, eye))
+}
+
+/// A [`Pinhole`] for each view as tensors, all of them differentiable.
+#[derive(Clone, Debug)]
+pub struct Pinholes<B: Backend> {
+    /// R of each view, `[views, 3, 3]`.
+    pub rotation: Tensor<B, 3>,
+    /// t of each view in world units, `[views, 3]`.
+    pub translation: Tensor<B, 2>,
+    /// fx, fy, cx and cy in pixels of each view, or one for all of them, `[1 or views, 4]`.
+    pub intrinsics: Tensor<B, 2>,
+    /// Height and width of all images.
+    pub size: ImageSize,
+}
+
+impl<B: Backend> Pinholes<B> {
+    /// The tensors of these cameras.
+    ///
+    /// # Panics
+    ///
+    /// If there is none, or their images differ in size.
+    pub fn new(cameras: &[Pinhole], device: &B::Device) -> Self {
+        let (views, size) = (cameras.len(), cameras[0].size);
+        assert!(cameras.iter().all(|camera| camera.size == size), "cameras differ in image size");
+        let rotation = cameras.iter().flat_map(|camera| camera.rotation.concat());
+        let translation = cameras.iter().flat_map(|camera| camera.translation);
+        let intrinsics = cameras.iter().flat_map(|camera| [camera.focal, camera.centre].concat());
+        Self {
+            rotation: tensor_on(rotation.collect(), [views, 3, 3], device),
+            translation: tensor_on(translation.collect(), [views, 3], device),
+            intrinsics: tensor_on(intrinsics.collect(), [views, 4], device),
+            size,
+        }
+    }
+
+    /// What projects: `[views, 3, 4]`, two rows give x and y in NDC times the depth, the third gives the depth.
+    fn matrices(&self) -> Tensor<B, 3> {
+        let Self { rotation, translation, intrinsics, size } = self;
+        let [views, ..] = rotation.dims();
+        let ([held, four], moves) = (intrinsics.dims(), translation.dims());
+        assert_eq!(rotation.dims(), [views, 3, 3], "rotations must be [views, 3, 3]");
+        assert_eq!(moves, [views, 3], "translations of {views} views are {moves:?}");
+        assert!(
+            four == 4 && (held == views || held == 1),
+            "intrinsics of {views} views are [{held}, {four}]"
+        );
+        // To NDC: the shorter side is [-1, 1], and y goes up.
+        let ([height, width], unit) =
+            ([size.height, size.width].map(|x| x as f64), 2.0 / size.shorter() as f64);
+        let device = rotation.device();
+        let gain = tensor_on::<B, 2>(vec![unit, -unit, unit, -unit], [1, 4], &device);
+        let shift = [0.0, 0.0, -width * unit / 2.0, height * unit / 2.0];
+        let shift = tensor_on::<B, 2>(shift.to_vec(), [1, 4], &device);
+        let ndc: Tensor<B, 3> = (intrinsics.clone() * gain + shift).unsqueeze_dim(2);
+        let pose = Tensor::cat(vec![rotation.clone(), translation.clone().unsqueeze_dim(2)], 2);
+        let ahead = pose.clone().narrow(1, 2, 1);
+        let seen = pose.narrow(1, 0, 2) * ndc.clone().narrow(1, 0, 2)
+            + ahead.clone() * ndc.narrow(1, 2, 2);
+        Tensor::cat(vec![seen, ahead], 1)
+    }
+}
+
+/// Perspective projection by pinhole cameras.
+///
+/// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates. The result is `[views, vertices, 3]`: x
+/// and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera depth in world units. What is far away or near
+/// the camera is held as with [`project`](crate::project).
+///
+/// # Panics
+///
+/// If the shapes do not fit.
+pub fn project_pinhole<B: RasterBackend>(
+    vertices: Tensor<B, 3>,
+    cameras: &Pinholes<B>,
+) -> Tensor<B, 3> {
+    perspective(vertices, cameras.matrices())
+}
+
+/// Rotations `[views, 3, 3]` turned further: `exp([w]×) R`, by the angle |w| in radians around the axis w in camera axes.
+///
+/// `tangent` `[views, 3]` holds w. It has gradients of any order at 0 too, so an optimiser can move it from 0 on, and a rotation has no
+/// pole. Its answers repeat beyond |w| = 2π, where it has no gradient along w's sphere: start anew from where it has come.
+///
+/// # Panics
+///
+/// If the shapes do not fit.
+pub fn turned<B: Backend>(tangent: Tensor<B, 2>, rotation: Tensor<B, 3>) -> Tensor<B, 3> {
+    let [views, ..] = rotation.dims();
+    assert_eq!(tangent.dims(), [views, 3], "tangents of {views} rotations");
+    let square = (tangent.clone() * tangent.clone()).sum_dim(1); // [views, 1]
+    // Near 0 by their series, whose next terms are below 1e-17; elsewhere by their names, at a number that does not divide by 0.
+    let near = square.clone().lower_elem(SERIES);
+    let series = |c: [f64; 4]| {
+        ((square.clone() * c[3] + c[2]) * square.clone() + c[1]) * square.clone() + c[0]
+    };
+    let safe = square.clone().mask_fill(near.clone(), 1.0);
+    let angle = safe.clone().sqrt();
+    let sinc = angle.clone().sin() / angle.clone();
+    let versine = (angle.cos().neg() + 1.0) / safe;
+    let sinc = sinc.mask_where(near.clone(), series([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0]));
+    let versine = versine.mask_where(near, series([0.5, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40320.0]));
+
+    let w = |k: usize| tangent.clone().narrow(1, k, 1);
+    let zero = || w(0) * 0.0;
+    let skew = vec![zero(), w(2).neg(), w(1), w(2), zero(), w(0).neg(), w(1).neg(), w(0), zero()];
+    let skew = Tensor::cat(skew, 1).reshape([views, 3, 3]);
+    let once = skew.clone().matmul(rotation.clone());
+    let twice = skew.matmul(once.clone());
+    rotation + once * sinc.unsqueeze_dim(2) + twice * versine.unsqueeze_dim(2)
+}
+
+/// Squares of angles below which the series of sine and cosine stand for them.
+const SERIES: f64 = 1e-3;

@@ -1,0 +1,210 @@
+//! Poses from pictures: what is found, and what is said of bad ones.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use image::{GrayImage, Luma};
+use serde_json::{Value, json};
+
+/// Runs `pose solve` with results in `out`: its JSON, or its error line.
+fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
+    let output = Command::new(env!("CARGO_BIN_EXE_pose"))
+        .arg("solve")
+        .args(words)
+        .args(["--quiet", "--json", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    match output.status.success() {
+        true => Ok(serde_json::from_slice(&output.stdout).unwrap()),
+        false => Err(String::from_utf8(output.stderr).unwrap().trim_end().to_owned()),
+    }
+}
+
+fn fox(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");
+    folder.join(name).to_str().unwrap().to_owned()
+}
+
+/// Degrees between the rotations of two cameras.
+fn angle_deg(a: &Value, b: &Value) -> f64 {
+    let at = |of: &Value, k: usize| of["R"][k / 3][k % 3].as_f64().unwrap();
+    let trace: f64 = (0..9).map(|k| at(a, k) * at(b, k)).sum();
+    ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
+}
+
+#[test]
+fn cameras_are_found_from_masks_alone() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    for view in [2, 7] {
+        let name = format!("images/{view:02}.png");
+        fs::copy(fox(&name), folder.path().join(format!("{view}.png"))).unwrap();
+    }
+    let camera = fox("transforms.json");
+    let words = ["--targets", folder.path().to_str().unwrap(), "--camera", &camera, "--size", "64"];
+    let found = run(out.path(), &words).unwrap();
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    for (picture, view) in found["pictures"].as_array().unwrap().iter().zip([2, 7]) {
+        let off = angle_deg(&picture["camera"], &truth["views"][view]);
+        assert!(
+            off < 5.0 && picture["iou"].as_f64().unwrap() > 0.9,
+            "view {view}: {off}, {picture}"
+        );
+        let distance = |k: usize| {
+            let of = |camera: &Value| camera["t"][k].as_f64().unwrap();
+            (of(&picture["camera"]) - of(&truth["views"][view])).abs()
+        };
+        assert!((0..3).all(|k| distance(k) < 0.2), "view {view}: {picture}");
+    }
+    for file in ["result.json", "report.html", "poses.csv", "overlay-2.png", "overlay-7.png"] {
+        assert!(out.path().join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_result_is_a_start_and_a_camera_for_the_mesh_as_it_is_in_its_file() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    // The fox, three times as large and elsewhere.
+    let mesh = softrast_mesh::fox();
+    let place = |p: &[f64; 3]| [3.0 * p[0] + 5.0, 3.0 * p[1] - 2.0, 3.0 * p[2] + 1.0];
+    let positions = mesh.positions().iter().map(place).collect();
+    let path = folder.path().join("fox.obj");
+    softrast_mesh::Mesh::new(positions, mesh.faces().to_vec()).unwrap().save(&path).unwrap();
+
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    let start = folder.path().join("start.json");
+    fs::write(&start, truth["views"][4].to_string()).unwrap();
+    let target = fox("images/04.png");
+    let (start, camera) = (start.to_str().unwrap(), fox("transforms.json"));
+    let words = ["--target", &target, "--camera", &camera, "--start", start, "--steps", "10"];
+    let plain = run(out.path(), &words).unwrap();
+    let result = out.path().join("result.json");
+    let again = folder.path().join("again.json");
+    fs::copy(&result, &again).unwrap();
+    let words = [
+        "--target",
+        &target,
+        "--camera",
+        again.to_str().unwrap(),
+        "--start",
+        again.to_str().unwrap(),
+        "--steps",
+        "5",
+    ];
+    assert!(run(out.path(), &words).unwrap()["iou"].as_f64().unwrap() > 0.97);
+
+    let mesh = path.to_str().unwrap();
+    let words = ["--target", &target, "--camera", &camera, "--mesh", mesh, "--size", "64"];
+    let moved = run(out.path(), &words).unwrap();
+    let of_file = &moved["camera_in_file"];
+    assert!(angle_deg(of_file, &plain["camera"]) < 3.0, "{moved}");
+    // Both see the origin of the fox in one place, three times as far away.
+    let seen = |camera: &Value, p: [f64; 3]| {
+        [0, 1, 2].map(|row| {
+            let along = (0..3).map(|k| camera["R"][row][k].as_f64().unwrap() * p[k]).sum::<f64>();
+            along + camera["t"][row].as_f64().unwrap()
+        })
+    };
+    let ([x, y, z], [u, v, w]) =
+        (seen(of_file, [5.0, -2.0, 1.0]), seen(&plain["camera"], [0.0; 3]));
+    assert!((x / z - u / w).abs() < 0.02 && (y / z - v / w).abs() < 0.02, "{moved}");
+    assert!((z / w / 3.0 - 1.0).abs() < 0.05, "{z} and {w}");
+}
+
+fn picture(folder: &Path, name: &str, pixel: impl Fn(u32, u32) -> u8) -> PathBuf {
+    let path = folder.join(name);
+    GrayImage::from_fn(40, 30, |x, y| Luma([pixel(x, y)])).save(&path).unwrap();
+    path
+}
+
+#[test]
+fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, value: Value| {
+        let path = folder.path().join(name);
+        fs::write(&path, value.to_string()).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let of = |path: PathBuf| path.to_str().unwrap().to_owned();
+    let disc = of(picture(folder.path(), "disc.png", |x, y| {
+        if x.abs_diff(20).pow(2) + y.abs_diff(15).pow(2) < 60 { 255 } else { 0 }
+    }));
+    let empty = of(picture(folder.path(), "empty.png", |_, _| 0));
+    let full = of(picture(folder.path(), "full.png", |_, _| 255));
+    let camera = json!({ "fx": 50.0, "width": 40, "height": 30 });
+    let wrong_size = write("size.json", json!({ "fx": 50.0, "width": 80, "height": 60 }));
+    let distorted = write("lens.json", json!({ "fx": 50.0, "k1": 0.1 }));
+    let fisheye = write("fish.json", json!({ "fx": 50.0, "camera_model": "OPENCV_FISHEYE" }));
+    let no_focal = write("none.json", json!({ "cx": 20.0 }));
+    let skewed = write("skew.json", json!({ "K": [[50, 3, 20], [0, 50, 15], [0, 0, 1]] }));
+    let text = write("text.json", json!({ "fx": "50" }));
+    let good = write("good.json", camera);
+    let turned =
+        write("r.json", json!({ "R": [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]], "t": [0, 0, 4] }));
+    let mirrored =
+        write("m.json", json!({ "R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]], "t": [0, 0, 4] }));
+    let inside =
+        write("in.json", json!({ "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 0.1] }));
+    let nowhere = write("no.json", json!({}));
+    for (words, parts) in [
+        (vec!["--target", "missing.png"], vec!["missing.png"]),
+        (vec!["--target", &good], vec!["good.json", "no picture"]),
+        (vec!["--target", &empty], vec!["empty.png", "the mask is empty", "--invert"]),
+        (vec!["--target", &full], vec!["full.png", "the mask is full"]),
+        (
+            vec!["--target", &disc, "--camera", &wrong_size],
+            vec!["size.json", "disc.png", "80 x 60", "40 x 30"],
+        ),
+        (
+            vec!["--target", &disc, "--camera", &distorted],
+            vec!["lens.json", "k1 = 0.1", "undistort"],
+        ),
+        (vec!["--target", &disc, "--camera", &fisheye], vec!["OPENCV_FISHEYE", "undistort"]),
+        (vec!["--target", &disc, "--camera", &no_focal], vec!["none.json", "no focal length"]),
+        (vec!["--target", &disc, "--camera", &skewed], vec!["skew.json", "skew of 3"]),
+        (vec!["--target", &disc, "--camera", &text], vec!["text.json", "line 1"]),
+        (vec!["--target", &disc, "--start", &turned], vec!["r.json", "no rotation", "1.00e-1"]),
+        (vec!["--target", &disc, "--start", &mirrored], vec!["m.json", "mirrors"]),
+        (vec!["--target", &disc, "--start", &inside], vec!["inside the mesh"]),
+        (vec!["--target", &disc, "--start", &nowhere], vec!["no.json", "R and t"]),
+        (vec!["--camera", &good], vec!["--target"]),
+        (vec!["--targets", "missing"], vec!["missing", "folder"]),
+        (vec!["--target", &disc, "--softness", "auto"], vec!["--softness auto"]),
+    ] {
+        let out = folder.path().join("out");
+        let error = run(&out, &words).unwrap_err();
+        assert_eq!(error.lines().count(), 1, "{words:?}: {error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{words:?}: {error}");
+        assert!(!out.join("report.html").exists(), "{words:?}");
+    }
+}
+
+/// Specks all over and a gap in the outline: a pose near the right one all the same.
+#[test]
+fn specks_and_gaps_do_not_lead_astray() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut mask = image::open(fox("images/04.png")).unwrap().to_luma8();
+    for (k, pixel) in mask.pixels_mut().enumerate() {
+        if k * 7919 % 97 == 0 {
+            pixel.0[0] = 255 - pixel.0[0];
+        }
+    }
+    for (_, _, pixel) in
+        mask.enumerate_pixels_mut().filter(|(x, y, _)| x.abs_diff(60) < 4 && y % 3 > 0)
+    {
+        pixel.0[0] = 0;
+    }
+    let path = folder.path().join("noisy.png");
+    mask.save(&path).unwrap();
+    let camera = fox("transforms.json");
+    let words = ["--target", path.to_str().unwrap(), "--camera", &camera, "--size", "64"];
+    let found = run(out.path(), &words).unwrap();
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    let off = angle_deg(&found["camera"], &truth["views"][4]);
+    assert!(off < 5.0, "{off} degrees off, {found}");
+}

@@ -1,0 +1,302 @@
+//! The visual hull: all that no mask rules out.
+//!
+//! Source: Laurentini 1994.
+
+use anyhow::{Context, ensure};
+use softrast_inverse::{Picture, View};
+use softrast_mesh::Mesh;
+use softrast_raster::ImageSize;
+
+/// Pixels a side of what is looked at of each mask.
+const SIDE: usize = 128;
+/// What is looked at is this much larger than the mask.
+pub(super) const MARGIN: f64 = 1.5;
+/// Cells along each side of the first grid.
+const COARSE: usize = 40;
+
+/// A mask as its camera looks through it.
+struct Cone<'a> {
+    view: &'a View,
+    square: [f64; 3],
+    /// Signed distance to the outline in pixels of the picture, negative inside, at the cells of the square.
+    distance: Vec<f64>,
+    /// Whether the picture cuts the object off: what is beyond its border is unknown then, else it is empty.
+    cut: bool,
+}
+
+/// The visual hull of the masks as a mesh, with so many cells along its longest side.
+///
+/// # Errors
+///
+/// If a mask is empty or full, the cameras do not look at one thing, or no solid has these masks.
+pub(super) fn hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
+    let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
+    let (centre, reach) = region(&cones)?;
+    let field =
+        |p: [f64; 3]| cones.iter().map(|cone| cone.distance(p)).fold(-reach, f64::max).min(reach);
+    // Where there is something at all.
+    let step = 2.0 * reach / COARSE as f64;
+    let at = |k: usize| {
+        let cell = [k % COARSE, k / COARSE % COARSE, k / COARSE / COARSE];
+        [0, 1, 2].map(|i| centre[i] - reach + (cell[i] as f64 + 0.5) * step)
+    };
+    let inside = (0..COARSE.pow(3)).map(at).filter(|&p| field(p) < 0.5 * step);
+    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    let [low, high] = inside.fold(none, |[low, high], p| {
+        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
+    });
+    ensure!(
+        low[0] <= high[0],
+        "no solid has these masks: check that cameras and pictures belong together (--invert?), or begin with --start sphere"
+    );
+    let (low, high) = (low.map(|x| x - step), high.map(|x| x + step));
+    // Beyond the region nothing is known.
+    let closed = |p: [f64; 3]| {
+        let beyond = (0..3).map(|k| (p[k] - high[k]).max(low[k] - p[k])).fold(f64::MIN, f64::max);
+        field(p).max(beyond + 0.5 * step)
+    };
+    let hull = Mesh::of_solid([low, high], cells, closed);
+    without_specks(hull.context("the visual hull is no mesh; begin with --start sphere")?)
+}
+
+/// Without the parts of fewer faces than a fiftieth of the largest: what few views happen to leave between their cones.
+fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
+    // Each vertex leads to another of its part, the last one to itself.
+    let mut next: Vec<usize> = (0..mesh.positions().len()).collect();
+    fn last(next: &mut [usize], mut vertex: usize) -> usize {
+        while next[vertex] != vertex {
+            next[vertex] = next[next[vertex]];
+            vertex = next[vertex];
+        }
+        vertex
+    }
+    for face in mesh.faces() {
+        let [a, b, c] = face.map(|vertex| last(&mut next, vertex as usize));
+        next[b] = a;
+        let c = last(&mut next, c);
+        next[c] = a;
+    }
+    let part: Vec<usize> =
+        mesh.faces().iter().map(|face| last(&mut next, face[0] as usize)).collect();
+    let mut faces_of = vec![0; next.len()];
+    part.iter().for_each(|&part| faces_of[part] += 1);
+    let largest = faces_of.iter().copied().max().unwrap_or(0);
+    let kept = mesh.faces().iter().zip(&part).filter(|(_, part)| 50 * faces_of[**part] >= largest);
+    let kept: Vec<[u32; 3]> = kept.map(|(face, _)| *face).collect();
+    // Vertices of no face would be moved and written for nothing.
+    let mut number = vec![u32::MAX; next.len()];
+    let mut positions = Vec::new();
+    let faces = kept.iter().map(|face| {
+        face.map(|vertex| {
+            let number = &mut number[vertex as usize];
+            if *number == u32::MAX {
+                *number = positions.len() as u32;
+                positions.push(mesh.positions()[vertex as usize]);
+            }
+            *number
+        })
+    });
+    let faces = faces.collect();
+    Ok(Mesh::new(positions, faces)?)
+}
+
+/// A ball that holds what the masks show: its middle is nearest to the lines of sight through the middle of all masks.
+pub(super) fn ball(views: &[View]) -> anyhow::Result<([f64; 3], f64)> {
+    let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
+    region(&cones)
+}
+
+fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
+    let mut matrix = [[0.0; 3]; 3];
+    let mut right = [0.0; 3];
+    for cone in cones {
+        let (eye, ray) = (cone.view.camera.eye(), cone.ray());
+        for i in 0..3 {
+            for j in 0..3 {
+                let across = f64::from(u8::from(i == j)) - ray[i] * ray[j];
+                matrix[i][j] += across;
+                right[i] += across * eye[j];
+            }
+        }
+    }
+    let middle = solved(matrix, right).context(
+        "the cameras do not tell how far away the object is: give views from at least two directions",
+    )?;
+    let depth = |view: &View| view.camera.seen(middle)[2];
+    let reach_of = |Cone { view, square: [_, _, extent], .. }: &Cone<'_>| {
+        let [fx, fy] = view.camera.focal;
+        // Half the diagonal of the mask.
+        extent / MARGIN * std::f64::consts::FRAC_1_SQRT_2 * depth(view) / fx.min(fy)
+    };
+    let reach = cones.iter().map(reach_of).fold(0.0, f64::max);
+    for view in cones.iter().map(|cone| cone.view) {
+        let eye = view.camera.eye();
+        let away = (0..3).map(|k| (eye[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
+        ensure!(
+            away > 0.5 * reach,
+            "{}: the camera is inside the object that the other masks show: check its transform_matrix",
+            view.name
+        );
+        ensure!(
+            depth(view) > 0.0,
+            "{}: the camera has the object behind it: check the convention of transform_matrix (camera to world; x right, y up, z behind)",
+            view.name
+        );
+    }
+    Ok((middle, reach))
+}
+
+impl<'a> Cone<'a> {
+    fn new(view: &'a View) -> anyhow::Result<Self> {
+        let square = square(view)?;
+        let mask = view.mask.despeckled();
+        let [levels, _] = mask.part(square, SIDE);
+        let distance = signed_distance(&levels, square[2] / SIDE as f64);
+        Ok(Self { view, square, distance, cut: is_cut(&mask) })
+    }
+
+    /// The line of sight through the middle of the mask, of length 1, in the world.
+    fn ray(&self) -> [f64; 3] {
+        let ([left, top, extent], camera) = (self.square, &self.view.camera);
+        let at = [left + extent / 2.0, top + extent / 2.0];
+        let [x, y] = [0, 1].map(|k| (at[k] - camera.centre[k]) / camera.focal[k]);
+        let length = (x * x + y * y + 1.0).sqrt();
+        let r = camera.rotation;
+        [0, 1, 2].map(|k| (x * r[0][k] + y * r[1][k] + r[2][k]) / length)
+    }
+
+    /// A point's distance to the cone of the mask in world units, about; negative inside, and beyond a picture that cuts the object off.
+    fn distance(&self, p: [f64; 3]) -> f64 {
+        let camera = &self.view.camera;
+        let [column, row, depth] = camera.pixel(p);
+        if depth <= 0.0 {
+            return f64::MAX;
+        }
+        let size = camera.size;
+        let beyond = |x: f64, pixels: usize| x < 0.0 || x > pixels as f64;
+        if self.cut && (beyond(column, size.width) || beyond(row, size.height)) {
+            return f64::MIN;
+        }
+        let ([left, top, extent], last) = (self.square, (SIDE - 1) as f64);
+        let cell = extent / SIDE as f64;
+        let place = [(column - left) / cell - 0.5, (row - top) / cell - 0.5];
+        let held = place.map(|x| x.clamp(0.0, last));
+        let off = cell * (place[0] - held[0]).hypot(place[1] - held[1]);
+        let low = held.map(|x| (x as usize).min(SIDE - 2));
+        let [u, v] = [0, 1].map(|k| held[k] - low[k] as f64);
+        let at = |dx: usize, dy: usize| self.distance[(low[1] + dy) * SIDE + low[0] + dx];
+        let upper = (1.0 - u) * at(0, 0) + u * at(1, 0);
+        let lower = (1.0 - u) * at(0, 1) + u * at(1, 1);
+        let [fx, fy] = camera.focal;
+        ((1.0 - v) * upper + v * lower + off) * depth * 2.0 / (fx + fy)
+    }
+}
+
+/// The square of a view that is looked at: left, top and extent in pixels.
+pub(super) fn square(view: &View) -> anyhow::Result<[f64; 3]> {
+    let name = &view.name;
+    let found = view.mask.square();
+    let [left, top, extent] = found.with_context(|| {
+        format!("{name}: the mask is empty: no pixel is half white or more (--invert takes what is black)")
+    })?;
+    ensure!(
+        view.mask.pixels().iter().any(|&level| level < 0.5),
+        "{name}: the mask is full: all pixels are white, and there is no outline to fit"
+    );
+    let margin = (MARGIN - 1.0) / 2.0 * extent;
+    Ok([left - margin, top - margin, MARGIN * extent])
+}
+
+/// Whether the mask reaches the border of its picture.
+fn is_cut(mask: &Picture) -> bool {
+    let ImageSize { width, height } = mask.size();
+    let inner = |k: usize, pixels: usize| k > 0 && k + 1 < pixels;
+    let levels = mask.pixels().iter().enumerate();
+    levels
+        .filter(|(_, level)| **level >= 0.5)
+        .any(|(k, _)| !(inner(k % width, width) && inner(k / width, height)))
+}
+
+/// Signed distance to where an image `[SIDE * SIDE]` is one half, negative where it is more, for cells of this width.
+fn signed_distance(levels: &[f64], cell: f64) -> Vec<f64> {
+    let white: Vec<bool> = levels.iter().map(|&level| level >= 0.5).collect();
+    let black: Vec<bool> = white.iter().map(|white| !white).collect();
+    let (to_white, to_black) = (distances(&white), distances(&black));
+    let signed = |k: usize| {
+        let level = levels[k];
+        // Within the cell that the outline passes, its share tells more.
+        if to_white[k].max(to_black[k]) < 1.5 && level > 0.0 && level < 1.0 {
+            return cell * (0.5 - level);
+        }
+        cell * if white[k] { 0.5 - to_black[k] } else { to_white[k] - 0.5 }
+    };
+    (0..levels.len()).map(signed).collect()
+}
+
+/// Distance of each cell to the nearest that is on, in cells.
+fn distances(on: &[bool]) -> Vec<f64> {
+    const FAR: f64 = 1e9;
+    // Along each column first, then the best of each row.
+    let mut along = vec![FAR; on.len()];
+    for x in 0..SIDE {
+        for forward in [true, false] {
+            let mut last = FAR;
+            for k in 0..SIDE {
+                let cell = if forward { k } else { SIDE - 1 - k } * SIDE + x;
+                last = if on[cell] { 0.0 } else { last + 1.0 };
+                along[cell] = along[cell].min(last);
+            }
+        }
+    }
+    let nearest = |k: usize| {
+        let (row, x) = (&along[k / SIDE * SIDE..][..SIDE], (k % SIDE) as f64);
+        let squares = row.iter().enumerate().map(|(at, d)| (at as f64 - x).powi(2) + d * d);
+        squares.fold(f64::INFINITY, f64::min).sqrt()
+    };
+    (0..on.len()).map(nearest).collect()
+}
+
+/// The solution of three linear equations, unless they are as good as two.
+fn solved(matrix: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
+    let determinant = |m: [[f64; 3]; 3]| {
+        (0..3)
+            .map(|k| {
+                m[0][k]
+                    * (m[1][(k + 1) % 3] * m[2][(k + 2) % 3]
+                        - m[1][(k + 2) % 3] * m[2][(k + 1) % 3])
+            })
+            .sum::<f64>()
+    };
+    let whole = determinant(matrix);
+    let trace = matrix[0][0] + matrix[1][1] + matrix[2][2];
+    let with = |column: usize| {
+        let mut m = matrix;
+        (0..3).for_each(|row| m[row][column] = right[row]);
+        determinant(m) / whole
+    };
+    (whole > 1e-6 * trace.powi(3)).then(|| [with(0), with(1), with(2)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_distance_to_a_disc_is_that_of_a_circle() {
+        let centre = 63.3;
+        let far = |k: usize| ((k % SIDE) as f64 - centre).hypot((k / SIDE) as f64 - centre);
+        // Cells that the circle passes are covered in part.
+        let levels: Vec<f64> = (0..SIDE * SIDE).map(|k| (30.5 - far(k)).clamp(0.0, 1.0)).collect();
+        for (k, found) in signed_distance(&levels, 2.0).into_iter().enumerate() {
+            assert!((found - 2.0 * (far(k) - 30.0)).abs() < 1.2, "{k}: {found}");
+        }
+    }
+
+    #[test]
+    fn equations_have_a_solution_unless_one_says_what_others_say() {
+        let m = [[2.0, 0.0, 1.0], [0.0, 3.0, 0.0], [1.0, 0.0, 2.0]];
+        let x = solved(m, [5.0, 6.0, 7.0]).unwrap();
+        assert!((0..3).all(|k| (x[k] - [1.0, 2.0, 3.0][k]).abs() < 1e-12));
+        assert_eq!(solved([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]], [1.0; 3]), None);
+    }
+}

@@ -1,0 +1,8 @@
+//! A mesh from pictures that the user gives.
+
+mod hull;
+mod problem;
+mod solve;
+
+pub(crate) use solve::solve_views;
+pub use solve::{Begin, Views};

@@ -1,0 +1,154 @@
+//! Meshes from pictures: what is made of them, and what is said of bad ones.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{fs, path::Path, process::Command};
+
+use serde_json::{Value, json};
+use softrast_mesh::Mesh;
+
+/// Runs `shape3d solve` with results in `out`: its JSON, or its error line.
+fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
+    let output = Command::new(env!("CARGO_BIN_EXE_shape3d"))
+        .arg("solve")
+        .args(words)
+        .args(["--quiet", "--json", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    match output.status.success() {
+        true => Ok(serde_json::from_slice(&output.stdout).unwrap()),
+        false => Err(String::from_utf8(output.stderr).unwrap().trim_end().to_owned()),
+    }
+}
+
+fn fox() -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox").to_str().unwrap().to_owned()
+}
+
+#[test]
+fn views_that_were_kept_aside_are_met() {
+    let out = tempfile::tempdir().unwrap();
+    let found = run(out.path(), &["--views", &fox(), "--hold-out", "2", "--steps", "20"]).unwrap();
+    let iou = |name: &str| found[name].as_f64().unwrap();
+    assert!(iou("train_iou") > 0.95 && iou("held_out_iou") > 0.93, "{found}");
+    assert_eq!(
+        found["views"].as_array().unwrap().iter().filter(|v| v["held_out"] == true).count(),
+        2
+    );
+    let mesh = Mesh::load(found["mesh"].as_str().unwrap()).unwrap();
+    assert_eq!(mesh.faces().len() as u64, found["faces"].as_u64().unwrap());
+    for file in ["result.json", "report.html", "views.png", "mesh.obj", "mesh.ply", "mesh.glb"] {
+        assert!(out.path().join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_sphere_becomes_the_fox_without_a_hull() {
+    let out = tempfile::tempdir().unwrap();
+    let words = ["--views", &fox(), "--start", "sphere", "--detail", "2", "--steps", "40"];
+    let found = run(out.path(), &words).unwrap();
+    assert!(found["train_iou"].as_f64().unwrap() > 0.85, "{found}");
+    assert!(found["held_out_iou"].is_null());
+}
+
+/// Changes the cameras of the fox in a copy of its folder, then runs.
+fn with(change: impl Fn(&mut Value), more: &[&str]) -> Result<Value, String> {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("images")).unwrap();
+    for k in 0..12 {
+        let name = format!("images/{k:02}.png");
+        fs::copy(Path::new(&fox()).join(&name), folder.path().join(&name)).unwrap();
+    }
+    let text = fs::read(Path::new(&fox()).join("transforms.json")).unwrap();
+    let mut cameras: Value = serde_json::from_slice(&text).unwrap();
+    change(&mut cameras);
+    fs::write(folder.path().join("transforms.json"), cameras.to_string()).unwrap();
+    let out = folder.path().join("out");
+    let words = [&["--views", folder.path().to_str().unwrap(), "--steps", "1"], more].concat();
+    let found = run(&out, &words);
+    assert!(found.is_ok() || !out.join("report.html").exists(), "{found:?}");
+    found
+}
+
+#[test]
+fn cameras_come_in_many_ways() {
+    // Intrinsics of each frame, paths without an ending, or an angle alone.
+    let each = |cameras: &mut Value| {
+        let of_all = cameras.clone();
+        for frame in cameras["frames"].as_array_mut().unwrap() {
+            for key in ["fl_x", "fl_y", "cx", "cy", "w", "h"] {
+                frame[key] = of_all[key].clone();
+            }
+            let path = frame["file_path"].as_str().unwrap().trim_end_matches(".png").to_owned();
+            frame["file_path"] = json!(format!("./{path}"));
+        }
+        *cameras = json!({ "frames": cameras["frames"] });
+    };
+    assert!(with(each, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
+    let angle = |cameras: &mut Value| {
+        let angle = 2.0 * (60.0f64 / 130.0).atan();
+        *cameras = json!({ "camera_angle_x": angle, "frames": cameras["frames"] });
+    };
+    // The principal point is taken to be in the middle, three pixels off.
+    let found = with(angle, &["--start", "sphere"]).unwrap();
+    assert!(found["train_iou"].as_f64().unwrap() > 0.1);
+}
+
+#[test]
+fn bad_views_are_one_line_that_names_file_and_frame() {
+    let frame = |of: fn(&mut Value)| move |cameras: &mut Value| of(&mut cameras["frames"][3]);
+    type Change = Box<dyn Fn(&mut Value)>;
+    let checks: [(Change, &[&str]); 12] = [
+        (Box::new(frame(|f| f["file_path"] = json!("images/no.png"))), &["frame 3", "no.png"]),
+        (Box::new(frame(|f| f["transform_matrix"] = json!([[1.0]]))), &["frame 3", "4 x 4"]),
+        (
+            Box::new(frame(|f| f["transform_matrix"][0][0] = json!(9.0))),
+            &["frame 3", "no rotation"],
+        ),
+        (Box::new(frame(|f| f["k1"] = json!(0.1))), &["frame 3", "k1", "undistort"]),
+        (Box::new(frame(|f| f["w"] = json!(7))), &["frame 3", "7 x 90", "120 x 90"]),
+        (Box::new(|c: &mut Value| c["frames"] = json!([])), &["no frame"]),
+        (Box::new(|c: &mut Value| c["frames"] = json!({})), &["transforms.json", "line 1"]),
+        (Box::new(|c: &mut Value| c["fl_x"] = json!(-1.0)), &["frame 0", "positive"]),
+        (
+            // World to camera instead of camera to world.
+            Box::new(|c: &mut Value| {
+                for f in c["frames"].as_array_mut().unwrap() {
+                    for row in 0..3 {
+                        f["transform_matrix"][row][3] = json!(5.0 * f64::from(u8::from(row == 2)));
+                    }
+                }
+            }),
+            &["the camera has the object behind it", "transform_matrix"],
+        ),
+        (Box::new(frame(|f| f["transform_matrix"][3][0] = json!(2.0))), &["frame 3", "transposed"]),
+        (
+            Box::new(frame(|f| {
+                (0..3).for_each(|row| f["transform_matrix"][row][3] = json!(0.01));
+            })),
+            &["images/03.png", "inside the object"],
+        ),
+        (
+            Box::new(|c: &mut Value| {
+                c["frames"].as_array_mut().unwrap().truncate(1);
+            }),
+            &["one view"],
+        ),
+    ];
+    for (k, (change, parts)) in checks.iter().enumerate() {
+        let error = with(change, &[]).expect_err(&k.to_string());
+        assert_eq!(error.lines().count(), 1, "{k}: {error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{k}: {error}");
+    }
+    let error = with(|_| (), &["--hold-out", "11"]).unwrap_err();
+    assert!(error.contains("--hold-out 11 leaves fewer than two of 12 views"), "{error}");
+    let error = with(|_| (), &["--elevation", "3"]).unwrap_err();
+    assert!(error.contains("--views"), "{error}");
+}
+
+#[test]
+fn two_views_are_enough_for_a_mesh_that_has_both_masks() {
+    let two = |cameras: &mut Value| cameras["frames"].as_array_mut().unwrap().truncate(2);
+    assert!(with(two, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
+}
