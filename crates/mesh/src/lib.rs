@@ -17,6 +17,7 @@
 mod airplane;
 mod chair;
 mod clean;
+mod cluster;
 mod edges;
 mod error;
 mod format;

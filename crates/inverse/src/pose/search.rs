@@ -18,17 +18,25 @@ const GLANCE: usize = 32;
 const DIRECTIONS: usize = 160;
 const ROLLS: usize = 16;
 const AT_ONCE: usize = 256;
+/// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about two pixels.
+const DETAIL: f64 = 1.0 / 16.0;
+/// A mesh whose surface is mostly such detail is looked at as it is.
+const LEAST_AREA: f64 = 0.4;
 /// Poses that differ by less are one.
 const APART_DEG: f64 = 12.0;
 
 /// How poses are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSearch {
-    /// Poses of the first look that are improved on few pixels.
+    /// Poses of the first look that are improved on few pixels, a little.
+    pub starts: usize,
+    /// Steps of that.
+    pub start_steps: usize,
+    /// Poses of these that are improved on few pixels further.
     pub coarse: usize,
     /// Steps of that.
     pub coarse_steps: usize,
-    /// Pixels a side of that.
+    /// Pixels a side of both.
     pub coarse_size: usize,
     /// Poses of these that are improved on many pixels.
     pub fine: usize,
@@ -47,8 +55,10 @@ pub struct PoseSearch {
 impl Default for PoseSearch {
     fn default() -> Self {
         Self {
+            starts: 128,
+            start_steps: 12,
             coarse: 24,
-            coarse_steps: 60,
+            coarse_steps: 48,
             coarse_size: 48,
             fine: 6,
             fine_steps: 80,
@@ -73,7 +83,7 @@ pub struct FoundPose {
 impl PoseSearch {
     /// Steps that [`PoseSearch::run`] takes from a start, or from anywhere.
     pub fn steps(&self, started: bool) -> usize {
-        self.fine_steps + if started { 0 } else { self.coarse_steps }
+        self.fine_steps + if started { 0 } else { self.start_steps + self.coarse_steps }
     }
 
     /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 12 degrees from all before
@@ -107,15 +117,21 @@ impl PoseSearch {
             );
             vec![*camera]
         } else {
-            let looked = glance(mesh, &mask, square, camera);
-            let starts = apart(looked, self.coarse, APART_DEG);
-            let coarse = Stage {
-                steps: self.coarse_steps,
-                size: self.coarse_size,
-                rate: self.learning_rate,
-            };
-            let poses = starts.into_iter().map(|(start, _)| posed(start)).collect();
-            let found = self.improved::<B>(mesh, poses, method, coarse, 0, &mut visit)?;
+            let merged = mesh
+                .clustered(DETAIL * 2.0 * radius)
+                .filter(|few| few.area() > LEAST_AREA * mesh.area());
+            let few = merged.as_ref().unwrap_or(mesh);
+            let mut found = glance(few, &mask, square, camera);
+            let mut begun = 0;
+            // Few steps already tell the hopeless apart: many starts are had for little.
+            let stages = [(self.starts, self.start_steps), (self.coarse, self.coarse_steps)];
+            for (count, steps) in stages {
+                let poses = apart(found, count, APART_DEG).into_iter();
+                let poses = poses.map(|(start, _)| posed(start)).collect();
+                let stage = Stage { steps, size: self.coarse_size, rate: self.learning_rate };
+                found = self.improved::<B>(few, poses, method, stage, begun, &mut visit)?;
+                begun += steps;
+            }
             apart(found, self.fine, APART_DEG).into_iter().map(|(start, _)| start).collect()
         };
         let begun = self.steps(started) - self.fine_steps;
