@@ -36,8 +36,12 @@ pub struct Lens {
     distortion: Distortion,
 }
 
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+/// By name, or as the list that OpenCV returns.
+#[derive(Clone, Debug, Default, Deserialize)]
 struct Distortion {
+    #[serde(alias = "dist", alias = "dist_coeffs", alias = "distortion_coefficients")]
+    distortion: Option<Value>,
+    is_fisheye: Option<bool>,
     k1: Option<f64>,
     k2: Option<f64>,
     k3: Option<f64>,
@@ -92,7 +96,11 @@ impl Lens {
         let angle = |angle: f64, pixels: f64| pixels / (2.0 * (angle / 2.0).tan());
         let (focal, centre) = match (self.matrix, self.fl_x) {
             (_, Some(fx)) => ([fx, self.fl_y.unwrap_or(fx)], [None, None]),
-            (Some([[fx, skew, cx], [_, fy, cy], _]), None) => {
+            (Some([[fx, skew, cx], [below, fy, cy], last]), None) => {
+                ensure!(
+                    [below, last[0], last[1], last[2]] == [0.0, 0.0, 0.0, 1.0],
+                    "K is no camera matrix: below its diagonal must be zeros, and its last row [0, 0, 1]; is it transposed?"
+                );
                 ensure!(
                     skew.abs() <= 1e-9 * fx.abs(),
                     "K has a skew of {skew}, which is not supported: rectify the picture"
@@ -132,8 +140,19 @@ impl Lens {
     }
 
     fn check_distortion(&self) -> anyhow::Result<()> {
-        let Distortion { k1, k2, k3, k4, p1, p2 } = self.distortion;
-        let named = [("k1", k1), ("k2", k2), ("k3", k3), ("k4", k4), ("p1", p1), ("p2", p2)];
+        let Distortion { distortion, is_fisheye, k1, k2, k3, k4, p1, p2 } = &self.distortion;
+        let listed = distortion.as_ref().and_then(first_not_zero);
+        let fisheye = is_fisheye.and_then(|is| is.then_some(1.0));
+        let named = [
+            ("k1", *k1),
+            ("k2", *k2),
+            ("k3", *k3),
+            ("k4", *k4),
+            ("p1", *p1),
+            ("p2", *p2),
+            ("distortion", listed),
+            ("is_fisheye", fisheye),
+        ];
         if let Some((name, value)) =
             named.iter().find_map(|&(name, x)| Some((name, x.filter(|&x| x != 0.0)?)))
         {
@@ -160,15 +179,17 @@ impl Lens {
             w: frame.w.or(self.w),
             h: frame.h.or(self.h),
             camera_model: frame.camera_model.clone().or(self.camera_model.clone()),
-            distortion: frame.distortion.or(self.distortion),
+            distortion: frame.distortion.or(&self.distortion),
             ..focal.clone()
         }
     }
 }
 
 impl Distortion {
-    fn or(self, other: Self) -> Self {
+    fn or(&self, other: &Self) -> Self {
         Self {
+            distortion: self.distortion.clone().or(other.distortion.clone()),
+            is_fisheye: self.is_fisheye.or(other.is_fisheye),
             k1: self.k1.or(other.k1),
             k2: self.k2.or(other.k2),
             k3: self.k3.or(other.k3),
@@ -176,6 +197,14 @@ impl Distortion {
             p1: self.p1.or(other.p1),
             p2: self.p2.or(other.p2),
         }
+    }
+}
+
+/// A number that is not zero among those of a list, or of lists in it.
+fn first_not_zero(value: &Value) -> Option<f64> {
+    match value {
+        Value::Array(values) => values.iter().find_map(first_not_zero),
+        _ => value.as_f64().filter(|&x| x != 0.0),
     }
 }
 

@@ -142,6 +142,8 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
     let fisheye = write("fish.json", json!({ "fx": 50.0, "camera_model": "OPENCV_FISHEYE" }));
     let no_focal = write("none.json", json!({ "cx": 20.0 }));
     let skewed = write("skew.json", json!({ "K": [[50, 3, 20], [0, 50, 15], [0, 0, 1]] }));
+    let turned_k = write("k.json", json!({ "K": [[50, 0, 0], [0, 50, 0], [20, 15, 1]] }));
+    let listed = write("cv.json", json!({ "fx": 50.0, "dist": [[0.0, -0.2, 0.0, 0.0, 0.0]] }));
     let text = write("text.json", json!({ "fx": "50" }));
     let good = write("good.json", camera);
     let turned =
@@ -167,6 +169,8 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         (vec!["--target", &disc, "--camera", &fisheye], vec!["OPENCV_FISHEYE", "undistort"]),
         (vec!["--target", &disc, "--camera", &no_focal], vec!["none.json", "no focal length"]),
         (vec!["--target", &disc, "--camera", &skewed], vec!["skew.json", "skew of 3"]),
+        (vec!["--target", &disc, "--camera", &turned_k], vec!["k.json", "transposed"]),
+        (vec!["--target", &disc, "--camera", &listed], vec!["cv.json", "distortion = -0.2"]),
         (vec!["--target", &disc, "--camera", &text], vec!["text.json", "line 1"]),
         (vec!["--target", &disc, "--start", &turned], vec!["r.json", "no rotation", "1.00e-1"]),
         (vec!["--target", &disc, "--start", &mirrored], vec!["m.json", "mirrors"]),

@@ -18,12 +18,16 @@ const GLANCE: usize = 32;
 const DIRECTIONS: usize = 160;
 const ROLLS: usize = 16;
 const AT_ONCE: usize = 256;
-/// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about two pixels.
-const DETAIL: f64 = 1.0 / 16.0;
+/// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about a pixel and a half.
+const DETAIL: f64 = 1.0 / 20.0;
 /// A mesh whose surface is mostly such detail is looked at as it is.
 const LEAST_AREA: f64 = 0.4;
-/// Poses that differ by less are one.
+/// A pose whose error on few pixels is larger than the least by more than this is given up.
+const HOPEFUL: f64 = 0.08;
+/// Starts that differ by less are one.
 const APART_DEG: f64 = 12.0;
+/// Answers that differ by less are one.
+const ANSWERS_APART_DEG: f64 = 6.0;
 
 /// How poses are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +90,7 @@ impl PoseSearch {
         self.fine_steps + if started { 0 } else { self.start_steps + self.coarse_steps }
     }
 
-    /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 12 degrees from all before
+    /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before
     /// and nearly as good.
     ///
     /// `camera` has the intrinsics; its pose is where to start if it is `started`, else all directions and rolls are tried. `visit` sees
@@ -132,7 +136,10 @@ impl PoseSearch {
                 found = self.improved::<B>(few, poses, method, stage, begun, &mut visit)?;
                 begun += steps;
             }
-            apart(found, self.fine, APART_DEG).into_iter().map(|(start, _)| start).collect()
+            let found = apart(found, self.fine, APART_DEG);
+            let least = found.first().map_or(0.0, |&(_, loss)| loss);
+            let found = found.into_iter().filter(|&(_, loss)| loss <= least + HOPEFUL);
+            found.map(|(start, _)| start).collect()
         };
         let begun = self.steps(started) - self.fine_steps;
         let fine =
@@ -142,7 +149,7 @@ impl PoseSearch {
         let scored = found
             .into_iter()
             .map(|(camera, _)| (camera, 1.0 - mask_iou(&silhouette_pixels(mesh, &camera), &mask)));
-        let scored: Vec<(Pinhole, f64)> = apart(scored.collect(), self.fine, APART_DEG);
+        let scored: Vec<(Pinhole, f64)> = apart(scored.collect(), self.fine, ANSWERS_APART_DEG);
         let best = scored.first().context("no pose was tried")?.1;
         let nearly = scored.iter().filter(|(_, loss)| *loss <= best + self.nearly);
         Ok(nearly.map(|&(camera, loss)| FoundPose { camera, iou: 1.0 - loss }).collect())
