@@ -5,6 +5,9 @@ use plotters::coord::{
     types::RangedCoordf64,
 };
 
+/// Larger values are not shown on an axis of even steps: ranges around them would not be finite.
+const LARGEST: f64 = 1e300;
+
 /// Name with unit, and whether it is divided in decades.
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -25,8 +28,13 @@ impl Axis {
         Self { name: name.to_owned(), logarithmic: true }
     }
 
+    /// Where a value stands; NaN if it cannot be shown.
     pub(crate) fn place(&self, value: f64) -> f64 {
-        if self.logarithmic { value.log10() } else { value }
+        match self.logarithmic {
+            true => value.log10(),
+            false if value.abs() > LARGEST => f64::NAN,
+            false => value,
+        }
     }
 
     pub(crate) fn label(&self, place: f64) -> String {
@@ -69,16 +77,23 @@ impl Axis {
             let marks = RangedCoordf64::from(range).key_points(most).into_iter();
             marks.map(|mark| if mark.abs() < least { 0.0 } else { mark }).collect::<Vec<_>>()
         };
+        // Of a logarithmic axis only: there are as many as the range is long.
         let multiples = |of: &[u32]| -> Vec<f64> {
             let powers = range.start.floor() as i32..=range.end.floor() as i32;
             let places = powers
                 .flat_map(|power| of.iter().map(move |k| f64::from(power) + f64::from(*k).log10()));
             places.filter(|place| range.contains(place)).collect()
         };
+        if !self.logarithmic {
+            return MarkedAxis {
+                numbers: round(range.clone()),
+                light: Vec::new(),
+                range: range.into(),
+            };
+        }
         let decades = multiples(&[1]);
         let few = multiples(&[1, 2, 5]);
         let (numbers, light) = match decades.len() {
-            _ if !self.logarithmic => (round(range.clone()), Vec::new()),
             0 | 1 if few.len() > 1 => (few, multiples(&[3, 4, 6, 7, 8, 9])),
             0 | 1 => {
                 let values = round(10f64.powf(range.start)..10f64.powf(range.end));
@@ -137,6 +152,23 @@ mod tests {
         assert_eq!(marks(-0.5..6.5)[0], [1.0, 1e2, 1e4, 1e6]);
         assert_eq!(marks(-1.2..-0.2), [vec![0.1, 0.2, 0.5], vec![0.07, 0.08, 0.09, 0.3, 0.4, 0.6]]);
         assert_eq!(marks(1.21f64.log10()..1.29f64.log10())[0], [1.22, 1.24, 1.26, 1.28]);
+    }
+
+    #[test]
+    fn marks_are_few_whatever_is_to_be_shown() {
+        let mut random = 1u64;
+        let mut number = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let value = f64::from_bits(random ^ (random >> 31));
+            if random.is_multiple_of(3) { (random >> 40) as f64 * 1e-7 } else { value }
+        };
+        for k in 0..300_000 {
+            let axis = Axis { name: String::new(), logarithmic: k % 2 == 0 };
+            let range = axis.range([number(), number()].into_iter());
+            assert!(range.start < range.end && (range.end - range.start).is_finite(), "{range:?}");
+            let marks = axis.over(range.clone(), 7);
+            assert!(marks.numbers.len() <= 15 && marks.light.len() <= 700, "{range:?}");
+        }
     }
 
     #[test]
