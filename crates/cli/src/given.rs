@@ -4,7 +4,7 @@ use std::path::Path;
 
 use softrast_inverse::{Method, Picture};
 use softrast_lab::{
-    Error, Progress, ViewerView, png, program::Output, report::Report, rgb_from_gray,
+    Error, Progress, ViewerView, mask_png, parse::share, program::Output, report::Report,
 };
 use softrast_raster::{BackendChoice, Pinhole};
 
@@ -88,6 +88,42 @@ impl<T: Task> Given<'_, T> {
     }
 }
 
+/// The sides of a picture on a page are no longer than this, in pixels.
+pub const LARGEST: u32 = 640;
+
+/// How pictures become masks.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct MaskFlags {
+    /// Take what is black for the mask
+    #[arg(long)]
+    pub invert: bool,
+
+    /// Take for the mask what is at least so bright, 0 to 1, instead of keeping soft edges
+    #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
+    pub threshold: Option<f64>,
+}
+
+impl MaskFlags {
+    /// Whether the command line says something of masks.
+    pub fn asked(&self) -> bool {
+        self.invert || self.threshold.is_some()
+    }
+
+    /// The mask in a file.
+    ///
+    /// # Errors
+    ///
+    /// If it is missing or no picture.
+    pub fn load(&self, path: &Path) -> anyhow::Result<Picture> {
+        let mask = Picture::load_mask(path)?;
+        let mask = if self.invert { mask.inverted() } else { mask };
+        Ok(match self.threshold {
+            Some(level) => mask.thresholded(level),
+            None => mask,
+        })
+    }
+}
+
 /// A camera and the mask that it took, for a page that shows them with a mesh.
 ///
 /// # Errors
@@ -100,7 +136,7 @@ pub fn seen_by(
     note: String,
 ) -> anyhow::Result<ViewerView> {
     let Pinhole { rotation, translation, focal, centre, size } = *camera;
-    let mask_png = png(&rgb_from_gray(mask.pixels(), mask.size().width, mask.size().height))?;
+    let mask_png = mask_png(mask.pixels(), mask.size().width, LARGEST)?;
     Ok(ViewerView {
         name,
         rotation,
@@ -125,10 +161,12 @@ pub(crate) fn solve_given<T: Task>(
     }
     let Shared { args, common, method } = shared;
     let given = Given { args, common, method, session };
+    // A folder that cannot be written is said before the work.
+    let folder = session.folder();
     let answer = T::solve_given(&given, pictures)?;
     Some(answer.and_then(|answer| {
         let Answer { page, output, files, beside } = answer;
-        let mut folder = session.folder()?;
+        let mut folder = folder?;
         files.iter().try_for_each(|(name, bytes)| folder.stage(name, bytes))?;
         session.finish(folder, page, &beside, Some(RESULT), output)
     }))

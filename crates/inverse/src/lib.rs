@@ -26,12 +26,15 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod camera_file;
 mod checkpoint;
 mod distilled_mlp;
 mod instances;
 mod layout;
 mod learn;
 mod learn_config;
+mod lens;
+mod mask_targets;
 mod method;
 mod minimize;
 mod objectives;
@@ -49,6 +52,8 @@ pub use instances::Instances;
 pub use layout::PhiLayout;
 pub use learn::{Learning, learn};
 pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
+pub use lens::Lens;
+pub use mask_targets::MaskTargets;
 pub use method::Method;
 pub use minimize::{Iterate, minimize};
 pub use objectives::{Inner, Outer};
@@ -58,7 +63,7 @@ pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
 pub use targets::Targets;
-pub use view::{Lens, View, camera_json, load_pose, load_views, mask_iou, silhouette_pixels};
+pub use view::{View, camera_json, load_pose, load_views, mask_iou, silhouette_pixels};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use anyhow::{Context, ensure};
 use burn::tensor::{Tensor, backend::Backend};
@@ -6,11 +6,14 @@ use image::{DynamicImage, GrayImage, Luma, LumaA};
 use softrast_raster::ImageSize;
 use softrast_softness::{numbers, tensor_on};
 
-/// A gray picture of any size: a target for silhouettes.
+/// What is looked at of a mask is this much larger than what is white.
+const MARGIN: f64 = 1.5;
+
+/// A gray picture of any size: a target for silhouettes. Copies share their pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// From 0 to 1, row by row from the top.
-    levels: Vec<f64>,
+    levels: Arc<[f32]>,
     width: usize,
 }
 
@@ -24,7 +27,7 @@ impl Picture {
         let picture = open(path.as_ref())?;
         let opaque = !picture.color().has_alpha()
             || picture.to_luma_alpha16().pixels().all(|p| p.0[1] == u16::MAX);
-        Ok(Self::of(&picture, |p| f64::from(p.0[usize::from(!opaque)]) / FULL))
+        Ok(Self::of(&picture, |p| f32::from(p.0[usize::from(!opaque)]) / FULL))
     }
 
     /// The luminance of a picture file; what is transparent is black.
@@ -33,7 +36,7 @@ impl Picture {
     ///
     /// If the file is missing or no picture.
     pub fn load_luminance(path: impl AsRef<Path>) -> anyhow::Result<Self> {
-        let level = |p: &LumaA<u16>| f64::from(p.0[0]) / FULL * (f64::from(p.0[1]) / FULL);
+        let level = |p: &LumaA<u16>| f32::from(p.0[0]) / FULL * (f32::from(p.0[1]) / FULL);
         Ok(Self::of(&open(path.as_ref())?, level))
     }
 
@@ -43,7 +46,7 @@ impl Picture {
     }
 
     /// All pixels, row by row from the top.
-    pub fn pixels(&self) -> &[f64] {
+    pub fn pixels(&self) -> &[f32] {
         &self.levels
     }
 
@@ -56,7 +59,8 @@ impl Picture {
     /// White from this level on, black below.
     #[must_use]
     pub fn thresholded(self, level: f64) -> Self {
-        let levels = self.levels.iter().map(|&x| f64::from(u8::from(x >= level))).collect();
+        let levels =
+            self.levels.iter().map(|&x| f32::from(u8::from(f64::from(x) >= level))).collect();
         Self { levels, ..self }
     }
 
@@ -71,7 +75,7 @@ impl Picture {
             let (sum, count) =
                 all.fold((0.0, 0.0), |(sum, count), k| (sum + self.levels[k], count + 1.0));
             let most = sum >= 0.5 * count;
-            if (self.levels[k] >= 0.5) == most { self.levels[k] } else { f64::from(u8::from(most)) }
+            if (self.levels[k] >= 0.5) == most { self.levels[k] } else { f32::from(u8::from(most)) }
         };
         Self { levels: (0..self.levels.len()).map(majority).collect(), width }
     }
@@ -100,6 +104,24 @@ impl Picture {
         Some([corner[0], corner[1], longest])
     }
 
+    /// The square of a mask that is looked at, one and a half times as large as [`Picture::square`]: its left, its top and its extent in
+    /// pixels.
+    ///
+    /// # Errors
+    ///
+    /// If nothing or all of the mask is white.
+    pub fn looked_at(&self) -> anyhow::Result<[f64; 3]> {
+        let [left, top, extent] = self.square().context(
+            "the mask is empty: no pixel is half white or more (--invert takes what is black)",
+        )?;
+        ensure!(
+            self.levels.iter().any(|&level| level < 0.5),
+            "the mask is full: all pixels are white, and there is no outline to fit"
+        );
+        let margin = (MARGIN - 1.0) / 2.0 * extent;
+        Ok([left - margin, top - margin, MARGIN * extent])
+    }
+
     /// A square of it, given by its left, its top and its extent in pixels, on `side` × `side` pixels: the mean of the picture over the
     /// area of each, black outside, and how much of each the picture covers.
     pub fn part(&self, [left, top, extent]: [f64; 3], side: usize) -> [Vec<f64>; 2] {
@@ -107,10 +129,10 @@ impl Picture {
         let columns = shares(self.width, left, cell, side);
         let rows = shares(height, top, cell, side);
         let mean = |level: &dyn Fn(usize) -> f64| means(&columns, &rows, self.width, level);
-        [mean(&|at| self.levels[at]), mean(&|_| 1.0)]
+        [mean(&|at| f64::from(self.levels[at])), mean(&|_| 1.0)]
     }
 
-    fn of(picture: &DynamicImage, level: impl Fn(&LumaA<u16>) -> f64) -> Self {
+    fn of(picture: &DynamicImage, level: impl Fn(&LumaA<u16>) -> f32) -> Self {
         let levels = picture.to_luma_alpha16().pixels().map(level).collect();
         Self { levels, width: picture.width() as usize }
     }
@@ -151,7 +173,7 @@ pub fn save_picture<B: Backend>(image: Tensor<B, 3>, path: impl AsRef<Path>) -> 
     picture.save(path).with_context(|| format!("cannot write the picture {}", path.display()))
 }
 
-const FULL: f64 = u16::MAX as f64;
+const FULL: f32 = u16::MAX as f32;
 
 fn open(path: &Path) -> anyhow::Result<DynamicImage> {
     image::ImageReader::open(path)
@@ -215,7 +237,7 @@ mod tests {
     }
 
     fn assert_close(found: &[f64], expected: &[f64]) {
-        let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9);
+        let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7);
         assert!(close && found.len() == expected.len(), "{found:?}");
     }
 
@@ -239,7 +261,7 @@ mod tests {
 
     #[test]
     fn a_part_is_black_where_it_leaves_the_picture_and_says_how_much_of_it_does() {
-        let levels = vec![0.0, 0.0, 0.0, 1.0, 1.0, 0.0];
+        let levels = [0.0, 0.0, 0.0, 1.0, 1.0, 0.0].into();
         let picture = Picture { levels, width: 3 };
         assert_eq!(picture.square(), Some([0.0, 0.5, 2.0]));
         let [levels, covered] = picture.part([0.0, 0.5, 2.0], 2);
@@ -248,9 +270,16 @@ mod tests {
         let speckled =
             |x, y| Luma([if x * y == 36 || (x > 1 && x < 5 && y < 5) { 255 } else { 0 }]);
         let speckled =
-            Picture::of(&GrayImage::from_fn(9, 9, speckled).into(), |p| f64::from(p.0[0]));
+            Picture::of(&GrayImage::from_fn(9, 9, speckled).into(), |p| f32::from(p.0[0]));
         assert_eq!(speckled.square(), Some([1.0, 0.0, 5.0]));
         assert_eq!(picture.clone().thresholded(2.0).square(), None);
+        assert!(
+            picture.clone().thresholded(2.0).looked_at().unwrap_err().to_string().contains("empty")
+        );
+        assert!(
+            picture.clone().thresholded(0.0).looked_at().unwrap_err().to_string().contains("full")
+        );
+        assert_eq!(picture.looked_at().unwrap(), [-0.5, 0.0, 3.0]);
         assert_eq!(picture.inverted().square(), Some([0.0, -0.5, 3.0]));
     }
 
@@ -261,7 +290,7 @@ mod tests {
         let mask = |pixels: [[u8; 2]; 2]| {
             let picture = image::GrayAlphaImage::from_fn(2, 1, |x, _| LumaA(pixels[x as usize]));
             picture.save(&path).unwrap();
-            Picture::load_mask(&path).unwrap().levels
+            Picture::load_mask(&path).unwrap().pixels().to_vec()
         };
         assert_eq!(mask([[0, 255], [255, 0]]), [1.0, 0.0]);
         assert_eq!(mask([[0, 255], [255, 255]]), [0.0, 1.0]);
@@ -286,7 +315,7 @@ mod tests {
             Ok(picture) => {
                 let levels = picture.levels(3);
                 assert!(
-                    levels.iter().all(|level| (0.0..=1.0 + 1e-9).contains(level)),
+                    levels.iter().all(|level| (0.0..=1.0 + 1e-6).contains(level)),
                     "{levels:?}"
                 );
             }

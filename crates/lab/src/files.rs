@@ -81,20 +81,23 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Gives all files their names; removes those of `replaced` that an earlier command left and this one does not have.
+    /// Gives all files their names; removes those of `replaced` that an earlier command left and this one does not have. One that ends in
+    /// `*` stands for all that begin like it.
     ///
     /// # Errors
     ///
     /// [`Error::Folder`] if a file cannot be renamed or removed.
     pub fn commit(mut self, replaced: &[&str]) -> Result<(), Error> {
         let staged = std::mem::take(&mut self.staged);
-        for name in replaced.iter().filter(|name| staged.iter().all(|(staged, _)| staged != *name))
-        {
-            match fs::remove_file(self.file(name)) {
-                Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
-                    return Err(self.refused(reason));
-                }
-                _ => {}
+        let is_replaced = |name: &str| {
+            let matches =
+                |of: &str| of.strip_suffix('*').map_or(name == of, |of| name.starts_with(of));
+            replaced.iter().any(|of| matches(of)) && staged.iter().all(|(staged, _)| staged != name)
+        };
+        for entry in fs::read_dir(&self.path).map_err(|reason| self.refused(reason))? {
+            let path = entry.map_err(|reason| self.refused(reason))?.path();
+            if path.file_name().and_then(|name| name.to_str()).is_some_and(is_replaced) {
+                fs::remove_file(&path).map_err(|reason| self.refused(reason))?;
             }
         }
         for (name, file) in staged {

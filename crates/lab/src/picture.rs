@@ -3,7 +3,7 @@ use std::io;
 use anyhow::Context;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use image::{
-    Delay, DynamicImage, Frame, Rgb, RgbImage,
+    Delay, DynamicImage, Frame, GrayImage, Luma, Rgb, RgbImage,
     codecs::gif::{GifEncoder, Repeat},
     imageops,
 };
@@ -141,6 +141,36 @@ pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
+/// A mask, row by row from 0 to 1, as a gray PNG that is made smaller if need be: no side has more than `side` pixels.
+///
+/// # Errors
+///
+/// If the encoder fails.
+///
+/// # Panics
+///
+/// If the mask has no pixels, or no whole rows.
+pub fn mask_png(mask: &[f32], width: usize, side: u32) -> anyhow::Result<Vec<u8>> {
+    assert!(width > 0 && mask.len().is_multiple_of(width), "a mask of whole rows");
+    let image = GrayImage::from_fn(width as u32, (mask.len() / width) as u32, |x, y| {
+        Luma([level(mask[y as usize * width + x as usize].into())])
+    });
+    let mut png = io::Cursor::new(Vec::new());
+    let image = DynamicImage::from(image);
+    let small =
+        if image.width().max(image.height()) > side { image.thumbnail(side, side) } else { image };
+    small.write_to(&mut png, image::ImageFormat::Png).context("cannot encode a picture")?;
+    Ok(png.into_inner())
+}
+
+/// An image of which no side has more than `side` pixels.
+pub fn at_most(image: RgbImage, side: u32) -> RgbImage {
+    if image.width().max(image.height()) <= side {
+        return image;
+    }
+    DynamicImage::from(image).thumbnail(side, side).into_rgb8()
+}
+
 /// An endless GIF: the target on the left, the frames on the right.
 fn gif(target: &RgbImage, frames: &[RgbImage]) -> image::ImageResult<Vec<u8>> {
     let mut bytes = Vec::new();
@@ -189,14 +219,15 @@ mod as_base64 {
 /// # Panics
 ///
 /// If they have no pixels or differ in number.
-pub fn overlay(silhouette: &[f64], mask: &[f64], width: usize) -> RgbImage {
+pub fn overlay(silhouette: &[f64], mask: &[f32], width: usize) -> RgbImage {
     const BOTH: [f64; 3] = [150.0, 160.0, 170.0];
     const MASK: [f64; 3] = [240.0, 130.0, 20.0];
     const SILHOUETTE: [f64; 3] = [30.0, 110.0, 220.0];
     assert_eq!(silhouette.len(), mask.len(), "a silhouette and a mask of different size");
     RgbImage::from_fn(width as u32, (mask.len() / width) as u32, |x, y| {
         let pixel = y as usize * width + x as usize;
-        let [drawn, mask] = [silhouette[pixel], mask[pixel]].map(|level| level.clamp(0.0, 1.0));
+        let [drawn, mask] =
+            [silhouette[pixel], f64::from(mask[pixel])].map(|level| level.clamp(0.0, 1.0));
         Rgb([0, 1, 2].map(|k| {
             let with = drawn * BOTH[k] + (1.0 - drawn) * MASK[k];
             let without = drawn * SILHOUETTE[k] + (1.0 - drawn) * 250.0;
@@ -215,6 +246,18 @@ mod tests {
         let at = |x, y| image.get_pixel(x, y).0;
         assert_eq!([at(0, 0), at(1, 0)], [[150, 160, 170], [30, 110, 220]]);
         assert_eq!([at(0, 1), at(1, 1)], [[240, 130, 20], [250; 3]]);
+    }
+
+    #[test]
+    fn large_pictures_are_made_smaller_and_small_ones_stay() {
+        let sizes = |bytes: Vec<u8>| {
+            let image = image::load_from_memory(&bytes).unwrap();
+            (image.width(), image.height(), image.to_luma8().pixels().map(|p| p.0[0]).max())
+        };
+        assert_eq!(sizes(mask_png(&[0.0, 1.0, 0.5, 0.2], 2, 9).unwrap()), (2, 2, Some(255)));
+        assert_eq!(sizes(mask_png(&[1.0; 800], 40, 10).unwrap()), (10, 5, Some(255)));
+        assert_eq!(at_most(plain(40, 20, 7), 10).dimensions(), (10, 5));
+        assert_eq!(at_most(plain(4, 2, 7), 10), plain(4, 2, 7));
     }
 
     fn plain(width: u32, height: u32, level: u8) -> RgbImage {

@@ -178,11 +178,13 @@ impl Trouble {
     }
 }
 
-/// A word of a file as an error message shows it: not longer than a line can bear.
+/// A word of a file as an error message shows it: not longer than a line can bear, and without signs that would break or colour it.
 pub(crate) fn shown(word: &str) -> String {
     const LONGEST: usize = 40;
-    match word.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}...", &word[..end]),
-        None => word.to_owned(),
+    let sign = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
+    let mut shown: String = word.chars().take(LONGEST).map(sign).collect();
+    if word.chars().nth(LONGEST).is_some() {
+        shown += "...";
     }
+    shown
 }

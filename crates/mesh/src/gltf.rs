@@ -208,6 +208,9 @@ impl Gltf {
     ) -> Result<Vec<[f64; N]>, String> {
         let part = |view, offset, component| Source { view, offset, component, bin };
         let component = component(accessor.component_type)?;
+        if accessor.normalized && matches!(component, Component::F32 | Component::U32) {
+            return Err("floats and 32-bit integers cannot be normalized".to_owned());
+        }
         let read = |bytes: [&[u8]; N]| bytes.map(|b| component.value(b, accessor.normalized));
         let mut values = match accessor.buffer_view {
             Some(view) => {

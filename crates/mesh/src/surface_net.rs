@@ -20,7 +20,8 @@ impl Mesh {
     /// The surface of a solid within a box (lowest and highest corner, world units), with so many cells along the longest side of that:
     /// closed, and counterclockwise from outside.
     ///
-    /// `field` is negative inside the solid, positive on the sides of the box, and grows about like a distance.
+    /// `field` is negative inside the solid, and grows about like a distance. What of the solid reaches the sides of the box is cut off half
+    /// a cell before them.
     ///
     /// # Errors
     ///
@@ -36,7 +37,11 @@ impl Mesh {
             return Err(MeshError::Empty);
         }
         let cubes = sides.map(|side| (side / step).ceil() as usize);
-        let (positions, faces) = surface_net(&Grid { low, step, cubes }, field);
+        let beyond = |p: [f64; 3]| {
+            (0..3).map(|k| (p[k] - high[k]).max(low[k] - p[k])).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let within = |p: [f64; 3]| field(p).max(beyond(p) + 0.5 * step);
+        let (positions, faces) = surface_net(&Grid { low, step, cubes }, within);
         Self::new(positions, faces)
     }
 }
@@ -187,6 +192,12 @@ mod tests {
         let ball = Mesh::of_solid(bounds, 20, |p| norm(p) - 1.0).unwrap();
         assert!((ball.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.02);
         assert!(matches!(Mesh::of_solid(bounds, 20, |_| 1.0), Err(MeshError::Empty)));
+        // A ball that the box cuts off on all sides is closed there.
+        let cut = Mesh::of_solid([[-1.0; 3], [1.0; 3]], 20, |p| norm(p) - 1.2).unwrap();
+        let edges = crate::Edges::new(cut.faces());
+        assert_eq!(edges.ends.len(), edges.hinges.len());
+        let [low, high] = cut.bounds();
+        assert!((0..3).all(|k| (high[k] - 0.95).abs() < 1e-3 && (low[k] + 0.95).abs() < 1e-3));
         assert!(matches!(Mesh::of_solid([[0.0; 3]; 2], 20, |_| -1.0), Err(MeshError::Empty)));
     }
 

@@ -24,6 +24,7 @@ fn main() {
     let (mesh, device) = (fox(), Default::default());
     let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
     let seen = project(vertices::<NdArray>(mesh.positions(), &device), camera.tensor(&device));
+    // Its tails are long, and hundreds of faces add them up: a tiny scale, and a tolerance that keeps the support small.
     let renderer = SoftRenderer::new(mesh.faces(), 24, Arctan, 2e-5).with_tolerance(1e-3);
     let alpha: Vec<f64> = renderer.silhouette(seen).into_data().iter().collect();
     for row in alpha.chunks(24) {

@@ -8,6 +8,9 @@
 //! - [`meta`]: optimisers and inner loops that can be differentiated;
 //! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them.
 //!
+//! Take burn 0.21, the version that this is built on: types of another do not fit. The Cargo features `ndarray` (default), `flex` and
+//! `wgpu` choose the backend.
+//!
 //! ```
 //! use burn::backend::{Autodiff, NdArray};
 //! use softrast::{mesh::fox, prelude::*};

@@ -2,8 +2,10 @@
 
 pub use burn::tensor::{Tensor, backend::Backend};
 pub use softrast_inverse::{
-    InverseProblem, Iterate, LearnConfig, Method, Picture, PoseProblem, SoftnessAt, SolveConfig,
-    learn, minimize, save_picture,
+    InverseProblem, Iterate, LearnConfig, Lens, Method, Picture, PoseProblem, SoftnessAt,
+    SolveConfig, learn, load_views, minimize,
+    pose::{FoundPose, PoseSearch},
+    save_picture,
 };
 pub use softrast_mesh::{Mesh, MeshError};
 pub use softrast_meta::{Adam, MetaGradient, Optimizer};

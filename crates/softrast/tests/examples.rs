@@ -41,6 +41,11 @@ fn a_sphere_comes_to_fit_two_silhouettes() {
 }
 
 #[test]
+fn a_pose_is_found_from_a_mask() {
+    assert!(number_after(&runs("pose_from_mask"), "IoU") > 0.97);
+}
+
+#[test]
 fn learning_lowers_the_validation_loss() {
     let said = runs("learn");
     let losses: Vec<f64> = said

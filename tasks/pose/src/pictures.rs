@@ -4,29 +4,32 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use image::RgbImage;
-use serde_json::json;
-use softrast_cli::{Answer, Given, seen_by};
+use serde_json::{Value, json};
+use softrast_cli::{Answer, Given, LARGEST, MaskFlags, Variant, seen_by};
 use softrast_inverse::{
     Lens, Picture, camera_json, load_pose,
     pose::{FoundPose, PoseSearch},
     silhouette_pixels,
 };
 use softrast_lab::{
-    Error, Viewer, contact_sheet,
+    Error, Viewer, at_most, contact_sheet,
     format::{counted, line},
-    overlay,
-    parse::share,
-    png,
+    overlay, png,
     program::Output,
     report::{Report, Table},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Pinhole, on_backend};
 
-use crate::{Pose, task::mesh};
+use crate::{
+    Instances, Pose,
+    task::{Framing, mesh},
+};
 
 /// Field of view along the shorter side where no camera is given, in degrees.
 const ASSUMED_FOV_DEG: f64 = 45.0;
+/// Answers that a picture of many shows.
+const SHOWN: usize = 12;
 
 /// A picture and the camera that took it.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -48,25 +51,16 @@ pub struct Pictures {
     #[arg(long, value_name = "FILE.json", requires = "target")]
     pub start: Option<PathBuf>,
 
-    /// Take what is black for the mask
-    #[arg(long)]
-    pub invert: bool,
-
-    /// Take for the mask what is at least so bright, 0 to 1, instead of keeping soft edges
-    #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
-    pub threshold: Option<f64>,
+    /// How pictures become masks.
+    #[command(flatten)]
+    pub masks: MaskFlags,
 }
 
 impl Pictures {
     /// Whether there is one.
     pub(crate) fn asked(&self) -> bool {
-        let Self { target, targets, camera, start, invert, threshold } = self;
-        target.is_some()
-            || targets.is_some()
-            || camera.is_some()
-            || start.is_some()
-            || *invert
-            || threshold.is_some()
+        let Self { target, targets, camera, start, masks } = self;
+        [target, targets, camera, start].into_iter().any(Option::is_some) || masks.asked()
     }
 
     fn paths(&self) -> anyhow::Result<Vec<PathBuf>> {
@@ -98,15 +92,6 @@ impl Pictures {
         );
         Ok(paths)
     }
-
-    fn load(&self, path: &Path) -> anyhow::Result<Picture> {
-        let mask = Picture::load_mask(path)?;
-        let mask = if self.invert { mask.inverted() } else { mask };
-        Ok(match self.threshold {
-            Some(level) => mask.thresholded(level),
-            None => mask,
-        })
-    }
 }
 
 /// A mask and what was found for it, the best first.
@@ -122,8 +107,8 @@ pub(crate) fn solve_pictures(
     pictures: &Pictures,
 ) -> anyhow::Result<Answer> {
     let args = given.args;
-    let (mesh, mesh_name) = mesh(args)?;
-    let framing = Framing::new(args, &mesh)?;
+    refuse_flags_of_seeds(given)?;
+    let (mesh, mesh_name, framing) = mesh(args)?;
     let (method, backend) = (given.method()?, given.backend()?);
     let mut search = PoseSearch { optimise_fov: args.optimise_fov, ..PoseSearch::default() };
     search.learning_rate = given.learning_rate().unwrap_or(search.learning_rate);
@@ -135,7 +120,7 @@ pub(crate) fn solve_pictures(
     // What would fail in the middle fails at once.
     let mut tasks = Vec::new();
     for path in paths {
-        let mask = pictures.load(&path)?;
+        let mask = pictures.masks.load(&path)?;
         let size = mask.size();
         let lens = lens.clone().unwrap_or_else(|| Lens::of_fov(ASSUMED_FOV_DEG, size));
         let mut camera = lens.pinhole(size).with_context(|| {
@@ -145,6 +130,8 @@ pub(crate) fn solve_pictures(
         if let Some((rotation, translation)) = start {
             (camera.rotation, camera.translation) = (rotation, translation);
         }
+        PoseSearch::check(&mesh, &mask, &camera, start.is_some())
+            .with_context(|| path.display().to_string())?;
         tasks.push((path, mask, camera));
     }
     let steps = search.steps(start.is_some());
@@ -158,54 +145,40 @@ pub(crate) fn solve_pictures(
         solved.push(Solved { path, mask, poses, seconds: clock.elapsed().as_secs_f64() });
     }
     progress.finish();
-    answer(pictures, &mesh, &mesh_name, &framing, lens.is_some(), args.optimise_fov, &solved)
+    let warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
+    let mesh = Framed { mesh, name: mesh_name, framing };
+    answer(&mesh, &solved, warnings, pictures.target.is_some())
 }
 
-/// How the mesh was moved from where it is in its file.
-struct Framing {
-    middle: [f64; 3],
-    scale: f64,
+/// The mesh that is looked for, and where it was.
+struct Framed {
+    mesh: Mesh,
+    name: String,
+    framing: Framing,
 }
 
-impl Framing {
-    fn new(args: &crate::Args, mesh: &Mesh) -> anyhow::Result<Self> {
-        let original = match &args.mesh {
-            Some(path) if !args.raw => Mesh::load(path)?,
-            _ => mesh.clone(),
-        };
-        let longest = |mesh: &Mesh| {
-            let [low, high] = mesh.bounds();
-            (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
-        };
-        let [low, high] = original.bounds();
-        let moved = args.mesh.is_some() && !args.raw;
-        let middle = if moved { [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0) } else { [0.0; 3] };
-        let scale = longest(mesh) / longest(&original);
-        Ok(Self { middle, scale: if scale.is_finite() { scale } else { 1.0 } })
-    }
-
-    /// The camera for the mesh as it is in its file.
-    fn of_file(&self, camera: &Pinhole) -> Pinhole {
-        let turned =
-            camera.rotation.map(|row| (0..3).map(|k| row[k] * self.middle[k]).sum::<f64>());
-        let translation = [0, 1, 2].map(|k| camera.translation[k] / self.scale - turned[k]);
-        Pinhole { translation, ..*camera }
+/// Flags that say what is drawn as a target.
+fn refuse_flags_of_seeds(given: &Given<'_, Pose>) -> anyhow::Result<()> {
+    let (args, common) = (given.args, given.common);
+    let flags = [
+        ("--range", args.range.is_some()),
+        ("--instances", args.instances != Instances::Seeded),
+        ("--starts", args.starts.is_some()),
+        ("--variant", common.variant != Variant::Original),
+        ("--seed", common.seed != 0),
+    ];
+    match flags.iter().find(|(_, given)| *given) {
+        Some((flag, _)) => Err(Error::usage(format!(
+            "{flag} says which target is drawn: leave it out with --target and --targets"
+        ))),
+        None => Ok(()),
     }
 }
 
-fn answer(
-    pictures: &Pictures,
-    mesh: &Mesh,
-    mesh_name: &str,
-    framing: &Framing,
-    calibrated: bool,
-    optimised: bool,
-    solved: &[Solved],
-) -> anyhow::Result<Answer> {
-    let mut page = Report::new("pose", "The camera from which a mesh has the silhouette of a mask");
-    let mut output = Output::default();
+fn warnings(calibrated: bool, optimised: bool, solved: &[Solved]) -> Vec<String> {
+    let mut warnings = Vec::new();
     if !calibrated {
-        output.warnings.push(format!(
+        warnings.push(format!(
             "no camera was given: a field of view of {ASSUMED_FOV_DEG} degrees along the shorter side {}; --camera FILE.json gives one{}",
             if optimised { "was the start" } else { "is assumed" },
             if optimised { "" } else { ", --optimise-fov looks for it" },
@@ -214,96 +187,132 @@ fn answer(
     for Solved { path, poses, .. } in solved {
         let iou = poses[0].iou;
         if iou < 0.8 {
-            output.warnings.push(format!(
+            warnings.push(format!(
                 "{}: the best pose has an IoU of {iou:.3} only: check that the mesh, the camera and the mask belong together (--invert?)",
                 path.display()
             ));
         }
     }
-    page.warnings(&output.warnings);
-    let single = pictures.target.is_some();
-    let name = |k: usize, what: &str| match single {
-        true => format!("{what}.png"),
-        false => format!(
-            "{what}-{}.png",
-            solved[k].path.file_stem().unwrap_or_default().to_string_lossy()
-        ),
-    };
-    let best: Vec<RgbImage> = solved.iter().map(|one| drawn(mesh, one, &one.poses[0])).collect();
-    let picture = png(&contact_sheet(&best, 4.min(best.len())))?;
-    page.viewer(
-        &viewer(mesh, solved)?,
-        &picture,
-        "The mesh and the cameras that were found. A view shows it with the outline of its mask.",
-    );
-    let mut table = Table::new(["picture", "IoU", "other poses", "their IoU", "seconds"]);
+    warnings
+}
+
+fn answer(
+    mesh: &Framed,
+    solved: &[Solved],
+    warnings: Vec<String>,
+    single: bool,
+) -> anyhow::Result<Answer> {
+    let overlays: Vec<RgbImage> =
+        solved.iter().map(|one| drawn(&mesh.mesh, one, &one.poses[0])).collect();
+    let page = page(&mesh.mesh, solved, &overlays, &warnings, single)?;
     let mut files = Vec::new();
-    let mut results = Vec::new();
-    for (k, one) in solved.iter().enumerate() {
-        let Solved { path, poses, seconds, .. } = one;
-        let best = png(&best[k])?;
-        page.heading(&path.display().to_string());
-        page.picture(
-            &best,
-            "The mask in grey with the silhouette of the answer over it: orange where only the mask is, blue where only the silhouette is.",
-        );
-        page.table(&of_camera(&poses[0]));
-        if poses.len() > 1 {
-            let others: Vec<RgbImage> =
-                poses[1..].iter().map(|pose| drawn(mesh, one, pose)).collect();
-            page.picture(
-                &png(&contact_sheet(&others, 3.min(others.len())))?,
-                "Other poses that fit nearly as well: a silhouette does not tell them apart.",
-            );
-        }
-        files.push((name(k, "overlay"), best));
-        let others: Vec<String> =
-            poses[1..].iter().map(|pose| format!("{:.4}", pose.iou)).collect();
-        let picture = path.display().to_string();
-        table.push([
-            picture.clone(),
-            format!("{:.4}", poses[0].iou),
-            (poses.len() - 1).to_string(),
-            others.join(", "),
-            format!("{seconds:.1}"),
-        ]);
-        results.push(json!({
-            "target": picture,
-            "camera": camera_json(&poses[0].camera),
-            "camera_in_file": camera_json(&framing.of_file(&poses[0].camera)),
-            "iou": poses[0].iou,
-            "alternatives": poses[1..].iter().map(|pose| json!({
-                "camera": camera_json(&pose.camera),
-                "camera_in_file": camera_json(&framing.of_file(&pose.camera)),
-                "iou": pose.iou,
-            })).collect::<Vec<_>>(),
-            "seconds": seconds,
-        }));
+    for (one, overlay) in solved.iter().zip(&overlays) {
+        files.push((overlay_name(one, single), png(overlay)?));
     }
-    output.text = text(mesh_name, solved, single);
-    let mean = solved.iter().map(|of| of.poses[0].iou).sum::<f64>() / solved.len() as f64;
-    if single {
-        output.json = results.swap_remove(0);
-    } else {
-        page.heading("All pictures");
-        page.table(&table);
+    if !single {
         files.push(("poses.csv".to_owned(), csv(solved).into_bytes()));
-        output.json = json!({ "mean_iou": mean, "pictures": results });
     }
-    output.json["mesh"] =
-        json!({ "name": mesh_name, "middle": framing.middle, "scale": framing.scale });
-    output.json["warnings"] = json!(output.warnings);
-    page.note(
-        "R and t are as OpenCV has them: a point p is seen at R p + t, with x right, y down and z ahead. They belong to the mesh as it \
-         was taken: centred and with its longest side 2, or with --raw as it stands. result.json also has them for the mesh as it is in \
-         its file (camera_in_file).",
-    );
+    let json = json(mesh, solved, &warnings, single);
+    let output = Output { text: text(&mesh.name, solved, single), json, warnings, partial: None };
     let beside = if single {
         "result.json holds the camera and the alternatives, overlay.png the picture"
     } else {
         "result.json holds all cameras and alternatives, poses.csv a line for each picture"
     };
     Ok(Answer { page, output, files, beside: beside.to_owned() })
+}
+
+/// The file with the mask and the silhouette of an answer.
+fn overlay_name(one: &Solved, single: bool) -> String {
+    let name = one.path.file_name().unwrap_or_default().to_string_lossy();
+    match single {
+        true => "overlay.png".to_owned(),
+        false => format!("overlay-{}.png", name.trim_end_matches(".png")),
+    }
+}
+
+fn page(
+    mesh: &Mesh,
+    solved: &[Solved],
+    overlays: &[RgbImage],
+    warnings: &[String],
+    single: bool,
+) -> anyhow::Result<Report> {
+    let mut page = Report::new("pose", "The camera from which a mesh has the silhouette of a mask");
+    page.warnings(warnings);
+    let small: Vec<RgbImage> =
+        overlays.iter().map(|overlay| at_most(overlay.clone(), LARGEST)).collect();
+    let first = &small[..SHOWN.min(small.len())];
+    page.viewer(
+        &viewer(mesh, solved)?,
+        &png(&contact_sheet(first, 4.min(first.len())))?,
+        "The mesh and the cameras that were found. A view shows it with the outline of its mask.",
+    );
+    let mut table = Table::new(["picture", "IoU", "other poses", "their IoU", "seconds"]);
+    for (one, overlay) in solved.iter().zip(&small) {
+        let Solved { path, poses, seconds, .. } = one;
+        page.heading(&path.display().to_string());
+        page.picture(
+            &png(overlay)?,
+            "The mask in grey with the silhouette of the answer over it: orange where only the mask is, blue where only the silhouette is.",
+        );
+        page.table(&of_camera(&poses[0]));
+        if poses.len() > 1 {
+            let others = poses[1..].iter().map(|pose| at_most(drawn(mesh, one, pose), LARGEST));
+            let others: Vec<RgbImage> = others.collect();
+            page.picture(
+                &png(&contact_sheet(&others, 3.min(others.len())))?,
+                "Other poses that fit nearly as well: a silhouette does not tell them apart.",
+            );
+        }
+        let others: Vec<String> =
+            poses[1..].iter().map(|pose| format!("{:.4}", pose.iou)).collect();
+        table.push([
+            path.display().to_string(),
+            format!("{:.4}", poses[0].iou),
+            (poses.len() - 1).to_string(),
+            others.join(", "),
+            format!("{seconds:.1}"),
+        ]);
+    }
+    if !single {
+        page.heading("All pictures");
+        page.table(&table);
+    }
+    page.note(
+        "R and t are as OpenCV has them: a point p is seen at R p + t, with x right, y down and z ahead. They belong to the mesh as it \
+         was taken: centred and with its longest side 2, or with --raw as it stands. result.json also has them for the mesh as it is in \
+         its file (camera_in_file).",
+    );
+    Ok(page)
+}
+
+fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> Value {
+    let Framed { name, framing, .. } = mesh;
+    let posed = |pose: &FoundPose| {
+        json!({
+            "camera": camera_json(&pose.camera),
+            "camera_in_file": camera_json(&framing.of_file(&pose.camera)),
+            "iou": pose.iou,
+        })
+    };
+    let mut results: Vec<Value> = Vec::new();
+    for Solved { path, poses, seconds, .. } in solved {
+        let mut result = posed(&poses[0]);
+        result["target"] = json!(path);
+        result["alternatives"] = poses[1..].iter().map(posed).collect();
+        result["seconds"] = json!(seconds);
+        results.push(result);
+    }
+    let mut json = if single {
+        results.swap_remove(0)
+    } else {
+        let mean = solved.iter().map(|of| of.poses[0].iou).sum::<f64>() / solved.len() as f64;
+        json!({ "mean_iou": mean, "pictures": results })
+    };
+    json["mesh"] = json!({ "name": name, "middle": framing.middle, "scale": framing.scale });
+    json["warnings"] = json!(warnings);
+    json
 }
 
 /// The mask with the silhouette at the pose over it.
@@ -390,8 +399,5 @@ fn of_camera(pose: &FoundPose) -> Table {
     }
     pairs.push(["t".to_owned(), row(&camera.translation)]);
     pairs.push(["fx, fy, cx, cy".to_owned(), row(&[camera.focal, camera.centre].concat())]);
-    if let Some(orbit) = camera.orbit() {
-        pairs.push(["orbit".to_owned(), format!("{orbit:?}")]);
-    }
     Table::pairs(pairs)
 }

@@ -10,6 +10,8 @@ use std::{
 
 use image::{GrayImage, Luma};
 use serde_json::{Value, json};
+use softrast_inverse::silhouette_pixels;
+use softrast_raster::Pinhole;
 
 /// Runs `pose solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
@@ -41,9 +43,9 @@ fn angle_deg(a: &Value, b: &Value) -> f64 {
 #[test]
 fn cameras_are_found_from_masks_alone() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    for view in [2, 7] {
-        let name = format!("images/{view:02}.png");
-        fs::copy(fox(&name), folder.path().join(format!("{view}.png"))).unwrap();
+    for (view, file) in [(2, "2.png"), (7, "7.jpg")] {
+        let mask = image::open(fox(&format!("images/{view:02}.png"))).unwrap();
+        mask.to_luma8().save(folder.path().join(file)).unwrap();
     }
     let camera = fox("transforms.json");
     let words = ["--targets", folder.path().to_str().unwrap(), "--camera", &camera, "--size", "64"];
@@ -61,7 +63,7 @@ fn cameras_are_found_from_masks_alone() {
         };
         assert!((0..3).all(|k| distance(k) < 0.2), "view {view}: {picture}");
     }
-    for file in ["result.json", "report.html", "poses.csv", "overlay-2.png", "overlay-7.png"] {
+    for file in ["result.json", "report.html", "poses.csv", "overlay-2.png", "overlay-7.jpg.png"] {
         assert!(out.path().join(file).exists(), "{file}");
     }
 }
@@ -145,6 +147,8 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
     let turned_k = write("k.json", json!({ "K": [[50, 0, 0], [0, 50, 0], [20, 15, 1]] }));
     let listed = write("cv.json", json!({ "fx": 50.0, "dist": [[0.0, -0.2, 0.0, 0.0, 0.0]] }));
     let text = write("text.json", json!({ "fx": "50" }));
+    let not_a_number = of(folder.path().join("nan.json"));
+    fs::write(&not_a_number, r#"{"fx": 50.0, "cx": NaN}"#).unwrap();
     let good = write("good.json", camera);
     let turned =
         write("r.json", json!({ "R": [[1, 0, 0], [0, 1, 0.1], [0, 0, 1]], "t": [0, 0, 4] }));
@@ -171,10 +175,25 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         (vec!["--target", &disc, "--camera", &skewed], vec!["skew.json", "skew of 3"]),
         (vec!["--target", &disc, "--camera", &turned_k], vec!["k.json", "transposed"]),
         (vec!["--target", &disc, "--camera", &listed], vec!["cv.json", "distortion = -0.2"]),
-        (vec!["--target", &disc, "--camera", &text], vec!["text.json", "line 1"]),
+        (
+            vec!["--target", &disc, "--camera", &text],
+            vec!["text.json", "fx is \"50\", not a number"],
+        ),
+        (
+            vec!["--target", &disc, "--camera", &not_a_number],
+            vec!["nan.json", "cx is NaN or infinite"],
+        ),
+        (vec!["--target", &disc, "--range", "15-35"], vec!["--range", "leave it out"]),
+        (
+            vec!["--targets", folder.path().to_str().unwrap()],
+            vec!["empty.png", "the mask is empty"],
+        ),
         (vec!["--target", &disc, "--start", &turned], vec!["r.json", "no rotation", "1.00e-1"]),
         (vec!["--target", &disc, "--start", &mirrored], vec!["m.json", "mirrors"]),
-        (vec!["--target", &disc, "--start", &inside], vec!["inside the mesh"]),
+        (
+            vec!["--target", &disc, "--start", &inside],
+            vec!["disc.png", "inside the mesh", "units of the mesh"],
+        ),
         (vec!["--target", &disc, "--start", &nowhere], vec!["no.json", "R and t"]),
         (vec!["--camera", &good], vec!["--target"]),
         (vec!["--targets", "missing"], vec!["missing", "folder"]),
@@ -186,6 +205,62 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         assert!(parts.iter().all(|part| error.contains(part)), "{words:?}: {error}");
         assert!(!out.join("report.html").exists(), "{words:?}");
     }
+}
+
+#[test]
+fn a_mask_may_be_black_and_a_field_of_view_unknown() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut mask = image::open(fox("images/04.png")).unwrap().to_luma8();
+    mask.pixels_mut().for_each(|pixel| pixel.0[0] = 200 - pixel.0[0] / 2);
+    let path = folder.path().join("black.png");
+    mask.save(&path).unwrap();
+    let target = ["--target", path.to_str().unwrap(), "--invert", "--threshold", "0.5"];
+    let found = run(out.path(), &[&target[..], &["--size", "64", "--optimise-fov"]].concat());
+    let found = found.unwrap();
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    let off = angle_deg(&found["camera"], &truth["views"][4]);
+    assert!(off < 8.0 && found["iou"].as_f64().unwrap() > 0.95, "{off} degrees off, {found}");
+    assert!(found["warnings"][0].as_str().unwrap().contains("field of view"), "{found}");
+    // What another picture left behind is gone.
+    fs::write(out.path().join("overlay-a.png"), b"old").unwrap();
+    fs::write(out.path().join("mine.png"), b"mine").unwrap();
+    let again = run(out.path(), &[&target[..], &["--size", "32", "--steps", "1"]].concat());
+    assert!(again.is_ok());
+    assert!(!out.path().join("overlay-a.png").exists() && out.path().join("mine.png").exists());
+}
+
+/// A bottle looks the same however it is turned around itself: that is one answer, not six.
+#[test]
+fn the_turns_of_a_bottle_are_one_pose() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    const ROUND: u32 = 48;
+    let outline = [(0.0, -1.0), (0.4, -1.0), (0.45, 0.1), (0.15, 0.5), (0.15, 1.0), (0.0, 1.0)];
+    let ring = |&(radius, height): &(f64, f64)| {
+        (0..ROUND).map(move |k| {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(ROUND)).sin_cos();
+            [radius * cos, height, radius * sin]
+        })
+    };
+    let positions = outline.iter().flat_map(ring).collect();
+    let faces = (0..outline.len() as u32 - 1).flat_map(|row| {
+        (0..ROUND).flat_map(move |k| {
+            let (a, b) = (row * ROUND + k, row * ROUND + (k + 1) % ROUND);
+            [[a, b, a + ROUND], [b, b + ROUND, a + ROUND]]
+        })
+    });
+    let bottle = softrast_mesh::Mesh::new(positions, faces.collect()).unwrap();
+    let mesh = folder.path().join("bottle.obj");
+    bottle.save(&mesh).unwrap();
+    let camera = Pinhole::look_at([2.0, 2.0, -3.0], [0.0; 3], [0.0, 1.0, 0.0], 45.0, [80, 80]);
+    let mask: Vec<u8> =
+        silhouette_pixels(&bottle, &camera).into_iter().map(|x| (255.0 * x) as u8).collect();
+    let path = folder.path().join("mask.png");
+    GrayImage::from_raw(80, 80, mask).unwrap().save(&path).unwrap();
+    let words = ["--mesh", mesh.to_str().unwrap(), "--target", path.to_str().unwrap()];
+    let found = run(out.path(), &words).unwrap();
+    assert!(found["iou"].as_f64().unwrap() > 0.97, "{found}");
+    // From the front, or tilted away as far as towards.
+    assert!(found["alternatives"].as_array().unwrap().len() <= 2, "{found}");
 }
 
 /// Specks all over and a gap in the outline: a pose near the right one all the same.

@@ -86,20 +86,33 @@ fn cameras_come_in_many_ways() {
         *cameras = json!({ "frames": cameras["frames"] });
     };
     assert!(with(each, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
-    let angle = |cameras: &mut Value| {
-        let angle = 2.0 * (60.0f64 / 130.0).atan();
-        *cameras = json!({ "camera_angle_x": angle, "frames": cameras["frames"] });
+    let angle = |focal: f64| {
+        move |cameras: &mut Value| {
+            let angle = 2.0 * (60.0 / focal).atan();
+            let [cx, cy] = ["cx", "cy"].map(|key| cameras[key].clone());
+            let frames = cameras["frames"].clone();
+            *cameras = json!({ "camera_angle_x": angle, "cx": cx, "cy": cy, "frames": frames });
+        }
     };
-    // The principal point is taken to be in the middle, three pixels off.
-    let found = with(angle, &["--start", "sphere"]).unwrap();
-    assert!(found["train_iou"].as_f64().unwrap() > 0.1);
+    assert!(with(angle(130.0), &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
+    // Beside an angle that is none, a length.
+    let error = with(angle(-1.0), &[]).unwrap_err();
+    assert!(error.contains("camera_angle_x") && error.contains("radians"), "{error}");
+    // A mask beside the picture goes before it.
+    let masks = |cameras: &mut Value| {
+        for frame in cameras["frames"].as_array_mut().unwrap() {
+            frame["mask_path"] = frame["file_path"].clone();
+            frame["file_path"] = json!("images/no.png");
+        }
+    };
+    assert!(with(masks, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
 }
 
 #[test]
 fn bad_views_are_one_line_that_names_file_and_frame() {
     let frame = |of: fn(&mut Value)| move |cameras: &mut Value| of(&mut cameras["frames"][3]);
     type Change = Box<dyn Fn(&mut Value)>;
-    let checks: [(Change, &[&str]); 12] = [
+    let checks: [(Change, &[&str]); 13] = [
         (Box::new(frame(|f| f["file_path"] = json!("images/no.png"))), &["frame 3", "no.png"]),
         (Box::new(frame(|f| f["transform_matrix"] = json!([[1.0]]))), &["frame 3", "4 x 4"]),
         (
@@ -109,7 +122,11 @@ fn bad_views_are_one_line_that_names_file_and_frame() {
         (Box::new(frame(|f| f["k1"] = json!(0.1))), &["frame 3", "k1", "undistort"]),
         (Box::new(frame(|f| f["w"] = json!(7))), &["frame 3", "7 x 90", "120 x 90"]),
         (Box::new(|c: &mut Value| c["frames"] = json!([])), &["no frame"]),
-        (Box::new(|c: &mut Value| c["frames"] = json!({})), &["transforms.json", "line 1"]),
+        (
+            Box::new(|c: &mut Value| c["frames"] = json!({})),
+            &["transforms.json", "frames is no list"],
+        ),
+        (Box::new(frame(|f| f["fl_x"] = json!("a"))), &["frame 3", "fl_x is \"a\", not a number"]),
         (Box::new(|c: &mut Value| c["fl_x"] = json!(-1.0)), &["frame 0", "positive"]),
         (
             // World to camera instead of camera to world.
@@ -143,8 +160,37 @@ fn bad_views_are_one_line_that_names_file_and_frame() {
     }
     let error = with(|_| (), &["--hold-out", "11"]).unwrap_err();
     assert!(error.contains("--hold-out 11 leaves fewer than two of 12 views"), "{error}");
+    let error = with(|_| (), &["--hold-out", "18446744073709551615"]).unwrap_err();
+    assert!(error.contains("leaves fewer than two"), "{error}");
+    let error = with(|_| (), &["--detail", "3"]).unwrap_err();
+    assert!(error.contains("--start sphere"), "{error}");
+    let out = tempfile::tempdir().unwrap();
+    let error = run(out.path(), &["--invert"]).unwrap_err();
+    assert!(error.contains("--views"), "{error}");
     let error = with(|_| (), &["--elevation", "3"]).unwrap_err();
     assert!(error.contains("--views"), "{error}");
+}
+
+#[test]
+fn a_template_is_deformed_and_pictures_may_cut_the_object_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let template = folder.path().join("template.ply");
+    softrast_mesh::icosphere(2).save(&template).unwrap();
+    let words = ["--views", &fox(), "--template", template.to_str().unwrap(), "--steps", "30"];
+    let found = run(&folder.path().join("out"), &words).unwrap();
+    assert!(found["train_iou"].as_f64().unwrap() > 0.7, "{found}");
+    // All that is left of column 60 of one picture is missing, the object's left half with it.
+    let cut = folder.path().join("cut.png");
+    let whole = image::open(Path::new(&fox()).join("images/03.png")).unwrap();
+    whole.crop_imm(60, 0, 60, 90).save(&cut).unwrap();
+    let with_cut = |cameras: &mut Value| {
+        let frame = &mut cameras["frames"][3];
+        frame["file_path"] = json!(cut);
+        frame["cx"] = json!(62.5 - 60.0);
+        frame["w"] = json!(60);
+    };
+    let found = with(with_cut, &["--hold-out", "2"]).unwrap();
+    assert!(found["held_out_iou"].as_f64().unwrap() > 0.9, "{found}");
 }
 
 #[test]

@@ -4,12 +4,12 @@ use anyhow::Context;
 use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, iou_loss, project_pinhole,
-    turned, vertices,
+    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, turned,
+    vertices,
 };
 use softrast_softness::{numbers, tensor};
 
-use crate::{InverseProblem, Picture, SoftnessAt, SolveConfig, Targets};
+use crate::{InverseProblem, MaskTargets, Picture, SoftnessAt, SolveConfig};
 
 /// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
 const CLEARANCE: f64 = 1.05;
@@ -20,7 +20,7 @@ const FARTHEST: f64 = 3.0;
 #[derive(Clone, Debug)]
 pub struct MaskPose {
     /// The picture.
-    pub mask: Arc<Picture>,
+    pub mask: Picture,
     /// Left, top and extent of the square of it that is looked at, in pixels.
     pub square: [f64; 3],
     /// The camera before the first step, for the whole picture.
@@ -32,6 +32,9 @@ pub struct MaskPose {
 /// θ holds for each instance a turn of the camera as a tangent vector in radians, where the middle of the mesh is seen (x and y, in
 /// radii of the mesh), and the logarithm of its depth, all from the start on; with an optimised focal length also its logarithm. The loss
 /// is the soft `IoU` loss over the part of the picture that is looked at; what lies outside of the picture does not count.
+///
+/// Not covered are cameras that stand within 1.05 times the distance of the farthest vertex from the middle of the mesh: depths are held
+/// beyond that, so that no part of the mesh comes behind the camera.
 #[derive(Clone, Debug)]
 pub struct MaskPoses {
     mesh: Mesh,
@@ -51,13 +54,10 @@ impl MaskPoses {
 
 /// The middle of the box of a mesh, and how far its farthest vertex is from there.
 pub(crate) fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
-    let corners = || mesh.triangles().flatten();
-    let bound = |k: usize, of: fn(f64, f64) -> f64| corners().map(|p| p[k]).reduce(of);
-    let [low, high] = [f64::min as fn(f64, f64) -> f64, f64::max]
-        .map(|of| [0, 1, 2].map(|k| bound(k, of).unwrap_or(0.0)));
+    let [low, high] = mesh.bounds();
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
     let distance = |p: [f64; 3]| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
-    (middle, corners().map(distance).fold(0.0, f64::max))
+    (middle, mesh.triangles().flatten().map(distance).fold(0.0, f64::max))
 }
 
 impl InverseProblem for MaskPoses {
@@ -108,12 +108,7 @@ impl InverseProblem for MaskPoses {
         scene: &MaskScene<B>,
         image: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        let target = scene.targets.of(&image);
-        let image = match &scene.covered {
-            Some(covered) => image.clone() * covered.of(&image),
-            None => image,
-        };
-        iou_loss(image, target)
+        scene.targets.iou_loss(image)
     }
 
     fn defaults(&self) -> SolveConfig {
@@ -137,9 +132,7 @@ pub struct MaskScene<B: RasterBackend> {
     /// Least logarithm of the depth against the start, `[views, 1]`.
     nearest: Tensor<B, 2>,
     optimise_fov: bool,
-    targets: Targets<B>,
-    /// How much of each pixel the picture covers, unless that is all of every pixel.
-    covered: Option<Targets<B>>,
+    targets: MaskTargets<B>,
 }
 
 impl<B: RasterBackend> MaskScene<B> {
@@ -159,10 +152,6 @@ impl<B: RasterBackend> MaskScene<B> {
         let nearest = |&[_, _, z]: &[f64; 3]| {
             (CLEARANCE * radius / z).ln().clamp(-FARTHEST, FARTHEST).min(0.0)
         };
-        let parts = instances.iter().map(|of| of.mask.part(of.square, size));
-        let (levels, covered): (Vec<_>, Vec<_>) = parts.map(|[a, b]| (a, b)).unzip();
-        let images = |of: Vec<Vec<f64>>| tensor::<B, 3>(of.concat(), [views, size, size]);
-        let whole = covered.iter().flatten().all(|&share| share > 1.0 - 1e-9);
         Self {
             vertices: vertices(mesh.positions(), &device),
             faces: mesh.faces().into(),
@@ -173,8 +162,7 @@ impl<B: RasterBackend> MaskScene<B> {
             radius: column(&|p| radius / p[2]),
             nearest: column(&nearest),
             optimise_fov: *optimise_fov,
-            targets: Targets::new(images(levels)),
-            covered: (!whole).then(|| Targets::new(images(covered))),
+            targets: MaskTargets::new(instances.iter().map(|of| (&of.mask, of.square)), size),
         }
     }
 
@@ -213,13 +201,14 @@ impl<B: RasterBackend> MaskScene<B> {
     /// The mesh stays in front of the camera, and nothing grows without end.
     fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
         let theta = theta.reshape(self.shape());
-        let depth =
-            theta.clone().narrow(1, 5, 1).max_pair(self.nearest.clone()).clamp_max(FARTHEST);
-        let mut columns = vec![theta.clone().narrow(1, 0, 5), depth];
-        if self.optimise_fov {
-            columns.push(theta.narrow(1, 6, 1).clamp(-FARTHEST, FARTHEST));
-        }
-        Tensor::cat(columns, 1).flatten(0, 1)
+        let zoom =
+            self.optimise_fov.then(|| theta.clone().narrow(1, 6, 1).clamp(-FARTHEST, FARTHEST));
+        // A longer lens is farther away already.
+        let farther = zoom.clone().unwrap_or_else(|| self.nearest.zeros_like());
+        let depth = theta.clone().narrow(1, 5, 1);
+        let depth = (depth + farther.clone()).max_pair(self.nearest.clone()).clamp_max(FARTHEST);
+        let columns = [Some(theta.narrow(1, 0, 5)), Some(depth - farther), zoom];
+        Tensor::cat(columns.into_iter().flatten().collect(), 1).flatten(0, 1)
     }
 }
 

@@ -1,6 +1,4 @@
-use std::sync::Arc;
-
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, iou_loss, project_pinhole,
@@ -11,8 +9,6 @@ use softrast_softness::{numbers, tensor};
 use super::masks::{MaskPose, MaskPoses, ball};
 use crate::{Iterate, Method, Picture, SolveConfig, mask_iou, minimize, silhouette_pixels};
 
-/// What is looked at is this much larger than the mask.
-const MARGIN: f64 = 1.5;
 /// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
 const GLANCE: usize = 32;
 const DIRECTIONS: usize = 160;
@@ -28,49 +24,37 @@ const HOPEFUL: f64 = 0.08;
 const APART_DEG: f64 = 12.0;
 /// Answers that differ by less are one.
 const ANSWERS_APART_DEG: f64 = 6.0;
+/// Poses are one, however they are turned, if the silhouettes of the mesh from three sides overlap by so much, as those of a vase do.
+const ALIKE: f64 = 0.985;
+/// Pixels a side of these.
+const SIDE_VIEW: usize = 48;
+/// Poses of the first look that are improved on few pixels, a little, and the steps of that.
+const STARTS: (usize, usize) = (128, 12);
+/// Those of them that are improved on few pixels further, and the steps of that.
+const COARSE: (usize, usize) = (24, 48);
+/// Pixels a side of both.
+const COARSE_SIZE: usize = 48;
+/// Poses of these that are improved on many pixels.
+const FINE: usize = 6;
+/// How much less than the best `IoU` a pose may have to count as another answer.
+const NEARLY: f64 = 0.03;
 
 /// How poses are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSearch {
-    /// Poses of the first look that are improved on few pixels, a little.
-    pub starts: usize,
-    /// Steps of that.
-    pub start_steps: usize,
-    /// Poses of these that are improved on few pixels further.
-    pub coarse: usize,
-    /// Steps of that.
-    pub coarse_steps: usize,
-    /// Pixels a side of both.
-    pub coarse_size: usize,
-    /// Poses of these that are improved on many pixels.
-    pub fine: usize,
-    /// Steps of that.
+    /// Steps on many pixels.
     pub fine_steps: usize,
-    /// Pixels a side of that.
+    /// Pixels a side of these.
     pub fine_size: usize,
-    /// Learning rate of the former, in radians; the latter has a third of it.
+    /// Learning rate on few pixels, in radians; on many it is a third of that.
     pub learning_rate: f64,
     /// Whether the focal length is optimised too.
     pub optimise_fov: bool,
-    /// How much less than the best `IoU` a pose may have to count as another answer.
-    pub nearly: f64,
 }
 
 impl Default for PoseSearch {
     fn default() -> Self {
-        Self {
-            starts: 128,
-            start_steps: 12,
-            coarse: 24,
-            coarse_steps: 48,
-            coarse_size: 48,
-            fine: 6,
-            fine_steps: 80,
-            fine_size: 128,
-            learning_rate: 0.03,
-            optimise_fov: false,
-            nearly: 0.03,
-        }
+        Self { fine_steps: 80, fine_size: 128, learning_rate: 0.03, optimise_fov: false }
     }
 }
 
@@ -87,18 +71,41 @@ pub struct FoundPose {
 impl PoseSearch {
     /// Steps that [`PoseSearch::run`] takes from a start, or from anywhere.
     pub fn steps(&self, started: bool) -> usize {
-        self.fine_steps + if started { 0 } else { self.start_steps + self.coarse_steps }
+        self.fine_steps + if started { 0 } else { STARTS.1 + COARSE.1 }
     }
 
-    /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before
-    /// and nearly as good.
+    /// What [`PoseSearch::run`] would refuse at once.
+    ///
+    /// # Errors
+    ///
+    /// If nothing or all of the mask is white, the mesh has no extent, or the start does not see it.
+    pub fn check(
+        mesh: &Mesh,
+        mask: &Picture,
+        camera: &Pinhole,
+        started: bool,
+    ) -> anyhow::Result<()> {
+        mask.looked_at()?;
+        let (middle, radius) = ball(mesh);
+        ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
+        let [_, _, depth] = camera.seen(middle);
+        ensure!(
+            !started || depth > radius,
+            "the start is inside the mesh, or has it behind: the middle of the mesh is {depth:.3} ahead, and must be more than {radius:.3}, as \
+             far as its farthest vertex; is t in the units of the mesh?"
+        );
+        Ok(())
+    }
+
+    /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before,
+    /// look otherwise from some side, and fit nearly as well: their `IoU` is less by 0.03 at most.
     ///
     /// `camera` has the intrinsics; its pose is where to start if it is `started`, else all directions and rolls are tried. `visit` sees
     /// the number of each step and the least loss; an error of it ends the search.
     ///
     /// # Errors
     ///
-    /// If nothing or all of the mask is white, the mesh has no extent, or the start does not see it; those of `visit` and the device.
+    /// Those of [`PoseSearch::check`], of `visit` and of the device.
     pub fn run<B: RasterBackend>(
         &self,
         mesh: &Mesh,
@@ -108,35 +115,27 @@ impl PoseSearch {
         method: &Method,
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
-        let square = looked_at(mask)?;
-        let (middle, radius) = ball(mesh);
-        ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
-        let mask = Arc::new(mask.clone());
+        Self::check(mesh, mask, camera, started)?;
+        let square = mask.looked_at()?;
         let posed = |start: Pinhole| MaskPose { mask: mask.clone(), square, start };
+        let (_, radius) = ball(mesh);
+        let merged = mesh
+            .clustered(DETAIL * 2.0 * radius)
+            .filter(|few| few.area() > LEAST_AREA * mesh.area());
+        let few = merged.as_ref().unwrap_or(mesh);
         let starts = if started {
-            let [_, _, depth] = camera.seen(middle);
-            ensure!(
-                depth > radius,
-                "the camera is inside the mesh, or has it behind: it is {depth:.3} ahead, and the mesh reaches {radius:.3} around its middle"
-            );
             vec![*camera]
         } else {
-            let merged = mesh
-                .clustered(DETAIL * 2.0 * radius)
-                .filter(|few| few.area() > LEAST_AREA * mesh.area());
-            let few = merged.as_ref().unwrap_or(mesh);
-            let mut found = glance(few, &mask, square, camera);
+            let mut found = apart(glance(few, mask, square, camera), STARTS.0, APART_DEG, None);
             let mut begun = 0;
             // Few steps already tell the hopeless apart: many starts are had for little.
-            let stages = [(self.starts, self.start_steps), (self.coarse, self.coarse_steps)];
-            for (count, steps) in stages {
-                let poses = apart(found, count, APART_DEG).into_iter();
-                let poses = poses.map(|(start, _)| posed(start)).collect();
-                let stage = Stage { steps, size: self.coarse_size, rate: self.learning_rate };
-                found = self.improved::<B>(few, poses, method, stage, begun, &mut visit)?;
+            for ((_, steps), left) in [(STARTS, COARSE.0), (COARSE, FINE)] {
+                let poses = found.into_iter().map(|(start, _)| posed(start)).collect();
+                let stage = Stage { steps, size: COARSE_SIZE, rate: self.learning_rate };
+                let better = self.improved::<B>(few, poses, method, stage, begun, &mut visit)?;
+                found = apart(better, left, APART_DEG, Some(few));
                 begun += steps;
             }
-            let found = apart(found, self.fine, APART_DEG);
             let least = found.first().map_or(0.0, |&(_, loss)| loss);
             let found = found.into_iter().filter(|&(_, loss)| loss <= least + HOPEFUL);
             found.map(|(start, _)| start).collect()
@@ -148,10 +147,11 @@ impl PoseSearch {
         let found = self.improved::<B>(mesh, poses, method, fine, begun, &mut visit)?;
         let scored = found
             .into_iter()
-            .map(|(camera, _)| (camera, 1.0 - mask_iou(&silhouette_pixels(mesh, &camera), &mask)));
-        let scored: Vec<(Pinhole, f64)> = apart(scored.collect(), self.fine, ANSWERS_APART_DEG);
+            .map(|(camera, _)| (camera, 1.0 - mask_iou(&silhouette_pixels(mesh, &camera), mask)));
+        let scored: Vec<(Pinhole, f64)> =
+            apart(scored.collect(), FINE, ANSWERS_APART_DEG, Some(few));
         let best = scored.first().context("no pose was tried")?.1;
-        let nearly = scored.iter().filter(|(_, loss)| *loss <= best + self.nearly);
+        let nearly = scored.iter().filter(|(_, loss)| *loss <= best + NEARLY);
         Ok(nearly.map(|&(camera, loss)| FoundPose { camera, iou: 1.0 - loss }).collect())
     }
 
@@ -190,25 +190,8 @@ struct Stage {
     rate: f64,
 }
 
-/// The square of a mask that is looked at: left, top and extent in pixels.
-///
-/// # Errors
-///
-/// If nothing or all of it is white.
-fn looked_at(mask: &Picture) -> anyhow::Result<[f64; 3]> {
-    let Some([left, top, extent]) = mask.square() else {
-        bail!("the mask is empty: no pixel is half white or more (--invert takes what is black)");
-    };
-    let white = mask.pixels().iter().filter(|&&level| level >= 0.5).count();
-    ensure!(
-        white < mask.pixels().len(),
-        "the mask is full: all pixels are white, and there is no outline to fit"
-    );
-    let margin = (MARGIN - 1.0) / 2.0 * extent;
-    Ok([left - margin, top - margin, MARGIN * extent])
-}
-
-/// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error.
+/// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error before
+/// they were moved there for the last time.
 fn glance(mesh: &Mesh, mask: &Picture, square: [f64; 3], camera: &Pinhole) -> Vec<(Pinhole, f64)> {
     let (middle, radius) = ball(mesh);
     let [levels, covered] = mask.part(square, GLANCE);
@@ -218,7 +201,8 @@ fn glance(mesh: &Mesh, mask: &Picture, square: [f64; 3], camera: &Pinhole) -> Ve
     // The mask, in the middle of its square, is that of a ball at first.
     let at = [left + pixel * target.middle[0], top + pixel * target.middle[1]];
     let ray = [0, 1].map(|k| (at[k] - camera.centre[k]) / camera.focal[k]);
-    let depth = 2.0 * radius * camera.focal[0] * MARGIN / extent;
+    let [_, _, white] = mask.square().unwrap_or(square);
+    let depth = 2.0 * radius * camera.focal[0] / white;
     let towards = turned_to(ray);
     let device = Default::default();
     let corners = vertices::<HostBackend>(mesh.positions(), &device);
@@ -237,12 +221,14 @@ fn glance(mesh: &Mesh, mask: &Picture, square: [f64; 3], camera: &Pinhole) -> Ve
         for _ in 0..2 {
             let cropped = cameras.iter().map(|of| of.cropped([left, top], [extent; 2], GLANCE));
             let cropped = Pinholes::new(&cropped.collect::<Vec<_>>(), &device);
-            let drawn =
-                hard_silhouette(project_pinhole(corners.clone(), &cropped), mesh.faces(), GLANCE);
             let of_views = |image: &[f64]| {
                 tensor::<HostBackend, 3>(image.repeat(views), [views, GLANCE, GLANCE])
             };
-            losses = numbers(iou_loss(drawn.clone() * of_views(&covered), of_views(&levels)));
+            // What lies outside of the picture does not count.
+            let drawn =
+                hard_silhouette(project_pinhole(corners.clone(), &cropped), mesh.faces(), GLANCE)
+                    * of_views(&covered);
+            losses = numbers(iou_loss(drawn.clone(), of_views(&levels)));
             let drawn = numbers(drawn);
             for (camera, image) in cameras.iter_mut().zip(drawn.chunks(GLANCE * GLANCE)) {
                 let now = moments(image);
@@ -315,17 +301,55 @@ fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     a.map(|row| [0, 1, 2].map(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
 }
 
-/// The best so many of these, each at least so many degrees from all that are better.
-fn apart(mut poses: Vec<(Pinhole, f64)>, count: usize, degrees: f64) -> Vec<(Pinhole, f64)> {
+/// The best so many of these, each at least so many degrees from all that are better; with a mesh, only those at which it looks otherwise,
+/// so that the turns of a vase are one pose.
+fn apart(
+    mut poses: Vec<(Pinhole, f64)>,
+    count: usize,
+    degrees: f64,
+    mesh: Option<&Mesh>,
+) -> Vec<(Pinhole, f64)> {
     poses.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-    let mut kept: Vec<(Pinhole, f64)> = Vec::new();
+    let mut kept = Vec::new();
     for (camera, loss) in poses {
-        if kept.len() < count && kept.iter().all(|(other, _)| angle_deg(&camera, other) >= degrees)
-        {
-            kept.push((camera, loss));
+        if kept.len() == count {
+            break;
+        }
+        if kept.iter().any(|((other, _), _): &(_, _)| angle_deg(&camera, other) < degrees) {
+            continue;
+        }
+        let sides = mesh.map(|mesh| from_three_sides(mesh, camera.rotation));
+        let alike = |other: &Option<Vec<bool>>| {
+            sides.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| overlap(a, b) >= ALIKE)
+        };
+        if !kept.iter().any(|(_, other)| alike(other)) {
+            kept.push(((camera, loss), sides));
         }
     }
-    kept
+    kept.into_iter().map(|(pose, _)| pose).collect()
+}
+
+/// Silhouettes of a turned mesh along each of its axes then: from the camera, from beside and from above.
+fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
+    let (middle, radius) = ball(mesh);
+    let positions = mesh.positions().iter().map(|p| {
+        let p = [0, 1, 2].map(|k| (p[k] - middle[k]) / radius);
+        rotation.map(|row| (0..3).map(|k| row[k] * p[k]).sum::<f64>())
+    });
+    let positions: Vec<[f64; 3]> = positions.collect();
+    let views = [[0, 1], [2, 1], [0, 2]];
+    // Without perspective, at depth 1.
+    let seen =
+        views.iter().flat_map(|&[x, y]| positions.iter().flat_map(move |p| [p[x], p[y], 1.0]));
+    let seen = tensor::<HostBackend, 3>(seen.collect(), [views.len(), positions.len(), 3]);
+    let drawn = numbers(hard_silhouette(seen, mesh.faces(), SIDE_VIEW));
+    drawn.into_iter().map(|level| level > 0.5).collect()
+}
+
+/// Overlap over union.
+fn overlap(a: &[bool], b: &[bool]) -> f64 {
+    let count = |of: fn(bool, bool) -> bool| a.iter().zip(b).filter(|&(&a, &b)| of(a, b)).count();
+    count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
 }
 
 /// Angle between the rotations of two cameras.

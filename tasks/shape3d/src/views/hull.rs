@@ -9,8 +9,6 @@ use softrast_raster::ImageSize;
 
 /// Pixels a side of what is looked at of each mask.
 const SIDE: usize = 128;
-/// What is looked at is this much larger than the mask.
-pub(super) const MARGIN: f64 = 1.5;
 /// Cells along each side of the first grid.
 const COARSE: usize = 40;
 
@@ -18,6 +16,8 @@ const COARSE: usize = 40;
 struct Cone<'a> {
     view: &'a View,
     square: [f64; 3],
+    /// Extent of what is white, in pixels.
+    white: f64,
     /// Signed distance to the outline in pixels of the picture, negative inside, at the cells of the square.
     distance: Vec<f64>,
     /// Whether the picture cuts the object off: what is beyond its border is unknown then, else it is empty.
@@ -50,12 +50,7 @@ pub(super) fn hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
         "no solid has these masks: check that cameras and pictures belong together (--invert?), or begin with --start sphere"
     );
     let (low, high) = (low.map(|x| x - step), high.map(|x| x + step));
-    // Beyond the region nothing is known.
-    let closed = |p: [f64; 3]| {
-        let beyond = (0..3).map(|k| (p[k] - high[k]).max(low[k] - p[k])).fold(f64::MIN, f64::max);
-        field(p).max(beyond + 0.5 * step)
-    };
-    let hull = Mesh::of_solid([low, high], cells, closed);
+    let hull = Mesh::of_solid([low, high], cells, field);
     without_specks(hull.context("the visual hull is no mesh; begin with --start sphere")?)
 }
 
@@ -123,10 +118,10 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
         "the cameras do not tell how far away the object is: give views from at least two directions",
     )?;
     let depth = |view: &View| view.camera.seen(middle)[2];
-    let reach_of = |Cone { view, square: [_, _, extent], .. }: &Cone<'_>| {
+    let reach_of = |Cone { view, white, .. }: &Cone<'_>| {
         let [fx, fy] = view.camera.focal;
         // Half the diagonal of the mask.
-        extent / MARGIN * std::f64::consts::FRAC_1_SQRT_2 * depth(view) / fx.min(fy)
+        white * std::f64::consts::FRAC_1_SQRT_2 * depth(view) / fx.min(fy)
     };
     let reach = cones.iter().map(reach_of).fold(0.0, f64::max);
     for view in cones.iter().map(|cone| cone.view) {
@@ -149,10 +144,11 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
 impl<'a> Cone<'a> {
     fn new(view: &'a View) -> anyhow::Result<Self> {
         let square = square(view)?;
+        let [_, _, white] = view.mask.square().unwrap_or(square);
         let mask = view.mask.despeckled();
         let [levels, _] = mask.part(square, SIDE);
         let distance = signed_distance(&levels, square[2] / SIDE as f64);
-        Ok(Self { view, square, distance, cut: is_cut(&mask) })
+        Ok(Self { view, square, white, distance, cut: is_cut(&mask) })
     }
 
     /// The line of sight through the middle of the mask, of length 1, in the world.
@@ -194,17 +190,7 @@ impl<'a> Cone<'a> {
 
 /// The square of a view that is looked at: left, top and extent in pixels.
 pub(super) fn square(view: &View) -> anyhow::Result<[f64; 3]> {
-    let name = &view.name;
-    let found = view.mask.square();
-    let [left, top, extent] = found.with_context(|| {
-        format!("{name}: the mask is empty: no pixel is half white or more (--invert takes what is black)")
-    })?;
-    ensure!(
-        view.mask.pixels().iter().any(|&level| level < 0.5),
-        "{name}: the mask is full: all pixels are white, and there is no outline to fit"
-    );
-    let margin = (MARGIN - 1.0) / 2.0 * extent;
-    Ok([left - margin, top - margin, MARGIN * extent])
+    view.mask.looked_at().with_context(|| view.name.clone())
 }
 
 /// Whether the mask reaches the border of its picture.

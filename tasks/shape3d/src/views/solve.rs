@@ -2,17 +2,15 @@ use std::{path::PathBuf, sync::Arc};
 
 use anyhow::ensure;
 use clap::ValueEnum;
-use serde_json::json;
-use softrast_cli::{Answer, Given, seen_by};
+use serde_json::{Value, json};
+use softrast_cli::{Answer, Given, LARGEST, MaskFlags, seen_by};
 use softrast_inverse::{
-    Method, Picture, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
+    Method, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
 };
 use softrast_lab::{
-    Error, Viewer, contact_sheet,
+    Error, Viewer, at_most, contact_sheet,
     format::{counted, line},
-    overlay,
-    parse::share,
-    png,
+    overlay, png,
     program::Output,
     report::{Report, Table},
 };
@@ -50,7 +48,7 @@ const FINE: [Stage; 2] = [
     Stage { steps: 60, size: 128, learning_rate: 0.003, narrow: true, finer: false },
 ];
 /// Scale of a logistic that is narrow, in NDC of what is looked at. On spot from 20 views the mean `IoU` on 4 others was 0.981 with it,
-/// 0.979 with half, 0.976 with one and a half and 0.962 with what was learned for spheres.
+/// 0.979 with half, 0.976 with one and a half and 0.962 with what was learned for spheres. Spot is the one mesh that it was chosen on.
 const NARROW: f64 = 0.001;
 /// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
 const CELLS: [usize; 3] = [32, 45, 64];
@@ -81,13 +79,9 @@ pub struct Views {
     #[arg(long, value_name = "FACTOR", requires = "views", value_parser = softrast_lab::parse::positive, allow_negative_numbers = true)]
     pub smooth: Option<f64>,
 
-    /// Take what is black for the mask
-    #[arg(long, requires = "views")]
-    pub invert: bool,
-
-    /// Take for the mask what is at least so bright, 0 to 1, instead of keeping soft edges
-    #[arg(long, value_name = "X", requires = "views", value_parser = share, allow_negative_numbers = true)]
-    pub threshold: Option<f64>,
+    /// How pictures become masks.
+    #[command(flatten)]
+    pub masks: MaskFlags,
 }
 
 /// What is deformed.
@@ -98,19 +92,6 @@ pub enum Begin {
     Hull,
     /// A sphere around it.
     Sphere,
-}
-
-impl Views {
-    fn load(&self, folder: &PathBuf) -> anyhow::Result<Vec<View>> {
-        load_views(folder, |path| {
-            let mask = Picture::load_mask(path)?;
-            let mask = if self.invert { mask.inverted() } else { mask };
-            Ok(match self.threshold {
-                Some(level) => mask.thresholded(level),
-                None => mask,
-            })
-        })
-    }
 }
 
 /// A view, how well the result fits it, and whether it was kept aside.
@@ -126,6 +107,11 @@ pub(crate) fn solve_views(
     given: &Given<'_, Shape3d>,
     flags: &Views,
 ) -> Option<anyhow::Result<Answer>> {
+    if flags.views.is_none() && flags.masks.asked() {
+        return Some(Err(Error::usage(
+            "--invert and --threshold are about pictures: name a folder of them with --views",
+        )));
+    }
     flags.views.as_ref().map(|folder| solved(given, flags, folder))
 }
 
@@ -136,7 +122,12 @@ fn solved(given: &Given<'_, Shape3d>, flags: &Views, folder: &PathBuf) -> anyhow
             "--mesh and --elevation say what is drawn as a target: leave them out with --views",
         ));
     }
-    let all = flags.load(folder)?;
+    if args.detail.is_some() && flags.start != Some(Begin::Sphere) {
+        return Err(Error::usage(
+            "--detail is about a sphere: with --views it goes with --start sphere",
+        ));
+    }
+    let all = load_views(folder, |path| flags.masks.load(path))?;
     let [train, held_out] = parted(all, flags.hold_out.unwrap_or(0))?;
     let clock = std::time::Instant::now();
     let start = start(given, flags, &train)?;
@@ -161,7 +152,7 @@ fn parted(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
         "there is one view only: the shape of a mesh takes two or more, from different directions"
     );
     ensure!(
-        hold_out + 2 <= count,
+        hold_out <= count - 2,
         "--hold-out {hold_out} leaves fewer than two of {} to work with",
         counted(count, "view")
     );
@@ -243,7 +234,7 @@ fn deformed(
         on_backend!(backend, B => minimize::<_, B>(&problem, &[()], method, &config, false, |iterate, _| {
             if iterate.hard_loss[0] < best {
                 best = iterate.hard_loss[0];
-                mesh = problem.mesh(&iterate.theta);
+                mesh = problem.mesh(&iterate.theta)?;
             }
             progress.step(done + iterate.step, iterate.loss[0])
         }))?;
@@ -262,26 +253,77 @@ fn mean(scored: &[Scored], held_out: bool) -> Option<f64> {
     (!of.is_empty()).then(|| of.iter().sum::<f64>() / of.len() as f64)
 }
 
+/// Scores of a mesh, and where it is written.
+struct Summary {
+    train: f64,
+    held_out: Option<f64>,
+    path: PathBuf,
+    seconds: f64,
+}
+
 fn answer(
     given: &Given<'_, Shape3d>,
     mesh: &Mesh,
     scored: &[Scored],
     seconds: f64,
 ) -> anyhow::Result<Answer> {
-    let (train, aside) = (mean(scored, false).unwrap_or(f64::NAN), mean(scored, true));
-    let mut page = Report::new("shape3d", "A mesh that has the silhouettes of given masks");
-    let mut output = Output::default();
-    if train < 0.9 {
-        output.warnings.push(format!(
-            "the mean IoU is {train:.3} only: check that the cameras belong to the pictures and that the masks are white where the object \
-             is (--invert)"
+    let summary = Summary {
+        train: mean(scored, false).unwrap_or(f64::NAN),
+        held_out: mean(scored, true),
+        path: given.folder().join("mesh.obj"),
+        seconds,
+    };
+    let mut warnings = Vec::new();
+    if summary.train < 0.9 {
+        warnings.push(format!(
+            "the mean IoU is {:.3} only: check that the cameras belong to the pictures and that the masks are white where the object is \
+             (--invert)",
+            summary.train
         ));
     }
-    page.warnings(&output.warnings);
     let sheet: Vec<_> = shown(scored)
         .map(|one| overlay(&one.silhouette, one.view.mask.pixels(), one.view.camera.size.width))
+        .map(|image| at_most(image, LARGEST))
         .collect();
     let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
+    let text = text(mesh, scored, &summary);
+    let page = page(mesh, scored, &warnings, &text[1..], &picture)?;
+    let json = json(mesh, scored, &summary, &warnings);
+    let files = vec![
+        ("mesh.obj".to_owned(), mesh.to_obj().into_bytes()),
+        ("mesh.ply".to_owned(), mesh.to_ply()),
+        ("mesh.glb".to_owned(), mesh.to_glb()),
+        ("views.png".to_owned(), picture),
+    ];
+    let beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture";
+    let output = Output { text, json, warnings, partial: None };
+    Ok(Answer { page, output, files, beside: beside.to_owned() })
+}
+
+fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
+    let Summary { train, held_out, path, seconds } = summary;
+    let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
+    let head = [
+        format!("3D SHAPE from {}", counted(scored.len(), "view")),
+        line("IoU", &format!("{train:.4}")),
+    ];
+    let rest = [
+        line("mesh", &format!("{}, {vertices} vertices, {faces} faces", path.display())),
+        line("seconds", &format!("{seconds:.1}")),
+    ];
+    let aside = held_out.map(|iou| line("IoU, held out", &format!("{iou:.4}")));
+    head.into_iter().chain(aside).chain(rest).collect()
+}
+
+fn page(
+    mesh: &Mesh,
+    scored: &[Scored],
+    warnings: &[String],
+    text: &[String],
+    picture: &[u8],
+) -> anyhow::Result<Report> {
+    let mut page = Report::new("shape3d", "A mesh that has the silhouettes of given masks");
+    page.warnings(warnings);
     let views = scored.iter().map(|Scored { view, iou, held_out, .. }| {
         let note = format!("IoU {iou:.4}{}", if *held_out { ", kept aside" } else { "" });
         seen_by(view.name.clone(), &view.camera, &view.mask, note)
@@ -293,58 +335,41 @@ fn answer(
     };
     page.viewer(
         &viewer,
-        &picture,
+        picture,
         "The mesh and the cameras. A view shows it with the outline of its mask.",
     );
     page.picture(
-        &picture,
+        picture,
         "Masks with the silhouettes of the result over them: grey where both are, orange where only the mask is, blue where only the \
          silhouette is. Views that were kept aside come first.",
     );
+    text.iter().for_each(|line| page.paragraph(line));
+    page.heading("Views");
     let mut table = Table::new(["view", "IoU", "kept aside"]);
     for Scored { view, iou, held_out, .. } in scored {
-        table.push([
-            view.name.clone(),
-            format!("{iou:.4}"),
-            if *held_out { "yes" } else { "" }.to_owned(),
-        ]);
+        let aside = if *held_out { "yes" } else { "" };
+        table.push([view.name.clone(), format!("{iou:.4}"), aside.to_owned()]);
     }
-    let path = given.folder().join("mesh.obj");
-    let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
-    output.text = vec![
-        format!("3D SHAPE from {}", counted(scored.len(), "view")),
-        line("IoU", &format!("{train:.4}")),
-    ];
-    output.text.extend(aside.map(|iou| line("IoU, held out", &format!("{iou:.4}"))));
-    output
-        .text
-        .push(line("mesh", &format!("{}, {vertices} vertices, {faces} faces", path.display())));
-    output.text.push(line("seconds", &format!("{seconds:.1}")));
-    output.text[1..].iter().for_each(|line| page.paragraph(line));
-    page.heading("Views");
     page.table(&table);
-    output.json = json!({
+    Ok(page)
+}
+
+fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
+    let Summary { train, held_out, path, seconds } = summary;
+    json!({
         "train_iou": train,
-        "held_out_iou": aside,
+        "held_out_iou": held_out,
         "mesh": path,
-        "vertices": vertices,
-        "faces": faces,
+        "vertices": mesh.positions().len(),
+        "faces": mesh.faces().len(),
         "seconds": seconds,
         "views": scored.iter().map(|one| json!({
             "name": one.view.name,
             "iou": one.iou,
             "held_out": one.held_out,
         })).collect::<Vec<_>>(),
-        "warnings": output.warnings,
-    });
-    let files = vec![
-        ("mesh.obj".to_owned(), mesh.to_obj().into_bytes()),
-        ("mesh.ply".to_owned(), mesh.to_ply()),
-        ("mesh.glb".to_owned(), mesh.to_glb()),
-        ("views.png".to_owned(), picture),
-    ];
-    let beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture";
-    Ok(Answer { page, output, files, beside: beside.to_owned() })
+        "warnings": warnings,
+    })
 }
 
 /// Those kept aside, then others evenly spaced.

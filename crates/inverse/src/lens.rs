@@ -1,0 +1,335 @@
+use std::path::Path;
+
+use anyhow::{Context, bail, ensure};
+use serde::Deserialize;
+use serde_json::Value;
+use softrast_raster::{ImageSize, Pinhole};
+
+use crate::camera_file::{json, typed};
+
+/// Intrinsics of a camera as files have them.
+///
+/// Focal lengths as `fl_x` and `fl_y`, as `fx` and `fy`, as the matrix `K`, or as the field of view `camera_angle_x` in radians; `cx` and
+/// `cy`, else those of `K`, else the middle; the size of its pictures as `w` and `h` or `width` and `height`. See [`Pinhole`] for what they
+/// mean.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct Lens {
+    #[serde(alias = "fx")]
+    fl_x: Option<f64>,
+    #[serde(alias = "fy")]
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    #[serde(rename = "K")]
+    matrix: Option<[[f64; 3]; 3]>,
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    #[serde(alias = "width")]
+    w: Option<f64>,
+    #[serde(alias = "height")]
+    h: Option<f64>,
+    camera_model: Option<String>,
+    #[serde(flatten)]
+    distortion: Distortion,
+}
+
+/// By name, or as the list that OpenCV returns.
+#[derive(Clone, Debug, Default, Deserialize)]
+struct Distortion {
+    #[serde(
+        alias = "dist",
+        alias = "dist_coeffs",
+        alias = "distortion_coefficients",
+        alias = "distortion_params"
+    )]
+    distortion: Option<Value>,
+    is_fisheye: Option<bool>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    k5: Option<f64>,
+    k6: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+}
+
+/// Models of cameras without distortion, or whose distortion is told by coefficients.
+const MODELS: [&str; 4] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL"];
+/// How much `fx` and that of `K` may differ, as a fraction: files hold few digits.
+const ROUNDED: f64 = 1e-6;
+
+impl Lens {
+    /// What a camera file says of it; a `transforms.json` is one, and so is a result of ours.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing, is no JSON, has a field of another type, or tells no focal length.
+    pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
+        let path = path.as_ref();
+        let file = json(path)?;
+        // A result of ours holds its camera one level down.
+        let camera = if file["camera"].is_object() { &file["camera"] } else { &file };
+        let lens = Self::of(camera).and_then(|lens| lens.angle_or_length().map(|()| lens));
+        lens.with_context(|| path.display().to_string())
+    }
+
+    /// What the fields of an object say.
+    pub(crate) fn of(object: &Value) -> anyhow::Result<Self> {
+        typed(object)
+    }
+
+    /// A lens with this whole field of view along the shorter side of an image, in degrees above 0 and below 180, and square pixels.
+    ///
+    /// [`Lens::pinhole`] refuses other angles.
+    pub fn of_fov(fov_deg: f64, size: ImageSize) -> Self {
+        let focal = size.shorter() as f64 / (2.0 * (fov_deg / 2.0).to_radians().tan());
+        Self { fl_x: Some(focal), ..Self::default() }
+    }
+
+    /// The camera with this lens for pictures of this size, at the origin, looking along z.
+    ///
+    /// # Errors
+    ///
+    /// If it is for pictures of another size, contradicts itself, or has a skew, a distortion or no focal length.
+    pub fn pinhole(&self, size: ImageSize) -> anyhow::Result<Pinhole> {
+        self.check_size(size)?;
+        self.check_distortion()?;
+        let pixels = [size.width as f64, size.height as f64];
+        let centre = self.centre();
+        let pinhole = Pinhole {
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            translation: [0.0; 3],
+            focal: self.focal(pixels)?,
+            centre: [0, 1].map(|k| centre[k].unwrap_or(pixels[k] / 2.0)),
+            size,
+        };
+        pinhole.check()?;
+        Ok(pinhole)
+    }
+
+    /// Focal lengths in pixels, for pictures of so many along x and y.
+    fn focal(&self, pixels: [f64; 2]) -> anyhow::Result<[f64; 2]> {
+        self.angle_or_length()?;
+        let of_matrix = self.matrix.as_ref().map(focal_of).transpose()?;
+        if let Some(fx) = self.fl_x {
+            let focal = [fx, self.fl_y.unwrap_or(fx)];
+            if let Some(other) = of_matrix.filter(|other| {
+                (0..2).any(|k| (other[k] - focal[k]).abs() > ROUNDED * focal[k].abs())
+            }) {
+                bail!("the focal lengths are {focal:?}, but {other:?} in K: leave one of them out");
+            }
+            return Ok(focal);
+        }
+        if let Some(focal) = of_matrix {
+            return Ok(focal);
+        }
+        let length = |name: &str, angle: Option<f64>, pixels: f64| {
+            let Some(angle) = angle else { return Ok(None) };
+            ensure!(
+                angle > 0.0 && angle < std::f64::consts::PI,
+                "{name} is {angle}: it is the whole field of view in radians, between 0 and pi"
+            );
+            Ok(Some(pixels / (2.0 * (angle / 2.0).tan())))
+        };
+        let along_x = length("camera_angle_x", self.camera_angle_x, pixels[0])?;
+        let along_y = length("camera_angle_y", self.camera_angle_y, pixels[1])?;
+        // One of them is there. Pixels are square if the other is not.
+        let either = along_x.or(along_y).unwrap_or_default();
+        Ok([along_x.unwrap_or(either), along_y.unwrap_or(either)])
+    }
+
+    /// The principal point, as far as it is told.
+    fn centre(&self) -> [Option<f64>; 2] {
+        let of_matrix = |row: usize| self.matrix.map(|matrix| matrix[row][2]);
+        [self.cx.or(of_matrix(0)), self.cy.or(of_matrix(1))]
+    }
+
+    fn angle_or_length(&self) -> anyhow::Result<()> {
+        let told = [self.fl_x, self.camera_angle_x, self.camera_angle_y];
+        ensure!(
+            self.matrix.is_some() || told.iter().any(Option::is_some),
+            "there is no focal length: name fx and fy in pixels (or fl_x and fl_y, K, camera_angle_x)"
+        );
+        Ok(())
+    }
+
+    fn check_size(&self, size: ImageSize) -> anyhow::Result<()> {
+        let ImageSize { width, height } = size;
+        let differs = |told: Option<f64>, found: usize| told.is_some_and(|x| x != found as f64);
+        if differs(self.w, width) || differs(self.h, height) {
+            let side = |told: Option<f64>| told.map_or("?".to_owned(), |x| x.to_string());
+            bail!(
+                "the camera is for pictures of {} x {} pixels, and this one has {width} x {height}: give the picture that the camera was \
+                 calibrated for, or scale fx, fy, cx and cy",
+                side(self.w),
+                side(self.h)
+            );
+        }
+        Ok(())
+    }
+
+    fn check_distortion(&self) -> anyhow::Result<()> {
+        let Distortion { distortion, is_fisheye, k1, k2, k3, k4, k5, k6, p1, p2 } =
+            &self.distortion;
+        let numbers = [
+            ("k1", k1),
+            ("k2", k2),
+            ("k3", k3),
+            ("k4", k4),
+            ("k5", k5),
+            ("k6", k6),
+            ("p1", p1),
+            ("p2", p2),
+        ];
+        let number =
+            numbers.into_iter().find_map(|(name, x)| Some((name, x.filter(|&x| x != 0.0)?)));
+        let told = match number {
+            Some((name, x)) => Some(format!("{name} = {x}")),
+            None => {
+                let listed = distortion.as_ref().and_then(not_zero);
+                listed.map(|value| format!("distortion = {value}"))
+            }
+        };
+        let fisheye = is_fisheye.unwrap_or(false).then(|| "is_fisheye".to_owned());
+        if let Some(told) = told.or(fisheye) {
+            bail!(
+                "the lens distorts ({told}), which is not supported: undistort the pictures first, as with colmap image_undistorter or \
+                 OpenCV's cv2.undistort"
+            );
+        }
+        if let Some(model) = self.camera_model.as_deref().filter(|model| !MODELS.contains(model)) {
+            bail!(
+                "the camera model {model} is not supported: undistort the pictures to PINHOLE first, as with colmap image_undistorter"
+            );
+        }
+        Ok(())
+    }
+
+    /// The lens of a frame that says so much of its own.
+    pub(crate) fn with(&self, frame: &Self) -> Self {
+        // Focal lengths belong together, however they are told.
+        let focal = if frame.angle_or_length().is_ok() { frame } else { self };
+        let ([cx, cy], [own_cx, own_cy]) = (self.centre(), frame.centre());
+        Self {
+            cx: own_cx.or(cx),
+            cy: own_cy.or(cy),
+            w: frame.w.or(self.w),
+            h: frame.h.or(self.h),
+            camera_model: frame.camera_model.clone().or(self.camera_model.clone()),
+            distortion: frame.distortion.or(&self.distortion),
+            ..focal.clone()
+        }
+    }
+}
+
+impl Distortion {
+    fn or(&self, other: &Self) -> Self {
+        Self {
+            distortion: self.distortion.clone().or(other.distortion.clone()),
+            is_fisheye: self.is_fisheye.or(other.is_fisheye),
+            k1: self.k1.or(other.k1),
+            k2: self.k2.or(other.k2),
+            k3: self.k3.or(other.k3),
+            k4: self.k4.or(other.k4),
+            k5: self.k5.or(other.k5),
+            k6: self.k6.or(other.k6),
+            p1: self.p1.or(other.p1),
+            p2: self.p2.or(other.p2),
+        }
+    }
+}
+
+/// The focal lengths of a camera matrix.
+fn focal_of(&[[fx, skew, _], [below, fy, _], last]: &[[f64; 3]; 3]) -> anyhow::Result<[f64; 2]> {
+    ensure!(
+        [below, last[0], last[1], last[2]] == [0.0, 0.0, 0.0, 1.0],
+        "K is no camera matrix: below its diagonal must be zeros, and its last row [0, 0, 1]; is it transposed?"
+    );
+    ensure!(
+        skew.abs() <= 1e-9 * fx.abs(),
+        "K has a skew of {skew}, which is not supported: rectify the picture"
+    );
+    Ok([fx, fy])
+}
+
+/// What in a value is not zero, in lists and objects too.
+fn not_zero(value: &Value) -> Option<&Value> {
+    match value {
+        Value::Array(values) => values.iter().find_map(not_zero),
+        Value::Object(fields) => fields.values().find_map(not_zero),
+        Value::Null | Value::Bool(false) => None,
+        other => Some(other).filter(|other| other.as_f64() != Some(0.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    const SIZE: ImageSize = ImageSize { height: 480, width: 640 };
+
+    fn pinhole(lens: Value) -> Result<([f64; 2], [f64; 2]), String> {
+        let found = Lens::of(&lens).and_then(|lens| lens.pinhole(SIZE));
+        found.map(|camera| (camera.focal, camera.centre)).map_err(|error| format!("{error:#}"))
+    }
+
+    #[test]
+    fn a_lens_is_told_in_many_ways() {
+        let k = json!([[500.0, 0.0, 310.0], [0.0, 510.0, 250.0], [0.0, 0.0, 1.0]]);
+        for (lens, expected) in [
+            (json!({ "fx": 500.0 }), ([500.0, 500.0], [320.0, 240.0])),
+            (json!({ "fl_x": 500.0, "fl_y": 510.0, "cy": 9.0 }), ([500.0, 510.0], [320.0, 9.0])),
+            (json!({ "K": k }), ([500.0, 510.0], [310.0, 250.0])),
+            (json!({ "K": k, "fx": 500.0, "fy": 510.0 }), ([500.0, 510.0], [310.0, 250.0])),
+            (json!({ "K": k, "cx": 300.0, "w": 640 }), ([500.0, 510.0], [300.0, 250.0])),
+            (
+                json!({ "fx": 7, "distortion_params": [0, 0.0, [0]], "k1": 0 }),
+                ([7.0; 2], [320.0, 240.0]),
+            ),
+        ] {
+            assert_eq!(pinhole(lens.clone()), Ok(expected), "{lens}");
+        }
+        let right_angle = std::f64::consts::FRAC_PI_2;
+        let (focal, _) = pinhole(json!({ "camera_angle_x": right_angle })).unwrap();
+        assert!((0..2).all(|k| (focal[k] - 320.0).abs() < 1e-9), "{focal:?}");
+    }
+
+    #[test]
+    fn what_contradicts_itself_or_is_not_supported_is_said() {
+        let k = json!([[500.0, 0.0, 310.0], [0.0, 510.0, 250.0], [0.0, 0.0, 1.0]]);
+        for (lens, part) in [
+            (json!({ "K": k, "fx": 400.0 }), "in K"),
+            (json!({ "camera_angle_x": 40.0 }), "radians"),
+            (json!({ "fx": 500.0, "w": 7 }), "7 x ?"),
+            (json!({ "fx": "a" }), "fx is \"a\", not a number"),
+            (json!({ "fx": 500.0, "distortion_params": [0.0, -0.2] }), "distortion = -0.2"),
+            (json!({ "fx": 500.0, "distortion": { "k1": 0.0, "k2": 0.3 } }), "distortion = 0.3"),
+            (json!({ "fx": 500.0, "distortion": "yes" }), "distortion = \"yes\""),
+            (json!({ "fx": 500.0, "is_fisheye": true }), "is_fisheye"),
+            (json!({ "fx": 500.0, "k6": 1.0 }), "k6 = 1"),
+            (json!({ "K": [[1.0]] }), "K"),
+            (json!({}), "no focal length"),
+        ] {
+            let error = pinhole(lens.clone()).unwrap_err();
+            assert!(error.contains(part) && error.lines().count() == 1, "{lens}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_frame_goes_before_its_file() {
+        let k = json!([[500.0, 0.0, 310.0], [0.0, 510.0, 250.0], [0.0, 0.0, 1.0]]);
+        let merged = |file: Value, frame: Value| {
+            let lens = Lens::of(&file).unwrap().with(&Lens::of(&frame).unwrap());
+            let camera = lens.pinhole(SIZE).unwrap();
+            (camera.focal, camera.centre)
+        };
+        let with_k = merged(json!({ "fx": 9.0, "cx": 1.0, "cy": 2.0 }), json!({ "K": k }));
+        assert_eq!(with_k, ([500.0, 510.0], [310.0, 250.0]));
+        let with_length = merged(json!({ "K": k }), json!({ "fl_x": 9.0 }));
+        assert_eq!(with_length, ([9.0, 9.0], [310.0, 250.0]));
+        assert_eq!(merged(json!({ "K": k }), json!({})), ([500.0, 510.0], [310.0, 250.0]));
+    }
+}

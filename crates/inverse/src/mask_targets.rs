@@ -1,0 +1,51 @@
+use std::sync::Arc;
+
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_raster::{RasterBackend, iou_loss};
+use softrast_softness::tensor;
+
+use crate::{Picture, Targets};
+
+/// Squares of masks as targets. What lies outside of a picture does not count.
+#[derive(Clone, Debug)]
+pub struct MaskTargets<B: Backend> {
+    levels: Targets<B>,
+    /// How much of each pixel the picture covers, unless that is all of every pixel.
+    covered: Option<Targets<B>>,
+}
+
+impl<B: RasterBackend> MaskTargets<B> {
+    /// A square of each mask, given by its left, its top and its extent in pixels, on `size` × `size` pixels.
+    pub fn new<'a>(masks: impl IntoIterator<Item = (&'a Picture, [f64; 3])>, size: usize) -> Self {
+        let mut parts: Vec<Arc<[Vec<f64>; 2]>> = Vec::new();
+        let mut last = None;
+        for (mask, square) in masks {
+            // Instances mostly share one mask, which may be large.
+            let same = |&(other, at): &(&Picture, [f64; 3])| {
+                std::ptr::eq(other.pixels(), mask.pixels()) && at == square
+            };
+            let part = match parts.last().filter(|_| last.as_ref().is_some_and(same)) {
+                Some(part) => part.clone(),
+                None => mask.part(square, size).into(),
+            };
+            parts.push(part);
+            last = Some((mask, square));
+        }
+        let images = |k: usize| {
+            let numbers = parts.iter().flat_map(|part| part[k].iter().copied()).collect();
+            Targets::new(tensor::<B, 3>(numbers, [parts.len(), size, size]))
+        };
+        let whole = parts.iter().flat_map(|part| &part[1]).all(|&share| share > 1.0 - 1e-9);
+        Self { levels: images(0), covered: (!whole).then(|| images(1)) }
+    }
+
+    /// The [`iou_loss`] `[views]` of an image `[views, side, side]`, where `side` is the size or a half of a half of it.
+    pub fn iou_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        let target = self.levels.of(&image);
+        let image = match &self.covered {
+            Some(covered) => image.clone() * covered.of(&image),
+            None => image,
+        };
+        iou_loss(image, target)
+    }
+}

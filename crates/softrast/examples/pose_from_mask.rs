@@ -1,0 +1,29 @@
+//! Finds the camera that took a picture, from its mask.
+//!
+//! `cargo run --release -p softrast --example pose_from_mask`
+
+use burn::backend::NdArray;
+use softrast::{mesh::fox, prelude::*};
+
+fn main() -> anyhow::Result<()> {
+    let (mesh, device) = (fox(), Default::default()); // of your own: Mesh::load("my.obj")?
+
+    // A mask, here drawn from a known place. Of your own: Picture::load_mask("mask.png")?
+    let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, [90, 120]);
+    let corners = vertices::<NdArray>(mesh.positions(), &device);
+    let seen = project_pinhole(corners, &Pinholes::new(&[truth], &device));
+    save_picture(hard_silhouette(seen, mesh.faces(), [90, 120]), "mask.png")?;
+    let mask = Picture::load_mask("mask.png")?;
+
+    // The lens is known, the pose is not. Of your own: Lens::load("camera.json")?.pinhole(mask.size())?
+    let camera = Lens::of_fov(45.0, mask.size()).pinhole(mask.size())?;
+    let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
+    let start = false; // nothing is known of it: all directions and rolls are tried
+    let found =
+        PoseSearch::default()
+            .run::<NdArray>(&mesh, &mask, &camera, start, &method, |_, _| Ok(()))?;
+    let FoundPose { camera, iou } = found[0]; // the best; others that fit nearly as well stand behind it
+    println!("R {:.3?}\nt {:.3?}", camera.rotation, camera.translation);
+    println!("stood at {:.2?}, found at {:.2?}, IoU {iou:.3}", truth.eye(), camera.eye());
+    Ok(())
+}
