@@ -28,10 +28,15 @@
 
 pub mod prelude;
 
+#[doc(inline)]
 pub use softrast_inverse as inverse;
+#[doc(inline)]
 pub use softrast_mesh as mesh;
+#[doc(inline)]
 pub use softrast_meta as meta;
+#[doc(inline)]
 pub use softrast_raster as raster;
+#[doc(inline)]
 pub use softrast_softness as softness;
 
 /// Compiles and runs the README's example.
