@@ -88,9 +88,6 @@ impl<T: Task> Given<'_, T> {
     }
 }
 
-/// The sides of a picture on a page are no longer than this, in pixels.
-pub const LARGEST: u32 = 640;
-
 /// How pictures become masks.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct MaskFlags {
@@ -136,7 +133,7 @@ pub fn seen_by(
     note: String,
 ) -> anyhow::Result<ViewerView> {
     let Pinhole { rotation, translation, focal, centre, size } = *camera;
-    let mask_png = mask_png(mask.pixels(), mask.size().width, LARGEST)?;
+    let mask_png = mask_png(mask.pixels(), mask.size().width)?;
     Ok(ViewerView {
         name,
         rotation,

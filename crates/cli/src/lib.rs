@@ -28,7 +28,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pub use experiment::{Purpose, TaskExperiment, backend};
 pub use flags::{Common, Init, MethodArgs, Schedule, SoftnessChoice, Variant, usual_args};
-pub use given::{Answer, Given, LARGEST, MaskFlags, seen_by};
+pub use given::{Answer, Given, MaskFlags, seen_by};
 use method::learned_name;
 pub use method::{Scales, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};

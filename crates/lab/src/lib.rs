@@ -41,7 +41,7 @@ pub use files::{OutputFolder, write_atomically};
 pub use machine::{machine, peak_rss_mib};
 pub use metric::{Metric, Role, place};
 pub use picture::{
-    Encoded, at_most, contact_sheet, difference, mask_png, overlay, png, rgb_from_gray,
+    Encoded, contact_sheet, difference, for_page, mask_png, overlay, png, rgb_from_gray,
     rgb_from_planes,
 };
 pub use progress::{Progress, stop_on_ctrl_c};

@@ -141,7 +141,10 @@ pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
-/// A mask, row by row from 0 to 1, as a gray PNG that is made smaller if need be: no side has more than `side` pixels.
+/// Widths and heights of pictures on a page: small ones are enlarged to about the first, none is larger than the second, in pixels.
+const ON_PAGE: [u32; 2] = [320, 640];
+
+/// A mask, row by row from 0 to 1, as a gray PNG for a page: large ones are made smaller.
 ///
 /// # Errors
 ///
@@ -150,25 +153,28 @@ pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
 /// # Panics
 ///
 /// If the mask has no pixels, or no whole rows.
-pub fn mask_png(mask: &[f32], width: usize, side: u32) -> anyhow::Result<Vec<u8>> {
+pub fn mask_png(mask: &[f32], width: usize) -> anyhow::Result<Vec<u8>> {
     assert!(width > 0 && mask.len().is_multiple_of(width), "a mask of whole rows");
     let image = GrayImage::from_fn(width as u32, (mask.len() / width) as u32, |x, y| {
         Luma([level(mask[y as usize * width + x as usize].into())])
     });
     let mut png = io::Cursor::new(Vec::new());
-    let image = DynamicImage::from(image);
-    let small =
-        if image.width().max(image.height()) > side { image.thumbnail(side, side) } else { image };
-    small.write_to(&mut png, image::ImageFormat::Png).context("cannot encode a picture")?;
+    let image = reduced(DynamicImage::from(image));
+    image.write_to(&mut png, image::ImageFormat::Png).context("cannot encode a picture")?;
     Ok(png.into_inner())
 }
 
-/// An image of which no side has more than `side` pixels.
-pub fn at_most(image: RgbImage, side: u32) -> RgbImage {
-    if image.width().max(image.height()) <= side {
-        return image;
+/// A picture for a page: small ones are enlarged so that their pixels show, large ones made smaller.
+pub fn for_page(image: RgbImage) -> RgbImage {
+    match image.width() < ON_PAGE[0] {
+        true => enlarged(&image, ON_PAGE[0]),
+        false => reduced(DynamicImage::from(image)).into_rgb8(),
     }
-    DynamicImage::from(image).thumbnail(side, side).into_rgb8()
+}
+
+fn reduced(image: DynamicImage) -> DynamicImage {
+    let most = ON_PAGE[1];
+    if image.width().max(image.height()) > most { image.thumbnail(most, most) } else { image }
 }
 
 /// An endless GIF: the target on the left, the frames on the right.
@@ -249,15 +255,16 @@ mod tests {
     }
 
     #[test]
-    fn large_pictures_are_made_smaller_and_small_ones_stay() {
+    fn pictures_on_a_page_are_neither_small_nor_large() {
         let sizes = |bytes: Vec<u8>| {
             let image = image::load_from_memory(&bytes).unwrap();
             (image.width(), image.height(), image.to_luma8().pixels().map(|p| p.0[0]).max())
         };
-        assert_eq!(sizes(mask_png(&[0.0, 1.0, 0.5, 0.2], 2, 9).unwrap()), (2, 2, Some(255)));
-        assert_eq!(sizes(mask_png(&[1.0; 800], 40, 10).unwrap()), (10, 5, Some(255)));
-        assert_eq!(at_most(plain(40, 20, 7), 10).dimensions(), (10, 5));
-        assert_eq!(at_most(plain(4, 2, 7), 10), plain(4, 2, 7));
+        assert_eq!(sizes(mask_png(&[0.0, 1.0, 0.5, 0.2], 2).unwrap()), (2, 2, Some(255)));
+        assert_eq!(sizes(mask_png(&[1.0; 1280 * 320], 1280).unwrap()), (640, 160, Some(255)));
+        assert_eq!(for_page(plain(1280, 320, 7)).dimensions(), (640, 160));
+        assert_eq!(for_page(plain(400, 2, 7)), plain(400, 2, 7));
+        assert_eq!(for_page(plain(120, 90, 7)).dimensions(), (360, 270));
     }
 
     fn plain(width: u32, height: u32, level: u8) -> RgbImage {

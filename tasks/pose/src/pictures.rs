@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use image::RgbImage;
 use serde_json::{Value, json};
-use softrast_cli::{Answer, Given, LARGEST, MaskFlags, Variant, seen_by};
+use softrast_cli::{Answer, Given, MaskFlags, Variant, seen_by};
 use softrast_inverse::{
     Lens, Picture, camera_json, load_pose,
     pose::{FoundPose, PoseSearch},
     silhouette_pixels,
 };
 use softrast_lab::{
-    Error, Viewer, at_most, contact_sheet,
+    Error, Viewer, contact_sheet, for_page,
     format::{counted, line},
     overlay, png,
     program::Output,
@@ -240,8 +240,7 @@ fn page(
 ) -> anyhow::Result<Report> {
     let mut page = Report::new("pose", "The camera from which a mesh has the silhouette of a mask");
     page.warnings(warnings);
-    let small: Vec<RgbImage> =
-        overlays.iter().map(|overlay| at_most(overlay.clone(), LARGEST)).collect();
+    let small: Vec<RgbImage> = overlays.iter().map(|overlay| for_page(overlay.clone())).collect();
     let first = &small[..SHOWN.min(small.len())];
     page.viewer(
         &viewer(mesh, solved)?,
@@ -258,7 +257,7 @@ fn page(
         );
         page.table(&of_camera(&poses[0]));
         if poses.len() > 1 {
-            let others = poses[1..].iter().map(|pose| at_most(drawn(mesh, one, pose), LARGEST));
+            let others = poses[1..].iter().map(|pose| for_page(drawn(mesh, one, pose)));
             let others: Vec<RgbImage> = others.collect();
             page.picture(
                 &png(&contact_sheet(&others, 3.min(others.len())))?,

@@ -3,12 +3,12 @@ use std::{path::PathBuf, sync::Arc};
 use anyhow::ensure;
 use clap::ValueEnum;
 use serde_json::{Value, json};
-use softrast_cli::{Answer, Given, LARGEST, MaskFlags, seen_by};
+use softrast_cli::{Answer, Given, MaskFlags, seen_by};
 use softrast_inverse::{
     Method, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
 };
 use softrast_lab::{
-    Error, Viewer, at_most, contact_sheet,
+    Error, Viewer, contact_sheet, for_page,
     format::{counted, line},
     overlay, png,
     program::Output,
@@ -283,7 +283,7 @@ fn answer(
     }
     let sheet: Vec<_> = shown(scored)
         .map(|one| overlay(&one.silhouette, one.view.mask.pixels(), one.view.camera.size.width))
-        .map(|image| at_most(image, LARGEST))
+        .map(for_page)
         .collect();
     let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
     let text = text(mesh, scored, &summary);
