@@ -33,7 +33,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = angle)]
     pub(crate) fov: f64,
 
-    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file
+    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file, taken as at the last step if its scale moves
     #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
     pub(crate) softness: Choice,
 

@@ -104,7 +104,8 @@ fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
         }
         Choice::File(path) => {
             let file = ScheduledSoftness::load(path).context("--softness")?;
-            Ok((file.softness, file.phi))
+            // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
+            Ok((file.softness, file.phi_at(1.0, args.size)))
         }
         &Choice::Named(family) => {
             let softness = EdgeSoftness { family, squared: args.squared };

@@ -102,7 +102,8 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     pub(crate) common: Common,
 
-    /// Softness: the name of a family, such as logistic, gauss or mlp, or a softness file in JSON.
+    /// Softness: the name of a family, such as logistic, gauss or mlp, or a softness file in JSON, which
+    /// begins as at its last step if its scale moves.
     #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
     pub(crate) softness: String,
 
@@ -213,7 +214,8 @@ impl Common {
     }
 }
 
-/// A softness and its first parameters, from a family or a file.
+/// A softness and its first parameters, from a family or a file; of a file whose scale moves those of the
+/// last step.
 ///
 /// # Errors
 ///
@@ -230,7 +232,9 @@ pub(crate) fn softness(
             return Err(Error::Usage(message.into()).into());
         }
         let file = ScheduledSoftness::load(text)?;
-        return Ok((file.softness, file.phi));
+        // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
+        let phi = file.phi_at(1.0, crate::SIZE);
+        return Ok((file.softness, phi));
     }
     let family: Family = text.parse().map_err(|error| Error::Usage(format!("{error}")))?;
     let softness = EdgeSoftness { family, squared };
@@ -256,5 +260,21 @@ fn rate(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(x) if x >= 0.0 && f64::is_finite(x) => Ok(x),
         _ => Err("expected 0 or a positive number".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_softness_file_whose_scale_moves_begins_as_at_its_last_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        let edge = EdgeSoftness { family: Family::Gauss, squared: false };
+        ScheduledSoftness::decay(edge, 0.3, 0.02).save(&path).unwrap();
+        let (found, phi) = softness(path.to_str().unwrap(), None, false).unwrap();
+        assert_eq!(found, edge);
+        assert!((edge.scale(&phi) / 0.02 - 1.0).abs() < 1e-12, "{phi:?}");
     }
 }
