@@ -6,9 +6,9 @@ use image::{ImageReader, imageops};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, NameOrFile, ScheduledSoftness, Softness};
 
-use crate::args::{Args, Choice, Target};
+use crate::args::{Args, Target};
 
 /// Everything that a measurement needs, in plain numbers.
 pub(crate) struct Scene {
@@ -99,15 +99,15 @@ fn tensor<B: Backend, const D: usize>(
 
 fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
     match &args.softness {
-        Choice::File(_) if args.scale.is_some() || args.squared => {
+        NameOrFile::File(_) if args.scale.is_some() || args.squared => {
             Err(Error::usage("--scale and --squared are for a named softness: a file has its own"))
         }
-        Choice::File(path) => {
+        NameOrFile::File(path) => {
             let file = ScheduledSoftness::load(path).context("--softness")?;
             // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
             Ok((file.softness, file.phi_at(1.0, args.size)))
         }
-        &Choice::Named(family) => {
+        &NameOrFile::Name(family) => {
             let softness = EdgeSoftness { family, squared: args.squared };
             let narrow = HALF_PIXEL * 2.0 / args.size as f64;
             let scale = args.scale.unwrap_or(if args.squared { narrow * narrow } else { narrow });

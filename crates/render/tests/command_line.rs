@@ -84,8 +84,7 @@ fn a_softness_file_whose_scale_moves_is_drawn_as_at_its_last_step() {
         let common = [&mesh, "--size", "32", "--json", "--out", out.to_str().unwrap()];
         json(&[&common[..], &softness].concat())["mean_alpha"].as_f64().unwrap()
     };
-    let [of_file, named] =
-        [["--softness", file.to_str().unwrap()], ["--scale", "0.02"]].map(words);
+    let [of_file, named] = [["--softness", file.to_str().unwrap()], ["--scale", "0.02"]].map(words);
     assert!((of_file / named - 1.0).abs() < 1e-6, "{of_file}, not {named}");
 }
 

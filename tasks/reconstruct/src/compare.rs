@@ -92,8 +92,9 @@ type Method = (String, (softrast_softness::EdgeSoftness, Vec<f64>), TConorm);
 fn method(text: &str) -> anyhow::Result<Method> {
     let (softness, t_conorm) = text.split_once('+').unwrap_or((text, "probabilistic"));
     let t_conorm = t_conorm.parse::<TConorm>().map_err(|error| Error::Usage(error.to_string()))?;
-    let parsed = args::softness(softness, None, false).with_context(|| format!("method {text}"))?;
-    Ok((text.to_owned(), parsed, t_conorm))
+    let softness =
+        softness.parse().map_err(Error::usage).and_then(|s| args::softness(&s, None, false));
+    Ok((text.to_owned(), softness.with_context(|| format!("method {text}"))?, t_conorm))
 }
 
 /// The table of all methods, and how they were trained.
