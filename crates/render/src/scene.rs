@@ -1,12 +1,12 @@
 use std::{path::Path, sync::Arc};
 
 use anyhow::Context;
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Tensor, backend::Backend};
 use image::{ImageReader, imageops};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, NameOrFile, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, NameOrFile, ScheduledSoftness, Softness, tensor, vector};
 
 use crate::args::{Args, Target};
 
@@ -68,33 +68,25 @@ impl Scene {
     }
 
     /// The vertices `[1, vertices, 3]`, shared by all views.
-    pub(crate) fn vertices<B: Backend>(&self, dtype: DType) -> Tensor<B, 3> {
-        tensor(&self.vertices, [1, self.vertices.len() / 3, 3], dtype)
+    pub(crate) fn vertices<B: Backend>(&self) -> Tensor<B, 3> {
+        tensor(self.vertices.clone(), [1, self.vertices.len() / 3, 3])
     }
 
     /// The cameras `[views, 4]`.
-    pub(crate) fn orbits<B: Backend>(&self, dtype: DType) -> Tensor<B, 2> {
-        tensor(&self.orbits, [self.views(), 4], dtype)
+    pub(crate) fn orbits<B: Backend>(&self) -> Tensor<B, 2> {
+        tensor(self.orbits.clone(), [self.views(), 4])
     }
 
     /// Parameters of the softness.
-    pub(crate) fn phi<B: Backend>(&self, dtype: DType) -> Tensor<B, 1> {
-        tensor(&self.phi, [self.phi.len()], dtype)
+    pub(crate) fn phi<B: Backend>(&self) -> Tensor<B, 1> {
+        vector(&self.phi)
     }
 
     /// The target, once for each view: `[views, size, size]`.
-    pub(crate) fn target<B: Backend>(&self, dtype: DType) -> Option<Tensor<B, 3>> {
-        let one = tensor(self.target.as_ref()?, [1, self.size, self.size], dtype);
+    pub(crate) fn target<B: Backend>(&self) -> Option<Tensor<B, 3>> {
+        let one = tensor(self.target.clone()?, [1, self.size, self.size]);
         Some(one.expand([self.views(), self.size, self.size]))
     }
-}
-
-fn tensor<B: Backend, const D: usize>(
-    values: &[f64],
-    shape: [usize; D],
-    dtype: DType,
-) -> Tensor<B, D> {
-    Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), dtype))
 }
 
 fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
