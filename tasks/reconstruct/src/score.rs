@@ -60,6 +60,11 @@ pub fn score<B: Backend>(
     Ok(score)
 }
 
+/// The values of all classes, and their mean.
+pub(crate) fn with_mean(classes: &[f64]) -> impl Iterator<Item = f64> {
+    classes.iter().copied().chain([softrast_lab::mean(classes)])
+}
+
 /// Which view is the k-th of so many of a shape.
 pub(crate) fn view_of(shape: usize, k: usize, views: usize) -> usize {
     // 7 and 24 have no common factor: neighbours differ, and all views come up.
