@@ -1,5 +1,5 @@
-use serde_json::{Map, Value};
 use softrast_lab::{Point, Run, best_point, median};
+use softrast_softness::{ScheduledSoftness, Softness, Surrogate};
 
 use crate::task::{HARD, PARAMETER, SCALE, SOFT};
 
@@ -10,15 +10,18 @@ const SAME: f64 = 1e-6;
 /// The end is worse than the best step where its error is larger by this share and this much.
 const WORSE: [f64; 2] = [0.05, 2e-3];
 
-/// What curves say about the choice of the softness, a line each; said once for all runs. `settings` are those of the experiment, whose
-/// images have `size` × `size` pixels.
+/// What curves say about the choice of the softness, a line each; said once for all runs on images of `size` × `size` pixels.
 ///
 /// A softness wider than the image; no pixel in the soft band, so that an image has no gradient; a decay that went on past the best
 /// step.
-pub(crate) fn diagnostics(settings: &Map<String, Value>, size: usize, runs: &[Run]) -> Vec<String> {
-    let squared = settings.get("squared").and_then(Value::as_bool) == Some(true);
-    let surrogate = settings.get("surrogate_scale").and_then(Value::as_f64);
-    let found = [too_wide(squared, runs), too_narrow(surrogate, size, runs), past_the_best(runs)];
+pub(crate) fn diagnostics(softness: &ScheduledSoftness, size: usize, runs: &[Run]) -> Vec<String> {
+    let surrogate = softness.surrogate_at(0.0, size);
+    let surrogate = surrogate.map(|Surrogate { softness, phi }| softness.scale(&phi));
+    let found = [
+        too_wide(softness.softness.squared, runs),
+        too_narrow(surrogate, size, runs),
+        past_the_best(runs),
+    ];
     found.into_iter().flatten().collect()
 }
 
@@ -97,6 +100,8 @@ fn of_runs(count: usize, all: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use softrast_softness::{EdgeSoftness, Family};
+
     use super::*;
 
     /// What is found in a run with these soft errors, hard errors and scales, whose parameter error falls by this much at each step.
@@ -107,11 +112,10 @@ mod tests {
         };
         let curve = points.into_iter().enumerate().map(point).collect();
         let run = Run { curve, ..Run::default() };
-        let mut settings = Map::new();
-        if surrogate {
-            settings.insert("surrogate_scale".into(), 1e-8.into());
-        }
-        diagnostics(&settings, 32, &[run])
+        let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+        let softness = ScheduledSoftness::constant(edge, 1e-8);
+        let softness = if surrogate { softness.with_surrogate_scale(1e-8) } else { softness };
+        diagnostics(&softness, 32, &[run])
     }
 
     fn one(lines: &[String], part: &str) {

@@ -9,7 +9,7 @@ use softrast_lab::{
     found,
     parse::{count, positive, seed, share, whole},
 };
-use softrast_softness::Family;
+use softrast_softness::{Family, NameOrFile};
 
 /// Heading of the flags that few need.
 pub(crate) const RARE: &str = "Rarely needed";
@@ -183,11 +183,10 @@ impl FromStr for SoftnessChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if let Ok(family) = text.parse() {
-            return Ok(Self::Family(family));
-        }
-        if text.to_ascii_lowercase().ends_with(".json") {
-            return Ok(Self::File(text.into()));
+        match text.parse() {
+            Ok(NameOrFile::Name(family)) => return Ok(Self::Family(family)),
+            Ok(NameOrFile::File(path)) => return Ok(Self::File(path)),
+            Err(_) => {}
         }
         match text.strip_prefix(LEARNED).map(|kind| (kind, kind.strip_prefix('-'))) {
             Some(("", _)) => return Ok(Self::Learned(None)),

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use softrast_cli::{MethodArgs, SoftnessChoice, Variant};
+use softrast_cli::{MethodArgs, SoftnessChoice, Variant, learned_kind};
 use softrast_inverse::{Method, Resolution};
 use softrast_raster::compiled_backends;
 use softrast_softness::ScheduledSoftness;
@@ -112,9 +112,7 @@ fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
     let there = |name: &str| ScheduledSoftness::learned(name).is_ok();
     match &method.softness {
         Some(SoftnessChoice::Learned(None)) => there(task.name()),
-        Some(SoftnessChoice::Learned(Some(kind))) => {
-            kind == "surrogate" || there(kind) || there(&format!("{}-{kind}", task.name()))
-        }
+        Some(SoftnessChoice::Learned(Some(kind))) => there(&learned_kind(task.name(), kind)),
         _ => true,
     }
 }
@@ -185,11 +183,7 @@ impl Args {
             let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
                 continue;
             };
-            // A surrogate is left out where no edge moves.
-            let surrogate = SoftnessChoice::Learned(Some("surrogate".into()));
-            if task.moves_edges() || method.softness.as_ref() != Some(&surrogate) {
-                cells.push(cell(name.clone(), method.clone(), None, Purpose::Compared));
-            }
+            cells.push(cell(name.clone(), method.clone(), None, Purpose::Compared));
         }
         for NamedMethod { name, method } in &self.varied {
             let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
@@ -261,6 +255,7 @@ impl Args {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Entry;
 
     fn args(line: &str) -> Args {
         Args::parse_from(["compare"].into_iter().chain(line.split_whitespace()))
@@ -287,6 +282,40 @@ mod tests {
         let two = args(two).cells().unwrap();
         assert_eq!([&two[4].name[..], &two[5].name], ["learned-mlp", "learned-occlusion-mlp"]);
         assert_eq!(two.len(), 2 * 2 + 2 * 2 * 2);
+    }
+
+    /// A task for which nothing comes with the programs.
+    struct Disc;
+
+    impl AnyTask for Disc {
+        fn name(&self) -> &'static str {
+            "disc"
+        }
+
+        fn title(&self) -> &'static str {
+            "DISC"
+        }
+
+        fn moves_edges(&self) -> bool {
+            true
+        }
+
+        fn paper(&self) -> &'static softrast_cli::Paper {
+            TASKS[0].paper()
+        }
+
+        fn entry(&self, _: &softrast_cli::Common, _: &MethodArgs) -> anyhow::Result<Entry> {
+            unreachable!("nothing is evaluated")
+        }
+    }
+
+    #[test]
+    fn a_new_task_is_compared_by_what_needs_nothing_learned_on_it() {
+        let line = "--methods learned,learned-mlp,learned-surrogate,gauss,learned-pose --varied=";
+        let mut cells = Vec::new();
+        args(line).compared(&Disc, Variant::Original, 1, &[], &mut cells).unwrap();
+        let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
+        assert_eq!(names, ["gauss", "learned-pose"]);
     }
 
     #[test]

@@ -50,9 +50,4 @@ impl Cell {
             == MethodArgs { softness: Some(SoftnessChoice::Learned(None)), ..MethodArgs::default() }
             && self.purpose == Purpose::Compared
     }
-
-    /// Whether the softness comes with the programs.
-    pub fn is_learned(&self) -> bool {
-        matches!(self.method.softness, Some(SoftnessChoice::Learned(_)))
-    }
 }

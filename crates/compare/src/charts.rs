@@ -27,13 +27,32 @@ pub(crate) struct Chart {
     pub(crate) plot: Plot,
 }
 
+/// All charts of a comparison.
+pub(crate) struct Charts {
+    /// Of each task in each variant, in the order of [`by_variant`](crate::tables::by_variant).
+    pub(crate) of_variants: Vec<Vec<Chart>>,
+    /// Over all of them.
+    pub(crate) profile: Option<Chart>,
+}
+
+impl Charts {
+    pub(crate) fn new(groups: &[Vec<&Measured>]) -> Self {
+        let of_variants = groups.iter().map(|group| of_variant(group)).collect();
+        Self { of_variants, profile: profile(groups) }
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Chart> {
+        self.of_variants.iter().flatten().chain(&self.profile)
+    }
+}
+
 fn named(one: &Measured) -> Series {
     let (name, colour) = (one.cell.name.clone(), method_colour(&one.cell.name));
     Series { name, colour, dashed: one.moves(), ..Series::default() }
 }
 
 /// The charts of the cells of one task in one variant.
-pub(crate) fn of_variant(all: &[&Measured]) -> Vec<Chart> {
+fn of_variant(all: &[&Measured]) -> Vec<Chart> {
     let cells: Vec<&Measured> =
         all.iter().filter(|one| one.cell.purpose == Purpose::Compared).copied().collect();
     let Some(first) = cells.first() else { return Vec::new() };
@@ -79,7 +98,7 @@ pub(crate) fn of_variant(all: &[&Measured]) -> Vec<Chart> {
 }
 
 fn place_of(one: &Measured, key: &str) -> usize {
-    one.metrics.iter().position(|metric| metric.key == key).unwrap_or(one.hard_place())
+    one.metrics().iter().position(|metric| metric.key == key).unwrap_or(one.hard_place())
 }
 
 /// Intervals between the points of a curve.
@@ -101,7 +120,7 @@ fn trace(run: &Run, place: usize, lowest: bool) -> Vec<f64> {
 /// Median and quartiles over the runs at every point of their curves: over the steps, or the lowest so far over seconds.
 fn over(one: &Measured, place: usize, anytime: bool) -> Series {
     let curves: Vec<Vec<f64>> = one.runs.iter().map(|run| trace(run, place, anytime)).collect();
-    let whole = if anytime { one.seconds } else { one.solve.steps as f64 };
+    let whole = if anytime { one.seconds } else { one.entry.solve.steps as f64 };
     let mut series = named(one);
     for k in 0..curves.iter().map(Vec::len).max().unwrap_or(0) {
         let now: Vec<f64> = curves.iter().filter_map(|curve| curve.get(k).copied()).collect();
@@ -213,7 +232,7 @@ fn mark(one: &Measured) -> Mark {
 /// What each method of one task takes for the step at an edge, at the last step of a run (Fig. 3 of the paper).
 fn functions(cells: &[&Measured], stem: &str, of: &str) -> Chart {
     let series = cells.iter().map(|one| {
-        let (method, size) = (&one.method.softness, one.solve.size);
+        let (method, size) = (&one.entry.method.softness, one.entry.solve.size);
         let offset = |k: i32| REACH_PX * f64::from(k) / f64::from(HALF);
         let offsets: Vec<f64> = (-HALF..=HALF).map(offset).collect();
         let distances: Vec<f64> = offsets.iter().map(|offset| offset * 2.0 / size as f64).collect();
@@ -236,7 +255,7 @@ fn functions(cells: &[&Measured], stem: &str, of: &str) -> Chart {
 
 /// The share of all problems, a problem being a seed of a task in a variant, that a method solves within a factor of the time of the
 /// fastest one on that problem.
-pub(crate) fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
+fn profile(groups: &[Vec<&Measured>]) -> Option<Chart> {
     let compared = |group: &'_ [&'_ Measured]| -> Vec<usize> {
         let kept = |k: &usize| group[*k].cell.purpose == Purpose::Compared;
         (0..group.len()).filter(kept).collect()

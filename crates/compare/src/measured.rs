@@ -1,7 +1,5 @@
 use anyhow::ensure;
-use serde_json::{Map, Value};
 use softrast_cli::{Common, InOurUnits, Variant};
-use softrast_inverse::{Method, SolveConfig};
 use softrast_lab::{
     Encoded, Metric, Role, Run, Runner, mean, mean_interval, place, sweep::rounded,
 };
@@ -12,21 +10,14 @@ use crate::{Cell, tasks::Entry};
 pub struct Measured {
     /// The cell.
     pub cell: Cell,
-    /// The method with all its numbers.
-    pub method: Method,
-    /// Size, steps and learning rate.
-    pub solve: SolveConfig,
-    /// Faces of the scene.
-    pub faces: usize,
-    /// What is measured at every point.
-    pub metrics: Vec<Metric>,
+    /// What was run.
+    pub entry: Entry,
     /// The runs, in the order of the seeds.
     pub runs: Vec<Run>,
     /// Of the first.
     pub pictures: Option<Encoded>,
     /// Time of the optimisation steps of a run, in seconds.
     pub seconds: f64,
-    settings: Map<String, Value>,
 }
 
 /// One error over all runs at the last step.
@@ -69,30 +60,30 @@ impl Measured {
         entry: Entry,
         evaluation: softrast_lab::Evaluation,
     ) -> anyhow::Result<Self> {
-        let Entry { experiment, method, solve, settings, faces } = entry;
         let whole = evaluation.runs.iter().all(|run| !run.curve.is_empty());
         ensure!(whole, "{}: the numbers are not finite before the first step", cell.name);
         Ok(Self {
             cell,
-            method,
-            solve,
-            faces,
-            metrics: experiment.metrics().to_vec(),
+            entry,
             seconds: evaluation.seconds_per_run(),
             runs: evaluation.runs,
             pictures: evaluation.pictures,
-            settings,
         })
+    }
+
+    /// What is measured at every point.
+    pub fn metrics(&self) -> &[Metric] {
+        self.entry.experiment.metrics()
     }
 
     /// Place of the error of the hard image among the metrics, which compares methods of any width.
     pub fn hard_place(&self) -> usize {
-        place(&self.metrics, Role::Score)
+        place(self.metrics(), Role::Score)
     }
 
     /// The error with this key, at the last step.
     pub fn error(&self, key: &str) -> Option<MeanError> {
-        let place = self.metrics.iter().position(|metric| metric.key == key)?;
+        let place = self.metrics().iter().position(|metric| metric.key == key)?;
         let last = |run: &Run| run.curve[run.curve.len() - 1].values[place];
         let per_run: Vec<f64> = self.runs.iter().map(last).collect();
         Some(MeanError { mean: mean(&per_run), ci95: mean_interval(&per_run), per_run })
@@ -100,7 +91,7 @@ impl Measured {
 
     /// The error of the hard image.
     pub fn hard(&self) -> MeanError {
-        self.error(self.metrics[self.hard_place()].key)
+        self.error(self.metrics()[self.hard_place()].key)
             .unwrap_or_else(|| unreachable!("it is there"))
     }
 
@@ -111,7 +102,7 @@ impl Measured {
 
     /// Name and unit of the metric at a place.
     pub fn title(&self, place: usize) -> String {
-        let Metric { name, unit, .. } = self.metrics[place];
+        let Metric { name, unit, .. } = self.metrics()[place];
         if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
     }
 
@@ -129,13 +120,14 @@ impl Measured {
 
     /// Whether the scale moves during a run.
     pub fn moves(&self) -> bool {
-        !self.method.softness.is_constant()
+        !self.entry.method.softness.is_constant()
     }
 
     /// Scale before the first and at the last step, surrogate and depth scale if there are such, learning rate.
     pub fn setting(&self) -> String {
-        let size = self.solve.size;
-        let [first, last] = [0.0, 1.0].map(|part| plain(self.method.softness.scale_at(part, size)));
+        let size = self.entry.solve.size;
+        let [first, last] =
+            [0.0, 1.0].map(|part| plain(self.entry.method.softness.scale_at(part, size)));
         let scale = if self.moves() {
             format!("scale {first} to {last}")
         } else {
@@ -144,21 +136,21 @@ impl Measured {
         let named =
             [("surrogate_scale", "surrogate"), ("depth_scale", "depth"), ("learning_rate", "rate")];
         let others = named.iter().filter_map(|(key, name)| {
-            Some(format!("{name} {}", plain(self.settings.get(*key)?.as_f64()?)))
+            Some(format!("{name} {}", plain(self.entry.settings.get(*key)?.as_f64()?)))
         });
         [scale].into_iter().chain(others).collect::<Vec<_>>().join(", ")
     }
 
     /// Image and parameter error in the unit of the paper's Table 3.
     pub fn in_papers_unit(&self) -> [Option<f64>; 2] {
-        let parameters = self.metrics.iter().filter(|m| m.key.starts_with("parameter_error"));
+        let parameters = self.metrics().iter().filter(|m| m.key.starts_with("parameter_error"));
         let mean_of = |key: &str| self.error(key).map_or(f64::NAN, |error| error.mean);
         let ours = InOurUnits {
             original: self.cell.variant == Variant::Original,
             hard: self.hard().mean,
             soft: mean_of("image_error"),
             parameters: parameters.map(|metric| mean_of(metric.key)).collect(),
-            faces: self.faces,
+            faces: self.entry.faces,
         };
         (self.cell.task.paper().in_its_unit)(&ours)
     }

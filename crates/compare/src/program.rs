@@ -11,7 +11,7 @@ use softrast_lab::{
 
 use crate::{
     Args, Measured,
-    charts::{of_variant, profile},
+    charts::Charts,
     records,
     results::{html, markdown},
     tables::by_variant,
@@ -71,20 +71,19 @@ fn write(args: &Args, measured: &[Measured], command: &str) -> anyhow::Result<()
         write_atomically(path, text.as_bytes()).with_context(|| format!("cannot write {path:?}"))
     };
     let tables = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
-    let charts = match &args.tables {
+    let folder = match &args.tables {
         Some(tables) => tables.with_extension(""),
         None => args.out.join("charts"),
     };
-    fs::create_dir_all(&charts).with_context(|| format!("cannot make the folder {charts:?}"))?;
-    let groups = by_variant(measured);
-    let all = groups.iter().flat_map(|group| of_variant(group)).chain(profile(&groups));
-    for chart in all {
-        replace(&charts.join(format!("{}.svg", chart.name)), &chart.plot.svg()?)?;
-        replace(&charts.join(format!("{}.csv", chart.name)), &chart.plot.csv())?;
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {folder:?}"))?;
+    let charts = Charts::new(&by_variant(measured));
+    for chart in charts.iter() {
+        replace(&folder.join(format!("{}.svg", chart.name)), &chart.plot.svg()?)?;
+        replace(&folder.join(format!("{}.csv", chart.name)), &chart.plot.csv())?;
     }
-    let shown = charts.file_name().and_then(|name| name.to_str());
-    replace(&tables, &markdown(measured, command, shown))?;
+    let shown = folder.file_name().and_then(|name| name.to_str());
+    replace(&tables, &markdown(measured, &charts, command, shown))?;
     replace(&args.out.join("cells.csv"), &records::csv(measured))?;
     replace(&args.out.join("cells.json"), &format!("{:#}\n", records::json(measured)))?;
-    replace(&args.out.join("report.html"), &html(measured, command)?)
+    replace(&args.out.join("report.html"), &html(measured, &charts, command)?)
 }

@@ -50,7 +50,7 @@ pub(crate) fn json(measured: &[Measured]) -> Value {
             "parameter_error": { "last": one.parameter().per_run },
             "success_rate": one.success_rate(),
             "seconds_a_run": one.seconds,
-            "steps": one.solve.steps,
+            "steps": one.entry.solve.steps,
         })
     };
     measured.iter().map(record).collect()

@@ -7,7 +7,7 @@ use softrast_lab::{machine, report::Report};
 
 use crate::{
     Measured,
-    charts::{Chart, of_variant, profile},
+    charts::{Chart, Charts},
     crossed::crossed,
     tables::{by_variant, errors, seconds, tasks},
 };
@@ -19,30 +19,35 @@ const CROSSED: &str = include_str!("text/crossed.md");
 
 /// The tables of the paper with our figures, as Markdown. `command` made them; `pictures` is where the charts are, seen from the file, if
 /// they are to be shown.
-pub(crate) fn markdown(measured: &[Measured], command: &str, pictures: Option<&str>) -> String {
+pub(crate) fn markdown(
+    measured: &[Measured],
+    charts: &Charts,
+    command: &str,
+    pictures: Option<&str>,
+) -> String {
     let mut text = format!(
         "{HEAD}\n```\n{command}\n```\n\non {}.\n\n{READING}\n## Table 2: tasks\n",
         machine()
     );
     text += &tasks(measured).markdown();
     text += "## Table 3: errors\n";
-    for group in by_variant(measured) {
+    for (group, charts) in by_variant(measured).iter().zip(&charts.of_variants) {
         let cell = &group[0].cell;
         // Writing to a string does not fail.
         if cell.variant == Variant::Original {
             let _ = write!(text, "\n### {}\n\n{}\n", cell.task.title(), cell.task.paper().note);
         }
         let _ = write!(text, "\n**{}**, seeds: {}\n", cell.variant.name(), cell.runs);
-        text += &errors(&group).markdown();
-        text.extend(of_variant(&group).iter().map(|chart| shown(chart, pictures)));
+        text += &errors(group).markdown();
+        text.extend(charts.iter().map(|chart| shown(chart, pictures)));
     }
     let _ = write!(text, "\n## Table 5: seconds\n\n{SECONDS}{}", seconds(measured).markdown());
     if let Some(table) = crossed(measured) {
         let _ = write!(text, "\n## Table 6: cross evaluation\n\n{CROSSED}{}", table.markdown());
     }
-    if let Some(chart) = profile(&by_variant(measured)) {
+    if let Some(chart) = &charts.profile {
         text += "\n## Who is fast how often\n";
-        text += &shown(&chart, pictures);
+        text += &shown(chart, pictures);
     }
     text
 }
@@ -53,22 +58,26 @@ fn shown(chart: &Chart, pictures: Option<&str>) -> String {
 }
 
 /// The same as one HTML page, with the pictures of the first seed of every cell.
-pub(crate) fn html(measured: &[Measured], command: &str) -> anyhow::Result<String> {
+pub(crate) fn html(
+    measured: &[Measured],
+    charts: &Charts,
+    command: &str,
+) -> anyhow::Result<String> {
     let mut report = Report::new("compare", "All methods on all tasks");
     report.paragraph(&format!("On {}.", machine()));
     READING.split("\n\n").for_each(|text| report.paragraph(&text.replace("**", "")));
     report.heading("Tasks");
     report.table(&tasks(measured));
-    for group in by_variant(measured) {
+    for (group, charts) in by_variant(measured).iter().zip(&charts.of_variants) {
         let cell = &group[0].cell;
         report.heading(&format!("{}, {}", cell.task.title(), cell.variant.name()));
         report.paragraph(cell.task.paper().note);
         report.paragraph(&format!("Seeds: {}", cell.runs));
-        report.table(&errors(&group));
-        for chart in of_variant(&group) {
+        report.table(&errors(group));
+        for chart in charts {
             report.chart(&chart.plot.svg()?, &chart.caption);
         }
-        for one in &group {
+        for one in group {
             if let Some(pictures) = &one.pictures {
                 report.picture(&pictures.before_after, &format!("{}, first seed", one.cell.name));
             }
@@ -82,7 +91,7 @@ pub(crate) fn html(measured: &[Measured], command: &str) -> anyhow::Result<Strin
         report.paragraph(CROSSED);
         report.table(&table);
     }
-    if let Some(chart) = profile(&by_variant(measured)) {
+    if let Some(chart) = &charts.profile {
         report.heading("Who is fast how often");
         report.chart(&chart.plot.svg()?, &chart.caption);
     }

@@ -30,15 +30,15 @@ pub(crate) fn tasks(measured: &[Measured]) -> Table {
     ]);
     for group in by_variant(measured) {
         let one = group[0];
-        let (cell, size) = (&one.cell, one.solve.size);
-        let parameter = one.metrics.iter().position(|metric| metric.key == "parameter_error");
+        let (cell, size) = (&one.cell, one.entry.solve.size);
+        let parameter = one.metrics().iter().position(|metric| metric.key == "parameter_error");
         let freedom = cell.task.paper().freedom[usize::from(cell.variant == Variant::Transfer)];
         table.push([
             cell.task.title().to_owned(),
             cell.variant.name().to_owned(),
-            one.faces.to_string(),
+            one.entry.faces.to_string(),
             format!("{size} × {size}"),
-            one.solve.steps.to_string(),
+            one.entry.solve.steps.to_string(),
             one.title(one.hard_place()),
             parameter.map(|place| one.title(place)).unwrap_or_default(),
             freedom.to_owned(),
@@ -51,7 +51,7 @@ pub(crate) fn tasks(measured: &[Measured]) -> Table {
 pub(crate) fn errors(group: &[&Measured]) -> Table {
     let first = group[0];
     let less = format!("less {}", first.cell.name);
-    let parameter = first.metrics.iter().position(|metric| metric.key == "parameter_error");
+    let parameter = first.metrics().iter().position(|metric| metric.key == "parameter_error");
     let mut table = Table::new([
         "method".to_owned(),
         "setting".into(),
@@ -103,7 +103,7 @@ pub(crate) fn seconds(measured: &[Measured]) -> Table {
             one.cell.variant.name().to_owned(),
             one.cell.name.clone(),
             short(one.seconds),
-            short(1e3 * one.seconds / one.solve.steps.max(1) as f64),
+            short(1e3 * one.seconds / one.entry.solve.steps.max(1) as f64),
         ]);
     }
     table

@@ -194,11 +194,6 @@ impl Table {
         self.rows.iter_mut().last().into_iter().for_each(|row| row.shades = shades.clone());
     }
 
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
     /// As Markdown, with an empty line before and after.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));

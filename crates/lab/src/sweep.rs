@@ -16,14 +16,14 @@ pub const TRAINING_SEED: u64 = 1_000_000;
 #[derive(Clone, Debug)]
 pub struct SearchSpace {
     /// The axes.
-    pub axes: Vec<Axis>,
+    pub axes: Vec<SearchAxis>,
     /// Whether there is such a combination.
     pub valid: fn(&GridPoint) -> bool,
 }
 
 /// Values to try for a flag.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct SearchAxis {
     /// The flag without dashes, such as `scale-end`.
     pub flag: &'static str,
     /// Values, ascending and positive; none is the flag left out.
@@ -35,7 +35,7 @@ pub type GridPoint = Vec<Option<f64>>;
 
 /// A grid point and how it did on the training seeds.
 #[derive(Clone, Debug)]
-pub struct Cell {
+pub struct GridResult {
     /// The values.
     pub point: GridPoint,
     /// Whether it is of the fine grid.
@@ -61,7 +61,7 @@ pub struct Sweep {
     /// Training seeds.
     seeds: Vec<u64>,
     /// What it has tried so far.
-    cells: Vec<Cell>,
+    cells: Vec<GridResult>,
     /// Whether the user stopped it.
     stopped: bool,
 }
@@ -97,14 +97,14 @@ impl SearchSpace {
 
     /// The flags that ask for a point.
     pub fn flags(&self, point: &GridPoint) -> String {
-        let flag = |(axis, value): (&Axis, &Option<f64>)| {
+        let flag = |(axis, value): (&SearchAxis, &Option<f64>)| {
             value.map(|value| format!("--{} {}", axis.flag, exact(value)))
         };
         self.axes.iter().zip(point).filter_map(flag).collect::<Vec<_>>().join(" ")
     }
 }
 
-impl Axis {
+impl SearchAxis {
     /// One of its values, and those halfway to its neighbours in the logarithm; beyond the first and the last the axis goes on as on
     /// the other side.
     fn around(&self, best: Option<f64>) -> Vec<Option<f64>> {
@@ -125,7 +125,7 @@ pub fn rounded(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
 
-impl Cell {
+impl GridResult {
     /// Mean score over the runs that stayed finite.
     fn mean(&self) -> Option<f64> {
         let finite: Vec<f64> = self.scores.iter().copied().flatten().collect();
@@ -161,7 +161,7 @@ impl Cell {
 }
 
 /// The cell with the fewest runs that went wrong, and of these the one with the lowest mean.
-fn best<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<&'a Cell> {
+fn best<'a>(cells: impl Iterator<Item = &'a GridResult>) -> Option<&'a GridResult> {
     let finite = cells.filter_map(|cell| Some((cell, cell.broken(), cell.mean()?)));
     let best = finite.min_by(|(_, a_bad, a), (_, b_bad, b)| a_bad.cmp(b_bad).then(a.total_cmp(b)));
     best.map(|(cell, ..)| cell)
@@ -189,7 +189,7 @@ impl Sweep {
         runner: &mut Runner,
         [each, later]: [usize; 2],
         make: &mut MakePoint<'_>,
-    ) -> anyhow::Result<&Cell> {
+    ) -> anyhow::Result<&GridResult> {
         for fine in [false, true] {
             runner.progress.expect(self.done().asked * each * self.seeds.len() + later);
             let points = if fine { self.fine_points()? } else { self.space.coarse() };
@@ -221,12 +221,12 @@ impl Sweep {
         fine: bool,
         label: &str,
         make: &mut MakePoint<'_>,
-    ) -> anyhow::Result<Cell> {
+    ) -> anyhow::Result<GridResult> {
         let experiment = make(point)?;
         let last = |run: &Run, score: usize| run.curve.last().map(|point| point.values[score]);
         let (scores, tried) = runner.score(experiment.as_ref(), &self.seeds, label, last)?;
         let successes = tried.runs.iter().filter(|run| run.success).count();
-        Ok(Cell { point: point.clone(), fine, scores, successes, seconds: tried.seconds })
+        Ok(GridResult { point: point.clone(), fine, scores, successes, seconds: tried.seconds })
     }
 
     /// The fine grid around the best of the coarse one.
@@ -255,14 +255,14 @@ impl Sweep {
         self.stopped.then(|| self.done())
     }
 
-    fn best(&self) -> Option<&Cell> {
+    fn best(&self) -> Option<&GridResult> {
         best(self.cells.iter())
     }
 
     /// The flags, without dashes, whose best value is the smallest or largest of several that were tried.
     fn at_edge(&self) -> Vec<&'static str> {
         let Some(best) = self.best() else { return Vec::new() };
-        let edge = |(k, axis): (usize, &Axis)| {
+        let edge = |(k, axis): (usize, &SearchAxis)| {
             let tried = || self.cells.iter().filter_map(|cell| cell.point[k]);
             let ends = [tried().fold(f64::INFINITY, f64::min), tried().fold(0.0, f64::max)];
             let several = axis.values.iter().flatten().count() > 1;
@@ -334,7 +334,7 @@ impl Sweep {
     }
 
     fn best_score(&self) -> String {
-        let mean = short_or_none(self.best().and_then(Cell::mean));
+        let mean = short_or_none(self.best().and_then(GridResult::mean));
         format!("{} {mean} on the training seeds", self.score[0])
     }
 
@@ -370,18 +370,18 @@ impl Sweep {
 
     fn table(&self, across: &str) -> Table {
         let axis = self.space.axes.iter().position(|axis| axis.flag == across);
-        let key = |cell: &Cell| axis.and_then(|k| cell.point[k]);
+        let key = |cell: &GridResult| axis.and_then(|k| cell.point[k]);
         let mut columns: Vec<Option<f64>> = self.cells.iter().map(key).collect();
         columns.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
         columns.dedup();
-        let row = |cell: &Cell| -> GridPoint {
+        let row = |cell: &GridResult| -> GridPoint {
             let others = cell.point.iter().enumerate().filter(|(k, _)| Some(*k) != axis);
             others.map(|(_, value)| *value).collect()
         };
         let mut rows: Vec<GridPoint> = self.cells.iter().map(row).collect();
         rows.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
         rows.dedup();
-        let means: Vec<f64> = self.cells.iter().filter_map(Cell::mean).collect();
+        let means: Vec<f64> = self.cells.iter().filter_map(GridResult::mean).collect();
         let (low, high) = (quantile(&means, 0.0), quantile(&means, 0.75));
         let chosen = self.best().map(|cell| &cell.point);
         let named = |value: &Option<f64>| value.map_or_else(|| "-".into(), exact);
@@ -391,15 +391,15 @@ impl Sweep {
             let at = |column: &Option<f64>| {
                 self.cells.iter().find(|cell| row(cell) == values && key(cell) == *column)
             };
-            let label = |cell: &Cell| {
+            let label = |cell: &GridResult| {
                 let star = if cell.broken() > 0 { " *" } else { "" };
                 let text = format!("{}{star}", short_or_none(cell.mean()));
                 if Some(&cell.point) == chosen { format!("**{text}**") } else { text }
             };
-            let shade = |cell: &Cell| {
+            let shade = |cell: &GridResult| {
                 Some(((cell.mean()? - low) / (high - low).max(1e-300)).clamp(0.0, 1.0))
             };
-            let cells: Vec<Option<&Cell>> = columns.iter().map(at).collect();
+            let cells: Vec<Option<&GridResult>> = columns.iter().map(at).collect();
             let text = cells.iter().map(|cell| cell.map(label).unwrap_or_default());
             table.push(values.iter().map(named).chain(text));
             let shades = cells.iter().map(|cell| cell.and_then(shade));
@@ -430,7 +430,7 @@ mod tests {
     use super::*;
 
     fn space() -> SearchSpace {
-        let axis = |flag, values: &[f64]| Axis {
+        let axis = |flag, values: &[f64]| SearchAxis {
             flag,
             values: values.iter().copied().map(Some).collect(),
         };
@@ -444,7 +444,7 @@ mod tests {
         let cell = |&(scale, scores): &(f64, [f64; 2])| {
             let scores = scores.map(|x| Some(x).filter(|x| x.is_finite())).to_vec();
             let point = vec![Some(scale), None, Some(1.0)];
-            Cell { fine: false, point, scores, successes: 0, seconds: 1.0 }
+            GridResult { fine: false, point, scores, successes: 0, seconds: 1.0 }
         };
         let mut sweep = Sweep::new(space(), ["error", ""], vec![TRAINING_SEED]);
         sweep.cells = cells.iter().map(cell).collect();
@@ -472,7 +472,7 @@ mod tests {
     fn values_lie_between_the_neighbours_and_go_on_beyond_an_end() {
         let around = |coarse: &[f64], best| {
             let values = coarse.iter().copied().map(Some).collect();
-            let found = Axis { flag: "x", values }.around(Some(best));
+            let found = SearchAxis { flag: "x", values }.around(Some(best));
             found.into_iter().flatten().collect::<Vec<_>>()
         };
         let coarse = [0.01, 0.1, 10.0];

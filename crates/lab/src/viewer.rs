@@ -1,7 +1,8 @@
 //! A mesh on a page that can be turned, zoomed, and seen through the cameras that saw it.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::json;
 
 use crate::report::{Report, escape, image};
 
@@ -12,11 +13,13 @@ pub(crate) const SCRIPT: &str = include_str!("viewer.js");
 ///
 /// Vertices and faces take 16 characters of the page each: a closed mesh of 200 000 faces makes a page of 5 MB, which opens in a second.
 /// From a million faces on there is only the picture.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Viewer {
     /// Vertices in world units; the page keeps them as f32.
+    #[serde(serialize_with = "positions")]
     pub positions: Vec<[f64; 3]>,
     /// Triangles as indices of `positions`. Both sides are drawn, so their orientation does not matter.
+    #[serde(serialize_with = "faces")]
     pub faces: Vec<[u32; 3]>,
     /// In the order in which the page offers them; there may be none.
     pub views: Vec<ViewerView>,
@@ -26,7 +29,7 @@ pub struct Viewer {
 ///
 /// A point `p` of the world is at `c = rotation · p + translation` in the camera, with x to the right, y down and z ahead, and is seen at
 /// `focal · c.xy / c.z + centre` in the image.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ViewerView {
     /// What the page calls it.
     pub name: String,
@@ -43,6 +46,7 @@ pub struct ViewerView {
     /// Height of the image in pixels.
     pub height: usize,
     /// The target mask as a gray PNG, inside from 128 on. It is stretched over the image, so it may be smaller; empty if there is none.
+    #[serde(rename = "mask", serialize_with = "base64")]
     pub mask_png: Vec<u8>,
     /// What is to be said about the view, such as "intersection over union 0.97, held out".
     pub note: String,
@@ -96,42 +100,30 @@ impl Viewer {
 
     /// JSON that may stand in a script element.
     fn json(&self) -> String {
-        let positions = self.positions.as_flattened().iter();
-        let faces = self.faces.as_flattened().iter();
-        let data = json!({
-            "positions": base64(positions.flat_map(|&x| (x as f32).to_le_bytes())),
-            "faces": base64(faces.flat_map(|index| index.to_le_bytes())),
-            "views": self.views.iter().map(ViewerView::json).collect::<Vec<_>>(),
-        });
         // A name may hold `</script>`; outside of strings, JSON has no such sign.
-        data.to_string().replace('<', "\\u003c")
+        json!(self).to_string().replace('<', "\\u003c")
     }
 }
 
-impl ViewerView {
-    fn json(&self) -> Value {
-        let Self { name, rotation, translation, focal, centre, width, height, mask_png, note } =
-            self;
-        json!({
-            "name": name,
-            "rotation": rotation,
-            "translation": translation,
-            "focal": focal,
-            "centre": centre,
-            "width": width,
-            "height": height,
-            "mask": STANDARD.encode(mask_png),
-            "note": note,
-        })
-    }
+/// Coordinates as f32.
+fn positions<S: Serializer>(positions: &[[f64; 3]], serializer: S) -> Result<S::Ok, S::Error> {
+    let floats = positions.as_flattened().iter().map(|&x| x as f32);
+    base64(&floats.flat_map(f32::to_le_bytes).collect::<Vec<_>>(), serializer)
 }
 
-fn base64(bytes: impl Iterator<Item = u8>) -> String {
-    STANDARD.encode(bytes.collect::<Vec<_>>())
+fn faces<S: Serializer>(faces: &[[u32; 3]], serializer: S) -> Result<S::Ok, S::Error> {
+    let indices = faces.as_flattened().iter();
+    base64(&indices.flat_map(|index| index.to_le_bytes()).collect::<Vec<_>>(), serializer)
+}
+
+fn base64<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&STANDARD.encode(bytes))
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::Value;
+
     use super::*;
 
     const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];

@@ -3,7 +3,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::Parser;
 use softrast_lab::parse::{count, positive, share, whole};
 use softrast_raster::{Rasterizer, TConorm};
-use softrast_softness::Family;
+use softrast_softness::{Family, NameOrFile};
 
 /// Draws soft silhouettes of a mesh and measures what they cost.
 #[derive(Debug, Parser)]
@@ -33,9 +33,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = angle)]
     pub(crate) fov: f64,
 
-    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file
+    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file, taken as at the last step if its scale moves
     #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
-    pub(crate) softness: Choice,
+    pub(crate) softness: NameOrFile<Family>,
 
     /// Scale of a named softness in NDC, NDC² with --squared; by default edges are about half a pixel wide
     #[arg(long, value_name = "X", value_parser = positive)]
@@ -88,29 +88,6 @@ pub(crate) struct Args {
     /// Show no progress
     #[arg(long)]
     pub(crate) quiet: bool,
-}
-
-/// A softness as named on the command line.
-#[derive(Clone, Debug)]
-pub(crate) enum Choice {
-    /// A family with its default parameters.
-    Named(Family),
-    /// A file, not opened yet.
-    File(PathBuf),
-}
-
-impl FromStr for Choice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text.to_ascii_lowercase().ends_with(".json") {
-            return Ok(Self::File(text.into()));
-        }
-        let family = text.parse().map(Self::Named);
-        family.map_err(|unknown: softrast_softness::UnknownFamily| {
-            format!("{unknown}; or a file that ends in .json")
-        })
-    }
 }
 
 /// What the silhouettes should look like.

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use burn::{
     backend::Autodiff,
-    tensor::{DType, ElementConversion, Tensor},
+    tensor::{ElementConversion, Tensor},
 };
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss, project};
 use softrast_softness::EdgeSoftness;
@@ -26,7 +26,7 @@ impl<B: RasterBackend> Fused<B> {
     pub(crate) fn new(scene: &Scene) -> Self {
         let &Scene { size, tolerance, t_conorm, .. } = scene;
         let start = Instant::now();
-        let phi = scene.phi::<B>(DType::F32);
+        let phi = scene.phi::<B>();
         let rasterizer = Rasterizer { size: size.into(), tolerance, t_conorm };
         let silhouette = rasterizer.prepare(&scene.faces, scene.softness, &phi);
         let table = silhouette.table(phi);
@@ -34,16 +34,16 @@ impl<B: RasterBackend> Fused<B> {
             prepare_ms: milliseconds::<B>(start),
             silhouette,
             table,
-            vertices: scene.vertices(DType::F32),
-            orbits: scene.orbits(DType::F32),
-            target: scene.target(DType::F32),
+            vertices: scene.vertices(),
+            orbits: scene.orbits(),
+            target: scene.target(),
         }
     }
 
     /// Pairs that one pass visits, and the share of those which the default tolerance keeps that are not among them.
     pub(crate) fn pairs(&self, scene: &Scene) -> (usize, f64) {
         let rasterizer = Rasterizer { t_conorm: scene.t_conorm, ..Rasterizer::new(scene.size) };
-        let usual = rasterizer.prepare(&scene.faces, scene.softness, &scene.phi::<B>(DType::F32));
+        let usual = rasterizer.prepare(&scene.faces, scene.softness, &scene.phi::<B>());
         let [pairs, kept] = [&self.silhouette, &usual]
             .map(|of| of.pairs(project(self.vertices.clone(), self.orbits.clone())));
         (pairs, kept.saturating_sub(pairs) as f64 / kept.max(1) as f64)

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use burn::{
     backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor},
+    tensor::Tensor,
 };
 use indicatif::ProgressBar;
 use rayon::prelude::*;
@@ -24,10 +24,10 @@ const PART: usize = 1 << 23;
 /// Draws the scene once, and differentiates if it has a target.
 pub(crate) fn step(scene: &Scene, quiet: bool) -> Step {
     let start = Instant::now();
-    let vertices = scene.vertices::<A>(DType::F64).require_grad();
-    let projected = project(vertices.clone(), scene.orbits::<A>(DType::F64));
+    let vertices = scene.vertices::<A>().require_grad();
+    let projected = project(vertices.clone(), scene.orbits::<A>());
     let corners = projected.clone().inner();
-    let phi = || scene.phi::<B>(DType::F64);
+    let phi = || scene.phi::<B>();
     let sums = in_parts(scene, quiet, |part| {
         reference::sums(part, corners.clone(), &scene.softness, scene.t_conorm, phi())
     });
@@ -36,7 +36,7 @@ pub(crate) fn step(scene: &Scene, quiet: bool) -> Step {
     let forward_ms = milliseconds(start);
 
     let start = Instant::now();
-    let loss = scene.target::<A>(DType::F64).map(|target| {
+    let loss = scene.target::<A>().map(|target| {
         let loss = mse_loss(image.clone(), target).mean();
         let upstream = sums.grad(&loss.backward()).expect("the loss depends on the sums");
         let grad = in_parts(scene, quiet, |part| {

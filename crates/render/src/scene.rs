@@ -1,14 +1,14 @@
 use std::{path::Path, sync::Arc};
 
 use anyhow::Context;
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Tensor, backend::Backend};
 use image::{ImageReader, imageops};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, NameOrFile, ScheduledSoftness, Softness, tensor, vector};
 
-use crate::args::{Args, Choice, Target};
+use crate::args::{Args, Target};
 
 /// Everything that a measurement needs, in plain numbers.
 pub(crate) struct Scene {
@@ -68,45 +68,38 @@ impl Scene {
     }
 
     /// The vertices `[1, vertices, 3]`, shared by all views.
-    pub(crate) fn vertices<B: Backend>(&self, dtype: DType) -> Tensor<B, 3> {
-        tensor(&self.vertices, [1, self.vertices.len() / 3, 3], dtype)
+    pub(crate) fn vertices<B: Backend>(&self) -> Tensor<B, 3> {
+        tensor(self.vertices.clone(), [1, self.vertices.len() / 3, 3])
     }
 
     /// The cameras `[views, 4]`.
-    pub(crate) fn orbits<B: Backend>(&self, dtype: DType) -> Tensor<B, 2> {
-        tensor(&self.orbits, [self.views(), 4], dtype)
+    pub(crate) fn orbits<B: Backend>(&self) -> Tensor<B, 2> {
+        tensor(self.orbits.clone(), [self.views(), 4])
     }
 
     /// Parameters of the softness.
-    pub(crate) fn phi<B: Backend>(&self, dtype: DType) -> Tensor<B, 1> {
-        tensor(&self.phi, [self.phi.len()], dtype)
+    pub(crate) fn phi<B: Backend>(&self) -> Tensor<B, 1> {
+        vector(&self.phi)
     }
 
     /// The target, once for each view: `[views, size, size]`.
-    pub(crate) fn target<B: Backend>(&self, dtype: DType) -> Option<Tensor<B, 3>> {
-        let one = tensor(self.target.as_ref()?, [1, self.size, self.size], dtype);
+    pub(crate) fn target<B: Backend>(&self) -> Option<Tensor<B, 3>> {
+        let one = tensor(self.target.clone()?, [1, self.size, self.size]);
         Some(one.expand([self.views(), self.size, self.size]))
     }
 }
 
-fn tensor<B: Backend, const D: usize>(
-    values: &[f64],
-    shape: [usize; D],
-    dtype: DType,
-) -> Tensor<B, D> {
-    Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), dtype))
-}
-
 fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
     match &args.softness {
-        Choice::File(_) if args.scale.is_some() || args.squared => {
+        NameOrFile::File(_) if args.scale.is_some() || args.squared => {
             Err(Error::usage("--scale and --squared are for a named softness: a file has its own"))
         }
-        Choice::File(path) => {
+        NameOrFile::File(path) => {
             let file = ScheduledSoftness::load(path).context("--softness")?;
-            Ok((file.softness, file.phi))
+            // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
+            Ok((file.softness, file.phi_at(1.0, args.size)))
         }
-        &Choice::Named(family) => {
+        &NameOrFile::Name(family) => {
             let softness = EdgeSoftness { family, squared: args.squared };
             let narrow = HALF_PIXEL * 2.0 / args.size as f64;
             let scale = args.scale.unwrap_or(if args.squared { narrow * narrow } else { narrow });

@@ -7,6 +7,7 @@ use std::{fs, path::Path, process::Command};
 use serde_json::Value;
 use softrast_lab::Failure;
 use softrast_mesh::icosphere;
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
 fn mesh(folder: &Path) -> String {
     let path = folder.join("sphere.obj");
@@ -66,6 +67,25 @@ fn a_picture_is_its_own_target() {
     let report = json(&[&mesh, "--size", "40", "--out", out, "--target", out, "--json"]);
     // The picture has 8 bits.
     assert!(report["loss"].as_f64().unwrap() < 1e-5, "{report}");
+}
+
+#[test]
+fn a_softness_file_whose_scale_moves_is_drawn_as_at_its_last_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = mesh(folder.path());
+    let [out, file] = ["sphere.png", "learned.json"].map(|name| folder.path().join(name));
+    let decay = ScheduledSoftness::decay(
+        EdgeSoftness { family: Family::Logistic, squared: false },
+        0.3,
+        0.02,
+    );
+    decay.save(&file).unwrap();
+    let words = |softness: [&str; 2]| {
+        let common = [&mesh, "--size", "32", "--json", "--out", out.to_str().unwrap()];
+        json(&[&common[..], &softness].concat())["mean_alpha"].as_f64().unwrap()
+    };
+    let [of_file, named] = [["--softness", file.to_str().unwrap()], ["--scale", "0.02"]].map(words);
+    assert!((of_file / named - 1.0).abs() < 1e-6, "{of_file}, not {named}");
 }
 
 #[test]

@@ -1,7 +1,10 @@
+use serde::Serialize;
+
 use crate::Tested;
 
 /// A way to fail, made worse level by level. To miss the target is a property of the softness; only numbers that are not finite are a
 /// fault of the program.
+#[derive(Serialize)]
 pub struct Case {
     /// Short and unique, such as `F02`; the letter says what is tested: F the image, G its
     /// gradient, O an optimisation, M learning.
@@ -9,6 +12,7 @@ pub struct Case {
     /// A few words.
     pub name: &'static str,
     /// Whether it belongs to the quick part.
+    #[serde(skip)]
     pub quick: bool,
     /// What is drawn or optimised.
     pub scene: &'static str,
@@ -19,6 +23,7 @@ pub struct Case {
     /// When a trial counts as reached.
     pub target: &'static str,
     /// All levels for one method.
+    #[serde(skip)]
     pub run: fn(&Tested) -> anyhow::Result<Vec<Level>>,
 }
 

@@ -11,7 +11,7 @@ use softrast_meta::{numbers, tensor};
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
 use softrast_softness::ScheduledSoftness;
 
-use crate::flat::{Flat, Random};
+use crate::planar_scene::{PlanarScene, Random};
 
 /// The backend in which the exact answer is found.
 pub type Exact = NdArray<f64>;
@@ -24,11 +24,11 @@ const STEPS: usize = 50;
 
 /// A picture of a scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Drawing<'a> {
+pub struct RenderRequest<'a> {
     /// With what softness; where its scale moves, as at the last step.
     pub softness: &'a ScheduledSoftness,
     /// What is drawn.
-    pub flat: &'a Flat,
+    pub flat: &'a PlanarScene,
     /// Pixels a side.
     pub size: usize,
     /// Largest error of a pixel.
@@ -44,24 +44,24 @@ pub struct Drawn {
     pub gradient: Vec<f64>,
 }
 
-impl<'a> Drawing<'a> {
+impl<'a> RenderRequest<'a> {
     /// At the tolerance of all tasks.
-    pub fn new(softness: &'a ScheduledSoftness, flat: &'a Flat, size: usize) -> Self {
+    pub fn new(softness: &'a ScheduledSoftness, flat: &'a PlanarScene, size: usize) -> Self {
         Self { softness, flat, size, tolerance: Rasterizer::TOLERANCE }
     }
 
     /// As tasks draw it, with the table that a scale that decays leaves behind.
     pub fn fused<B: RasterBackend>(&self) -> Drawn {
-        self.painter::<B>().draw(self.flat, &weights(self.size))
+        self.renderer::<B>().draw(self.flat, &weights(self.size))
     }
 
     /// All that it takes to draw other corners of the same faces; costs more than an image.
-    pub fn painter<B: RasterBackend>(&self) -> Painter<B> {
+    pub fn renderer<B: RasterBackend>(&self) -> Renderer<B> {
         let rasterizer = Rasterizer { tolerance: self.tolerance, ..Rasterizer::new(self.size) };
         let layout = PhiLayout::new(self.softness.clone(), Vec::new(), STEPS, self.size);
         let (phi, faces) = (layout.start(), Some(self.flat.faces.clone()));
         let renderer = ScheduledRenderer::new(layout, &phi, rasterizer, Resolution::Full, faces);
-        Painter { renderer, size: self.size, backend: PhantomData }
+        Renderer { renderer, size: self.size, backend: PhantomData }
     }
 
     /// By the definition, over all pairs, in f64.
@@ -78,16 +78,16 @@ impl<'a> Drawing<'a> {
 }
 
 /// Draws faces wherever their corners are.
-pub struct Painter<B: RasterBackend> {
+pub struct Renderer<B: RasterBackend> {
     renderer: ScheduledRenderer,
     size: usize,
     backend: PhantomData<B>,
 }
 
-impl<B: RasterBackend> Painter<B> {
+impl<B: RasterBackend> Renderer<B> {
     /// The image of `flat`, and the gradient of the sum of its pixels times `weights`
     /// `[size * size]`.
-    pub fn draw(&self, flat: &Flat, weights: &[f64]) -> Drawn {
+    pub fn draw(&self, flat: &PlanarScene, weights: &[f64]) -> Drawn {
         drawn::<B>(flat, self.size, weights, |vertices| {
             self.renderer.at(STEPS).silhouette(vertices)
         })
@@ -95,7 +95,7 @@ impl<B: RasterBackend> Painter<B> {
 }
 
 fn drawn<B: RasterBackend>(
-    flat: &Flat,
+    flat: &PlanarScene,
     size: usize,
     weights: &[f64],
     image: impl FnOnce(Tensor<Autodiff<B>, 3>) -> Tensor<Autodiff<B>, 3>,

@@ -8,8 +8,8 @@
 mod case;
 pub mod cases;
 pub mod drawing;
-pub mod flat;
 mod matrix;
+pub mod planar_scene;
 mod program;
 mod report;
 mod tested;

@@ -28,21 +28,12 @@ pub struct Matrix {
     pub seconds: f64,
 }
 
-/// One case.
+/// One case and what came of it.
 #[derive(Serialize)]
 pub struct Row {
-    /// Short and unique.
-    pub id: &'static str,
-    /// A few words.
-    pub name: &'static str,
-    /// What is drawn or optimised.
-    pub scene: &'static str,
-    /// What changes from level to level.
-    pub perturbation: &'static str,
-    /// What is measured.
-    pub measure: &'static str,
-    /// When a trial counts as reached.
-    pub target: &'static str,
+    /// What is tested, and how.
+    #[serde(flatten)]
+    pub case: &'static Case,
     /// In the order of the methods.
     pub outcomes: Vec<Outcome>,
 }
@@ -93,7 +84,7 @@ pub struct LevelOutcome {
 ///
 /// The threads are plain ones, outside of the pool in which images are drawn: a thread of that pool that waits for an image may begin
 /// another case meanwhile, while it holds what the first needs.
-pub fn run(cases: &[&Case], methods: &[Tested], threads: usize, quiet: bool) -> Matrix {
+pub fn run(cases: &[&'static Case], methods: &[Tested], threads: usize, quiet: bool) -> Matrix {
     let clock = Instant::now();
     let cells: Vec<(&Case, &Tested)> =
         cases.iter().flat_map(|&case| methods.iter().map(move |method| (case, method))).collect();
@@ -115,20 +106,12 @@ pub fn run(cases: &[&Case], methods: &[Tested], threads: usize, quiet: bool) -> 
     std::thread::scope(|scope| (0..threads.max(1)).for_each(|_| drop(scope.spawn(work))));
     bar.finish_and_clear();
     let done = done.into_inner().unwrap_or_default();
-    let row = |case: &&Case| {
+    let row = |&case: &&'static Case| {
         let of_method = |method: &Tested| {
             let found = |(id, o): &&(&str, Outcome)| *id == case.id && o.method == method.name;
             done.iter().find(found).map(|(_, outcome)| outcome.clone())
         };
-        Row {
-            id: case.id,
-            name: case.name,
-            scene: case.scene,
-            perturbation: case.perturbation,
-            measure: case.measure,
-            target: case.target,
-            outcomes: methods.iter().filter_map(of_method).collect(),
-        }
+        Row { case, outcomes: methods.iter().filter_map(of_method).collect() }
     };
     let sum = |of: fn(&Outcome) -> usize| done.iter().map(|(_, outcome)| of(outcome)).sum();
     Matrix {
@@ -145,7 +128,7 @@ impl Matrix {
     pub fn faults(&self) -> Vec<String> {
         let faults = self.rows.iter().flat_map(|row| {
             row.outcomes.iter().filter_map(|outcome| {
-                let head = format!("broken: {} {}, {}", row.id, row.name, outcome.method);
+                let head = format!("broken: {} {}, {}", row.case.id, row.case.name, outcome.method);
                 match (&outcome.failed, outcome.non_finite) {
                     (Some(failed), _) => Some(format!("{head}: {failed}")),
                     (None, 0) => None,

@@ -24,12 +24,12 @@ pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
     report.paragraph(READING);
     report.table(&table(matrix, true));
     for row in &matrix.rows {
-        report.heading(&format!("{}: {}", row.id, row.name));
+        report.heading(&format!("{}: {}", row.case.id, row.case.name));
         report.table(&Table::pairs([
-            ["Scene", row.scene],
-            ["Levels", row.perturbation],
-            ["Measure", row.measure],
-            ["Target", row.target],
+            ["Scene", row.case.scene],
+            ["Levels", row.case.perturbation],
+            ["Measure", row.case.measure],
+            ["Target", row.case.target],
         ]));
         if row.outcomes.iter().all(has_axis) {
             let (plot, caption) = chart(row);
@@ -64,7 +64,7 @@ fn table(matrix: &Matrix, with_levels: bool) -> Table {
             Some(level) => format!("{}, fails: {}", outcome.share(), level.label),
             None => outcome.share(),
         };
-        let name = [row.id, row.name].map(str::to_owned).into_iter();
+        let name = [row.case.id, row.case.name].map(str::to_owned).into_iter();
         table.push(name.chain(row.outcomes.iter().map(cell)));
         let share = |outcome: &Outcome| match outcome.trials {
             0 => Some(0.0),
@@ -104,8 +104,8 @@ fn chart(row: &Row) -> (Plot, &'static str) {
     };
     let value = |level: &LevelOutcome| level.worst.map(|worst| worst.max(LEAST));
     let x = match decades(levels().filter_map(|level| level.at).collect()) {
-        true => Axis::logarithmic(row.perturbation),
-        false => Axis::linear(row.perturbation),
+        true => Axis::logarithmic(row.case.perturbation),
+        false => Axis::linear(row.case.perturbation),
     };
     let (y, caption) = match shares {
         true => (

@@ -3,12 +3,9 @@ use softrast_cli::{EdgeChoice, Preset, Schedule};
 use softrast_lab::Error;
 use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
-use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
+use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family, NameOrFile};
 
-use crate::{
-    Args,
-    args::{DepthSoftnessChoice, NAME},
-};
+use crate::{Args, args::NAME};
 
 /// Width of the soft depth unless the command line names one, in units of the distance between the planes.
 ///
@@ -37,14 +34,14 @@ impl Depth {
     /// If a file cannot be used, flags contradict each other, or weights are not finite.
     pub(crate) fn new(args: &Args, edges: &EdgeChoice) -> anyhow::Result<Self> {
         let softness = match &args.depth_softness {
-            Some(DepthSoftnessChoice::File(path)) => {
+            Some(NameOrFile::File(path)) => {
                 if args.depth_scale.is_some() {
                     return Err(usage("a depth softness file holds its own parameters"));
                 }
                 let file = DepthSoftnessFile::load(path)?;
                 return Self::of_file(path.display().to_string(), file);
             }
-            Some(DepthSoftnessChoice::Named(softness)) => *softness,
+            Some(NameOrFile::Name(softness)) => *softness,
             None => match learned(args, edges) {
                 Some(file) => return Self::of_file("learned".to_owned(), file),
                 None => like_edges(edges),

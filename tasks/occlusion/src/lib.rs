@@ -33,7 +33,7 @@ mod scene;
 mod task;
 mod texture;
 
-pub use args::{Args, DepthSoftnessChoice};
+pub use args::Args;
 pub use error::DepthError;
 pub use instance::Instance;
 pub use problem::Problem;

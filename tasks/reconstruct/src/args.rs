@@ -6,7 +6,7 @@ use softrast_lab::{
     parse::{count, positive, seed, whole},
 };
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, Family, NameOrFile, ScheduledSoftness, Softness};
 
 use crate::{Data, Settings, Width};
 
@@ -102,9 +102,10 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     pub(crate) common: Common,
 
-    /// Softness: the name of a family, such as logistic, gauss or mlp, or a softness file in JSON.
+    /// Softness: the name of a family, such as logistic, gauss or mlp, or a softness file in JSON, which
+    /// begins as at its last step if its scale moves.
     #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
-    pub(crate) softness: String,
+    pub(crate) softness: NameOrFile<Family>,
 
     /// Width of the soft edge before the first step, in NDC (NDC² with --squared); by default that of
     /// earlier papers for the family.
@@ -213,29 +214,31 @@ impl Common {
     }
 }
 
-/// A softness and its first parameters, from a family or a file.
+/// A softness and its first parameters, from a family or a file; of a file whose scale moves those of the
+/// last step.
 ///
 /// # Errors
 ///
-/// If there is no such family, the file cannot be used, or a file and a scale contradict each other.
+/// If the file cannot be used, or it and a scale contradict each other.
 pub(crate) fn softness(
-    text: &str,
+    chosen: &NameOrFile<Family>,
     scale: Option<f64>,
     squared: bool,
 ) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
-    if text.to_ascii_lowercase().ends_with(".json") {
-        if scale.is_some() || squared {
-            let message =
-                "a softness file holds its own parameters: leave out --scale and --squared";
-            return Err(Error::Usage(message.into()).into());
+    match chosen {
+        NameOrFile::File(_) if scale.is_some() || squared => Err(Error::usage(
+            "a softness file holds its own parameters: leave out --scale and --squared",
+        )),
+        NameOrFile::File(path) => {
+            let file = ScheduledSoftness::load(path)?;
+            // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
+            Ok((file.softness, file.phi_at(1.0, crate::SIZE)))
         }
-        let file = ScheduledSoftness::load(text)?;
-        return Ok((file.softness, file.phi));
+        &NameOrFile::Name(family) => {
+            let softness = EdgeSoftness { family, squared };
+            Ok((softness, softness.default_phi(scale.unwrap_or(default_scale(softness)))))
+        }
     }
-    let family: Family = text.parse().map_err(|error| Error::Usage(format!("{error}")))?;
-    let softness = EdgeSoftness { family, squared };
-    let phi = softness.default_phi(scale.unwrap_or(default_scale(softness)));
-    Ok((softness, phi))
 }
 
 /// Scale of a family for the probabilistic sum. Source: docs/notes.md, Reconstruction; families that are not named there
@@ -256,5 +259,21 @@ fn rate(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(x) if x >= 0.0 && f64::is_finite(x) => Ok(x),
         _ => Err("expected 0 or a positive number".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_softness_file_whose_scale_moves_begins_as_at_its_last_step() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("softness.json");
+        let edge = EdgeSoftness { family: Family::Gauss, squared: false };
+        ScheduledSoftness::decay(edge, 0.3, 0.02).save(&path).unwrap();
+        let (found, phi) = softness(&NameOrFile::File(path), None, false).unwrap();
+        assert_eq!(found, edge);
+        assert!((edge.scale(&phi) / 0.02 - 1.0).abs() < 1e-12, "{phi:?}");
     }
 }

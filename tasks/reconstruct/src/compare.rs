@@ -1,6 +1,6 @@
 use anyhow::Context;
 use serde_json::json;
-use softrast_lab::{Error, mean, program::Output, report::Table};
+use softrast_lab::{Error, program::Output, report::Table};
 use softrast_raster::{RasterBackend, TConorm};
 
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
     args::{self, CompareArgs},
     checkpoint,
     program::trained,
-    score::{Score, score},
+    score::{Score, score, with_mean},
     shapes::{self, Split},
     train::CHECKPOINT,
 };
@@ -92,8 +92,9 @@ type Method = (String, (softrast_softness::EdgeSoftness, Vec<f64>), TConorm);
 fn method(text: &str) -> anyhow::Result<Method> {
     let (softness, t_conorm) = text.split_once('+').unwrap_or((text, "probabilistic"));
     let t_conorm = t_conorm.parse::<TConorm>().map_err(|error| Error::Usage(error.to_string()))?;
-    let parsed = args::softness(softness, None, false).with_context(|| format!("method {text}"))?;
-    Ok((text.to_owned(), parsed, t_conorm))
+    let softness =
+        softness.parse().map_err(Error::usage).and_then(|s| args::softness(&s, None, false));
+    Ok((text.to_owned(), softness.with_context(|| format!("method {text}"))?, t_conorm))
 }
 
 /// The table of all methods, and how they were trained.
@@ -102,7 +103,7 @@ fn markdown(args: &CompareArgs, rows: &[Row], command: &str) -> String {
     let classes = classes.iter().map(String::as_str);
     let mut table = Table::new(["voxel IoU"].into_iter().chain(classes).chain(["mean", "minutes"]));
     let mut push = |name: &str, values: &[f64], minutes: String| {
-        let cells = values.iter().copied().chain([mean(values)]).map(|x| format!("{x:.3}"));
+        let cells = with_mean(values).map(|iou| format!("{iou:.3}"));
         table.push([name.to_owned()].into_iter().chain(cells).chain([minutes]));
     };
     push("sphere, not deformed", &score.sphere, String::new());

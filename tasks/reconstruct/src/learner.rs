@@ -9,10 +9,10 @@ use burn::{
     module::{AutodiffModule, Module},
     optim::{Adam, AdamConfig, GradientsParams, Optimizer, adaptor::OptimizerAdaptor},
     record::{FullPrecisionSettings, NamedMpkBytesRecorder, Recorder},
-    tensor::{Tensor, backend::Backend},
+    tensor::Tensor,
 };
 use softrast_raster::RasterBackend;
-use softrast_softness::SoftStep;
+use softrast_softness::{SoftStep, numbers};
 
 use crate::{
     Network, Settings, Template, Time,
@@ -73,7 +73,7 @@ impl<B: RasterBackend> Learner<B> {
 
     /// Parameters of the softness as they stand.
     pub(crate) fn phi(&self) -> Vec<f64> {
-        crate::objective::phi(&self.softness)
+        numbers(self.softness.phi.val())
     }
 
     /// Starts an epoch.
@@ -104,7 +104,7 @@ impl<B: RasterBackend> Learner<B> {
         let smooth = leaf();
         let smoothness = self.objective.smoothness(smooth.clone());
         let of_smoothness = smooth.grad_remove(&mut smoothness.backward());
-        let smoothness = number(smoothness.inner());
+        let smoothness = numbers(smoothness.inner())[0];
         time.smoothness = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -114,7 +114,7 @@ impl<B: RasterBackend> Learner<B> {
         let mut grads = silhouette.backward();
         let of_silhouettes = drawn.grad_remove(&mut grads);
         let of_softness = GradientsParams::from_module(&mut grads, &self.softness);
-        let silhouette = number(silhouette.inner());
+        let silhouette = numbers(silhouette.inner())[0];
         time.rasterizer = clock.elapsed().as_secs_f64();
 
         let clock = Instant::now();
@@ -176,11 +176,6 @@ type Records<B> = (
 type ModuleRecord<B, M> = <M as Module<Autodiff<B>>>::Record;
 type OptimizerRecord<B, M> =
     <OptimizerAdaptor<Adam, M, Autodiff<B>> as Optimizer<M, Autodiff<B>>>::Record;
-
-/// The only number of a tensor.
-fn number<B: Backend>(tensor: Tensor<B, 1>) -> f64 {
-    tensor.into_data().iter::<f64>().next().unwrap_or(f64::NAN)
-}
 
 /// Waits until a tensor is there.
 fn wait<B: RasterBackend>(tensor: &Tensor<Autodiff<B>, 3>) {

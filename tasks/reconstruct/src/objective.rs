@@ -5,7 +5,7 @@ use softrast_mesh::Edges;
 use softrast_raster::{
     RasterBackend, Rasterizer, Silhouette, TConorm, flatness, iou_loss, project,
 };
-use softrast_softness::{EdgeSoftness, SoftStep};
+use softrast_softness::{EdgeSoftness, SoftStep, tensor_on};
 
 use crate::{SIZE, Template, orbit};
 
@@ -92,8 +92,8 @@ pub(crate) fn orbits<B: Backend>(
     device: &B::Device,
 ) -> Tensor<B, 2> {
     let values: Vec<f64> = views.flat_map(orbit).collect();
-    let data = TensorData::new(values.clone(), [values.len() / 4, 4]);
-    Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+    let views = values.len() / 4;
+    tensor_on(values, [views, 4], device)
 }
 
 /// A softness that learns, in the float type of the backend.
@@ -103,11 +103,6 @@ pub(crate) fn soft_step<B: Backend>(
     device: &B::Device,
 ) -> SoftStep<B> {
     SoftStep::new(softness, phi, <B::FloatElem as Element>::dtype(), device)
-}
-
-/// The parameters of a softness as numbers.
-pub(crate) fn phi<B: Backend>(softness: &SoftStep<B>) -> Vec<f64> {
-    softness.phi.val().into_data().iter().collect()
 }
 
 /// Weights of the two terms. Source: docs/notes.md, Reconstruction.
@@ -148,9 +143,8 @@ impl<B: Backend> Smoothness<B> {
         let corners = (0..4).flat_map(|k| edges.hinges.iter().map(move |h| i64::from(h[k])));
         let corners: Vec<i64> = corners.collect();
         let count = corners.len();
-        let dtype = <B::FloatElem as Element>::dtype();
         Self {
-            away: Tensor::from_data(TensorData::new(away, [vertices; 2]), (device, dtype)),
+            away: tensor_on(away, [vertices; 2], device),
             corners: Tensor::from_data(TensorData::new(corners, [count]), device),
         }
     }

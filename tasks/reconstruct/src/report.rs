@@ -4,7 +4,7 @@ use softrast_lab::{
     report::{Report, Table},
 };
 
-use crate::{Epoch, Header, Time};
+use crate::{Epoch, Header, Time, score::with_mean};
 
 /// The page of a training: figures, curves and contact sheets, in one file that needs no other.
 ///
@@ -48,8 +48,7 @@ fn scores(header: &Header, sphere: &[f64]) -> Table {
     let words = ["voxel IoU"].into_iter().chain(header.classes.iter().map(String::as_str));
     let mut table = Table::new(words.chain(["mean"]));
     let mut row = |name: String, values: &[f64]| {
-        let values = values.iter().copied().chain([mean(values)]);
-        table.push([name].into_iter().chain(values.map(|value| format!("{value:.3}"))));
+        table.push([name].into_iter().chain(with_mean(values).map(|iou| format!("{iou:.3}"))));
     };
     row("sphere, not deformed".into(), sphere);
     if let Some(last) = header.epochs.last() {

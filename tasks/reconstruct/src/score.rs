@@ -1,5 +1,6 @@
 use burn::tensor::backend::Backend;
 use rayon::prelude::*;
+use softrast_softness::{numbers, tensor_on};
 
 use crate::{Network, Shapes, Template, VIEWS, Voxels, pairs, template::points};
 
@@ -59,6 +60,11 @@ pub fn score<B: Backend>(
     Ok(score)
 }
 
+/// The values of all classes, and their mean.
+pub(crate) fn with_mean(classes: &[f64]) -> impl Iterator<Item = f64> {
+    classes.iter().copied().chain([softrast_lab::mean(classes)])
+}
+
 /// Which view is the k-th of so many of a shape.
 pub(crate) fn view_of(shape: usize, k: usize, views: usize) -> usize {
     // 7 and 24 have no common factor: neighbours differ, and all views come up.
@@ -73,16 +79,14 @@ pub(crate) fn predict<B: Backend>(
     device: &B::Device,
 ) -> Vec<Vec<[f64; 3]>> {
     let (centre, displacement) = network.forward(pairs::tensor(pictures, device));
-    let planes: Vec<f64> = template.deformed(centre, displacement).into_data().iter().collect();
+    let planes = numbers(template.deformed(centre, displacement));
     planes.chunks(3 * template.vertices()).map(points).collect()
 }
 
 /// The vertices that nothing has moved.
 fn sphere<B: Backend>(template: &Template<B>, device: &B::Device) -> Vec<[f64; 3]> {
-    use burn::tensor::{Element, Tensor};
-    let dtype = <B::FloatElem as Element>::dtype();
-    let centre = Tensor::zeros([1, 3], (device, dtype));
-    let displacement = Tensor::zeros([1, 3, template.vertices()], (device, dtype));
-    let planes: Vec<f64> = template.deformed(centre, displacement).into_data().iter().collect();
-    points(&planes)
+    let count = template.vertices();
+    let displacement = tensor_on(vec![0.0; 3 * count], [1, 3, count], device);
+    let centre = tensor_on(vec![0.0; 3], [1, 3], device);
+    points(&numbers(template.deformed(centre, displacement)))
 }

@@ -1,7 +1,8 @@
 use std::sync::Arc;
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
-use softrast_mesh::{Mesh, icosphere};
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_mesh::icosphere;
+use softrast_softness::tensor_on;
 
 /// A coordinate this near to a plane through the origin, in world units, stays in that plane: its
 /// log-odds would be about minus infinity.
@@ -36,8 +37,7 @@ impl<B: Backend> Template<B> {
         let planes = |of: &dyn Fn(f64) -> f64| {
             let vertices = sphere.positions();
             let values = (0..3).flat_map(|k| vertices.iter().map(move |p| of(RADIUS * p[k])));
-            let data = TensorData::new(values.collect(), [1, 3, vertices.len()]);
-            Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+            tensor_on(values.collect(), [1, 3, vertices.len()], device)
         };
         Self { log_odds: planes(&log_odds), sign: planes(&sign), faces: sphere.faces().into() }
     }
@@ -61,15 +61,6 @@ impl<B: Backend> Template<B> {
         let sign = self.sign.clone();
         let away = sign.clone() - sign.clone() * sign * centre.clone();
         (size * away + centre) * OUTPUT
-    }
-
-    /// The shape with these vertices `[3 * vertices]`, all x first.
-    ///
-    /// # Errors
-    ///
-    /// If a coordinate is not finite.
-    pub fn mesh(&self, planes: &[f64]) -> anyhow::Result<Mesh> {
-        Ok(Mesh::new(points(planes), self.faces.to_vec())?)
     }
 }
 

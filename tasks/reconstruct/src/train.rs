@@ -6,7 +6,7 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use burn::backend::Autodiff;
-use softrast_lab::{Progress, mean};
+use softrast_lab::Progress;
 use softrast_raster::RasterBackend;
 
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
     learner::Learner,
     pairs::Pairs,
     report,
-    score::score,
+    score::{score, with_mean},
     shapes::{self, Split},
     sheet,
 };
@@ -229,9 +229,7 @@ impl Training {
 pub(crate) fn table(classes: &[String], iou: &[f64], sphere: &[f64]) -> String {
     let mut text = format!("{:<14} {:>9} {:>9}", "voxel IoU", "network", "sphere");
     let names = classes.iter().map(String::as_str).chain(["mean"]);
-    let iou = iou.iter().copied().chain([mean(iou)]);
-    let sphere = sphere.iter().copied().chain([mean(sphere)]);
-    for ((name, iou), sphere) in names.zip(iou).zip(sphere) {
+    for ((name, iou), sphere) in names.zip(with_mean(iou)).zip(with_mean(sphere)) {
         text += &format!("\n{name:<14} {iou:>9.3} {sphere:>9.3}");
     }
     text

@@ -18,7 +18,7 @@ use softrast_lab::{
     report::Report,
     write_atomically,
 };
-use softrast_meta::Record;
+use softrast_meta::{Best, Record};
 use softrast_raster::HostBackend;
 use softrast_softness::ScheduledSoftness;
 
@@ -116,7 +116,7 @@ fn write<T: Task>(
         "settings": about["settings"],
         "files": files,
     });
-    let mut text = text::<T>(&result);
+    let mut text = text(learning, log, about);
     text.extend(files.iter().map(|file| line("learned", &file.display().to_string())));
     let mut report = Report::new(T::NAME, T::ABOUT);
     report.stopped(partial.as_deref());
@@ -283,20 +283,24 @@ fn files<T: Task>(
     Ok([Some((name, text)), own].into_iter().flatten().collect())
 }
 
-fn text<T: Task>(result: &Value) -> Vec<String> {
+fn text<T: Task>(
+    learning: &Learning<T, HostBackend>,
+    log: &Log,
+    about: &Map<String, Value>,
+) -> Vec<String> {
+    let progress = learning.progress();
     let mut lines = vec![format!(
         "{}: learned {} parameters of {} in {} outer steps of {} inner ones, {:.1} s",
         T::NAME,
-        result["parameters"],
-        result["softness"].as_str().unwrap_or_default(),
-        result["outer_steps"],
-        result["inner_steps"],
-        result["seconds"].as_f64().unwrap_or_default(),
+        progress.phi.len(),
+        about["softness"].as_str().unwrap_or_default(),
+        log.updates(),
+        about["steps"],
+        progress.seconds,
     )];
-    if let Some(loss) = result["best"]["validation_loss"].as_f64() {
-        let start = short_or_none(result["start_validation_loss"].as_f64());
-        let step = &result["best"]["step"];
-        let best = short(loss);
+    if let Some(Best { step, loss, .. }) = &progress.best {
+        let start = short_or_none(log.start().filter(|loss| loss.is_finite()));
+        let best = short(*loss);
         let losses = format!("{start} at the start, {best} at the best, after {step} updates");
         lines.push(line("validation loss", &losses));
     }

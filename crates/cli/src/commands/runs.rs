@@ -26,8 +26,8 @@ impl<T: Task> Finished<'_, T> {
     pub(super) fn summary(&self, many: bool) -> anyhow::Result<Summary> {
         let Self { experiment, evaluation } = self;
         let mut summary = Summary::new(*experiment, &evaluation.runs, evaluation.seconds, many)?;
-        let (settings, size) = (experiment.settings(), experiment.solve.size);
-        summary.warnings.extend(diagnostics(&settings, size, &evaluation.runs));
+        let (softness, size) = (&experiment.method.softness, experiment.solve.size);
+        summary.warnings.extend(diagnostics(softness, size, &evaluation.runs));
         Ok(summary)
     }
 

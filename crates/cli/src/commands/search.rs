@@ -1,13 +1,14 @@
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use softrast_lab::{
     Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, check_held_out,
     format::exact,
     program::Output,
     report::Report,
     seeds,
-    sweep::{Axis, GridPoint, SearchSpace, Sweep, TRAINING_SEED, rounded},
+    sweep::{GridPoint, SearchAxis, SearchSpace, Sweep, TRAINING_SEED, rounded},
     was_interrupted,
 };
+use softrast_softness::ScheduledSoftness;
 
 use super::{
     ended,
@@ -134,8 +135,8 @@ fn space<T: Task>(
     if is_file && !flags.scales.is_empty() {
         return Err(Error::usage("a softness file holds its own scale: leave out --scales"));
     }
-    let settings = base.settings();
-    let around = if is_file { Vec::new() } else { T::searched_scales(scales_around(&settings)) };
+    let around = || T::searched_scales(scales_around(&base.method.softness, base.solve.size));
+    let around = if is_file { Vec::new() } else { around() };
     let values = |fixed: Option<f64>, listed: &[f64], own: &[f64]| -> Vec<f64> {
         let values = if listed.is_empty() { own } else { listed };
         let mut values = fixed.map_or_else(|| values.to_vec(), |x| vec![x]);
@@ -150,7 +151,7 @@ fn space<T: Task>(
     let [statics, decays] =
         [Schedule::Decay, Schedule::Static].map(|other| method.schedule != Some(other));
     let some = |values: &[f64]| values.iter().copied().map(Some).collect::<Vec<_>>();
-    let axis = |flag, values: Vec<Option<f64>>| Axis { flag, values };
+    let axis = |flag, values: Vec<Option<f64>>| SearchAxis { flag, values };
     let no_end = (statics || scales.is_empty()).then_some(None);
     let some_end = if decays && !scales.is_empty() { some(&ends) } else { Vec::new() };
     let scales = if scales.is_empty() { vec![None] } else { some(&scales) };
@@ -170,16 +171,13 @@ fn space<T: Task>(
     Ok(space)
 }
 
-/// Scales around the numbers `scale` and `scale_end` of some settings.
+/// Scales around the first and the last one of a softness on images of `size` pixels a side.
 ///
 /// They go from one below the narrower of the two to the wider, or two to either side if they are the same. Neighbours are half a decade
 /// apart, as widths in NDC: a decade if `squared` is true.
-fn scales_around(settings: &Map<String, Value>) -> Vec<f64> {
-    let number = |key: &str| settings.get(key).and_then(Value::as_f64).filter(|x| *x > 0.0);
-    let squared = settings.get("squared").and_then(Value::as_bool) == Some(true);
-    let ratio = if squared { RATIO * RATIO } else { RATIO };
-    let Some(scale) = number("scale") else { return Vec::new() };
-    let end = number("scale_end").unwrap_or(scale);
+fn scales_around(softness: &ScheduledSoftness, size: usize) -> Vec<f64> {
+    let [scale, end] = [0.0, 1.0].map(|part| softness.scale_at(part, size));
+    let ratio = if softness.softness.squared { RATIO * RATIO } else { RATIO };
     let (low, high) = (scale.min(end), scale.max(end));
     let steps = ((high / low).ln() / ratio.ln() - 1e-9).ceil().min(STEPS);
     if steps < 1.0 {
@@ -218,19 +216,19 @@ fn all_flags(
 
 #[cfg(test)]
 mod tests {
+    use softrast_softness::{EdgeSoftness, Family};
+
     use super::*;
 
-    fn around(settings: Value) -> Vec<f64> {
-        scales_around(settings.as_object().unwrap())
+    fn around(squared: bool, first: f64, last: f64) -> Vec<f64> {
+        let softness = EdgeSoftness { family: Family::Gauss, squared };
+        scales_around(&ScheduledSoftness::decay(softness, first, last), 64)
     }
 
     #[test]
     fn the_scales_of_the_task_lie_among_those_that_are_tried() {
-        let scales = around(json!({"scale": 0.03, "scale_end": 0.002}));
-        assert_eq!(scales, [0.000811, 0.002, 0.00493, 0.0122, 0.03]);
-        let scales = around(json!({"scale": 0.01, "scale_end": 0.01}));
-        assert_eq!(scales, [0.001, 0.00316, 0.01, 0.0316, 0.1]);
-        let squared = around(json!({"scale": 1e-4, "squared": true}));
-        assert_eq!(squared, [1e-6, 1e-5, 1e-4, 1e-3, 1e-2]);
+        assert_eq!(around(false, 0.03, 0.002), [0.000811, 0.002, 0.00493, 0.0122, 0.03]);
+        assert_eq!(around(false, 0.01, 0.01), [0.001, 0.00316, 0.01, 0.0316, 0.1]);
+        assert_eq!(around(true, 1e-4, 1e-4), [1e-6, 1e-5, 1e-4, 1e-3, 1e-2]);
     }
 }

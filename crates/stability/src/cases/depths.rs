@@ -3,7 +3,7 @@
 use occlusion::{Args, Occlusion};
 use softrast_cli::Variant;
 
-use super::{ORIGINAL, PARAMETER, trials};
+use super::{ORIGINAL, PARAMETER, levels, trials};
 use crate::{Case, Config, Level, Tested};
 
 pub(super) const CASES: &[Case] = &[
@@ -45,29 +45,26 @@ const FRONT: usize = 5;
 const SOLVED: Config = Config { size: 24, runs: 10, ..ORIGINAL };
 
 fn steps(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |steps: usize| {
+    levels([10, 30, 100], |steps: usize| {
         let config = Config { steps: Some(steps), ..SOLVED };
         let trials = trials::<Occlusion>(tested, Args::default(), &config, PARAMETER)?;
         Ok(Level::new(steps as f64, trials))
-    };
-    [10, 30, 100].map(level).into_iter().collect()
+    })
 }
 
 fn depth_scales(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |scale: f64| {
+    levels([1e-3, 1e-2, 0.1, 1.0, 10.0], |scale: f64| {
         let args =
             Args { depth_scale: Some(scale).filter(|_| !tested.is_network()), ..Args::default() };
         let config = Config { steps: Some(60), ..SOLVED };
         Ok(Level::new(scale, trials::<Occlusion>(tested, args, &config, PARAMETER)?))
-    };
-    [1e-3, 1e-2, 0.1, 1.0, 10.0].map(level).into_iter().collect()
+    })
 }
 
 fn eight(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |rate: f64| {
+    levels([0.07, 0.2, 0.7, 2.0, 7.0], |rate: f64| {
         let config = Config { variant: Variant::Transfer, learning_rate: Some(rate), ..SOLVED };
         let trials = trials::<Occlusion>(tested, Args::default(), &config, FRONT)?;
         Ok(Level::new(rate, trials))
-    };
-    [0.07, 0.2, 0.7, 2.0, 7.0].map(level).into_iter().collect()
+    })
 }

@@ -1,9 +1,10 @@
 //! Gradients over the pixel grid, and an outline that depends on how faces are split.
 
+use super::levels;
 use crate::{
     Case, Level, Tested, Trial,
-    drawing::{Drawing, Exact, Single, largest},
-    flat::Flat,
+    drawing::{Exact, RenderRequest, Single, largest},
+    planar_scene::PlanarScene,
 };
 
 pub(super) const CASES: &[Case] = &[
@@ -70,8 +71,8 @@ fn split(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     const FINE: usize = 512;
     let method = tested.at(SCALE);
     let level = |side: usize| {
-        let flat = Flat::grid(side);
-        let drawn = Drawing::new(&method, &flat, FINE).fused::<Single>();
+        let flat = PlanarScene::grid(side);
+        let drawn = RenderRequest::new(&method, &flat, FINE).fused::<Single>();
         // Off the middle, where no edge of a triangle meets the side of the square.
         let row = &drawn.image[FINE * (FINE / 2 + 37)..][..FINE];
         let last = row.iter().rposition(|&a| a >= 0.5).unwrap_or(0);
@@ -88,20 +89,20 @@ fn split(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 
 /// The half-plane left of a line through `offset` on the axis that is turned by `angle` from x: only
 /// this one of the triangle's sides is in view.
-fn half_plane(offset: f64, angle: f64) -> Flat {
+fn half_plane(offset: f64, angle: f64) -> PlanarScene {
     let (sin, cos) = angle.sin_cos();
     let place = |x: f64, y: f64| [cos * x - sin * y, sin * x + cos * y];
-    Flat::triangle([place(-60.0, 0.0), place(offset, 40.0), place(offset, -40.0)])
+    PlanarScene::triangle([place(-60.0, 0.0), place(offset, 40.0), place(offset, -40.0)])
 }
 
 /// Gradients of the sum of all pixels by moving each of these lines, an offset and an angle, to its
 /// right.
 fn pushed(tested: &Tested, scale: f64, lines: &[[f64; 2]]) -> anyhow::Result<Vec<f64>> {
     let method = tested.at(scale);
-    let painter = Drawing::new(&method, &half_plane(0.0, 0.0), FINE).painter::<Exact>();
+    let renderer = RenderRequest::new(&method, &half_plane(0.0, 0.0), FINE).renderer::<Exact>();
     let pushed = |&[offset, angle]: &[f64; 2]| {
         let (sin, cos) = angle.sin_cos();
-        let g = painter.draw(&half_plane(offset, angle), &[1.0; FINE * FINE]).gradient;
+        let g = renderer.draw(&half_plane(offset, angle), &[1.0; FINE * FINE]).gradient;
         [1, 2].into_iter().map(|k| g[3 * k] * cos + g[3 * k + 1] * sin).sum()
     };
     Ok(lines.iter().map(pushed).collect())
@@ -111,20 +112,19 @@ const PIXELS: [f64; 6] = [0.05, 0.1, 0.25, 0.4, 0.5, 1.0];
 
 fn upright(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let lines: Vec<[f64; 2]> = (0..16).map(|k| [0.1 + f64::from(k) / 16.0 * PIXEL, 0.0]).collect();
-    let level = |scale: f64| {
+    levels(PIXELS, |scale: f64| {
         let found = pushed(tested, scale * PIXEL, &lines)?;
         let mean = found.iter().sum::<f64>() / found.len() as f64;
         let most = largest(found.iter().map(|g| g / mean - 1.0));
         Ok(Level::new(scale, vec![Trial::at_most(most, 0.2).with(&found)]))
-    };
-    PIXELS.map(level).into_iter().collect()
+    })
 }
 
 fn turned(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let angle = |k: u32| (2.5 + 5.0 * f64::from(k / 8)).to_radians();
     let lines = (0..80).map(|k| [f64::from(k % 8) / 8.0 * PIXEL, angle(k)]);
     let lines: Vec<[f64; 2]> = lines.collect();
-    let level = |scale: f64| {
+    levels(PIXELS, |scale: f64| {
         let mut found = pushed(tested, scale * PIXEL, &lines)?;
         // As much of the line as the image shows.
         let seen = lines.iter().map(|[_, angle]| angle.cos().max(angle.sin()));
@@ -133,16 +133,17 @@ fn turned(tested: &Tested) -> anyhow::Result<Vec<Level>> {
         let mean = found.iter().sum::<f64>() / n;
         let spread = (found.iter().map(|g| (g / mean - 1.0).powi(2)).sum::<f64>() / n).sqrt();
         Ok(Level::new(scale, vec![Trial::at_most(spread, 0.05).with(&found)]))
-    };
-    PIXELS.map(level).into_iter().collect()
+    })
 }
 
 fn sizes(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let method = tested.at(0.1);
-    let flat = Flat::plain();
+    let flat = PlanarScene::plain();
     let gradient = |size: usize| {
         let share = 1.0 / (size * size) as f64;
-        Drawing::new(&method, &flat, size).painter::<Exact>().draw(&flat, &vec![share; size * size])
+        RenderRequest::new(&method, &flat, size)
+            .renderer::<Exact>()
+            .draw(&flat, &vec![share; size * size])
     };
     let full = gradient(256);
     let level = |size: usize| {
@@ -156,20 +157,19 @@ fn sizes(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 }
 
 fn dead(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let mut flat = Flat::random(14, 60);
+    let mut flat = PlanarScene::random(14, 60);
     flat.corners.chunks_mut(3).for_each(|face| {
         let centre = [0, 1].map(|k| face.iter().map(|p| p[k]).sum::<f64>() / 3.0);
         for corner in face {
             (0..2).for_each(|k| corner[k] = 0.8 * centre[k] + 0.25 * (corner[k] - centre[k]));
         }
     });
-    let level = |pixels: f64| {
+    levels([1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.3, 1.0, 10.0], |pixels: f64| {
         let method = tested.at(pixels * 2.0 / FINE as f64);
-        let drawn = Drawing::new(&method, &flat, FINE).fused::<Single>();
+        let drawn = RenderRequest::new(&method, &flat, FINE).fused::<Single>();
         let faces = drawn.gradient.chunks(9);
         let still = faces.filter(|face| face.iter().all(|&g| g == 0.0)).count();
         let share = still as f64 / flat.faces.len() as f64;
         Ok(Level::new(pixels, vec![Trial::at_most(share, 0.02).with(&drawn.all())]))
-    };
-    [1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.3, 1.0, 10.0].map(level).into_iter().collect()
+    })
 }

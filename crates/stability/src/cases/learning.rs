@@ -8,7 +8,7 @@ use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss};
 use softrast_softness::{EdgeSoftness, ScaleSchedule, ScheduledSoftness};
 
 use super::triangle::at_depth_2;
-use crate::{Case, Level, Tested, Trial, drawing::Exact, flat::Flat};
+use crate::{Case, Level, Tested, Trial, drawing::Exact, planar_scene::PlanarScene};
 
 pub(super) const CASES: &[Case] = &[Case {
     id: "M03",
@@ -34,7 +34,12 @@ pub struct Triangles {
 }
 
 impl Triangles {
-    fn new(softness: &ScheduledSoftness, flat: &Flat, target: Vec<f64>, steps: usize) -> Self {
+    fn new(
+        softness: &ScheduledSoftness,
+        flat: &PlanarScene,
+        target: Vec<f64>,
+        steps: usize,
+    ) -> Self {
         let scale = |step| softness.scale_at(ScaleSchedule::part(step, steps), SIDE);
         let phi = softness.phi_at(0.0, SIDE);
         let phi = tensor::<Exact, 1>(phi.clone(), [phi.len()]);
@@ -64,8 +69,8 @@ pub fn disk() -> Vec<f64> {
 }
 
 /// Three triangles that overlap.
-pub fn three() -> Flat {
-    Flat::loose(vec![
+pub fn three() -> PlanarScene {
+    PlanarScene::loose(vec![
         [-0.7, -0.5, 2.0],
         [0.1, -0.6, 2.0],
         [-0.2, 0.3, 2.0],
@@ -84,7 +89,7 @@ pub type Inner = BilevelProblem<Exact, Triangles, Triangles, Adam>;
 /// Moves triangles to a target `[12, 12]`.
 pub fn problem(
     softness: &ScheduledSoftness,
-    flat: &Flat,
+    flat: &PlanarScene,
     target: Vec<f64>,
     steps: usize,
     adam: Adam,

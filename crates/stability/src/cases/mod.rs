@@ -9,7 +9,7 @@ pub mod triangle;
 
 use softrast_cli::{Task, Variant};
 
-use crate::{Case, Config, Tested, Trial};
+use crate::{Case, Config, Level, Tested, Trial};
 
 /// Softness, in NDC, of cases that do not vary it.
 pub const SCALE: f64 = 0.03;
@@ -39,6 +39,14 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         learning::CASES,
     ];
     parts.into_iter().flatten()
+}
+
+/// The level that each strength of a perturbation makes.
+fn levels<T>(
+    strengths: impl IntoIterator<Item = T>,
+    level: impl FnMut(T) -> anyhow::Result<Level>,
+) -> anyhow::Result<Vec<Level>> {
+    strengths.into_iter().map(level).collect()
 }
 
 /// Solves seeds of a task, one trial each: the metric at `measured` where the hard image is best. It reaches its target if the run is a

@@ -7,7 +7,7 @@ use softrast_inverse::pose::PoseInstance;
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::Orbit;
 
-use super::{ORIGINAL, trials};
+use super::{ORIGINAL, levels, trials};
 use crate::{Case, Config, Descended, Level, Tested, Trial, descend};
 
 pub(super) const CASES: &[Case] = &[
@@ -103,43 +103,38 @@ const SOLVED: Config =
     Config { size: 24, steps: Some(80), learning_rate: Some(1.0), runs: 4, ..ORIGINAL };
 
 fn past_the_optimum(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |scale: f64| {
+    levels([1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7], |scale: f64| {
         let config = Config { scale: Some(scale), ..SOLVED };
         Ok(Level::new(scale, degrees(tested, Range::Near, config)?))
-    };
-    [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7].map(level).into_iter().collect()
+    })
 }
 
 fn sizes(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |size: usize| {
+    levels([8, 16, 32, 64, 128], |size: usize| {
         let config = Config { size, scale: Some(0.02), ..SOLVED };
         Ok(Level::new(size as f64, degrees(tested, Range::Near, config)?))
-    };
-    [8, 16, 32, 64, 128].map(level).into_iter().collect()
+    })
 }
 
 fn rates(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |rate: f64| {
+    levels([1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0], |rate: f64| {
         let config = Config { learning_rate: Some(rate), ..SOLVED };
         Ok(Level::new(rate, degrees(tested, Range::Near, config)?))
-    };
-    [1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0].map(level).into_iter().collect()
+    })
 }
 
 fn ranges(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |range: Range| {
+    levels([Range::Near, Range::Middle, Range::Far], |range: Range| {
         let trials = degrees(tested, range, Config { runs: 8, ..SOLVED })?;
         Ok(Level::named(range.name(), trials))
-    };
-    [Range::Near, Range::Middle, Range::Far].map(level).into_iter().collect()
+    })
 }
 
 fn softness(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |scale: f64| {
+    levels([1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3], |scale: f64| {
         let config = Config { scale: Some(scale), steps: Some(60), runs: 2, ..SOLVED };
         Ok(Level::new(scale, super::with_limit(degrees(tested, Range::Near, config)?, 10.0)))
-    };
-    [1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3].map(level).into_iter().collect()
+    })
 }
 
 /// A ball with a nose, a fin and an ear, so that no two poses look alike.
@@ -212,18 +207,16 @@ fn angle_trials(
 
 fn angles(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let mesh = lopsided()?;
-    let level = |angle: f64| {
+    levels([5.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0], |angle: f64| {
         let start = |direction| instance(DISTANCE, DISTANCE, angle, direction);
         Ok(Level::new(angle, angle_trials(tested, &mesh, start)?))
-    };
-    [5.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0].map(level).into_iter().collect()
+    })
 }
 
 fn distances(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let mesh = lopsided()?;
-    let level = |factor: f64| {
+    levels([0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0], |factor: f64| {
         let start = |direction| instance(DISTANCE, factor * DISTANCE, 20.0, direction);
         Ok(Level::new(factor, angle_trials(tested, &mesh, start)?))
-    };
-    [0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0].map(level).into_iter().collect()
+    })
 }

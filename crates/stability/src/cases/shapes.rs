@@ -7,11 +7,11 @@ use softrast_cli::{EdgeChoice, Task, Variant};
 use softrast_inverse::SolveConfig;
 use softrast_mesh::icosphere;
 
-use super::{HARD, ORIGINAL, trials, with_limit};
+use super::{HARD, ORIGINAL, levels, trials, with_limit};
 use crate::{
     Case, Config, Level, Tested, Trial, descend,
-    drawing::{Drawing, Single},
-    flat::Flat,
+    drawing::{RenderRequest, Single},
+    planar_scene::PlanarScene,
 };
 
 pub(super) const CASES: &[Case] = &[
@@ -99,7 +99,7 @@ fn shape(tested: &Tested, args: Args, config: &Config, limit: f64) -> anyhow::Re
 }
 
 fn spokes(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |width: u32| {
+    levels([1, 2, 4, 6], |width: u32| {
         let folder = tempfile::tempdir()?;
         let path = folder.path().join("target.png");
         let bar = |x: u32| (16 - width.div_ceil(2)..16 + width / 2).contains(&x);
@@ -113,49 +113,44 @@ fn spokes(tested: &Tested) -> anyhow::Result<Vec<Level>> {
         let mut trials = shape(tested, args, &config, f64::INFINITY)?;
         trials.iter_mut().for_each(|trial| trial.value /= empty);
         Ok(Level::new(f64::from(width), with_limit(trials, 0.5)))
-    };
-    [1, 2, 4, 6].map(level).into_iter().collect()
+    })
 }
 
 fn dying(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     const SIDE: usize = 32;
     let problem = Shape2d::new(&triangles(80), Variant::Original, &EdgeChoice::default())?;
-    let level = |scale: f64| {
+    levels([1e-4, 1e-3, 1e-2, 1e-1], |scale: f64| {
         let softness = tested.at(scale);
         let config = SolveConfig { size: SIDE, steps: 60, learning_rate: 0.02 };
         let found = descend(&problem, &[Instance::seeded(0, 80)], softness.clone(), config)?;
         let corners = found.last().chunks(2).map(|p| [p[0], p[1], 1.0]).collect();
-        let flat = Flat::loose(corners);
-        let drawn = Drawing::new(&softness, &flat, SIDE).fused::<Single>();
+        let flat = PlanarScene::loose(corners);
+        let drawn = RenderRequest::new(&softness, &flat, SIDE).fused::<Single>();
         let still = drawn.gradient.chunks(9).filter(|face| face.iter().all(|&g| g == 0.0)).count();
         let share = still as f64 / flat.faces.len() as f64;
         Ok(Level::new(scale, vec![Trial::at_most(share, 0.02).with(&found.numbers)]))
-    };
-    [1e-4, 1e-3, 1e-2, 1e-1].map(level).into_iter().collect()
+    })
 }
 
 fn counts(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |count: usize| {
+    levels([8, 32, 128, 512], |count: usize| {
         let config = Config { scale: Some(0.02), ..SHAPE2D };
         Ok(Level::new(count as f64, shape(tested, triangles(count), &config, 0.1)?))
-    };
-    [8, 32, 128, 512].map(level).into_iter().collect()
+    })
 }
 
 fn rates(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |rate: f64| {
+    levels([1e-4, 1e-3, 1e-2, 3e-2, 0.1, 1.0], |rate: f64| {
         let config = Config { learning_rate: Some(rate), scale: Some(0.02), ..SHAPE2D };
         Ok(Level::new(rate, shape(tested, triangles(80), &config, 0.1)?))
-    };
-    [1e-4, 1e-3, 1e-2, 3e-2, 0.1, 1.0].map(level).into_iter().collect()
+    })
 }
 
 fn scales(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |scale: f64| {
+    levels([1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3], |scale: f64| {
         let config = Config { steps: Some(40), scale: Some(scale), runs: 1, ..SHAPE2D };
         Ok(Level::new(scale, shape(tested, triangles(80), &config, 0.1)?))
-    };
-    [1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3].map(level).into_iter().collect()
+    })
 }
 
 fn airplane(tested: &Tested, config: Config, limit: f64) -> anyhow::Result<Vec<Trial>> {
@@ -174,9 +169,8 @@ fn elevations(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 }
 
 fn softness(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |scale: f64| {
+    levels([1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0], |scale: f64| {
         let config = Config { size: 24, steps: Some(20), scale: Some(scale), runs: 1, ..ORIGINAL };
         Ok(Level::new(scale, airplane(tested, config, 0.6)?))
-    };
-    [1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0].map(level).into_iter().collect()
+    })
 }

@@ -7,11 +7,11 @@ use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Targets};
 use softrast_meta::{numbers, tensor};
 use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, mse_loss};
 
-use super::SCALE;
+use super::{SCALE, levels};
 use crate::{
     Case, Descended, Level, Tested, Trial, descend,
     drawing::{Single, largest},
-    flat::{Flat, Random},
+    planar_scene::{PlanarScene, Random},
 };
 
 pub(super) const CASES: &[Case] = &[
@@ -73,10 +73,10 @@ const TARGET: [[f64; 2]; 3] = [[-0.35, -0.3], [0.35, -0.2], [0.0, 0.4]];
 
 /// The target image of the triangle, hard.
 pub fn target() -> Vec<f64> {
-    hard(&Flat::triangle(TARGET), SIDE)
+    hard(&PlanarScene::triangle(TARGET), SIDE)
 }
 
-fn hard(flat: &Flat, size: usize) -> Vec<f64> {
+fn hard(flat: &PlanarScene, size: usize) -> Vec<f64> {
     let corners = tensor::<Single, 3>(flat.corners.concat(), [1, flat.corners.len(), 3]);
     numbers(hard_silhouette(corners, &flat.faces, size))
 }
@@ -84,7 +84,7 @@ fn hard(flat: &Flat, size: usize) -> Vec<f64> {
 /// Triangles in the image plane that should cover a target; θ is x and y of their corners.
 pub struct Triangles {
     /// What is moved.
-    pub flat: Flat,
+    pub flat: PlanarScene,
     /// `[size, size]`.
     pub target: Vec<f64>,
     /// Of image and target.
@@ -206,50 +206,48 @@ impl Moved {
     pub fn run(self, tested: &Tested, target: &[f64]) -> anyhow::Result<Descended> {
         let Self { scale, distance, direction, steps, learning_rate, loss, factor } = self;
         let (sin, cos) = (std::f64::consts::TAU * (direction as f64 + 0.2) / 6.0).sin_cos();
-        let flat = Flat::triangle(TARGET.map(|[x, y]| [x + distance * cos, y + distance * sin]));
+        let flat =
+            PlanarScene::triangle(TARGET.map(|[x, y]| [x + distance * cos, y + distance * sin]));
         let problem = Triangles { flat, target: target.to_vec(), loss, factor };
         descend(&problem, &[()], tested.at(scale), SolveConfig { size: SIDE, steps, learning_rate })
     }
 }
 
 fn no_overlap(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |distance: f64| {
+    levels([0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4], |distance: f64| {
         let trial = |direction| {
             let end = Moved { distance, direction, ..MOVED }.run(tested, &target())?;
             Ok(Trial::at_most(end.lowest(0), 0.15).with(&end.numbers))
         };
         let trials: anyhow::Result<Vec<Trial>> = (0..6).map(trial).collect();
         Ok(Level::new(distance, trials?))
-    };
-    [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.4].map(level).into_iter().collect()
+    })
 }
 
 fn widths(tested: &Tested) -> anyhow::Result<Vec<Level>> {
-    let level = |scale: f64| {
+    levels([1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0], |scale: f64| {
         let trial = |direction| {
             let end = Moved { scale, distance: 1.0, direction, ..MOVED }.run(tested, &target())?;
             Ok(Trial::at_most(end.lowest(0), 0.15).with(&end.numbers))
         };
         let trials: anyhow::Result<Vec<Trial>> = (0..4).map(trial).collect();
         Ok(Level::new(scale, trials?))
-    };
-    [1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0].map(level).into_iter().collect()
+    })
 }
 
 fn factors(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let run = |factor: f64| Moved { factor, steps: 30, ..MOVED }.run(tested, &target());
     let plain = run(1.0)?;
-    let level = |factor: f64| {
+    levels([1e-8, 1e-6, 1e-4, 1e-2, 1e2, 1e4, 1e8], |factor: f64| {
         let end = run(factor)?;
         let off = end.last().iter().zip(plain.last()).map(|(a, b)| (a - b) / RATE);
         Ok(Level::new(factor, vec![Trial::at_most(largest(off), 0.1).with(&end.numbers)]))
-    };
-    [1e-8, 1e-6, 1e-4, 1e-2, 1e2, 1e4, 1e8].map(level).into_iter().collect()
+    })
 }
 
 fn noise(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let clean = target();
-    let level = |share: f64| {
+    levels([0.0, 0.02, 0.05, 0.1, 0.2], |share: f64| {
         let trial = |seed: u64| {
             let mut random = Random::new(seed);
             let flip = |p: f64| if random.unit() < share { 1.0 - p } else { p };
@@ -258,20 +256,19 @@ fn noise(tested: &Tested) -> anyhow::Result<Vec<Level>> {
                 Moved { distance: 0.2, direction: seed as usize, ..MOVED }.run(tested, &noisy)?;
             let found = end.best(0).chunks(2).map(|p| [p[0], p[1], 2.0]).collect();
             let image = |values: Vec<f64>| tensor::<Single, 3>(values, [1, SIDE, SIDE]);
-            let found = image(hard(&Flat::loose(found), SIDE));
+            let found = image(hard(&PlanarScene::loose(found), SIDE));
             let off = numbers(iou_loss(found, image(clean.clone())))[0];
             Ok(Trial::at_most(off, 0.2).with(&end.numbers))
         };
         let trials: anyhow::Result<Vec<Trial>> = (0..3).map(trial).collect();
         Ok(Level::new(share, trials?))
-    };
-    [0.0, 0.02, 0.05, 0.1, 0.2].map(level).into_iter().collect()
+    })
 }
 
 fn gray(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     /// Places a side that a gray pixel is the mean of.
     const PLACES: usize = 8;
-    let fine = hard(&Flat::triangle(TARGET), PLACES * SIDE);
+    let fine = hard(&PlanarScene::triangle(TARGET), PLACES * SIDE);
     let mean = |pixel: usize| {
         let (row, column) = (pixel / SIDE * PLACES, pixel % SIDE * PLACES);
         let at = |k: usize| fine[(row + k / PLACES) * PLACES * SIDE + column + k % PLACES];
@@ -280,7 +277,7 @@ fn gray(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     let gray = (0..SIDE * SIDE).map(mean).collect();
     let area =
         |p: &[f64]| 0.5 * ((p[2] - p[0]) * (p[5] - p[1]) - (p[4] - p[0]) * (p[3] - p[1])).abs();
-    let level = |(name, target): (&str, Vec<f64>)| {
+    levels([("hard", target()), ("gray", gray)], |(name, target): (&str, Vec<f64>)| {
         let trial = |direction| {
             let moved = Moved { distance: 0.1, direction, learning_rate: 0.005, ..MOVED };
             let end = Moved { loss: Loss::Mse, ..moved }.run(tested, &target)?;
@@ -289,6 +286,5 @@ fn gray(tested: &Tested) -> anyhow::Result<Vec<Level>> {
         };
         let trials: anyhow::Result<Vec<Trial>> = (0..3).map(trial).collect();
         Ok(Level::named(name, trials?))
-    };
-    [("hard", target()), ("gray", gray)].map(level).into_iter().collect()
+    })
 }

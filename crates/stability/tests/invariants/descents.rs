@@ -11,7 +11,7 @@ use stability::{
         triangle::{Loss, MOVED, Moved, Triangles, target},
     },
     descend,
-    flat::Flat,
+    planar_scene::PlanarScene,
 };
 
 use crate::hold_for_the_paper;
@@ -45,7 +45,7 @@ fn a_descent_has_the_same_bits_on_any_number_of_threads() {
     const SIDE: usize = 100;
     hold_for_the_paper(|tested| {
         let target = (0..SIDE * SIDE).map(|k| f64::from(u8::from(k % SIDE < k / SIDE))).collect();
-        let flat = Flat::random(31, 100);
+        let flat = PlanarScene::random(31, 100);
         let problem = Triangles { flat, target, loss: Loss::Mse, factor: 1.0 };
         let config = SolveConfig { size: SIDE, steps: 2, learning_rate: 0.02 };
         let run = |threads: usize| {

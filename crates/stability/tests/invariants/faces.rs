@@ -4,8 +4,8 @@ use softrast_raster::NEAR;
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,
-    drawing::{Drawing, Exact, Single, largest, weights},
-    flat::Flat,
+    drawing::{Exact, RenderRequest, Single, largest, weights},
+    planar_scene::{PlanarScene, Random},
 };
 
 use crate::{Levels, SIZE, against_dense, hold, hold_where_tails_end};
@@ -68,15 +68,15 @@ fn on_edges(tested: &Tested) -> Levels {
     let (a, b) = (-7.0 / 16.0, 5.0 / 16.0);
     let quad = [[a, a], [b, a], [b, b], [a, a], [b, b], [a, b]].map(|[x, y]| [x, y, 2.0]);
     let scenes = [
-        ("corner", Flat::triangle([[a, a], [b, a], [a, b]])),
-        ("diagonal", Flat::loose(quad.into())),
-        ("line", Flat::triangle([[a, a], [-1.0 / 16.0, a], [a, 0.21]])),
+        ("corner", PlanarScene::triangle([[a, a], [b, a], [a, b]])),
+        ("diagonal", PlanarScene::loose(quad.into())),
+        ("line", PlanarScene::triangle([[a, a], [-1.0 / 16.0, a], [a, 0.21]])),
     ];
     against_dense(tested, scenes)
 }
 
 fn slivers(tested: &Tested) -> Levels {
-    let width = |width: f64| Flat::triangle([[-0.7, 0.0], [0.7, 0.1], [0.7, 0.1 + width]]);
+    let width = |width: f64| PlanarScene::triangle([[-0.7, 0.0], [0.7, 0.1], [0.7, 0.1 + width]]);
     let widths = [1e-1, 1e-2, 1e-3, 1e-5, 1e-7, 1e-10, 1e-15];
     against_dense(tested, widths.map(|w| (format!("{w:e}"), width(w))))
 }
@@ -84,9 +84,9 @@ fn slivers(tested: &Tested) -> Levels {
 fn without_area(tested: &Tested) -> Levels {
     let p = [0.1, 0.1];
     let beside = |degenerate: [[f64; 2]; 3]| {
-        let mut corners = Flat::plain().corners;
+        let mut corners = PlanarScene::plain().corners;
         corners.extend(degenerate.map(|[x, y]| [x, y, 2.0]));
-        Flat::loose(corners)
+        PlanarScene::loose(corners)
     };
     let scenes = [
         ("point", [p; 3]),
@@ -97,8 +97,8 @@ fn without_area(tested: &Tested) -> Levels {
 }
 
 fn crossing(tested: &Tested) -> Levels {
-    let one = Flat::plain().corners;
-    let with = |other: [[f64; 3]; 3]| Flat::loose([&one[..], &other].concat());
+    let one = PlanarScene::plain().corners;
+    let with = |other: [[f64; 3]; 3]| PlanarScene::loose([&one[..], &other].concat());
     let scenes = [
         ("cross", with([[-0.5, 0.5, 1.0], [0.6, -0.2, 3.0], [0.4, 0.6, 2.5]])),
         ("share a plane", with([[-0.5, 0.5, 2.0], [0.6, -0.2, 2.0], [0.4, 0.6, 2.0]])),
@@ -109,31 +109,43 @@ fn crossing(tested: &Tested) -> Levels {
 
 fn scaled(tested: &Tested) -> Levels {
     let factors = [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9];
-    against_dense(tested, factors.map(|x| (format!("{x:e}"), Flat::random(6, 8).scaled(x))))
+    against_dense(tested, factors.map(|x| (format!("{x:e}"), PlanarScene::random(6, 8).scaled(x))))
 }
 
 fn winding(tested: &Tested) -> Levels {
     let softness = tested.at(SCALE);
-    let flat = Flat::random(4, 20);
-    let turned =
-        Flat { faces: flat.faces.iter().map(|&[a, b, c]| [c, b, a]).collect(), ..flat.clone() };
+    let flat = PlanarScene::random(4, 20);
+    let turned = PlanarScene {
+        faces: flat.faces.iter().map(|&[a, b, c]| [c, b, a]).collect(),
+        ..flat.clone()
+    };
     let [one, other] =
-        [&flat, &turned].map(|flat| Drawing::new(&softness, flat, SIZE).fused::<Exact>());
+        [&flat, &turned].map(|flat| RenderRequest::new(&softness, flat, SIZE).fused::<Exact>());
     Ok(vec![Level::named(
         "turned",
         vec![Trial::at_most(one.off(&other), 1e-12).with(&other.all())],
     )])
 }
 
+/// The same faces in another order.
+fn permuted(flat: &PlanarScene, seed: u64) -> PlanarScene {
+    let mut random = Random::new(seed);
+    let mut faces = flat.faces.to_vec();
+    for k in (1..faces.len()).rev() {
+        faces.swap(k, (random.unit() * (k + 1) as f64) as usize);
+    }
+    PlanarScene { corners: flat.corners.clone(), faces: faces.into() }
+}
+
 fn order(tested: &Tested) -> Levels {
     let softness = tested.at(SCALE);
-    let flat = Flat::random(5, 40);
-    let single = Drawing::new(&softness, &flat, SIZE).fused::<Single>();
-    let exact = Drawing::new(&softness, &flat, SIZE).fused::<Exact>();
+    let flat = PlanarScene::random(5, 40);
+    let single = RenderRequest::new(&softness, &flat, SIZE).fused::<Single>();
+    let exact = RenderRequest::new(&softness, &flat, SIZE).fused::<Exact>();
     let [mut singles, mut exacts] = [Vec::new(), Vec::new()];
     for seed in 0..4 {
-        let flat = flat.permuted(seed);
-        let drawing = Drawing::new(&softness, &flat, SIZE);
+        let flat = permuted(&flat, seed);
+        let drawing = RenderRequest::new(&softness, &flat, SIZE);
         let [a, b] = [drawing.fused::<Single>(), drawing.fused::<Exact>()];
         let faces = flat.faces.len() as f64;
         let trial = |off: f64, rounding: f64| Trial::at_most(off / (rounding * faces), 2.0);
@@ -145,12 +157,12 @@ fn order(tested: &Tested) -> Levels {
 
 fn behind(tested: &Tested) -> Levels {
     let softness = tested.at(0.1);
-    let painter = Drawing::new(&softness, &Flat::plain(), SIZE).painter::<Single>();
+    let renderer = RenderRequest::new(&softness, &PlanarScene::plain(), SIZE).renderer::<Single>();
     let level = |depth: f64| {
         let trial = |moved: usize| {
-            let mut flat = Flat::plain();
+            let mut flat = PlanarScene::plain();
             flat.corners[..moved].iter_mut().for_each(|corner| corner[2] = depth);
-            let drawn = painter.draw(&flat, &weights(SIZE));
+            let drawn = renderer.draw(&flat, &weights(SIZE));
             let most = if depth >= NEAR { 0.0 } else { largest(drawn.all()) };
             Trial::at_most(most, 0.0).with(&drawn.all())
         };
@@ -161,17 +173,17 @@ fn behind(tested: &Tested) -> Levels {
 
 fn broken(tested: &Tested) -> Levels {
     let softness = tested.at(SCALE);
-    let sound = Flat::plain();
-    let alone = Drawing::new(&softness, &sound, SIZE).fused::<Exact>();
+    let sound = PlanarScene::plain();
+    let alone = RenderRequest::new(&softness, &sound, SIZE).fused::<Exact>();
     let mut corners = sound.corners.clone();
     corners.extend([[0.0, 0.0, 2.0], [0.5, 0.0, 2.0], [0.0, 0.5, 2.0]]);
-    let both = Flat::loose(corners);
-    let painter = Drawing::new(&softness, &both, SIZE).painter::<Exact>();
+    let both = PlanarScene::loose(corners);
+    let renderer = RenderRequest::new(&softness, &both, SIZE).renderer::<Exact>();
     let level = |number: f64| {
         let trial = |axis: usize| {
             let mut flat = both.clone();
             flat.corners[3][axis] = number;
-            let drawn = painter.draw(&flat, &weights(SIZE));
+            let drawn = renderer.draw(&flat, &weights(SIZE));
             Trial::at_most(drawn.off(&alone), 1e-5).with(&drawn.all())
         };
         Level::named(format!("{number:e}"), [0, 1].map(trial).into())

@@ -2,8 +2,8 @@
 
 use stability::{
     Level, Tested, Trial,
-    drawing::{Drawing, Exact, Single, weights},
-    flat::Flat,
+    drawing::{Exact, RenderRequest, Single, weights},
+    planar_scene::PlanarScene,
 };
 
 use crate::{Levels, SIZE, hold};
@@ -27,10 +27,10 @@ fn gradients_of_softnesses_from_1e_12_to_1e3_are_finite() {
 }
 
 fn against_all_pairs(tested: &Tested) -> Levels {
-    let flat = Flat::random(12, 12);
+    let flat = PlanarScene::random(12, 12);
     let level = |scale: f64| {
         let softness = tested.at(scale);
-        let drawing = Drawing::new(&softness, &flat, SIZE);
+        let drawing = RenderRequest::new(&softness, &flat, SIZE);
         let drawn = drawing.fused::<Exact>();
         let off = drawn.gradient_off(&drawing.dense(), 1e-12);
         Ok(Level::new(scale, vec![Trial::at_most(off, 1e-2).with(&drawn.all())]))
@@ -41,13 +41,13 @@ fn against_all_pairs(tested: &Tested) -> Levels {
 fn against_differences(tested: &Tested) -> Levels {
     const STEP: f64 = 1e-6;
     let softness = tested.at(0.1);
-    let painter = Drawing::new(&softness, &Flat::plain(), SIZE).painter::<Exact>();
+    let renderer = RenderRequest::new(&softness, &PlanarScene::plain(), SIZE).renderer::<Exact>();
     let weights = weights(SIZE);
     let level = |seed: u64| {
-        let flat = Flat::random(seed, 1);
-        let drawn = painter.draw(&flat, &weights);
-        let weighed = |flat: &Flat| {
-            let image = painter.draw(flat, &weights).image;
+        let flat = PlanarScene::random(seed, 1);
+        let drawn = renderer.draw(&flat, &weights);
+        let weighed = |flat: &PlanarScene| {
+            let image = renderer.draw(flat, &weights).image;
             image.iter().zip(&weights).map(|(a, w)| a * w).sum::<f64>()
         };
         let mut off = Vec::new();
@@ -68,10 +68,10 @@ fn against_differences(tested: &Tested) -> Levels {
 }
 
 fn ends(tested: &Tested) -> Levels {
-    let flat = Flat::random(13, 12);
+    let flat = PlanarScene::random(13, 12);
     let level = |scale: f64| {
         let softness = tested.at(scale);
-        let drawn = Drawing::new(&softness, &flat, SIZE).fused::<Single>();
+        let drawn = RenderRequest::new(&softness, &flat, SIZE).fused::<Single>();
         let bad = drawn.gradient.iter().filter(|g| !g.is_finite()).count();
         Ok(Level::new(scale, vec![Trial::at_most(bad as f64, 0.0).with(&drawn.all())]))
     };

@@ -19,13 +19,13 @@ use softrast_softness::{Family, Softness};
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,
-    drawing::{Drawing, Exact, Painter, Single, weights},
-    flat::Flat,
+    drawing::{Exact, RenderRequest, Renderer, Single, weights},
+    planar_scene::PlanarScene,
 };
 
 type Levels = anyhow::Result<Vec<Level>>;
 /// What draws some faces in both float types.
-type Painters = (Arc<[[u32; 3]]>, Painter<Exact>, Painter<Single>);
+type Renderers = (Arc<[[u32; 3]]>, Renderer<Exact>, Renderer<Single>);
 
 /// Width and height of small images.
 const SIZE: usize = 16;
@@ -68,18 +68,18 @@ fn hold_one(promise: impl Fn(&Tested) -> Levels, tested: &Tested) {
 /// types.
 fn against_dense<L: Into<String>>(
     tested: &Tested,
-    scenes: impl IntoIterator<Item = (L, Flat)>,
+    scenes: impl IntoIterator<Item = (L, PlanarScene)>,
 ) -> Levels {
     let softness = tested.at(SCALE);
     let weights = weights(SIZE);
-    let mut painters: Option<Painters> = None;
+    let mut renderers: Option<Renderers> = None;
     let mut levels = Vec::new();
     for (label, flat) in scenes {
-        let drawing = Drawing::new(&softness, &flat, SIZE);
+        let drawing = RenderRequest::new(&softness, &flat, SIZE);
         // To choose the knots costs more than an image.
-        let kept = painters.take().filter(|(faces, ..)| *faces == flat.faces);
-        let made = || (flat.faces.clone(), drawing.painter(), drawing.painter());
-        let (_, exact, single) = painters.insert(kept.unwrap_or_else(made));
+        let kept = renderers.take().filter(|(faces, ..)| *faces == flat.faces);
+        let made = || (flat.faces.clone(), drawing.renderer(), drawing.renderer());
+        let (_, exact, single) = renderers.insert(kept.unwrap_or_else(made));
         let exact = exact.draw(&flat, &weights);
         let single = single.draw(&flat, &weights);
         let off = exact.off(&drawing.dense());

@@ -3,8 +3,8 @@
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,
-    drawing::{Drawing, Exact, Single, largest},
-    flat::Flat,
+    drawing::{Exact, RenderRequest, Single, largest},
+    planar_scene::PlanarScene,
 };
 
 use crate::{Levels, SIZE, hold, hold_where_tails_end};
@@ -48,7 +48,7 @@ fn mean_coverage_does_not_depend_on_the_image_size() {
 /// `1 - (1 - s)^count` of one triangle, from the definition.
 fn stacked(tested: &Tested, scale: f64, count: usize) -> anyhow::Result<Vec<f64>> {
     let softness = tested.at(scale);
-    let one = Drawing::new(&softness, &Flat::plain(), SIZE).dense();
+    let one = RenderRequest::new(&softness, &PlanarScene::plain(), SIZE).dense();
     Ok(one.image.iter().map(|a| -((1.0 - a).ln() * count as f64).exp_m1()).collect())
 }
 
@@ -59,7 +59,8 @@ fn worst(found: &[f64], expected: &[f64]) -> f64 {
 fn copies(tested: &Tested) -> Levels {
     let level = |count: usize| {
         let softness = tested.at(0.1);
-        let drawn = Drawing::new(&softness, &Flat::stack(count), SIZE).fused::<Exact>();
+        let drawn =
+            RenderRequest::new(&softness, &PlanarScene::stack(count), SIZE).fused::<Exact>();
         let off = worst(&drawn.image, &stacked(tested, 0.1, count)?);
         Ok(Level::new(count as f64, vec![Trial::at_most(off, 1e-5).with(&drawn.all())]))
     };
@@ -67,11 +68,11 @@ fn copies(tested: &Tested) -> Levels {
 }
 
 fn extremes(tested: &Tested) -> Levels {
-    let far = |x: f64| Flat::triangle([[x, x], [x + 1.0, x], [x, x + 1.0]]);
-    let around = Flat::triangle([[-1e3, -1e3], [1e3, -1e3], [0.0, 2e3]]);
+    let far = |x: f64| PlanarScene::triangle([[x, x], [x + 1.0, x], [x, x + 1.0]]);
+    let around = PlanarScene::triangle([[-1e3, -1e3], [1e3, -1e3], [0.0, 2e3]]);
     let softness = tested.at(SCALE);
-    let level = |(name, flat, expected): (&str, Flat, f64)| {
-        let drawn = Drawing::new(&softness, &flat, SIZE).fused::<Single>();
+    let level = |(name, flat, expected): (&str, PlanarScene, f64)| {
+        let drawn = RenderRequest::new(&softness, &flat, SIZE).fused::<Single>();
         let off = worst(&drawn.image, &vec![expected; SIZE * SIZE]);
         Level::named(name, vec![Trial::at_most(off, 1e-5).with(&drawn.all())])
     };
@@ -83,7 +84,8 @@ fn extremes(tested: &Tested) -> Levels {
 fn stacks(tested: &Tested) -> Levels {
     let level = |count: usize| {
         let softness = tested.at(0.3);
-        let drawn = Drawing::new(&softness, &Flat::stack(count), SIZE).fused::<Single>();
+        let drawn =
+            RenderRequest::new(&softness, &PlanarScene::stack(count), SIZE).fused::<Single>();
         let off = worst(&drawn.image, &stacked(tested, 0.3, count)?);
         let limit = 1e-5 + f64::from(f32::EPSILON) * count as f64;
         Ok(Level::new(count as f64, vec![Trial::at_most(off, limit).with(&drawn.all())]))
@@ -95,8 +97,8 @@ fn haze(tested: &Tested) -> Levels {
     let softness = tested.at(0.01);
     let level = |count: usize| {
         let corners = [[2.0, -0.5, 2.0], [3.0, 0.0, 2.0], [2.0, 0.5, 2.0]];
-        let flat = Flat::loose((0..count).flat_map(|_| corners).collect());
-        let drawn = Drawing::new(&softness, &flat, SIZE).fused::<Single>();
+        let flat = PlanarScene::loose((0..count).flat_map(|_| corners).collect());
+        let drawn = RenderRequest::new(&softness, &flat, SIZE).fused::<Single>();
         let most = largest(drawn.image.iter().copied());
         Level::new(count as f64, vec![Trial::at_most(most, 1e-3).with(&drawn.all())])
     };
@@ -106,8 +108,8 @@ fn haze(tested: &Tested) -> Levels {
 fn crowd(tested: &Tested) -> Levels {
     let softness = tested.at(SCALE);
     let level = |side: usize| {
-        let flat = Flat::grid(side).scaled(0.07 * 2.0 / SIZE as f64);
-        let drawn = Drawing::new(&softness, &flat, SIZE).fused::<Single>();
+        let flat = PlanarScene::grid(side).scaled(0.07 * 2.0 / SIZE as f64);
+        let drawn = RenderRequest::new(&softness, &flat, SIZE).fused::<Single>();
         let sound = drawn.image.iter().filter(|a| (0.0..=1.0).contains(*a)).count();
         let missing = 1.0 - sound as f64 / drawn.image.len() as f64;
         let faces = flat.faces.len() as f64;
@@ -119,7 +121,8 @@ fn crowd(tested: &Tested) -> Levels {
 fn sizes(tested: &Tested) -> Levels {
     let softness = tested.at(0.1);
     let mean = |size: usize| {
-        let image = Drawing::new(&softness, &Flat::plain(), size).fused::<Single>().image;
+        let image =
+            RenderRequest::new(&softness, &PlanarScene::plain(), size).fused::<Single>().image;
         image.iter().sum::<f64>() / image.len() as f64
     };
     let full = mean(1024);

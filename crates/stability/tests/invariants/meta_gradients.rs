@@ -9,7 +9,7 @@ use stability::{
     Level, Tested, Trial,
     cases::learning::{Inner, SIDE, SOFT, Triangles, disk, phi, problem, three},
     drawing::{Exact, largest},
-    flat::Flat,
+    planar_scene::PlanarScene,
 };
 
 use crate::{Levels, hold_for_the_paper};
@@ -42,7 +42,7 @@ fn no_gradient(tested: &Tested) -> Levels {
     let softness = tested.at(SOFT);
     let mut corners = three().corners[..6].to_vec();
     corners[3..].iter_mut().for_each(|p| p[0] += 500.0);
-    let flat = Flat::loose(corners);
+    let flat = PlanarScene::loose(corners);
     let level = |epsilon_root: f64| {
         let adam = Adam { epsilon_root, ..Adam::new(0.01) };
         let problem = problem(&softness, &flat, disk(), 30, adam);

@@ -8,8 +8,8 @@ use softrast_softness::{ScheduledSoftness, Softness};
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,
-    drawing::{Drawing, Exact, Single, largest},
-    flat::Flat,
+    drawing::{Exact, RenderRequest, Single, largest},
+    planar_scene::PlanarScene,
 };
 
 use crate::{Levels, SIZE, hold};
@@ -55,10 +55,10 @@ fn meshes_with_what_is_no_number_are_refused() {
 
 fn culling(tested: &Tested) -> Levels {
     let softness = tested.at(0.05);
-    let flat = Flat::random(8, 30);
-    let dense = Drawing::new(&softness, &flat, SIZE).dense();
+    let flat = PlanarScene::random(8, 30);
+    let dense = RenderRequest::new(&softness, &flat, SIZE).dense();
     let level = |tolerance: f64| {
-        let drawing = Drawing { tolerance, ..Drawing::new(&softness, &flat, SIZE) };
+        let drawing = RenderRequest { tolerance, ..RenderRequest::new(&softness, &flat, SIZE) };
         let drawn = drawing.fused::<Exact>();
         let limit = if tolerance < 1e-6 { 1.5 } else { 1.0 };
         let off = drawn.off(&dense) / tolerance;
@@ -92,10 +92,10 @@ fn viewed<B: RasterBackend>(softness: &ScheduledSoftness, mesh: &Mesh, factor: f
 }
 
 fn softness(tested: &Tested) -> Levels {
-    let flat = Flat::random(9, 12);
+    let flat = PlanarScene::random(9, 12);
     let level = |scale: f64| {
         let softness = tested.at(scale);
-        let drawing = Drawing::new(&softness, &flat, SIZE);
+        let drawing = RenderRequest::new(&softness, &flat, SIZE);
         let off = drawing.fused::<Exact>().off(&drawing.dense());
         let single = drawing.fused::<Single>();
         Ok(Level::new(scale, vec![Trial::at_most(off, 1e-5).with(&single.all())]))
@@ -128,7 +128,7 @@ fn parameters(tested: &Tested) -> Levels {
     let edge = softness.softness;
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("softness.json");
-    let flat = Flat::random(10, 12);
+    let flat = PlanarScene::random(10, 12);
     // Of families other than the network a parameter is a logarithm or a shift.
     let big = if edge.parameters() > 3 { 1e4 } else { 60.0 };
     let small = if edge.parameters() > 3 { -1.0 } else { -60.0 };
@@ -154,7 +154,7 @@ fn parameters(tested: &Tested) -> Levels {
         }
         .save(&path)?;
         let softness = ScheduledSoftness::load(&path)?;
-        let single = Drawing::new(&softness, &flat, SIZE).fused::<Single>();
+        let single = RenderRequest::new(&softness, &flat, SIZE).fused::<Single>();
         let outside = single.image.iter().filter(|a| !(0.0..=1.0).contains(*a)).count();
         let share = outside as f64 / single.image.len() as f64;
         Ok(Level::named(name, vec![Trial::at_most(share, 0.0).with(&single.all())]))

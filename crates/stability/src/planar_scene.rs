@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 /// Triangles in the image: x and y in NDC, and the depth.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Flat {
+pub struct PlanarScene {
     /// Corners of the faces.
     pub corners: Vec<[f64; 3]>,
     /// Three corners each.
     pub faces: Arc<[[u32; 3]]>,
 }
 
-impl Flat {
+impl PlanarScene {
     /// Loose triangles, three corners each.
     pub fn loose(corners: Vec<[f64; 3]>) -> Self {
         let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
@@ -69,17 +69,6 @@ impl Flat {
             p[1] *= factor;
         });
         self
-    }
-
-    /// The same faces in another order.
-    #[must_use]
-    pub fn permuted(&self, seed: u64) -> Self {
-        let mut random = Random::new(seed);
-        let mut faces = self.faces.to_vec();
-        for k in (1..faces.len()).rev() {
-            faces.swap(k, (random.unit() * (k + 1) as f64) as usize);
-        }
-        Self { corners: self.corners.clone(), faces: faces.into() }
     }
 }
 

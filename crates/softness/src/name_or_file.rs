@@ -1,0 +1,42 @@
+use std::{fmt, path::PathBuf, str::FromStr};
+
+/// A softness as a command line says it, `NAME|FILE.json`: a [`Family`](crate::Family) or a
+/// [`DepthSoftness`](crate::DepthSoftness) by its name, or a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NameOrFile<T> {
+    /// By its name.
+    Name(T),
+    /// A file, not opened yet. Its name ends in `.json`.
+    File(PathBuf),
+}
+
+impl<T: FromStr<Err: fmt::Display>> FromStr for NameOrFile<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.to_ascii_lowercase().ends_with(".json") {
+            return Ok(Self::File(text.into()));
+        }
+        let named = text.parse().map(Self::Name);
+        named.map_err(|unknown| format!("{unknown}; or a file that ends in .json"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DepthSoftness, Family};
+
+    #[test]
+    fn what_ends_in_json_is_a_file_and_all_else_a_name() {
+        assert_eq!("gauss".parse(), Ok(NameOrFile::Name(Family::Gauss)));
+        assert_eq!("depth_mlp".parse(), Ok(NameOrFile::Name(DepthSoftness::Mlp)));
+        assert_eq!("a/B.JSON".parse(), Ok(NameOrFile::<Family>::File("a/B.JSON".into())));
+        let message = "soft".parse::<NameOrFile<Family>>().unwrap_err();
+        assert!(
+            message.starts_with("unknown softness \"soft\"; known are logistic, "),
+            "{message}"
+        );
+        assert!(message.ends_with("; or a file that ends in .json"), "{message}");
+    }
+}
