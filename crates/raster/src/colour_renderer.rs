@@ -25,7 +25,8 @@ const BEHIND: f64 = 1e-3;
 ///
 /// No pixel is off by more than the tolerance times the range of what is shown, in exact arithmetic: tables of both softnesses are made to
 /// measure, and what is left out of a pixel is bounded by the background's weight. In floats of 32 bits, logarithms of weights have an error
-/// of 1e-7 of themselves.
+/// of 1e-7 of themselves. An edge softness that is 0 from some distance on is known to 1e-11, so its background should weigh no less than
+/// 1e-6 of the nearest faces. One that never comes to be negligible, as the network, has every face drawn at every pixel.
 ///
 /// Limits: as the edge softness narrows, faces count only where they cover a pixel; as the depth softness narrows too, the
 /// nearest one alone: the hard image. The faces' share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`, which is not the coverage of a silhouette but one that

@@ -212,7 +212,6 @@ mod tests {
                     LogCurve::measured::<NdArray<f64>>(softness, &phi, precision, &device);
                 // Where the law of this one begins, it rises faster than knots follow.
                 let most = if family == Family::GammaForward { 200.0 } else { 1.0 };
-                println!("{family} {squared} {floor:e}: {error} {:?}", curve.grid);
                 assert!(
                     error <= most,
                     "{family}, squared {squared}: {error} with {:?}",

@@ -48,3 +48,8 @@ pub(crate) fn floor(edge: &EdgeSoftness) -> f64 {
     let limit = f64::from(limit.into_scalar());
     if (limit - OPAQUE.ln()).abs() < 1e-3 { OPAQUE } else { 0.0 }
 }
+
+/// The logarithm of an edge softness from which on it counts, above its floor by more than rounding leaves; minus infinity without a floor.
+pub(crate) fn counts_from(floor: f64) -> f64 {
+    (floor / (1.0 - NOTHING)).ln()
+}

@@ -456,3 +456,19 @@ fn a_wide_tolerance_leaves_something_out() {
     case.tolerance = 0.1;
     assert!(error_at(&case) > 1e-6);
 }
+
+#[test]
+fn a_softness_that_ends_leaves_the_rest_to_a_background_that_weighs_next_to_nothing() {
+    for family in [Family::Uniform, Family::Wigner, Family::ExpForward] {
+        let edge = EdgeSoftness { family, squared: false };
+        let phi = [edge.default_phi(0.05), EXP.default_phi(0.1)];
+        let mut case = Case::random(6, 12, weighting(edge, EXP), phi);
+        (case.background[3], case.tolerance) = (-1000.0, 1e-6);
+        let [found, exact] = [true, false].map(|way| numbers(case.image(case.inputs::<B>(), way)));
+        let share = &exact[3 * PIXELS..];
+        assert!(share.contains(&0.0) && share.iter().any(|&share| share > 0.999), "{family}");
+        for (a, b) in found.iter().zip(&exact) {
+            assert!((a - b).abs() < 1e-3, "{family}: {a} {b}");
+        }
+    }
+}

@@ -6,7 +6,7 @@ use super::{Scene, between, chunks, corners, edge, lesser, places};
 use crate::{
     Attributes, Background, NEAR, Weighting,
     kernel::{FAR_AWAY, blend::AREA},
-    weighting::{FARTHEST_SEEN, NOTHING, floor},
+    weighting::{FARTHEST_SEEN, counts_from, floor},
 };
 
 /// Stands for the logarithm of a weight of 0.
@@ -48,16 +48,17 @@ pub fn blended<B: Backend>(
         let values = attributes.values.clone().narrow(0, if own { view } else { 0 }, 1);
         let log_edge = weighting.edge.log_value(phi[0].clone(), points.distance.clone());
         let log_depth = weighting.log_weight_of_depth(phi[1].clone(), points.depth.clone());
-        let hidden = points.hidden.clone().expand(log_edge.dims());
-        let log_depth = log_depth.mask_fill(hidden, HIDDEN);
+        // What does not count is not even compared, so that it makes nothing else vanish.
+        let nothing = log_edge.clone().lower_equal_elem(counts_from(floor));
+        let nothing = nothing.bool_or(points.hidden.clone().expand(log_edge.dims()));
+        let log_depth = log_depth.mask_fill(nothing, HIDDEN);
         let log_weight = log_edge + log_depth.clone();
         let behind = background.log_weight.clone().reshape([1, 1, 1]);
         let largest = log_weight.clone().detach().max_dim(2);
         let largest = largest.clone().max_pair(behind.clone().detach().expand(largest.dims()));
         let weight = (log_weight - largest.clone()).exp();
         let rest = (log_depth - largest.clone()).exp() * floor;
-        let nothing = rest.clone().greater_equal(weight.clone() * (1.0 - NOTHING));
-        let weight = (weight - rest).mask_fill(nothing, 0.0) * (1.0 - floor).recip();
+        let weight = (weight - rest) * (1.0 - floor).recip();
         let behind = (behind - largest).exp();
         let per_total = (weight.clone().sum_dim(2) + behind.clone()).recip();
         let share = weight * per_total.clone();

@@ -29,7 +29,7 @@ use super::{
     table::Grid,
     walk::{Scene, has_avx2},
 };
-use crate::ImageSize;
+use crate::{ImageSize, weighting::counts_from};
 
 type Float<T> = real::Float<T>;
 
@@ -102,6 +102,7 @@ impl<'a, F: float::Float> Inputs<'a, F> {
             near: F::from_f64(self.planes[0]),
             per_range: F::from_f64((self.planes[1] - self.planes[0]).recip()),
             floor: F::from_f64(self.floor),
+            counts_from: F::from_f64(counts_from(self.floor)),
             background: [self.background, tangents[3]],
         }
     }
@@ -119,6 +120,8 @@ struct Blend<'a, T: Real> {
     near: Float<T>,
     per_range: Float<T>,
     floor: Float<T>,
+    /// Logarithm of an edge softness from which on it counts.
+    counts_from: Float<T>,
     background: [&'a [Float<T>]; 2],
 }
 

@@ -18,10 +18,12 @@ use crate::kernel::{
     table,
     walk::Place,
 };
-use crate::weighting::NOTHING;
 
 /// Numbers of a face that a gradient has beside those of its attributes: x and y of three corners, then their depths.
 pub(super) const OF_CORNERS: usize = 9;
+
+/// Stands for the logarithm of a weight of 0.
+const HIDDEN: f64 = -1e30;
 
 /// A face of a band, in all lanes.
 pub(super) struct Shown<T: Real> {
@@ -191,7 +193,7 @@ impl<T: Real> Blend<'_, T> {
         }
         let rest = T::Lanes::splat(Float::<T>::ONE / (Float::<T>::ONE - self.floor));
         let floor = T::exponential(by_depth).scale(T::Lanes::splat(self.floor));
-        let some = floor.value().less(whole.value() * splat(1.0 - NOTHING));
+        let some = T::Lanes::splat(self.counts_from).less(pair.log_edge.value());
         [(whole - floor).scale(rest).masked(some), whole.scale(rest).masked(some)]
     }
 }
@@ -203,8 +205,11 @@ pub(super) struct Largest<'a, T: Real> {
 
 impl<T: Real> Visitor<T> for Largest<'_, T> {
     #[inline(always)]
-    fn pair(&mut self, _: &Blend<T>, _: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
-        self.largest.raise(at, (pair.log_edge + pair.by_depth.log()).value());
+    fn pair(&mut self, blend: &Blend<T>, _: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+        let log = (pair.log_edge + pair.by_depth.log()).value();
+        // A face that does not count must make nothing else vanish.
+        let some = T::Lanes::splat(blend.counts_from).less(pair.log_edge.value());
+        self.largest.raise(at, <T::Lanes as Lanes>::pick(some, log, splat(HIDDEN)));
     }
 }
 
