@@ -1,5 +1,6 @@
 //! What the tests that cross crates share: workloads with known results, small problems, tensors; and the examples of the pages.
 
+mod colours;
 mod known_row;
 mod outputs;
 mod paper_mesh;
@@ -8,6 +9,7 @@ mod tensors;
 mod waves;
 mod workload;
 
+pub use colours::colours;
 pub use known_row::KnownRow;
 pub use outputs::{Outputs, outputs};
 pub use paper_mesh::paper_mesh;

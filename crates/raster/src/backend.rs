@@ -208,7 +208,7 @@ pub fn profile_sum<B: RasterBackend, const D: usize>(
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
     let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
-    of_primitive(B::run(&FusedOp::ProfileSum(op.clone()), &Pass::Forward, inputs))
+    fused(&FusedOp::ProfileSum(op.clone()), inputs)
 }
 
 /// The result of an op that is written for any number. Only where tensors lie on the host.
@@ -216,7 +216,15 @@ pub(crate) fn elementary<B: RasterBackend, const D: usize>(
     op: ElementaryOp,
     inputs: Vec<FloatTensor<B>>,
 ) -> Tensor<B, D> {
-    of_primitive(B::run(&FusedOp::Elementary(op), &Pass::Forward, inputs))
+    fused(&FusedOp::Elementary(op), inputs)
+}
+
+/// The result of an op.
+pub(crate) fn fused<B: RasterBackend, const D: usize>(
+    op: &FusedOp,
+    inputs: Vec<FloatTensor<B>>,
+) -> Tensor<B, D> {
+    of_primitive(B::run(op, &Pass::Forward, inputs))
 }
 
 /// What stands for a tensor below burn's own type.
@@ -252,6 +260,8 @@ impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
             2 => recorded::<B, C, 2>(op, pass, tensors),
             3 => recorded::<B, C, 3>(op, pass, tensors),
             4 => recorded::<B, C, 4>(op, pass, tensors),
+            5 => recorded::<B, C, 5>(op, pass, tensors),
+            6 => recorded::<B, C, 6>(op, pass, tensors),
             many => panic!("no op has {many} inputs"),
         }
     }

@@ -3,8 +3,8 @@
 //! A silhouette is a sum over faces of a one-dimensional function of the signed distance
 //! ([`profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
 //! softness and the T-conorm ([`Profile`]). A [`SoftRenderer`] puts the pieces together;
-//! [`mod@reference`] is the same in plain tensor ops over every pixel-face pair. Scenes of a few faces
-//! that hide one another take their colours from [`blend`].
+//! [`mod@reference`] is the same in plain tensor ops over every pixel-face pair. A [`ColourRenderer`]
+//! draws what faces show, soft by edge and by depth; [`blend`] does so for a few faces of any kind.
 //!
 //! ```
 //! use burn::{backend::NdArray, tensor::Tensor};
@@ -23,28 +23,35 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-raster needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod attributes;
 mod backend;
 mod backend_choice;
 mod camera;
 mod colour;
+mod colour_renderer;
 mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod hard;
 mod image_size;
 mod kernel;
+mod log_curve;
 mod loss;
 mod pinhole;
 mod profile;
 pub mod reference;
 mod silhouette;
+mod soft_blend;
 mod soft_renderer;
 mod t_conorm;
+mod weighting;
 
+pub use attributes::Attributes;
 pub use backend::{ProfileSum, RasterBackend, profile_sum};
 pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
 pub use camera::{NEAR, Orbit, project, vertices, view_rotation};
 pub use colour::{Background, blend, hard_colour, nearness};
+pub use colour_renderer::ColourRenderer;
 #[doc(hidden)]
 pub use fused::{ElementaryOp, FusedOp, Pass};
 #[cfg(feature = "wgpu")]
@@ -57,8 +64,11 @@ pub use loss::{flatness, iou_loss, mse_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
 pub use profile::Profile;
 pub use silhouette::{Rasterizer, Silhouette};
+#[doc(hidden)]
+pub use soft_blend::SoftBlend;
 pub use soft_renderer::SoftRenderer;
 pub use t_conorm::{TConorm, UnknownTConorm};
+pub use weighting::Weighting;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -9,7 +9,7 @@ const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 120];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
 /// Octaves of the distance to the end of the support that a table may resolve, coarsest first, where
 /// cells that are spaced from the edge of the face are not enough.
-const FAR: [u32; 4] = [8, 16, 26, 36];
+pub(crate) const FAR: [u32; 4] = [8, 16, 26, 36];
 /// There, the terms of a second derivative all but cancel; this many bits more keep what is left.
 const SHARPER: u32 = 2;
 /// Stands in for a support that does not end, in NDC.
@@ -40,8 +40,8 @@ const NARROWEST: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     pub(crate) grid: Grid,
-    t_conorm: TConorm,
-    error: f64,
+    pub(crate) t_conorm: TConorm,
+    pub(crate) error: f64,
 }
 
 impl Profile {
@@ -122,52 +122,12 @@ impl Profile {
         };
         let larger = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a.max(c), b.max(d)];
         let [outer, inner] = phi.iter().map(|phi| radii(phi)).fold([0.0; 2], larger);
-        let radius = |r: f64| r.clamp(NARROWEST, EVERYWHERE);
-        let mut grid = Grid {
-            outer: radius(outer),
-            inner: radius(inner),
-            octaves: OCTAVES[0],
-            far: 0,
-            bits: *BITS.start(),
-        };
-        let error = |grid: Grid| {
+        let (grid, reached) = refined([outer, inner], far, |grid: Grid| {
             let of = |&phi: &&[f64]| {
                 interpolation_error::<B>(softness, t_conorm, phi, grid, tolerance, faces, device)
             };
             phi.iter().map(of).fold(Reached::NOTHING, Reached::larger)
-        };
-        // The innermost cell decides the octaves, all others the cells in an octave.
-        for octaves in OCTAVES {
-            grid.octaves = octaves;
-            if error(grid).innermost <= 1.0 {
-                break;
-            }
-        }
-        let refined = |mut grid: Grid, enough: f64| {
-            let mut reached = Reached { innermost: f64::INFINITY, rest: f64::INFINITY };
-            for bits in BITS {
-                grid.bits = bits;
-                reached = error(grid);
-                if reached.rest <= enough {
-                    break;
-                }
-            }
-            (grid, reached)
-        };
-        let (mut grid, mut reached) = refined(grid, 1.0);
-        // Knots are left wanting where the profile rises without bound at the end of its support, or
-        // at a corner in the middle, where more of them at the end are of no use.
-        if let (true, Some(&most)) = (reached.rest > 1.0, far.last()) {
-            let best = error(Grid { far: most, ..grid }).rest;
-            if best < 0.5 * reached.rest {
-                let enough = best.max(1.0);
-                let suffices = |&&far: &&u32| error(Grid { far, ..grid }).rest <= enough;
-                grid.far = *far.iter().find(suffices).unwrap_or(&most);
-                grid = refined(grid, enough).0;
-                grid.bits += SHARPER;
-                reached = error(grid);
-            }
-        }
+        });
         let error = reached.innermost.max(reached.rest) * tolerance / 2.0;
         Self { grid, t_conorm, error }
     }
@@ -268,32 +228,85 @@ impl Profile {
     }
 }
 
+/// A grid with these radii that is fine enough for `error` to be at most 1, or as fine as it may be, and the error.
+pub(crate) fn refined(
+    [outer, inner]: [f64; 2],
+    far: &[u32],
+    error: impl Fn(Grid) -> Reached,
+) -> (Grid, Reached) {
+    let radius = |r: f64| r.clamp(NARROWEST, EVERYWHERE);
+    let mut grid = Grid {
+        outer: radius(outer),
+        inner: radius(inner),
+        octaves: OCTAVES[0],
+        far: 0,
+        bits: *BITS.start(),
+    };
+    // The innermost cell decides the octaves, all others the cells in an octave.
+    for octaves in OCTAVES {
+        grid.octaves = octaves;
+        if error(grid).innermost <= 1.0 {
+            break;
+        }
+    }
+    let finer = |mut grid: Grid, enough: f64| {
+        let mut reached = Reached { innermost: f64::INFINITY, rest: f64::INFINITY };
+        for bits in BITS {
+            grid.bits = bits;
+            reached = error(grid);
+            if reached.rest <= enough {
+                break;
+            }
+        }
+        (grid, reached)
+    };
+    let (mut grid, mut reached) = finer(grid, 1.0);
+    // Knots are left wanting where the profile rises without bound at the end of its support, or
+    // at a corner in the middle, where more of them at the end are of no use.
+    if let (true, Some(&most)) = (reached.rest > 1.0, far.last()) {
+        let best = error(Grid { far: most, ..grid }).rest;
+        if best < 0.5 * reached.rest {
+            let enough = best.max(1.0);
+            let suffices = |&&far: &&u32| error(Grid { far, ..grid }).rest <= enough;
+            grid.far = *far.iter().find(suffices).unwrap_or(&most);
+            grid = finer(grid, enough).0;
+            grid.bits += SHARPER;
+            reached = error(grid);
+        }
+    }
+    (grid, reached)
+}
+
 /// How far interpolation misses its target, as multiples of it.
-struct Reached {
-    innermost: f64,
-    rest: f64,
+pub(crate) struct Reached {
+    pub(crate) innermost: f64,
+    pub(crate) rest: f64,
 }
 
 impl Reached {
-    const NOTHING: Self = Self { innermost: 0.0, rest: 0.0 };
+    pub(crate) const NOTHING: Self = Self { innermost: 0.0, rest: 0.0 };
 
     fn larger(self, other: Self) -> Self {
         Self { innermost: self.innermost.max(other.innermost), rest: self.rest.max(other.rest) }
     }
 }
 
-/// Compares the cubics of a grid with the profile itself at four places in each cell.
-fn interpolation_error<B: Backend>(
+/// A profile and its cubics, at a place between knots.
+pub(crate) struct Sample {
+    pub(crate) exact: f64,
+    pub(crate) interpolated: f64,
+    /// Whether it lies in the innermost cell of its side.
+    pub(crate) innermost: bool,
+}
+
+/// Compares a profile with its cubics at four places in each cell; and what rounding alone makes of a value of 1.
+pub(crate) fn samples<B: Backend>(
     softness: &impl Softness,
     t_conorm: TConorm,
     phi: &[f64],
     grid: Grid,
-    tolerance: f64,
-    faces: usize,
     device: &B::Device,
-) -> Reached {
-    let faces = faces as f64;
-    let excess = t_conorm.slack(tolerance / 2.0) / faces;
+) -> (Vec<Sample>, f64) {
     let dtype = if B::supports_dtype(device, DType::F64) { DType::F64 } else { DType::F32 };
     let tensor = |values: Vec<f64>| {
         let shape = [values.len()];
@@ -318,13 +331,32 @@ fn interpolation_error<B: Backend>(
         }
     }
     let (exact, _) = t_conorm.profile(softness, tensor(phi.to_vec()), tensor(distances));
-    let exact = numbers(exact);
-    let mut reached = Reached::NOTHING;
     let per_side = places.len() * grid.cells();
+    let pairs = numbers(exact).into_iter().zip(interpolated).enumerate();
+    let sample = |(i, (exact, interpolated))| Sample {
+        exact,
+        interpolated,
+        innermost: i % per_side < places.len(),
+    };
+    (pairs.map(sample).collect(), if dtype == DType::F64 { 1e-14 } else { 1e-6 })
+}
+
+/// Compares the cubics of a grid with the profile itself at four places in each cell.
+fn interpolation_error<B: Backend>(
+    softness: &impl Softness,
+    t_conorm: TConorm,
+    phi: &[f64],
+    grid: Grid,
+    tolerance: f64,
+    faces: usize,
+    device: &B::Device,
+) -> Reached {
+    let faces = faces as f64;
+    let excess = t_conorm.slack(tolerance / 2.0) / faces;
+    let (samples, rounding) = samples::<B>(softness, t_conorm, phi, grid, device);
+    let mut reached = Reached::NOTHING;
     let steepest = steepest(t_conorm);
-    // What rounding alone makes of a value.
-    let rounding = if dtype == DType::F64 { 1e-14 } else { 1e-6 };
-    for (i, (exact, interpolated)) in exact.into_iter().zip(interpolated).enumerate() {
+    for Sample { exact, interpolated, innermost } in samples {
         // Either the term itself is right, or the coverage that it alone makes.
         let relative = tolerance / 4.0 + rounding;
         let term = (exact - interpolated).abs() / (relative * exact.abs() + excess / 2.0);
@@ -334,8 +366,7 @@ fn interpolation_error<B: Backend>(
         let moved = covered(interpolated + company) - covered(exact + company);
         let alone = moved.abs() / (relative * covered(exact) + tolerance / (4.0 * faces));
         let error = term.min(alone);
-        let place =
-            if i % per_side < places.len() { &mut reached.innermost } else { &mut reached.rest };
+        let place = if innermost { &mut reached.innermost } else { &mut reached.rest };
         *place = place.max(error);
     }
     reached

@@ -269,17 +269,17 @@ impl SoftRenderer<EdgeSoftness> {
 impl<S: Softness> Prepared<S> {
     /// What draws under parameters `phi`, if their softness is the prepared one stretched.
     fn stretched_to(&self, phi: &[f64]) -> Option<Silhouette<S>> {
-        let softness = self.silhouette.softness();
-        let [before, now] = [&self.phi[..], phi];
-        let factor = softness.scale(now) / softness.scale(before);
-        let stretched = softness.with_scale_values(before, factor);
-        let same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs().max(1.0);
-        if !stretched.iter().zip(now).all(same) {
-            return None;
-        }
-        let widened = softness.width(now) / softness.width(before);
+        let widened = stretch(self.silhouette.softness(), &self.phi, phi)?;
         self.silhouette.stretched(widened)
     }
+}
+
+/// By how much a step with parameters `now` is stretched against one with those `before`, if that is all that they differ by.
+pub(crate) fn stretch(softness: &impl Softness, before: &[f64], now: &[f64]) -> Option<f64> {
+    let factor = softness.scale(now) / softness.scale(before);
+    let stretched = softness.with_scale_values(before, factor);
+    let same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs().max(1.0);
+    stretched.iter().zip(now).all(same).then(|| softness.width(now) / softness.width(before))
 }
 
 impl Table {

@@ -93,6 +93,12 @@ impl DepthSoftness {
         }
     }
 
+    /// What the network gives at nearness 1 and -1, `[2]`, before it is held at [`OPAQUE`]: all that there is to know of it.
+    pub fn mlp_at_ends<B: Backend>(phi: Tensor<B, 1>) -> Tensor<B, 1> {
+        let ends = Tensor::from_data([1.0, -1.0], (&phi.device(), phi.dtype()));
+        network(&phi, ends)
+    }
+
     /// How many of the leading parameters are logarithms.
     fn logarithms(self) -> usize {
         match self {

@@ -4,7 +4,7 @@
 //!
 //! - [`mesh`]: triangle meshes, a careful reader of OBJ, PLY, STL and GLB, generators;
 //! - [`softness`]: soft step functions as burn tensor ops;
-//! - [`raster`]: cameras, silhouettes, losses, exact to second order;
+//! - [`raster`]: cameras, silhouettes, colours, losses, exact to second order;
 //! - [`meta`]: optimisers and inner loops that can be differentiated;
 //! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them.
 //!

@@ -10,7 +10,7 @@ pub use softrast_inverse::{
 pub use softrast_mesh::{Mesh, MeshError};
 pub use softrast_meta::{Adam, MetaGradient, Optimizer};
 pub use softrast_raster::{
-    Orbit, Pinhole, Pinholes, RasterBackend, SoftRenderer, TConorm, hard_silhouette, iou_loss,
-    mse_loss, project, project_pinhole, vertices,
+    Attributes, Background, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, SoftRenderer,
+    TConorm, Weighting, hard_silhouette, iou_loss, mse_loss, project, project_pinhole, vertices,
 };
-pub use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
+pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, ScheduledSoftness, Softness};

@@ -46,6 +46,11 @@ fn a_pose_is_found_from_a_mask() {
 }
 
 #[test]
+fn colours_are_found_from_pictures() {
+    assert!(number_after(&runs("colour"), "mean squared error") < 1e-4);
+}
+
+#[test]
 fn learning_lowers_the_validation_loss() {
     let said = runs("learn");
     let losses: Vec<f64> = said

@@ -2,4 +2,5 @@
 
 mod limits;
 mod second_order;
+mod soft_blend;
 mod threads;

@@ -1,11 +1,11 @@
 //! The same bits on any number of threads, in f32.
 
 use burn::backend::NdArray;
-use softrast_tests::{Outputs, outputs};
+use softrast_tests::{Outputs, colours, outputs};
 
 fn on_threads(count: usize) -> Outputs {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
-    pool.install(outputs::<NdArray<f32>>)
+    pool.install(|| [outputs::<NdArray<f32>>(), colours::<NdArray<f32>>()].concat())
 }
 
 #[test]

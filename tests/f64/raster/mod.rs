@@ -9,6 +9,7 @@ mod images;
 mod pinhole;
 mod pytorch3d;
 mod reference;
+mod soft_blend;
 mod soft_renderer;
 mod threads;
 mod tolerance;

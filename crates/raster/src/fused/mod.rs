@@ -14,7 +14,7 @@ use image::{Coverage, Iou, SquaredError};
 pub(crate) use number::Number;
 
 use crate::{
-    ProfileSum,
+    ProfileSum, SoftBlend,
     kernel::{self, Dual, Float, Inputs},
 };
 
@@ -23,6 +23,9 @@ use crate::{
 pub enum FusedOp {
     /// See [`crate::profile_sum`].
     ProfileSum(ProfileSum),
+    /// See [`crate::ColourRenderer`].
+    #[doc(hidden)]
+    SoftBlend(SoftBlend),
     /// One that is written for any number.
     #[doc(hidden)]
     Elementary(ElementaryOp),
@@ -122,6 +125,7 @@ where
 
     match op {
         FusedOp::ProfileSum(op) => op.run(pass, slices, dims),
+        FusedOp::SoftBlend(op) => op.run(pass, slices, dims),
         FusedOp::Elementary(O) => elementary(&OrbitMatrix, pass, slices, dims),
         FusedOp::Elementary(P) => elementary(&Perspective, pass, slices, dims),
         FusedOp::Elementary(C) => elementary(&Coverage, pass, slices, dims),

@@ -21,9 +21,23 @@ pub(crate) struct View {
     pub(crate) reaches: Vec<Reach>,
     /// Faces that are drawn at all, on the image or beside it.
     pub(crate) drawn: usize,
+    /// How far outside each face reaches, in NDC; nothing where all faces reach as far.
+    pub(crate) radii: Vec<f32>,
 }
 
 impl View {
+    /// Lists faces by the pixels that each reaches, in `count` bands of `rows` each: a power of two.
+    pub(crate) fn of_reaches(
+        reaches: Vec<Reach>,
+        radii: Vec<f32>,
+        count: usize,
+        rows: usize,
+    ) -> Self {
+        let (offsets, entries) = by_band(&reaches, count, rows);
+        let drawn = reaches.iter().filter(|&&reach| reach != Reach::NOTHING).count();
+        Self { offsets, entries, reaches, drawn, radii }
+    }
+
     /// Faces of band `band`.
     pub(crate) fn faces(&self, band: usize) -> &[u32] {
         &self.entries[self.offsets[band] as usize..self.offsets[band + 1] as usize]
@@ -65,7 +79,7 @@ impl Bands {
                 reach_of_faces::<Plain<F>>(&places, faces, radius, size, &mut reaches)
             };
             let (offsets, entries) = by_band(&reaches, count, rows);
-            View { offsets, entries, reaches, drawn }
+            View { offsets, entries, reaches, drawn, radii: Vec::new() }
         };
         let views = vertices.par_chunks(3 * vertices_per_view.max(1)).map(view).collect();
         Self { views, count }

@@ -55,9 +55,9 @@ pub(crate) struct Face<T: Real> {
 }
 
 impl<T: Real> Faces<T> {
-    /// Prepares triangles with these corners (NDC) for pixels no farther than `radius` outside.
+    /// Prepares triangles with these corners (NDC) for pixels no farther outside than the `radius` of each.
     #[inline(always)]
-    pub(crate) fn new(x: [T; 3], y: [T; 3], radius: Float<T>) -> Self {
+    pub(crate) fn new(x: [T; 3], y: [T; 3], radius: T::Lanes) -> Self {
         let zero = splat::<T::Lanes>(0.0);
         let area = (x[1] - x[0]).value() * (y[2] - y[0]).value()
             - (y[1] - y[0]).value() * (x[2] - x[0]).value();
@@ -101,7 +101,7 @@ impl<T: Real> Faces<T> {
             let flat = splat::<T::Lanes>(FLAT * FLAT) * ex * ex;
             let useful = flat.less(ey * ey);
             let tilt = (ex * Lanes::recip(pick(useful, ey, splat(1.0)))).only(useful);
-            let reach = T::Lanes::splat(radius) * (splat::<T::Lanes>(1.0) + tilt * tilt).sqrt();
+            let reach = radius * (splat::<T::Lanes>(1.0) + tilt * tilt).sqrt();
             let bound = x[k].value() - tilt * y[k].value();
             let never = splat::<T::Lanes>(FAR_AWAY);
             let low = pick(ey.less(zero), bound - reach, never.neg());

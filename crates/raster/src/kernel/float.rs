@@ -40,6 +40,8 @@ pub(crate) trait Float:
     fn nearest(self) -> i32;
     /// `e` to this power, to 2 units in the last place.
     fn exp(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self;
     /// Sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
 }
@@ -88,6 +90,10 @@ macro_rules! float {
             #[inline(always)]
             fn exp(self) -> Self {
                 $exp(self)
+            }
+            #[inline(always)]
+            fn ln(self) -> Self {
+                self.ln()
             }
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {

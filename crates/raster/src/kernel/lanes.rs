@@ -60,6 +60,24 @@ pub(crate) trait Lanes:
     fn recip(self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// `e` to this power; see [`Float::exp`].
+    #[inline(always)]
+    fn exp(self) -> Self {
+        let mut numbers = self.array();
+        for i in 0..LANES {
+            numbers[i] = Float::exp(numbers[i]);
+        }
+        Self::of(&numbers)
+    }
+    /// Natural logarithm.
+    #[inline(always)]
+    fn ln(self) -> Self {
+        let mut numbers = self.array();
+        for i in 0..LANES {
+            numbers[i] = Float::ln(numbers[i]);
+        }
+        Self::of(&numbers)
+    }
     /// `-self`.
     fn neg(self) -> Self;
     /// `self` where it is less, else `other`.
@@ -99,6 +117,37 @@ pub(crate) trait Lanes:
     fn rows(table: &[[Self::Float; 4]], at: &Places) -> [Self; 4];
     /// Adds to the rows of a table at some places, lane by lane.
     fn add_to_rows(table: &mut [[Self::Float; 4]], at: &Places, columns: [Self; 4]);
+}
+
+/// Something that is computed with vectors, and compiled for the machines that have better ones.
+pub(crate) trait Work {
+    /// What comes of it.
+    type Output;
+    /// Does it. To be inlined, like all that it calls.
+    fn run(self) -> Self::Output;
+}
+
+/// Does some work with vectors `L`, compiled for AVX2 where they gain from it and this machine has it. Products and sums are
+/// never contracted, so that the bits are the same.
+pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<W: Work>(work: W) -> W::Output {
+            work.run()
+        }
+        if L::NEEDS_AVX2 {
+            // SAFETY: the feature was detected before there were such vectors.
+            #[allow(unsafe_code)]
+            return unsafe { avx2(work) };
+        }
+        if L::GAINS_AVX2 && super::walk::has_avx2() {
+            // SAFETY: the feature was just detected.
+            #[allow(unsafe_code)]
+            return unsafe { avx2(work) };
+        }
+    }
+    work.run()
 }
 
 /// Rows of a table, one for each lane.

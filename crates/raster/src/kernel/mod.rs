@@ -7,6 +7,7 @@
 //! the image and its gradient, dual numbers give both second-order products.
 
 mod bands;
+pub(crate) mod blend;
 mod face;
 mod float;
 mod lanes;
@@ -21,7 +22,7 @@ mod walk;
 
 pub(crate) use float::Float;
 pub(crate) use pairs::pairs;
-pub(crate) use reach::inside_spans;
+pub(crate) use reach::{FAR_AWAY, inside_spans};
 pub(crate) use real::Dual;
 pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};
 pub(crate) use table::Grid;

@@ -142,7 +142,7 @@ mod tests {
         pixels: &[[f64; 2]],
     ) -> (bool, Vec<[(f64, bool); 2]>) {
         let axis = |k: usize| triangle.map(|corner| Plain::splat(F::from_f64(corner[k])));
-        let faces = Faces::<Plain<F>>::new(axis(0), axis(1), F::from_f64(0.1));
+        let faces = Faces::<Plain<F>>::new(axis(0), axis(1), splat(0.1));
         let face = faces.face(0);
         let at = |x: f64| Plain::splat(F::from_f64(x));
         let of = |point: Closest<Plain<F>>| {

@@ -26,6 +26,10 @@ pub(crate) trait Real:
     fn scale(self, factor: Self::Lanes) -> Self;
     /// `1 / self`.
     fn inverse(self) -> Self;
+    /// `e` to this power.
+    fn exponential(self) -> Self;
+    /// Natural logarithm.
+    fn logarithm(self) -> Self;
     /// `yes` where the mask holds, else `no`.
     fn choose(mask: Mask<Self>, yes: Self, no: Self) -> Self;
     /// `self` where the mask holds, else 0.
@@ -85,6 +89,14 @@ impl<L: Lanes> Real for L {
     #[inline(always)]
     fn inverse(self) -> Self {
         Lanes::recip(self)
+    }
+    #[inline(always)]
+    fn exponential(self) -> Self {
+        Lanes::exp(self)
+    }
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        Lanes::ln(self)
     }
     #[inline(always)]
     fn choose(mask: L::Mask, yes: L, no: L) -> Self {
@@ -174,6 +186,15 @@ impl<L: Lanes> Real for Dual<L> {
     fn inverse(self) -> Self {
         let value = Lanes::recip(self.value);
         Self { value, tangent: (value * value * self.tangent).neg() }
+    }
+    #[inline(always)]
+    fn exponential(self) -> Self {
+        let value = Lanes::exp(self.value);
+        Self { value, tangent: value * self.tangent }
+    }
+    #[inline(always)]
+    fn logarithm(self) -> Self {
+        Self { value: Lanes::ln(self.value), tangent: self.tangent * Lanes::recip(self.value) }
     }
     #[inline(always)]
     fn choose(mask: L::Mask, yes: Self, no: Self) -> Self {

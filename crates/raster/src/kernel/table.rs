@@ -114,8 +114,8 @@ impl<F: Float> Lookup<F> {
         self.far > 0
     }
 
-    /// Places of squared distances (not negative; NaN counts as far away) on the inner side where the mask holds. `FAR` is
-    /// [`Lookup::has_far_cells`].
+    /// Places of squared distances (not negative; NaN counts as far away) on the inner side where the mask holds. Without
+    /// `FAR` none may be counted from the far end.
     #[inline(always)]
     pub(crate) fn place<T: Real, const FAR: bool>(&self, distance2: T, inside: Mask<T>) -> Place<T>
     where
@@ -135,7 +135,7 @@ impl<F: Float> Lookup<F> {
         let start = pick(first, splat(0.0), lower);
         let mut rate = pick(first, T::Lanes::splat(self.innermost), inverse_width);
         let mut along = scaled - T::constant(start);
-        if FAR {
+        if FAR && self.far > 0 {
             let z = (one - y).only(y.less(one));
             let (cell, lower, inverse_width) = z.cell(self.far + 1, self.bits);
             let last = T::Lanes::not_positive(cell);

@@ -36,7 +36,7 @@ pub(crate) struct Scene<'a, T: Real> {
     pub(crate) size: ImageSize,
     /// Rows of a band.
     pub(crate) rows: usize,
-    lookup: Lookup<Float<T>>,
+    pub(crate) lookup: Lookup<Float<T>>,
     /// Centres of the columns, with a group more than the image has.
     centres: Vec<Float<T>>,
     /// Centres of the rows, with a vector more.
@@ -80,7 +80,14 @@ impl<T: Real> Place<'_, T> {
         let [dx, dy] = tangents;
         let x = [lanes(&x[0], &dx[0]), lanes(&x[1], &dx[1]), lanes(&x[2], &dx[2])];
         let y = [lanes(&y[0], &dy[0]), lanes(&y[1], &dy[1]), lanes(&y[2], &dy[2])];
-        Faces::new(x, y, Float::<T>::from_f64(scene.grid.outer))
+        let mut radii = [Float::<T>::from_f64(scene.grid.outer); LANES];
+        if !self.view.radii.is_empty() {
+            for lane in 0..LANES {
+                let number = numbers[lane.min(numbers.len() - 1)] as usize;
+                radii[lane] = Float::<T>::from_f64(f64::from(self.view.radii[number]));
+            }
+        }
+        Faces::new(x, y, T::Lanes::of(&radii))
     }
 
     /// The constant outside the support.
@@ -98,6 +105,7 @@ impl<T: Real> Place<'_, T> {
     }
 }
 
+/// Numbers with their tangents.
 #[inline(always)]
 fn lanes<T: Real>(values: &[Float<T>; LANES], tangents: &[Float<T>; LANES]) -> T {
     T::new(T::Lanes::of(values), T::Lanes::of(tangents))
@@ -175,6 +183,13 @@ impl<'a, T: Real> Scene<'a, T> {
     /// Rows of the image that band `band` holds.
     pub(crate) fn band_rows(&self, band: usize) -> Range<usize> {
         band * self.rows..((band + 1) * self.rows).min(self.size.height)
+    }
+
+    /// Centres of a column and those behind it.
+    #[inline(always)]
+    pub(crate) fn centres(&self, column: u32) -> &[Float<T>; GROUP] {
+        let group = &self.centres[column as usize..column as usize + GROUP];
+        group.try_into().expect("a group of columns")
     }
 
     /// Centres of a row of the image and those below it.
@@ -314,7 +329,8 @@ impl<T: Real> Walker<'_, '_, T> {
         [low, high]: &Chunk<Float<T>>,
     ) {
         let face = list.faces[owner / LANES].face(owner % LANES);
-        let px = T::Lanes::of_groups(self.centres(low.column), self.centres(high.column));
+        let centres = |column: u32| self.scene.centres(column);
+        let px = T::Lanes::of_groups(centres(low.column), centres(high.column));
         let py = T::Lanes::of_halves(low.y, high.y);
         let point = closest::<T, SLIVERS>(&face, px, py);
         let Cell { row, t, rate } =
@@ -325,12 +341,6 @@ impl<T: Real> Walker<'_, '_, T> {
             (ring.dx[slot], ring.dy[slot]) = (point.dx, point.dy);
             (ring.weights[slot], ring.rate[slot]) = (point.weights, rate);
         }
-    }
-
-    #[inline(always)]
-    fn centres(&self, column: u32) -> &[Float<T>; GROUP] {
-        let group = &self.scene.centres[column as usize..column as usize + GROUP];
-        group.try_into().expect("a group of columns")
     }
 
     /// Adds `profile - tail` to the pixels of a chunk.

@@ -2,6 +2,7 @@
 //!
 //! Slow (about 1.3 kB of traffic a pair) and simple; every faster path is tested against it.
 
+mod blend;
 mod step;
 
 use burn::{
@@ -11,6 +12,7 @@ use burn::{
 use softrast_softness::Softness;
 
 use crate::{ImageSize, NEAR, TConorm};
+pub use blend::blended;
 pub use step::{iou_loss, mse_loss, orbit_matrices, perspective};
 
 /// Squared edge lengths below this (NDC²) count as a point.
@@ -53,35 +55,49 @@ pub fn signed_distance<B: Backend>(
     let area = cross(between(&a, &b), between(&b, &c));
     let orientation = area.sign().detach();
     let [ab, bc, ca] = [(&a, &b), (&b, &c), (&c, &a)].map(|(from, to)| edge(&p, from, to));
-    let nearest = lesser(lesser(ab.0, bc.0), ca.0);
+    let nearest = lesser(lesser(ab.distance2, bc.distance2), ca.distance2);
     let within = |side: Tensor<B, 3>| (side * orientation.clone()).greater_equal_elem(0.0);
-    let inside = within(ab.1).bool_and(within(bc.1)).bool_and(within(ca.1));
+    let inside = within(ab.side).bool_and(within(bc.side)).bool_and(within(ca.side));
     let flat = orientation.clone().equal_elem(0.0).expand(nearest.dims());
     let inside = inside.bool_and(flat.bool_not());
+    signed(nearest, inside)
+}
+
+/// Signed distances of squared ones.
+fn signed<B: Backend>(
+    distance2: Tensor<B, 3>,
+    inside: Tensor<B, 3, burn::tensor::Bool>,
+) -> Tensor<B, 3> {
     // Selected by the argument, so that neither the root nor its gradient meets 0.
-    let on_edge = nearest.clone().lower_elem(ON_EDGE);
-    let distance = nearest.mask_fill(on_edge.clone(), 1.0).sqrt().mask_fill(on_edge, 0.0);
+    let on_edge = distance2.clone().lower_elem(ON_EDGE);
+    let distance = distance2.mask_fill(on_edge.clone(), 1.0).sqrt().mask_fill(on_edge, 0.0);
     distance.clone().neg().mask_where(inside, distance)
 }
 
 /// x and y of places, or of the ways between them.
 type Plane<B> = [Tensor<B, 3>; 2];
 
-/// Squared distance of points to an edge, and a number that is positive on its left.
-fn edge<B: Backend>(
-    p: &Plane<B>,
-    start: &[Tensor<B, 3>; 3],
-    end: &[Tensor<B, 3>; 3],
-) -> (Tensor<B, 3>, Tensor<B, 3>) {
+/// An edge as points see it.
+struct Edge<B: Backend> {
+    /// Squared distance to its closest point.
+    distance2: Tensor<B, 3>,
+    /// Positive on its left: the doubled area of the triangle that it makes with the point.
+    side: Tensor<B, 3>,
+    /// The place of the closest point on it, 0 to 1.
+    along: Tensor<B, 3>,
+}
+
+fn edge<B: Backend>(p: &Plane<B>, start: &[Tensor<B, 3>; 3], end: &[Tensor<B, 3>; 3]) -> Edge<B> {
     let [ex, ey] = between(start, end);
     let [wx, wy] = [0, 1].map(|k| p[k].clone() - start[k].clone());
     let length2 = ex.clone() * ex.clone() + ey.clone() * ey.clone();
     let point = length2.clone().lower_elem(POINT);
     let inverse = length2.mask_fill(point.clone(), 1.0).recip().mask_fill(point, 0.0);
-    let t = ((wx.clone() * ex.clone() + wy.clone() * ey.clone()) * inverse).clamp(0.0, 1.0);
-    let dx = wx.clone() - t.clone() * ex.clone();
-    let dy = wy.clone() - t * ey.clone();
-    (dx.clone() * dx + dy.clone() * dy, cross([ex, ey], [wx, wy]))
+    let along = ((wx.clone() * ex.clone() + wy.clone() * ey.clone()) * inverse).clamp(0.0, 1.0);
+    let dx = wx.clone() - along.clone() * ex.clone();
+    let dy = wy.clone() - along.clone() * ey.clone();
+    let distance2 = dx.clone() * dx + dy.clone() * dy;
+    Edge { distance2, side: cross([ex, ey], [wx, wy]), along }
 }
 
 /// From one corner to another.

@@ -1,0 +1,362 @@
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
+use softrast_softness::{DepthSoftness, EdgeSoftness, OPAQUE, Softness, vector};
+
+use crate::{
+    Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
+    log_curve::{DepthCurve, LogCurve, Precision},
+    reference::{self, Scene},
+    soft_blend::{SoftBlend, soft_blend, tables},
+    soft_renderer::stretch,
+    weighting::floor,
+};
+
+/// How far the logarithm of the background's weight may fall below the one that tables were made for.
+const MARGIN: f64 = 3.0;
+/// The background's part of what a face at the far plane weighs, where nothing else is asked for.
+const BEHIND: f64 = 1e-3;
+
+/// Draws soft colours of one mesh topology.
+///
+/// At each pixel it takes the mean of what all faces show, and of a background behind them. A face weighs as much as it covers the pixel
+/// (its edge softness), times what its depth counts (its depth softness): `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` with `wⱼ = s(dⱼ) b(zⱼ)`. So
+/// an image changes smoothly as faces move, also where one comes in front of another. [`reference::blended`] has the definition in full.
+///
+/// No pixel is off by more than the tolerance times the range of what is shown, in exact arithmetic: tables of both softnesses are made to
+/// measure, and what is left out of a pixel is bounded by the background's weight. In floats of 32 bits, logarithms of weights have an error
+/// of 1e-7 of themselves. An edge softness that is 0 from some distance on is known to 1e-11, so its background should weigh no less than
+/// 1e-6 of the nearest faces. One that never comes to be negligible, as the network, has every face drawn at every pixel.
+///
+/// Limits: as the edge softness narrows, faces count only where they cover a pixel; as the depth softness narrows too, the
+/// nearest one alone: the hard image. The faces' share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`, which is not the coverage of a silhouette but one that
+/// grows with each face; it tends to the hard silhouette as the edge narrows and `w / b` vanishes. The order of the faces changes nothing
+/// above rounding.
+///
+/// ```
+/// use burn::backend::{Autodiff, NdArray};
+/// use softrast_raster::{Attributes, ColourRenderer, vertices};
+/// use softrast_softness::Family;
+///
+/// let device = Default::default();
+/// let faces = [[0, 1, 2]];
+/// let corners = vertices::<Autodiff<NdArray>>(&[[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.0, 0.5, 3.0]], &device);
+/// let red = vertices(&[[1.0, 0.0, 0.0]; 3], &device).require_grad();
+/// let renderer = ColourRenderer::new(&faces, 16, Family::Logistic, 0.01, [1.0, 4.0]);
+/// let background = renderer.background(&[0.0, 0.0, 1.0], &device);
+/// let image = renderer.image(corners, &Attributes::of_vertices(red.clone(), &faces), &background);
+/// assert_eq!(image.dims(), [1, 4, 16, 16]); // red, green, blue, and the share of the faces
+/// let gradient = red.grad(&image.mean().backward()).unwrap();
+/// assert_eq!(gradient.dims(), [1, 3, 3]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct ColourRenderer {
+    faces: Arc<[[u32; 3]]>,
+    size: ImageSize,
+    weighting: Weighting,
+    phi: [Vec<f64>; 2],
+    tolerance: f64,
+    kept: Arc<Mutex<Option<Prepared>>>,
+}
+
+/// What the last image needed and the next one may need again.
+#[derive(Clone, Debug)]
+struct Prepared {
+    phi: [Vec<f64>; 2],
+    /// Logarithm of the background's weight that the tables reach.
+    log_weight: f64,
+    edge: LogCurve,
+    depth: DepthCurve,
+    /// The tables of the renderer's own parameters.
+    tables: Option<([Vec<f64>; 2], DType, TensorData)>,
+}
+
+impl ColourRenderer {
+    /// Scale of the depth softness unless another is chosen, in units of the distance between the planes.
+    pub const DEPTH_SCALE: f64 = 0.05;
+
+    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under an edge
+    /// softness of this `scale` in NDC and, between the depths `planes` of nearness 1 and 0 (ascending, world units), the reversed
+    /// exponential as depth softness: a face counts e times as much as one that lies [`DEPTH_SCALE`](Self::DEPTH_SCALE) of the distance
+    /// between the planes behind it, as in `SoftRas` and PyTorch3D.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, `scale` is not positive, or the planes do not ascend.
+    pub fn new(
+        faces: &[[u32; 3]],
+        size: impl Into<ImageSize>,
+        family: softrast_softness::Family,
+        scale: f64,
+        planes: [f64; 2],
+    ) -> Self {
+        let edge = EdgeSoftness { family, squared: false };
+        let depth = DepthSoftness::Family(softrast_softness::Family::Exp);
+        let weighting = Weighting { edge, depth, planes };
+        let phi = [edge.default_phi(scale), depth.default_phi(Self::DEPTH_SCALE)];
+        Self::with_weighting(faces.into(), size, weighting, phi)
+    }
+
+    /// The same from parts: `phi` are the parameters of the softnesses by edge and by depth.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, the planes do not ascend, or a `phi` has the wrong length.
+    pub fn with_weighting(
+        faces: Arc<[[u32; 3]]>,
+        size: impl Into<ImageSize>,
+        weighting: Weighting,
+        phi: [Vec<f64>; 2],
+    ) -> Self {
+        let size = size.into();
+        assert!(size.pixels() > 0, "an image needs at least one pixel");
+        assert!(!faces.is_empty(), "an image needs at least one face");
+        let [near, far] = weighting.planes;
+        assert!(near < far, "the near plane {near} is not nearer than the far plane {far}");
+        check(&weighting, &phi);
+        let (tolerance, kept) = (Rasterizer::TOLERANCE, Arc::default());
+        Self { faces, size, weighting, phi, tolerance, kept }
+    }
+
+    /// With another largest error of a pixel, as a part of the range of what is shown, in (0, 1).
+    ///
+    /// # Panics
+    ///
+    /// If it is not.
+    #[must_use]
+    pub fn with_tolerance(mut self, tolerance: f64) -> Self {
+        assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
+        (self.tolerance, self.kept) = (tolerance, Arc::default());
+        self
+    }
+
+    /// With another depth softness, of this scale in units of the distance between the planes.
+    ///
+    /// # Panics
+    ///
+    /// If `scale` is not positive.
+    #[must_use]
+    pub fn with_depth(mut self, depth: DepthSoftness, scale: f64) -> Self {
+        (self.weighting.depth, self.phi[1]) = (depth, depth.default_phi(scale));
+        self.kept = Arc::default();
+        self
+    }
+
+    /// How faces are weighted.
+    pub fn weighting(&self) -> &Weighting {
+        &self.weighting
+    }
+
+    /// The parameters φ of the softnesses by edge and by depth: those to draw with where no others are given.
+    pub fn phi(&self) -> &[Vec<f64>; 2] {
+        &self.phi
+    }
+
+    /// Draws with these parameters from now on.
+    ///
+    /// # Panics
+    ///
+    /// If there are more or fewer of them than the softnesses have.
+    pub fn set_phi(&mut self, phi: [Vec<f64>; 2]) {
+        check(&self.weighting, &phi);
+        self.phi = phi;
+    }
+
+    /// A background of this colour that weighs a thousandth of a face at the far plane: where a face covers a pixel it takes at most that
+    /// share, and it prevails where none does.
+    pub fn background<B: Backend>(&self, colour: &[f64], device: &B::Device) -> Background<B> {
+        let phi = vector::<HostBackend>(&self.phi[1]);
+        let far = self.weighting.depth.log_weight(phi, vector::<HostBackend>(&[0.0]));
+        let log_weight = f64::from(far.into_scalar()) + BEHIND.ln();
+        let tensor = |values: Vec<f64>| {
+            let data = TensorData::new(values.clone(), [values.len()]);
+            Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+        };
+        Background { colour: tensor(colour.to_vec()), log_weight: tensor(vec![log_weight]) }
+    }
+
+    /// Blended channels and, last, the share of the faces: `[views, channels + 1, height, width]`, top row first.
+    ///
+    /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. They, the
+    /// attributes and the background receive gradients, to second order on `Autodiff<Autodiff<B>>`.
+    ///
+    /// Where tensors do not lie on the host, on a GPU, this is [`reference::blended`]: every pair of pixel and face in tensor ops.
+    ///
+    /// # Panics
+    ///
+    /// If shapes do not fit, or float types differ.
+    pub fn image<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        attributes: &Attributes<B>,
+        background: &Background<B>,
+    ) -> Tensor<B, 4> {
+        let (device, dtype) = (vertices.device(), vertices.dtype());
+        if !B::ON_HOST {
+            let phi = self.phi.each_ref().map(|phi| {
+                Tensor::from_data(TensorData::new(phi.clone(), [phi.len()]), (&device, dtype))
+            });
+            return self.by_reference(vertices, attributes, phi, background);
+        }
+        let mut prepared = self.prepared(&self.phi, background);
+        let data = match prepared.tables.take() {
+            Some((phi, of, data)) if phi == self.phi && of == dtype => data,
+            _ => {
+                let phi = self.phi.each_ref().map(|phi| {
+                    let data = TensorData::new(phi.clone(), [phi.len()]);
+                    Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), dtype))
+                });
+                let data = prepared.tables(phi).into_data();
+                if let Some(kept) = self.kept().as_mut() {
+                    kept.tables = Some((self.phi.clone(), dtype, data.clone()));
+                }
+                data
+            }
+        };
+        let tables = Tensor::from_data(data, (&device, dtype));
+        self.drawn(&prepared, vertices, attributes, tables, background)
+    }
+
+    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too.
+    ///
+    /// # Panics
+    ///
+    /// If shapes do not fit, or float types differ.
+    pub fn image_with<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        attributes: &Attributes<B>,
+        [edge, depth]: [&Tensor<B, 1>; 2],
+        background: &Background<B>,
+    ) -> Tensor<B, 4> {
+        let phi = [edge.clone(), depth.clone()];
+        if !B::ON_HOST {
+            return self.by_reference(vertices, attributes, phi, background);
+        }
+        let values = [edge, depth].map(|phi| phi.to_data().iter().collect::<Vec<f64>>());
+        check(&self.weighting, &values);
+        let prepared = self.prepared(&values, background);
+        let tables = prepared.tables(phi);
+        self.drawn(&prepared, vertices, attributes, tables, background)
+    }
+
+    fn by_reference<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        attributes: &Attributes<B>,
+        phi: [Tensor<B, 1>; 2],
+        background: &Background<B>,
+    ) -> Tensor<B, 4> {
+        let scene = Scene { faces: &self.faces, size: self.size };
+        reference::blended(scene, vertices, attributes, &self.weighting, phi, background)
+    }
+
+    fn drawn<B: RasterBackend>(
+        &self,
+        prepared: &Prepared,
+        vertices: Tensor<B, 3>,
+        attributes: &Attributes<B>,
+        tables: Tensor<B, 2>,
+        background: &Background<B>,
+    ) -> Tensor<B, 4> {
+        let op = SoftBlend {
+            faces: self.faces.clone(),
+            entries: attributes.entries.clone(),
+            edge: prepared.edge.grid,
+            depth: prepared.depth.grid(),
+            floor: floor(&self.weighting.edge),
+            planes: self.weighting.planes,
+            size: self.size,
+            tolerance: 0.5 * self.tolerance,
+        };
+        soft_blend(op, vertices, attributes.values.clone(), tables, background)
+    }
+
+    /// Knots for these parameters and this background.
+    fn prepared<B: Backend>(&self, phi: &[Vec<f64>; 2], background: &Background<B>) -> Prepared {
+        let numbers = background.log_weight.to_data().iter().collect::<Vec<f64>>();
+        assert!(numbers.len() == 1 && numbers[0].is_finite(), "log weight {numbers:?}");
+        let log_weight = numbers[0];
+        let mut kept = self.kept();
+        if let Some(prepared) = kept.as_ref().filter(|kept| log_weight >= kept.log_weight) {
+            if prepared.phi == *phi {
+                return prepared.clone();
+            }
+            // What was chosen first stays, so that no rounding piles up.
+            if let Some(stretched) = prepared.stretched_to(&self.weighting, phi) {
+                return stretched;
+            }
+        }
+        kept.insert(Prepared::new(
+            &self.weighting,
+            phi,
+            self.faces.len(),
+            self.tolerance,
+            log_weight,
+        ))
+        .clone()
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Option<Prepared>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Prepared {
+    /// Half of the tolerance goes to culling, the other half to interpolation: an error of the logarithms of both factors of a weight by a
+    /// quarter of it each would do, were they all of one sign; together they move a mean by at most half as much as they are.
+    fn new(
+        weighting: &Weighting,
+        phi: &[Vec<f64>; 2],
+        faces: usize,
+        tolerance: f64,
+        log_weight: f64,
+    ) -> Self {
+        let device = Default::default();
+        let log_weight = log_weight - MARGIN;
+        let accuracy = tolerance / 2.0;
+        let least = (accuracy / faces as f64).ln() + log_weight;
+        let highest = match weighting.depth {
+            DepthSoftness::Family(_) => 0.0,
+            DepthSoftness::Mlp => {
+                let ends = DepthSoftness::mlp_at_ends(vector::<HostBackend>(&phi[1]));
+                let ends: Vec<f64> = ends.into_data().iter().collect();
+                let [near, far] = weighting.planes;
+                // Only how far the table reaches depends on this.
+                let nearest = (far - NEAR) / (far - near);
+                (ends[0] * nearest).max(ends[1]).max(OPAQUE).ln()
+            }
+        };
+        let [edge, depth] = phi;
+        let by_depth = Precision { accuracy, least, floor: 0.0 };
+        let floor = floor(&weighting.edge);
+        let by_edge = Precision { least: least - highest, floor, ..by_depth };
+        let edge = LogCurve::new::<HostBackend>(weighting.edge, edge, by_edge, &device);
+        let depth = DepthCurve::new::<HostBackend>(weighting.depth, depth, by_depth, &device);
+        Self { phi: phi.clone(), log_weight, edge, depth, tables: None }
+    }
+
+    /// Knots for parameters `phi`, if their softnesses are the prepared ones stretched.
+    fn stretched_to(&self, weighting: &Weighting, phi: &[Vec<f64>; 2]) -> Option<Self> {
+        let [edge, depth] = &self.phi;
+        let edge = self.edge.stretched(stretch(&weighting.edge, edge, &phi[0])?)?;
+        let depth = match (self.depth, weighting.depth) {
+            (DepthCurve::Family(curve), DepthSoftness::Family(family)) => {
+                DepthCurve::Family(curve.stretched(stretch(&family, depth, &phi[1])?)?)
+            }
+            (curve, _) if *depth == phi[1] => curve,
+            _ => return None,
+        };
+        Some(Self { edge, depth, tables: None, ..self.clone() })
+    }
+
+    fn tables<B: Backend>(&self, [edge, depth]: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
+        tables(self.edge.table(edge), self.depth.table(depth))
+    }
+}
+
+fn check(weighting: &Weighting, phi: &[Vec<f64>; 2]) {
+    let found = phi.each_ref().map(Vec::len);
+    let expected = [weighting.edge.parameters(), weighting.depth.parameters()];
+    assert_eq!(found, expected, "parameters of the softnesses by edge and by depth");
+}

@@ -1,0 +1,139 @@
+//! How much a point counts by its depth, and how that changes.
+
+use crate::kernel::{
+    lanes::{Lanes, Places},
+    real::{Mask, Real, Table, splat},
+    table::{Grid, Lookup, Place},
+};
+
+/// Where the logarithm of a weight by depth comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum DepthGrid {
+    /// A table of its negative over the squared distance from the near plane; what is nearer than that plane is the outer side.
+    Table(Grid),
+    /// One row that holds `a` and `c`: the weight is `a z` of a nearness z above 0, `-c z` of one below it, and never less than `floor`.
+    Line {
+        /// The least weight.
+        floor: f64,
+    },
+}
+
+impl DepthGrid {
+    /// Rows of the table.
+    pub(crate) fn rows(&self) -> usize {
+        match self {
+            Self::Table(grid) => grid.rows(),
+            Self::Line { .. } => 1,
+        }
+    }
+}
+
+/// A [`DepthGrid`] prepared for look-ups, with its table.
+pub(super) struct DepthLookup<'a, T: Real> {
+    grid: DepthGrid,
+    lookup: Option<Lookup<super::Float<T>>>,
+    table: Table<'a, T>,
+}
+
+/// What points count by their depth.
+pub(super) enum DepthAt<T: Real> {
+    /// From a table: the logarithm of the weight, its derivative by the place, and the place in the table.
+    Table { log: T, slope: T, t: T, row: Places },
+    /// From a line: the logarithm, and what its derivatives need.
+    Line { log: T, per_weight: T, nearness: T, slope: T, near: Mask<T> },
+}
+
+impl<'a, T: Real> DepthLookup<'a, T> {
+    pub(super) fn new(grid: DepthGrid, table: Table<'a, T>) -> Self {
+        let lookup = match &grid {
+            DepthGrid::Table(grid) => Some(Lookup::new(grid)),
+            DepthGrid::Line { .. } => None,
+        };
+        Self { grid, lookup, table }
+    }
+
+    /// Rows of the table.
+    pub(super) fn rows(&self) -> usize {
+        self.grid.rows()
+    }
+
+    /// What points at `x` count: their nearness less 1.
+    #[inline(always)]
+    pub(super) fn at(&self, x: T) -> DepthAt<T> {
+        let zero = splat::<T::Lanes>(0.0);
+        match (&self.lookup, self.grid) {
+            (Some(lookup), _) => {
+                let behind = x.value().at_most(zero);
+                let Place { row, t, rate } = lookup.place::<T, true>(x * x, behind);
+                let row = T::Lanes::places(row, self.table.values.len());
+                let [a, b, c, d] = T::rows(self.table, &row);
+                let log = T::constant(zero) - (a + t * (b + t * (c + t * d)));
+                let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
+                let slope = slope.scale(rate) * x.scale(splat(-2.0));
+                DepthAt::Table { log, slope, t, row }
+            }
+            (None, DepthGrid::Line { floor }) => {
+                let nearness = x + T::constant(splat(1.0));
+                let near = zero.less(nearness.value());
+                let [a, c, ..] = T::rows(self.table, &Places::FIRST);
+                let slope = T::choose(near, a, T::constant(zero) - c);
+                let weight = slope * nearness;
+                let some = splat::<T::Lanes>(floor).less(weight.value());
+                let held = T::choose(some, weight, T::constant(splat(floor)));
+                let per_weight = held.inverse().masked(some);
+                DepthAt::Line { log: held.logarithm(), per_weight, nearness, slope, near }
+            }
+            (None, DepthGrid::Table(_)) => unreachable!("a table has a look-up"),
+        }
+    }
+}
+
+impl<T: Real> DepthAt<T> {
+    /// The logarithm of the weight.
+    #[inline(always)]
+    pub(super) fn log(&self) -> T {
+        match self {
+            Self::Table { log, .. } | Self::Line { log, .. } => *log,
+        }
+    }
+
+    /// Its derivative by the nearness.
+    #[inline(always)]
+    pub(super) fn slope(&self) -> T {
+        match self {
+            Self::Table { slope, .. } => *slope,
+            Self::Line { per_weight, slope, .. } => *per_weight * *slope,
+        }
+    }
+
+    /// Adds to the gradient of the table, of a function with this derivative by the logarithm.
+    #[inline(always)]
+    pub(super) fn pull(&self, by_log: T, table: &mut [[super::Float<T>; 4]]) {
+        let zero = T::constant(splat(0.0));
+        match self {
+            Self::Table { t, row, .. } => pull_row(zero - by_log, *t, row, table),
+            Self::Line { per_weight, nearness, near, .. } => {
+                let by_slope = by_log * *per_weight * *nearness;
+                let above = by_slope.masked(*near);
+                let below = above - by_slope;
+                let columns = [above.output(), below.output(), splat(0.0), splat(0.0)];
+                T::Lanes::add_to_rows(table, &Places::FIRST, columns);
+            }
+        }
+    }
+}
+
+/// Adds to the gradient of the rows of a table, of a function with this derivative by the value at the place `t` in them.
+#[inline(always)]
+pub(super) fn pull_row<T: Real>(
+    by_value: T,
+    t: T,
+    row: &Places,
+    table: &mut [[super::Float<T>; 4]],
+) {
+    let first = by_value * t;
+    let second = first * t;
+    let third = second * t;
+    let columns = [by_value.output(), first.output(), second.output(), third.output()];
+    T::Lanes::add_to_rows(table, row, columns);
+}

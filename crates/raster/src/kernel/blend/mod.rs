@@ -1,0 +1,525 @@
+//! Colours of faces that share pixels, weighted by their edges and depths: the image, its gradient, and the gradient of that.
+//!
+//! `C = (Σ wⱼ cⱼ + w c) / (Σ wⱼ + w)` with `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, both from tables. Each band is walked for the sums, and once
+//! more for the gradient; where weights of a pixel may differ by more than floats can hold, first for the largest of each pixel. As in
+//! the sums of profiles, all is written once for any [`Real`].
+#![allow(clippy::needless_range_loop)]
+
+mod depth;
+mod planes;
+mod point;
+mod reach;
+mod walk;
+
+use rayon::prelude::*;
+
+pub(crate) use self::{depth::DepthGrid, point::AREA};
+use self::{
+    depth::DepthLookup,
+    planes::Planes,
+    reach::Reached,
+    walk::{Largest, OF_CORNERS, Pull, Sums, Visitor, Walk, everywhere},
+};
+use super::{
+    bands::View,
+    float,
+    lanes::{Lanes, Plain, Work, run},
+    list::rows_of_bands,
+    real::{self, Dual, Real, Table, splat},
+    table::Grid,
+    walk::{Scene, has_avx2},
+};
+use crate::{ImageSize, weighting::counts_from};
+
+type Float<T> = real::Float<T>;
+
+/// Logarithm of the largest ratio of two weights that floats of 32 and of 64 bits add up without losing the sum.
+const RANGE: [f64; 2] = [60.0, 600.0];
+
+/// The inputs of the op in one float type.
+#[derive(Clone, Copy)]
+pub(crate) struct Inputs<'a, F> {
+    /// `[views, 3, vertices]`: x and y in NDC, depth.
+    pub(crate) vertices: &'a [F],
+    /// `[1 or views, entries, channels]`.
+    pub(crate) attributes: &'a [F],
+    /// `[rows, 4]`: minus the logarithms of the weights by edge, then of those by depth.
+    pub(crate) tables: &'a [F],
+    /// `[channels + 1]`: the colour, then the logarithm of the weight.
+    pub(crate) background: &'a [F],
+    pub(crate) faces: &'a [[u32; 3]],
+    /// Entries of the attributes at the corners of each face.
+    pub(crate) entries: &'a [[u32; 3]],
+    /// Cells of the edge softness, mirrored: the inner side is outside a face.
+    pub(crate) edge: Grid,
+    pub(crate) depth: DepthGrid,
+    /// What is taken off the edge softness.
+    pub(crate) floor: f64,
+    /// Depths of nearness 1 and 0.
+    pub(crate) planes: [f64; 2],
+    pub(crate) size: ImageSize,
+    /// Depths between which all corners of a face that is drawn lie.
+    pub(crate) near: f64,
+    pub(crate) far: f64,
+    /// What all that is left out of a pixel may add up to, in weights of the background.
+    pub(crate) tolerance: f64,
+    pub(crate) views: usize,
+    /// Whether all views have the same attributes.
+    pub(crate) shared: bool,
+}
+
+impl<'a, F: float::Float> Inputs<'a, F> {
+    /// Channels of the attributes.
+    pub(crate) fn channels(&self) -> usize {
+        self.background.len() - 1
+    }
+
+    /// Rows of both tables, or of their tangents.
+    fn split_tables<'b>(&self, tables: &'b [F]) -> (&'b [[F; 4]], &'b [[F; 4]]) {
+        let rows: &[[F; 4]] = tables.as_chunks().0;
+        rows.split_at(self.edge.rows().min(rows.len()))
+    }
+
+    /// What a walk reads; `tangents` are those of vertices, attributes, tables and background, or nothing.
+    fn blend<'s, T>(&'s self, tangents: [&'s [F]; 4]) -> Blend<'s, T>
+    where
+        T: Real,
+        T::Lanes: Lanes<Float = F>,
+    {
+        let values = self.split_tables(self.tables);
+        let along = self.split_tables(tangents[2]);
+        let edge = Table { values: values.0, tangents: along.0 };
+        let depth = Table { values: values.1, tangents: along.1 };
+        let rows = rows_of_bands(self.views);
+        let vertices = [self.vertices, tangents[0]];
+        Blend {
+            scene: Scene::new(vertices, self.faces, edge, self.edge, self.size, rows),
+            attributes: [self.attributes, tangents[1]],
+            entries: self.entries,
+            channels: self.channels(),
+            per_view: if self.shared { 0 } else { self.attributes.len() / self.views.max(1) },
+            depth: DepthLookup::new(self.depth, depth),
+            near: F::from_f64(self.planes[0]),
+            per_range: F::from_f64((self.planes[1] - self.planes[0]).recip()),
+            floor: F::from_f64(self.floor),
+            counts_from: F::from_f64(counts_from(self.floor)),
+            background: [self.background, tangents[3]],
+        }
+    }
+}
+
+/// Everything a walk reads, in one number type.
+struct Blend<'a, T: Real> {
+    scene: Scene<'a, T>,
+    attributes: [&'a [Float<T>]; 2],
+    entries: &'a [[u32; 3]],
+    channels: usize,
+    /// Attributes of a view that has its own.
+    per_view: usize,
+    depth: DepthLookup<'a, T>,
+    near: Float<T>,
+    per_range: Float<T>,
+    floor: Float<T>,
+    /// Logarithm of an edge softness from which on it counts.
+    counts_from: Float<T>,
+    background: [&'a [Float<T>]; 2],
+}
+
+impl<T: Real> Blend<'_, T> {
+    /// Where the attributes of a view begin.
+    fn first_attribute(&self, view: usize) -> usize {
+        view * self.per_view
+    }
+
+    /// A number of the background: a channel, or behind them the logarithm of the weight.
+    #[inline(always)]
+    fn behind(&self, channel: usize) -> T {
+        everywhere(self.background[0], self.background[1], channel)
+    }
+}
+
+/// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share.
+pub(crate) fn forward<F: float::Float>(inputs: &Inputs<F>) -> Vec<F> {
+    let bands = reach::bands(inputs);
+    let tangents = [&[][..]; 4];
+    if has_avx2() {
+        passes::<F::Avx2>(inputs, &inputs.blend(tangents), &bands, None).image()
+    } else {
+        passes::<Plain<F>>(inputs, &inputs.blend(tangents), &bands, None).image()
+    }
+}
+
+/// Gradients of `Σ upstream · image` to vertices, attributes, tables and background, as they are wanted, flat and in this order.
+pub(crate) fn vjp<F: float::Float>(
+    inputs: &Inputs<F>,
+    upstream: &[F],
+    wanted: [bool; 4],
+) -> Vec<F> {
+    let bands = reach::bands(inputs);
+    let tangents = [&[][..]; 4];
+    let pull = Some((upstream, wanted));
+    if has_avx2() {
+        passes::<F::Avx2>(inputs, &inputs.blend(tangents), &bands, pull).gradient(wanted)
+    } else {
+        passes::<Plain<F>>(inputs, &inputs.blend(tangents), &bands, pull).gradient(wanted)
+    }
+}
+
+/// Pullback of `direction` (like the result of [`vjp`], which consists of what is `along`) through [`vjp`]: gradients to the inputs and to
+/// the upstream, as they are wanted, flat and in this order.
+pub(crate) fn vjp_of_vjp<F: float::Float>(
+    inputs: &Inputs<F>,
+    upstream: &[F],
+    direction: &[F],
+    along: [bool; 4],
+    wanted: [bool; 5],
+) -> Vec<F> {
+    let bands = reach::bands(inputs);
+    let of_inputs = [inputs.vertices, inputs.attributes, inputs.tables, inputs.background];
+    let still: [Vec<F>; 4] =
+        std::array::from_fn(|k| vec![F::ZERO; if along[k] { 0 } else { of_inputs[k].len() }]);
+    let mut direction = direction;
+    let tangents = std::array::from_fn(|k| {
+        if !along[k] {
+            return &still[k][..];
+        }
+        let (own, rest) = direction.split_at(of_inputs[k].len());
+        direction = rest;
+        own
+    });
+    let [vertices, attributes, tables, background, to_upstream] = wanted;
+    let wanted = [vertices, attributes, tables, background];
+    let pull = Some((upstream, wanted));
+    let passed = if has_avx2() {
+        passes::<Dual<F::Avx2>>(inputs, &inputs.blend(tangents), &bands, pull)
+    } else {
+        passes::<Dual<Plain<F>>>(inputs, &inputs.blend(tangents), &bands, pull)
+    };
+    let image = if to_upstream { passed.image() } else { Vec::new() };
+    let mut gradient = passed.gradient(wanted);
+    gradient.extend(image);
+    gradient
+}
+
+/// What the bands of a view, and then all views, give back. Of dual numbers all are tangents.
+struct Passed<F> {
+    /// `[views, channels + 1, height, width]`, view by view.
+    images: Vec<Vec<F>>,
+    /// `[views, 3, vertices]`, view by view.
+    vertices: Vec<Vec<F>>,
+    attributes: Vec<F>,
+    tables: Vec<F>,
+    background: Vec<F>,
+}
+
+impl<F: float::Float> Passed<F> {
+    fn image(&self) -> Vec<F> {
+        self.images.concat()
+    }
+
+    fn gradient(self, wanted: [bool; 4]) -> Vec<F> {
+        let parts = [self.vertices.concat(), self.attributes, self.tables, self.background];
+        parts
+            .into_iter()
+            .zip(wanted)
+            .filter(|&(_, wanted)| wanted)
+            .flat_map(|(part, _)| part)
+            .collect()
+    }
+}
+
+/// Runs all bands, with their gradients if there is an upstream; everything is added up in the order of views and bands.
+fn passes<T: Real>(
+    inputs: &Inputs<Float<T>>,
+    blend: &Blend<T>,
+    reached: &Reached,
+    pull: Option<(&[Float<T>], [bool; 4])>,
+) -> Passed<Float<T>> {
+    let zero = <Float<T> as float::Float>::ZERO;
+    let bands = &reached.bands;
+    let views = bands.views.len();
+    let of_image = (blend.channels + 1) * inputs.size.pixels();
+    let with_image = pull.is_none() || T::DUAL;
+    let per_view: Vec<_> = (0..views)
+        .into_par_iter()
+        .map(|view| {
+            let upstream = pull.map(|(upstream, wanted)| {
+                (&upstream[view * of_image..(view + 1) * of_image], wanted)
+            });
+            let walked: Vec<_> = (0..bands.count)
+                .into_par_iter()
+                .map(|band| {
+                    let work = Band {
+                        blend,
+                        of_view: &bands.views[view],
+                        views,
+                        view,
+                        band,
+                        logs: &reached.logs[view],
+                        least: reached.least,
+                        upstream,
+                    };
+                    run::<T::Lanes, _>(work)
+                })
+                .collect();
+            gather::<T>(
+                inputs,
+                &bands.views[view],
+                walked,
+                with_image,
+                pull.map(|(_, wanted)| wanted),
+            )
+        })
+        .collect();
+    let mut passed = Passed {
+        images: Vec::new(),
+        vertices: Vec::new(),
+        attributes: vec![zero; if pull.is_some() { inputs.attributes.len() } else { 0 }],
+        tables: Vec::new(),
+        background: Vec::new(),
+    };
+    for (index, mut view) in per_view.into_iter().enumerate() {
+        passed.images.append(&mut view.images);
+        passed.vertices.append(&mut view.vertices);
+        let first = blend.first_attribute(index).min(passed.attributes.len());
+        add(&mut passed.attributes[first..], &view.attributes);
+        added(&mut passed.tables, view.tables);
+        added(&mut passed.background, view.background);
+    }
+    passed
+}
+
+/// Adds numbers to as many.
+fn add<F: float::Float>(total: &mut [F], part: &[F]) {
+    total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
+}
+
+/// The same where there may be no total yet.
+fn added<F: float::Float>(total: &mut Vec<F>, part: Vec<F>) {
+    match total.is_empty() {
+        true => *total = part,
+        false => add(total, &part),
+    }
+}
+
+/// What one band gives back.
+struct Walked<F> {
+    /// Rows of the image, plane by plane, as they stand in the image.
+    image: Vec<Vec<F>>,
+    faces: Vec<F>,
+    tables: [Vec<[F; 4]>; 2],
+    background: Vec<F>,
+}
+
+/// Adds up the bands of a view in their order.
+fn gather<T: Real>(
+    inputs: &Inputs<Float<T>>,
+    view: &View,
+    walked: Vec<Walked<Float<T>>>,
+    with_image: bool,
+    wanted: Option<[bool; 4]>,
+) -> Passed<Float<T>> {
+    let zero = <Float<T> as float::Float>::ZERO;
+    let channels = inputs.channels();
+    let mut image = Vec::new();
+    if with_image {
+        for plane in 0..=channels {
+            walked.iter().for_each(|band| image.extend_from_slice(&band.image[plane]));
+        }
+    }
+    let mut passed = Passed {
+        images: vec![image],
+        vertices: Vec::new(),
+        attributes: Vec::new(),
+        tables: Vec::new(),
+        background: Vec::new(),
+    };
+    let Some([_, of_attributes, ..]) = wanted else { return passed };
+    let count = inputs.vertices.len() / inputs.views / 3;
+    let mut vertices = vec![zero; 3 * count];
+    let entries = inputs.attributes.len() / if inputs.shared { 1 } else { inputs.views };
+    let mut attributes = vec![zero; if of_attributes { entries } else { 0 }];
+    let stride = OF_CORNERS + if of_attributes { 3 * channels } else { 0 };
+    for (band, walked) in walked.into_iter().enumerate() {
+        for (&face, own) in view.faces(band).iter().zip(walked.faces.chunks_exact(stride)) {
+            for (k, &vertex) in inputs.faces[face as usize].iter().enumerate() {
+                let vertex = vertex as usize;
+                vertices[vertex] += own[2 * k];
+                vertices[count + vertex] += own[2 * k + 1];
+                vertices[2 * count + vertex] += own[6 + k];
+            }
+            if of_attributes {
+                for (k, &entry) in inputs.entries[face as usize].iter().enumerate() {
+                    for channel in 0..channels {
+                        attributes[entry as usize * channels + channel] +=
+                            own[OF_CORNERS + 3 * channel + k];
+                    }
+                }
+            }
+        }
+        added(&mut passed.tables, walked.tables.concat().as_flattened().to_vec());
+        added(&mut passed.background, walked.background);
+    }
+    (passed.vertices, passed.attributes) = (vec![vertices], attributes);
+    passed
+}
+
+/// One band of one view.
+struct Band<'a, 's, T: Real> {
+    blend: &'a Blend<'s, T>,
+    of_view: &'a View,
+    views: usize,
+    view: usize,
+    band: usize,
+    /// Logarithm of the largest weight by depth of each face.
+    logs: &'a [f32],
+    /// Logarithm of what may be left out of a pixel of each face, as a part of the weights there.
+    least: f64,
+    /// `[channels + 1, height, width]`, and what gradients are wanted.
+    upstream: Option<(&'a [Float<T>], [bool; 4])>,
+}
+
+impl<T: Real> Work for Band<'_, '_, T> {
+    type Output = Walked<Float<T>>;
+
+    #[inline(always)]
+    fn run(self) -> Walked<Float<T>> {
+        let blend = self.blend;
+        let (scene, channels) = (&blend.scene, blend.channels);
+        let length = scene.band_length(self.band);
+        let largest = self.largest(length);
+        let mut sums = Planes::new(1 + channels, length);
+        self.walk(&mut Sums { largest: &largest, sums: &mut sums });
+
+        let upstream = self.upstream.map(|(upstream, _)| self.padded(upstream, length));
+        // The image; one over the sum of all weights, and what the upstream makes of the image; what each channel of the background gets.
+        let mut image = Planes::new(channels + 1, length);
+        let mut pixels = Planes::new(3, length);
+        let mut background = vec![splat::<T::Lanes>(0.0); channels + 1];
+        let log_weight = blend.behind(channels);
+        for k in 0..largest.vectors() {
+            let behind = T::exponential(log_weight - T::constant(largest.vector(0, k).value()));
+            let per_total = T::inverse(sums.vector(0, k) + behind);
+            let rest = behind * per_total;
+            let covered = sums.vector(0, k) * per_total;
+            image.set(channels, k, covered);
+            for channel in 0..channels {
+                let seen = sums.vector(1 + channel, k) * per_total;
+                image.set(channel, k, seen + rest * blend.behind(channel));
+            }
+            let Some(upstream) = &upstream else { continue };
+            let of_share = upstream.vector(channels, k).value();
+            let mut whole = covered.scale(of_share);
+            let mut alone = T::constant(splat(0.0));
+            for channel in 0..channels {
+                let upstream = upstream.vector(channel, k).value();
+                whole = whole + image.vector(channel, k).scale(upstream);
+                alone = alone + blend.behind(channel).scale(upstream);
+                background[channel] += rest.scale(upstream).output();
+            }
+            background[channels] += (rest * (alone - whole)).output();
+            pixels.set(0, k, per_total);
+            pixels.set(1, k, whole - T::constant(of_share));
+            let total = (sums.vector(0, k) + behind).value().ln();
+            let total = total + largest.vector(0, k).value() + splat(self.least);
+            pixels.set(2, k, T::constant(total));
+        }
+        let mut walked = Walked {
+            image: Vec::new(),
+            faces: Vec::new(),
+            tables: [Vec::new(), Vec::new()],
+            background: background.into_iter().map(Lanes::sum).collect(),
+        };
+        if self.upstream.is_none() || T::DUAL {
+            walked.image = (0..=channels).map(|plane| self.trimmed(image.output(plane))).collect();
+        }
+        if let (Some(upstream), Some((_, wanted))) = (&upstream, self.upstream) {
+            self.pull(&largest, &pixels, upstream, wanted, &mut walked);
+        }
+        walked
+    }
+}
+
+impl<T: Real> Band<'_, '_, T> {
+    #[inline(always)]
+    fn walk<V: Visitor<T>>(&self, visitor: &mut V) {
+        let place = self.blend.scene.place(self.of_view, self.view, self.views, self.band);
+        Walk { blend: self.blend, place, view: self.view, logs: self.logs, visitor }.run();
+    }
+
+    /// Logarithms that weights are relative to: none is so much larger or smaller than that of a pixel's sum that it could not be told.
+    #[inline(always)]
+    fn largest(&self, length: usize) -> Planes<T> {
+        let blend = self.blend;
+        let behind = blend.background[0][blend.channels];
+        let number = <Float<T> as float::Float>::from_f64;
+        let mut largest = Planes::new(1, length);
+        let double = size_of::<Float<T>>() == size_of::<f64>();
+        // No weight is larger than this, and the background is always there: so one number does for all pixels.
+        let faces = self.of_view.faces(self.band).iter();
+        let highest = faces.map(|&face| self.logs[face as usize]).fold(f32::MIN, f32::max);
+        let highest = number(f64::from(highest));
+        if highest <= behind + number(RANGE[usize::from(double)]) {
+            largest.fill(if highest > behind { highest } else { behind });
+        } else {
+            largest.fill(behind);
+            self.walk(&mut Largest { largest: &mut largest });
+        }
+        largest
+    }
+
+    #[inline(always)]
+    fn pull(
+        &self,
+        largest: &Planes<T>,
+        pixels: &Planes<T>,
+        upstream: &Planes<T>,
+        [_, of_attributes, of_tables, _]: [bool; 4],
+        walked: &mut Walked<Float<T>>,
+    ) {
+        let zero = <Float<T> as float::Float>::ZERO;
+        let channels = if of_attributes { self.blend.channels } else { 0 };
+        let stride = OF_CORNERS + 3 * channels;
+        walked.faces = vec![zero; self.of_view.faces(self.band).len() * stride];
+        let rows = [self.blend.scene.grid.rows(), self.blend.depth.rows()];
+        let mut tables = rows.map(|rows| vec![[zero; 4]; if of_tables { rows } else { 0 }]);
+        self.walk(&mut Pull {
+            largest,
+            pixels,
+            upstream,
+            faces: &mut walked.faces,
+            stride,
+            tables: of_tables.then_some(&mut tables),
+            corners: [splat(0.0); OF_CORNERS],
+            attributes: vec![[splat(0.0); 3]; channels],
+            least: splat(self.least.exp()),
+        });
+        walked.tables = tables;
+    }
+
+    /// The band's rows of an upstream, followed by zeros.
+    fn padded(&self, upstream: &[Float<T>], length: usize) -> Planes<T> {
+        let scene = &self.blend.scene;
+        let (width, rows) = (scene.size.width, scene.band_rows(self.band));
+        let mut planes = Planes::new(self.blend.channels + 1, length);
+        for (plane, upstream) in upstream.chunks_exact(scene.size.pixels()).enumerate() {
+            let own = &upstream[rows.start * width..rows.end * width];
+            let padded = planes.values_mut(plane).chunks_mut(scene.stride());
+            for (padded, row) in padded.zip(own.chunks(width)) {
+                padded[..width].copy_from_slice(row);
+            }
+        }
+        planes
+    }
+
+    /// The band's rows as they stand in the image.
+    fn trimmed(&self, padded: &[Float<T>]) -> Vec<Float<T>> {
+        let scene = &self.blend.scene;
+        let (width, rows) = (scene.size.width, scene.band_rows(self.band).len());
+        let padded = padded.chunks(scene.stride()).take(rows);
+        padded.flat_map(|row| &row[..width]).copied().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

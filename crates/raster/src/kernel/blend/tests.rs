@@ -1,0 +1,83 @@
+//! Every instruction set that walks are compiled for gives the same bits.
+
+use std::sync::atomic::Ordering;
+
+use super::*;
+use crate::kernel::walk::PORTABLE;
+
+const VERTICES: usize = 40;
+const FACES: u32 = 50;
+const CHANNELS: usize = 2;
+
+/// All that the three passes give, over random triangles, some of them points or without area.
+fn passes<F: float::Float>(views: usize, log_weight: f64, floor: f64, line: bool) -> Vec<F> {
+    let edge = Grid { outer: 0.2, inner: 0.3, octaves: 12, far: 5, bits: 2 };
+    let by_depth = Grid { outer: 1e-3, inner: 2.0, octaves: 10, far: 0, bits: 2 };
+    let depth = if line { DepthGrid::Line { floor: 1e-7 } } else { DepthGrid::Table(by_depth) };
+    let wave = |k: usize, step: f64| (step * k as f64).sin();
+    let numbers = |count: usize, step: f64| -> Vec<F> {
+        (0..count).map(|k| F::from_f64(wave(k, step))).collect()
+    };
+    let coordinate = |k: usize| {
+        let depth = k % (3 * VERTICES) >= 2 * VERTICES;
+        wave(k, 1.7) + if depth { 2.5 } else { 0.0 }
+    };
+    let vertices: Vec<F> = (0..3 * VERTICES * views).map(|k| F::from_f64(coordinate(k))).collect();
+    let attributes = numbers(VERTICES * CHANNELS, 0.9);
+    let tables = numbers(4 * (edge.rows() + depth.rows()), 0.7);
+    let background = [0.1, 0.2, log_weight].map(F::from_f64);
+    let corner = |k: u32| k % VERTICES as u32;
+    let face = |f: u32| match (f % 7, f % 11) {
+        (0, _) => [corner(f), corner(f + 1), corner(f)],
+        (_, 0) => [corner(f); 3],
+        _ => [corner(f), corner(7 * f + 3), corner(11 * f + 8)],
+    };
+    let faces: Vec<_> = (0..FACES).map(face).collect();
+    let size = ImageSize::from([37, 50]);
+    let inputs = Inputs {
+        vertices: &vertices,
+        attributes: &attributes,
+        tables: &tables,
+        background: &background,
+        faces: &faces,
+        entries: &faces,
+        edge,
+        depth,
+        floor,
+        planes: [1.0, 4.0],
+        size,
+        near: 0.01,
+        far: 1e15,
+        tolerance: 1e-3,
+        views,
+        shared: true,
+    };
+    let upstream = numbers(views * (CHANNELS + 1) * size.pixels(), 0.3);
+    let lengths = [&vertices, &attributes, &tables].map(Vec::len);
+    let direction = numbers(lengths.iter().sum::<usize>() + background.len(), 2.3);
+    let mut all = forward(&inputs);
+    all.extend(vjp(&inputs, &upstream, [true; 4]));
+    all.extend(vjp(&inputs, &upstream, [true, false, false, false]));
+    all.extend(vjp_of_vjp(&inputs, &upstream, &direction, [true; 4], [true; 5]));
+    all
+}
+
+fn assert_same_bits<F: float::Float>() {
+    // A background that weighs little asks for the largest weight of each pixel.
+    for (views, log_weight, floor, line) in
+        [(1, -2.0, 0.0, false), (4, -1.0, 1e-7, true), (3, -700.0, 1e-7, false)]
+    {
+        let fast = passes::<F>(views, log_weight, floor, line);
+        PORTABLE.store(true, Ordering::SeqCst);
+        let portable = passes::<F>(views, log_weight, floor, line);
+        PORTABLE.store(false, Ordering::SeqCst);
+        assert!(fast.iter().all(|x| x.to_f64().is_finite()), "{views} views");
+        assert!(format!("{fast:?}") == format!("{portable:?}"), "{views} views");
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    assert_same_bits::<f32>();
+    assert_same_bits::<f64>();
+}

@@ -1,0 +1,337 @@
+//! Walks over the pixel-face pairs of a band: for the largest weight of a pixel, for sums of weights, and for gradients.
+//!
+//! Loops run over numbers of corners and channels, as in `lanes`, so that all of them become vectors.
+#![allow(clippy::needless_range_loop)]
+
+use super::{
+    Blend,
+    depth::{DepthAt, pull_row},
+    planes::Planes,
+    point::Point,
+};
+use crate::kernel::{
+    face::Face,
+    float::Float as _,
+    lanes::{LANES, Lanes, Places, Work},
+    list::{LISTED, List},
+    real::{Float, Real, splat},
+    table,
+    walk::Place,
+};
+
+/// Numbers of a face that a gradient has beside those of its attributes: x and y of three corners, then their depths.
+pub(super) const OF_CORNERS: usize = 9;
+
+/// Stands for the logarithm of a weight of 0.
+const HIDDEN: f64 = -1e30;
+
+/// A face of a band, in all lanes.
+pub(super) struct Shown<T: Real> {
+    face: Face<T>,
+    /// The corners as they were given, by their places here.
+    order: [usize; 3],
+    /// One over the depth of each corner.
+    per_depth: [T; 3],
+    /// Attributes of the corners, channel by channel.
+    attributes: Vec<[T; 3]>,
+    /// Logarithm of its largest weight by depth.
+    log: T::Lanes,
+}
+
+/// What a face is to eight pixels.
+pub(super) struct Pair<T: Real> {
+    point: Point<T>,
+    /// Depth of the point.
+    depth: T,
+    /// Its barycentric weights on the face itself.
+    weights: [T; 3],
+    /// Logarithm of the edge softness, its derivative by the squared distance, and its place in the table.
+    log_edge: T,
+    edge_slope: T,
+    edge_t: T,
+    edge_row: Places,
+    by_depth: DepthAt<T>,
+}
+
+/// What is done to every pair.
+pub(super) trait Visitor<T: Real> {
+    /// Whether the pair at these places of the band counts for nothing.
+    #[inline(always)]
+    fn skips(&self, shown: &Shown<T>, at: [u32; 2]) -> bool {
+        let _ = (shown, at);
+        false
+    }
+
+    /// Takes a pair at these places of the band.
+    fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]);
+
+    /// Has taken all pairs, or some of the last, of face `index` of the band.
+    fn face(&mut self, index: usize, shown: &Shown<T>) {
+        let _ = (index, shown);
+    }
+}
+
+/// A walk over the pairs of a band.
+pub(super) struct Walk<'a, 's, T: Real, V> {
+    pub(super) blend: &'a Blend<'s, T>,
+    pub(super) place: Place<'a, T>,
+    pub(super) view: usize,
+    /// Logarithm of the largest weight by depth of each face.
+    pub(super) logs: &'a [f32],
+    pub(super) visitor: &'a mut V,
+}
+
+impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let scene = &self.blend.scene;
+        let mut list = List::new();
+        let numbers = self.place.view.faces(self.place.band);
+        for (k, numbers) in numbers.chunks(LISTED).enumerate() {
+            list.fill(scene, &self.place, numbers);
+            let (chunks, owners) = list.chunks();
+            let mut shown: Option<(usize, Shown<T>)> = None;
+            for (chunk, &owner) in chunks.iter().zip(owners) {
+                let owner = owner as usize;
+                if shown.as_ref().is_none_or(|&(face, _)| face != owner) {
+                    if let Some((face, shown)) = &shown {
+                        self.visitor.face(k * LISTED + face, shown);
+                    }
+                    shown = Some((owner, self.shown(&list, owner, numbers[owner])));
+                }
+                let Some((_, shown)) = &shown else { continue };
+                let [low, high] = chunk;
+                if self.visitor.skips(shown, [low.at, high.at]) {
+                    continue;
+                }
+                let px = T::Lanes::of_groups(scene.centres(low.column), scene.centres(high.column));
+                let py = T::Lanes::of_halves(low.y, high.y);
+                let pair = self.blend.pair(&self.place, shown, px, py);
+                self.visitor.pair(self.blend, shown, &pair, [low.at, high.at]);
+            }
+            if let Some((face, shown)) = &shown {
+                self.visitor.face(k * LISTED + face, shown);
+            }
+        }
+    }
+}
+
+impl<T: Real, V> Walk<'_, '_, T, V> {
+    /// Face `owner` of a list, whose number in the scene is given too.
+    #[inline(always)]
+    fn shown(&self, list: &List<T>, owner: usize, number: u32) -> Shown<T> {
+        let faces = &list.faces[owner / LANES];
+        let order = faces.corners(owner % LANES);
+        let (blend, place) = (self.blend, &self.place);
+        let (corners, entries) =
+            (blend.scene.faces[number as usize], blend.entries[number as usize]);
+        let count = place.vertices.len() / 3;
+        let one = T::constant(splat(1.0));
+        let mut per_depth = [one; 3];
+        let mut attributes = vec![[one; 3]; blend.channels];
+        let first = blend.first_attribute(self.view);
+        for k in 0..3 {
+            let at = 2 * count + corners[order[k]] as usize;
+            per_depth[k] = everywhere(place.vertices, place.tangents, at);
+            per_depth[k] = T::inverse(per_depth[k]);
+            let start = first + entries[order[k]] as usize * blend.channels;
+            for (c, attribute) in attributes.iter_mut().enumerate() {
+                attribute[k] = everywhere(blend.attributes[0], blend.attributes[1], start + c);
+            }
+        }
+        let log = splat(f64::from(self.logs[number as usize]));
+        Shown { face: faces.face(owner % LANES), order, per_depth, attributes, log }
+    }
+}
+
+/// A number and its tangent in all lanes.
+#[inline(always)]
+pub(super) fn everywhere<T: Real>(values: &[Float<T>], tangents: &[Float<T>], at: usize) -> T {
+    let tangent = if T::DUAL { tangents[at] } else { Float::<T>::ZERO };
+    T::new(T::Lanes::splat(values[at]), T::Lanes::splat(tangent))
+}
+
+impl<T: Real> Blend<'_, T> {
+    /// What a face is to the pixels at `px`, `py` (NDC).
+    #[inline(always)]
+    fn pair(&self, place: &Place<T>, shown: &Shown<T>, px: T::Lanes, py: T::Lanes) -> Pair<T> {
+        let point = Point::new(&shown.face, px, py);
+        // 1 / z is what interpolates linearly on the screen.
+        let [r0, r1, r2] = shown.per_depth;
+        let [l0, l1, l2] = point.barycentric;
+        let parts = [l0 * r0, l1 * r1, l2 * r2];
+        let depth = T::inverse(parts[0] + parts[1] + parts[2]);
+        let weights = [parts[0] * depth, parts[1] * depth, parts[2] * depth];
+
+        // The table is that of the mirrored softness, so that its inner side is outside the face.
+        let pick = <T::Lanes as Lanes>::pick;
+        let zero = splat::<T::Lanes>(0.0);
+        let outside = zero.less(pick(point.inside, zero, splat(1.0)));
+        let table::Place { row, t, rate } =
+            self.scene.lookup.place::<T, true>(point.distance2, outside);
+        let edge_row = T::Lanes::places(row, place.table.values.len());
+        let [a, b, c, d] = T::rows(place.table, &edge_row);
+        let log_edge = T::constant(zero) - (a + t * (b + t * (c + t * d)));
+        let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
+        let edge_slope = slope.scale(rate.neg());
+        let x = (T::constant(T::Lanes::splat(self.near)) - depth)
+            .scale(T::Lanes::splat(self.per_range));
+        let by_depth = self.depth.at(x);
+        Pair { point, depth, weights, log_edge, edge_slope, edge_t: t, edge_row, by_depth }
+    }
+
+    /// Weights of pairs relative to those of the logarithm `largest`: all of it, and the part that the edge softness makes before its
+    /// floor is taken off.
+    #[inline(always)]
+    fn weight(&self, pair: &Pair<T>, largest: T::Lanes) -> [T; 2] {
+        let by_depth = pair.by_depth.log() - T::constant(largest);
+        let whole = T::exponential(pair.log_edge + by_depth);
+        if self.floor == Float::<T>::ZERO {
+            return [whole, whole];
+        }
+        let rest = T::Lanes::splat(Float::<T>::ONE / (Float::<T>::ONE - self.floor));
+        let floor = T::exponential(by_depth).scale(T::Lanes::splat(self.floor));
+        let some = T::Lanes::splat(self.counts_from).less(pair.log_edge.value());
+        [(whole - floor).scale(rest).masked(some), whole.scale(rest).masked(some)]
+    }
+}
+
+/// Finds the logarithm of the largest weight of each pixel.
+pub(super) struct Largest<'a, T: Real> {
+    pub(super) largest: &'a mut Planes<T>,
+}
+
+impl<T: Real> Visitor<T> for Largest<'_, T> {
+    #[inline(always)]
+    fn pair(&mut self, blend: &Blend<T>, _: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+        let log = (pair.log_edge + pair.by_depth.log()).value();
+        // A face that does not count must make nothing else vanish.
+        let some = T::Lanes::splat(blend.counts_from).less(pair.log_edge.value());
+        self.largest.raise(at, <T::Lanes as Lanes>::pick(some, log, splat(HIDDEN)));
+    }
+}
+
+/// Adds up weights, and weights times attributes.
+pub(super) struct Sums<'a, T: Real> {
+    pub(super) largest: &'a Planes<T>,
+    /// The weights, then a plane for each channel.
+    pub(super) sums: &'a mut Planes<T>,
+}
+
+impl<T: Real> Visitor<T> for Sums<'_, T> {
+    #[inline(always)]
+    fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+        let [weight, _] = blend.weight(pair, self.largest.groups(0, at).value());
+        self.sums.add(0, at, weight);
+        let [w0, w1, w2] = pair.weights;
+        for (channel, &[c0, c1, c2]) in shown.attributes.iter().enumerate() {
+            self.sums.add(1 + channel, at, weight * (w0 * c0 + w1 * c1 + w2 * c2));
+        }
+    }
+}
+
+/// Gradients of `Σ upstream · image` to a band's faces and to the tables.
+pub(super) struct Pull<'a, T: Real> {
+    pub(super) largest: &'a Planes<T>,
+    /// One over the sum of all weights of a pixel; then what the image is, `Σ upstream · image` over the channels, less the upstream of
+    /// the faces' share; then the logarithm of a weight that may be left out of that sum.
+    pub(super) pixels: &'a Planes<T>,
+    /// A plane for each channel.
+    pub(super) upstream: &'a Planes<T>,
+    /// For each face of the band [`OF_CORNERS`] numbers, then three for each channel if the gradient to the attributes is wanted.
+    pub(super) faces: &'a mut [Float<T>],
+    pub(super) stride: usize,
+    /// Gradients to the tables of edge and depth, if they are wanted.
+    pub(super) tables: Option<&'a mut [Vec<[Float<T>; 4]>; 2]>,
+    pub(super) corners: [T::Lanes; OF_CORNERS],
+    pub(super) attributes: Vec<[T::Lanes; 3]>,
+    /// The share of a pixel that a face may have and be left out of its gradient, as it may be left out of its image.
+    pub(super) least: T::Lanes,
+}
+
+/// Whether a mask holds nowhere.
+#[inline(always)]
+fn nowhere<L: Lanes>(mask: L::Mask) -> bool {
+    L::pick(mask, splat(1.0), splat(0.0)).sum() == L::Float::ZERO
+}
+
+impl<T: Real> Visitor<T> for Pull<'_, T> {
+    #[inline(always)]
+    fn skips(&self, shown: &Shown<T>, at: [u32; 2]) -> bool {
+        // Now that the sums are known, what is hidden by nearer faces is known too.
+        nowhere::<T::Lanes>(self.pixels.groups(2, at).value().less(shown.log))
+    }
+
+    #[inline(always)]
+    fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+        let [weight, of_edge] = blend.weight(pair, self.largest.groups(0, at).value());
+        let per_total = self.pixels.groups(0, at);
+        let [share, of_edge] = [weight * per_total, of_edge * per_total];
+        if nowhere::<T::Lanes>(self.least.less(of_edge.value())) {
+            return;
+        }
+        let zero = T::constant(splat(0.0));
+        // How the objective changes with the attributes of the three corners, were the point there.
+        let mut at_corners = [zero; 3];
+        for (channel, values) in shown.attributes.iter().enumerate() {
+            let upstream = self.upstream.groups(channel, at).value();
+            for k in 0..3 {
+                at_corners[k] = at_corners[k] + values[k].scale(upstream);
+            }
+            if let Some(sums) = self.attributes.get_mut(channel) {
+                let seen = share.scale(upstream);
+                for k in 0..3 {
+                    sums[k] += (seen * pair.weights[k]).output();
+                }
+            }
+        }
+        let [q0, q1, q2] = at_corners;
+        let [w0, w1, w2] = pair.weights;
+        let here = w0 * q0 + w1 * q1 + w2 * q2;
+        // A share draws the image from what it is towards what the face shows.
+        let draw = here - self.pixels.groups(1, at);
+        let (by_edge, by_depth) = (of_edge * draw, share * draw);
+        let by_place = by_depth * pair.by_depth.slope();
+        // The nearness falls as the depth grows.
+        let by_z = by_place.scale(T::Lanes::splat(blend.per_range).neg());
+        // d z / d λₖ = -z² / zₖ, and the weights on the face are λₖ z / zₖ: so both change by λₖ as by its share of 1 / z.
+        let mut by_part = [zero; 3];
+        for k in 0..3 {
+            by_part[k] = pair.depth * (share * (at_corners[k] - here) - pair.depth * by_z);
+        }
+        let [r0, r1, r2] = shown.per_depth;
+        let by_barycentric = [by_part[0] * r0, by_part[1] * r1, by_part[2] * r2];
+        let moved = pair.point.pulled(&shown.face, by_edge * pair.edge_slope, by_barycentric);
+        for k in 0..6 {
+            self.corners[k] += moved[k].output();
+        }
+        for k in 0..3 {
+            let per_depth = shown.per_depth[k];
+            let by_depth = by_part[k] * pair.point.barycentric[k] * per_depth * per_depth;
+            self.corners[6 + k] += (zero - by_depth).output();
+        }
+        if let Some(tables) = &mut self.tables {
+            let [edge, depth] = &mut **tables;
+            pull_row(zero - by_edge, pair.edge_t, &pair.edge_row, edge);
+            pair.by_depth.pull(by_depth, depth);
+        }
+    }
+
+    #[inline(always)]
+    fn face(&mut self, index: usize, shown: &Shown<T>) {
+        let own = &mut self.faces[index * self.stride..(index + 1) * self.stride];
+        for k in 0..3 {
+            let corner = shown.order[k];
+            own[2 * corner] += self.corners[2 * k].sum();
+            own[2 * corner + 1] += self.corners[2 * k + 1].sum();
+            own[6 + corner] += self.corners[6 + k].sum();
+            for (channel, sums) in self.attributes.iter_mut().enumerate() {
+                own[OF_CORNERS + 3 * channel + corner] += sums[k].sum();
+                sums[k] = splat(0.0);
+            }
+        }
+        self.corners = [splat(0.0); OF_CORNERS];
+    }
+}

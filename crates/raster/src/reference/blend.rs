@@ -1,0 +1,155 @@
+//! Colours of whole meshes, in tensor ops.
+
+use burn::tensor::{Bool, Int, Tensor, TensorData, backend::Backend};
+
+use super::{Scene, between, chunks, corners, edge, lesser, places};
+use crate::{
+    Attributes, Background, NEAR, Weighting,
+    kernel::{FAR_AWAY, blend::AREA},
+    weighting::{FARTHEST_SEEN, counts_from, floor},
+};
+
+/// Stands for the logarithm of a weight of 0.
+const HIDDEN: f64 = -1e30;
+
+/// Soft colours of whole meshes: `[views, channels + 1, height, width]`, top row first, the last channel being the faces' share.
+///
+/// `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` over all faces j none of whose corners is nearer than [`NEAR`], farther than 1e15 world units, or
+/// projected beyond 1e6 NDC, and the background. The weight of a face, `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, is that of a [`Weighting`] with the parameters `phi` of both of its
+/// softnesses. The depth zⱼ and the attributes cⱼ are those at the point of the face nearest to the pixel: the pixel itself where it lies
+/// in the face, else the closest point of the boundary. They are interpolated in perspective: 1/z is linear on the screen, and so is c/z.
+/// A face without area has no inside. The share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`.
+///
+/// Under a softness that is 0 from some distance on, `s` is what its logarithm gives less what keeps that finite, and 0 from 1e-11 on. The computation goes
+/// in chunks of pixels of one view; weights are relative to the largest of a pixel.
+///
+/// Source: Wu et al. 2024, Eq. 3 and 4; docs/notes.md, Colour.
+///
+/// # Panics
+///
+/// If shapes do not fit, or a face uses a vertex that is not there.
+pub fn blended<B: Backend>(
+    scene: Scene,
+    vertices: Tensor<B, 3>,
+    attributes: &Attributes<B>,
+    weighting: &Weighting,
+    phi: [Tensor<B, 1>; 2],
+    background: &Background<B>,
+) -> Tensor<B, 4> {
+    let [views, ..] = vertices.dims();
+    let channels = attributes.channels();
+    let floor = floor(&weighting.edge);
+    let own = attributes.values.dims()[0] > 1;
+    let mut parts: Vec<Vec<Tensor<B, 3>>> = vec![Vec::new(); views];
+    for (view, pixels) in chunks(scene, views) {
+        let vertices = vertices.clone().narrow(0, view, 1);
+        let places = places(&vertices, scene, &pixels);
+        let points = Points::new(vertices, scene.faces, places);
+        let values = attributes.values.clone().narrow(0, if own { view } else { 0 }, 1);
+        let log_edge = weighting.edge.log_value(phi[0].clone(), points.distance.clone());
+        let log_depth = weighting.log_weight_of_depth(phi[1].clone(), points.depth.clone());
+        // What does not count is not even compared, so that it makes nothing else vanish.
+        let nothing = log_edge.clone().lower_equal_elem(counts_from(floor));
+        let nothing = nothing.bool_or(points.hidden.clone().expand(log_edge.dims()));
+        let log_depth = log_depth.mask_fill(nothing, HIDDEN);
+        let log_weight = log_edge + log_depth.clone();
+        let behind = background.log_weight.clone().reshape([1, 1, 1]);
+        let largest = log_weight.clone().detach().max_dim(2);
+        let largest = largest.clone().max_pair(behind.clone().detach().expand(largest.dims()));
+        let weight = (log_weight - largest.clone()).exp();
+        let rest = (log_depth - largest.clone()).exp() * floor;
+        let weight = (weight - rest) * (1.0 - floor).recip();
+        let behind = (behind - largest).exp();
+        let per_total = (weight.clone().sum_dim(2) + behind.clone()).recip();
+        let share = weight * per_total.clone();
+        let colour = background.colour.clone().reshape([1, 1, channels]);
+        let mut seen = (behind * per_total) * colour;
+        for (k, weights) in points.weights.into_iter().enumerate() {
+            let index =
+                attributes.entries.iter().map(|face| i64::from(face[k])).collect::<Vec<_>>();
+            let data = TensorData::new(index, [scene.faces.len()]);
+            let index = Tensor::<B, 1, Int>::from_data(data, &values.device());
+            seen = seen + (share.clone() * weights).matmul(values.clone().select(1, index));
+        }
+        parts[view].push(Tensor::cat(vec![seen, share.sum_dim(2)], 2).swap_dims(1, 2));
+    }
+    let of_view = |parts: Vec<Tensor<B, 3>>| Tensor::cat(parts, 2);
+    Tensor::cat(parts.into_iter().map(of_view).collect(), 0).reshape([
+        views,
+        channels + 1,
+        scene.size.height,
+        scene.size.width,
+    ])
+}
+
+/// Points of faces that are nearest to pixels, each `[views, pixels, faces]`.
+struct Points<B: Backend> {
+    /// Signed distance, positive inside.
+    distance: Tensor<B, 3>,
+    /// Depth of the point.
+    depth: Tensor<B, 3>,
+    /// Its barycentric weights on the face itself.
+    weights: [Tensor<B, 3>; 3],
+    /// Faces that are not drawn, `[views, 1, faces]`.
+    hidden: Tensor<B, 3, Bool>,
+}
+
+impl<B: Backend> Points<B> {
+    fn new(vertices: Tensor<B, 3>, faces: &[[u32; 3]], pixels: Tensor<B, 2>) -> Self {
+        let corners = corners(vertices, faces);
+        let seen = |[x, y, z]: &[Tensor<B, 3>; 3]| {
+            let far = [(x, FAR_AWAY), (y, FAR_AWAY), (z, FARTHEST_SEEN)];
+            let within = far.map(|(x, most)| x.clone().abs().lower_equal_elem(most));
+            within.into_iter().fold(z.clone().greater_equal_elem(NEAR), Tensor::bool_and)
+        };
+        let drawn = corners.iter().map(seen).reduce(Tensor::bool_and).expect("three corners");
+        let hidden = drawn.bool_not();
+        // What is not drawn is a point at depth 1, so that it meets no root and no division.
+        let corners = corners.map(|[x, y, z]| {
+            let [x, y] = [x, y].map(|x| x.mask_fill(hidden.clone(), 0.0));
+            [x, y, z.mask_fill(hidden.clone(), 1.0)]
+        });
+        let [a, b, c] = &corners;
+        let count = pixels.dims()[0];
+        let p = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));
+        let area = super::cross(between(a, b), between(b, c));
+        let orientation = area.sign().detach();
+        let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(from, to)| edge(&p, from, to));
+        let second = bc.distance2.clone().lower(ab.distance2.clone());
+        let nearer = lesser(ab.distance2, bc.distance2);
+        let third = ca.distance2.clone().lower(nearer.clone());
+        let nearest = lesser(nearer, ca.distance2);
+        let sides = [ab.side, bc.side, ca.side].map(|side| side * orientation.clone());
+        let within = |side: &Tensor<B, 3>| side.clone().greater_equal_elem(0.0);
+        let flat = orientation.equal_elem(0.0).expand(nearest.dims());
+        let inside = sides.iter().map(within).reduce(Tensor::bool_and).expect("three sides");
+        let inside = inside.bool_and(flat.bool_not());
+
+        let pick = |a: Tensor<B, 3>, b: Tensor<B, 3>, c: Tensor<B, 3>| {
+            a.mask_where(second.clone(), b).mask_where(third.clone(), c)
+        };
+        let along = pick(ab.along, bc.along, ca.along);
+        let (rest, zero) = (along.clone().neg() + 1.0, along.clone() * 0.0);
+        let on_boundary = [
+            pick(rest.clone(), zero.clone(), along.clone()),
+            pick(along.clone(), rest.clone(), zero.clone()),
+            pick(zero, along, rest),
+        ];
+        let [side_a, side_b, side_c] = sides;
+        let area = side_a.clone() + side_b.clone() + side_c.clone();
+        let own = inside.clone().bool_and(area.clone().greater_elem(AREA));
+        let per_area = area.mask_fill(own.clone().bool_not(), 1.0).recip();
+        // Corner k lies across from edge k + 1.
+        let mut across = [side_b, side_c, side_a].into_iter();
+        let parts = on_boundary.map(|weight| {
+            let side = across.next().expect("three sides");
+            weight.mask_where(own.clone(), side * per_area.clone())
+        });
+        let mut depths = corners.iter().map(|[_, _, z]| z.clone().recip());
+        let parts = parts.map(|part| part * depths.next().expect("three corners"));
+        let [p0, p1, p2] = parts.clone();
+        let depth = (p0 + p1 + p2).recip();
+        let distance = super::signed(nearest, inside);
+        Self { distance, weights: parts.map(|part| part * depth.clone()), depth, hidden }
+    }
+}
