@@ -3,11 +3,12 @@ use std::rc::Rc;
 use serde_json::{Map, Value, json};
 use softrast_inverse::{Iterate, Method, Resolution, SolveConfig, minimize};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
-use softrast_raster::{BackendChoice, HostBackend, RasterBackend, compiled_backends, on_backend};
+use softrast_raster::{BackendChoice, HostBackend, RasterBackend, on_backend};
 use softrast_softness::{Softness, Surrogate};
 
 use crate::{
-    Common, Description, EdgeChoice, MethodArgs, SoftnessChoice, Task, Variant, learned_name,
+    Common, Description, EdgeChoice, MethodArgs, SoftnessChoice, Task, Variant, backend,
+    learned_name,
     task::{Ended, HARD, PARAMETER, theta_of},
 };
 
@@ -292,18 +293,6 @@ impl Solved {
     fn hard(&self) -> f64 {
         best_point(&self.run.curve, HARD).map_or(f64::INFINITY, |point| point.values[HARD])
     }
-}
-
-/// The backend that the command line asks for, set up.
-///
-/// # Errors
-///
-/// If there is none of that name or no adapter for it.
-pub fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
-    let backend = BackendChoice::among(compiled_backends!(), asked);
-    let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
-    backend.set_up()?;
-    Ok(backend)
 }
 
 fn refuse_what_edges_that_stay_do_not_know(method: &MethodArgs) -> anyhow::Result<()> {

@@ -8,20 +8,18 @@ use softrast_lab::{
 };
 use softrast_raster::{BackendChoice, Pinhole};
 
-use crate::{
-    Common, MethodArgs, SoftnessChoice, Task, backend,
-    command_line::Shared,
-    session::{RESULT, Session},
-};
+use crate::{Common, MethodArgs, Scales, SoftnessChoice, backend, session::Session};
 
 /// The flags that every `solve` has, for pictures that the user gives.
-pub struct Given<'a, T: Task> {
+pub struct Given<'a, A> {
     /// Those of the task.
-    pub args: &'a T::Args,
+    pub args: &'a A,
     /// What is solved, and where results go.
     pub common: &'a Common,
-    method: &'a MethodArgs,
-    session: &'a Session,
+    pub(crate) method: &'a MethodArgs,
+    /// Name of the task, and the scales of its method.
+    pub(crate) task: (&'static str, Scales),
+    pub(crate) session: &'a Session,
 }
 
 /// What came of pictures that the user gave.
@@ -36,7 +34,7 @@ pub struct Answer {
     pub beside: String,
 }
 
-impl<T: Task> Given<'_, T> {
+impl<A> Given<'_, A> {
     /// The softness, as always without a word: what was learned on the task.
     ///
     /// # Errors
@@ -48,7 +46,8 @@ impl<T: Task> Given<'_, T> {
                 "--softness auto needs seeds to choose on: with pictures of your own name a family or a file",
             ));
         }
-        self.method.method(T::NAME, &T::SCALES, true)
+        let (name, scales) = &self.task;
+        self.method.method(name, scales, true)
     }
 
     /// Whether the command line says which softness.
@@ -83,7 +82,7 @@ impl<T: Task> Given<'_, T> {
     pub fn progress(&self, steps: usize) -> anyhow::Result<Progress> {
         let mut progress = Progress::of_program(self.common.quiet);
         progress.expect(steps);
-        progress.begin(T::NAME.to_owned(), 1, steps)?;
+        progress.begin(self.task.0.to_owned(), 1, steps)?;
         Ok(progress)
     }
 }
@@ -145,26 +144,4 @@ pub fn seen_by(
         mask_png,
         note,
     })
-}
-
-/// What the task makes of the pictures, if the flags name some.
-pub(crate) fn solve_given<T: Task>(
-    session: &Session,
-    shared: &mut Shared<T::Args>,
-    pictures: &T::Pictures,
-) -> Option<anyhow::Result<Output>> {
-    if let Err(wrong) = shared.method.reconcile() {
-        return Some(Err(Error::usage(wrong)));
-    }
-    let Shared { args, common, method } = shared;
-    let given = Given { args, common, method, session };
-    // A folder that cannot be written is said before the work.
-    let folder = session.folder();
-    let answer = T::solve_given(&given, pictures)?;
-    Some(answer.and_then(|answer| {
-        let Answer { page, output, files, beside } = answer;
-        let mut folder = folder?;
-        files.iter().try_for_each(|(name, bytes)| folder.stage(name, bytes))?;
-        session.finish(folder, page, &beside, Some(RESULT), output)
-    }))
 }

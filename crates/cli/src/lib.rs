@@ -6,6 +6,7 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("a program needs a backend: turn on one of the features ndarray, flex and wgpu");
 
+mod backend;
 mod command_line;
 mod commands;
 mod diagnostics;
@@ -26,7 +27,8 @@ mod task;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-pub use experiment::{Purpose, TaskExperiment, backend};
+pub use backend::backend;
+pub use experiment::{Purpose, TaskExperiment};
 pub use flags::{Common, Init, MethodArgs, Schedule, SoftnessChoice, Variant, usual_args};
 pub use given::{Answer, Given, MaskFlags, seen_by};
 use method::learned_name;

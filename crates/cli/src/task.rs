@@ -36,7 +36,7 @@ pub trait Task: InverseProblem + Sized {
 
     /// What comes of the pictures that the flags name; nothing if they name none.
     fn solve_given(
-        _given: &Given<'_, Self>,
+        _given: &Given<'_, Self::Args>,
         _pictures: &Self::Pictures,
     ) -> Option<anyhow::Result<Answer>> {
         None

@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 
-use crate::viewer;
+/// What a page with a viewer needs.
+pub(crate) const VIEWER: [&str; 2] = [include_str!("viewer.css"), include_str!("viewer.js")];
 
 /// A page that grows section by section.
 #[derive(Clone, Debug)]
@@ -90,8 +91,8 @@ impl Report {
     pub fn finish(self, command: &str, beside: &str) -> String {
         let Self { title, about, body, has_viewer } = self;
         let [command, beside] = [command, beside].map(escape);
-        let viewer_style = if has_viewer { viewer::STYLE } else { "" };
-        let script = format!("<script>\n{}</script>\n", viewer::SCRIPT);
+        let viewer_style = if has_viewer { VIEWER[0] } else { "" };
+        let script = format!("<script>\n{}</script>\n", VIEWER[1]);
         let script = if has_viewer { &script } else { "" };
         format!(
             "<!DOCTYPE html>

@@ -6,9 +6,6 @@ use serde_json::json;
 
 use crate::report::{Report, escape, image};
 
-pub(crate) const STYLE: &str = include_str!("viewer.css");
-pub(crate) const SCRIPT: &str = include_str!("viewer.js");
-
 /// A mesh and the cameras that see it, to be turned and zoomed on a page.
 ///
 /// Vertices and faces take 16 characters of the page each: a closed mesh of 200 000 faces makes a page of 5 MB, which opens in a second.
@@ -125,6 +122,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
+    use crate::report::VIEWER;
 
     const UPRIGHT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
 
@@ -187,7 +185,7 @@ mod tests {
         assert!(!page.contains("</script><b>") && !page.contains("<mesh>"));
         assert!(page.contains("<img alt=\"A &lt;mesh&gt;\" src=\"data:image/png;base64,UE5H\">"));
         assert!(page.contains("<figcaption>A &lt;mesh&gt;</figcaption>"));
-        assert!(!SCRIPT.contains("</script") && !STYLE.contains("</style"));
+        assert!(!VIEWER[1].contains("</script") && !VIEWER[0].contains("</style"));
     }
 
     #[test]
@@ -196,9 +194,9 @@ mod tests {
         other.views.clear();
         let page = page(&[triangle(), other]);
         assert_eq!(page.matches("<div class=\"viewer\">").count(), 2);
-        assert_eq!([page.matches(SCRIPT).count(), page.matches(STYLE).count()], [1, 1]);
+        assert_eq!([page.matches(VIEWER[1]).count(), page.matches(VIEWER[0]).count()], [1, 1]);
         assert_eq!(data(&page)[1]["views"], json!([]));
-        assert!(!page.contains(" id=") && !SCRIPT.contains(".id ="));
+        assert!(!page.contains(" id=") && !VIEWER[1].contains(".id ="));
     }
 
     #[test]

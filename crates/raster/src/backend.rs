@@ -1,7 +1,5 @@
 //! Fused ops as a burn backend extension: each with its gradient and the gradient of that.
 
-use std::sync::Arc;
-
 use burn::{
     backend::{
         Autodiff,
@@ -18,74 +16,9 @@ use burn::{
 };
 
 use crate::{
-    ImageSize,
+    ProfileSum,
     fused::{ElementaryOp, FusedOp, HostFloat, Pass},
-    kernel::{self, Float, Grid, Inputs},
 };
-
-/// What stays the same over the calls of the op: faces, image size and the places of the knots.
-#[derive(Clone, Debug)]
-pub struct ProfileSum {
-    pub(crate) faces: Arc<[[u32; 3]]>,
-    pub(crate) grid: Grid,
-    pub(crate) size: ImageSize,
-    pub(crate) near: f64,
-    #[cfg(feature = "wgpu")]
-    pub(crate) topology: crate::gpu::Topology,
-}
-
-impl ProfileSum {
-    /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what
-    /// each pass over all views visits.
-    pub(crate) fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
-        let [views, _, _] = vertices.dims();
-        let data = vertices.swap_dims(1, 2).into_data();
-        match data.dtype {
-            DType::F32 => f32::pairs(&self.inputs::<f32>(views, slice(&data), &[])),
-            DType::F64 => f64::pairs(&self.inputs::<f64>(views, slice(&data), &[])),
-            other => panic!("profile_sum works in f32 and f64, found {other:?}"),
-        }
-    }
-
-    fn inputs<'a, F>(&'a self, views: usize, vertices: &'a [F], table: &'a [F]) -> Inputs<'a, F> {
-        Inputs {
-            vertices,
-            table,
-            faces: &self.faces,
-            grid: self.grid,
-            size: self.size,
-            near: self.near,
-            views,
-        }
-    }
-
-    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and `tables` `[1 or views, rows, 4]`, to sums
-    /// `[views, height, width]`, top row first.
-    pub(crate) fn run<F: Float + Element>(
-        &self,
-        pass: &Pass,
-        slices: &[&[F]],
-        dims: &[Vec<usize>],
-    ) -> TensorData {
-        let views = dims[0][0];
-        let inputs = self.inputs(views, slices[0], slices[1]);
-        let values = match pass {
-            Pass::Forward => {
-                return TensorData::new(
-                    kernel::forward(&inputs),
-                    [views, self.size.height, self.size.width],
-                );
-            }
-            Pass::Vjp { wanted } => kernel::vjp(&inputs, slices[2], [wanted[0], wanted[1]]),
-            Pass::VjpOfVjp { along, wanted } => {
-                let wanted = [wanted[0], wanted[1], wanted[2]];
-                kernel::vjp_of_vjp(&inputs, slices[2], slices[3], [along[0], along[1]], wanted)
-            }
-        };
-        let length = values.len();
-        TensorData::new(values, [length])
-    }
-}
 
 fn slice<F: Element>(data: &TensorData) -> &[F] {
     data.as_slice().expect("all tensors of a call have one float type")
@@ -181,6 +114,17 @@ mod ndarray {
 }
 #[cfg(feature = "flex")]
 impl RasterBackend for burn::backend::Flex {}
+
+/// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what each pass over all views visits.
+pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usize {
+    let [views, _, _] = vertices.dims();
+    let data = vertices.swap_dims(1, 2).into_data();
+    match data.dtype {
+        DType::F32 => f32::pairs(&op.inputs::<f32>(views, slice(&data), &[])),
+        DType::F64 => f64::pairs(&op.inputs::<f64>(views, slice(&data), &[])),
+        other => panic!("profile_sum works in f32 and f64, found {other:?}"),
+    }
+}
 
 /// Sums `profile(d)` over the faces of each pixel: the one op under every silhouette.
 ///

@@ -43,13 +43,15 @@ pub mod reference;
 mod silhouette;
 mod soft_blend;
 mod soft_renderer;
+mod sum_op;
 mod t_conorm;
+mod view;
 mod weighting;
 
 pub use attributes::Attributes;
-pub use backend::{ProfileSum, RasterBackend, profile_sum};
+pub use backend::{RasterBackend, profile_sum};
 pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
-pub use camera::{NEAR, Orbit, project, vertices, view_rotation};
+pub use camera::{Orbit, project, vertices};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
 #[doc(hidden)]
@@ -67,7 +69,9 @@ pub use silhouette::{Rasterizer, Silhouette};
 #[doc(hidden)]
 pub use soft_blend::SoftBlend;
 pub use soft_renderer::SoftRenderer;
+pub use sum_op::ProfileSum;
 pub use t_conorm::{TConorm, UnknownTConorm};
+pub use view::{NEAR, view_rotation};
 pub use weighting::Weighting;
 
 /// Compiles and runs the README's example.

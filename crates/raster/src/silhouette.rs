@@ -5,7 +5,7 @@ use softrast_softness::Softness;
 
 use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
-    backend::{elementary, primitive},
+    backend::{elementary, pairs, primitive},
     fused::ElementaryOp,
     profile_sum,
 };
@@ -200,7 +200,7 @@ impl<S: Softness> Silhouette<S> {
     /// one pass over all views visits, forward or backward.
     #[doc(hidden)]
     pub fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
-        self.op.pairs(vertices)
+        pairs(&self.op, vertices)
     }
 
     /// The same support with `2^bits` cells in each octave of the squared distance, instead of as

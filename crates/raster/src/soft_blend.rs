@@ -1,11 +1,10 @@
 use std::sync::Arc;
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Element, TensorData};
 
 use crate::{
-    Background, ImageSize, NEAR, RasterBackend,
-    backend::{fused, primitive},
-    fused::{FusedOp, Pass},
+    ImageSize, NEAR,
+    fused::pass::Pass,
     kernel::{
         Float, Grid,
         blend::{self, DepthGrid, Inputs},
@@ -71,48 +70,4 @@ impl SoftBlend {
         let length = values.len();
         TensorData::new(values, [length])
     }
-}
-
-/// Blends the attributes of the faces of each pixel by their weights: the one op under every soft image in colour.
-///
-/// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth; `tables` are those of the curves that `op` was made for. The
-/// result is `[views, channels + 1, height, width]`, the last channel being the faces' share.
-///
-/// # Panics
-///
-/// If the shapes do not fit or the float types differ.
-pub(crate) fn soft_blend<B: RasterBackend>(
-    op: SoftBlend,
-    vertices: Tensor<B, 3>,
-    attributes: Tensor<B, 3>,
-    tables: Tensor<B, 2>,
-    background: &Background<B>,
-) -> Tensor<B, 4> {
-    let [views, count, three] = vertices.dims();
-    assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
-    let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
-    assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
-    let [own, _, channels] = attributes.dims();
-    assert!(own == 1 || own == views, "attributes of {own} views, but there are {views}");
-    assert_eq!(op.entries.len(), op.faces.len(), "faces that have attributes");
-    assert_eq!(background.colour.dims(), [channels], "channels of the background");
-    let types = [attributes.dtype(), tables.dtype(), background.colour.dtype()];
-    assert_eq!(
-        types,
-        [vertices.dtype(); 3],
-        "attributes, tables and background differ in float type"
-    );
-    let behind = Tensor::cat(vec![background.colour.clone(), background.log_weight.clone()], 0);
-    let inputs = vec![
-        primitive(vertices.swap_dims(1, 2)),
-        primitive(attributes),
-        primitive(tables),
-        primitive(behind),
-    ];
-    fused(&FusedOp::SoftBlend(op), inputs)
-}
-
-/// Both tables as the op takes them, `[rows, 4]`.
-pub(crate) fn tables<B: Backend>(edge: Tensor<B, 2>, depth: Tensor<B, 2>) -> Tensor<B, 2> {
-    Tensor::cat(vec![edge, depth], 0)
 }

@@ -20,6 +20,7 @@
 
 mod args;
 mod error;
+mod framing;
 mod paper;
 mod picture;
 mod pictures;

@@ -22,8 +22,8 @@ use softrast_mesh::Mesh;
 use softrast_raster::{Pinhole, on_backend};
 
 use crate::{
-    Instances, Pose,
-    task::{Framing, mesh},
+    Args, Instances,
+    framing::{Framing, mesh},
 };
 
 /// Field of view along the shorter side where no camera is given, in degrees.
@@ -103,7 +103,7 @@ struct Solved {
 }
 
 pub(crate) fn solve_pictures(
-    given: &Given<'_, Pose>,
+    given: &Given<'_, Args>,
     pictures: &Pictures,
 ) -> anyhow::Result<Answer> {
     let args = given.args;
@@ -158,7 +158,7 @@ struct Framed {
 }
 
 /// Flags that say what is drawn as a target.
-fn refuse_flags_of_seeds(given: &Given<'_, Pose>) -> anyhow::Result<()> {
+fn refuse_flags_of_seeds(given: &Given<'_, Args>) -> anyhow::Result<()> {
     let (args, common) = (given.args, given.common);
     let flags = [
         ("--range", args.range.is_some()),

@@ -4,12 +4,11 @@ use softrast_lab::{Error, program::Output, report::Table};
 use softrast_raster::{RasterBackend, TConorm};
 
 use crate::{
-    Settings, Template, Training,
+    Settings, Split, Template, Training,
     args::{self, CompareArgs},
-    checkpoint,
-    program::trained,
+    checkpoint, data_set,
+    learner::trained,
     score::{Score, score, with_mean},
-    shapes::{self, Split},
     train::CHECKPOINT,
 };
 
@@ -50,7 +49,7 @@ pub(crate) fn compare<B: RasterBackend>(
         }
         let (header, _) = training.run::<B>(device)?;
         let (_, network) = trained::<B>(&training.out.join(CHECKPOINT), device)?;
-        let shapes = shapes::open(&training.settings.data, Split::Test, training.settings.seed)?;
+        let shapes = data_set::open(&training.settings.data, Split::Test, training.settings.seed)?;
         let views = [args.test_shapes, VIEWS];
         let score = score(&network, &Template::new(device), shapes.as_ref(), views, device)?;
         let seconds: f64 = header.epochs.iter().map(|epoch| epoch.time.all).sum();

@@ -1,4 +1,5 @@
 use std::{
+    path::Path,
     sync::{Mutex, PoisonError},
     time::Instant,
 };
@@ -15,7 +16,7 @@ use softrast_raster::RasterBackend;
 use softrast_softness::{SoftStep, numbers};
 
 use crate::{
-    Network, Settings, Template, Time,
+    Checkpoint, Network, Settings, Template, Time,
     objective::{Objective, soft_step},
     pairs::PairBatch,
 };
@@ -180,4 +181,19 @@ type OptimizerRecord<B, M> =
 /// Waits until a tensor is there.
 fn wait<B: RasterBackend>(tensor: &Tensor<Autodiff<B>, 3>) {
     let _ = tensor.clone().inner().narrow(2, 0, 1).into_data();
+}
+
+/// The network of a checkpoint.
+pub(crate) fn trained<B: RasterBackend>(
+    path: &Path,
+    device: &B::Device,
+) -> anyhow::Result<(Checkpoint, Network<B>)> {
+    let mut checkpoint = Checkpoint::load(path)?;
+    let records = std::mem::take(&mut checkpoint.records);
+    let learner = Learner::<B>::new(&checkpoint.header.settings, device)?;
+    let learner = learner
+        .with_bytes(records, device)
+        .with_context(|| format!("{} cannot be used: train anew", path.display()))?;
+    let network = learner.network();
+    Ok((checkpoint, network))
 }

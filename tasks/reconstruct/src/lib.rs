@@ -20,6 +20,7 @@ compile_error!("reconstruct needs a backend: turn on one of the features flex, n
 mod args;
 mod checkpoint;
 mod compare;
+mod data_set;
 mod history;
 mod kinds;
 mod learner;

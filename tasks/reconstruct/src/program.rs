@@ -11,12 +11,12 @@ use softrast_lab::{
 use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
 
 use crate::{
-    Checkpoint, Data, Network, SIZE, Template, Training,
+    Data, SIZE, Split, Template, Training,
     args::{self, Command, CommandLine, EvaluateArgs, PredictArgs, TrainArgs},
     compare::compare,
-    learner::Learner,
+    data_set,
+    learner::trained,
     score::{predict, score},
-    shapes::{self, Split},
     train::table,
 };
 
@@ -107,7 +107,7 @@ fn evaluate<B: RasterBackend>(args: &EvaluateArgs, device: &B::Device) -> anyhow
     let (checkpoint, network) = trained::<B>(&args.checkpoint, device)?;
     let settings = &checkpoint.header.settings;
     let data = args.data.clone().map_or_else(|| settings.data.clone(), Data::Files);
-    let shapes = shapes::open(&data, Split::Test, settings.seed)?;
+    let shapes = data_set::open(&data, Split::Test, settings.seed)?;
     let views = [args.shapes, args.views];
     let score = score(&network, &Template::new(device), shapes.as_ref(), views, device)?;
     let pictures: usize = score.pictures.iter().sum();
@@ -145,21 +145,6 @@ fn predict_mesh<B: RasterBackend>(
     let text = vec![format!("{vertices} vertices, {faces} faces: {}", args.out.display())];
     let json = json!({ "vertices": vertices, "faces": faces, "mesh": args.out });
     Ok(Output { json, text, ..Output::default() })
-}
-
-/// The network of a checkpoint.
-pub(crate) fn trained<B: RasterBackend>(
-    path: &Path,
-    device: &B::Device,
-) -> anyhow::Result<(Checkpoint, Network<B>)> {
-    let mut checkpoint = Checkpoint::load(path)?;
-    let records = std::mem::take(&mut checkpoint.records);
-    let learner = Learner::<B>::new(&checkpoint.header.settings, device)?;
-    let learner = learner
-        .with_bytes(records, device)
-        .with_context(|| format!("{} cannot be used: train anew", path.display()))?;
-    let network = learner.network();
-    Ok((checkpoint, network))
 }
 
 /// A picture file as the network takes it: planes of red, green, blue and alpha, `[4 * 64 * 64]`.

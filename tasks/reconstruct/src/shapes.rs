@@ -1,6 +1,6 @@
-use std::{fmt::Debug, sync::Arc};
+use std::fmt::Debug;
 
-use crate::{Data, NpzFolder, Procedural, Voxels};
+use crate::Voxels;
 
 /// Shapes in classes, each as pictures from 24 views and as voxels.
 pub trait Shapes: Debug + Send + Sync {
@@ -45,22 +45,4 @@ impl Split {
             Self::Test => "test",
         }
     }
-}
-
-/// Shapes of a class for watching and for the figures at the end, in the procedural set.
-const HELD_OUT: usize = 200;
-
-/// The shapes of a split of a data set.
-///
-/// # Errors
-///
-/// If there are files, and they are missing or not as they should be.
-pub(crate) fn open(data: &Data, split: Split, seed: u64) -> anyhow::Result<Arc<dyn Shapes>> {
-    Ok(match data {
-        Data::Procedural(per_class) => {
-            let count = if split == Split::Train { *per_class } else { HELD_OUT };
-            Arc::new(Procedural::new(split, seed, count))
-        }
-        Data::Files(folder) => Arc::new(NpzFolder::open(folder, split)?),
-    })
 }

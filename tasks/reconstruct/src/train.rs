@@ -10,12 +10,12 @@ use softrast_lab::Progress;
 use softrast_raster::RasterBackend;
 
 use crate::{
-    Checkpoint, Epoch, Header, Score, Settings, Shapes, Template, Time, checkpoint,
+    Checkpoint, Epoch, Header, Score, Settings, Shapes, Split, Template, Time, checkpoint,
+    data_set,
     learner::Learner,
     pairs::Pairs,
     report,
     score::{score, with_mean},
-    shapes::{self, Split},
     sheet,
 };
 
@@ -57,8 +57,8 @@ impl Training {
     /// loss is not finite any more.
     pub fn run<B: RasterBackend>(&self, device: &B::Device) -> anyhow::Result<(Header, Vec<f64>)> {
         let path = self.out.join(CHECKPOINT);
-        let shapes = shapes::open(&self.settings.data, Split::Train, self.settings.seed)?;
-        let held_out = shapes::open(&self.settings.data, Split::Val, self.settings.seed)?;
+        let shapes = data_set::open(&self.settings.data, Split::Train, self.settings.seed)?;
+        let held_out = data_set::open(&self.settings.data, Split::Val, self.settings.seed)?;
         let (mut header, mut learner) = self.start::<B>(&path, shapes.as_ref(), device)?;
         let template = Template::new(device);
         let mut bar = Progress::of_program(!self.visible);

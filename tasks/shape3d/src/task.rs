@@ -122,7 +122,7 @@ impl Task for Shape3d {
     type Args = Args;
     type Pictures = Views;
 
-    fn solve_given(given: &Given<'_, Self>, flags: &Views) -> Option<anyhow::Result<Answer>> {
+    fn solve_given(given: &Given<'_, Args>, flags: &Views) -> Option<anyhow::Result<Answer>> {
         solve_views(given, flags)
     }
 

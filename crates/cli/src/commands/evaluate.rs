@@ -7,10 +7,9 @@ use super::{
     runs::{Finished, write},
 };
 use crate::{
-    Purpose, SoftnessChoice, Task, TaskExperiment,
+    Answer, Given, Purpose, SoftnessChoice, Task, TaskExperiment,
     command_line::{Auto, Evaluate, Shared, Solve},
-    given::solve_given,
-    session::Session,
+    session::{RESULT, Session},
 };
 
 /// Solves one instance, or what the user gives.
@@ -24,6 +23,29 @@ pub(crate) fn solve<T: Task>(
     }
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
     run(session, &first, None, &[shared.common.seed], false, false)
+}
+
+/// What the task makes of the pictures, if the flags name some.
+fn solve_given<T: Task>(
+    session: &Session,
+    shared: &mut Shared<T::Args>,
+    pictures: &T::Pictures,
+) -> Option<anyhow::Result<Output>> {
+    if let Err(wrong) = shared.method.reconcile() {
+        return Some(Err(Error::usage(wrong)));
+    }
+    let Shared { args, common, method } = shared;
+    let task = (T::NAME, T::SCALES);
+    let given = Given { args, common, method, task, session };
+    // A folder that cannot be written is said before the work.
+    let folder = session.folder();
+    let answer = T::solve_given(&given, pictures)?;
+    Some(answer.and_then(|answer| {
+        let Answer { page, output, files, beside } = answer;
+        let mut folder = folder?;
+        files.iter().try_for_each(|(name, bytes)| folder.stage(name, bytes))?;
+        session.finish(folder, page, &beside, Some(RESULT), output)
+    }))
 }
 
 /// Solves many instances with one method or two.

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use super::{Elementary, Views, number::Number};
 use crate::{
     NEAR,
-    camera::FARTHEST,
     kernel::{Dual, Float},
+    view::FARTHEST,
 };
 
 /// Orbits `[views, 4]` to matrices `[views, 3, 4]`; see [`crate::project`].

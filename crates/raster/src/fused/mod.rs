@@ -6,12 +6,14 @@
 mod camera;
 mod image;
 mod number;
+pub(crate) mod pass;
 
 use burn::tensor::{Element, TensorData};
 
 use camera::{OrbitMatrix, Perspective};
 use image::{Coverage, Iou, SquaredError};
 pub(crate) use number::Number;
+pub use pass::Pass;
 
 use crate::{
     ProfileSum, SoftBlend,
@@ -44,27 +46,6 @@ pub enum ElementaryOp {
     SquaredError,
     /// One less the overlap over the union.
     Iou,
-}
-
-/// What is asked of an op with some inputs.
-///
-/// Gradients come back flat, one after the other, in the order of the inputs, and only those that are wanted.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Pass {
-    /// The result.
-    Forward,
-    /// The gradient of `Σ upstream · result`; the upstream stands behind the inputs.
-    Vjp {
-        /// To which inputs.
-        wanted: Vec<bool>,
-    },
-    /// The gradient of `Σ direction · gradient`; the direction stands behind inputs and upstream.
-    VjpOfVjp {
-        /// What the gradient consists of.
-        along: Vec<bool>,
-        /// To which of the inputs, and whether to the upstream.
-        wanted: Vec<bool>,
-    },
 }
 
 /// An op that is written for any number. `dims` are the shapes of the inputs.

@@ -4,10 +4,9 @@ use rayon::prelude::*;
 
 use super::{
     float::Float,
-    lanes::{LANES, Lanes, Plain},
+    lanes::{LANES, Lanes, Plain, has_avx2},
     reach::{Reach, grown, in_pixels},
     real::splat,
-    walk::has_avx2,
 };
 use crate::ImageSize;
 

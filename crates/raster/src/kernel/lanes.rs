@@ -141,13 +141,30 @@ pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
             #[allow(unsafe_code)]
             return unsafe { avx2(work) };
         }
-        if L::GAINS_AVX2 && super::walk::has_avx2() {
+        if L::GAINS_AVX2 && has_avx2() {
             // SAFETY: the feature was just detected.
             #[allow(unsafe_code)]
             return unsafe { avx2(work) };
         }
     }
     work.run()
+}
+
+/// Lets tests walk as on a machine without AVX2.
+#[cfg(test)]
+pub(crate) static PORTABLE: std::sync::atomic::AtomicBool =
+    std::sync::atomic::AtomicBool::new(false);
+
+/// Whether this machine has AVX2.
+pub(crate) fn has_avx2() -> bool {
+    #[cfg(test)]
+    if PORTABLE.load(std::sync::atomic::Ordering::SeqCst) {
+        return false;
+    }
+    #[cfg(target_arch = "x86_64")]
+    return is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
 }
 
 /// Rows of a table, one for each lane.

@@ -8,7 +8,7 @@ use super::{
     lanes::{GROUP, LANES},
     reach::Reach,
     real::{Float, Real},
-    walk::{Place, Scene},
+    scene::{Place, Scene},
 };
 
 /// Faces that are listed together: what is prepared of them stays near the processor.

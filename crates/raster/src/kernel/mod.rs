@@ -16,6 +16,7 @@ mod pair;
 mod pairs;
 mod reach;
 mod real;
+mod scene;
 mod sum;
 mod table;
 mod walk;

@@ -6,8 +6,8 @@ use super::{
     float::Float,
     lanes::{LANES, Plain},
     list::within,
+    scene::Scene,
     sum::Inputs,
-    walk::Scene,
 };
 
 /// Number of pixel-face pairs over all views that one walk visits; the table is not read.

@@ -5,13 +5,14 @@ use rayon::prelude::*;
 use super::{
     bands::{Bands, View},
     float::Float,
-    lanes::Plain,
+    lanes::{Plain, has_avx2},
     list::rows_of_bands,
     real::{self, Dual, Real, Table},
+    scene::Scene,
     table::Grid,
     walk::{
-        BandGradient, Scene, has_avx2, walk_everything, walk_gradient, walk_gradient_and_table,
-        walk_image, walk_image_and_gradient,
+        BandGradient, walk_everything, walk_gradient, walk_gradient_and_table, walk_image,
+        walk_image_and_gradient,
     },
 };
 use crate::ImageSize;

@@ -1,18 +1,14 @@
 //! One walk over the pixel-face pairs of a band, for the image, its gradient or both.
 
-use std::ops::Range;
-
 use super::{
-    bands::View,
-    face::Faces,
     float::Float as _,
-    lanes::{GROUP, LANES, Lanes, Places},
+    lanes::{GROUP, LANES, Lanes, Places, has_avx2},
     list::{Chunk, LISTED, List},
     pair::closest,
     real::{Float, Real, Table, splat},
-    table::{Grid, Lookup, Place as Cell},
+    scene::{Place, Scene},
+    table::Place as Cell,
 };
-use crate::ImageSize;
 
 /// Chunks by which adding up follows geometry: while one waits for the table, the arithmetic of the
 /// other goes on.
@@ -23,180 +19,11 @@ const RING: usize = 8;
 /// Chunks whose gradients are added up lane by lane: fewer terms in a row keep more digits.
 const TOGETHER: usize = 16;
 
-/// Everything a traversal reads, in one number type.
-pub(crate) struct Scene<'a, T: Real> {
-    /// `[views, 3, vertices]`: x and y in NDC, depth.
-    pub(crate) vertices: &'a [Float<T>],
-    /// Their tangents, where numbers have any.
-    pub(crate) tangents: &'a [Float<T>],
-    pub(crate) faces: &'a [[u32; 3]],
-    /// Cubic coefficients of each cell, `[1 or views, grid.rows()]`.
-    pub(crate) tables: Table<'a, T>,
-    pub(crate) grid: Grid,
-    pub(crate) size: ImageSize,
-    /// Rows of a band.
-    pub(crate) rows: usize,
-    pub(crate) lookup: Lookup<Float<T>>,
-    /// Centres of the columns, with a group more than the image has.
-    centres: Vec<Float<T>>,
-    /// Centres of the rows, with a vector more.
-    heights: Vec<Float<T>>,
-}
-
-/// Which band of which view.
-#[derive(Clone, Copy)]
-pub(crate) struct Place<'a, T: Real> {
-    /// `[3, vertices]`.
-    pub(crate) vertices: &'a [Float<T>],
-    /// The same, or nothing.
-    pub(crate) tangents: &'a [Float<T>],
-    /// `[grid.rows()]`.
-    pub(crate) table: Table<'a, T>,
-    pub(crate) view: &'a View,
-    pub(crate) band: usize,
-}
-
-impl<T: Real> Place<'_, T> {
-    /// Up to [`LANES`] faces of the scene, given by their numbers, as this view sees them; the last one
-    /// fills them up.
-    #[inline(always)]
-    pub(crate) fn faces(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T> {
-        let mut values = [[[Float::<T>::ZERO; LANES]; 3]; 2];
-        let mut tangents = [[[Float::<T>::ZERO; LANES]; 3]; 2];
-        let count = self.vertices.len() / 3;
-        let (xs, ys) = (&self.vertices[..count], &self.vertices[count..2 * count]);
-        for lane in 0..LANES {
-            let face = scene.faces[numbers[lane.min(numbers.len() - 1)] as usize];
-            for k in 0..3 {
-                let vertex = face[k] as usize;
-                (values[0][k][lane], values[1][k][lane]) = (xs[vertex], ys[vertex]);
-                if T::DUAL {
-                    tangents[0][k][lane] = self.tangents[vertex];
-                    tangents[1][k][lane] = self.tangents[count + vertex];
-                }
-            }
-        }
-        let [x, y] = values;
-        let [dx, dy] = tangents;
-        let x = [lanes(&x[0], &dx[0]), lanes(&x[1], &dx[1]), lanes(&x[2], &dx[2])];
-        let y = [lanes(&y[0], &dy[0]), lanes(&y[1], &dy[1]), lanes(&y[2], &dy[2])];
-        let mut radii = [Float::<T>::from_f64(scene.grid.outer); LANES];
-        if !self.view.radii.is_empty() {
-            for lane in 0..LANES {
-                let number = numbers[lane.min(numbers.len() - 1)] as usize;
-                radii[lane] = Float::<T>::from_f64(f64::from(self.view.radii[number]));
-            }
-        }
-        Faces::new(x, y, T::Lanes::of(&radii))
-    }
-
-    /// The constant outside the support.
-    #[inline(always)]
-    fn tail(&self, grid: &Grid) -> T {
-        let tail = grid.tail();
-        let tangent = if T::DUAL { self.table.tangents[tail][0] } else { Float::<T>::ZERO };
-        T::new(T::Lanes::splat(self.table.values[tail][0]), T::Lanes::splat(tangent))
-    }
-
-    /// A pixel that no face reaches.
-    pub(crate) fn empty(&self, grid: &Grid) -> Float<T> {
-        let rows = if T::DUAL { self.table.tangents } else { self.table.values };
-        rows[grid.tail()][0] * Float::<T>::from_f64(self.view.drawn as f64)
-    }
-}
-
-/// Numbers with their tangents.
-#[inline(always)]
-fn lanes<T: Real>(values: &[Float<T>; LANES], tangents: &[Float<T>; LANES]) -> T {
-    T::new(T::Lanes::of(values), T::Lanes::of(tangents))
-}
-
 /// What one band gives back.
 pub(crate) struct BandGradient<F> {
     /// For each face of the band, the gradient to x and y of its three corners.
     pub(crate) corners: Vec<[F; 6]>,
     pub(crate) table: Vec<[F; 4]>,
-}
-
-impl<'a, T: Real> Scene<'a, T> {
-    pub(crate) fn new(
-        vertices: [&'a [Float<T>]; 2],
-        faces: &'a [[u32; 3]],
-        tables: Table<'a, T>,
-        grid: Grid,
-        size: ImageSize,
-        rows: usize,
-    ) -> Self {
-        let number = Float::<T>::from_f64;
-        let [vertices, tangents] = vertices;
-        Self {
-            vertices,
-            tangents,
-            faces,
-            tables,
-            grid,
-            size,
-            rows,
-            lookup: Lookup::new(&grid),
-            centres: (0..size.width + GROUP).map(|k| number(size.column_centre(k))).collect(),
-            heights: (0..size.height + LANES).map(|row| number(size.row_centre(row))).collect(),
-        }
-    }
-
-    /// A band of view `index` of `views`.
-    pub(crate) fn place<'b>(
-        &self,
-        view: &'b View,
-        index: usize,
-        views: usize,
-        band: usize,
-    ) -> Place<'b, T>
-    where
-        'a: 'b,
-    {
-        let of_view = |numbers: &'a [Float<T>]| {
-            let length = numbers.len() / views;
-            &numbers[index * length..(index + 1) * length]
-        };
-        let rows = self.grid.rows();
-        let first = if self.tables.values.len() > rows { index * rows } else { 0 };
-        let of_table =
-            |all: &'a [[Float<T>; 4]]| &all[first.min(all.len())..(first + rows).min(all.len())];
-        let table = Table {
-            values: of_table(self.tables.values),
-            tangents: of_table(self.tables.tangents),
-        };
-        let [vertices, tangents] = [self.vertices, self.tangents].map(of_view);
-        Place { vertices, tangents, table, view, band }
-    }
-
-    /// Length of a row of a band: that of the image, and a group for what reaches beyond.
-    pub(crate) fn stride(&self) -> usize {
-        self.size.width + GROUP
-    }
-
-    /// Numbers of a band: its rows, and a group for pixels on which nothing depends.
-    pub(crate) fn band_length(&self, band: usize) -> usize {
-        self.band_rows(band).len() * self.stride() + GROUP
-    }
-
-    /// Rows of the image that band `band` holds.
-    pub(crate) fn band_rows(&self, band: usize) -> Range<usize> {
-        band * self.rows..((band + 1) * self.rows).min(self.size.height)
-    }
-
-    /// Centres of a column and those behind it.
-    #[inline(always)]
-    pub(crate) fn centres(&self, column: u32) -> &[Float<T>; GROUP] {
-        let group = &self.centres[column as usize..column as usize + GROUP];
-        group.try_into().expect("a group of columns")
-    }
-
-    /// Centres of a row of the image and those below it.
-    #[inline(always)]
-    pub(crate) fn heights(&self, row: usize) -> &[Float<T>; LANES] {
-        self.heights[row..row + LANES].try_into().expect("as many heights as lanes")
-    }
 }
 
 /// One walk over the pairs of a band. `upstream` and `image` are `[rows, stride]` and a group more.
@@ -409,23 +236,6 @@ impl<T: Real> Walker<'_, '_, T> {
             corners[2 * order[k] + 1] += sums[2 * k + 1].sum() * factor;
         }
     }
-}
-
-/// Lets tests walk as on a machine without AVX2.
-#[cfg(test)]
-pub(crate) static PORTABLE: std::sync::atomic::AtomicBool =
-    std::sync::atomic::AtomicBool::new(false);
-
-/// Whether this machine has AVX2.
-pub(crate) fn has_avx2() -> bool {
-    #[cfg(test)]
-    if PORTABLE.load(std::sync::atomic::Ordering::SeqCst) {
-        return false;
-    }
-    #[cfg(target_arch = "x86_64")]
-    return is_x86_feature_detected!("avx2");
-    #[cfg(not(target_arch = "x86_64"))]
-    false
 }
 
 /// Compiles a walk for AVX2 and for what every machine has, and picks one at run time. Products and

@@ -4,8 +4,8 @@ use burn::tensor::{Tensor, backend::Backend};
 
 use crate::{
     NEAR,
-    camera::{FARTHEST, focal, view_rotation},
     loss::EMPTY,
+    view::{FARTHEST, focal, view_rotation},
 };
 
 /// The matrices `[views, 3, 4]` of orbits `[views, 4]` (distance, elevation, azimuth, whole field of view in degrees): two rows give x and

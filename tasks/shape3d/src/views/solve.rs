@@ -22,7 +22,7 @@ use super::{
     hull::{ball, hull},
     problem::FromViews,
 };
-use crate::Shape3d;
+use crate::Args;
 
 /// A part of the work.
 #[derive(Clone, Copy)]
@@ -104,7 +104,7 @@ struct Scored {
 
 /// The mesh that has the silhouettes of a folder's masks, if the flags name one.
 pub(crate) fn solve_views(
-    given: &Given<'_, Shape3d>,
+    given: &Given<'_, Args>,
     flags: &Views,
 ) -> Option<anyhow::Result<Answer>> {
     if flags.views.is_none() && flags.masks.asked() {
@@ -115,7 +115,7 @@ pub(crate) fn solve_views(
     flags.views.as_ref().map(|folder| solved(given, flags, folder))
 }
 
-fn solved(given: &Given<'_, Shape3d>, flags: &Views, folder: &PathBuf) -> anyhow::Result<Answer> {
+fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::Result<Answer> {
     let args = given.args;
     if args.mesh.is_some() || args.elevation.is_some() {
         return Err(Error::usage(
@@ -162,7 +162,7 @@ fn parted(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
     Ok([train, aside].map(|part| part.into_iter().map(|(_, view)| view).collect()))
 }
 
-fn start(given: &Given<'_, Shape3d>, flags: &Views, views: &[View]) -> anyhow::Result<Mesh> {
+fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Result<Mesh> {
     let placed = |mesh: Mesh, size: f64| {
         let (middle, reach) = ball(views)?;
         let place = |p: &[f64; 3]| [0, 1, 2].map(|k| middle[k] + size * reach * p[k]);
@@ -197,7 +197,7 @@ fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
 
 /// The start after all stages: of each the best by its hard images.
 fn deformed(
-    given: &Given<'_, Shape3d>,
+    given: &Given<'_, Args>,
     flags: &Views,
     start: Mesh,
     views: &[View],
@@ -262,7 +262,7 @@ struct Summary {
 }
 
 fn answer(
-    given: &Given<'_, Shape3d>,
+    given: &Given<'_, Args>,
     mesh: &Mesh,
     scored: &[Scored],
     seconds: f64,

@@ -23,11 +23,11 @@ use self::{
 use super::{
     bands::View,
     float,
-    lanes::{Lanes, Plain, Work, run},
+    lanes::{Lanes, Plain, Work, has_avx2, run},
     list::rows_of_bands,
     real::{self, Dual, Real, Table, splat},
+    scene::Scene,
     table::Grid,
-    walk::{Scene, has_avx2},
 };
 use crate::{ImageSize, weighting::counts_from};
 

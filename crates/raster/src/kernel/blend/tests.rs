@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::*;
-use crate::kernel::walk::PORTABLE;
+use crate::kernel::lanes::PORTABLE;
 
 const VERTICES: usize = 40;
 const FACES: u32 = 50;

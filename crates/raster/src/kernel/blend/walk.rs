@@ -15,8 +15,8 @@ use crate::kernel::{
     lanes::{LANES, Lanes, Places, Work},
     list::{LISTED, List},
     real::{Float, Real, splat},
+    scene::Place,
     table,
-    walk::Place,
 };
 
 /// Numbers of a face that a gradient has beside those of its attributes: x and y of three corners, then their depths.

@@ -1,0 +1,66 @@
+use std::sync::Arc;
+
+use burn::tensor::{Element, TensorData};
+
+use crate::{
+    ImageSize,
+    fused::pass::Pass,
+    kernel::{self, Float, Grid, Inputs},
+};
+
+/// What stays the same over the calls of the op: faces, image size and the places of the knots.
+#[derive(Clone, Debug)]
+pub struct ProfileSum {
+    pub(crate) faces: Arc<[[u32; 3]]>,
+    pub(crate) grid: Grid,
+    pub(crate) size: ImageSize,
+    pub(crate) near: f64,
+    #[cfg(feature = "wgpu")]
+    pub(crate) topology: crate::gpu::Topology,
+}
+
+impl ProfileSum {
+    pub(crate) fn inputs<'a, F>(
+        &'a self,
+        views: usize,
+        vertices: &'a [F],
+        table: &'a [F],
+    ) -> Inputs<'a, F> {
+        Inputs {
+            vertices,
+            table,
+            faces: &self.faces,
+            grid: self.grid,
+            size: self.size,
+            near: self.near,
+            views,
+        }
+    }
+
+    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and `tables` `[1 or views, rows, 4]`, to sums
+    /// `[views, height, width]`, top row first.
+    pub(crate) fn run<F: Float + Element>(
+        &self,
+        pass: &Pass,
+        slices: &[&[F]],
+        dims: &[Vec<usize>],
+    ) -> TensorData {
+        let views = dims[0][0];
+        let inputs = self.inputs(views, slices[0], slices[1]);
+        let values = match pass {
+            Pass::Forward => {
+                return TensorData::new(
+                    kernel::forward(&inputs),
+                    [views, self.size.height, self.size.width],
+                );
+            }
+            Pass::Vjp { wanted } => kernel::vjp(&inputs, slices[2], [wanted[0], wanted[1]]),
+            Pass::VjpOfVjp { along, wanted } => {
+                let wanted = [wanted[0], wanted[1], wanted[2]];
+                kernel::vjp_of_vjp(&inputs, slices[2], slices[3], [along[0], along[1]], wanted)
+            }
+        };
+        let length = values.len();
+        TensorData::new(values, [length])
+    }
+}
