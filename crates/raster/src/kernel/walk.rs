@@ -2,7 +2,7 @@
 
 use super::{
     float::Float as _,
-    lanes::{GROUP, LANES, Lanes, Places, has_avx2},
+    lanes::{GROUP, LANES, Lanes, Places},
     list::{Chunk, LISTED, List},
     pair::closest,
     real::{Float, Real, Table, splat},
@@ -268,7 +268,7 @@ macro_rules! dispatched {
                     return unsafe { avx2(scene, place, upstream, image, gradient) };
                 }
                 if T::Lanes::GAINS_AVX2 {
-                    if has_avx2() {
+                    if super::lanes::has_avx2() {
                         // SAFETY: the feature was just detected.
                         #[allow(unsafe_code)]
                         return unsafe { avx2(scene, place, upstream, image, gradient) };
