@@ -85,7 +85,7 @@ pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tenso
 /// units.
 ///
 /// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
-/// vertex nearer than [`NEAR`] is projected as though it were that near, so that nothing divides
+/// vertex nearer than [`NEAR`](crate::NEAR) is projected as though it were that near, so that nothing divides
 /// by zero; the rasterizer does not draw its faces, by their depth.
 ///
 /// Source: docs/notes.md, Camera.
