@@ -1,8 +1,8 @@
 //! A softness that adapts inside every run, against one that stays and the learned one.
 //!
 //! ```text
-//! cargo run --release -p compare --example alternating              # as many seeds as in docs/results.md
-//! cargo run --release -p compare --example alternating -- --quick   # two seeds of tiny instances, to out/alternating.md
+//! cargo run --release -p compare --features studies --example alternating              # as many seeds as in docs/results.md
+//! cargo run --release -p compare --features studies --example alternating -- --quick   # two seeds of tiny instances, to out/alternating.md
 //! ```
 //!
 //! The strongest baseline without learning: φ goes down the inner loss along with the scene, from the searched static softness, at a

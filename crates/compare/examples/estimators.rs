@@ -1,8 +1,8 @@
 //! How well each estimator of `learn` estimates the slope of the outer loss, and what it costs.
 //!
 //! ```text
-//! cargo run --release -p compare --example estimators              # 16 scenes; 10, 30 and 100 steps
-//! cargo run --release -p compare --example estimators -- --quick   # 2 scenes; 10 steps, to out/estimators.md
+//! cargo run --release -p compare --features studies --example estimators              # 16 scenes; 10, 30 and 100 steps
+//! cargo run --release -p compare --features studies --example estimators -- --quick   # 2 scenes; 10 steps, to out/estimators.md
 //! ```
 //!
 //! Small instances of 2D SHAPE and POSE under a static logistic, so that φ is one number, the logarithm of its scale. The truth is the

@@ -1,8 +1,8 @@
 //! Peak memory of a meta-gradient through 3D SHAPE, and how it grows.
 //!
 //! ```text
-//! cargo run --release -p compare --example memory              # 10, 30 and 100 steps, and what grows
-//! cargo run --release -p compare --example memory -- --quick   # 10 steps, to out/memory.md
+//! cargo run --release -p compare --features studies --example memory              # 10, 30 and 100 steps, and what grows
+//! cargo run --release -p compare --features studies --example memory -- --quick   # 10 steps, to out/memory.md
 //! ```
 //!
 //! 24 views of a sphere of 1,280 faces on 64 × 64 pixels, exact with the adjoint clipped, as `learn` takes it and in f64 with an error

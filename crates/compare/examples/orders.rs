@@ -2,8 +2,8 @@
 //! them.
 //!
 //! ```text
-//! cargo run --release -p compare --example orders              # 400 inner loops each
-//! cargo run --release -p compare --example orders -- --quick   # 40 on tiny instances, to out/orders.md
+//! cargo run --release -p compare --features studies --example orders              # 400 inner loops each
+//! cargo run --release -p compare --features studies --example orders -- --quick   # 40 on tiny instances, to out/orders.md
 //! ```
 //!
 //! Small instances of 2D SHAPE, once with the scale of a logistic to learn and once with the weights of the network that is fitted to

@@ -43,6 +43,7 @@ pub mod pose;
 mod problem;
 mod renderer;
 mod resolution;
+mod surface;
 mod targets;
 mod view;
 
@@ -62,6 +63,7 @@ pub use pose::PoseProblem;
 pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
+pub use surface::Surface;
 pub use targets::Targets;
 pub use view::{View, camera_json, load_pose, load_views, mask_iou, silhouette_pixels};
 

@@ -25,6 +25,10 @@ use softrast_raster::{
 use softrast_softness::{DepthSoftness, Family, Softness};
 use workload::{Workload, disk, tensor};
 
+/// As in the programs.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 type B = NdArray<f32>;
 type A = Autodiff<B>;
 
@@ -94,7 +98,7 @@ struct Scene {
 impl Scene {
     fn new(workload: &Workload) -> Self {
         let (world, cameras) = (workload.world::<B>(DType::F32), workload.cameras(DType::F32));
-        let ([_, vertices, _], [views, _]) = (world.dims(), cameras.dims());
+        let [_, vertices, _] = world.dims();
         let phi = workload.softness.default_phi(workload.width * workload.width);
         let depth = DepthSoftness::Family(Family::Exp);
         let weighting = Weighting { edge: workload.softness, depth, planes: PLANES };
@@ -120,13 +124,8 @@ impl Scene {
             flat,
             colours: Attributes::new(colours, faces.clone()),
             faces,
-            picture: mask.clone().reshape([1, 1, size, size]).expand([
-                views,
-                COLOURS + 1,
-                size,
-                size,
-            ]),
-            mask: mask.expand([views, size, size]),
+            picture: mask.clone().reshape([1, 1, size, size]).repeat_dim(1, COLOURS + 1),
+            mask,
             world,
             cameras,
         }
@@ -153,10 +152,8 @@ impl Scene {
         let attributes = Attributes::new(colours.clone(), self.faces.clone());
         let background = renderer.background(&[0.0; COLOURS], &Default::default());
         let image = renderer.image(seen, &attributes, &background);
-        let [views, channels, height, width] = image.dims();
-        let shape = [views, channels * height, width];
-        let picture = Tensor::from_inner(self.picture.clone()).reshape(shape);
-        let gradients = mse_loss(image.reshape(shape), picture).mean().backward();
+        let picture = Tensor::from_inner(self.picture.clone());
+        let gradients = mse_loss(image, picture).mean().backward();
         let moved = world.grad(&gradients).expect("a gradient").sum();
         (moved + colours.grad(&gradients).expect("a gradient").sum()).into_scalar()
     }

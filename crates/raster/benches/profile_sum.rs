@@ -38,6 +38,10 @@ use softrast_raster::{Rasterizer, Silhouette, mse_loss, project};
 use softrast_softness::{EdgeSoftness, Family};
 use workload::{Workload, disk, tensor};
 
+/// As in the programs.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 type B = NdArray<f32>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
@@ -316,7 +320,7 @@ impl Step {
             op: Op::new(workload),
             phi: workload.phi(DType::F32),
             world: workload.world(DType::F32),
-            target: target.expand([cameras.dims()[0], size, size]),
+            target,
             cameras,
         }
     }

@@ -27,7 +27,8 @@ fn slice<F: Element>(data: &TensorData) -> &[F] {
 /// A backend that runs fused ops.
 ///
 /// By default they run on the host, which serves every CPU backend. The implementation for `Autodiff<B>` makes them differentiable
-/// twice: each pass differentiates by the next one of `B`. A third order panics. Saved for the backward pass are the inputs alone.
+/// twice: each pass differentiates by the next one of `B`. A third order panics. Saved for the backward pass are
+/// the inputs, and which faces reach which rows.
 pub trait RasterBackend: Backend {
     /// Whether ops and little tensors are as quick on the CPU anyway: false where a tensor lies
     /// behind a queue, and what is computed of it in many little ops should come in one piece.
@@ -252,8 +253,9 @@ fn recorded<B: RasterBackend, C: CheckpointStrategy, const N: usize>(
     let tensors: Vec<_> = tensors.into_iter().map(|tensor| tensor.primitive).collect();
     match Backward::<B, N>::prepare::<C>(Recorded, nodes).compute_bound().stateful() {
         OpsKind::Tracked(prep) => {
-            let result = B::run(op, pass, tensors.clone());
-            prep.finish((op.clone(), pass.clone(), tensors), result)
+            let op = op.keeping();
+            let result = B::run(&op, pass, tensors.clone());
+            prep.finish((op, pass.clone(), tensors), result)
         }
         OpsKind::UnTracked(prep) => prep.finish(B::run(op, pass, tensors)),
     }

@@ -270,6 +270,7 @@ impl ColourRenderer {
             planes: self.weighting.planes,
             size: self.size,
             tolerance: 0.5 * self.tolerance,
+            kept: None,
         };
         soft_blend(op, vertices, attributes.values.clone(), tables, background)
     }

@@ -99,6 +99,7 @@ impl Rasterizer {
             grid: profile.grid,
             size: self.size,
             near: NEAR,
+            kept: None,
             #[cfg(feature = "wgpu")]
             topology: Default::default(),
         };

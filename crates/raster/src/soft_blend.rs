@@ -1,4 +1,7 @@
-use std::sync::Arc;
+use std::{
+    any::Any,
+    sync::{Arc, OnceLock},
+};
 
 use burn::tensor::{Element, TensorData};
 
@@ -7,7 +10,7 @@ use crate::{
     fused::pass::Pass,
     kernel::{
         Float, Grid,
-        blend::{self, DepthGrid, Inputs},
+        blend::{self, DepthGrid, Inputs, Kept},
     },
     weighting::FARTHEST_SEEN,
 };
@@ -24,9 +27,17 @@ pub struct SoftBlend {
     pub(crate) size: ImageSize,
     /// What all that is left out of a pixel may add up to, in weights of the background.
     pub(crate) tolerance: f64,
+    /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows, 28 bytes for each face of
+    /// each view, and the sums of each pixel, a number for each channel and two more. Its type is that of the floats.
+    pub(crate) kept: Option<Arc<OnceLock<Box<dyn Any + Send + Sync>>>>,
 }
 
 impl SoftBlend {
+    /// The op of one call whose passes share what they find out.
+    pub(crate) fn keeping(&self) -> Self {
+        Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
+    }
+
     /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, channels]`, `tables` `[rows, 4]` and
     /// `background` `[channels + 1]`, to an image `[views, channels + 1, height, width]`, top row first.
     pub(crate) fn run<F: Float + Element>(
@@ -54,17 +65,21 @@ impl SoftBlend {
             views,
             shared: dims[1][0] == 1,
         };
+        let own = OnceLock::new();
+        let kept = self.kept.as_deref().unwrap_or(&own);
+        let kept = kept.get_or_init(|| Box::new(Kept::new(&inputs, self.kept.is_some())));
+        let kept: &Kept<F> = kept.downcast_ref().expect("passes over the same inputs");
         let four = |flags: &[bool]| [flags[0], flags[1], flags[2], flags[3]];
         let values = match pass {
             Pass::Forward => {
                 let shape = [views, channels + 1, self.size.height, self.size.width];
-                return TensorData::new(blend::forward(&inputs), shape);
+                return TensorData::new(blend::forward(&inputs, kept), shape);
             }
-            Pass::Vjp { wanted } => blend::vjp(&inputs, slices[4], four(wanted)),
+            Pass::Vjp { wanted } => blend::vjp(&inputs, kept, slices[4], four(wanted)),
             Pass::VjpOfVjp { along, wanted } => {
                 let [a, b, c, d] = four(wanted);
                 let wanted = [a, b, c, d, wanted[4]];
-                blend::vjp_of_vjp(&inputs, slices[4], slices[5], four(along), wanted)
+                blend::vjp_of_vjp(&inputs, kept, slices[4], slices[5], four(along), wanted)
             }
         };
         let length = values.len();

@@ -1,11 +1,11 @@
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use burn::tensor::{Element, TensorData};
 
 use crate::{
     ImageSize,
     fused::pass::Pass,
-    kernel::{self, Float, Grid, Inputs},
+    kernel::{self, Bands, Float, Grid, Inputs},
 };
 
 /// What stays the same over the calls of the op: faces, image size and the places of the knots.
@@ -15,11 +15,19 @@ pub struct ProfileSum {
     pub(crate) grid: Grid,
     pub(crate) size: ImageSize,
     pub(crate) near: f64,
+    /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows. 20 bytes for each face of
+    /// each view.
+    pub(crate) kept: Option<Arc<OnceLock<Bands>>>,
     #[cfg(feature = "wgpu")]
     pub(crate) topology: crate::gpu::Topology,
 }
 
 impl ProfileSum {
+    /// The op of one call whose passes share what they find out.
+    pub(crate) fn keeping(&self) -> Self {
+        Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
+    }
+
     pub(crate) fn inputs<'a, F>(
         &'a self,
         views: usize,
@@ -47,17 +55,20 @@ impl ProfileSum {
     ) -> TensorData {
         let views = dims[0][0];
         let inputs = self.inputs(views, slices[0], slices[1]);
+        let own = OnceLock::new();
+        let bands = self.kept.as_deref().unwrap_or(&own).get_or_init(|| inputs.bands());
         let values = match pass {
             Pass::Forward => {
                 return TensorData::new(
-                    kernel::forward(&inputs),
+                    kernel::forward(&inputs, bands),
                     [views, self.size.height, self.size.width],
                 );
             }
-            Pass::Vjp { wanted } => kernel::vjp(&inputs, slices[2], [wanted[0], wanted[1]]),
+            Pass::Vjp { wanted } => kernel::vjp(&inputs, bands, slices[2], [wanted[0], wanted[1]]),
             Pass::VjpOfVjp { along, wanted } => {
                 let wanted = [wanted[0], wanted[1], wanted[2]];
-                kernel::vjp_of_vjp(&inputs, slices[2], slices[3], [along[0], along[1]], wanted)
+                let along = [along[0], along[1]];
+                kernel::vjp_of_vjp(&inputs, bands, slices[2], slices[3], along, wanted)
             }
         };
         let length = values.len();

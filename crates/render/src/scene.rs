@@ -82,10 +82,9 @@ impl Scene {
         vector(&self.phi)
     }
 
-    /// The target, once for each view: `[views, size, size]`.
+    /// The target of all views, `[1, size, size]`.
     pub(crate) fn target<B: Backend>(&self) -> Option<Tensor<B, 3>> {
-        let one = tensor(self.target.clone()?, [1, self.size, self.size]);
-        Some(one.expand([self.views(), self.size, self.size]))
+        Some(tensor(self.target.clone()?, [1, self.size, self.size]))
     }
 }
 

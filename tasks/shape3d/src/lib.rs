@@ -19,9 +19,7 @@
 
 mod args;
 mod chamfer;
-mod flatness;
 mod instance;
-mod laplacian;
 mod nearest;
 mod paper;
 mod scene;
@@ -30,9 +28,7 @@ mod views;
 
 pub use args::Args;
 pub use chamfer::Chamfer;
-pub use flatness::Flatness;
 pub use instance::Instance;
-pub use laplacian::Laplacian;
 pub use scene::{Scene, VIEWS};
 pub use task::Shape3d;
 pub use views::{Begin, Views};

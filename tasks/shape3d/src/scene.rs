@@ -1,12 +1,12 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use softrast_inverse::Targets;
+use softrast_inverse::{Surface, Targets};
 use softrast_mesh::{Edges, Mesh};
 use softrast_meta::tensor;
 use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, project};
 
-use crate::{Instance, flatness::Flatness, laplacian::Laplacian};
+use crate::Instance;
 
 /// Cameras around the target, evenly in azimuth.
 pub const VIEWS: usize = 24;
@@ -38,8 +38,7 @@ pub struct Scene<B: RasterBackend> {
     sign: Tensor<B, 2>,
     orbits: Tensor<B, 2>,
     faces: Arc<[[u32; 3]]>,
-    laplacian: Laplacian<B>,
-    flatness: Flatness<B>,
+    surface: Surface<B>,
     targets: Targets<B>,
     size: usize,
 }
@@ -65,8 +64,7 @@ impl<B: RasterBackend> Scene<B> {
             log_odds: tensor(start.iter().map(log_odds).collect(), [count, 3]),
             sign: tensor(start.iter().map(sign).collect(), [count, 3]),
             orbits,
-            laplacian: Laplacian::new(&edges, count),
-            flatness: Flatness::new(&edges),
+            surface: Surface::new(&edges, count),
             faces: template.faces().into(),
             targets: Targets::new(target),
             size,
@@ -117,6 +115,7 @@ impl<B: RasterBackend> Scene<B> {
     /// and 0.0003 times the flatness loss, `[1]`. Second derivatives are finite everywhere.
     pub fn smoothness_loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let vertices = vertices.transpose();
-        self.laplacian.loss(vertices.clone()) * LAPLACIAN + self.flatness.loss(vertices) * FLATNESS
+        let laplacian = self.surface.laplacian(vertices.clone());
+        laplacian * LAPLACIAN + self.surface.flatness(vertices) * FLATNESS
     }
 }

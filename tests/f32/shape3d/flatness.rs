@@ -1,28 +1,42 @@
 //! Hinges worked by hand.
 
 use burn::backend::NdArray;
-use shape3d::Flatness;
+use softrast_inverse::Surface;
 use softrast_mesh::Edges;
 use softrast_tests::tensor;
 
-/// The loss of two faces on an edge along x, the second turned up to the point (y, z).
-fn loss([y, z]: [f64; 2]) -> f32 {
+/// Flatness and normal consistency of two faces on an edge along x, the second turned up to the point (y, z).
+fn losses([y, z]: [f64; 2]) -> [f32; 2] {
     let vertices = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.3, -1.0, 0.0, 0.6, y, z];
-    let flatness = Flatness::<NdArray>::new(&Edges::new(&[[0, 1, 2], [1, 0, 3]]));
-    flatness.loss(tensor(&vertices, [4, 3]).transpose()).into_scalar()
+    let surface = Surface::<NdArray>::new(&Edges::new(&[[0, 1, 2], [1, 0, 3]]), 4);
+    let vertices = tensor(&vertices, [4, 3]).transpose();
+    [surface.flatness(vertices.clone()), surface.normal_consistency(vertices)]
+        .map(|loss| loss.into_scalar())
 }
 
 #[test]
-fn flat_is_zero_a_right_angle_one_and_folded_back_four() {
-    for (beyond, expected) in [([1.0, 0.0], 0.0), ([0.0, 2.0], 1.0), ([-1.0, 0.0], 4.0)] {
-        let found = loss(beyond);
-        assert!((found - expected).abs() < 1e-4, "{beyond:?}: {found}");
+fn flat_is_zero_a_right_angle_one_and_folded_back_four_or_two() {
+    let cases = [([1.0, 0.0], [0.0, 0.0]), ([0.0, 2.0], [1.0, 1.0]), ([-1.0, 0.0], [4.0, 2.0])];
+    for (beyond, expected) in cases {
+        let found = losses(beyond);
+        let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 1e-4, "{beyond:?}: {found:?}");
     }
 }
 
 #[test]
+fn lengths_are_those_of_all_edges() {
+    let corners = [0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 4.0, 0.0];
+    let surface = Surface::<NdArray>::new(&Edges::new(&[[0, 1, 2]]), 3);
+    let loss = surface.edge_length(tensor(&corners, [3, 3]).transpose(), 2.0).into_scalar();
+    assert!((loss - (1.0 + 4.0 + 9.0) / 3.0).abs() < 1e-4, "{loss}");
+}
+
+#[test]
 fn collapsed_faces_and_no_hinges_are_finite() {
-    assert!(loss([0.0, 0.0]).is_finite());
-    let none = Flatness::<NdArray>::new(&Edges::new(&[[0, 1, 2]]));
-    assert_eq!(none.loss(tensor(&[1.0; 9], [3, 3])).into_scalar(), 0.0);
+    assert!(losses([0.0, 0.0]).iter().all(|loss| loss.is_finite()));
+    let none = Surface::<NdArray>::new(&Edges::new(&[[0, 1, 2]]), 3);
+    assert_eq!(none.flatness(tensor(&[1.0; 9], [3, 3])).into_scalar(), 0.0);
+    let nothing = Surface::<NdArray>::new(&Edges::new(&[]), 3);
+    assert_eq!(nothing.edge_length(tensor(&[1.0; 9], [3, 3]), 1.0).into_scalar(), 0.0);
 }

@@ -1,13 +1,13 @@
 //! A triangle worked by hand.
 
 use burn::backend::NdArray;
-use shape3d::Laplacian;
+use softrast_inverse::Surface;
 use softrast_mesh::Edges;
 use softrast_tests::tensor;
 
 fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {
-    let laplacian = Laplacian::<NdArray>::new(&Edges::new(faces), vertices.len());
-    laplacian.loss(tensor(&vertices.concat(), [vertices.len(), 3]).transpose()).into_scalar()
+    let surface = Surface::<NdArray>::new(&Edges::new(faces), vertices.len());
+    surface.laplacian(tensor(&vertices.concat(), [vertices.len(), 3]).transpose()).into_scalar()
 }
 
 #[test]

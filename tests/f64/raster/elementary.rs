@@ -95,6 +95,41 @@ fn pixels() -> Vec<f64> {
     wave(2 * 2 * 100 * 103, 0.37).into_iter().map(|x| x * x).collect()
 }
 
+/// Images of two views, and one target of both.
+fn with_one_target(x: Tensor<AA, 1>) -> [Tensor<AA, 3>; 2] {
+    let length = x.dims()[0] / 3;
+    let images = x.clone().narrow(0, 0, 2 * length).reshape([2, 100, -1]);
+    [images, x.narrow(0, 2 * length, length).reshape([1, 100, -1])]
+}
+
+#[test]
+fn one_target_is_compared_with_all_views() {
+    let pixels = &pixels()[..3 * 100 * 103];
+    assert_same(
+        |x| {
+            let [image, target] = with_one_target(x);
+            iou_loss(image, target)
+        },
+        |x| {
+            let [image, target] = with_one_target(x);
+            reference::iou_loss(image, target)
+        },
+        pixels,
+    );
+    // And the other way round.
+    assert_same(
+        |x| {
+            let [image, target] = with_one_target(x);
+            mse_loss(target, image)
+        },
+        |x| {
+            let [image, target] = with_one_target(x);
+            reference::mse_loss(target, image)
+        },
+        pixels,
+    );
+}
+
 #[test]
 fn losses_are_those_of_tensor_ops() {
     let pairs: [[Of; 2]; 2] = [
@@ -131,7 +166,7 @@ fn one_target_serves_all_views() {
         vector::<B>(&waves).reshape(shape)
     });
     let all = target.clone().expand([3, 4, 5]);
-    for loss in [iou_loss::<B>, mse_loss::<B>] {
+    for loss in [iou_loss::<B>, mse_loss::<B, 3>] {
         let found = numbers(loss(image.clone(), target.clone()));
         assert_eq!(found, numbers(loss(image.clone(), all.clone())));
         assert_eq!(found.len(), 3);

@@ -6,6 +6,7 @@ mod colour;
 mod elementary;
 mod fused;
 mod images;
+mod losses;
 mod pinhole;
 mod pytorch3d;
 mod reference;

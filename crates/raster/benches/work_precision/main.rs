@@ -85,7 +85,6 @@ impl<B: RasterBackend> Scene<B> {
         let cameras = workload.cameras(dtype);
         let size = workload.size;
         let target = tensor(&disk(size), [1, size, size], dtype);
-        let target = target.expand([cameras.dims()[0], size, size]);
         Self { silhouette, table, world: workload.world(dtype), cameras, target }
     }
 
@@ -198,7 +197,7 @@ fn plain(workload: &Workload, radius: f32) -> Drawn {
     let sums = tensor_of(scalar.forward(&flat, count), [views, size, size]);
     let sums = Tensor::<A, 3>::from_inner(sums).require_grad();
     let image = TConorm::Probabilistic.coverage(sums.clone());
-    let loss = mse_loss(image.clone(), target.expand([views, size, size])).mean();
+    let loss = mse_loss(image.clone(), target).mean();
     let upstream = sums.grad(&loss.backward()).expect("the loss depends on the sums");
     let upstream: Vec<f32> = upstream.into_data().iter().collect();
     let gradient = tensor_of(scalar.gradient(&flat, count, &upstream), [views, count, 3]);

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Elementary, number::Number};
+use super::{Elementary, Views, number::Number};
 use crate::{kernel::Float, loss::EMPTY};
 
 /// Pixels that one task takes; sums of them are added in order, whatever the number of threads.
@@ -102,34 +102,69 @@ fn summed<N: Number, const K: usize>(
     totals
 }
 
-/// Two images of each view, `[views, height, width]`, and what compares them.
-fn views<'a, N: Number>(
-    inputs: &'a [&'a [N]],
-    dims: &[Vec<usize>],
-) -> impl IndexedParallelIterator<Item = (&'a [N], &'a [N])> {
-    let pixels = (dims[0][1] * dims[0][2]).max(1);
-    inputs[0].par_chunks(pixels).zip(inputs[1].par_chunks(pixels))
+/// Two images of each view, and what compares them: `[views, height, width]`, or one of all views.
+struct Compared<'a, N> {
+    images: [Views<'a, N>; 2],
+    count: usize,
 }
 
-/// The gradients of views to both images, as they are wanted: `of` gives for a view what maps its pixels to the two.
-fn gradients<N: Number, G: Fn(N, N) -> N + Copy + Sync>(
-    inputs: &[&[N]],
-    dims: &[Vec<usize>],
-    wanted: &[bool],
-    of: impl Fn(usize, &[N], &[N]) -> [G; 2] + Sync,
-) -> Vec<N> {
-    let of_image = inputs[0].len();
-    let pixels = (dims[0][1] * dims[0][2]).max(1);
-    let mut gradient = vec![N::of(0.0); of_image * wanted.iter().filter(|&&wanted| wanted).count()];
-    let images = [0, 1].into_iter().filter(|&which| wanted[which]);
-    for (which, image) in images.zip(gradient.chunks_mut(of_image.max(1))) {
-        let pairs = views(inputs, dims).enumerate();
-        image.par_chunks_mut(pixels).zip(pairs).for_each(|(out, (view, (a, b)))| {
-            let maps = of(view, a, b);
-            map_to(out, a, b, maps[which]);
-        });
+impl<'a, N: Number> Compared<'a, N> {
+    fn new(inputs: &[&'a [N]], dims: &[Vec<usize>]) -> Self {
+        let images = [0, 1].map(|which| Views::new(inputs[which], &dims[which]));
+        Self { images, count: views(dims) }
     }
-    gradient
+
+    /// Both images of a view.
+    fn of(&self, view: usize) -> [&'a [N]; 2] {
+        self.images.map(|images| images.of(view))
+    }
+
+    /// What `of` says of both images of each view.
+    fn losses(&self, of: impl Fn(&[N], &[N]) -> N + Sync) -> Vec<N> {
+        let of_view = |view| {
+            let [a, b] = self.of(view);
+            of(a, b)
+        };
+        (0..self.count).into_par_iter().map(of_view).collect()
+    }
+
+    /// The gradients of views to both images, as they are wanted: `of` gives for a view what maps its pixels to the two.
+    fn gradients<G: Fn(N, N) -> N + Copy + Sync>(
+        &self,
+        wanted: &[bool],
+        of: impl Fn(usize, &[N], &[N]) -> [G; 2] + Sync,
+    ) -> Vec<N> {
+        let zero = N::of(0.0);
+        let mut all = Vec::new();
+        for (which, images) in self.images.iter().enumerate().filter(|&(which, _)| wanted[which]) {
+            let to_view = |out: &mut [N], view| {
+                let [a, b] = self.of(view);
+                map_to(out, a, b, of(view, a, b)[which]);
+            };
+            let mut gradient = vec![zero; self.count * images.length];
+            let views = gradient.par_chunks_mut(images.length.max(1)).enumerate();
+            views.for_each(|(view, out)| to_view(out, view));
+            if images.shared {
+                let (total, others) = gradient.split_at_mut(images.length);
+                for other in others.chunks(images.length.max(1)) {
+                    total.iter_mut().zip(other).for_each(|(total, &part)| *total = *total + part);
+                }
+                gradient.truncate(images.length);
+            }
+            all.append(&mut gradient);
+        }
+        all
+    }
+}
+
+/// How many views two images have that may be one of all.
+fn views(dims: &[Vec<usize>]) -> usize {
+    dims[0][0].max(dims[1][0])
+}
+
+/// Numbers of an image.
+fn pixels(dims: &[Vec<usize>]) -> usize {
+    dims[0][1..].iter().product()
 }
 
 /// Mean squared difference of each view; see [`crate::mse_loss`].
@@ -138,16 +173,15 @@ pub(crate) struct SquaredError;
 
 impl Elementary for SquaredError {
     fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        vec![dims[0][0]]
+        vec![views(dims)]
     }
 
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
-        let part = N::Float::ONE / N::Float::from_f64((dims[0][1] * dims[0][2]) as f64);
-        let of_view = |(a, b)| {
+        let part = N::Float::ONE / N::Float::from_f64(pixels(dims) as f64);
+        Compared::new(inputs, dims).losses(|a, b| {
             let [sum] = summed(a, b, |a: N, b: N| [(a - b) * (a - b)]);
             sum.scale(part)
-        };
-        views(inputs, dims).map(of_view).collect()
+        })
     }
 
     fn vjp<N: Number>(
@@ -157,8 +191,8 @@ impl Elementary for SquaredError {
         upstream: &[N::Float],
         wanted: &[bool],
     ) -> Vec<N> {
-        let part = N::Float::from_f64(2.0) / N::Float::from_f64((dims[0][1] * dims[0][2]) as f64);
-        gradients(inputs, dims, wanted, |view, _, _| {
+        let part = N::Float::from_f64(2.0) / N::Float::from_f64(pixels(dims) as f64);
+        Compared::new(inputs, dims).gradients(wanted, |view, _, _| {
             [part, -part].map(|part| {
                 let factor = part * upstream[view];
                 move |a: N, b: N| (a - b).scale(factor)
@@ -184,15 +218,14 @@ impl Iou {
 
 impl Elementary for Iou {
     fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize> {
-        vec![dims[0][0]]
+        vec![views(dims)]
     }
 
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N> {
-        let of_view = |(a, b)| {
+        Compared::new(inputs, dims).losses(|a, b| {
             let [overlap, inverse] = Self::of(a, b);
             N::of(1.0) - overlap * inverse
-        };
-        views(inputs, dims).map(of_view).collect()
+        })
     }
 
     fn vjp<N: Number>(
@@ -202,7 +235,7 @@ impl Elementary for Iou {
         upstream: &[N::Float],
         wanted: &[bool],
     ) -> Vec<N> {
-        gradients(inputs, dims, wanted, |view, a, b| {
+        Compared::new(inputs, dims).gradients(wanted, |view, a, b| {
             let [overlap, inverse] = Self::of(a, b);
             // d(-overlap / union) = -(1 / union) d overlap + (overlap / union²) d union.
             let to_overlap = inverse.scale(-upstream[view]);

@@ -33,6 +33,17 @@ pub enum FusedOp {
     Elementary(ElementaryOp),
 }
 
+impl FusedOp {
+    /// The op of one call whose passes share what they find out.
+    pub(crate) fn keeping(&self) -> Self {
+        match self {
+            Self::ProfileSum(op) => Self::ProfileSum(op.keeping()),
+            Self::SoftBlend(op) => Self::SoftBlend(op.keeping()),
+            Self::Elementary(op) => Self::Elementary(*op),
+        }
+    }
+}
+
 /// Those that are written for any number.
 #[derive(Clone, Copy, Debug)]
 pub enum ElementaryOp {

@@ -15,11 +15,10 @@ const BIAS: u32 = 127;
 /// Where the cells of a profile table lie: a [`Grid`](crate::kernel::Grid) prepared for look-ups.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
 pub(super) struct Lookup {
-    /// One over the squared radii of the support.
+    /// From squared distances to what places are read from, without its start.
     pub(super) inverse_outer: f32,
     pub(super) inverse_inner: f32,
-    /// One over the width of the innermost cell.
-    pub(super) innermost: f32,
+    pub(super) start: f32,
     pub(super) octaves: u32,
     pub(super) bits: u32,
     /// Cells of one side, without its tail.
@@ -163,23 +162,18 @@ impl Face {
         let inverse = select(inside, lookup.inverse_inner, lookup.inverse_outer);
         let y = nearest.distance2.scale(inverse);
         // Exponent and leading mantissa bits count the cells; what remains is the place in one.
-        let raw = u32::reinterpret(select(y.value < 2.0f32, y.value, 2.0f32));
+        let z = select(y.value < 2.0f32, y.value, 2.0f32) + lookup.start;
+        let raw = u32::reinterpret(z);
         let shift = MANTISSA - lookup.bits;
         let lower = f32::reinterpret((raw >> shift) << shift);
-        let before = (BIAS - lookup.octaves) << lookup.bits;
-        let counted = raw >> shift;
-        // Cell 0 lies below the first octave.
-        let innermost = counted < before;
-        let index = select(innermost, 0u32, counted + 1u32 - before);
+        let index = (raw >> shift) - ((BIAS - lookup.octaves) << lookup.bits);
         let index = select(index > lookup.cells, lookup.cells, index);
         let row = select(inside, index + lookup.cells + 1u32, index);
         let exponent = raw >> MANTISSA;
-        let inverse_width = f32::reinterpret((2u32 * BIAS + lookup.bits - exponent) << MANTISSA);
-        let start = select(innermost, 0.0f32, lower);
-        let rate = select(innermost, lookup.innermost, inverse_width);
+        let rate = f32::reinterpret((2u32 * BIAS + lookup.bits - exponent) << MANTISSA);
         // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
-        let place = y.sub(Dual::constant(start)).scale(rate);
-        let place = Dual::select(y.value < 1.0f32, place, Dual::constant(0.0f32));
+        let place = Dual { value: (z - lower) * rate, tangent: y.tangent * rate };
+        let place = Dual::select(z < 1.0f32, place, Dual::constant(0.0f32));
         let slope = rate * inverse;
         Pair {
             row,

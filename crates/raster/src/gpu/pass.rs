@@ -379,10 +379,12 @@ impl<'a> Pass<'a> {
 
     fn lookup(&self) -> LookupLaunch<WgpuRuntime> {
         let grid = &self.op.grid;
+        let start = f64::exp2(-f64::from(grid.octaves));
+        let inverse = |radius: f64| ((1.0 - start) * radius.powi(-2)) as f32;
         LookupLaunch::new(
-            grid.outer.powi(-2) as f32,
-            grid.inner.powi(-2) as f32,
-            f32::exp2(grid.octaves as f32),
+            inverse(grid.outer),
+            inverse(grid.inner),
+            start as f32,
             grid.octaves,
             grid.bits,
             grid.cells() as u32,

@@ -170,8 +170,8 @@ impl<L: Lanes> Range<L> {
         let low = a.min(b).min(c) - grown + splat(1.0);
         let most = splat(side as f64);
         Self {
-            start: low.max(splat(0.0)).min(most).nearest(),
-            end: (highest + grown).max(splat(0.0)).min(most).nearest(),
+            start: L::index_array(low.max(splat(0.0)).min(most).nearest()),
+            end: L::index_array((highest + grown).max(splat(0.0)).min(most).nearest()),
             highest: highest.array(),
         }
     }

@@ -1,12 +1,15 @@
 //! Projected triangles, eight at a time: their edges, and the pixels of a row that their support can reach.
+//!
+//! Lengths are in pixels, x to the right and y down, from the centre of a pixel near the face: so places of
+//! pixels are whole numbers, and next to the face the digits of its corners are kept.
+#![allow(clippy::needless_range_loop)]
 
 use super::{
     float::Float as _,
     lanes::{LANES, Lanes},
-    reach::{FAR_AWAY, Reach},
-    real::{Float, Real, splat},
+    reach::FAR_AWAY,
+    real::{Float, Mask, Real, Which, splat},
 };
-use crate::ImageSize;
 
 /// Edge vectors shorter than this (NDC², squared length) count as a point.
 const POINT: f64 = 1e-30;
@@ -17,21 +20,138 @@ const SLIVER: f64 = 1e-3;
 /// What makes up for the rounding of a column, in pixels.
 const MARGIN: f64 = 0.01;
 
-/// Triangles prepared for distances, one a lane; corner k starts edge k, and all turn counterclockwise.
-///
-/// Meshes have faces of a few pixels, so that what a face costs before its first pixel counts.
+/// Triangles prepared for distances, one a lane; corner k starts edge k, and all turn the same way.
+#[derive(Clone, Copy)]
 pub(crate) struct Faces<T: Real> {
-    x: [T::Stored; 3],
-    y: [T::Stored; 3],
-    edge_x: [T::Stored; 3],
-    edge_y: [T::Stored; 3],
-    inverse: [T::Stored; 3],
-    inverse_length: [[Float<T>; LANES]; 3],
-    most: [Float<T>; LANES],
-    /// Whether some are slivers or have no area.
-    pub(crate) slivers: bool,
-    /// Whether corners 1 and 2 have changed places: above 0 where they have.
-    turned: [Float<T>; LANES],
+    /// The signed distance to the line of edge k is `lines[0][k] + lines[1][k] x + lines[2][k] y`, above 0 on the inner side. Not for
+    /// slivers.
+    lines: [[[Float<T>; 4]; LANES]; 3],
+    x: T::Threes,
+    y: T::Threes,
+    edge_x: T::Threes,
+    edge_y: T::Threes,
+    /// One over the squared length of each edge; 0 for an edge that is a point.
+    inverse: T::Threes,
+    /// In which lanes corners 1 and 2 have changed places, bit by bit.
+    turned: u32,
+    /// Which lanes hold slivers or triangles without area.
+    slivers: u32,
+    /// Which lanes hold triangles with an area.
+    solid: u32,
+}
+
+impl<T: Real> Faces<T> {
+    /// Stands where no faces are yet.
+    pub(crate) fn nothing() -> Self {
+        let threes = T::Threes::default();
+        Self {
+            lines: [[[Float::<T>::ZERO; 4]; LANES]; 3],
+            x: threes,
+            y: threes,
+            edge_x: threes,
+            edge_y: threes,
+            inverse: threes,
+            turned: 0,
+            slivers: 0,
+            solid: 0,
+        }
+    }
+
+    /// Whether one of the first `count` is a sliver.
+    #[inline(always)]
+    pub(crate) fn any_sliver(&self, count: usize) -> bool {
+        self.slivers & ((1 << count) - 1) != 0
+    }
+
+    /// The face of a lane.
+    #[inline(always)]
+    pub(crate) fn face(&self, lane: usize) -> Face<'_, T> {
+        Face { faces: self, lane: lane % LANES }
+    }
+}
+
+/// One of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Face<'a, T: Real> {
+    faces: &'a Faces<T>,
+    lane: usize,
+}
+
+/// An edge, in all lanes or another in each.
+pub(crate) struct Edge<T> {
+    /// Its first corner.
+    pub(crate) x: T,
+    pub(crate) y: T,
+    /// From there to its second corner.
+    pub(crate) to_x: T,
+    pub(crate) to_y: T,
+    /// One over its squared length; 0 for an edge that is a point.
+    pub(crate) inverse: T,
+}
+
+impl<T: Real> Face<'_, T> {
+    /// The corners as they were given, by their places here.
+    #[inline(always)]
+    pub(crate) fn corners(&self) -> [usize; 3] {
+        if self.faces.turned >> self.lane & 1 == 1 { [0, 2, 1] } else { [0, 1, 2] }
+    }
+
+    /// Whether it has an area.
+    #[inline(always)]
+    pub(crate) fn is_solid(&self) -> bool {
+        self.faces.solid >> self.lane & 1 == 1
+    }
+
+    /// Whether it is a sliver or has no area.
+    #[inline(always)]
+    pub(crate) fn is_sliver(&self) -> bool {
+        self.faces.slivers >> self.lane & 1 == 1
+    }
+
+    /// Signed distances of pixels to the line of edge k.
+    #[inline(always)]
+    pub(crate) fn line(&self, k: usize, px: T::Lanes, py: T::Lanes) -> T::Lanes {
+        let [start, x, y] = &self.faces.lines;
+        let number = <T::Lanes as Lanes>::splat;
+        let lane = self.lane;
+        number(x[lane][k]) * px + number(y[lane][k]) * py + number(start[lane][k])
+    }
+
+    /// Edge k.
+    #[inline(always)]
+    pub(crate) fn edge(&self, k: usize) -> Edge<T> {
+        let (faces, lane) = (self.faces, self.lane);
+        Edge {
+            x: T::of_three(&faces.x, lane, k),
+            y: T::of_three(&faces.y, lane, k),
+            to_x: T::of_three(&faces.edge_x, lane, k),
+            to_y: T::of_three(&faces.edge_y, lane, k),
+            inverse: T::of_three(&faces.inverse, lane, k),
+        }
+    }
+
+    /// One edge for each pixel: the third, the second or the first, where the masks hold.
+    #[inline(always)]
+    pub(crate) fn chosen_by(&self, [_, second, third]: [Mask<T>; 3]) -> Edge<T> {
+        self.chosen(T::Lanes::which(second, third))
+    }
+
+    /// One edge for each pixel.
+    #[inline(always)]
+    pub(crate) fn chosen(&self, which: Which<T>) -> Edge<T> {
+        let (faces, lane) = (self.faces, self.lane);
+        Edge {
+            x: T::chosen(&faces.x, lane, which),
+            y: T::chosen(&faces.y, lane, which),
+            to_x: T::chosen(&faces.edge_x, lane, which),
+            to_y: T::chosen(&faces.edge_y, lane, which),
+            inverse: T::chosen(&faces.inverse, lane, which),
+        }
+    }
+}
+
+/// Rows that triangles may reach, column by column: bounds of their edges.
+pub(crate) struct Spans<T: Real> {
     // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
     // out of reach.
     low: [[Float<T>; LANES]; 3],
@@ -39,138 +159,90 @@ pub(crate) struct Faces<T: Real> {
     tilt: [[Float<T>; LANES]; 3],
 }
 
-/// One of them, in all lanes.
-pub(crate) struct Face<T: Real> {
-    pub(crate) x: [T; 3],
-    pub(crate) y: [T; 3],
-    pub(crate) edge_x: [T; 3],
-    pub(crate) edge_y: [T; 3],
-    /// One over the squared length of each edge; 0 for an edge that is a point.
-    pub(crate) inverse: [T; 3],
-    /// One over the length of each edge.
-    pub(crate) inverse_length: [T::Lanes; 3],
-    /// What the least of the three edge functions may be at most: -1 for a triangle without area,
-    /// which has no inside.
-    pub(crate) most: T::Lanes,
+/// Prepares triangles with these corners, one in each lane, for pixels no farther outside than the `radius` of each. `half` is the number
+/// of pixels in a unit of NDC.
+///
+/// Meshes have faces of a few pixels, so that what a face costs before its first pixel counts.
+#[inline(always)]
+pub(crate) fn prepare<T: Real>(
+    x: [T; 3],
+    y: [T; 3],
+    radius: T::Lanes,
+    half: f64,
+    faces: &mut Faces<T>,
+) -> Spans<T> {
+    let zero = splat::<T::Lanes>(0.0);
+    let pick = <T::Lanes as Lanes>::pick;
+    let area = (x[1] - x[0]).value() * (y[2] - y[0]).value()
+        - (y[1] - y[0]).value() * (x[2] - x[0]).value();
+    let turned = area.less(zero);
+    let x = [x[0], T::choose(turned, x[2], x[1]), T::choose(turned, x[1], x[2])];
+    let y = [y[0], T::choose(turned, y[2], y[1]), T::choose(turned, y[1], y[2])];
+    let area = area.max(area.neg());
+    let solid = zero.less(area);
+    let mut longest = zero;
+    let nothing = [[Float::<T>::ZERO; LANES]; 3];
+    let mut spans = Spans { low: nothing, high: nothing, tilt: nothing };
+    let none = T::constant(zero);
+    let (mut edge_x, mut edge_y, mut inverse) = ([none; 3], [none; 3], [none; 3]);
+    let mut lines = [[zero; 3]; 3];
+    for k in 0..3 {
+        let (ex, ey) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
+        let length2 = ex * ex + ey * ey;
+        let some = splat::<T::Lanes>(POINT * half * half).less(length2.value());
+        (edge_x[k], edge_y[k]) = (ex, ey);
+        inverse[k] = T::choose(some, length2, T::constant(splat(1.0))).inverse().masked(some);
+        longest = length2.value().max(longest);
+
+        let (ex, ey) = (ex.value().only(solid), ey.value().only(solid));
+        let per_length = inverse[k].value().sqrt();
+        let (across_x, across_y) = (ey.neg() * per_length, ex * per_length);
+        let start = (across_x * x[k].value() + across_y * y[k].value()).neg();
+        (lines[0][k], lines[1][k], lines[2][k]) = (start, across_x, across_y);
+
+        // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for an edge
+        // that is all but horizontal, or for a face without area.
+        let flat = splat::<T::Lanes>(FLAT * FLAT) * ex * ex;
+        let useful = flat.less(ey * ey);
+        let tilt = (ex * Lanes::recip(pick(useful, ey, splat(1.0)))).only(useful);
+        let reach = radius * (splat::<T::Lanes>(1.0) + tilt * tilt).sqrt();
+        let bound = x[k].value() - tilt * y[k].value();
+        let never = splat::<T::Lanes>(FAR_AWAY * half);
+        let low = pick(ey.less(zero), bound - reach, never.neg());
+        let high = pick(zero.less(ey), bound + reach, never);
+        spans.tilt[k] = tilt.array();
+        spans.low[k] = pick(useful, low, never.neg()).array();
+        spans.high[k] = pick(useful, high, never).array();
+    }
+    let stout = (splat::<T::Lanes>(SLIVER) * longest).less(area);
+    for k in 0..3 {
+        <T::Lanes as Lanes>::to_rows(lines[k], &mut faces.lines[k]);
+    }
+    T::write_threes(x, &mut faces.x);
+    T::write_threes(y, &mut faces.y);
+    T::write_threes(edge_x, &mut faces.edge_x);
+    T::write_threes(edge_y, &mut faces.edge_y);
+    T::write_threes(inverse, &mut faces.inverse);
+    faces.turned = T::Lanes::bits(turned);
+    faces.slivers = !T::Lanes::bits(stout);
+    faces.solid = T::Lanes::bits(solid);
+    spans
 }
 
-impl<T: Real> Faces<T> {
-    /// Prepares triangles with these corners (NDC) for pixels no farther outside than the `radius` of each.
+impl<T: Real> Spans<T> {
+    /// Columns from 0 to `width` that all three edges of a lane allow in the rows at `y`: first column and the one after the last.
     #[inline(always)]
-    pub(crate) fn new(x: [T; 3], y: [T; 3], radius: T::Lanes) -> Self {
-        let zero = splat::<T::Lanes>(0.0);
-        let area = (x[1] - x[0]).value() * (y[2] - y[0]).value()
-            - (y[1] - y[0]).value() * (x[2] - x[0]).value();
-        let turned = area.less(zero);
-        let x = [x[0], T::choose(turned, x[2], x[1]), T::choose(turned, x[1], x[2])];
-        let y = [y[0], T::choose(turned, y[2], y[1]), T::choose(turned, y[1], y[2])];
-        let area = area.max(area.neg());
-        let solid = zero.less(area);
-        let mut longest = zero;
-        let pick = <T::Lanes as Lanes>::pick;
-        let none = [T::Stored::default(); 3];
-        let nothing = [[Float::<T>::ZERO; LANES]; 3];
-        let mut faces = Self {
-            x: none,
-            y: none,
-            edge_x: none,
-            edge_y: none,
-            inverse: none,
-            inverse_length: nothing,
-            most: pick(solid, splat(1.0), splat(-1.0)).array(),
-            slivers: false,
-            turned: splat::<T::Lanes>(1.0).only(turned).array(),
-            low: nothing,
-            high: nothing,
-            tilt: nothing,
-        };
-        for k in 0..3 {
-            let (edge_x, edge_y) = (x[(k + 1) % 3] - x[k], y[(k + 1) % 3] - y[k]);
-            let length2 = edge_x * edge_x + edge_y * edge_y;
-            let some = splat::<T::Lanes>(POINT).less(length2.value());
-            let inverse = T::choose(some, length2, T::constant(splat(1.0))).inverse().masked(some);
-            (faces.x[k], faces.y[k]) = (x[k].store(), y[k].store());
-            (faces.edge_x[k], faces.edge_y[k]) = (edge_x.store(), edge_y.store());
-            faces.inverse[k] = inverse.store();
-            faces.inverse_length[k] = inverse.value().sqrt().array();
-            longest = length2.value().max(longest);
-
-            // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for an edge
-            // that is all but horizontal, or for a face without area.
-            let (ex, ey) = (edge_x.value().only(solid), edge_y.value().only(solid));
-            let flat = splat::<T::Lanes>(FLAT * FLAT) * ex * ex;
-            let useful = flat.less(ey * ey);
-            let tilt = (ex * Lanes::recip(pick(useful, ey, splat(1.0)))).only(useful);
-            let reach = radius * (splat::<T::Lanes>(1.0) + tilt * tilt).sqrt();
-            let bound = x[k].value() - tilt * y[k].value();
-            let never = splat::<T::Lanes>(FAR_AWAY);
-            let low = pick(ey.less(zero), bound - reach, never.neg());
-            let high = pick(zero.less(ey), bound + reach, never);
-            faces.tilt[k] = tilt.array();
-            faces.low[k] = pick(useful, low, never.neg()).array();
-            faces.high[k] = pick(useful, high, never).array();
-        }
-        let stout = (splat::<T::Lanes>(SLIVER) * longest).less(area);
-        faces.slivers = pick(stout, zero, splat(1.0)).sum() > Float::<T>::ZERO;
-        faces
-    }
-
-    /// The face of a lane.
-    #[inline(always)]
-    pub(crate) fn face(&self, lane: usize) -> Face<T> {
-        Face {
-            x: of_lane(&self.x, lane),
-            y: of_lane(&self.y, lane),
-            edge_x: of_lane(&self.edge_x, lane),
-            edge_y: of_lane(&self.edge_y, lane),
-            inverse: of_lane(&self.inverse, lane),
-            inverse_length: [
-                T::Lanes::splat(self.inverse_length[0][lane % LANES]),
-                T::Lanes::splat(self.inverse_length[1][lane % LANES]),
-                T::Lanes::splat(self.inverse_length[2][lane % LANES]),
-            ],
-            most: T::Lanes::splat(self.most[lane % LANES]),
-        }
-    }
-
-    /// The corners of a lane as they were given, by their places here.
-    #[inline(always)]
-    pub(crate) fn corners(&self, lane: usize) -> [usize; 3] {
-        if self.turned[lane % LANES] > Float::<T>::ZERO { [0, 2, 1] } else { [0, 1, 2] }
-    }
-
-    /// Columns that all three edges of a lane allow in the rows at heights `y`, within the columns of
-    /// `reach`: first column and the one after the last.
-    #[inline(always)]
-    pub(crate) fn columns(
-        &self,
-        lane: usize,
-        y: &[Float<T>; LANES],
-        reach: Reach,
-        size: ImageSize,
-    ) -> ([i32; LANES], [i32; LANES]) {
-        let y = <T::Lanes as Lanes>::of(y);
+    pub(crate) fn columns(&self, lane: usize, y: T::Lanes, width: T::Lanes) -> [T::Lanes; 2] {
         let lane = lane % LANES;
-        let number = |column: u32| -> T::Lanes { splat(f64::from(column)) };
-        let (left, right) = (number(reach.left), number(reach.right));
-        let (mut low, mut high) = (splat::<T::Lanes>(-FAR_AWAY), splat::<T::Lanes>(FAR_AWAY));
+        let (mut low, mut high) = (splat::<T::Lanes>(0.0), width);
         for k in 0..3 {
             let shift = T::Lanes::splat(self.tilt[k][lane]) * y;
             low = (T::Lanes::splat(self.low[k][lane]) + shift).max(low);
             high = (T::Lanes::splat(self.high[k][lane]) + shift).min(high);
         }
         // The first centre at or after low, and the one after the last at or before high.
-        let half = splat::<T::Lanes>(0.5 * size.shorter() as f64);
-        let middle = 0.5 * (size.width as f64 - 1.0) + 0.5;
-        let low = low * half + splat(middle - MARGIN);
-        let high = high * half + splat(middle + MARGIN);
-        let (starts, ends) = (low.max(left).min(right), high.min(right).max(splat(0.0)));
-        (starts.nearest(), ends.nearest())
+        let start = (low + splat(0.5 - MARGIN)).max(splat(0.0)).min(width);
+        let end = (high + splat(0.5 + MARGIN)).min(width).max(splat(0.0));
+        [start.rounded(), end.rounded()]
     }
-}
-
-/// What three edges or corners have in a lane. Written out: `map` on an array is a call.
-#[inline(always)]
-fn of_lane<T: Real>([a, b, c]: &[T::Stored; 3], lane: usize) -> [T; 3] {
-    [T::of_lane(a, lane), T::of_lane(b, lane), T::of_lane(c, lane)]
 }

@@ -29,15 +29,20 @@ pub(crate) trait Float:
     const ONE: Self;
     /// Nearest float.
     fn from_f64(value: f64) -> Self;
+    /// A whole number.
+    fn of_whole(value: i32) -> Self;
     /// To double precision.
     fn to_f64(self) -> f64;
-    /// Where `self` (at least 0) lies on the piecewise logarithmic grid of a table:
-    /// the cell's index (not yet limited to the table), its lower end and the inverse of its width.
+    /// Where `self`, at least `2^-octaves`, lies among cells of which each octave holds `2^bits`, from there on:
+    /// the cell's index, the place in it from 0 to 1, and the inverse of its width. Infinity and NaN lie in one of more than
+    /// `octaves << bits`.
     fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self);
     /// Square root.
     fn sqrt(self) -> Self;
     /// Nearest integer, for numbers in [0, 2^22].
     fn nearest(self) -> i32;
+    /// Nearest integer as a float, for numbers in [0, 2^22].
+    fn rounded(self) -> Self;
     /// `e` to this power, to 2 units in the last place.
     fn exp(self) -> Self;
     /// Natural logarithm.
@@ -60,6 +65,10 @@ macro_rules! float {
                 value as Self
             }
             #[inline(always)]
+            fn of_whole(value: i32) -> Self {
+                value as Self
+            }
+            #[inline(always)]
             fn to_f64(self) -> f64 {
                 f64::from(self)
             }
@@ -68,13 +77,14 @@ macro_rules! float {
                 // Exponent and leading mantissa bits count the cells; what remains is the place
                 // within the cell.
                 let raw = self.to_bits();
-                let shift = $mantissa - bits;
-                let lower = Self::from_bits((raw >> shift) << shift);
                 let first = ($bias - octaves) << bits;
-                let index = ((raw >> shift) as i32).wrapping_sub(first as i32 - 1);
+                let index = ((raw >> ($mantissa - bits)) as i32).wrapping_sub(first as i32);
+                let one = (1.0 as Self).to_bits();
+                let rest = (raw << bits) & ((1 << $mantissa) - 1);
+                let place = Self::from_bits(rest | one) - 1.0;
                 let exponent = (2 * $bias + bits as $bits).wrapping_sub(raw >> $mantissa);
                 let inverse_width = Self::from_bits(exponent << $mantissa);
-                (index, lower, inverse_width)
+                (index, place, inverse_width)
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -86,6 +96,12 @@ macro_rules! float {
                 // number by number.
                 let shift = (1u64 << $mantissa) as Self;
                 ((self + shift).to_bits() - shift.to_bits()) as i32
+            }
+            #[inline(always)]
+            fn rounded(self) -> Self {
+                // 1.5 * 2^mantissa leaves no room for a fraction.
+                let shift = (3u64 << ($mantissa - 1)) as Self;
+                self + shift - shift
             }
             #[inline(always)]
             fn exp(self) -> Self {

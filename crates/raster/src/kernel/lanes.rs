@@ -36,6 +36,8 @@ pub(crate) trait Lanes:
     type Mask: Copy;
     /// Whole numbers.
     type Index: Copy;
+    /// Which of three numbers each lane takes.
+    type Which: Copy;
     /// Whether this needs AVX2.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     const NEEDS_AVX2: bool;
@@ -51,8 +53,6 @@ pub(crate) trait Lanes:
     fn array(self) -> [Self::Float; LANES];
     /// Two groups of neighbours.
     fn of_groups(low: &[Self::Float; GROUP], high: &[Self::Float; GROUP]) -> Self;
-    /// One number for each of two groups.
-    fn of_halves(low: Self::Float, high: Self::Float) -> Self;
     /// Adds the first half to one group of numbers, then the second to another or the same.
     fn add_to_groups(self, numbers: &mut [Self::Float], at: [u32; 2]);
 
@@ -92,27 +92,44 @@ pub(crate) trait Lanes:
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// `self` where the mask holds, else 0.
     fn only(self, mask: Self::Mask) -> Self;
+    /// The third where the second mask holds, else the second where the first does, else the first.
+    fn which(second: Self::Mask, third: Self::Mask) -> Self::Which;
+    /// Where that is the first, the second and the third.
+    fn where_each(second: Self::Mask, third: Self::Mask) -> [Self::Mask; 3];
+    /// One of the first three numbers for each lane.
+    fn chosen(numbers: &[Self::Float; 4], which: Self::Which) -> Self;
+    /// Writes three columns and zeros as rows, one for each lane.
+    fn to_rows(columns: [Self; 3], to: &mut [[Self::Float; 4]; LANES]);
+    /// A mask as bits, the first lane lowest.
+    fn bits(mask: Self::Mask) -> u32;
     /// The sum of all lanes, halves first.
     fn sum(self) -> Self::Float;
     /// Nearest whole numbers, for numbers in [0, 2^22].
-    fn nearest(self) -> [i32; LANES];
+    fn nearest(self) -> Self::Index;
+    /// Nearest whole numbers as floats, for numbers in [0, 2^22].
+    fn rounded(self) -> Self;
+    /// Writes the lanes where the mask holds one behind the other, and says how many there are. What stands behind them is overwritten.
+    fn pack(keep: Self::Mask, numbers: [Self::Index; 2], to: [&mut [u32; LANES]; 2]) -> usize;
+    /// Places of the pixels of two groups from the origin of their face, from those of the first pixels: column, and row times 2^24.
+    fn pixels(places: &[u32; 2]) -> (Self, Self);
 
     /// See [`Float::cell`].
     fn cell(self, octaves: u32, bits: u32) -> (Self::Index, Self, Self);
     /// The same whole number in all lanes.
     fn index(value: i32) -> Self::Index;
-    /// Where a whole number is 0 or less.
-    fn not_positive(index: Self::Index) -> Self::Mask;
-    /// Whole numbers no less than 0 and no greater than `most`.
-    fn limited(index: Self::Index, most: i32) -> Self::Index;
+    /// The whole numbers of an array.
+    fn indices(values: &[i32; LANES]) -> Self::Index;
+    /// Whole numbers as an array.
+    fn index_array(index: Self::Index) -> [i32; LANES];
     /// Sums and differences of whole numbers.
     fn plus(a: Self::Index, b: Self::Index) -> Self::Index;
     /// `a - b`.
     fn minus(a: Self::Index, b: Self::Index) -> Self::Index;
     /// `yes` where the mask holds, else `no`.
     fn pick_index(mask: Self::Mask, yes: Self::Index, no: Self::Index) -> Self::Index;
-    /// Places in a table of so many rows. One behind its end is the last row.
-    fn places(index: Self::Index, rows: usize) -> Places;
+    /// Places in a table of two sides with so many cells each, and a tail behind the last of each; where the mask holds on its second
+    /// side. Cells beyond the last are the tail.
+    fn places(cell: Self::Index, cells: i32, second: Self::Mask) -> Places;
     /// The rows of a table at some places, column by column.
     fn rows(table: &[[Self::Float; 4]], at: &Places) -> [Self; 4];
     /// Adds to the rows of a table at some places, lane by lane.
@@ -170,7 +187,7 @@ pub(crate) fn has_avx2() -> bool {
 /// Rows of a table, one for each lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Places {
-    /// Each below `rows`.
+    /// Each below `rows`; of vectors as explicit as in [`x86`], bytes from the first row.
     at: [u32; LANES],
     /// What the table has at least.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
@@ -178,6 +195,13 @@ pub(crate) struct Places {
 }
 
 impl Places {
+    /// Numbers of the rows, in plain arrays.
+    #[cfg(test)]
+    pub(crate) fn numbers<L: Lanes>(&self) -> [usize; LANES] {
+        assert!(!L::NEEDS_AVX2, "vectors have places of their own");
+        self.at.map(|at| at as usize)
+    }
+
     /// The first row of a table with one row or more.
     pub(crate) const FIRST: Self = Self { at: [0; LANES], rows: 1 };
 }
@@ -216,6 +240,7 @@ impl<F: Float> Lanes for Plain<F> {
     type Float = F;
     type Mask = [bool; LANES];
     type Index = [i32; LANES];
+    type Which = [[bool; LANES]; 2];
     const NEEDS_AVX2: bool = false;
     // Floats of 32 bits have vectors of their own there.
     const GAINS_AVX2: bool = size_of::<F>() == 8;
@@ -242,11 +267,6 @@ impl<F: Float> Lanes for Plain<F> {
             (lanes[i], lanes[i + GROUP]) = (low[i], high[i]);
         }
         Self(lanes)
-    }
-
-    #[inline(always)]
-    fn of_halves(low: F, high: F) -> Self {
-        Self([low, low, low, low, high, high, high, high])
     }
 
     #[inline(always)]
@@ -331,6 +351,42 @@ impl<F: Float> Lanes for Plain<F> {
     }
 
     #[inline(always)]
+    fn which(second: [bool; LANES], third: [bool; LANES]) -> [[bool; LANES]; 2] {
+        [second, third]
+    }
+
+    #[inline(always)]
+    fn where_each(second: [bool; LANES], third: [bool; LANES]) -> [[bool; LANES]; 3] {
+        let mut masks = [[false; LANES], [false; LANES], third];
+        for i in 0..LANES {
+            masks[0][i] = !second[i] & !third[i];
+            masks[1][i] = second[i] & !third[i];
+        }
+        masks
+    }
+
+    #[inline(always)]
+    fn chosen(&[a, b, c, _]: &[F; 4], [second, third]: [[bool; LANES]; 2]) -> Self {
+        Self::pick(third, Self::splat(c), Self::pick(second, Self::splat(b), Self::splat(a)))
+    }
+
+    #[inline(always)]
+    fn to_rows([a, b, c]: [Self; 3], to: &mut [[F; 4]; LANES]) {
+        for i in 0..LANES {
+            to[i] = [a.0[i], b.0[i], c.0[i], F::ZERO];
+        }
+    }
+
+    #[inline(always)]
+    fn bits(mask: [bool; LANES]) -> u32 {
+        let mut bits = 0;
+        for i in 0..LANES {
+            bits |= u32::from(mask[i]) << i;
+        }
+        bits
+    }
+
+    #[inline(always)]
     fn sum(self) -> F {
         let mut lanes = self.0;
         let mut width = LANES / 2;
@@ -353,12 +409,46 @@ impl<F: Float> Lanes for Plain<F> {
     }
 
     #[inline(always)]
-    fn cell(self, octaves: u32, bits: u32) -> ([i32; LANES], Self, Self) {
-        let (mut index, mut lower, mut inverse) = ([0; LANES], self.0, self.0);
+    fn rounded(mut self) -> Self {
         for i in 0..LANES {
-            (index[i], lower[i], inverse[i]) = self.0[i].cell(octaves, bits);
+            self.0[i] = self.0[i].rounded();
         }
-        (index, Self(lower), Self(inverse))
+        self
+    }
+
+    #[inline(always)]
+    fn pack(
+        keep: [bool; LANES],
+        [a, b]: [[i32; LANES]; 2],
+        [to_a, to_b]: [&mut [u32; LANES]; 2],
+    ) -> usize {
+        let mut count = 0;
+        for i in 0..LANES {
+            let free = count % LANES;
+            (to_a[free], to_b[free]) = (a[i] as u32, b[i] as u32);
+            count += usize::from(keep[i]);
+        }
+        count
+    }
+
+    #[inline(always)]
+    fn pixels(places: &[u32; 2]) -> (Self, Self) {
+        let (mut x, mut y) = ([F::ZERO; LANES], [F::ZERO; LANES]);
+        for i in 0..LANES {
+            let place = places[i / GROUP];
+            x[i] = F::of_whole((place & 0x00ff_ffff) as i32 + (i % GROUP) as i32);
+            y[i] = F::of_whole((place >> 24) as i32);
+        }
+        (Self(x), Self(y))
+    }
+
+    #[inline(always)]
+    fn cell(self, octaves: u32, bits: u32) -> ([i32; LANES], Self, Self) {
+        let (mut index, mut place, mut inverse) = ([0; LANES], self.0, self.0);
+        for i in 0..LANES {
+            (index[i], place[i], inverse[i]) = self.0[i].cell(octaves, bits);
+        }
+        (index, Self(place), Self(inverse))
     }
 
     #[inline(always)]
@@ -367,20 +457,12 @@ impl<F: Float> Lanes for Plain<F> {
     }
 
     #[inline(always)]
-    fn not_positive(index: [i32; LANES]) -> [bool; LANES] {
-        let mut mask = [false; LANES];
-        for i in 0..LANES {
-            mask[i] = index[i] <= 0;
-        }
-        mask
+    fn indices(values: &[i32; LANES]) -> [i32; LANES] {
+        *values
     }
 
     #[inline(always)]
-    fn limited(mut index: [i32; LANES], most: i32) -> [i32; LANES] {
-        for i in 0..LANES {
-            let least = if index[i] > 0 { index[i] } else { 0 };
-            index[i] = if least < most { least } else { most };
-        }
+    fn index_array(index: [i32; LANES]) -> [i32; LANES] {
         index
     }
 
@@ -409,12 +491,13 @@ impl<F: Float> Lanes for Plain<F> {
     }
 
     #[inline(always)]
-    fn places(index: [i32; LANES], rows: usize) -> Places {
+    fn places(cell: [i32; LANES], cells: i32, second: [bool; LANES]) -> Places {
         let mut at = [0; LANES];
         for i in 0..LANES {
-            at[i] = (index[i] as u32).min((rows - 1) as u32);
+            let side = if second[i] { cells as u32 + 1 } else { 0 };
+            at[i] = (cell[i] as u32).min(cells as u32) + side;
         }
-        Places { at, rows }
+        Places { at, rows: 2 * (cells as usize + 1) }
     }
 
     #[inline(always)]

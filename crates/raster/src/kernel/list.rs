@@ -1,18 +1,23 @@
 //! The pixels that faces may reach, as a list of chunks that a walk takes one after the other.
+#![allow(clippy::needless_range_loop)]
 
 use std::ops::Range;
 
 use super::{
-    face::Faces,
+    face::{Face, Faces},
     float::Float as _,
-    lanes::{GROUP, LANES},
+    lanes::{GROUP, LANES, Lanes},
     reach::Reach,
-    real::{Float, Real},
+    real::{Float, Real, splat},
     scene::{Place, Scene},
 };
 
 /// Faces that are listed together: what is prepared of them stays near the processor.
 pub(crate) const LISTED: usize = 64;
+/// Chunks behind the last on which nothing depends.
+pub(crate) const AHEAD: usize = 4;
+/// Groups behind those of a face that are written without asking.
+const MORE: usize = 2 * LANES + 2 * AHEAD;
 /// Most rows of a band.
 const MOST_ROWS: usize = 64;
 /// Fewer of them for fewer views than this, so that there are bands for all threads.
@@ -23,96 +28,155 @@ pub(crate) fn rows_of_bands(views: usize) -> usize {
     if views < FEW_VIEWS { MOST_ROWS / 2 } else { MOST_ROWS }
 }
 
-/// Neighbours of a row that a face may reach.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Group<F> {
-    /// Column of the first one.
-    pub(crate) column: u32,
-    /// Position of the first one in the band.
-    pub(crate) at: u32,
-    /// Height of all of them, in NDC.
-    pub(crate) y: F,
+/// Some faces of a band and their pixels: groups of neighbours of a row, two groups of one face in a chunk.
+pub(crate) struct List<T: Real> {
+    blocks: [Faces<T>; LISTED / LANES],
+    /// Whether some of them are slivers.
+    pub(crate) slivers: bool,
+    /// Where the first pixel of each group lies, from the origin of its face: column, and row times 2^24. There is more room than groups.
+    places: Vec<u32>,
+    /// Its position in the band.
+    at: Vec<u32>,
+    /// Which face of the list it belongs to.
+    owners: Vec<u8>,
+    chunks: usize,
 }
 
-/// Two groups of one face.
-pub(crate) type Chunk<F> = [Group<F>; 2];
-
-/// Faces of a band and their pixels.
-pub(crate) struct List<T: Real> {
-    pub(crate) faces: Vec<Faces<T>>,
-    /// Two groups of one face make a chunk; more than there are.
-    groups: Vec<Group<Float<T>>>,
-    /// Which face of the list each chunk belongs to.
-    owners: Vec<u32>,
+/// Two groups of a list.
+#[derive(Clone, Copy)]
+pub(crate) struct Chunk<'a> {
+    pub(crate) places: &'a [u32; 2],
+    pub(crate) at: [u32; 2],
+    pub(crate) owner: usize,
 }
 
 impl<T: Real> List<T> {
     pub(crate) fn new() -> Self {
-        let faces = Vec::with_capacity(LISTED / LANES);
-        Self { faces, groups: Vec::new(), owners: Vec::new() }
+        let blocks = [Faces::nothing(); LISTED / LANES];
+        let (places, at, owners) = (Vec::new(), Vec::new(), Vec::new());
+        Self { blocks, slivers: false, places, at, owners, chunks: 0 }
     }
 
-    /// Groups of each chunk, and the face that it belongs to.
-    pub(crate) fn chunks(&self) -> (&[Chunk<Float<T>>], &[u32]) {
-        (&self.groups.as_chunks().0[..self.owners.len()], &self.owners)
+    /// A face of the list.
+    #[inline(always)]
+    pub(crate) fn face(&self, owner: usize) -> Face<'_, T> {
+        self.blocks[owner / LANES % (LISTED / LANES)].face(owner)
     }
 
-    /// Lists the pixels of some faces of a band, given by their numbers.
+    /// Its chunks, those of a face one behind the other, and then so `many` of [`AHEAD`] on which nothing depends.
+    #[inline(always)]
+    pub(crate) fn chunks(&self, many: usize) -> impl Iterator<Item = Chunk<'_>> {
+        let count = self.chunks + many;
+        let places = &self.places.as_chunks().0[..count];
+        let at = &self.at.as_chunks::<2>().0[..count];
+        let owners = &self.owners.as_chunks::<2>().0[..count];
+        let groups = places.iter().zip(at.iter().zip(owners));
+        groups.map(|(places, (&at, owners))| Chunk { places, at, owner: owners[0] as usize })
+    }
+
+    /// Makes room for so many groups.
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self, groups: usize) {
+        self.places.resize(2 * groups, 0);
+        self.at.resize(2 * groups, 0);
+        self.owners.resize(2 * groups, 0);
+    }
+
+    /// Prepares up to [`LISTED`] faces of a band, given by their numbers, and lists their pixels.
     #[inline(always)]
     pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &Place<T>, numbers: &[u32]) {
-        self.faces.clear();
-        self.owners.clear();
-        let mut listed = 0;
+        let index = <T::Lanes as Lanes>::index;
+        let plus = <T::Lanes as Lanes>::plus;
+        let four = splat::<T::Lanes>(GROUP as f64);
         let band = scene.band_rows(place.band);
         let stride = scene.stride();
-        // An odd group is joined by one on which nothing depends.
-        let at = (band.len() * stride) as u32;
-        let nowhere = Group { column: 0, at, y: Float::<T>::ZERO };
+        let nowhere = (band.len() * stride) as u32;
+        let (mut rows_apart, mut rows_below) = ([0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            rows_apart[lane] = (lane * stride) as i32;
+            rows_below[lane] = (lane << 24) as i32;
+        }
+        let rows_apart = T::Lanes::indices(&rows_apart);
+        let rows_below = T::Lanes::indices(&rows_below);
+        self.slivers = false;
+        let mut listed = 0;
         for (block, numbers) in numbers.chunks(LANES).enumerate() {
-            let faces = place.faces(scene, numbers);
+            let faces = &mut self.blocks[block % (LISTED / LANES)];
+            let spans = place.faces(scene, numbers, faces);
+            self.slivers |= faces.any_sliver(numbers.len());
             for (lane, &number) in numbers.iter().enumerate() {
+                let owner = (block * LANES + lane) as u8;
                 let reach = place.view.reaches[number as usize];
                 let rows = within(band.clone(), reach);
-                let most = listed + rows.len() * stride.div_ceil(GROUP) + 2;
-                if self.groups.len() < most {
-                    self.groups.resize(2 * most, Group::default());
+                let columns = reach.right - reach.left;
+                let most = rows.len() * (columns as usize).div_ceil(GROUP);
+                if self.at.len() < listed + most + MORE {
+                    self.grow(listed + most + MORE);
                 }
-                for first in rows.clone().step_by(LANES) {
-                    let (starts, ends) =
-                        faces.columns(lane, scene.heights(first), reach, scene.size);
-                    let mut at = (first - band.start) * stride;
-                    for (k, y) in scene.heights(first).iter().take(rows.end - first).enumerate() {
-                        let (column, groups) = (starts[k] as usize, groups_of(starts[k], ends[k]));
-                        // Most rows have one group or two. These are written without asking, since a branch
-                        // that nobody can foresee costs more.
-                        let group = |n: usize| {
-                            let (column, at) = (column + n * GROUP, at + column + n * GROUP);
-                            Group { column: column as u32, at: at as u32, y: *y }
-                        };
-                        let free = &mut self.groups[listed..listed + 2];
-                        (free[0], free[1]) = (group(0), group(1));
-                        for n in 2..groups {
-                            self.groups[listed + n] = group(n);
+                let room = self.at.len();
+                let (places, ats) = (&mut self.places[..room], &mut self.at[..room]);
+                let owners = &mut self.owners[..room];
+                let width = T::Lanes::splat(Float::<T>::of_whole(columns as i32));
+                let height = T::Lanes::splat(Float::<T>::of_whole(rows.len() as i32));
+                let mut corner = ((rows.start - band.start) * stride) as i32 + reach.left as i32;
+                let (mut y, mut row) = (rows_from_origin::<T::Lanes>(), 0);
+                while row < rows.len() {
+                    let [mut x, end] = spans.columns(lane, y, width);
+                    let end = end.only(y.less(height));
+                    let start = x.nearest();
+                    let mut at = plus(plus(index(corner), rows_apart), start);
+                    let mut from_origin = plus(plus(index((row << 24) as i32), rows_below), start);
+                    loop {
+                        // Most rows have one group or two, and nobody can foresee which.
+                        for _ in 0..2 {
+                            *eight(owners, listed) = [owner; LANES];
+                            let to = [eight(places, listed), eight(ats, listed)];
+                            listed += T::Lanes::pack(x.less(end), [from_origin, at], to);
+                            x += four;
+                            at = plus(at, index(GROUP as i32));
+                            from_origin = plus(from_origin, index(GROUP as i32));
                         }
-                        listed += groups;
-                        at += stride;
+                        if T::Lanes::bits(x.less(end)) == 0 {
+                            break;
+                        }
                     }
+                    row += LANES;
+                    y += splat(LANES as f64);
+                    corner += (LANES * stride) as i32;
                 }
-                if listed % 2 == 1 {
-                    self.groups[listed] = nowhere;
-                    listed += 1;
-                }
-                self.owners.resize(listed / 2, (block * LANES + lane) as u32);
+                // An odd group is joined by one on which nothing depends. Written always, since nobody can foresee whether it counts.
+                (places[listed], ats[listed]) = (0, nowhere);
+                listed += listed % 2;
             }
-            self.faces.push(faces);
         }
+        if self.at.len() < listed + MORE {
+            self.grow(listed + MORE);
+        }
+        let last = listed..listed + 2 * AHEAD;
+        self.places[last.clone()].fill(0);
+        self.at[last.clone()].fill(nowhere);
+        self.owners[last].fill(numbers.len().saturating_sub(1) as u8);
+        self.chunks = listed / 2;
     }
 }
 
-/// Groups that hold the columns from `start` to before `end`.
+/// Room for [`LANES`] numbers.
 #[inline(always)]
-fn groups_of(start: i32, end: i32) -> usize {
-    ((end - start).max(0) as usize).div_ceil(GROUP)
+fn eight<F>(numbers: &mut [F], at: usize) -> &mut [F; LANES] {
+    (&mut numbers[at..at + LANES]).try_into().expect("as many numbers as lanes")
+}
+
+/// Rows from the first one, one for each lane.
+#[inline(always)]
+pub(crate) fn rows_from_origin<L: Lanes>() -> L {
+    let number = L::Float::from_f64;
+    let rows = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+    let mut lanes = [L::Float::ZERO; LANES];
+    for lane in 0..LANES {
+        lanes[lane] = number(rows[lane]);
+    }
+    L::of(&lanes)
 }
 
 /// Rows of a band that a face may reach.

@@ -21,6 +21,7 @@ mod sum;
 mod table;
 mod walk;
 
+pub(crate) use bands::Bands;
 pub(crate) use float::Float;
 pub(crate) use pairs::pairs;
 pub(crate) use reach::{FAR_AWAY, inside_spans};

@@ -1,14 +1,14 @@
 //! The arithmetic of eight pixels and one face.
 
 use super::{
-    face::Face,
+    face::{Edge, Face},
     lanes::Lanes,
     real::{Mask, Real, splat},
 };
 
 /// Closest points of a triangle's boundary to eight pixels.
 pub(crate) struct Closest<T: Real> {
-    /// Squared distance to it, NDC².
+    /// Squared distance to it, in pixels.
     pub(crate) distance2: T,
     /// From it to the pixel.
     pub(crate) dx: T,
@@ -17,62 +17,58 @@ pub(crate) struct Closest<T: Real> {
     pub(crate) weights: [T; 3],
     /// Where the pixel lies in the triangle, edges included.
     pub(crate) inside: Mask<T>,
+    /// Its place on its edge, 0 to 1, and where that is the first, the second and the third.
+    pub(crate) along: T,
+    pub(crate) edges: [Mask<T>; 3],
 }
 
-/// Closest boundary points to the pixels at `px`, `py` (NDC), by projection onto edges. No inverted matrix, no division:
+/// Closest boundary points to the pixels at `px`, `py`, by projection onto edges. No inverted matrix, no division:
 /// slivers, points and pixels on an edge all give finite numbers.
 ///
 /// Without `SLIVERS`, only onto the edge whose line has the least signed distance: it holds the closest point. docs/notes.md, Nearest
 /// edge, has the proof. Rounding confuses edges only where they are all but parallel.
 #[inline(always)]
 pub(crate) fn closest<T: Real, const SLIVERS: bool>(
-    face: &Face<T>,
+    face: Face<T>,
     px: T::Lanes,
     py: T::Lanes,
 ) -> Closest<T> {
-    let a = Edge::seen_from(face, 0, px, py);
-    let b = Edge::seen_from(face, 1, px, py);
-    let c = Edge::seen_from(face, 2, px, py);
-    let side = a.side.min(b.side).min(c.side).min(face.most);
-    let inside = splat::<T::Lanes>(0.0).at_most(side);
-    let (second, third, point);
+    let (second, third, point, side);
     if SLIVERS {
-        let points = [a.point(), b.point(), c.point()];
+        let points = [
+            Point::of(face.edge(0), px, py),
+            Point::of(face.edge(1), px, py),
+            Point::of(face.edge(2), px, py),
+        ];
         let [first, other, last] = &points;
         second = other.distance2.value().less(first.distance2.value());
         let nearer = Point::choose(second, other, first);
         third = last.distance2.value().less(nearer.distance2.value());
         point = Point::choose(third, last, &nearer);
+        // A triangle without area has no inside.
+        let most = splat(if face.is_solid() { 1.0 } else { -1.0 });
+        side = first.side.min(other.side).min(last.side).min(most);
     } else {
-        second = b.line.less(a.line);
-        third = c.line.less(b.line.min(a.line));
-        point = Edge::choose(third, &c, &Edge::choose(second, &b, &a)).point();
+        let lines = [face.line(0, px, py), face.line(1, px, py), face.line(2, px, py)];
+        let two = lines[0].min(lines[1]);
+        (second, third) = (lines[1].less(lines[0]), lines[2].less(two));
+        point = Point::of(face.chosen(T::Lanes::which(second, third)), px, py);
+        side = point.side;
     }
+    // Not from the lines: they do not hold a pixel that lies on an edge to the last bit.
+    let inside = splat::<T::Lanes>(0.0).at_most(side);
     // Corner k starts edge k and ends edge k - 1.
-    let (zero, along) = (T::constant(splat(0.0)), point.along);
+    let edges = T::Lanes::where_each(second, third);
+    let [on_first, on_second, on_third] = edges;
+    let along = point.along;
     let rest = T::constant(splat(1.0)) - along;
     let weights = [
-        T::choose(third, along, T::choose(second, zero, rest)),
-        T::choose(third, zero, T::choose(second, rest, along)),
-        T::choose(third, rest, along.masked(second)),
+        rest.masked(on_first) + along.masked(on_third),
+        along.masked(on_first) + rest.masked(on_second),
+        along.masked(on_second) + rest.masked(on_third),
     ];
-    Closest { distance2: point.distance2, dx: point.dx, dy: point.dy, weights, inside }
-}
-
-/// An edge as pixels see it.
-struct Edge<T: Real> {
-    /// From its first corner to the pixel.
-    wx: T,
-    wy: T,
-    /// From its first corner to its second.
-    x: T,
-    y: T,
-    /// One over its squared length.
-    inverse: T,
-    /// Twice the area of the triangle that edge and pixel make: above 0 on the inner side.
-    side: T::Lanes,
-    /// Signed distance to its line.
-    line: T::Lanes,
+    let Point { distance2, dx, dy, .. } = point;
+    Closest { distance2, dx, dy, weights, inside, along, edges }
 }
 
 /// The closest point of an edge.
@@ -82,40 +78,20 @@ struct Point<T: Real> {
     dy: T,
     /// Its place on the edge, 0 to 1.
     along: T,
-}
-
-impl<T: Real> Edge<T> {
-    #[inline(always)]
-    fn seen_from(face: &Face<T>, k: usize, px: T::Lanes, py: T::Lanes) -> Self {
-        let (x, y) = (face.edge_x[k], face.edge_y[k]);
-        let (wx, wy) = (T::constant(px) - face.x[k], T::constant(py) - face.y[k]);
-        let side = x.value() * wy.value() - y.value() * wx.value();
-        Self { wx, wy, x, y, inverse: face.inverse[k], side, line: side * face.inverse_length[k] }
-    }
-
-    #[inline(always)]
-    fn choose(mask: Mask<T>, yes: &Self, no: &Self) -> Self {
-        let pick = <T::Lanes as Lanes>::pick;
-        Self {
-            wx: T::choose(mask, yes.wx, no.wx),
-            wy: T::choose(mask, yes.wy, no.wy),
-            x: T::choose(mask, yes.x, no.x),
-            y: T::choose(mask, yes.y, no.y),
-            inverse: T::choose(mask, yes.inverse, no.inverse),
-            side: pick(mask, yes.side, no.side),
-            line: pick(mask, yes.line, no.line),
-        }
-    }
-
-    #[inline(always)]
-    fn point(&self) -> Point<T> {
-        let along = ((self.wx * self.x + self.wy * self.y) * self.inverse).clamped();
-        let (dx, dy) = (self.wx - along * self.x, self.wy - along * self.y);
-        Point { distance2: dx * dx + dy * dy, dx, dy, along }
-    }
+    /// Twice the area of the triangle that edge and pixel make: above 0 on the inner side.
+    side: T::Lanes,
 }
 
 impl<T: Real> Point<T> {
+    #[inline(always)]
+    fn of(edge: Edge<T>, px: T::Lanes, py: T::Lanes) -> Self {
+        let (wx, wy) = (T::constant(px) - edge.x, T::constant(py) - edge.y);
+        let along = ((wx * edge.to_x + wy * edge.to_y) * edge.inverse).clamped();
+        let (dx, dy) = (wx - along * edge.to_x, wy - along * edge.to_y);
+        let side = edge.to_x.value() * wy.value() - edge.to_y.value() * wx.value();
+        Self { distance2: dx * dx + dy * dy, dx, dy, along, side }
+    }
+
     #[inline(always)]
     fn choose(mask: Mask<T>, yes: &Self, no: &Self) -> Self {
         Self {
@@ -123,6 +99,7 @@ impl<T: Real> Point<T> {
             dx: T::choose(mask, yes.dx, no.dx),
             dy: T::choose(mask, yes.dy, no.dy),
             along: T::choose(mask, yes.along, no.along),
+            side: no.side,
         }
     }
 }
@@ -131,7 +108,7 @@ impl<T: Real> Point<T> {
 mod tests {
     use super::*;
     use crate::kernel::{
-        face::Faces,
+        face::{Faces, prepare},
         float::Float,
         lanes::{LANES, Plain},
     };
@@ -142,7 +119,8 @@ mod tests {
         pixels: &[[f64; 2]],
     ) -> (bool, Vec<[(f64, bool); 2]>) {
         let axis = |k: usize| triangle.map(|corner| Plain::splat(F::from_f64(corner[k])));
-        let faces = Faces::<Plain<F>>::new(axis(0), axis(1), splat(0.1));
+        let mut faces = Faces::<Plain<F>>::nothing();
+        prepare(axis(0), axis(1), splat(0.1), 1.0, &mut faces);
         let face = faces.face(0);
         let at = |x: f64| Plain::splat(F::from_f64(x));
         let of = |point: Closest<Plain<F>>| {
@@ -150,11 +128,11 @@ mod tests {
         };
         let ways = |&[x, y]: &[f64; 2]| {
             [
-                of(closest::<_, true>(&face, at(x), at(y))),
-                of(closest::<_, false>(&face, at(x), at(y))),
+                of(closest::<_, true>(face, at(x), at(y))),
+                of(closest::<_, false>(face, at(x), at(y))),
             ]
         };
-        (faces.slivers, pixels.iter().map(ways).collect())
+        (faces.any_sliver(1), pixels.iter().map(ways).collect())
     }
 
     fn assert_same<F: Float>(bound: f64) {

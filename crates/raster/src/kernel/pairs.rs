@@ -3,9 +3,11 @@
 use rayon::prelude::*;
 
 use super::{
+    face::Faces,
     float::Float,
-    lanes::{LANES, Plain},
-    list::within,
+    lanes::{LANES, Lanes as _, Plain},
+    list::{rows_from_origin, within},
+    real::splat,
     scene::Scene,
     sum::Inputs,
 };
@@ -19,17 +21,20 @@ pub(crate) fn pairs<F: Float>(inputs: &Inputs<F>) -> usize {
         let in_band = |band: usize| {
             let place = scene.place(view, index, views, band);
             let mut pairs = 0;
+            let mut prepared = Faces::nothing();
             for numbers in place.view.faces(band).chunks(LANES) {
-                let faces = place.faces(&scene, numbers);
+                let spans = place.faces(&scene, numbers, &mut prepared);
                 for (lane, &number) in numbers.iter().enumerate() {
                     let reach = place.view.reaches[number as usize];
-                    let rows = within(scene.band_rows(band), reach);
-                    for row in rows.clone().step_by(LANES) {
-                        let heights = scene.heights(row);
-                        let (starts, ends) = faces.columns(lane, heights, reach, scene.size);
+                    let rows = within(scene.band_rows(band), reach).len();
+                    let width = splat::<Plain<F>>(f64::from(reach.right - reach.left));
+                    for row in (0..rows).step_by(LANES) {
+                        let y = rows_from_origin::<Plain<F>>() + splat(row as f64);
+                        let [starts, ends] =
+                            spans.columns(lane, y, width).map(|columns| columns.nearest());
                         let lengths =
                             starts.iter().zip(ends).map(|(start, end)| (end - start).max(0));
-                        pairs += lengths.take(rows.end - row).sum::<i32>() as usize;
+                        pairs += lengths.take(rows - row).sum::<i32>() as usize;
                     }
                 }
             }

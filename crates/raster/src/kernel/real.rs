@@ -10,8 +10,8 @@ pub(crate) trait Real:
 {
     /// The vectors below.
     type Lanes: Lanes;
-    /// The same in memory.
-    type Stored: Copy + Default;
+    /// One number of each edge or corner of [`LANES`] faces, in memory.
+    type Threes: Copy + Default;
     /// Whether numbers have tangents. Then the tangents are what a kernel gives back.
     const DUAL: bool;
     /// Numbers with these tangents, which are left aside where there are none.
@@ -36,10 +36,12 @@ pub(crate) trait Real:
     fn masked(self, mask: Mask<Self>) -> Self;
     /// No less than 0 and no more than 1.
     fn clamped(self) -> Self;
-    /// To memory.
-    fn store(self) -> Self::Stored;
-    /// The number of one lane, in all lanes.
-    fn of_lane(stored: &Self::Stored, lane: usize) -> Self;
+    /// Writes the numbers of each lane.
+    fn write_threes(columns: [Self; 3], to: &mut Self::Threes);
+    /// Number `k` of those of a lane, in all lanes.
+    fn of_three(threes: &Self::Threes, lane: usize, k: usize) -> Self;
+    /// One of those of a lane for each lane.
+    fn chosen(threes: &Self::Threes, lane: usize, which: Which<Self>) -> Self;
     /// Rows of a table, column by column. `tangents` belongs to dual numbers.
     fn rows(table: Table<Self>, at: &Places) -> [Self; 4];
 }
@@ -48,6 +50,8 @@ pub(crate) trait Real:
 pub(crate) type Float<T> = <<T as Real>::Lanes as Lanes>::Float;
 /// Which lanes of a [`Real`].
 pub(crate) type Mask<T> = <<T as Real>::Lanes as Lanes>::Mask;
+/// Which of three numbers each lane of a [`Real`] takes.
+pub(crate) type Which<T> = <<T as Real>::Lanes as Lanes>::Which;
 
 /// Rows of a profile table, and their tangents where numbers have any.
 pub(crate) struct Table<'a, T: Real> {
@@ -64,7 +68,7 @@ impl<T: Real> Copy for Table<'_, T> {}
 
 impl<L: Lanes> Real for L {
     type Lanes = L;
-    type Stored = [L::Float; LANES];
+    type Threes = [[L::Float; 4]; LANES];
     const DUAL: bool = false;
     #[inline(always)]
     fn new(value: L, _: L) -> Self {
@@ -111,12 +115,16 @@ impl<L: Lanes> Real for L {
         self.max(splat(0.0)).min(splat(1.0))
     }
     #[inline(always)]
-    fn store(self) -> [L::Float; LANES] {
-        self.array()
+    fn write_threes(columns: [L; 3], to: &mut Self::Threes) {
+        L::to_rows(columns, to);
     }
     #[inline(always)]
-    fn of_lane(stored: &[L::Float; LANES], lane: usize) -> Self {
-        L::splat(stored[lane % LANES])
+    fn of_three(threes: &Self::Threes, lane: usize, k: usize) -> Self {
+        L::splat(threes[lane % LANES][k % 4])
+    }
+    #[inline(always)]
+    fn chosen(threes: &Self::Threes, lane: usize, which: L::Which) -> Self {
+        <L as Lanes>::chosen(&threes[lane % LANES], which)
     }
     #[inline(always)]
     fn rows(table: Table<Self>, at: &Places) -> [Self; 4] {
@@ -160,7 +168,7 @@ impl<L: Copy + Add<Output = L> + Mul<Output = L>> Mul for Dual<L> {
 
 impl<L: Lanes> Real for Dual<L> {
     type Lanes = L;
-    type Stored = Dual<[L::Float; LANES]>;
+    type Threes = Dual<[[L::Float; 4]; LANES]>;
     const DUAL: bool = true;
     #[inline(always)]
     fn new(value: L, tangent: L) -> Self {
@@ -214,14 +222,22 @@ impl<L: Lanes> Real for Dual<L> {
         Self { value: self.value.clamped(), tangent }
     }
     #[inline(always)]
-    fn store(self) -> Self::Stored {
-        Dual { value: self.value.array(), tangent: self.tangent.array() }
+    fn write_threes([a, b, c]: [Self; 3], to: &mut Self::Threes) {
+        L::to_rows([a.value, b.value, c.value], &mut to.value);
+        L::to_rows([a.tangent, b.tangent, c.tangent], &mut to.tangent);
     }
     #[inline(always)]
-    fn of_lane(stored: &Self::Stored, lane: usize) -> Self {
+    fn of_three(threes: &Self::Threes, lane: usize, k: usize) -> Self {
         Self {
-            value: L::splat(stored.value[lane % LANES]),
-            tangent: L::splat(stored.tangent[lane % LANES]),
+            value: L::splat(threes.value[lane % LANES][k % 4]),
+            tangent: L::splat(threes.tangent[lane % LANES][k % 4]),
+        }
+    }
+    #[inline(always)]
+    fn chosen(threes: &Self::Threes, lane: usize, which: L::Which) -> Self {
+        Self {
+            value: L::chosen(&threes.value[lane % LANES], which),
+            tangent: L::chosen(&threes.tangent[lane % LANES], which),
         }
     }
     #[inline(always)]

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::{
     bands::View,
-    face::Faces,
+    face::{Faces, Spans, prepare},
     float::Float as _,
     lanes::{GROUP, LANES, Lanes},
-    real::{Float, Real, Table},
+    list::within,
+    real::{Float, Real, Table, splat},
     table::{Grid, Lookup},
 };
 use crate::ImageSize;
@@ -26,9 +27,10 @@ pub(crate) struct Scene<'a, T: Real> {
     /// Rows of a band.
     pub(crate) rows: usize,
     pub(crate) lookup: Lookup<Float<T>>,
-    /// Centres of the columns, with a group more than the image has.
-    centres: Vec<Float<T>>,
-    /// Centres of the rows, with a vector more.
+    /// Pixels in a unit of NDC.
+    pub(crate) half: f64,
+    /// Centres of the columns and of the rows, in NDC.
+    columns: Vec<Float<T>>,
     heights: Vec<Float<T>>,
 }
 
@@ -46,16 +48,27 @@ pub(crate) struct Place<'a, T: Real> {
 }
 
 impl<T: Real> Place<'_, T> {
-    /// Up to [`LANES`] faces of the scene, given by their numbers, as this view sees them; the last one
-    /// fills them up.
+    /// Prepares up to [`LANES`] faces of the band, given by their numbers; the last one fills them up. Each is seen from the first
+    /// column that it reaches, and the first row in this band.
     #[inline(always)]
-    pub(crate) fn faces(&self, scene: &Scene<T>, numbers: &[u32]) -> Faces<T> {
-        let mut values = [[[Float::<T>::ZERO; LANES]; 3]; 2];
-        let mut tangents = [[[Float::<T>::ZERO; LANES]; 3]; 2];
+    pub(crate) fn faces(
+        &self,
+        scene: &Scene<T>,
+        numbers: &[u32],
+        faces: &mut Faces<T>,
+    ) -> Spans<T> {
+        let nothing = [Float::<T>::ZERO; LANES];
+        let (mut values, mut tangents) = ([[nothing; 3]; 2], [[nothing; 3]; 2]);
+        let mut origin = [nothing; 2];
+        let mut radii = [Float::<T>::from_f64(scene.grid.outer); LANES];
         let count = self.vertices.len() / 3;
         let (xs, ys) = (&self.vertices[..count], &self.vertices[count..2 * count]);
+        let band = scene.band_rows(self.band);
         for lane in 0..LANES {
-            let face = scene.faces[numbers[lane.min(numbers.len() - 1)] as usize];
+            let number = numbers[lane.min(numbers.len() - 1)] as usize;
+            let (face, reach) = (scene.faces[number], self.view.reaches[number]);
+            origin[0][lane] = scene.columns[reach.left as usize];
+            origin[1][lane] = scene.heights[within(band.clone(), reach).start];
             for k in 0..3 {
                 let vertex = face[k] as usize;
                 (values[0][k][lane], values[1][k][lane]) = (xs[vertex], ys[vertex]);
@@ -64,19 +77,25 @@ impl<T: Real> Place<'_, T> {
                     tangents[1][k][lane] = self.tangents[count + vertex];
                 }
             }
-        }
-        let [x, y] = values;
-        let [dx, dy] = tangents;
-        let x = [lanes(&x[0], &dx[0]), lanes(&x[1], &dx[1]), lanes(&x[2], &dx[2])];
-        let y = [lanes(&y[0], &dy[0]), lanes(&y[1], &dy[1]), lanes(&y[2], &dy[2])];
-        let mut radii = [Float::<T>::from_f64(scene.grid.outer); LANES];
-        if !self.view.radii.is_empty() {
-            for lane in 0..LANES {
-                let number = numbers[lane.min(numbers.len() - 1)] as usize;
+            if !self.view.radii.is_empty() {
                 radii[lane] = Float::<T>::from_f64(f64::from(self.view.radii[number]));
             }
         }
-        Faces::new(x, y, T::Lanes::of(&radii))
+        let (right, down) = (splat::<T::Lanes>(scene.half), splat::<T::Lanes>(-scene.half));
+        let [left, top] = [T::Lanes::of(&origin[0]), T::Lanes::of(&origin[1])];
+        let [x, y] = values;
+        let [dx, dy] = tangents;
+        let x = [
+            placed(&x[0], &dx[0], left, right),
+            placed(&x[1], &dx[1], left, right),
+            placed(&x[2], &dx[2], left, right),
+        ];
+        let y = [
+            placed(&y[0], &dy[0], top, down),
+            placed(&y[1], &dy[1], top, down),
+            placed(&y[2], &dy[2], top, down),
+        ];
+        prepare(x, y, T::Lanes::of(&radii) * right, scene.half, faces)
     }
 
     /// The constant outside the support.
@@ -94,10 +113,15 @@ impl<T: Real> Place<'_, T> {
     }
 }
 
-/// Numbers with their tangents.
+/// Places in pixels from an origin, with their tangents; pixels are so many in a unit.
 #[inline(always)]
-fn lanes<T: Real>(values: &[Float<T>; LANES], tangents: &[Float<T>; LANES]) -> T {
-    T::new(T::Lanes::of(values), T::Lanes::of(tangents))
+fn placed<T: Real>(
+    values: &[Float<T>; LANES],
+    tangents: &[Float<T>; LANES],
+    origin: T::Lanes,
+    unit: T::Lanes,
+) -> T {
+    T::new((T::Lanes::of(values) - origin) * unit, T::Lanes::of(tangents) * unit)
 }
 
 impl<'a, T: Real> Scene<'a, T> {
@@ -111,6 +135,7 @@ impl<'a, T: Real> Scene<'a, T> {
     ) -> Self {
         let number = Float::<T>::from_f64;
         let [vertices, tangents] = vertices;
+        let half = 0.5 * size.shorter() as f64;
         Self {
             vertices,
             tangents,
@@ -119,9 +144,10 @@ impl<'a, T: Real> Scene<'a, T> {
             grid,
             size,
             rows,
-            lookup: Lookup::new(&grid),
-            centres: (0..size.width + GROUP).map(|k| number(size.column_centre(k))).collect(),
-            heights: (0..size.height + LANES).map(|row| number(size.row_centre(row))).collect(),
+            lookup: Lookup::new(&grid, half),
+            half,
+            columns: (0..size.width).map(|column| number(size.column_centre(column))).collect(),
+            heights: (0..size.height).map(|row| number(size.row_centre(row))).collect(),
         }
     }
 
@@ -165,18 +191,5 @@ impl<'a, T: Real> Scene<'a, T> {
     /// Rows of the image that band `band` holds.
     pub(crate) fn band_rows(&self, band: usize) -> Range<usize> {
         band * self.rows..((band + 1) * self.rows).min(self.size.height)
-    }
-
-    /// Centres of a column and those behind it.
-    #[inline(always)]
-    pub(crate) fn centres(&self, column: u32) -> &[Float<T>; GROUP] {
-        let group = &self.centres[column as usize..column as usize + GROUP];
-        group.try_into().expect("a group of columns")
-    }
-
-    /// Centres of a row of the image and those below it.
-    #[inline(always)]
-    pub(crate) fn heights(&self, row: usize) -> &[Float<T>; LANES] {
-        self.heights[row..row + LANES].try_into().expect("as many heights as lanes")
     }
 }

@@ -51,24 +51,27 @@ impl<F: Float> Inputs<'_, F> {
     }
 }
 
-/// Sums of the profile, `[views, height, width]`.
-pub(crate) fn forward<F: Float>(inputs: &Inputs<F>) -> Vec<F> {
-    let bands = inputs.bands();
+/// Sums of the profile, `[views, height, width]`. `bands` are those of these inputs.
+pub(crate) fn forward<F: Float>(inputs: &Inputs<F>, bands: &Bands) -> Vec<F> {
     if has_avx2() {
-        image::<F::Avx2>(&inputs.scene([&[]; 2]), &bands)
+        image::<F::Avx2>(&inputs.scene([&[]; 2]), bands)
     } else {
-        image::<Plain<F>>(&inputs.scene([&[]; 2]), &bands)
+        image::<Plain<F>>(&inputs.scene([&[]; 2]), bands)
     }
 }
 
 /// Gradients of `Σ upstream S` to vertices and tables, as they are wanted, flat and in this order.
-pub(crate) fn vjp<F: Float>(inputs: &Inputs<F>, upstream: &[F], wanted: [bool; 2]) -> Vec<F> {
-    let bands = inputs.bands();
+pub(crate) fn vjp<F: Float>(
+    inputs: &Inputs<F>,
+    bands: &Bands,
+    upstream: &[F],
+    wanted: [bool; 2],
+) -> Vec<F> {
     let wanted = [wanted[0], wanted[1], false];
     if has_avx2() {
-        gradient::<F::Avx2>(&inputs.scene([&[]; 2]), &bands, upstream, wanted)
+        gradient::<F::Avx2>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
     } else {
-        gradient::<Plain<F>>(&inputs.scene([&[]; 2]), &bands, upstream, wanted)
+        gradient::<Plain<F>>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
     }
 }
 
@@ -79,12 +82,12 @@ pub(crate) fn vjp<F: Float>(inputs: &Inputs<F>, upstream: &[F], wanted: [bool; 2
 /// direction, and the third is the derivative of the image along it: one walk with dual numbers.
 pub(crate) fn vjp_of_vjp<F: Float>(
     inputs: &Inputs<F>,
+    bands: &Bands,
     upstream: &[F],
     direction: &[F],
     along: [bool; 2],
     wanted: [bool; 3],
 ) -> Vec<F> {
-    let bands = inputs.bands();
     let nothing = |length: usize| vec![F::ZERO; length];
     let (count, rows) = (inputs.vertices.len(), inputs.table.len());
     let still =
@@ -95,9 +98,9 @@ pub(crate) fn vjp_of_vjp<F: Float>(
         if along[1] { to_table } else { &still[1] },
     ];
     if has_avx2() {
-        gradient::<Dual<F::Avx2>>(&inputs.scene(tangents), &bands, upstream, wanted)
+        gradient::<Dual<F::Avx2>>(&inputs.scene(tangents), bands, upstream, wanted)
     } else {
-        gradient::<Dual<Plain<F>>>(&inputs.scene(tangents), &bands, upstream, wanted)
+        gradient::<Dual<Plain<F>>>(&inputs.scene(tangents), bands, upstream, wanted)
     }
 }
 

@@ -2,33 +2,33 @@
 
 use super::{
     float::Float,
-    lanes::Lanes,
+    lanes::{Lanes, Places},
     real::{Mask, Real, splat},
 };
 
-/// Largest rate at which a place in a cell moves with the squared distance, in NDC⁻². Reached only
+/// Largest rate at which a place in a cell moves with the squared distance, in pixels⁻². Reached only
 /// next to the edge under a softness narrower than f32 can tell from a step.
 const STEEPEST: f64 = 1e30;
 
 /// Places of the cells of a profile table: two one-sided tables over the squared distance that
 /// meet at the edge of the face.
 ///
-/// With `y = d² / radius²` of the side, cell 0 is `y < 2^-octaves`; above it each octave of y up to
-/// 1 holds `2^bits` cells; the last cell is the constant tail `y >= 1`. The place is read off the
-/// bits of the float, so the look-up needs no transcendental function and no square root.
+/// With `y = d² / radius²` of the side and `c = 2^-octaves`, places are read off the bits of the float `z = y (1 - c) + c`: each of
+/// the octaves of z from c to 1 holds `2^bits` cells, and the last cell is the constant tail `y >= 1`. So the look-up needs no
+/// transcendental function, no square root, and no case for the first cell, at the edge.
 ///
-/// With `far`, the octave from 1/2 to 1 is cut like that from its other end: `far` octaves of
-/// `1 - y` below 1/2 hold `2^bits` cells each, and one cell is what remains next to 1. It serves
-/// profiles that rise without bound towards the end of their support.
+/// With `far`, the octave of z from 1/2 to 1 is cut like that from its other end: with `C = 2^-(far + 1)`, the `far` octaves
+/// of `(1 - z) (1 - 2 C) + C` below 1/2 hold `2^bits` cells each. It serves profiles that rise without bound towards the end of their
+/// support.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Grid {
     /// Distance outside the face beyond which the profile is constant, in NDC.
     pub(crate) outer: f64,
     /// Distance inside the face beyond which the profile is constant, in NDC.
     pub(crate) inner: f64,
-    /// Octaves of y that are resolved.
+    /// Octaves that are resolved.
     pub(crate) octaves: u32,
-    /// Octaves of 1 - y that are resolved; 0 for none.
+    /// Octaves before the end that are resolved; 0 for none.
     pub(crate) far: u32,
     /// Cells in an octave, as a power of two.
     pub(crate) bits: u32,
@@ -37,10 +37,13 @@ pub(crate) struct Grid {
 impl Grid {
     /// Cells of one side, without its constant tail.
     pub(crate) fn cells(&self) -> usize {
-        match self.far {
-            0 => 1 + ((self.octaves as usize) << self.bits),
-            far => 2 + (((self.octaves - 1 + far) as usize) << self.bits),
-        }
+        let octaves = if self.far == 0 { self.octaves } else { self.octaves - 1 + self.far };
+        (octaves as usize) << self.bits
+    }
+
+    /// Where the places start: `2^-octaves`, and with `far` the same of the other end.
+    fn starts(&self) -> [f64; 2] {
+        [self.octaves, self.far + 1].map(|octaves| f64::exp2(-f64::from(octaves)))
     }
 
     /// Rows of the coefficient table: both sides with their tails, outside first.
@@ -59,26 +62,34 @@ impl Grid {
         let octave = |start: f64| {
             (0..per_octave).map(move |j| start * (1.0 + f64::from(j) / f64::from(per_octave)))
         };
-        let near = (1..=self.octaves).rev().map(|o| f64::exp2(-f64::from(o)));
-        // The last octave is cut from the other end if it is cut at all.
-        let near = near.filter(|&start| self.far == 0 || start < 0.5);
-        let mut knots = vec![0.0];
-        knots.extend(near.flat_map(octave));
-        let far = (2..=self.far + 1).rev().map(|o| f64::exp2(-f64::from(o)));
-        let from_far: Vec<_> = far.flat_map(octave).chain((self.far > 0).then_some(0.5)).collect();
-        knots.extend(from_far.into_iter().rev().map(|z| 1.0 - z));
-        knots.push(1.0);
-        knots
+        let octaves = |first: u32, last: u32| {
+            (last..=first).rev().flat_map(move |o| octave(f64::exp2(-f64::from(o))))
+        };
+        let [start, end] = self.starts();
+        let y = |z: f64| (z - start) / (1.0 - start);
+        if self.far == 0 {
+            return octaves(self.octaves, 1).chain([1.0]).map(y).collect();
+        }
+        let from_far: Vec<f64> = octaves(self.far + 1, 2).chain([0.5]).collect();
+        // Without the digits that 1 - z would lose.
+        let far = from_far.into_iter().rev().map(|v| {
+            let rest = (v - end) / (1.0 - 2.0 * end);
+            1.0 - rest / (1.0 - start)
+        });
+        octaves(self.octaves, 2).map(y).chain(far).collect()
     }
 }
 
 /// A [`Grid`] prepared for look-ups.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lookup<F> {
+    /// From squared distances to z, without its start.
     inverse_outer: F,
     inverse_inner: F,
-    innermost: F,
-    outermost: F,
+    start: F,
+    /// From `1 - z` to what the cells before the end lie in, and the start of that.
+    shrunk: F,
+    end: F,
     octaves: u32,
     far: u32,
     bits: u32,
@@ -87,7 +98,7 @@ pub(crate) struct Lookup<F> {
 
 /// Places of squared distances in a table.
 pub(crate) struct Place<T: Real> {
-    pub(crate) row: <T::Lanes as Lanes>::Index,
+    pub(crate) row: Places,
     /// Places within the cells, in [0, 1].
     pub(crate) t: T,
     /// Rates at which they change with the squared distance.
@@ -95,12 +106,16 @@ pub(crate) struct Place<T: Real> {
 }
 
 impl<F: Float> Lookup<F> {
-    pub(crate) fn new(grid: &Grid) -> Self {
+    /// For distances of which `unit` are one unit of the grid's.
+    pub(crate) fn new(grid: &Grid, unit: f64) -> Self {
+        let [start, end] = grid.starts();
+        let inverse = |radius: f64| F::from_f64((1.0 - start) * (radius * unit).powi(-2));
         Self {
-            inverse_outer: F::from_f64(grid.outer.powi(-2)),
-            inverse_inner: F::from_f64(grid.inner.powi(-2)),
-            innermost: F::from_f64(f64::exp2(f64::from(grid.octaves))),
-            outermost: F::from_f64(f64::exp2(f64::from(grid.far + 1))),
+            inverse_outer: inverse(grid.outer),
+            inverse_inner: inverse(grid.inner),
+            start: F::from_f64(start),
+            shrunk: F::from_f64(1.0 - 2.0 * end),
+            end: F::from_f64(end),
             octaves: grid.octaves,
             far: grid.far,
             bits: grid.bits,
@@ -128,34 +143,28 @@ impl<F: Float> Lookup<F> {
         let inverse =
             pick(inside, T::Lanes::splat(self.inverse_inner), T::Lanes::splat(self.inverse_outer));
         let scaled = distance2.scale(inverse);
-        let y = scaled.value();
-        let (cell, lower, inverse_width) = y.cell(self.octaves, self.bits);
-        let first = T::Lanes::not_positive(cell);
-        let mut row = T::Lanes::limited(cell, self.cells);
-        let start = pick(first, splat(0.0), lower);
-        let mut rate = pick(first, T::Lanes::splat(self.innermost), inverse_width);
-        let mut along = scaled - T::constant(start);
+        let z = scaled.value() + T::Lanes::splat(self.start);
+        let (cell, mut t, mut rate) = z.cell(self.octaves, self.bits);
+        let mut row = cell;
         if FAR && self.far > 0 {
-            let z = (one - y).only(y.less(one));
-            let (cell, lower, inverse_width) = z.cell(self.far + 1, self.bits);
-            let last = T::Lanes::not_positive(cell);
-            let far_rate = pick(last, T::Lanes::splat(self.outermost), inverse_width);
-            // Counted from where the cell starts, 1 - y keeps its digits.
-            let start = pick(last, splat(0.0), lower) + Lanes::recip(far_rate);
-            let far_row =
-                T::Lanes::minus(index(self.cells - 1), T::Lanes::limited(cell, self.cells));
-            let far_row = pick_index(y.less(one), far_row, index(self.cells));
-            let far = splat::<T::Lanes>(0.5).less(y);
+            let half = splat::<T::Lanes>(0.5);
+            let rest = (one - z.min(one)).min(half);
+            let shrunk = T::Lanes::splat(self.shrunk);
+            let rest = rest * shrunk + T::Lanes::splat(self.end);
+            let (cell, place, far_rate) = rest.cell(self.far + 1, self.bits);
+            // Counted from its end; one that starts at the middle is not reached.
+            let last = T::Lanes::minus(index(self.cells - 1), cell);
+            let far = half.less(z);
+            let far_row = pick_index(z.less(one), last, index(self.cells));
             row = pick_index(far, far_row, row);
-            rate = pick(far, far_rate, rate);
-            let from_end = T::constant(start) - (T::constant(one) - scaled);
-            along = T::choose(far, from_end, along);
+            t = pick(far, one - place, t);
+            rate = pick(far, far_rate * shrunk, rate);
         }
-        // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
-        let t = along.scale(rate).masked(y.less(one));
-        let side = pick_index(inside, index(self.cells + 1), index(0));
+        let row = T::Lanes::places(row, self.cells, inside);
+        // In the tail the cubic is constant. A place that does not change keeps overflow out of it.
+        let moves = (scaled.output() * rate).only(z.less(one));
         let rate = (rate * inverse).min(splat(STEEPEST));
-        Place { row: T::Lanes::plus(row, side), t, rate }
+        Place { row, t: T::new(t, moves), rate }
     }
 }
 
@@ -167,12 +176,12 @@ mod tests {
     /// Row and place within the cell of `y` outside.
     fn place<F: Float>(grid: &Grid, y: F) -> (usize, f64) {
         let inside = [false; LANES];
-        let (lookup, y) = (Lookup::new(grid), Plain::splat(y));
+        let (lookup, y) = (Lookup::new(grid, 1.0), Plain::splat(y));
         let place: Place<Plain<F>> = match grid.far {
             0 => lookup.place::<_, false>(y, inside),
             _ => lookup.place::<_, true>(y, inside),
         };
-        (place.row[0] as usize, place.t.array()[0].to_f64())
+        (place.row.numbers::<Plain<F>>()[0], place.t.array()[0].to_f64())
     }
 
     #[test]
@@ -191,8 +200,11 @@ mod tests {
                     continue;
                 }
                 assert!((0.0..=1.0 + 1e-6).contains(&t), "y {y} row {row} t {t}");
-                let wanted = (y - knots[row]) / (knots[row + 1] - knots[row]);
-                assert!((t - wanted).abs() < 2e-4, "y {y} row {row} t {t} instead of {wanted}");
+                let width = knots[row + 1] - knots[row];
+                let wanted = (y - knots[row]) / width;
+                // In units of the float that the place is read from.
+                let rounded = 3e-7 * y.max(1.0 - y).max(1e-4) / width;
+                assert!((t - wanted).abs() < rounded, "y {y} row {row} t {t} instead of {wanted}");
             }
         }
     }
@@ -202,8 +214,11 @@ mod tests {
         let grid = Grid { outer: 1.0, inner: 0.5, octaves: 4, far: 0, bits: 2 };
         let y = Plain::splat(0.3f64);
         let inside =
-            Lookup::new(&grid).place::<_, false>(y.scale(Plain::splat(0.25)), [true; LANES]);
-        assert_eq!(inside.row[0] as usize, place(&grid, 0.3f64).0 + grid.cells() + 1);
+            Lookup::new(&grid, 1.0).place::<_, false>(y.scale(Plain::splat(0.25)), [true; LANES]);
+        assert_eq!(
+            inside.row.numbers::<Plain<f64>>()[0],
+            place(&grid, 0.3f64).0 + grid.cells() + 1
+        );
     }
 
     #[test]
@@ -211,7 +226,7 @@ mod tests {
         for far in [0, 5] {
             let grid = Grid { outer: 1.0, inner: 1.0, octaves: 4, far, bits: 2 };
             for y in [f64::INFINITY, f64::NAN, 1.0, 1e300] {
-                assert_eq!(place(&grid, y), (grid.tail(), 0.0));
+                assert_eq!(place(&grid, y).0, grid.tail());
             }
         }
     }

@@ -2,18 +2,16 @@
 
 use super::{
     float::Float as _,
-    lanes::{GROUP, LANES, Lanes, Places},
-    list::{Chunk, LISTED, List},
+    lanes::{GROUP, Lanes, Places},
+    list::{AHEAD, Chunk, LISTED, List},
     pair::closest,
     real::{Float, Real, Table, splat},
     scene::{Place, Scene},
     table::Place as Cell,
 };
 
-/// Chunks by which adding up follows geometry: while one waits for the table, the arithmetic of the
-/// other goes on.
-const BEHIND: usize = 4;
-/// Chunks between the two, and room for more: a power of two.
+/// Room for chunks whose geometry is known: a power of two. Adding up follows [`AHEAD`] chunks behind: while one waits for the table, the
+/// arithmetic of the other goes on.
 const RING: usize = 8;
 
 /// Chunks whose gradients are added up lane by lane: fewer terms in a row keep more digits.
@@ -47,13 +45,11 @@ fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
     };
     for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
         list.fill(scene, &place, numbers);
-        let slivers = list.faces.iter().any(|faces| faces.slivers);
-        match (scene.lookup.has_far_cells(), slivers) {
-            (false, false) => {
-                walker.take::<IMAGE, GRADIENT, TABLE, false, false>(&list, k * LISTED)
-            }
-            (false, true) => walker.take::<IMAGE, GRADIENT, TABLE, false, true>(&list, k * LISTED),
-            (true, _) => walker.take::<IMAGE, GRADIENT, TABLE, true, true>(&list, k * LISTED),
+        let first = k * LISTED;
+        match (scene.lookup.has_far_cells(), list.slivers) {
+            (false, false) => walker.take::<IMAGE, GRADIENT, TABLE, false, false>(&list, first),
+            (false, true) => walker.take::<IMAGE, GRADIENT, TABLE, false, true>(&list, first),
+            (true, _) => walker.take::<IMAGE, GRADIENT, TABLE, true, true>(&list, first),
         }
     }
     if TABLE {
@@ -76,6 +72,8 @@ struct Walker<'a, 's, T: Real> {
 
 /// Chunks whose geometry is known: closest points, their weights, and their places in the table.
 struct Ring<T: Real> {
+    at: [[u32; 2]; RING],
+    owner: [usize; RING],
     dx: [T; RING],
     dy: [T; RING],
     weights: [[T; 3]; RING],
@@ -100,6 +98,8 @@ impl<T: Real> Walker<'_, '_, T> {
     ) {
         let zero = T::constant(splat(0.0));
         let mut ring = Ring {
+            at: [[0; 2]; RING],
+            owner: [0; RING],
             dx: [zero; RING],
             dy: [zero; RING],
             weights: [[zero; 3]; RING],
@@ -109,23 +109,23 @@ impl<T: Real> Walker<'_, '_, T> {
         };
         let mut sums = [splat::<T::Lanes>(0.0); 6];
         let mut face = usize::MAX;
-        let (chunks, owners) = list.chunks();
-        for ahead in 0..chunks.len() + BEHIND {
-            if ahead < chunks.len() {
-                let owner = owners[ahead] as usize;
-                self.geometry::<GRADIENT, FAR, SLIVERS>(
-                    &mut ring,
-                    ahead % RING,
-                    list,
-                    owner,
-                    &chunks[ahead],
-                );
+        for (ahead, Chunk { places, at, owner }) in list.chunks(AHEAD).enumerate() {
+            let slot = ahead % RING;
+            (ring.at[slot], ring.owner[slot]) = (at, owner);
+            let (px, py) = T::Lanes::pixels(places);
+            let point = closest::<T, SLIVERS>(list.face(owner), px, py);
+            let Cell { row, t, rate } =
+                self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
+            (ring.row[slot], ring.t[slot]) = (row, t);
+            if GRADIENT {
+                (ring.dx[slot], ring.dy[slot]) = (point.dx, point.dy);
+                (ring.weights[slot], ring.rate[slot]) = (point.weights, rate);
             }
-            if ahead < BEHIND {
+            if ahead < AHEAD {
                 continue;
             }
-            let (chunk, owner) = (&chunks[ahead - BEHIND], owners[ahead - BEHIND] as usize);
-            let slot = (ahead - BEHIND) % RING;
+            let slot = (ahead - AHEAD) % RING;
+            let (at, owner) = (ring.at[slot], ring.owner[slot]);
             if GRADIENT && (owner != face || ahead % TOGETHER == 0) {
                 self.corners(list, first, face, &sums);
                 face = owner;
@@ -133,10 +133,10 @@ impl<T: Real> Walker<'_, '_, T> {
             }
             let cubic = T::rows(self.table, &ring.row[slot]);
             if IMAGE {
-                self.value(&ring, slot, cubic, chunk);
+                self.value(&ring, slot, cubic, at);
             }
             if GRADIENT {
-                self.pull::<TABLE>(&ring, slot, cubic, chunk, &mut sums);
+                self.pull::<TABLE>(&ring, slot, cubic, at, &mut sums);
             }
         }
         if GRADIENT {
@@ -144,44 +144,12 @@ impl<T: Real> Walker<'_, '_, T> {
         }
     }
 
-    /// Closest points of a chunk and their places in the table; `GRADIENT` keeps what the gradient
-    /// needs of them.
-    #[inline(always)]
-    fn geometry<const GRADIENT: bool, const FAR: bool, const SLIVERS: bool>(
-        &self,
-        ring: &mut Ring<T>,
-        slot: usize,
-        list: &List<T>,
-        owner: usize,
-        [low, high]: &Chunk<Float<T>>,
-    ) {
-        let face = list.faces[owner / LANES].face(owner % LANES);
-        let centres = |column: u32| self.scene.centres(column);
-        let px = T::Lanes::of_groups(centres(low.column), centres(high.column));
-        let py = T::Lanes::of_halves(low.y, high.y);
-        let point = closest::<T, SLIVERS>(&face, px, py);
-        let Cell { row, t, rate } =
-            self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
-        ring.row[slot] = T::Lanes::places(row, self.table.values.len());
-        ring.t[slot] = t;
-        if GRADIENT {
-            (ring.dx[slot], ring.dy[slot]) = (point.dx, point.dy);
-            (ring.weights[slot], ring.rate[slot]) = (point.weights, rate);
-        }
-    }
-
     /// Adds `profile - tail` to the pixels of a chunk.
     #[inline(always)]
-    fn value(
-        &mut self,
-        ring: &Ring<T>,
-        slot: usize,
-        [a, b, c, d]: [T; 4],
-        [low, high]: &Chunk<Float<T>>,
-    ) {
+    fn value(&mut self, ring: &Ring<T>, slot: usize, [a, b, c, d]: [T; 4], at: [u32; 2]) {
         let t = ring.t[slot];
         let value = a + t * (b + t * (c + t * d)) - self.tail;
-        value.output().add_to_groups(self.image, [low.at, high.at]);
+        value.output().add_to_groups(self.image, at);
     }
 
     /// Adds to the gradient of a face, without its factor -2, and to that of the table.
@@ -191,10 +159,10 @@ impl<T: Real> Walker<'_, '_, T> {
         ring: &Ring<T>,
         slot: usize,
         [_, b, c, d]: [T; 4],
-        [low, high]: &Chunk<Float<T>>,
+        [low, high]: [u32; 2],
         sums: &mut [T::Lanes; 6],
     ) {
-        let upstream = T::Lanes::of_groups(self.group(low.at), self.group(high.at));
+        let upstream = T::Lanes::of_groups(self.group(low), self.group(high));
         let t = ring.t[slot];
         let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
         let pull = slope.scale(ring.rate[slot] * upstream);
@@ -228,12 +196,13 @@ impl<T: Real> Walker<'_, '_, T> {
         if face == usize::MAX {
             return;
         }
-        let order = list.faces[face / LANES].corners(face % LANES);
+        let order = list.face(face).corners();
         let corners = &mut self.gradient.corners[first + face];
-        let factor = Float::<T>::from_f64(-2.0);
+        // From pixels, with y down, to NDC.
+        let [right, down] = [-2.0, 2.0].map(|k| Float::<T>::from_f64(k * self.scene.half));
         for k in 0..3 {
-            corners[2 * order[k]] += sums[2 * k].sum() * factor;
-            corners[2 * order[k] + 1] += sums[2 * k + 1].sum() * factor;
+            corners[2 * order[k]] += sums[2 * k].sum() * right;
+            corners[2 * order[k] + 1] += sums[2 * k + 1].sum() * down;
         }
     }
 }

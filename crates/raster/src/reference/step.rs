@@ -40,16 +40,19 @@ pub fn iou_loss<B: Backend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor
 }
 
 /// [`mse_loss`](crate::mse_loss).
-pub fn mse_loss<B: Backend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
+pub fn mse_loss<B: Backend, const D: usize>(
+    image: Tensor<B, D>,
+    target: Tensor<B, D>,
+) -> Tensor<B, 1> {
     let difference = image - target;
     of_views(difference.clone() * difference, Tensor::mean_dim)
 }
 
-/// One number for each view `[views]` of pixels `[views, height, width]`.
-fn of_views<B: Backend>(
-    pixels: Tensor<B, 3>,
+/// One number for each view `[views]` of pixels `[views, ..]`.
+fn of_views<B: Backend, const D: usize>(
+    pixels: Tensor<B, D>,
     of: impl Fn(Tensor<B, 2>, usize) -> Tensor<B, 2>,
 ) -> Tensor<B, 1> {
-    let [views, height, width] = pixels.dims();
-    of(pixels.reshape([views, height * width]), 1).reshape([views])
+    let views = pixels.dims()[0];
+    of(pixels.flatten(1, D - 1), 1).reshape([views])
 }

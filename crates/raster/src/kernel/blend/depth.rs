@@ -46,7 +46,7 @@ pub(super) enum DepthAt<T: Real> {
 impl<'a, T: Real> DepthLookup<'a, T> {
     pub(super) fn new(grid: DepthGrid, table: Table<'a, T>) -> Self {
         let lookup = match &grid {
-            DepthGrid::Table(grid) => Some(Lookup::new(grid)),
+            DepthGrid::Table(grid) => Some(Lookup::new(grid, 1.0)),
             DepthGrid::Line { .. } => None,
         };
         Self { grid, lookup, table }
@@ -65,7 +65,6 @@ impl<'a, T: Real> DepthLookup<'a, T> {
             (Some(lookup), _) => {
                 let behind = x.value().at_most(zero);
                 let Place { row, t, rate } = lookup.place::<T, true>(x * x, behind);
-                let row = T::Lanes::places(row, self.table.values.len());
                 let [a, b, c, d] = T::rows(self.table, &row);
                 let log = T::constant(zero) - (a + t * (b + t * (c + t * d)));
                 let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));

@@ -11,6 +11,8 @@ mod point;
 mod reach;
 mod walk;
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 pub(crate) use self::{depth::DepthGrid, point::AREA};
@@ -92,7 +94,9 @@ impl<'a, F: float::Float> Inputs<'a, F> {
         let depth = Table { values: values.1, tangents: along.1 };
         let rows = rows_of_bands(self.views);
         let vertices = [self.vertices, tangents[0]];
+        let half = 0.5 * self.size.shorter() as f64;
         Blend {
+            least_area: F::from_f64(AREA * half * half),
             scene: Scene::new(vertices, self.faces, edge, self.edge, self.size, rows),
             attributes: [self.attributes, tangents[1]],
             entries: self.entries,
@@ -120,6 +124,8 @@ struct Blend<'a, T: Real> {
     near: Float<T>,
     per_range: Float<T>,
     floor: Float<T>,
+    /// [`AREA`] in pixels.
+    least_area: Float<T>,
     /// Logarithm of an edge softness from which on it counts.
     counts_from: Float<T>,
     background: [&'a [Float<T>]; 2],
@@ -138,30 +144,46 @@ impl<T: Real> Blend<'_, T> {
     }
 }
 
-/// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share.
-pub(crate) fn forward<F: float::Float>(inputs: &Inputs<F>) -> Vec<F> {
-    let bands = reach::bands(inputs);
+/// What passes over the same inputs share.
+pub(crate) struct Kept<F> {
+    reached: Reached,
+    /// Of each band of each view, what weights are relative to, and their sums, once an image has been drawn; nothing where no pass
+    /// follows that would need them.
+    sums: Vec<OnceLock<[Vec<F>; 2]>>,
+}
+
+impl<F: float::Float> Kept<F> {
+    /// Of these inputs. `sums`: whether those of the image are kept, a number for each channel of each pixel and two more.
+    pub(crate) fn new(inputs: &Inputs<F>, sums: bool) -> Self {
+        let reached = reach::bands(inputs);
+        let count = if sums { reached.bands.views.len() * reached.bands.count } else { 0 };
+        Self { reached, sums: (0..count).map(|_| OnceLock::new()).collect() }
+    }
+}
+
+/// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` is of these inputs.
+pub(crate) fn forward<F: float::Float>(inputs: &Inputs<F>, kept: &Kept<F>) -> Vec<F> {
     let tangents = [&[][..]; 4];
     if has_avx2() {
-        passes::<F::Avx2>(inputs, &inputs.blend(tangents), &bands, None).image()
+        passes::<F::Avx2>(inputs, &inputs.blend(tangents), kept, None).image()
     } else {
-        passes::<Plain<F>>(inputs, &inputs.blend(tangents), &bands, None).image()
+        passes::<Plain<F>>(inputs, &inputs.blend(tangents), kept, None).image()
     }
 }
 
 /// Gradients of `Σ upstream · image` to vertices, attributes, tables and background, as they are wanted, flat and in this order.
 pub(crate) fn vjp<F: float::Float>(
     inputs: &Inputs<F>,
+    kept: &Kept<F>,
     upstream: &[F],
     wanted: [bool; 4],
 ) -> Vec<F> {
-    let bands = reach::bands(inputs);
     let tangents = [&[][..]; 4];
     let pull = Some((upstream, wanted));
     if has_avx2() {
-        passes::<F::Avx2>(inputs, &inputs.blend(tangents), &bands, pull).gradient(wanted)
+        passes::<F::Avx2>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
     } else {
-        passes::<Plain<F>>(inputs, &inputs.blend(tangents), &bands, pull).gradient(wanted)
+        passes::<Plain<F>>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
     }
 }
 
@@ -169,12 +191,12 @@ pub(crate) fn vjp<F: float::Float>(
 /// the upstream, as they are wanted, flat and in this order.
 pub(crate) fn vjp_of_vjp<F: float::Float>(
     inputs: &Inputs<F>,
+    kept: &Kept<F>,
     upstream: &[F],
     direction: &[F],
     along: [bool; 4],
     wanted: [bool; 5],
 ) -> Vec<F> {
-    let bands = reach::bands(inputs);
     let of_inputs = [inputs.vertices, inputs.attributes, inputs.tables, inputs.background];
     let still: [Vec<F>; 4] =
         std::array::from_fn(|k| vec![F::ZERO; if along[k] { 0 } else { of_inputs[k].len() }]);
@@ -191,9 +213,9 @@ pub(crate) fn vjp_of_vjp<F: float::Float>(
     let wanted = [vertices, attributes, tables, background];
     let pull = Some((upstream, wanted));
     let passed = if has_avx2() {
-        passes::<Dual<F::Avx2>>(inputs, &inputs.blend(tangents), &bands, pull)
+        passes::<Dual<F::Avx2>>(inputs, &inputs.blend(tangents), kept, pull)
     } else {
-        passes::<Dual<Plain<F>>>(inputs, &inputs.blend(tangents), &bands, pull)
+        passes::<Dual<Plain<F>>>(inputs, &inputs.blend(tangents), kept, pull)
     };
     let image = if to_upstream { passed.image() } else { Vec::new() };
     let mut gradient = passed.gradient(wanted);
@@ -232,10 +254,11 @@ impl<F: float::Float> Passed<F> {
 fn passes<T: Real>(
     inputs: &Inputs<Float<T>>,
     blend: &Blend<T>,
-    reached: &Reached,
+    kept: &Kept<Float<T>>,
     pull: Option<(&[Float<T>], [bool; 4])>,
 ) -> Passed<Float<T>> {
     let zero = <Float<T> as float::Float>::ZERO;
+    let Kept { reached, sums } = kept;
     let bands = &reached.bands;
     let views = bands.views.len();
     let of_image = (blend.channels + 1) * inputs.size.pixels();
@@ -257,6 +280,7 @@ fn passes<T: Real>(
                         band,
                         logs: &reached.logs[view],
                         least: reached.least,
+                        kept: sums.get(view * bands.count + band),
                         upstream,
                     };
                     run::<T::Lanes, _>(work)
@@ -375,6 +399,7 @@ struct Band<'a, 's, T: Real> {
     logs: &'a [f32],
     /// Logarithm of what may be left out of a pixel of each face, as a part of the weights there.
     least: f64,
+    kept: Option<&'a OnceLock<[Vec<Float<T>>; 2]>>,
     /// `[channels + 1, height, width]`, and what gradients are wanted.
     upstream: Option<(&'a [Float<T>], [bool; 4])>,
 }
@@ -387,10 +412,7 @@ impl<T: Real> Work for Band<'_, '_, T> {
         let blend = self.blend;
         let (scene, channels) = (&blend.scene, blend.channels);
         let length = scene.band_length(self.band);
-        let largest = self.largest(length);
-        let mut sums = Planes::new(1 + channels, length);
-        self.walk(&mut Sums { largest: &largest, sums: &mut sums });
-
+        let [largest, sums] = self.sums(length);
         let upstream = self.upstream.map(|(upstream, _)| self.padded(upstream, length));
         // The image; one over the sum of all weights, and what the upstream makes of the image; what each channel of the background gets.
         let mut image = Planes::new(channels + 1, length);
@@ -445,6 +467,25 @@ impl<T: Real> Band<'_, '_, T> {
     fn walk<V: Visitor<T>>(&self, visitor: &mut V) {
         let place = self.blend.scene.place(self.of_view, self.view, self.views, self.band);
         Walk { blend: self.blend, place, view: self.view, logs: self.logs, visitor }.run();
+    }
+
+    /// What weights are relative to, and their sums: the weights, then a plane for each channel.
+    #[inline(always)]
+    fn sums(&self, length: usize) -> [Planes<T>; 2] {
+        // Those that are kept have no tangents.
+        let kept = self.kept.filter(|_| !T::DUAL);
+        if let Some(planes) = kept.and_then(OnceLock::get) {
+            let [largest, sums] = planes;
+            return [Planes::of(largest, length), Planes::of(sums, length)];
+        }
+        let largest = self.largest(length);
+        let mut sums = Planes::new(1 + self.blend.channels, length);
+        self.walk(&mut Sums { largest: &largest, sums: &mut sums });
+        if let Some(kept) = kept {
+            // Another walk may have been as quick; its sums are the same.
+            let _ = kept.set([largest.values().to_vec(), sums.values().to_vec()]);
+        }
+        [largest, sums]
     }
 
     /// Logarithms that weights are relative to: none is so much larger or smaller than that of a pixel's sum that it could not be told.

@@ -21,6 +21,20 @@ impl<T: Real> Planes<T> {
         Self { values: zeros(true), tangents: zeros(T::DUAL), length }
     }
 
+    /// Planes without tangents, for a band of this length.
+    pub(super) fn of(values: &[Float<T>], length: usize) -> Self {
+        Self {
+            values: values.to_vec(),
+            tangents: Vec::new(),
+            length: length.next_multiple_of(LANES),
+        }
+    }
+
+    /// All values, plane by plane.
+    pub(super) fn values(&self) -> &[Float<T>] {
+        &self.values
+    }
+
     /// Vectors in a plane.
     pub(super) fn vectors(&self) -> usize {
         self.length / LANES

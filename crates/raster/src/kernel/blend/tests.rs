@@ -55,10 +55,15 @@ fn passes<F: float::Float>(views: usize, log_weight: f64, floor: f64, line: bool
     let upstream = numbers(views * (CHANNELS + 1) * size.pixels(), 0.3);
     let lengths = [&vertices, &attributes, &tables].map(Vec::len);
     let direction = numbers(lengths.iter().sum::<usize>() + background.len(), 2.3);
-    let mut all = forward(&inputs);
-    all.extend(vjp(&inputs, &upstream, [true; 4]));
-    all.extend(vjp(&inputs, &upstream, [true, false, false, false]));
-    all.extend(vjp_of_vjp(&inputs, &upstream, &direction, [true; 4], [true; 5]));
+    let kept = &Kept::new(&inputs, false);
+    let mut all = forward(&inputs, kept);
+    all.extend(vjp(&inputs, kept, &upstream, [true; 4]));
+    all.extend(vjp(&inputs, kept, &upstream, [true, false, false, false]));
+    all.extend(vjp_of_vjp(&inputs, kept, &upstream, &direction, [true; 4], [true; 5]));
+    // The sums of an image serve the gradient as well.
+    let kept = &Kept::new(&inputs, true);
+    let again = [forward(&inputs, kept), vjp(&inputs, kept, &upstream, [true; 4])].concat();
+    assert!(format!("{again:?}") == format!("{:?}", &all[..again.len()]));
     all
 }
 

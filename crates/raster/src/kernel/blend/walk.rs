@@ -7,15 +7,15 @@ use super::{
     Blend,
     depth::{DepthAt, pull_row},
     planes::Planes,
-    point::Point,
+    point::{Barycentric, Point},
 };
 use crate::kernel::{
     face::Face,
     float::Float as _,
-    lanes::{LANES, Lanes, Places, Work},
-    list::{LISTED, List},
+    lanes::{Lanes, Places, Work},
+    list::{Chunk, LISTED, List},
     real::{Float, Real, splat},
-    scene::Place,
+    scene::{Place, Scene},
     table,
 };
 
@@ -26,8 +26,9 @@ pub(super) const OF_CORNERS: usize = 9;
 const HIDDEN: f64 = -1e30;
 
 /// A face of a band, in all lanes.
-pub(super) struct Shown<T: Real> {
-    face: Face<T>,
+pub(super) struct Shown<'a, T: Real> {
+    face: Face<'a, T>,
+    planes: Barycentric<T>,
     /// The corners as they were given, by their places here.
     order: [usize; 3],
     /// One over the depth of each corner.
@@ -66,8 +67,8 @@ pub(super) trait Visitor<T: Real> {
     fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]);
 
     /// Has taken all pairs, or some of the last, of face `index` of the band.
-    fn face(&mut self, index: usize, shown: &Shown<T>) {
-        let _ = (index, shown);
+    fn face(&mut self, scene: &Scene<T>, index: usize, shown: &Shown<T>) {
+        let _ = (scene, index, shown);
     }
 }
 
@@ -86,33 +87,28 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
 
     #[inline(always)]
     fn run(self) {
-        let scene = &self.blend.scene;
+        let (blend, place) = (self.blend, self.place);
         let mut list = List::new();
-        let numbers = self.place.view.faces(self.place.band);
-        for (k, numbers) in numbers.chunks(LISTED).enumerate() {
-            list.fill(scene, &self.place, numbers);
-            let (chunks, owners) = list.chunks();
+        for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
+            list.fill(&blend.scene, &place, numbers);
             let mut shown: Option<(usize, Shown<T>)> = None;
-            for (chunk, &owner) in chunks.iter().zip(owners) {
-                let owner = owner as usize;
+            for Chunk { places, at, owner } in list.chunks(0) {
                 if shown.as_ref().is_none_or(|&(face, _)| face != owner) {
                     if let Some((face, shown)) = &shown {
-                        self.visitor.face(k * LISTED + face, shown);
+                        self.visitor.face(&blend.scene, k * LISTED + face, shown);
                     }
                     shown = Some((owner, self.shown(&list, owner, numbers[owner])));
                 }
                 let Some((_, shown)) = &shown else { continue };
-                let [low, high] = chunk;
-                if self.visitor.skips(shown, [low.at, high.at]) {
+                if self.visitor.skips(shown, at) {
                     continue;
                 }
-                let px = T::Lanes::of_groups(scene.centres(low.column), scene.centres(high.column));
-                let py = T::Lanes::of_halves(low.y, high.y);
-                let pair = self.blend.pair(&self.place, shown, px, py);
-                self.visitor.pair(self.blend, shown, &pair, [low.at, high.at]);
+                let (px, py) = T::Lanes::pixels(places);
+                let pair = blend.pair(&place, shown, px, py);
+                self.visitor.pair(blend, shown, &pair, at);
             }
             if let Some((face, shown)) = &shown {
-                self.visitor.face(k * LISTED + face, shown);
+                self.visitor.face(&blend.scene, k * LISTED + face, shown);
             }
         }
     }
@@ -121,9 +117,9 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
 impl<T: Real, V> Walk<'_, '_, T, V> {
     /// Face `owner` of a list, whose number in the scene is given too.
     #[inline(always)]
-    fn shown(&self, list: &List<T>, owner: usize, number: u32) -> Shown<T> {
-        let faces = &list.faces[owner / LANES];
-        let order = faces.corners(owner % LANES);
+    fn shown<'l>(&self, list: &'l List<T>, owner: usize, number: u32) -> Shown<'l, T> {
+        let face = list.face(owner);
+        let order = face.corners();
         let (blend, place) = (self.blend, &self.place);
         let (corners, entries) =
             (blend.scene.faces[number as usize], blend.entries[number as usize]);
@@ -142,7 +138,8 @@ impl<T: Real, V> Walk<'_, '_, T, V> {
             }
         }
         let log = splat(f64::from(self.logs[number as usize]));
-        Shown { face: faces.face(owner % LANES), order, per_depth, attributes, log }
+        let planes = Barycentric::new(face, blend.least_area);
+        Shown { face, planes, order, per_depth, attributes, log }
     }
 }
 
@@ -154,10 +151,10 @@ pub(super) fn everywhere<T: Real>(values: &[Float<T>], tangents: &[Float<T>], at
 }
 
 impl<T: Real> Blend<'_, T> {
-    /// What a face is to the pixels at `px`, `py` (NDC).
+    /// What a face is to the pixels at `px`, `py`, from its origin.
     #[inline(always)]
     fn pair(&self, place: &Place<T>, shown: &Shown<T>, px: T::Lanes, py: T::Lanes) -> Pair<T> {
-        let point = Point::new(&shown.face, px, py);
+        let point = Point::new(shown.face, &shown.planes, px, py);
         // 1 / z is what interpolates linearly on the screen.
         let [r0, r1, r2] = shown.per_depth;
         let [l0, l1, l2] = point.barycentric;
@@ -168,10 +165,9 @@ impl<T: Real> Blend<'_, T> {
         // The table is that of the mirrored softness, so that its inner side is outside the face.
         let pick = <T::Lanes as Lanes>::pick;
         let zero = splat::<T::Lanes>(0.0);
-        let outside = zero.less(pick(point.inside, zero, splat(1.0)));
-        let table::Place { row, t, rate } =
-            self.scene.lookup.place::<T, true>(point.distance2, outside);
-        let edge_row = T::Lanes::places(row, place.table.values.len());
+        let outside = zero.less(pick(point.closest.inside, zero, splat(1.0)));
+        let table::Place { row: edge_row, t, rate } =
+            self.scene.lookup.place::<T, true>(point.closest.distance2, outside);
         let [a, b, c, d] = T::rows(place.table, &edge_row);
         let log_edge = T::constant(zero) - (a + t * (b + t * (c + t * d)));
         let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
@@ -303,7 +299,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
         }
         let [r0, r1, r2] = shown.per_depth;
         let by_barycentric = [by_part[0] * r0, by_part[1] * r1, by_part[2] * r2];
-        let moved = pair.point.pulled(&shown.face, by_edge * pair.edge_slope, by_barycentric);
+        let moved = pair.point.pulled(&shown.planes, by_edge * pair.edge_slope, by_barycentric);
         for k in 0..6 {
             self.corners[k] += moved[k].output();
         }
@@ -320,12 +316,14 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
     }
 
     #[inline(always)]
-    fn face(&mut self, index: usize, shown: &Shown<T>) {
+    fn face(&mut self, scene: &Scene<T>, index: usize, shown: &Shown<T>) {
+        // From pixels, with y down, to NDC.
+        let [right, down] = [scene.half, -scene.half].map(Float::<T>::from_f64);
         let own = &mut self.faces[index * self.stride..(index + 1) * self.stride];
         for k in 0..3 {
             let corner = shown.order[k];
-            own[2 * corner] += self.corners[2 * k].sum();
-            own[2 * corner + 1] += self.corners[2 * k + 1].sum();
+            own[2 * corner] += self.corners[2 * k].sum() * right;
+            own[2 * corner + 1] += self.corners[2 * k + 1].sum() * down;
             own[6 + corner] += self.corners[6 + k].sum();
             for (channel, sums) in self.attributes.iter_mut().enumerate() {
                 own[OF_CORNERS + 3 * channel + corner] += sums[k].sum();

@@ -11,6 +11,11 @@ use std::{
 
 use super::{GROUP, LANES, Lanes, Places};
 
+/// Bytes of a row of a table, as a power of two.
+const ROW: i32 = 4;
+/// Cells of a side of a table whose places in bytes fit 31 bits.
+const MOST_CELLS: i32 = 1 << 25;
+
 /// Eight `f32`.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
@@ -46,6 +51,7 @@ impl Lanes for F32x8 {
     type Float = f32;
     type Mask = __m256;
     type Index = __m256i;
+    type Which = __m256i;
     const NEEDS_AVX2: bool = true;
     const GAINS_AVX2: bool = true;
 
@@ -69,11 +75,6 @@ impl Lanes for F32x8 {
     #[inline(always)]
     fn of_groups(low: &[f32; GROUP], high: &[f32; GROUP]) -> Self {
         Self(unsafe { _mm256_set_m128(_mm_loadu_ps(high.as_ptr()), _mm_loadu_ps(low.as_ptr())) })
-    }
-
-    #[inline(always)]
-    fn of_halves(low: f32, high: f32) -> Self {
-        Self(unsafe { _mm256_set_m128(_mm_set1_ps(high), _mm_set1_ps(low)) })
     }
 
     #[inline(always)]
@@ -132,6 +133,52 @@ impl Lanes for F32x8 {
     }
 
     #[inline(always)]
+    fn which(second: __m256, third: __m256) -> __m256i {
+        unsafe {
+            let second = _mm256_and_si256(_mm256_castps_si256(second), _mm256_set1_epi32(1));
+            let third = _mm256_and_si256(_mm256_castps_si256(third), _mm256_set1_epi32(2));
+            _mm256_max_epi32(second, third)
+        }
+    }
+
+    #[inline(always)]
+    fn where_each(second: __m256, third: __m256) -> [__m256; 3] {
+        unsafe {
+            let either = _mm256_or_ps(second, third);
+            let all = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            [_mm256_andnot_ps(either, all), _mm256_andnot_ps(third, second), third]
+        }
+    }
+
+    #[inline(always)]
+    fn chosen(numbers: &[f32; 4], which: __m256i) -> Self {
+        unsafe {
+            let numbers = _mm_loadu_ps(numbers.as_ptr());
+            Self(_mm256_permutevar_ps(_mm256_set_m128(numbers, numbers), which))
+        }
+    }
+
+    #[inline(always)]
+    fn to_rows([a, b, c]: [Self; 3], to: &mut [[f32; 4]; LANES]) {
+        unsafe {
+            let [p, q, r, s] = transposed([a.0, b.0, c.0, _mm256_setzero_ps()]);
+            _mm_storeu_ps(to[0].as_mut_ptr(), _mm256_castps256_ps128(p));
+            _mm_storeu_ps(to[1].as_mut_ptr(), _mm256_castps256_ps128(q));
+            _mm_storeu_ps(to[2].as_mut_ptr(), _mm256_castps256_ps128(r));
+            _mm_storeu_ps(to[3].as_mut_ptr(), _mm256_castps256_ps128(s));
+            _mm_storeu_ps(to[4].as_mut_ptr(), _mm256_extractf128_ps::<1>(p));
+            _mm_storeu_ps(to[5].as_mut_ptr(), _mm256_extractf128_ps::<1>(q));
+            _mm_storeu_ps(to[6].as_mut_ptr(), _mm256_extractf128_ps::<1>(r));
+            _mm_storeu_ps(to[7].as_mut_ptr(), _mm256_extractf128_ps::<1>(s));
+        }
+    }
+
+    #[inline(always)]
+    fn bits(mask: __m256) -> u32 {
+        unsafe { _mm256_movemask_ps(mask) as u32 }
+    }
+
+    #[inline(always)]
     fn sum(self) -> f32 {
         unsafe {
             let four =
@@ -142,25 +189,61 @@ impl Lanes for F32x8 {
     }
 
     #[inline(always)]
-    fn nearest(self) -> [i32; LANES] {
-        let mut whole = [0; LANES];
-        // SAFETY: the array holds a whole vector; it need not be aligned.
-        unsafe { _mm256_storeu_si256(whole.as_mut_ptr().cast(), _mm256_cvtps_epi32(self.0)) };
-        whole
+    fn nearest(self) -> __m256i {
+        unsafe { _mm256_cvtps_epi32(self.0) }
+    }
+
+    #[inline(always)]
+    fn rounded(self) -> Self {
+        Self(unsafe {
+            _mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)
+        })
+    }
+
+    #[inline(always)]
+    fn pack(keep: __m256, [a, b]: [__m256i; 2], [to_a, to_b]: [&mut [u32; LANES]; 2]) -> usize {
+        unsafe {
+            let mask = _mm256_movemask_ps(keep) as usize;
+            let order = _mm256_cvtepu8_epi32(_mm_loadu_si64(KEPT[mask].as_ptr()));
+            let (a, b) =
+                (_mm256_permutevar8x32_epi32(a, order), _mm256_permutevar8x32_epi32(b, order));
+            _mm256_storeu_si256(to_a.as_mut_ptr().cast(), a);
+            _mm256_storeu_si256(to_b.as_mut_ptr().cast(), b);
+            COUNT[mask] as usize
+        }
+    }
+
+    #[inline(always)]
+    fn pixels(places: &[u32; 2]) -> (Self, Self) {
+        unsafe {
+            let both = _mm_loadu_si64(places.as_ptr().cast());
+            let both = _mm256_permutevar8x32_epi32(
+                _mm256_castsi128_si256(both),
+                _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1),
+            );
+            let columns = _mm256_and_si256(both, _mm256_set1_epi32(0x00ff_ffff));
+            let columns = _mm256_add_epi32(columns, _mm256_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3));
+            let rows = _mm256_srli_epi32::<24>(both);
+            (Self(_mm256_cvtepi32_ps(columns)), Self(_mm256_cvtepi32_ps(rows)))
+        }
     }
 
     #[inline(always)]
     fn cell(self, octaves: u32, bits: u32) -> (__m256i, Self, Self) {
         unsafe {
             let raw = _mm256_castps_si256(self.0);
-            let shift = _mm_cvtsi32_si128(23 - bits as i32);
-            let cells = _mm256_srl_epi32(raw, shift);
-            let lower = _mm256_castsi256_ps(_mm256_sll_epi32(cells, shift));
-            let first = ((127 - octaves as i32) << bits) - 1;
+            // Shifts by a number for each lane are one instruction inside, those by one number for all two.
+            let cells = _mm256_srlv_epi32(raw, _mm256_set1_epi32(23 - bits as i32));
+            let first = (127 - octaves as i32) << bits;
             let index = _mm256_sub_epi32(cells, _mm256_set1_epi32(first));
+            let one = _mm256_castps_si256(_mm256_set1_ps(1.0));
+            let rest = _mm256_sllv_epi32(raw, _mm256_set1_epi32(bits as i32));
+            let rest = _mm256_and_si256(rest, _mm256_set1_epi32(0x007f_ffff));
+            let above = _mm256_castsi256_ps(_mm256_or_si256(rest, one));
             let exponent = _mm256_srli_epi32::<23>(raw);
             let inverse = _mm256_sub_epi32(_mm256_set1_epi32(254 + bits as i32), exponent);
-            (index, Self(lower), Self(_mm256_castsi256_ps(_mm256_slli_epi32::<23>(inverse))))
+            let inverse = _mm256_castsi256_ps(_mm256_slli_epi32::<23>(inverse));
+            (index, Self(_mm256_sub_ps(above, _mm256_set1_ps(1.0))), Self(inverse))
         }
     }
 
@@ -170,16 +253,15 @@ impl Lanes for F32x8 {
     }
 
     #[inline(always)]
-    fn not_positive(index: __m256i) -> __m256 {
-        unsafe { _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(1), index)) }
+    fn indices(values: &[i32; LANES]) -> __m256i {
+        unsafe { _mm256_loadu_si256(values.as_ptr().cast()) }
     }
 
     #[inline(always)]
-    fn limited(index: __m256i, most: i32) -> __m256i {
-        unsafe {
-            let least = _mm256_max_epi32(index, _mm256_setzero_si256());
-            _mm256_min_epi32(least, _mm256_set1_epi32(most))
-        }
+    fn index_array(index: __m256i) -> [i32; LANES] {
+        let mut values = [0; LANES];
+        unsafe { _mm256_storeu_si256(values.as_mut_ptr().cast(), index) };
+        values
     }
 
     #[inline(always)]
@@ -198,15 +280,18 @@ impl Lanes for F32x8 {
     }
 
     #[inline(always)]
-    fn places(index: __m256i, rows: usize) -> Places {
-        assert!(rows > 0, "a table has rows");
+    fn places(cell: __m256i, cells: i32, second: __m256) -> Places {
+        assert!((0..MOST_CELLS).contains(&cells), "a table of {cells} cells");
         let mut at = [0; LANES];
         // SAFETY: the array holds a whole vector; it need not be aligned.
         unsafe {
-            let last = _mm256_set1_epi32((rows - 1) as i32);
-            _mm256_storeu_si256(at.as_mut_ptr().cast(), _mm256_min_epu32(index, last));
+            let cell = _mm256_min_epu32(cell, _mm256_set1_epi32(cells));
+            let side = _mm256_set1_epi32((cells + 1) << ROW);
+            let side = _mm256_and_si256(_mm256_castps_si256(second), side);
+            let bytes = _mm256_add_epi32(_mm256_slli_epi32::<ROW>(cell), side);
+            _mm256_storeu_si256(at.as_mut_ptr().cast(), bytes);
         }
-        Places { at, rows }
+        Places { at, rows: 2 * (cells as usize + 1) }
     }
 
     #[inline(always)]
@@ -242,6 +327,35 @@ impl Lanes for F32x8 {
     }
 }
 
+/// For each mask, the lanes where it holds, in ascending order.
+static KEPT: [[u8; LANES]; 256] = {
+    let mut all = [[0; LANES]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < LANES {
+            if mask >> lane & 1 == 1 {
+                all[mask][count] = lane as u8;
+                count += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    all
+};
+
+/// How many lanes those are.
+static COUNT: [u8; 256] = {
+    let mut all = [0; 256];
+    let mut mask = 0usize;
+    while mask < 256 {
+        all[mask] = mask.count_ones() as u8;
+        mask += 1;
+    }
+    all
+};
+
 /// The row of lane `k` in the lower half and that of lane `k + 4` in the upper one.
 ///
 /// # Safety
@@ -252,8 +366,9 @@ unsafe fn pair_of_rows(table: &[[f32; 4]], places: &Places, k: usize) -> __m256 
     let [low, high] = [places.at[k], places.at[k + GROUP]];
     // SAFETY: the caller has checked both places.
     unsafe {
-        let low = _mm_loadu_ps(table.get_unchecked(low as usize).as_ptr());
-        let high = _mm_loadu_ps(table.get_unchecked(high as usize).as_ptr());
+        let first = table.as_ptr().cast::<f32>();
+        let low = _mm_loadu_ps(first.byte_add(low as usize));
+        let high = _mm_loadu_ps(first.byte_add(high as usize));
         _mm256_set_m128(high, low)
     }
 }
@@ -267,7 +382,7 @@ unsafe fn pair_of_rows(table: &[[f32; 4]], places: &Places, k: usize) -> __m256 
 unsafe fn add_to_row(table: &mut [[f32; 4]], at: u32, numbers: __m128) {
     // SAFETY: the caller has checked the place.
     unsafe {
-        let row = table.get_unchecked_mut(at as usize).as_mut_ptr();
+        let row = table.as_mut_ptr().cast::<f32>().byte_add(at as usize);
         _mm_storeu_ps(row, _mm_add_ps(_mm_loadu_ps(row), numbers));
     }
 }

@@ -31,12 +31,13 @@ fn passes<F: Float>(size: [usize; 2], views: usize, tables: usize, far: u32) -> 
         Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, views };
     let upstream = numbers(views * size.pixels(), 0.3);
     let direction = numbers(vertices.len() + table.len(), 2.3);
-    let mut all = forward(&inputs);
-    all.extend(vjp(&inputs, &upstream, [true, false]));
-    all.extend(vjp(&inputs, &upstream, [true; 2]));
-    all.extend(vjp_of_vjp(&inputs, &upstream, &direction, [true; 2], [true; 3]));
+    let bands = &inputs.bands();
+    let mut all = forward(&inputs, bands);
+    all.extend(vjp(&inputs, bands, &upstream, [true, false]));
+    all.extend(vjp(&inputs, bands, &upstream, [true; 2]));
+    all.extend(vjp_of_vjp(&inputs, bands, &upstream, &direction, [true; 2], [true; 3]));
     let along = &direction[..vertices.len()];
-    all.extend(vjp_of_vjp(&inputs, &upstream, along, [true, false], [true, false, true]));
+    all.extend(vjp_of_vjp(&inputs, bands, &upstream, along, [true, false], [true, false, true]));
     all
 }
 

@@ -1,0 +1,130 @@
+//! What is wrong with a picture, beside what [`mse_loss`](crate::mse_loss) and [`iou_loss`](crate::iou_loss) say of it.
+
+use burn::tensor::{Tensor, TensorData, backend::Backend};
+
+/// Pixels across the window of [`ssim_loss`], and the width of the Gauss curve in it.
+const WINDOW: usize = 11;
+const SIGMA: f64 = 1.5;
+/// What keeps its ratios defined where a window is all of one value, for values from 0 to 1.
+const STABLE: [f64; 2] = [0.01 * 0.01, 0.03 * 0.03];
+
+/// Mean absolute difference of each view: `[views, ..]` twice to `[views]`. The derivative where both are the same is 0.
+pub fn l1_loss<B: Backend, const D: usize>(
+    image: Tensor<B, D>,
+    target: Tensor<B, D>,
+) -> Tensor<B, 1> {
+    of_views((image - target).abs())
+}
+
+/// The mean over the pixels of each view of `d² / 2` where a difference d is at most `delta`, and `delta (|d| - delta / 2)` beyond:
+/// `[views, ..]` twice to `[views]`. So single pixels that do not fit pull no harder than `delta`.
+///
+/// Source: Huber, "Robust estimation of a location parameter", 1964.
+///
+/// # Panics
+///
+/// If `delta` is not positive.
+pub fn huber_loss<B: Backend, const D: usize>(
+    image: Tensor<B, D>,
+    target: Tensor<B, D>,
+    delta: f64,
+) -> Tensor<B, 1> {
+    assert!(delta > 0.0, "a delta of {delta} is not positive");
+    let size = (image - target).abs();
+    let near = size.clone().clamp_max(delta);
+    of_views(near.clone() * (size - near * 0.5))
+}
+
+/// 1 less the mean structural similarity of each view: `[views, channels, height, width]` twice, values from 0 to 1, to `[views]`, from 0
+/// for the same picture to 2. Windows are 11 x 11 pixels under a Gauss curve of 1.5 pixels, and none reaches beyond the picture.
+///
+/// Source: Wang et al., "Image quality assessment: from error visibility to structural similarity", 2004.
+///
+/// # Panics
+///
+/// If the pictures differ in size, or are smaller than a window.
+pub fn ssim_loss<B: Backend>(image: Tensor<B, 4>, target: Tensor<B, 4>) -> Tensor<B, 1> {
+    let [_, channels, height, width] = image.dims();
+    assert_eq!(target.dims()[1..], [channels, height, width], "pictures differ in size");
+    assert!(
+        height.min(width) >= WINDOW,
+        "a picture of {height} x {width} is smaller than a window of {WINDOW} x {WINDOW}"
+    );
+    let (down, across) = (window(height, &image), window(width, &image));
+    let mean = |picture: Tensor<B, 4>| along(along(picture, &across).swap_dims(2, 3), &down);
+    let (a, b) = (mean(image.clone()), mean(target.clone()));
+    let (aa, bb, ab) = (a.clone() * a.clone(), b.clone() * b.clone(), a.clone() * b.clone());
+    let spread = mean(image.clone() * image.clone()) - aa.clone();
+    let other = mean(target.clone() * target.clone()) - bb.clone();
+    let both = mean(image * target) - ab.clone();
+    let [level, contrast] = STABLE;
+    let above = (ab * 2.0 + level) * (both * 2.0 + contrast);
+    // Rounding leaves a variance no lower than -1e-7, which the constants make up for.
+    let below = (aa + bb + level) * (spread + other + contrast);
+    of_views(above * below.recip()).neg() + 1.0
+}
+
+/// The mean over `levels` of `loss`, of pictures `[views, channels, height, width]` as they are, of half the size, of a quarter and so on.
+/// Wide differences then count at every level, so that a picture is drawn towards a target that it does not overlap.
+///
+/// # Panics
+///
+/// If there are no levels, or the sides cannot be halved so often.
+pub fn multi_scale_loss<B: Backend>(
+    image: Tensor<B, 4>,
+    target: Tensor<B, 4>,
+    levels: usize,
+    loss: impl Fn(Tensor<B, 4>, Tensor<B, 4>) -> Tensor<B, 1>,
+) -> Tensor<B, 1> {
+    assert!(levels > 0, "a loss needs at least one level");
+    let mut total = loss(image.clone(), target.clone());
+    let mut pictures = [image, target];
+    for _ in 1..levels {
+        pictures = pictures.map(halved);
+        let [image, target] = pictures.clone();
+        total = total + loss(image, target);
+    }
+    total * (levels as f64).recip()
+}
+
+/// Means of blocks of 2 x 2 pixels.
+fn halved<B: Backend>(picture: Tensor<B, 4>) -> Tensor<B, 4> {
+    let [views, channels, height, width] = picture.dims();
+    assert!(
+        height.is_multiple_of(2) && width.is_multiple_of(2),
+        "a picture of {height} x {width} cannot be halved"
+    );
+    let blocks = picture.reshape([views * channels, height / 2, 2, width / 2, 2]);
+    blocks.mean_dim(4).mean_dim(2).reshape([views, channels, height / 2, width / 2])
+}
+
+/// Means over windows along the last axis.
+fn along<B: Backend>(picture: Tensor<B, 4>, window: &Tensor<B, 2>) -> Tensor<B, 4> {
+    let [views, channels, rows, length] = picture.dims();
+    let [_, places] = window.dims();
+    let flat = picture.reshape([views * channels * rows, length]);
+    flat.matmul(window.clone()).reshape([views, channels, rows, places])
+}
+
+/// Windows at all places of an axis of this `length`, in the float type of a picture: `[length, places]`.
+fn window<B: Backend>(length: usize, like: &Tensor<B, 4>) -> Tensor<B, 2> {
+    let middle = (WINDOW - 1) as f64 / 2.0;
+    let curve = |k: usize| (-0.5 * ((k as f64 - middle) / SIGMA).powi(2)).exp();
+    let total: f64 = (0..WINDOW).map(curve).sum();
+    let places = length + 1 - WINDOW;
+    let mut columns = vec![0.0; length * places];
+    for place in 0..places {
+        for k in 0..WINDOW {
+            columns[(place + k) * places + place] = curve(k) / total;
+        }
+    }
+    let data = TensorData::new(columns, [length, places]);
+    Tensor::from_data(data, (&like.device(), like.dtype()))
+}
+
+/// The mean of each view.
+fn of_views<B: Backend, const D: usize>(pixels: Tensor<B, D>) -> Tensor<B, 1> {
+    let views = pixels.dims()[0];
+    let flat: Tensor<B, 2> = pixels.flatten(1, D - 1);
+    flat.mean_dim(1).reshape([views])
+}
