@@ -10,7 +10,7 @@
 //! tolerance, so that both visit the same pairs; the last column is the step at the default scale, where near faces reach farther.
 
 mod machine;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the other benchmark uses the rest")]
 mod workload;
 
 use std::{hint::black_box, time::Instant};

@@ -297,7 +297,7 @@ impl Lanes for F32x8 {
     #[inline(always)]
     fn rows(table: &[[f32; 4]], places: &Places) -> [Self; 4] {
         assert!(places.rows <= table.len(), "places of another table");
-        // SAFETY: every place is below `places.rows`, so the table has that row.
+        // SAFETY: every place is the first byte of a row below `places.rows`, or less, so the table has all that is read.
         unsafe {
             let [a, b, c, d] = transposed([
                 pair_of_rows(table, places, 0),
@@ -312,7 +312,7 @@ impl Lanes for F32x8 {
     #[inline(always)]
     fn add_to_rows(table: &mut [[f32; 4]], places: &Places, [a, b, c, d]: [Self; 4]) {
         assert!(places.rows <= table.len(), "places of another table");
-        // SAFETY: every place is below `places.rows`, so the table has that row.
+        // SAFETY: every place is the first byte of a row below `places.rows`, or less, so the table has all that is read.
         unsafe {
             let [a, b, c, d] = transposed([a.0, b.0, c.0, d.0]);
             add_to_row(table, places.at[0], _mm256_castps256_ps128(a));
@@ -360,7 +360,7 @@ static COUNT: [u8; 256] = {
 ///
 /// # Safety
 ///
-/// The table must have both rows, and `k` be below 4.
+/// Sixteen bytes from both places on must lie in the table, and `k` be below 4.
 #[inline(always)]
 unsafe fn pair_of_rows(table: &[[f32; 4]], places: &Places, k: usize) -> __m256 {
     let [low, high] = [places.at[k], places.at[k + GROUP]];
@@ -377,7 +377,7 @@ unsafe fn pair_of_rows(table: &[[f32; 4]], places: &Places, k: usize) -> __m256 
 ///
 /// # Safety
 ///
-/// The table must have the row.
+/// Sixteen bytes from that place on must lie in the table.
 #[inline(always)]
 unsafe fn add_to_row(table: &mut [[f32; 4]], at: u32, numbers: __m128) {
     // SAFETY: the caller has checked the place.
