@@ -2,7 +2,7 @@ use std::{path::Path, sync::Arc};
 
 use anyhow::{Context, ensure};
 use burn::tensor::{Tensor, backend::Backend};
-use image::{DynamicImage, GrayImage, Luma, LumaA};
+use image::{DynamicImage, GrayImage, Luma, LumaA, Rgba};
 use softrast_raster::ImageSize;
 use softrast_softness::{numbers, tensor_on};
 
@@ -38,6 +38,19 @@ impl Picture {
     pub fn load_luminance(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let level = |p: &LumaA<u16>| f32::from(p.0[0]) / FULL * (f32::from(p.0[1]) / FULL);
         Ok(Self::of(&open(path.as_ref())?, level))
+    }
+
+    /// Red, green and blue of a picture file, as its numbers are; what is transparent is black.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or no picture.
+    pub fn load_colours(path: impl AsRef<Path>) -> anyhow::Result<[Self; 3]> {
+        let picture = open(path.as_ref())?;
+        let (width, pixels) = (picture.width() as usize, picture.to_rgba16());
+        let level = |p: &Rgba<u16>, k: usize| f32::from(p.0[k]) / FULL * (f32::from(p.0[3]) / FULL);
+        let of = |k| pixels.pixels().map(|p| level(p, k)).collect();
+        Ok([0, 1, 2].map(|k| Self { levels: of(k), width }))
     }
 
     /// Height and width in pixels.
@@ -351,5 +364,21 @@ mod tests {
     fn transparent_is_black() {
         let picture = image::GrayAlphaImage::from_pixel(1, 1, LumaA([255, 0]));
         assert_close(&luminance_of(picture, 1), &[0.0]);
+    }
+
+    #[test]
+    fn colours_are_three_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let colours = [[255, 51, 0, 255], [255, 255, 102, 0]];
+        image::RgbaImage::from_fn(2, 1, |x, _| Rgba(colours[x as usize])).save(&path).unwrap();
+        let channels = Picture::load_colours(&path).unwrap();
+        let expected = [[1.0, 0.0], [0.2, 0.0], [0.0, 0.0]];
+        for (channel, expected) in channels.iter().zip(expected) {
+            assert_close(&channel.part([0.0, -0.5, 2.0], 2)[0][..2], &expected.map(|x| 0.5 * x));
+        }
+        let gray = GrayImage::from_pixel(1, 1, Luma([102]));
+        gray.save(&path).unwrap();
+        assert_eq!(Picture::load_colours(&path).unwrap().map(|c| c.pixels()[0]), [0.4; 3]);
     }
 }

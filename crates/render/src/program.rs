@@ -1,5 +1,6 @@
 use std::{ffi::OsString, io::Write, path::Path};
 
+use anyhow::anyhow;
 use clap::CommandFactory;
 use serde_json::{Value, json};
 use softrast_lab::{
@@ -28,7 +29,15 @@ const REPEAT: usize = 5;
 /// Everything that should end the program with an error line. Unless only `stdout` failed, no picture was written then.
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
-    draw(&args)?.print(args.json, &repeated("render", &words), stdout)
+    let output = match args.threads {
+        None => draw(&args),
+        Some(threads) => {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.map_err(|error| anyhow!("--threads {threads}: {error}"))?;
+            pool.install(|| draw(&args))
+        }
+    };
+    output?.print(args.json, &repeated("render", &words), stdout)
 }
 
 /// All passes, and what is known of the fused op.
@@ -41,11 +50,6 @@ struct Measured {
 }
 
 fn draw(args: &Args) -> anyhow::Result<Output> {
-    if let Some(threads) = args.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        // Fails where threads run already: a library user has chosen their number.
-        let _ = pool.build_global();
-    }
     let backend = BackendChoice::among(compiled_backends!(), args.backend.as_deref());
     let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
     if !args.reference {
