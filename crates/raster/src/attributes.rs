@@ -2,9 +2,12 @@ use std::sync::Arc;
 
 use burn::tensor::{Tensor, backend::Backend};
 
+use crate::kernel::blend::OF_TEXEL;
+
 /// What faces show: numbers at their corners, as many channels as you like, interpolated between them in perspective.
 ///
-/// Colours are one case. Normals, coordinates on a texture, or the depth of the vertices are others; where each corner of each face has an
+/// Colours are one case. Normals or the depth of the vertices are others, and so are places on a texture, which is shown in their stead
+/// ([`with_texture`](Self::with_texture)); where each corner of each face has an
 /// entry of its own, so are barycentric coordinates.
 ///
 /// ```
@@ -19,6 +22,7 @@ use burn::tensor::{Tensor, backend::Backend};
 pub struct Attributes<B: Backend> {
     pub(crate) values: Tensor<B, 3>,
     pub(crate) entries: Arc<[[u32; 3]]>,
+    pub(crate) texture: Option<Tensor<B, 3>>,
 }
 
 impl<B: Backend> Attributes<B> {
@@ -32,7 +36,7 @@ impl<B: Backend> Attributes<B> {
         assert!(channels > 0, "attributes need a channel, found {:?}", values.dims());
         let largest = entries.iter().flatten().max().map_or(0, |&entry| entry as usize + 1);
         assert!(largest <= count, "a corner has entry {}, but there are {count}", largest - 1);
-        Self { values, entries }
+        Self { values, entries, texture: None }
     }
 
     /// One entry for each vertex: `[1 or views, vertices, channels]`.
@@ -73,16 +77,49 @@ impl<B: Backend> Attributes<B> {
     /// If there is no channel, or a face has an entry that is not there.
     #[must_use]
     pub fn with_values(&self, values: Tensor<B, 3>) -> Self {
-        Self::new(values, self.entries.clone())
+        Self { texture: self.texture.clone(), ..Self::new(values, self.entries.clone()) }
     }
 
-    /// The numbers, `[1 or views, entries, channels]`.
+    /// Shows a picture `[height, width, channels]`, the top row first: the numbers, two for each entry, are places on it.
+    ///
+    /// The first, u, goes from 0 at the left end to 1 at the right one, the second, v, from 0 at the bottom to 1 at the top, as in an OBJ
+    /// file; beyond them the picture repeats. Between the centres of texels colours are interpolated linearly, which is not smoothed where
+    /// a texel is much smaller than a pixel. Both the picture and the places receive gradients. Places are finite, and no larger
+    /// than the float type tells texels apart.
+    ///
+    /// # Panics
+    ///
+    /// If entries have not two numbers, or the picture has no texel, more than 2^26 of them, or not 1 to 4 channels.
+    #[must_use]
+    pub fn with_texture(self, texture: Tensor<B, 3>) -> Self {
+        let [.., numbers] = self.values.dims();
+        assert_eq!(numbers, 2, "places on a texture are two numbers");
+        let [height, width, channels] = texture.dims();
+        let texels = height * width;
+        assert!((1..=1 << 26).contains(&texels), "a texture of {height} x {width} texels");
+        assert!(
+            (1..=OF_TEXEL).contains(&channels),
+            "a texture has 1 to 4 channels, not {channels}"
+        );
+        Self { texture: Some(texture), ..self }
+    }
+
+    /// The numbers, `[1 or views, entries, channels]`; places on a texture if there is one.
     pub fn values(&self) -> &Tensor<B, 3> {
         &self.values
     }
 
-    /// Numbers of an entry.
+    /// The texture, `[height, width, channels]`, if there is one.
+    pub fn texture(&self) -> Option<&Tensor<B, 3>> {
+        self.texture.as_ref()
+    }
+
+    /// Channels of what is seen.
     pub fn channels(&self) -> usize {
-        self.values.dims()[2]
+        let values = match &self.texture {
+            Some(texture) => texture,
+            None => &self.values,
+        };
+        values.dims()[2]
     }
 }

@@ -207,6 +207,7 @@ impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
             4 => recorded::<B, C, 4>(op, pass, tensors),
             5 => recorded::<B, C, 5>(op, pass, tensors),
             6 => recorded::<B, C, 6>(op, pass, tensors),
+            7 => recorded::<B, C, 7>(op, pass, tensors),
             many => panic!("no op has {many} inputs"),
         }
     }

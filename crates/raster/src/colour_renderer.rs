@@ -7,6 +7,7 @@ use crate::{
     Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
     backend::{fused, primitive},
     fused::FusedOp,
+    kernel::blend::OF_TEXEL,
     log_curve::{DepthCurve, LogCurve, Precision},
     reference::{self, Scene},
     soft_blend::SoftBlend,
@@ -264,6 +265,7 @@ impl ColourRenderer {
         let op = SoftBlend {
             faces: self.faces.clone(),
             entries: attributes.entries.clone(),
+            texture: attributes.texture.as_ref().map(texture_size),
             edge: prepared.edge.grid,
             depth: prepared.depth.grid(),
             floor: floor(&self.weighting.edge),
@@ -272,7 +274,7 @@ impl ColourRenderer {
             tolerance: 0.5 * self.tolerance,
             kept: None,
         };
-        soft_blend(op, vertices, attributes.values.clone(), tables, background)
+        soft_blend(op, vertices, attributes, tables, background)
     }
 
     /// Knots for these parameters and this background.
@@ -375,7 +377,7 @@ fn check(weighting: &Weighting, phi: &[Vec<f64>; 2]) {
 fn soft_blend<B: RasterBackend>(
     op: SoftBlend,
     vertices: Tensor<B, 3>,
-    attributes: Tensor<B, 3>,
+    attributes: &Attributes<B>,
     tables: Tensor<B, 2>,
     background: &Background<B>,
 ) -> Tensor<B, 4> {
@@ -383,24 +385,45 @@ fn soft_blend<B: RasterBackend>(
     assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
-    let [own, _, channels] = attributes.dims();
+    let (values, channels) = (attributes.values.clone(), attributes.channels());
+    let [own, ..] = values.dims();
     assert!(own == 1 || own == views, "attributes of {own} views, but there are {views}");
     assert_eq!(op.entries.len(), op.faces.len(), "faces that have attributes");
     assert_eq!(background.colour.dims(), [channels], "channels of the background");
-    let types = [attributes.dtype(), tables.dtype(), background.colour.dtype()];
+    let texture = attributes.texture.clone().map(texels);
+    let of_texture = texture.as_ref().map_or(vertices.dtype(), Tensor::dtype);
+    let types = [values.dtype(), tables.dtype(), background.colour.dtype(), of_texture];
     assert_eq!(
         types,
-        [vertices.dtype(); 3],
-        "attributes, tables and background differ in float type"
+        [vertices.dtype(); 4],
+        "attributes, tables, background and texture differ in float type"
     );
     let behind = Tensor::cat(vec![background.colour.clone(), background.log_weight.clone()], 0);
-    let inputs = vec![
+    let mut inputs = vec![
         primitive(vertices.swap_dims(1, 2)),
-        primitive(attributes),
+        primitive(values),
         primitive(tables),
         primitive(behind),
     ];
+    inputs.extend(texture.map(primitive));
     fused(&FusedOp::SoftBlend(op), inputs)
+}
+
+/// A texture as the op takes it: `[texels, 4]`.
+fn texels<B: Backend>(texture: Tensor<B, 3>) -> Tensor<B, 2> {
+    let [height, width, channels] = texture.dims();
+    let rows = texture.reshape([height * width, channels]);
+    if channels == OF_TEXEL {
+        return rows;
+    }
+    let options = (&rows.device(), rows.dtype());
+    let rest = Tensor::zeros([height * width, OF_TEXEL - channels], options);
+    Tensor::cat(vec![rows, rest], 1)
+}
+
+fn texture_size<B: Backend>(texture: &Tensor<B, 3>) -> [usize; 2] {
+    let [height, width, _] = texture.dims();
+    [height, width]
 }
 
 /// Both tables as the op takes them, `[rows, 4]`.

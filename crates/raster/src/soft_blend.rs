@@ -20,6 +20,8 @@ use crate::{
 pub struct SoftBlend {
     pub(crate) faces: Arc<[[u32; 3]]>,
     pub(crate) entries: Arc<[[u32; 3]]>,
+    /// Rows and columns of the texture, if there is one.
+    pub(crate) texture: Option<[usize; 2]>,
     pub(crate) edge: Grid,
     pub(crate) depth: DepthGrid,
     pub(crate) floor: f64,
@@ -38,20 +40,24 @@ impl SoftBlend {
         Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, channels]`, `tables` `[rows, 4]` and
-    /// `background` `[channels + 1]`, to an image `[views, channels + 1, height, width]`, top row first.
+    /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, numbers]`, `tables` `[rows, 4]`,
+    /// `background` `[channels + 1]` and, if there is one, a texture `[texels, 4]`, to an image `[views, channels + 1, height, width]`, top
+    /// row first.
     pub(crate) fn run<F: Float + Element>(
         &self,
         pass: &Pass,
         slices: &[&[F]],
         dims: &[Vec<usize>],
     ) -> TensorData {
-        let (views, channels) = (dims[0][0], dims[1][2]);
+        let (views, channels) = (dims[0][0], dims[3][0] - 1);
+        let count = 4 + usize::from(self.texture.is_some());
         let inputs = Inputs {
             vertices: slices[0],
             attributes: slices[1],
             tables: slices[2],
             background: slices[3],
+            texture: if self.texture.is_some() { slices[4] } else { &[] },
+            texture_size: self.texture,
             faces: &self.faces,
             entries: &self.entries,
             edge: self.edge,
@@ -69,17 +75,22 @@ impl SoftBlend {
         let kept = self.kept.as_deref().unwrap_or(&own);
         let kept = kept.get_or_init(|| Box::new(Kept::new(&inputs, self.kept.is_some())));
         let kept: &Kept<F> = kept.downcast_ref().expect("passes over the same inputs");
-        let four = |flags: &[bool]| [flags[0], flags[1], flags[2], flags[3]];
+        // Of each input, the texture being the last of five.
+        let five = |flags: &[bool]| {
+            let texture = self.texture.is_some() && flags[4];
+            [flags[0], flags[1], flags[2], flags[3], texture]
+        };
         let values = match pass {
             Pass::Forward => {
                 let shape = [views, channels + 1, self.size.height, self.size.width];
                 return TensorData::new(blend::forward(&inputs, kept), shape);
             }
-            Pass::Vjp { wanted } => blend::vjp(&inputs, kept, slices[4], four(wanted)),
+            Pass::Vjp { wanted } => blend::vjp(&inputs, kept, slices[count], five(wanted)),
             Pass::VjpOfVjp { along, wanted } => {
-                let [a, b, c, d] = four(wanted);
-                let wanted = [a, b, c, d, wanted[4]];
-                blend::vjp_of_vjp(&inputs, kept, slices[4], slices[5], four(along), wanted)
+                let [a, b, c, d, e] = five(wanted);
+                let wanted = [a, b, c, d, e, wanted[count]];
+                let [upstream, direction] = [slices[count], slices[count + 1]];
+                blend::vjp_of_vjp(&inputs, kept, upstream, direction, five(along), wanted)
             }
         };
         let length = values.len();

@@ -31,6 +31,8 @@ struct Case {
     attributes: Vec<f64>,
     entries: Arc<[[u32; 3]]>,
     channels: usize,
+    /// Rows and columns of a texture, and its texels: then attributes are places on it.
+    texture: Option<([usize; 2], Vec<f64>)>,
     weighting: Weighting,
     phi: [Vec<f64>; 2],
     /// The colour, then the logarithm of the weight.
@@ -38,8 +40,8 @@ struct Case {
     tolerance: f64,
 }
 
-/// Inputs of a case, one after the other: vertices, attributes, both parameters, background.
-type Inputs<T> = [Tensor<T, 1>; 5];
+/// Inputs of a case, one after the other: vertices, attributes, both parameters, background, and texels if there are any.
+type Inputs<T> = Vec<Tensor<T, 1>>;
 
 impl Case {
     /// Random triangles at random depths under these softnesses.
@@ -58,6 +60,7 @@ impl Case {
             vertices,
             faces,
             channels,
+            texture: None,
             weighting,
             phi,
             background: vec![0.2, -0.3, 0.5, -5.0],
@@ -65,17 +68,33 @@ impl Case {
         }
     }
 
+    /// The same with a texture, of which faces show pieces of any size.
+    fn textured(mut self) -> Self {
+        let size = [5, 7];
+        self.attributes = wave(self.vertices.len() / 3 * 2, 1.7).iter().map(|x| 0.9 * x).collect();
+        self.texture = Some((size, wave(size[0] * size[1] * self.channels, 0.77)));
+        self
+    }
+
     fn inputs<T: Backend>(&self) -> Inputs<T> {
         let [edge, depth] = &self.phi;
-        [&self.vertices, &self.attributes, edge, depth, &self.background].map(|x| vector(x))
+        let inputs = [&self.vertices, &self.attributes, edge, depth, &self.background];
+        let texels = self.texture.iter().map(|(_, texels)| texels);
+        inputs.into_iter().chain(texels).map(|x| vector(x)).collect()
     }
 
     /// The image `[1, channels + 1, height, width]` by the kernel or by the reference.
     fn image<T: RasterBackend>(&self, inputs: Inputs<T>, by_kernel: bool) -> Tensor<T, 4> {
-        let [vertices, attributes, edge, depth, background] = inputs;
+        let mut inputs = inputs.into_iter();
+        let mut next = || inputs.next().expect("an input");
+        let [vertices, attributes, edge, depth, background] = [(); 5].map(|()| next());
         let vertices = vertices.reshape([1, -1, 3]);
-        let attributes = attributes.reshape([1, -1, self.channels as i64]);
-        let attributes = Attributes::new(attributes, self.entries.clone());
+        let numbers = if self.texture.is_some() { 2 } else { self.channels };
+        let attributes = attributes.reshape([1, -1, numbers as i64]);
+        let mut attributes = Attributes::new(attributes, self.entries.clone());
+        if let Some(([height, width], _)) = self.texture {
+            attributes = attributes.with_texture(next().reshape([height, width, self.channels]));
+        }
         let background = Background {
             colour: background.clone().narrow(0, 0, self.channels),
             log_weight: background.narrow(0, self.channels, 1),
@@ -94,20 +113,22 @@ impl Case {
 
     /// The image, the gradients of a sum of squares of it to all inputs, and the gradients of a sum of these.
     fn derivatives(&self, by_kernel: bool) -> Vec<Vec<f64>> {
-        let inner = self.inputs::<A>().map(Tensor::require_grad);
-        let leaves = inner.clone().map(|x| Tensor::<AA, 1>::from_inner(x).require_grad());
+        let inner: Inputs<A> = self.inputs().into_iter().map(Tensor::require_grad).collect();
+        let outer = |x: &Tensor<A, 1>| Tensor::<AA, 1>::from_inner(x.clone()).require_grad();
+        let leaves: Inputs<AA> = inner.iter().map(outer).collect();
         let image = self.image(leaves.clone(), by_kernel);
         let weights = wave(4 * PIXELS, 0.37);
         let weights = tensor::<AA, 4>(&weights, [1, 4, SIZE[0], SIZE[1]]);
         let mut found = vec![numbers(image.clone().inner().inner())];
         let grads = (image.clone() * image * weights).sum().backward();
-        let grads = leaves.map(|leaf| leaf.grad(&grads).expect("the image depends on it"));
+        let of = |leaf: &Tensor<AA, 1>| leaf.grad(&grads).expect("the image depends on it");
+        let grads: Vec<_> = leaves.iter().map(of).collect();
         found.extend(grads.iter().map(|grad| numbers(grad.clone().inner())));
         let ramps = grads.into_iter().enumerate().map(|(k, grad)| {
             let length = grad.dims()[0];
             (grad * vector::<A>(&wave(length, 0.11 + 0.1 * k as f64))).sum()
         });
-        let again = ramps.reduce(|a, b| a + b).expect("five inputs").backward();
+        let again = ramps.reduce(|a, b| a + b).expect("five inputs or more").backward();
         found.extend(inner.iter().map(|x| numbers(x.grad(&again).expect("second order"))));
         found
     }
@@ -126,26 +147,16 @@ fn weighting(edge: EdgeSoftness, depth: DepthSoftness) -> Weighting {
     Weighting { edge, depth, planes: PLANES }
 }
 
-const NAMES: [&str; 11] = [
-    "image",
-    "vertices",
-    "attributes",
-    "edge",
-    "depth",
-    "background",
-    "vertices, second",
-    "attributes, second",
-    "edge, second",
-    "depth, second",
-    "background, second",
-];
+const NAMES: [&str; 6] = ["vertices", "attributes", "edge", "depth", "background", "texels"];
 
 fn compare(name: &str, case: &Case, bounds: [f64; 3]) {
     let (found, expected) = (case.derivatives(true), case.derivatives(false));
     for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        let bound = bounds[k.div_ceil(5)];
+        let inputs = case.inputs::<B>().len();
+        let (order, bound) = (k.div_ceil(inputs), bounds[k.div_ceil(inputs)]);
+        let of = if k == 0 { "image" } else { NAMES[(k - 1) % inputs] };
         let error = relative(found, expected);
-        assert!(error <= bound, "{name}, {}: {error:e} above {bound:e}", NAMES[k]);
+        assert!(error <= bound, "{name}, {of}, order {order}: {error:e} above {bound:e}");
     }
 }
 
@@ -158,6 +169,64 @@ fn the_kernel_agrees_with_the_reference_to_second_order() {
     let phi = [LOGISTIC.default_phi(0.05), EXP.default_phi(0.1)];
     for seed in 0..5 {
         compare("logistic", &Case::random(seed, 20, weighting, phi.clone()), [1e-8, 1e-6, 1e-4]);
+    }
+}
+
+#[test]
+fn textures_agree_with_the_reference_to_second_order() {
+    let weighting = weighting(LOGISTIC, EXP);
+    let phi = [LOGISTIC.default_phi(0.05), EXP.default_phi(0.1)];
+    for seed in 0..5 {
+        let case = Case::random(seed, 20, weighting, phi.clone()).textured();
+        compare("textured", &case, [1e-8, 1e-6, 1e-4]);
+    }
+    let mut one = Case::random(1, 20, weighting, phi).textured();
+    one.texture = Some(([1, 1], vec![0.3, -0.2, 0.9]));
+    let image = numbers(one.image(one.inputs::<B>(), true));
+    one.attributes = vec![0.3, -0.2, 0.9].repeat(one.vertices.len() / 3);
+    one.texture = None;
+    let plain = numbers(one.image(one.inputs::<B>(), true));
+    assert!(relative(&image, &plain) < 1e-12, "one texel is one colour");
+}
+
+#[test]
+fn a_texture_is_seen_upright_and_repeats() {
+    // A square that covers the image, of two faces, and four texels.
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let vertices: Vec<f64> = corners.iter().flat_map(|&[x, y]| [x, y, 2.0]).collect();
+    let faces = [[0, 1, 2], [0, 2, 3]];
+    let renderer = ColourRenderer::new(&faces, 8, Family::Logistic, 1e-6, [1.0, 3.0]);
+    let seen = |turns: f64| {
+        let places = corners.map(|[x, y]| [0.5 + 0.5 * x + turns, 0.5 + 0.5 * y - turns]);
+        let places = tensor::<B, 3>(places.as_flattened(), [1, 4, 2]);
+        let texels = tensor(&[1.0, 2.0, 3.0, 4.0], [2, 2, 1]);
+        let attributes = Attributes::of_vertices(places, &faces).with_texture(texels);
+        let background =
+            Background { colour: tensor(&[0.0], [1]), log_weight: tensor(&[-90.0], [1]) };
+        let vertices = tensor::<B, 3>(&vertices, [1, 4, 3]);
+        numbers(renderer.image(vertices, &attributes, &background))[..64].to_vec()
+    };
+    let image = seen(0.0);
+    let at = |row: usize, column: usize| image[8 * row + column];
+    let between = |t: f64, a: f64, b: f64| a + t * (b - a);
+    // Centres of pixels lie at (2 k + 1) / 8 texels, those of texels at 1/2 and 3/2.
+    for row in 2..6 {
+        for column in 2..6 {
+            let [down, right] = [row, column].map(|k| (2 * k + 1) as f64 / 8.0 - 0.5);
+            let expected = between(down, between(right, 1.0, 2.0), between(right, 3.0, 4.0));
+            assert!(
+                (at(row, column) - expected).abs() < 1e-6,
+                "{row} {column}: {}",
+                at(row, column)
+            );
+        }
+    }
+    // Beyond its last texel comes the first again.
+    let edge = between(0.375, 1.0, 2.0);
+    let wanted = between(0.375, edge, between(0.375, 3.0, 4.0));
+    assert!((at(0, 0) - wanted).abs() < 1e-6, "{} {wanted}", at(0, 0));
+    for (a, b) in seen(3.0).iter().zip(&image) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
 }
 
@@ -242,18 +311,21 @@ fn a_pixel_worked_by_hand() {
 #[test]
 fn gradients_match_central_differences() {
     const H: f64 = 1e-5;
-    for depth in [EXP, DepthSoftness::Mlp] {
+    for (depth, textured) in [(EXP, false), (DepthSoftness::Mlp, false), (EXP, true)] {
         let phi = [LOGISTIC.default_phi(0.05), depth.default_phi(0.2)];
         let mut case = Case::random(5, 9, weighting(LOGISTIC, depth), phi);
+        if textured {
+            case = case.textured();
+        }
         case.tolerance = 1e-11;
         let weights = tensor::<A, 4>(&wave(4 * PIXELS, 0.37), [1, 4, SIZE[0], SIZE[1]]);
         let value = |inputs: Inputs<A>| {
             let image = case.image(inputs, true);
             (image.clone() * image * weights.clone()).sum()
         };
-        let leaves = case.inputs::<A>().map(Tensor::require_grad);
+        let leaves: Inputs<A> = case.inputs().into_iter().map(Tensor::require_grad).collect();
         let grads = value(leaves.clone()).backward();
-        let plain = case.inputs::<B>().map(numbers);
+        let plain: Vec<_> = case.inputs::<B>().into_iter().map(numbers).collect();
         for (which, leaf) in leaves.iter().enumerate() {
             let grad = numbers(leaf.grad(&grads).unwrap());
             let most = grad.iter().fold(0.0, |most: f64, g| most.max(g.abs()));
@@ -265,10 +337,10 @@ fn gradients_match_central_differences() {
                 let at = |h: f64| {
                     let mut moved = plain.clone();
                     moved[which][k] += h;
-                    value(moved.map(|x| vector(&x))).into_scalar()
+                    value(moved.iter().map(|x| vector(x)).collect()).into_scalar()
                 };
                 let slope = (at(H) - at(-H)) / (2.0 * H);
-                let name = NAMES[which + 1];
+                let name = NAMES[which];
                 assert!(
                     (grad[k] - slope).abs() < 1e-5 * most,
                     "{name} {k}: {} and {slope}",

@@ -130,6 +130,8 @@ pub(crate) trait Lanes:
     /// Places in a table of two sides with so many cells each, and a tail behind the last of each; where the mask holds on its second
     /// side. Cells beyond the last are the tail.
     fn places(cell: Self::Index, cells: i32, second: Self::Mask) -> Places;
+    /// Rows of a table of `count`, by their numbers.
+    fn numbered(rows: &[u32; LANES], count: usize) -> Places;
     /// The rows of a table at some places, column by column.
     fn rows(table: &[[Self::Float; 4]], at: &Places) -> [Self; 4];
     /// Adds to the rows of a table at some places, lane by lane.
@@ -498,6 +500,11 @@ impl<F: Float> Lanes for Plain<F> {
             at[i] = (cell[i] as u32).min(cells as u32) + side;
         }
         Places { at, rows: 2 * (cells as usize + 1) }
+    }
+
+    #[inline(always)]
+    fn numbered(rows: &[u32; LANES], count: usize) -> Places {
+        Places { at: *rows, rows: count }
     }
 
     #[inline(always)]

@@ -63,14 +63,30 @@ pub fn blended<B: Backend>(
         let per_total = (weight.clone().sum_dim(2) + behind.clone()).recip();
         let share = weight * per_total.clone();
         let colour = background.colour.clone().reshape([1, 1, channels]);
-        let mut seen = (behind * per_total) * colour;
-        for (k, weights) in points.weights.into_iter().enumerate() {
-            let index =
-                attributes.entries.iter().map(|face| i64::from(face[k])).collect::<Vec<_>>();
-            let data = TensorData::new(index, [scene.faces.len()]);
-            let index = Tensor::<B, 1, Int>::from_data(data, &values.device());
-            seen = seen + (share.clone() * weights).matmul(values.clone().select(1, index));
-        }
+        let behind = (behind * per_total) * colour;
+        let corners = corner_values(&values, &attributes.entries);
+        let seen = match &attributes.texture {
+            None => {
+                let parts = points.weights.into_iter().zip(corners);
+                parts
+                    .map(|(weights, values)| (share.clone() * weights).matmul(values))
+                    .reduce(Tensor::add)
+            }
+            Some(texture) => {
+                let [u, v] = [0, 1].map(|number| {
+                    let of_faces =
+                        |values: Tensor<B, 3>| values.narrow(2, number, 1).swap_dims(1, 2);
+                    let parts = points.weights.iter().zip(corners.clone());
+                    let parts = parts.map(|(weights, values)| weights.clone() * of_faces(values));
+                    parts.reduce(Tensor::add).expect("three corners")
+                });
+                let sampled = sampled(texture.clone(), [u, v]).into_iter();
+                let channels =
+                    sampled.map(|channel| (share.clone() * channel).sum_dim(2)).collect();
+                Some(Tensor::cat(channels, 2))
+            }
+        };
+        let seen = behind + seen.expect("three corners");
         parts[view].push(Tensor::cat(vec![seen, share.sum_dim(2)], 2).swap_dims(1, 2));
     }
     let of_view = |parts: Vec<Tensor<B, 3>>| Tensor::cat(parts, 2);
@@ -80,6 +96,49 @@ pub fn blended<B: Backend>(
         scene.size.height,
         scene.size.width,
     ])
+}
+
+/// Values `[1, entries, numbers]` at the corners of the faces: `[1, faces, numbers]` each.
+fn corner_values<B: Backend>(values: &Tensor<B, 3>, entries: &[[u32; 3]]) -> [Tensor<B, 3>; 3] {
+    [0, 1, 2].map(|k| {
+        let index = entries.iter().map(|face| i64::from(face[k])).collect::<Vec<_>>();
+        let data = TensorData::new(index, [entries.len()]);
+        values.clone().select(1, Tensor::<B, 1, Int>::from_data(data, &values.device()))
+    })
+}
+
+/// The channels of a texture `[height, width, channels]` at places u, v of any one shape, as [`Attributes::with_texture`] says.
+fn sampled<B: Backend>(texture: Tensor<B, 3>, [u, v]: [Tensor<B, 3>; 2]) -> Vec<Tensor<B, 3>> {
+    let [height, width, channels] = texture.dims();
+    let shape = u.dims();
+    let texels = texture.reshape([height * width, channels]);
+    let x = u * width as f64 - 0.5;
+    let y = (v.neg() + 1.0) * height as f64 - 0.5;
+    let [left, above] = [&x, &y].map(|x| x.clone().detach().floor());
+    let (right, down) = (x - left.clone(), y - above.clone());
+    let within = |at: Tensor<B, 3>, count: usize| {
+        let turns = at.clone().div_scalar(count as f64).floor();
+        at - turns * count as f64
+    };
+    let at = |row: f64, column: f64| {
+        let row = within(above.clone() + row, height);
+        let texel = row * width as f64 + within(left.clone() + column, width);
+        texels.clone().select(0, texel.flatten::<1>(0, 2).int())
+    };
+    let shares = [
+        (right.clone().neg() + 1.0) * (down.clone().neg() + 1.0),
+        right.clone() * (down.clone().neg() + 1.0),
+        (right.clone().neg() + 1.0) * down.clone(),
+        right * down,
+    ];
+    let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
+    let channel = |channel: usize| {
+        let parts = shares.iter().zip(&corners).map(|(share, texels)| {
+            share.clone() * texels.clone().narrow(1, channel, 1).reshape(shape)
+        });
+        parts.reduce(Tensor::add).expect("four texels")
+    };
+    (0..channels).map(channel).collect()
 }
 
 /// Points of faces that are nearest to pixels, each `[views, pixels, faces]`.

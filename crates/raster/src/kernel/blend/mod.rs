@@ -9,17 +9,19 @@ mod depth;
 mod planes;
 mod point;
 mod reach;
+mod texture;
 mod walk;
 
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-pub(crate) use self::{depth::DepthGrid, point::AREA};
+pub(crate) use self::{depth::DepthGrid, point::AREA, texture::OF_TEXEL};
 use self::{
     depth::DepthLookup,
     planes::Planes,
     reach::Reached,
+    texture::{TexelSums, Texture},
     walk::{Largest, OF_CORNERS, Pull, Sums, Visitor, Walk, everywhere},
 };
 use super::{
@@ -43,12 +45,16 @@ const RANGE: [f64; 2] = [60.0, 600.0];
 pub(crate) struct Inputs<'a, F> {
     /// `[views, 3, vertices]`: x and y in NDC, depth.
     pub(crate) vertices: &'a [F],
-    /// `[1 or views, entries, channels]`.
+    /// `[1 or views, entries, channels]`, or with a texture places on it, `[1 or views, entries, 2]`.
     pub(crate) attributes: &'a [F],
     /// `[rows, 4]`: minus the logarithms of the weights by edge, then of those by depth.
     pub(crate) tables: &'a [F],
     /// `[channels + 1]`: the colour, then the logarithm of the weight.
     pub(crate) background: &'a [F],
+    /// `[rows, columns, 4]`, or nothing.
+    pub(crate) texture: &'a [F],
+    /// Rows and columns of the texture, if there is one.
+    pub(crate) texture_size: Option<[usize; 2]>,
     pub(crate) faces: &'a [[u32; 3]],
     /// Entries of the attributes at the corners of each face.
     pub(crate) entries: &'a [[u32; 3]],
@@ -71,9 +77,14 @@ pub(crate) struct Inputs<'a, F> {
 }
 
 impl<'a, F: float::Float> Inputs<'a, F> {
-    /// Channels of the attributes.
+    /// Channels of the image, but for the faces' share.
     pub(crate) fn channels(&self) -> usize {
         self.background.len() - 1
+    }
+
+    /// Numbers of an entry of the attributes.
+    fn numbers(&self) -> usize {
+        if self.texture_size.is_some() { 2 } else { self.channels() }
     }
 
     /// Rows of both tables, or of their tangents.
@@ -82,8 +93,8 @@ impl<'a, F: float::Float> Inputs<'a, F> {
         rows.split_at(self.edge.rows().min(rows.len()))
     }
 
-    /// What a walk reads; `tangents` are those of vertices, attributes, tables and background, or nothing.
-    fn blend<'s, T>(&'s self, tangents: [&'s [F]; 4]) -> Blend<'s, T>
+    /// What a walk reads; `tangents` are those of vertices, attributes, tables, background and texture, or nothing.
+    fn blend<'s, T>(&'s self, tangents: [&'s [F]; 5]) -> Blend<'s, T>
     where
         T: Real,
         T::Lanes: Lanes<Float = F>,
@@ -101,6 +112,14 @@ impl<'a, F: float::Float> Inputs<'a, F> {
             attributes: [self.attributes, tangents[1]],
             entries: self.entries,
             channels: self.channels(),
+            numbers: self.numbers(),
+            texture: self.texture_size.map(|size| Texture {
+                size,
+                texels: Table {
+                    values: self.texture.as_chunks().0,
+                    tangents: tangents[4].as_chunks().0,
+                },
+            }),
             per_view: if self.shared { 0 } else { self.attributes.len() / self.views.max(1) },
             depth: DepthLookup::new(self.depth, depth),
             near: F::from_f64(self.planes[0]),
@@ -117,7 +136,11 @@ struct Blend<'a, T: Real> {
     scene: Scene<'a, T>,
     attributes: [&'a [Float<T>]; 2],
     entries: &'a [[u32; 3]],
+    /// Of the image, but for the faces' share.
     channels: usize,
+    /// Of an entry of the attributes.
+    numbers: usize,
+    texture: Option<Texture<'a, T>>,
     /// Attributes of a view that has its own.
     per_view: usize,
     depth: DepthLookup<'a, T>,
@@ -132,6 +155,12 @@ struct Blend<'a, T: Real> {
 }
 
 impl<T: Real> Blend<'_, T> {
+    /// A gradient to the texels of the texture, if it is wanted, else to none.
+    fn no_texels(&self, wanted: bool) -> TexelSums<Float<T>> {
+        let texels = self.texture.as_ref().filter(|_| wanted).map(|texture| texture.size);
+        TexelSums::new(texels.map_or(0, |[height, width]| height * width))
+    }
+
     /// Where the attributes of a view begin.
     fn first_attribute(&self, view: usize) -> usize {
         view * self.per_view
@@ -163,7 +192,7 @@ impl<F: float::Float> Kept<F> {
 
 /// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` is of these inputs.
 pub(crate) fn forward<F: float::Float>(inputs: &Inputs<F>, kept: &Kept<F>) -> Vec<F> {
-    let tangents = [&[][..]; 4];
+    let tangents = [&[][..]; 5];
     if has_avx2() {
         passes::<F::Avx2>(inputs, &inputs.blend(tangents), kept, None).image()
     } else {
@@ -171,14 +200,14 @@ pub(crate) fn forward<F: float::Float>(inputs: &Inputs<F>, kept: &Kept<F>) -> Ve
     }
 }
 
-/// Gradients of `Σ upstream · image` to vertices, attributes, tables and background, as they are wanted, flat and in this order.
+/// Gradients of `Σ upstream · image` to vertices, attributes, tables, background and texture, as they are wanted, flat and in this order.
 pub(crate) fn vjp<F: float::Float>(
     inputs: &Inputs<F>,
     kept: &Kept<F>,
     upstream: &[F],
-    wanted: [bool; 4],
+    wanted: [bool; 5],
 ) -> Vec<F> {
-    let tangents = [&[][..]; 4];
+    let tangents = [&[][..]; 5];
     let pull = Some((upstream, wanted));
     if has_avx2() {
         passes::<F::Avx2>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
@@ -194,11 +223,12 @@ pub(crate) fn vjp_of_vjp<F: float::Float>(
     kept: &Kept<F>,
     upstream: &[F],
     direction: &[F],
-    along: [bool; 4],
-    wanted: [bool; 5],
+    along: [bool; 5],
+    wanted: [bool; 6],
 ) -> Vec<F> {
-    let of_inputs = [inputs.vertices, inputs.attributes, inputs.tables, inputs.background];
-    let still: [Vec<F>; 4] =
+    let of_inputs =
+        [inputs.vertices, inputs.attributes, inputs.tables, inputs.background, inputs.texture];
+    let still: [Vec<F>; 5] =
         std::array::from_fn(|k| vec![F::ZERO; if along[k] { 0 } else { of_inputs[k].len() }]);
     let mut direction = direction;
     let tangents = std::array::from_fn(|k| {
@@ -209,8 +239,7 @@ pub(crate) fn vjp_of_vjp<F: float::Float>(
         direction = rest;
         own
     });
-    let [vertices, attributes, tables, background, to_upstream] = wanted;
-    let wanted = [vertices, attributes, tables, background];
+    let [wanted @ .., to_upstream] = wanted;
     let pull = Some((upstream, wanted));
     let passed = if has_avx2() {
         passes::<Dual<F::Avx2>>(inputs, &inputs.blend(tangents), kept, pull)
@@ -232,6 +261,7 @@ struct Passed<F> {
     attributes: Vec<F>,
     tables: Vec<F>,
     background: Vec<F>,
+    texels: TexelSums<F>,
 }
 
 impl<F: float::Float> Passed<F> {
@@ -239,8 +269,14 @@ impl<F: float::Float> Passed<F> {
         self.images.concat()
     }
 
-    fn gradient(self, wanted: [bool; 4]) -> Vec<F> {
-        let parts = [self.vertices.concat(), self.attributes, self.tables, self.background];
+    fn gradient(self, wanted: [bool; 5]) -> Vec<F> {
+        let parts = [
+            self.vertices.concat(),
+            self.attributes,
+            self.tables,
+            self.background,
+            self.texels.dense(),
+        ];
         parts
             .into_iter()
             .zip(wanted)
@@ -255,7 +291,7 @@ fn passes<T: Real>(
     inputs: &Inputs<Float<T>>,
     blend: &Blend<T>,
     kept: &Kept<Float<T>>,
-    pull: Option<(&[Float<T>], [bool; 4])>,
+    pull: Option<(&[Float<T>], [bool; 5])>,
 ) -> Passed<Float<T>> {
     let zero = <Float<T> as float::Float>::ZERO;
     let Kept { reached, sums } = kept;
@@ -286,7 +322,8 @@ fn passes<T: Real>(
                     run::<T::Lanes, _>(work)
                 })
                 .collect();
-            gather::<T>(
+            gather(
+                blend,
                 inputs,
                 &bands.views[view],
                 walked,
@@ -301,6 +338,7 @@ fn passes<T: Real>(
         attributes: vec![zero; if pull.is_some() { inputs.attributes.len() } else { 0 }],
         tables: Vec::new(),
         background: Vec::new(),
+        texels: blend.no_texels(pull.is_some_and(|(_, wanted)| wanted[4])),
     };
     for (index, mut view) in per_view.into_iter().enumerate() {
         passed.images.append(&mut view.images);
@@ -309,6 +347,7 @@ fn passes<T: Real>(
         add(&mut passed.attributes[first..], &view.attributes);
         added(&mut passed.tables, view.tables);
         added(&mut passed.background, view.background);
+        passed.texels.add_all(view.texels);
     }
     passed
 }
@@ -333,18 +372,20 @@ struct Walked<F> {
     faces: Vec<F>,
     tables: [Vec<[F; 4]>; 2],
     background: Vec<F>,
+    texels: TexelSums<F>,
 }
 
 /// Adds up the bands of a view in their order.
 fn gather<T: Real>(
+    blend: &Blend<T>,
     inputs: &Inputs<Float<T>>,
     view: &View,
     walked: Vec<Walked<Float<T>>>,
     with_image: bool,
-    wanted: Option<[bool; 4]>,
+    wanted: Option<[bool; 5]>,
 ) -> Passed<Float<T>> {
     let zero = <Float<T> as float::Float>::ZERO;
-    let channels = inputs.channels();
+    let (channels, numbers) = (blend.channels, blend.numbers);
     let mut image = Vec::new();
     if with_image {
         for plane in 0..=channels {
@@ -357,13 +398,14 @@ fn gather<T: Real>(
         attributes: Vec::new(),
         tables: Vec::new(),
         background: Vec::new(),
+        texels: blend.no_texels(wanted.is_some_and(|wanted| wanted[4])),
     };
     let Some([_, of_attributes, ..]) = wanted else { return passed };
     let count = inputs.vertices.len() / inputs.views / 3;
     let mut vertices = vec![zero; 3 * count];
     let entries = inputs.attributes.len() / if inputs.shared { 1 } else { inputs.views };
     let mut attributes = vec![zero; if of_attributes { entries } else { 0 }];
-    let stride = OF_CORNERS + if of_attributes { 3 * channels } else { 0 };
+    let stride = OF_CORNERS + if of_attributes { 3 * numbers } else { 0 };
     for (band, walked) in walked.into_iter().enumerate() {
         for (&face, own) in view.faces(band).iter().zip(walked.faces.chunks_exact(stride)) {
             for (k, &vertex) in inputs.faces[face as usize].iter().enumerate() {
@@ -374,15 +416,16 @@ fn gather<T: Real>(
             }
             if of_attributes {
                 for (k, &entry) in inputs.entries[face as usize].iter().enumerate() {
-                    for channel in 0..channels {
-                        attributes[entry as usize * channels + channel] +=
-                            own[OF_CORNERS + 3 * channel + k];
+                    for number in 0..numbers {
+                        attributes[entry as usize * numbers + number] +=
+                            own[OF_CORNERS + 3 * number + k];
                     }
                 }
             }
         }
         added(&mut passed.tables, walked.tables.concat().as_flattened().to_vec());
         added(&mut passed.background, walked.background);
+        passed.texels.add_all(walked.texels);
     }
     (passed.vertices, passed.attributes) = (vec![vertices], attributes);
     passed
@@ -401,7 +444,7 @@ struct Band<'a, 's, T: Real> {
     least: f64,
     kept: Option<&'a OnceLock<[Vec<Float<T>>; 2]>>,
     /// `[channels + 1, height, width]`, and what gradients are wanted.
-    upstream: Option<(&'a [Float<T>], [bool; 4])>,
+    upstream: Option<(&'a [Float<T>], [bool; 5])>,
 }
 
 impl<T: Real> Work for Band<'_, '_, T> {
@@ -451,6 +494,7 @@ impl<T: Real> Work for Band<'_, '_, T> {
             faces: Vec::new(),
             tables: [Vec::new(), Vec::new()],
             background: background.into_iter().map(Lanes::sum).collect(),
+            texels: blend.no_texels(self.upstream.is_some_and(|(_, wanted)| wanted[4])),
         };
         if self.upstream.is_none() || T::DUAL {
             walked.image = (0..=channels).map(|plane| self.trimmed(image.output(plane))).collect();
@@ -515,12 +559,12 @@ impl<T: Real> Band<'_, '_, T> {
         largest: &Planes<T>,
         pixels: &Planes<T>,
         upstream: &Planes<T>,
-        [_, of_attributes, of_tables, _]: [bool; 4],
+        [_, of_attributes, of_tables, _, of_texels]: [bool; 5],
         walked: &mut Walked<Float<T>>,
     ) {
         let zero = <Float<T> as float::Float>::ZERO;
-        let channels = if of_attributes { self.blend.channels } else { 0 };
-        let stride = OF_CORNERS + 3 * channels;
+        let numbers = if of_attributes { self.blend.numbers } else { 0 };
+        let stride = OF_CORNERS + 3 * numbers;
         walked.faces = vec![zero; self.of_view.faces(self.band).len() * stride];
         let rows = [self.blend.scene.grid.rows(), self.blend.depth.rows()];
         let mut tables = rows.map(|rows| vec![[zero; 4]; if of_tables { rows } else { 0 }]);
@@ -532,7 +576,8 @@ impl<T: Real> Band<'_, '_, T> {
             stride,
             tables: of_tables.then_some(&mut tables),
             corners: [splat(0.0); OF_CORNERS],
-            attributes: vec![[splat(0.0); 3]; channels],
+            attributes: vec![[splat(0.0); 3]; numbers],
+            texels: of_texels.then_some(&mut walked.texels),
             least: splat(self.least.exp()),
         });
         walked.tables = tables;

@@ -10,7 +10,13 @@ const FACES: u32 = 50;
 const CHANNELS: usize = 2;
 
 /// All that the three passes give, over random triangles, some of them points or without area.
-fn passes<F: float::Float>(views: usize, log_weight: f64, floor: f64, line: bool) -> Vec<F> {
+fn passes<F: float::Float>(
+    views: usize,
+    log_weight: f64,
+    floor: f64,
+    line: bool,
+    texture_size: Option<[usize; 2]>,
+) -> Vec<F> {
     let edge = Grid { outer: 0.2, inner: 0.3, octaves: 12, far: 5, bits: 2 };
     let by_depth = Grid { outer: 1e-3, inner: 2.0, octaves: 10, far: 0, bits: 2 };
     let depth = if line { DepthGrid::Line { floor: 1e-7 } } else { DepthGrid::Table(by_depth) };
@@ -24,6 +30,7 @@ fn passes<F: float::Float>(views: usize, log_weight: f64, floor: f64, line: bool
     };
     let vertices: Vec<F> = (0..3 * VERTICES * views).map(|k| F::from_f64(coordinate(k))).collect();
     let attributes = numbers(VERTICES * CHANNELS, 0.9);
+    let texture = numbers(texture_size.map_or(0, |[height, width]| 4 * height * width), 1.1);
     let tables = numbers(4 * (edge.rows() + depth.rows()), 0.7);
     let background = [0.1, 0.2, log_weight].map(F::from_f64);
     let corner = |k: u32| k % VERTICES as u32;
@@ -39,6 +46,8 @@ fn passes<F: float::Float>(views: usize, log_weight: f64, floor: f64, line: bool
         attributes: &attributes,
         tables: &tables,
         background: &background,
+        texture: &texture,
+        texture_size,
         faces: &faces,
         entries: &faces,
         edge,
@@ -53,28 +62,31 @@ fn passes<F: float::Float>(views: usize, log_weight: f64, floor: f64, line: bool
         shared: true,
     };
     let upstream = numbers(views * (CHANNELS + 1) * size.pixels(), 0.3);
-    let lengths = [&vertices, &attributes, &tables].map(Vec::len);
+    let lengths = [&vertices, &attributes, &tables, &texture].map(Vec::len);
     let direction = numbers(lengths.iter().sum::<usize>() + background.len(), 2.3);
     let kept = &Kept::new(&inputs, false);
     let mut all = forward(&inputs, kept);
-    all.extend(vjp(&inputs, kept, &upstream, [true; 4]));
-    all.extend(vjp(&inputs, kept, &upstream, [true, false, false, false]));
-    all.extend(vjp_of_vjp(&inputs, kept, &upstream, &direction, [true; 4], [true; 5]));
+    all.extend(vjp(&inputs, kept, &upstream, [true; 5]));
+    all.extend(vjp(&inputs, kept, &upstream, [true, false, false, false, false]));
+    all.extend(vjp_of_vjp(&inputs, kept, &upstream, &direction, [true; 5], [true; 6]));
     // The sums of an image serve the gradient as well.
     let kept = &Kept::new(&inputs, true);
-    let again = [forward(&inputs, kept), vjp(&inputs, kept, &upstream, [true; 4])].concat();
+    let again = [forward(&inputs, kept), vjp(&inputs, kept, &upstream, [true; 5])].concat();
     assert!(format!("{again:?}") == format!("{:?}", &all[..again.len()]));
     all
 }
 
 fn assert_same_bits<F: float::Float>() {
     // A background that weighs little asks for the largest weight of each pixel.
-    for (views, log_weight, floor, line) in
-        [(1, -2.0, 0.0, false), (4, -1.0, 1e-7, true), (3, -700.0, 1e-7, false)]
-    {
-        let fast = passes::<F>(views, log_weight, floor, line);
+    for (views, log_weight, floor, line, texture) in [
+        (1, -2.0, 0.0, false, None),
+        (4, -1.0, 1e-7, true, None),
+        (3, -700.0, 1e-7, false, None),
+        (2, -2.0, 0.0, false, Some([9, 13])),
+    ] {
+        let fast = passes::<F>(views, log_weight, floor, line, texture);
         PORTABLE.store(true, Ordering::SeqCst);
-        let portable = passes::<F>(views, log_weight, floor, line);
+        let portable = passes::<F>(views, log_weight, floor, line, texture);
         PORTABLE.store(false, Ordering::SeqCst);
         assert!(fast.iter().all(|x| x.to_f64().is_finite()), "{views} views");
         assert!(format!("{fast:?}") == format!("{portable:?}"), "{views} views");

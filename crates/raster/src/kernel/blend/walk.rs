@@ -8,6 +8,7 @@ use super::{
     depth::{DepthAt, pull_row},
     planes::Planes,
     point::{Barycentric, Point},
+    texture::{OF_TEXEL, TexelSums},
 };
 use crate::kernel::{
     face::Face,
@@ -33,7 +34,7 @@ pub(super) struct Shown<'a, T: Real> {
     order: [usize; 3],
     /// One over the depth of each corner.
     per_depth: [T; 3],
-    /// Attributes of the corners, channel by channel.
+    /// Attributes of the corners, number by number.
     attributes: Vec<[T; 3]>,
     /// Logarithm of its largest weight by depth.
     log: T::Lanes,
@@ -52,6 +53,21 @@ pub(super) struct Pair<T: Real> {
     edge_t: T,
     edge_row: Places,
     by_depth: DepthAt<T>,
+}
+
+impl<T: Real> Pair<T> {
+    /// What lies at the point, of what lies at the corners.
+    #[inline(always)]
+    fn between(&self, [c0, c1, c2]: [T; 3]) -> T {
+        let [w0, w1, w2] = self.weights;
+        w0 * c0 + w1 * c1 + w2 * c2
+    }
+
+    /// Where a texture is seen, if there is one.
+    #[inline(always)]
+    fn place_on_texture(&self, shown: &Shown<T>) -> [T; 2] {
+        [self.between(shown.attributes[0]), self.between(shown.attributes[1])]
+    }
 }
 
 /// What is done to every pair.
@@ -126,13 +142,13 @@ impl<T: Real, V> Walk<'_, '_, T, V> {
         let count = place.vertices.len() / 3;
         let one = T::constant(splat(1.0));
         let mut per_depth = [one; 3];
-        let mut attributes = vec![[one; 3]; blend.channels];
+        let mut attributes = vec![[one; 3]; blend.numbers];
         let first = blend.first_attribute(self.view);
         for k in 0..3 {
             let at = 2 * count + corners[order[k]] as usize;
             per_depth[k] = everywhere(place.vertices, place.tangents, at);
             per_depth[k] = T::inverse(per_depth[k]);
-            let start = first + entries[order[k]] as usize * blend.channels;
+            let start = first + entries[order[k]] as usize * blend.numbers;
             for (c, attribute) in attributes.iter_mut().enumerate() {
                 attribute[k] = everywhere(blend.attributes[0], blend.attributes[1], start + c);
             }
@@ -221,9 +237,15 @@ impl<T: Real> Visitor<T> for Sums<'_, T> {
     fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
         let [weight, _] = blend.weight(pair, self.largest.groups(0, at).value());
         self.sums.add(0, at, weight);
-        let [w0, w1, w2] = pair.weights;
-        for (channel, &[c0, c1, c2]) in shown.attributes.iter().enumerate() {
-            self.sums.add(1 + channel, at, weight * (w0 * c0 + w1 * c1 + w2 * c2));
+        if let Some(texture) = &blend.texture {
+            let seen = texture.sample(pair.place_on_texture(shown)).channels();
+            for channel in 0..blend.channels {
+                self.sums.add(1 + channel, at, weight * seen[channel % OF_TEXEL]);
+            }
+            return;
+        }
+        for (channel, &corners) in shown.attributes.iter().enumerate() {
+            self.sums.add(1 + channel, at, weight * pair.between(corners));
         }
     }
 }
@@ -236,15 +258,29 @@ pub(super) struct Pull<'a, T: Real> {
     pub(super) pixels: &'a Planes<T>,
     /// A plane for each channel.
     pub(super) upstream: &'a Planes<T>,
-    /// For each face of the band [`OF_CORNERS`] numbers, then three for each channel if the gradient to the attributes is wanted.
+    /// For each face of the band [`OF_CORNERS`] numbers, then three for each number of an attribute if the gradient to the attributes is wanted.
     pub(super) faces: &'a mut [Float<T>],
     pub(super) stride: usize,
     /// Gradients to the tables of edge and depth, if they are wanted.
     pub(super) tables: Option<&'a mut [Vec<[Float<T>; 4]>; 2]>,
     pub(super) corners: [T::Lanes; OF_CORNERS],
     pub(super) attributes: Vec<[T::Lanes; 3]>,
+    /// Gradient to the texels, if it is wanted.
+    pub(super) texels: Option<&'a mut TexelSums<Float<T>>>,
     /// The share of a pixel that a face may have and be left out of its gradient, as it may be left out of its image.
     pub(super) least: T::Lanes,
+}
+
+impl<T: Real> Pull<'_, T> {
+    /// Adds to the gradient of a number of the attributes, of a function with this derivative by it at the point of a pair.
+    #[inline(always)]
+    fn pull_attribute(&mut self, number: usize, by_number: T, pair: &Pair<T>) {
+        if let Some(sums) = self.attributes.get_mut(number) {
+            for k in 0..3 {
+                sums[k] += (by_number * pair.weights[k]).output();
+            }
+        }
+    }
 }
 
 /// Whether a mask holds nowhere.
@@ -269,23 +305,38 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
             return;
         }
         let zero = T::constant(splat(0.0));
-        // How the objective changes with the attributes of the three corners, were the point there.
+        // How the objective changes with the attributes of the three corners, were the point there, and what it is at the point.
         let mut at_corners = [zero; 3];
-        for (channel, values) in shown.attributes.iter().enumerate() {
-            let upstream = self.upstream.groups(channel, at).value();
+        let (here, between);
+        if let Some(texture) = &blend.texture {
+            let sample = texture.sample(pair.place_on_texture(shown));
+            let mut upstream = [splat(0.0); OF_TEXEL];
+            for channel in 0..blend.channels {
+                upstream[channel % OF_TEXEL] = self.upstream.groups(channel, at).value();
+            }
+            let [seen, by_u, by_v] = sample.pulled(upstream);
+            let [u, v] = [shown.attributes[0], shown.attributes[1]];
             for k in 0..3 {
-                at_corners[k] = at_corners[k] + values[k].scale(upstream);
+                at_corners[k] = by_u * u[k] + by_v * v[k];
             }
-            if let Some(sums) = self.attributes.get_mut(channel) {
-                let seen = share.scale(upstream);
+            for (number, by_place) in [by_u, by_v].into_iter().enumerate() {
+                self.pull_attribute(number, share * by_place, pair);
+            }
+            if let Some(texels) = &mut self.texels {
+                sample.pull_texels(share, upstream, texels);
+            }
+            (here, between) = (seen, pair.between(at_corners));
+        } else {
+            for (channel, values) in shown.attributes.iter().enumerate() {
+                let upstream = self.upstream.groups(channel, at).value();
                 for k in 0..3 {
-                    sums[k] += (seen * pair.weights[k]).output();
+                    at_corners[k] = at_corners[k] + values[k].scale(upstream);
                 }
+                self.pull_attribute(channel, share.scale(upstream), pair);
             }
+            between = pair.between(at_corners);
+            here = between;
         }
-        let [q0, q1, q2] = at_corners;
-        let [w0, w1, w2] = pair.weights;
-        let here = w0 * q0 + w1 * q1 + w2 * q2;
         // A share draws the image from what it is towards what the face shows.
         let draw = here - self.pixels.groups(1, at);
         let (by_edge, by_depth) = (of_edge * draw, share * draw);
@@ -295,7 +346,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
         // d z / d λₖ = -z² / zₖ, and the weights on the face are λₖ z / zₖ: so both change by λₖ as by its share of 1 / z.
         let mut by_part = [zero; 3];
         for k in 0..3 {
-            by_part[k] = pair.depth * (share * (at_corners[k] - here) - pair.depth * by_z);
+            by_part[k] = pair.depth * (share * (at_corners[k] - between) - pair.depth * by_z);
         }
         let [r0, r1, r2] = shown.per_depth;
         let by_barycentric = [by_part[0] * r0, by_part[1] * r1, by_part[2] * r2];
@@ -325,8 +376,8 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
             own[2 * corner] += self.corners[2 * k].sum() * right;
             own[2 * corner + 1] += self.corners[2 * k + 1].sum() * down;
             own[6 + corner] += self.corners[6 + k].sum();
-            for (channel, sums) in self.attributes.iter_mut().enumerate() {
-                own[OF_CORNERS + 3 * channel + corner] += sums[k].sum();
+            for (number, sums) in self.attributes.iter_mut().enumerate() {
+                own[OF_CORNERS + 3 * number + corner] += sums[k].sum();
                 sums[k] = splat(0.0);
             }
         }

@@ -295,6 +295,17 @@ impl Lanes for F32x8 {
     }
 
     #[inline(always)]
+    fn numbered(rows: &[u32; LANES], count: usize) -> Places {
+        assert!(count <= 1 << (32 - ROW), "a table of {count} rows");
+        let mut at = [0; LANES];
+        for i in 0..LANES {
+            assert!((rows[i] as usize) < count, "row {} of {count}", rows[i]);
+            at[i] = rows[i] << ROW;
+        }
+        Places { at, rows: count }
+    }
+
+    #[inline(always)]
     fn rows(table: &[[f32; 4]], places: &Places) -> [Self; 4] {
         assert!(places.rows <= table.len(), "places of another table");
         // SAFETY: every place is the first byte of a row below `places.rows`, or less, so the table has all that is read.
