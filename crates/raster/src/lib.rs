@@ -41,6 +41,7 @@ mod picture_loss;
 mod pinhole;
 mod profile;
 pub mod reference;
+mod shading;
 mod silhouette;
 mod soft_blend;
 mod soft_renderer;
@@ -67,6 +68,7 @@ pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
 pub use profile::Profile;
+pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use silhouette::{Rasterizer, Silhouette};
 #[doc(hidden)]
 pub use soft_blend::SoftBlend;

@@ -13,12 +13,12 @@ type B = NdArray<f64>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
-type Of = fn(Tensor<AA, 1>) -> Tensor<AA, 1>;
+pub(super) type Of = fn(Tensor<AA, 1>) -> Tensor<AA, 1>;
 
 const SIDES: [usize; 4] = [2, 3, 12, 16];
 const PIXELS: usize = 2 * 3 * 12 * 16;
 
-fn wave(count: usize, step: f64) -> Vec<f64> {
+pub(super) fn wave(count: usize, step: f64) -> Vec<f64> {
     (0..count).map(|k| (step * k as f64 + 0.3).sin()).collect()
 }
 
@@ -41,7 +41,7 @@ fn of(loss: fn(Tensor<AA, 4>, Tensor<AA, 4>) -> Tensor<AA, 1>, x: &[f64]) -> Vec
 }
 
 /// The gradient of the sum of a loss, and how a weighted sum of that changes.
-fn derivatives(of: Of, x: &[f64], weights: &[f64]) -> [Vec<f64>; 2] {
+pub(super) fn derivatives(of: Of, x: &[f64], weights: &[f64]) -> [Vec<f64>; 2] {
     let inner = vector::<A>(x).require_grad();
     let outer = Tensor::<AA, 1>::from_inner(inner.clone()).require_grad();
     let gradient = outer.grad(&of(outer.clone()).sum().backward()).expect("a gradient");
@@ -50,7 +50,7 @@ fn derivatives(of: Of, x: &[f64], weights: &[f64]) -> [Vec<f64>; 2] {
 }
 
 /// Both orders along a few directions, against differences.
-fn assert_derivatives(of: Of, x: &[f64]) {
+pub(super) fn assert_derivatives(of: Of, x: &[f64]) {
     let h = 1e-5;
     let weights = wave(x.len(), 2.1);
     let [gradient, second] = derivatives(of, x, &weights);

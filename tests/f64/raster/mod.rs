@@ -10,6 +10,7 @@ mod losses;
 mod pinhole;
 mod pytorch3d;
 mod reference;
+mod shading;
 mod soft_blend;
 mod soft_renderer;
 mod threads;
