@@ -128,10 +128,10 @@ fn coloured(component: u32, shape: &str, colours: &[u8]) -> (Value, Vec<u8>) {
     let (mut json, bin) = bytes();
     let attributes = &mut json["meshes"][0]["primitives"][0]["attributes"];
     attributes["COLOR_0"] = json!(2);
-    json["accessors"].as_array_mut().unwrap().push(json!({
+    json["accessors"].as_array_mut().expect("a list").push(json!({
         "bufferView": 2, "componentType": component, "normalized": component != 5126, "count": 4, "type": shape,
     }));
-    json["bufferViews"].as_array_mut().unwrap().push(json!({
+    json["bufferViews"].as_array_mut().expect("a list").push(json!({
         "buffer": 0, "byteOffset": 56, "byteLength": colours.len(),
     }));
     (json, [bin.as_slice(), &[0; 2], colours].concat())

@@ -1,6 +1,7 @@
 //! A mesh from pictures that the user gives.
 
 mod hull;
+mod painted;
 mod problem;
 mod solve;
 

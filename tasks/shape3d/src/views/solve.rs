@@ -5,10 +5,10 @@ use clap::ValueEnum;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, MaskFlags, seen_by};
 use softrast_inverse::{
-    Method, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
+    Method, PaintedView, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
 };
 use softrast_lab::{
-    Error, Viewer, contact_sheet, for_page,
+    Error, Progress, Viewer, contact_sheet, for_page,
     format::{counted, line},
     overlay, png,
     program::Output,
@@ -20,6 +20,7 @@ use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
 use super::{
     hull::{ball, hull},
+    painted::{self, Colours},
     problem::FromViews,
 };
 use crate::Args;
@@ -75,6 +76,10 @@ pub struct Views {
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
 
+    /// Look for colours too: the mesh gets those of the pictures at its vertices. With --mesh the shape is known, in the world units of the cameras, and stays
+    #[arg(long)]
+    pub colour: bool,
+
     /// How smooth the surface is kept, against the usual
     #[arg(long, value_name = "FACTOR", requires = "views", value_parser = softrast_lab::parse::positive, allow_negative_numbers = true)]
     pub smooth: Option<f64>,
@@ -95,11 +100,13 @@ pub enum Begin {
 }
 
 /// A view, how well the result fits it, and whether it was kept aside.
-struct Scored {
-    view: View,
+pub(super) struct Scored {
+    pub(super) view: View,
     silhouette: Vec<f64>,
     iou: f64,
-    held_out: bool,
+    /// If colours were asked for.
+    pub(super) colours: Option<Colours>,
+    pub(super) held_out: bool,
 }
 
 /// The mesh that has the silhouettes of a folder's masks, if the flags name one.
@@ -107,6 +114,11 @@ pub(crate) fn solve_views(
     given: &Given<'_, Args>,
     flags: &Views,
 ) -> Option<anyhow::Result<Answer>> {
+    if flags.views.is_none() && flags.colour {
+        return Some(Err(Error::usage(
+            "--colour takes the colours of pictures: name a folder of them with --views",
+        )));
+    }
     if flags.views.is_none() && flags.masks.asked() {
         return Some(Err(Error::usage(
             "--invert and --threshold are about pictures: name a folder of them with --views",
@@ -117,9 +129,16 @@ pub(crate) fn solve_views(
 
 fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::Result<Answer> {
     let args = given.args;
-    if args.mesh.is_some() || args.elevation.is_some() {
+    if args.elevation.is_some() || (args.mesh.is_some() && !flags.colour) {
         return Err(Error::usage(
-            "--mesh and --elevation say what is drawn as a target: leave them out with --views",
+            "--mesh and --elevation say what is drawn as a target: leave them out with --views (--colour takes a --mesh whose colours are \
+             looked for)",
+        ));
+    }
+    let deforms = args.template.is_some() || flags.start.is_some() || flags.smooth.is_some();
+    if args.mesh.is_some() && deforms {
+        return Err(Error::usage(
+            "--template, --start and --smooth say how a shape is found: leave them out where --mesh says what it is",
         ));
     }
     if args.detail.is_some() && flags.start != Some(Begin::Sphere) {
@@ -128,20 +147,57 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         ));
     }
     let all = load_views(folder, |path| flags.masks.load(path))?;
-    let [train, held_out] = parted(all, flags.hold_out.unwrap_or(0))?;
+    // What is wrong with a picture is said before the work.
+    let paint = |views: &[View]| {
+        let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
+        painted.collect::<anyhow::Result<Vec<_>>>()
+    };
+    let parts = parted(all, flags.hold_out.unwrap_or(0))?;
+    let [to_paint, to_compare] = [paint(&parts[0])?, paint(&parts[1])?];
+    let [train, held_out] = parts;
     let clock = std::time::Instant::now();
-    let start = start(given, flags, &train)?;
-    let mesh = deformed(given, flags, start, &train)?;
+    let stages = stages(given, flags);
+    let of_colours = if flags.colour { painted::config(given).steps } else { 0 };
+    let steps = stages.iter().map(|stage| stage.steps).sum::<usize>() + of_colours;
+    let mut progress = given.progress(steps)?;
+    let mut mesh = match &args.mesh {
+        Some(path) => Mesh::load(path)?,
+        None => {
+            let start = start(given, flags, &train)?;
+            deformed(given, flags, &stages, start, &train, &mut progress)?
+        }
+    };
+    if flags.colour {
+        mesh = painted::painted(given, &mesh, &to_paint, |step, loss| {
+            progress.step(steps - of_colours + step, loss)
+        })?;
+    }
+    progress.finish();
     let seconds = clock.elapsed().as_secs_f64();
-    let score = |view: View, held_out: bool| {
+    let score = |(k, view): (usize, &View), painted: &[PaintedView], held_out: bool| {
         let silhouette = silhouette_pixels(&mesh, &view.camera);
         let iou = mask_iou(&silhouette, &view.mask);
-        Scored { view, silhouette, iou, held_out }
+        let colours = painted.get(k).map(|view| Colours::new(view, &mesh));
+        Scored { view: view.clone(), silhouette, iou, colours, held_out }
     };
-    let train = train.iter().map(|view| score(view.clone(), false));
-    let scored: Vec<Scored> =
-        train.chain(held_out.into_iter().map(|view| score(view, true))).collect();
+    let train = train.iter().enumerate().map(|view| score(view, &to_paint, false));
+    let held_out = held_out.iter().enumerate().map(|view| score(view, &to_compare, true));
+    let scored: Vec<Scored> = train.chain(held_out).collect();
     answer(given, &mesh, &scored, seconds)
+}
+
+/// Parts of the work on the shape, with the steps that were asked for; none if it is known.
+fn stages(given: &Given<'_, Args>, flags: &Views) -> Vec<Stage> {
+    let args = given.args;
+    let from_hull = args.template.is_none() && flags.start.unwrap_or_default() == Begin::Hull;
+    let stages: Vec<Stage> = match (args.mesh.is_some(), from_hull) {
+        (true, _) => Vec::new(),
+        (false, true) => FINE.to_vec(),
+        (false, false) => ROUGH.into_iter().chain([FINE[1]]).collect(),
+    };
+    let with_steps =
+        |stage: Stage| Stage { steps: given.common.steps.unwrap_or(stage.steps), ..stage };
+    stages.into_iter().map(with_steps).collect()
 }
 
 /// Views to work with, and so many evenly spaced ones that are kept aside.
@@ -166,8 +222,7 @@ fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Resu
     let placed = |mesh: Mesh, size: f64| {
         let (middle, reach) = ball(views)?;
         let place = |p: &[f64; 3]| [0, 1, 2].map(|k| middle[k] + size * reach * p[k]);
-        let positions = mesh.positions().iter().map(place).collect();
-        anyhow::Ok(Mesh::new(positions, mesh.faces().to_vec())?)
+        anyhow::Ok(mesh.with_positions(mesh.positions().iter().map(place).collect())?)
     };
     match (&given.args.template, flags.start.unwrap_or_default()) {
         (Some(path), _) => placed(Mesh::load(path)?.normalized(), 0.7),
@@ -199,15 +254,12 @@ fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
 fn deformed(
     given: &Given<'_, Args>,
     flags: &Views,
+    stages: &[Stage],
     start: Mesh,
     views: &[View],
+    progress: &mut Progress,
 ) -> anyhow::Result<Mesh> {
     let (backend, views): (_, Arc<[View]>) = (given.backend()?, views.into());
-    let from_hull = given.args.template.is_none() && flags.start.unwrap_or_default() == Begin::Hull;
-    let stages: Vec<Stage> = match from_hull {
-        true => FINE.to_vec(),
-        false => ROUGH.into_iter().chain([FINE[1]]).collect(),
-    };
     let asked = given.method()?;
     let edge = EdgeSoftness { family: Family::Logistic, squared: false };
     let narrow = Method {
@@ -215,8 +267,6 @@ fn deformed(
         softness: ScheduledSoftness::constant(edge, NARROW),
         ..asked.clone()
     };
-    let steps = |stage: &Stage| given.common.steps.unwrap_or(stage.steps);
-    let mut progress = given.progress(stages.iter().map(steps).sum())?;
     let (mut mesh, mut done) = (start, 0);
     for (k, stage) in stages.iter().enumerate() {
         if stage.finer {
@@ -227,7 +277,7 @@ fn deformed(
         let last = k + 1 == stages.len();
         let config = SolveConfig {
             size: given.common.size.filter(|_| last).unwrap_or(stage.size),
-            steps: steps(stage),
+            steps: stage.steps,
             learning_rate: given.learning_rate().unwrap_or(stage.learning_rate),
         };
         let mut best = f64::INFINITY;
@@ -243,13 +293,13 @@ fn deformed(
             break;
         }
     }
-    progress.finish();
     Ok(mesh)
 }
 
-fn mean(scored: &[Scored], held_out: bool) -> Option<f64> {
+/// The mean of a score of the views that were kept aside, or of the others.
+fn mean(scored: &[Scored], held_out: bool, score: impl Fn(&Scored) -> Option<f64>) -> Option<f64> {
     let of: Vec<f64> =
-        scored.iter().filter(|one| one.held_out == held_out).map(|one| one.iou).collect();
+        scored.iter().filter(|one| one.held_out == held_out).filter_map(score).collect();
     (!of.is_empty()).then(|| of.iter().sum::<f64>() / of.len() as f64)
 }
 
@@ -257,6 +307,8 @@ fn mean(scored: &[Scored], held_out: bool) -> Option<f64> {
 struct Summary {
     train: f64,
     held_out: Option<f64>,
+    /// In decibels, of the same two parts.
+    psnr: [Option<f64>; 2],
     path: PathBuf,
     seconds: f64,
 }
@@ -267,14 +319,23 @@ fn answer(
     scored: &[Scored],
     seconds: f64,
 ) -> anyhow::Result<Answer> {
+    let psnr = |one: &Scored| one.colours.as_ref()?.psnr;
+    let iou = |one: &Scored| Some(one.iou);
     let summary = Summary {
-        train: mean(scored, false).unwrap_or(f64::NAN),
-        held_out: mean(scored, true),
+        train: mean(scored, false, iou).unwrap_or(f64::NAN),
+        held_out: mean(scored, true, iou),
+        psnr: [false, true].map(|held_out| mean(scored, held_out, psnr)),
         path: given.folder().join("mesh.obj"),
         seconds,
     };
     let mut warnings = Vec::new();
-    if summary.train < 0.9 {
+    if summary.train < 0.9 && given.args.mesh.is_some() {
+        warnings.push(format!(
+            "the mean IoU is {:.3} only: the mesh is taken as it stands, in the world units of the cameras; check that it lies where the \
+             pictures show it",
+            summary.train
+        ));
+    } else if summary.train < 0.9 {
         warnings.push(format!(
             "the mean IoU is {:.3} only: check that the cameras belong to the pictures and that the masks are white where the object is \
              (--invert)",
@@ -286,22 +347,28 @@ fn answer(
         .map(for_page)
         .collect();
     let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
+    let colours = painted::sheet(&shown(scored).collect::<Vec<_>>()).map(|sheet| png(&sheet));
+    let colours = colours.transpose()?;
     let text = text(mesh, scored, &summary);
-    let page = page(mesh, scored, &warnings, &text[1..], &picture)?;
+    let page = page(mesh, scored, &warnings, &text[1..], &picture, colours.as_deref())?;
     let json = json(mesh, scored, &summary, &warnings);
-    let files = vec![
+    let mut beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture".to_owned();
+    let mut files = vec![
         ("mesh.obj".to_owned(), mesh.to_obj().into_bytes()),
         ("mesh.ply".to_owned(), mesh.to_ply()),
         ("mesh.glb".to_owned(), mesh.to_glb()),
         ("views.png".to_owned(), picture),
     ];
-    let beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture";
+    if let Some(colours) = colours {
+        files.push(("colours.png".to_owned(), colours));
+        beside += ", colours.png the same in colour";
+    }
     let output = Output { text, json, warnings, partial: None };
-    Ok(Answer { page, output, files, beside: beside.to_owned() })
+    Ok(Answer { page, output, files, beside })
 }
 
 fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
-    let Summary { train, held_out, path, seconds } = summary;
+    let Summary { train, held_out, psnr: [psnr, aside_psnr], path, seconds } = summary;
     let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
     let head = [
         format!("3D SHAPE from {}", counted(scored.len(), "view")),
@@ -312,7 +379,9 @@ fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
         line("seconds", &format!("{seconds:.1}")),
     ];
     let aside = held_out.map(|iou| line("IoU, held out", &format!("{iou:.4}")));
-    head.into_iter().chain(aside).chain(rest).collect()
+    let psnr = psnr.map(|psnr| line("PSNR", &format!("{psnr:.2} dB")));
+    let aside_psnr = aside_psnr.map(|psnr| line("PSNR, held out", &format!("{psnr:.2} dB")));
+    head.into_iter().chain(aside).chain(psnr).chain(aside_psnr).chain(rest).collect()
 }
 
 fn page(
@@ -321,23 +390,35 @@ fn page(
     warnings: &[String],
     text: &[String],
     picture: &[u8],
+    colours: Option<&[u8]>,
 ) -> anyhow::Result<Report> {
-    let mut page = Report::new("shape3d", "A mesh that has the silhouettes of given masks");
+    let about = match colours {
+        Some(_) => "A mesh that has the silhouettes and colours of given pictures",
+        None => "A mesh that has the silhouettes of given masks",
+    };
+    let mut page = Report::new("shape3d", about);
     page.warnings(warnings);
-    let views = scored.iter().map(|Scored { view, iou, held_out, .. }| {
-        let note = format!("IoU {iou:.4}{}", if *held_out { ", kept aside" } else { "" });
+    let psnr = |one: &Scored| one.colours.as_ref().and_then(|colours| colours.psnr);
+    let views = scored.iter().map(|one| {
+        let Scored { view, iou, held_out, .. } = one;
+        let psnr = psnr(one).map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
+        let note = format!("IoU {iou:.4}{psnr}{}", if *held_out { ", kept aside" } else { "" });
         seen_by(view.name.clone(), &view.camera, &view.mask, note)
     });
     let viewer = Viewer {
         positions: mesh.positions().to_vec(),
         faces: mesh.faces().to_vec(),
+        colours: mesh.colours().map(<[_]>::to_vec),
         views: views.collect::<anyhow::Result<_>>()?,
     };
     page.viewer(
         &viewer,
-        picture,
+        colours.unwrap_or(picture),
         "The mesh and the cameras. A view shows it with the outline of its mask.",
     );
+    if let Some(colours) = colours {
+        page.picture(colours, painted::CAPTION);
+    }
     page.picture(
         picture,
         "Masks with the silhouettes of the result over them: grey where both are, orange where only the mask is, blue where only the \
@@ -345,18 +426,22 @@ fn page(
     );
     text.iter().for_each(|line| page.paragraph(line));
     page.heading("Views");
-    let mut table = Table::new(["view", "IoU", "kept aside"]);
-    for Scored { view, iou, held_out, .. } in scored {
-        let aside = if *held_out { "yes" } else { "" };
-        table.push([view.name.clone(), format!("{iou:.4}"), aside.to_owned()]);
+    let head =
+        ["view", "IoU"].into_iter().chain(colours.map(|_| "PSNR in dB")).chain(["kept aside"]);
+    let mut table = Table::new(head);
+    for one in scored {
+        let aside = if one.held_out { "yes" } else { "" };
+        let row = [one.view.name.clone(), format!("{:.4}", one.iou)];
+        let psnr = colours.map(|_| psnr(one).map(|x| format!("{x:.2}")).unwrap_or_default());
+        table.push(row.into_iter().chain(psnr).chain([aside.to_owned()]));
     }
     page.table(&table);
     Ok(page)
 }
 
 fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
-    let Summary { train, held_out, path, seconds } = summary;
-    json!({
+    let Summary { train, held_out, psnr, path, seconds } = summary;
+    let mut json = json!({
         "train_iou": train,
         "held_out_iou": held_out,
         "mesh": path,
@@ -369,7 +454,14 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
             "held_out": one.held_out,
         })).collect::<Vec<_>>(),
         "warnings": warnings,
-    })
+    });
+    if mesh.colours().is_some() {
+        (json["train_psnr"], json["held_out_psnr"]) = (json!(psnr[0]), json!(psnr[1]));
+        for (view, one) in json["views"].as_array_mut().into_iter().flatten().zip(scored) {
+            view["psnr"] = json!(one.colours.as_ref().and_then(|colours| colours.psnr));
+        }
+    }
+    json
 }
 
 /// Those kept aside, then others evenly spaced.
