@@ -94,9 +94,7 @@ fn a_known_shape_gets_its_colours_back_over_nothing_and_over_white() {
         let words = ["--views", views, "--colour", "--mesh", known.to_str().unwrap()];
         let found = run(&out, &[&words[..], &["--hold-out", "2"]].concat()).unwrap();
         assert!(number(&found, "held_out_iou") > 0.98, "{found}");
-        // Over white, pixels of the outline have some white in them.
-        let least = if opaque { 20.0 } else { 30.0 };
-        assert!(number(&found, "held_out_psnr") > least, "{found}");
+        assert!(number(&found, "held_out_psnr") > 30.0, "opaque: {opaque}: {found}");
         assert!(found["views"].as_array().unwrap().iter().all(|view| number(view, "psnr") > 15.0));
         for (name, tolerance) in [("mesh.obj", 0.0), ("mesh.ply", 0.002), ("mesh.glb", 1e-6)] {
             let mesh = Mesh::load(out.join(name)).unwrap();
@@ -144,8 +142,10 @@ fn a_luminance_that_is_the_mask_is_a_white_mesh() {
     let words = ["--views", fox.to_str().unwrap(), "--colour", "--steps", "5"];
     run(out.path(), &words).unwrap();
     let mesh = Mesh::load(out.path().join("mesh.obj")).unwrap();
-    let least = mesh.colours().unwrap().iter().flatten().copied().fold(1.0, f64::min);
-    assert!(least > 0.5, "{least}");
+    // Where grey pixels lie within the mask, as in a gap between legs, there is some grey.
+    let colours = mesh.colours().unwrap();
+    let white = colours.iter().filter(|colour| colour.iter().all(|&x| x > 0.95)).count();
+    assert!(white * 10 > colours.len() * 9, "{white} of {}", colours.len());
 }
 
 #[test]

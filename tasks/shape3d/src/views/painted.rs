@@ -6,7 +6,7 @@ use softrast_inverse::{PaintedView, SolveConfig, coloured_pixels, paint};
 use softrast_lab::{contact_sheet, for_page, rgb_from_planes};
 use softrast_mesh::Mesh;
 
-use super::solve::Scored;
+use super::answer::Scored;
 use crate::Args;
 
 /// On spot with its shape known, 30 steps at 0.1 end at 31.4 dB on views kept aside, 40 at 0.05 at 32.6, 60 at 34.3.
