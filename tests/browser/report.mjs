@@ -86,6 +86,17 @@ async function turns(file) {
   await page.getByRole("checkbox", { name: "Cameras" }).uncheck();
   assert.ok(await pixels(page) !== far, "cameras can be hidden");
 
+  const colours = page.getByRole("checkbox", { name: "Colours" });
+  const painted = await page.evaluate(() => Boolean(JSON.parse(document.querySelector(".viewer script").textContent).colours));
+  assert.equal(await colours.count() > 0, painted, "a switch where there are colours");
+  if (painted) {
+    const before = await pixels(page);
+    await colours.uncheck();
+    assert.ok(await pixels(page) !== before, "colours can be left out");
+    await colours.check();
+    assert.ok(await pixels(page) === before, "and come back");
+  }
+
   const notes = await page.evaluate(() => JSON.parse(document.querySelector(".viewer script").textContent).views.map((view) => view.note));
   for (const [index, note] of notes.entries()) {
     const said = Number(/IoU ([\d.]+)/.exec(note)[1]);

@@ -28,6 +28,7 @@ compile_error!("softrast-inverse needs a backend: turn on one of the features nd
 
 mod camera_file;
 mod checkpoint;
+mod coloured_pixels;
 mod distilled_mlp;
 mod instances;
 mod layout;
@@ -38,6 +39,9 @@ mod mask_targets;
 mod method;
 mod minimize;
 mod objectives;
+mod paint;
+mod paint_targets;
+mod painted_view;
 mod picture;
 pub mod pose;
 mod problem;
@@ -48,6 +52,7 @@ mod targets;
 mod view;
 
 pub use checkpoint::Checkpoint;
+pub use coloured_pixels::coloured_pixels;
 pub use distilled_mlp::{distilled_mlp, mlp_like};
 pub use instances::Instances;
 pub use layout::PhiLayout;
@@ -58,6 +63,9 @@ pub use mask_targets::MaskTargets;
 pub use method::Method;
 pub use minimize::{Iterate, minimize};
 pub use objectives::{Inner, Outer};
+pub use paint::paint;
+pub use paint_targets::PaintTargets;
+pub use painted_view::PaintedView;
 pub use picture::{Picture, save_picture};
 pub use pose::PoseProblem;
 pub use problem::{InverseProblem, SolveConfig};

@@ -53,6 +53,32 @@ impl Picture {
         Ok([0, 1, 2].map(|k| Self { levels: of(k), width }))
     }
 
+    /// Red, green and blue of a picture file, as its numbers are whatever the transparency, and how opaque it is.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing or no picture.
+    pub fn load_with_opacity(path: impl AsRef<Path>) -> anyhow::Result<[Self; 4]> {
+        let picture = open(path.as_ref())?;
+        let (width, pixels) = (picture.width() as usize, picture.to_rgba16());
+        let of = |k: usize| pixels.pixels().map(|p| f32::from(p.0[k]) / FULL).collect();
+        Ok([0, 1, 2, 3].map(|k| Self { levels: of(k), width }))
+    }
+
+    /// A picture of these levels from 0 to 1, row by row from the top.
+    ///
+    /// # Panics
+    ///
+    /// If there are no levels, or no whole rows of this width.
+    pub fn new(levels: Vec<f32>, width: usize) -> Self {
+        let count = levels.len();
+        assert!(
+            count > 0 && width > 0 && count.is_multiple_of(width),
+            "{count} levels, {width} a row"
+        );
+        Self { levels: levels.into(), width }
+    }
+
     /// Height and width in pixels.
     pub fn size(&self) -> ImageSize {
         [self.levels.len() / self.width, self.width].into()

@@ -116,6 +116,8 @@ pub fn mask_iou(silhouette: &[f64], mask: &Picture) -> f64 {
 pub struct View {
     /// What the file calls it.
     pub name: String,
+    /// The file of the picture.
+    pub picture: PathBuf,
     /// Its mask.
     pub mask: Picture,
     /// Who took it.
@@ -153,16 +155,20 @@ pub fn load_views(
         let view = || {
             let frame: Frame = typed(object)?;
             let matrix = camera_to_world(&frame.transform_matrix)?;
-            let mask = load(&picture_path(folder, &frame.mask_path.unwrap_or(frame.file_path)))?;
+            let picture = picture_path(folder, &frame.file_path);
+            let mask = match frame.mask_path {
+                Some(name) => load(&picture_path(folder, &name))?,
+                None => load(&picture)?,
+            };
             let lens = lens.with(&Lens::of(object)?);
             let Pinhole { focal, centre, size, .. } = lens.pinhole(mask.size())?;
             let camera = Pinhole::from_opengl(&matrix, focal, centre, size);
             camera.check()?;
-            anyhow::Ok((mask, camera))
+            anyhow::Ok((picture, mask, camera))
         };
-        let (mask, camera) =
+        let (picture, mask, camera) =
             view().with_context(|| format!("{}: frame {k} ({name})", path.display()))?;
-        Ok(View { name, mask, camera })
+        Ok(View { name, picture, mask, camera })
     };
     frames.iter().enumerate().map(view).collect()
 }

@@ -1,5 +1,5 @@
 // Makes the mesh of every `div.viewer` turn. Each holds a picture, which gives way to a canvas where there is WebGL, and its data as JSON:
-// `positions` (f32) and `faces` (u32) in base64, and `views`: cameras with x right, y down, z ahead, and their masks.
+// `positions` (f32), `faces` (u32) and, if the mesh has some, `colours` (u8) in base64, and `views`: cameras with x right, y down, z ahead, and their masks.
 (() => {
   "use strict";
 
@@ -9,6 +9,7 @@
   const HINT = "Drag to turn, wheel or two fingers to zoom, Shift and drag to pan, double click to reset. " +
     "Keys: arrows, + and −, Shift with arrows, 0.";
   const FREE_FIELD_OF_VIEW = 35 * Math.PI / 180;
+  const CORNER = 9; // numbers of a corner: position, normal, colour
   const LINE_ENDS = 20; // of the frustum of one camera
 
   // Vectors are arrays of three numbers, matrices arrays of three rows.
@@ -37,17 +38,19 @@
     return array.buffer;
   }
 
-  /** Three corners per face, each as position and normal of the face; and a sphere around them. */
-  function triangles(positions, faces) {
-    const data = new Float32Array(6 * faces.length);
+  /** Three corners per face, each as position, normal of the face and colour; and a sphere around them. */
+  function triangles(positions, faces, colours) {
+    const data = new Float32Array(CORNER * faces.length);
     const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
     for (let face = 0; face < faces.length; face += 3) {
       const corners = [0, 1, 2].map((k) => positions.subarray(3 * faces[face + k], 3 * faces[face + k] + 3));
       const [a, b, c] = corners.map((corner) => Array.from(corner));
       const normal = unit(cross(difference(b, a), difference(c, a)));
       corners.forEach((corner, k) => {
-        data.set(corner, 6 * (face + k));
-        data.set(normal, 6 * (face + k) + 3);
+        const [at, vertex] = [CORNER * (face + k), 3 * faces[face + k]];
+        data.set(corner, at);
+        data.set(normal, at + 3);
+        if (colours) data.set(Array.from(colours.subarray(vertex, vertex + 3), (x) => x / 255), at + 6);
         for (let axis = 0; axis < 3; axis++) {
           low[axis] = Math.min(low[axis], corner[axis]);
           high[axis] = Math.max(high[axis], corner[axis]);
@@ -97,23 +100,25 @@
   }
 
   const VERTEX = `
-    attribute vec3 position, normal;
+    attribute vec3 position, normal, colour;
     uniform mat4 clip;
     uniform vec3 eye;
-    varying vec3 across, towards;
+    varying vec3 across, towards, paint;
     void main() {
       gl_Position = clip * vec4(position, 1.0);
       across = normal;
+      paint = colour;
       towards = eye - position;
     }`;
   const FRAGMENT = `
     precision highp float;
     uniform vec3 ink;
-    uniform float ambient;
-    varying vec3 across, towards;
+    uniform float ambient, painted;
+    varying vec3 across, towards, paint;
     void main() {
       float facing = abs(dot(across, normalize(towards)));
-      gl_FragColor = vec4(ink * mix(facing, 1.0, ambient), 1.0);
+      vec3 plain = ink * mix(facing, 1.0, ambient);
+      gl_FragColor = vec4(mix(plain, paint, painted), 1.0);
     }`;
 
   /** Draws for all viewers of the page, because browsers allow only about sixteen WebGL contexts. */
@@ -144,8 +149,8 @@
       if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(this.program));
       gl.useProgram(this.program);
       gl.enable(gl.DEPTH_TEST);
-      this.at = Object.fromEntries(["clip", "eye", "ink", "ambient"].map((name) => [name, gl.getUniformLocation(this.program, name)]));
-      [this.position, this.normal] = ["position", "normal"].map((name) => gl.getAttribLocation(this.program, name));
+      this.at = Object.fromEntries(["clip", "eye", "ink", "ambient", "painted"].map((name) => [name, gl.getUniformLocation(this.program, name)]));
+      [this.position, ...this.ofMesh] = ["position", "normal", "colour"].map((name) => gl.getAttribLocation(this.program, name));
       gl.enableVertexAttribArray(this.position);
     }
 
@@ -166,16 +171,22 @@
       gl.uniform3fv(at.eye, eye);
     }
 
-    mesh(buffer, corners) {
-      this.use(buffer, 24, MESH, 0.25);
-      this.gl.enableVertexAttribArray(this.normal);
-      this.gl.vertexAttribPointer(this.normal, 3, this.gl.FLOAT, false, 24, 12);
-      this.gl.drawArrays(this.gl.TRIANGLES, 0, corners);
+    /** In its colours as they are, which hold the light of the pictures already, or plain and shaded. */
+    mesh(buffer, corners, painted) {
+      const [gl, stride] = [this.gl, 4 * CORNER];
+      this.use(buffer, stride, MESH, 0.25);
+      gl.uniform1f(this.at.painted, painted ? 1 : 0);
+      this.ofMesh.forEach((attribute, k) => {
+        gl.enableVertexAttribArray(attribute);
+        gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, stride, 12 * (k + 1));
+      });
+      gl.drawArrays(gl.TRIANGLES, 0, corners);
+      gl.uniform1f(this.at.painted, 0);
+      for (const attribute of this.ofMesh) gl.disableVertexAttribArray(attribute);
     }
 
     lines(buffer, first, count) {
       this.use(buffer, 12, CAMERA, 1);
-      this.gl.disableVertexAttribArray(this.normal);
       if (count > 0) this.gl.drawArrays(this.gl.LINES, first, count);
     }
 
@@ -205,7 +216,9 @@
       const data = JSON.parse(box.querySelector("script").textContent);
       this.painter = painter;
       this.views = data.views;
-      this.mesh = triangles(new Float32Array(bytes(data.positions)), new Uint32Array(bytes(data.faces)));
+      const colours = data.colours && new Uint8Array(bytes(data.colours));
+      this.mesh = triangles(new Float32Array(bytes(data.positions)), new Uint32Array(bytes(data.faces)), colours);
+      this.coloured = Boolean(colours);
       this.frustums = new Float32Array(this.views.flatMap((view) => frustum(view, 0.25 * this.mesh.radius)));
       this.eyes = this.views.map((view) => unprojected(view, 0, 0, 0));
       this.upload();
@@ -229,9 +242,12 @@
       this.stage = element("div", { className: "viewer-stage" }, this.canvas, this.overlay);
       this.select = element("select", {}, new Option("Free", -1), ...this.views.map((view, k) => new Option(view.name, k)));
       this.cameras = element("input", { type: "checkbox", checked: true });
+      this.colours = element("input", { type: "checkbox", checked: true });
       this.button = element("button", { type: "button" }, "Reset");
       const labels = [element("label", {}, "View ", this.select), element("label", {}, this.cameras, "Cameras")];
-      const controls = element("div", { className: "viewer-controls" }, ...(this.views.length ? labels : []), this.button);
+      const paint = element("label", {}, this.colours, "Colours");
+      const controls = element("div", { className: "viewer-controls" },
+        ...(this.views.length ? labels : []), ...(this.coloured ? [paint] : []), this.button);
       this.note = element("p", { className: "note" });
       this.note.setAttribute("aria-live", "polite");
       picture.replaceWith(this.stage, controls, this.note);
@@ -264,7 +280,7 @@
       canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
       canvas.addEventListener("keydown", (event) => this.key(event));
       select.addEventListener("change", () => (select.value < 0 ? this.leave() : this.enter(this.views[select.value])));
-      this.cameras.addEventListener("change", () => this.schedule());
+      for (const box of [this.cameras, this.colours]) box.addEventListener("change", () => this.schedule());
       this.button.addEventListener("click", () => this.reset());
     }
 
@@ -375,7 +391,8 @@
       const translation = difference(this.seen, apply(this.rotation, this.pivot));
       const eye = times(-1, apply(transposed(this.rotation), translation));
       this.painter.begin(size.width, size.height, this.clip(translation, width, height), eye);
-      this.painter.mesh(this.buffers[0], this.mesh.data.length / 6);
+      const painted = this.coloured && this.colours.checked;
+      this.painter.mesh(this.buffers[0], this.mesh.data.length / CORNER, painted);
       if (this.cameras.checked) {
         // The frustum of the view that is looked through would be the border of the image.
         const own = this.view ? this.views.indexOf(this.view) : this.views.length;

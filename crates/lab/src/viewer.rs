@@ -18,6 +18,9 @@ pub struct Viewer {
     /// Triangles as indices of `positions`. Both sides are drawn, so their orientation does not matter.
     #[serde(serialize_with = "faces")]
     pub faces: Vec<[u32; 3]>,
+    /// Red, green and blue of each vertex from 0 to 1, if the mesh has colours; the page keeps them as bytes.
+    #[serde(serialize_with = "colours", skip_serializing_if = "Option::is_none")]
+    pub colours: Option<Vec<[f64; 3]>>,
     /// In the order in which the page offers them; there may be none.
     pub views: Vec<ViewerView>,
 }
@@ -57,7 +60,7 @@ impl Report {
     ///
     /// # Panics
     ///
-    /// If a face refers to a vertex that there is not, or a view has an image without pixels.
+    /// If a face refers to a vertex that there is not, there are not as many colours as vertices, or a view has an image without pixels.
     pub fn viewer(&mut self, viewer: &Viewer, fallback_png: &[u8], caption: &str) {
         viewer.check();
         if !viewer.can_be_drawn() {
@@ -78,6 +81,8 @@ impl Viewer {
             let inside = face.iter().all(|&vertex| (vertex as usize) < vertices);
             assert!(inside, "face {k} is {face:?}, but there are {vertices} vertices");
         }
+        let colours = self.colours.as_ref().map_or(vertices, Vec::len);
+        assert_eq!(colours, vertices, "colours and vertices");
         for ViewerView { name, width, height, .. } in &self.views {
             assert!(width * height > 0, "view {name:?} has {width} x {height} pixels");
         }
@@ -113,6 +118,17 @@ fn faces<S: Serializer>(faces: &[[u32; 3]], serializer: S) -> Result<S::Ok, S::E
     base64(&indices.flat_map(|index| index.to_le_bytes()).collect::<Vec<_>>(), serializer)
 }
 
+fn colours<S: Serializer>(
+    colours: &Option<Vec<[f64; 3]>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let channels = colours.iter().flatten().flatten();
+    base64(
+        &channels.map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8).collect::<Vec<_>>(),
+        serializer,
+    )
+}
+
 fn base64<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&STANDARD.encode(bytes))
 }
@@ -139,7 +155,8 @@ mod tests {
             note: "IoU <0.97>".into(),
         };
         let positions = vec![[0.1, -2.0, 3e4], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        Viewer { positions, faces: vec![[0, 1, 2], [2, 1, 0]], views: vec![view] }
+        let faces = vec![[0, 1, 2], [2, 1, 0]];
+        Viewer { positions, faces, colours: None, views: vec![view] }
     }
 
     fn page(viewers: &[Viewer]) -> String {
@@ -176,6 +193,21 @@ mod tests {
             "centre": [32.5, 24.0], "width": 64, "height": 48,
         });
         assert_eq!(data["views"], json!([view]));
+    }
+
+    #[test]
+    fn colours_are_bytes_and_left_out_where_there_are_none() {
+        assert_eq!(data(&page(&[triangle()]))[0]["colours"], Value::Null);
+        let colours = Some(vec![[0.0, 0.2, 1.0], [1.0, 0.0, 0.0], [f64::NAN, 2.0, -1.0]]);
+        let found = &data(&page(&[Viewer { colours, ..triangle() }]))[0]["colours"];
+        let bytes = STANDARD.decode(found.as_str().unwrap()).unwrap();
+        assert_eq!(bytes, [0, 51, 255, 255, 0, 0, 0, 255, 0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "colours and vertices")]
+    fn a_missing_colour_panics() {
+        page(&[Viewer { colours: Some(vec![[0.0; 3]]), ..triangle() }]);
     }
 
     #[test]

@@ -7,12 +7,12 @@ impl Mesh {
     ///
     /// `cell` is the side of a cube in world units; no vertex moves further than its diagonal. Faces that shrink to an edge or a point are
     /// left out, and of faces between the same three vertices only the first stays, so walls thinner than a cube become one sheet.
-    /// `None` if no face is left.
+    /// Colours are means too. `None` if no face is left.
     ///
     /// Source: vertex clustering, Rossignac and Borrel 1993.
     #[must_use]
     pub fn clustered(&self, cell: f64) -> Option<Self> {
-        let mut sums: Vec<([f64; 3], f64)> = Vec::new();
+        let mut sums: Vec<([[f64; 3]; 2], f64)> = Vec::new();
         let mut numbers = BTreeMap::new();
         let mut merged = vec![None; self.positions().len()];
         let mut seen = BTreeSet::new();
@@ -24,11 +24,13 @@ impl Mesh {
                     let number = *numbers
                         .entry(position.map(|x| (x / cell).floor() as i64))
                         .or_insert_with(|| {
-                            sums.push(([0.0; 3], 0.0));
+                            sums.push(([[0.0; 3]; 2], 0.0));
                             sums.len() - 1
                         });
-                    let (sum, count) = &mut sums[number];
-                    *sum = [0, 1, 2].map(|k| sum[k] + position[k]);
+                    let colour = self.colours().map_or([0.0; 3], |colours| colours[v as usize]);
+                    let ([place, paint], count) = &mut sums[number];
+                    *place = [0, 1, 2].map(|k| place[k] + position[k]);
+                    *paint = [0, 1, 2].map(|k| paint[k] + colour[k]);
                     *count += 1.0;
                     number as u32
                 })
@@ -40,8 +42,18 @@ impl Mesh {
                 faces.push(corners);
             }
         }
-        let positions = sums.iter().map(|(sum, count)| sum.map(|x| x / count)).collect();
-        (!faces.is_empty()).then(|| Self::from_valid(positions, faces))
+        if faces.is_empty() {
+            return None;
+        }
+        let means = |part: usize| -> Vec<[f64; 3]> {
+            sums.iter().map(|(sum, count)| sum[part].map(|x| x / count)).collect()
+        };
+        let mesh = Self::from_valid(means(0), faces);
+        Some(match self.colours() {
+            // Rounding may lead a hair beyond what all of them are.
+            Some(_) => mesh.painted(means(1).into_iter().map(|c| c.map(|x| x.min(1.0))).collect()),
+            None => mesh,
+        })
     }
 }
 
@@ -67,6 +79,15 @@ mod tests {
         let sheet = wall.clustered(1.0).unwrap();
         assert_eq!(sheet.faces(), &[[0, 1, 2]]);
         assert!(sheet.positions().iter().all(|p| (p[2] - 0.3).abs() < 1e-12));
+    }
+
+    #[test]
+    fn colours_of_merged_vertices_are_means() {
+        let corners = vec![[0.1; 3], [0.2; 3], [3.1, 0.1, 0.1], [0.1, 3.1, 0.1]];
+        let mesh = Mesh::new(corners, vec![[0, 2, 3], [1, 2, 3]]).unwrap();
+        let mesh = mesh.with_colours(vec![[0.0; 3], [1.0; 3], [0.25; 3], [1.0; 3]]).unwrap();
+        let few = mesh.clustered(1.0).unwrap();
+        assert_eq!(few.colours().unwrap(), [[0.5; 3], [0.25; 3], [1.0; 3]]);
     }
 
     #[test]

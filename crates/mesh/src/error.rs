@@ -88,6 +88,20 @@ pub enum MeshError {
         /// Index of the vertex, from 0.
         vertex: usize,
     },
+    /// There are more or fewer colours than vertices.
+    #[error("{found} colours for the {vertices} vertices of the mesh")]
+    Colours {
+        /// How many colours there are.
+        found: usize,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// A channel of a colour is not from 0 to 1.
+    #[error("the colour of vertex {vertex} of the mesh is not from 0 to 1")]
+    Colour {
+        /// Index of the vertex, from 0.
+        vertex: usize,
+    },
     /// A face refers to a vertex that the mesh does not have.
     #[error("face {face} of the mesh uses vertex {vertex}, but there are {vertices}")]
     Vertex {
@@ -118,6 +132,14 @@ pub enum Fault {
     /// A coordinate that is NaN, infinite, or infinite once rounded to 32 bits.
     #[error("coordinate {0:?} is not finite in 32-bit floats")]
     NotFinite(String),
+    /// A channel of a colour that is NaN, below 0, or above what the file's type of number has for full.
+    #[error("colour {value:?} is not from 0 to {full}")]
+    Colour {
+        /// The channel as the file has it.
+        value: String,
+        /// What stands for full.
+        full: u16,
+    },
     /// A face with fewer than three corners.
     #[error("fewer than three corners: found {0}")]
     Corners(usize),
@@ -153,6 +175,15 @@ impl Fault {
     pub(crate) fn format(reason: impl Into<String>) -> Self {
         Self::Format(reason.into().replace(char::is_control, " "))
     }
+}
+
+/// A channel of a colour, as a share of `full`.
+pub(crate) fn channel(value: f64, full: u16) -> Result<f64, Fault> {
+    let share = value / f64::from(full);
+    if (0.0..=1.0).contains(&share) {
+        return Ok(share);
+    }
+    Err(Fault::Colour { value: value.to_string(), full })
 }
 
 /// What is wrong with the content of a file whose name the reader does not know.

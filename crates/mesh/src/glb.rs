@@ -9,7 +9,8 @@ use crate::{
     error::{Trouble, shown},
     gltf::{Gltf, Node, Primitive},
     placement::Placement,
-    ply::{Parts, finite},
+    ply::finite,
+    read::Parts,
 };
 
 const MAGIC: &[u8] = b"glTF";
@@ -33,6 +34,9 @@ const HARMLESS: [&str; 9] = [
     "MSFT_texture_",
 ];
 
+/// The colour of what has none beside what has one.
+const WHITE: [f64; 3] = [1.0; 3];
+
 const NO_FACES: Trouble =
     Trouble::NoFaces("a GLB file has them in meshes of triangles at the nodes of its scene");
 
@@ -54,7 +58,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
     }
 
     let most = MOST_PLACED.max(bytes.len());
-    let mut surface = Surface { gltf: &gltf, bin, most, positions: vec![], faces: vec![] };
+    let parts = Parts::default();
+    let mut surface = Surface { gltf: &gltf, bin, most, parts };
     let mut seen = vec![false; gltf.nodes.len()];
     let mut waiting = vec![];
     enter(&roots(&gltf)?, &Placement::IDENTITY, &mut seen, &mut waiting)?;
@@ -70,7 +75,14 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
         }
         enter(&node.children, &placement, &mut seen, &mut waiting)?;
     }
-    if surface.faces.is_empty() { Err(NO_FACES) } else { Ok((surface.positions, surface.faces)) }
+    let mut parts = surface.parts;
+    if parts.faces.is_empty() {
+        return Err(NO_FACES);
+    }
+    if let Some(colours) = &mut parts.colours {
+        colours.resize(parts.positions.len(), WHITE);
+    }
+    Ok(parts)
 }
 
 /// The JSON chunk and the binary chunk, if there is one.
@@ -162,8 +174,8 @@ struct Surface<'a> {
     gltf: &'a Gltf,
     bin: Option<&'a [u8]>,
     most: usize,
-    positions: Vec<[f64; 3]>,
-    faces: Vec<[u32; 3]>,
+    /// Colours may be fewer than positions: those at the end are white.
+    parts: Parts,
 }
 
 impl Surface<'_> {
@@ -190,7 +202,7 @@ impl Surface<'_> {
         &mut self,
         primitive: &Primitive,
         placement: &Placement,
-        firsts: &mut HashMap<usize, usize>,
+        firsts: &mut HashMap<(usize, Option<usize>), usize>,
     ) -> Result<(), Trouble> {
         let wrong = |reason: String| Trouble::part("", reason);
         let accessor = match (primitive.mode, primitive.attributes.position) {
@@ -199,23 +211,27 @@ impl Surface<'_> {
             (mode, _) => return Err(wrong(format!("{mode} is not a mode of glTF"))),
         };
         let vertices = self.gltf.count(accessor)?;
-        let first = match firsts.get(&accessor) {
+        let key = (accessor, primitive.attributes.colour);
+        let first = match firsts.get(&key) {
             Some(&first) => first,
             None => {
-                self.leave_room(self.positions.len(), vertices, "vertices")?;
-                let first = self.positions.len();
+                let first = self.parts.positions.len();
+                self.leave_room(first, vertices, "vertices")?;
+                if let Some(colour) = primitive.attributes.colour {
+                    self.add_colours(colour, first, vertices)?;
+                }
                 for (vertex, p) in self.gltf.positions(accessor, self.bin)?.iter().enumerate() {
                     let position = placement.apply(*p);
                     finite(position)
                         .map_err(|why| Trouble::Part(format!("vertex {vertex}"), why))?;
-                    self.positions.push(position);
+                    self.parts.positions.push(position);
                 }
-                *firsts.entry(accessor).or_insert(first)
+                *firsts.entry(key).or_insert(first)
             }
         };
 
         let count = primitive.indices.map_or(Ok(vertices), |indices| self.gltf.count(indices))?;
-        self.leave_room(self.faces.len(), count, "corners")?;
+        self.leave_room(self.parts.faces.len(), count, "corners")?;
         let indices = match primitive.indices {
             Some(indices) => self.gltf.indices(indices, self.bin)?,
             // No more than 2³² vertices have been let in.
@@ -235,7 +251,32 @@ impl Surface<'_> {
             let [a, b, c] = [first + a, first + b, first + c];
             if placement.mirrors() { [a, c, b] } else { [a, b, c] }
         };
-        self.faces.extend(triangles(primitive.mode, &indices).into_iter().map(placed));
+        self.parts.faces.extend(triangles(primitive.mode, &indices).into_iter().map(placed));
+        Ok(())
+    }
+
+    /// Adds the colours of as many vertices, after `first` others.
+    fn add_colours(
+        &mut self,
+        accessor: usize,
+        first: usize,
+        vertices: usize,
+    ) -> Result<(), Trouble> {
+        let linear = self.gltf.colours(accessor, self.bin)?;
+        if linear.len() != vertices {
+            let reason = format!("{} colours for {vertices} vertices", linear.len());
+            return Err(Trouble::part("", reason));
+        }
+        let colours = self.parts.colours.get_or_insert_default();
+        colours.resize(first, WHITE);
+        for (vertex, colour) in linear.into_iter().enumerate() {
+            if colour.iter().any(|x| x.is_nan()) {
+                let reason = Fault::Colour { value: "NaN".to_owned(), full: 1 };
+                return Err(Trouble::Part(format!("vertex {vertex}"), reason));
+            }
+            // Source: glTF 2.0 specification, Sec. 3.7.2.1: components must be clamped.
+            colours.push(colour.map(|x| from_linear(x.clamp(0.0, 1.0))));
+        }
         Ok(())
     }
 
@@ -262,6 +303,20 @@ fn triangles(mode: u64, indices: &[u32]) -> Vec<[u32; 3]> {
     }
 }
 
+/// A channel as screens have it, of one that is proportional to light; both from 0 to 1.
+///
+/// Source: IEC 61966-2-1 (sRGB). Vertex colours of glTF are linear: specification, Sec. 3.7.2.1.
+fn from_linear(x: f64) -> f64 {
+    let root = x.powf(1.0 / 2.4);
+    // In this form 1 is exactly 1.
+    if x <= 0.003_130_8 { 12.92 * x } else { root + 0.055 * (root - 1.0) }
+}
+
+/// The inverse of [`from_linear`].
+fn to_linear(x: f64) -> f64 {
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
 /// See [`Mesh::to_glb`].
 pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     let positions: Vec<_> = mesh.positions().iter().map(|p| p.map(|x| x as f32)).collect();
@@ -269,8 +324,8 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
         positions.iter().copied().reduce(|a, b| [0, 1, 2].map(|k| pick(a[k], b[k])))
     };
     let (vertices, corners) = (positions.len(), 3 * mesh.faces().len());
-    let length = 12 * vertices + 4 * corners;
-    let json = json!({
+    let mut length = 12 * vertices + 4 * corners;
+    let mut json = json!({
         "asset": {"version": "2.0", "generator": "softrast-mesh"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -299,8 +354,27 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
             {"buffer": 0, "byteLength": 12 * vertices, "target": 34962},
             {"buffer": 0, "byteOffset": 12 * vertices, "byteLength": 4 * corners, "target": 34963},
         ],
-        "buffers": [{"byteLength": length}],
     });
+    if mesh.colours().is_some() {
+        json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(2);
+        json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] =
+            json!([1.0, 1.0, 1.0, 1.0]);
+        let more = [
+            (
+                "accessors",
+                json!({"bufferView": 2, "componentType": 5126, "count": vertices, "type": "VEC3"}),
+            ),
+            (
+                "bufferViews",
+                json!({"buffer": 0, "byteOffset": length, "byteLength": 12 * vertices, "target": 34962}),
+            ),
+        ];
+        for (list, entry) in more {
+            json[list].as_array_mut().expect("a list").push(entry);
+        }
+        length += 12 * vertices;
+    }
+    json["buffers"] = json!([{"byteLength": length}]);
     let mut json = json.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
 
@@ -315,5 +389,7 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     file.extend([&of_32_bits(length), BIN].concat());
     file.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
     file.extend(mesh.faces().iter().flatten().flat_map(|v| v.to_le_bytes()));
+    let colours = mesh.colours().into_iter().flatten().flatten();
+    file.extend(colours.flat_map(|&x| (to_linear(x) as f32).to_le_bytes()));
     file
 }

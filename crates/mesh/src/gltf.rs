@@ -61,6 +61,8 @@ fn triangles() -> u64 {
 pub(crate) struct Attributes {
     #[serde(rename = "POSITION")]
     pub(crate) position: Option<usize>,
+    #[serde(rename = "COLOR_0")]
+    pub(crate) colour: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -183,6 +185,31 @@ impl Gltf {
         } else {
             Err(format!("positions are of type VEC3, not {:?}", it.shape))
         };
+        values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+    }
+
+    /// The entries of an accessor of linear colours, without transparency; `bin` is the binary chunk.
+    pub(crate) fn colours(
+        &self,
+        accessor: usize,
+        bin: Option<&[u8]>,
+    ) -> Result<Vec<[f64; 3]>, Trouble> {
+        let count = self.count(accessor)?;
+        let it = &self.accessors[accessor];
+        let share = match Component::of(it.component_type) {
+            Some(Component::F32) => true,
+            Some(Component::U8 | Component::U16) => it.normalized,
+            _ => false,
+        };
+        let values =
+            match (share, it.shape.as_str()) {
+                (true, "VEC3") => self.values(it, count, bin),
+                (true, "VEC4") => self
+                    .values(it, count, bin)
+                    .map(|all| all.into_iter().map(|[r, g, b, _]| [r, g, b]).collect()),
+                _ => Err("colours are VEC3 or VEC4 of floats or of normalized bytes or shorts"
+                    .to_owned()),
+            };
         values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
     }
 

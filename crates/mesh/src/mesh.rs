@@ -9,14 +9,17 @@ use crate::MeshError;
 /// Every position is finite, also once rounded to 32 bits; every index is in range; there is at
 /// least one face. Faces may be degenerate (a corner repeated, or no area), vertices may be
 /// doubled or unused, and the surface may be open: none of this keeps a mesh from being rendered.
+///
+/// A mesh may have a colour at each vertex; then every channel is in [0, 1].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
+    colours: Option<Vec<[f64; 3]>>,
 }
 
 impl Mesh {
-    /// A mesh of `positions` (world units, y up) and `faces` (indices from 0).
+    /// A mesh of `positions` (world units, y up) and `faces` (indices from 0), without colours.
     ///
     /// # Errors
     ///
@@ -25,27 +28,62 @@ impl Mesh {
         if faces.is_empty() {
             return Err(MeshError::Empty);
         }
-        if let Some(vertex) = positions.iter().position(|p| !p.iter().all(|&x| fits_f32(x))) {
-            return Err(MeshError::Position { vertex });
-        }
+        all_finite(&positions)?;
         let vertices = positions.len();
         for (face, corners) in faces.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
                 return Err(MeshError::Vertex { face, vertex, vertices });
             }
         }
-        Ok(Self { positions, faces })
+        Ok(Self { positions, faces, colours: None })
     }
 
-    /// The same surface with each triangle cut into four, at the middles of its edges.
+    /// The same mesh with a colour at each vertex: red, green and blue from 0 to 1, as pictures and screens have them (sRGB).
+    ///
+    /// # Errors
+    ///
+    /// If there are not as many colours as vertices, or a channel is not from 0 to 1.
+    pub fn with_colours(self, colours: Vec<[f64; 3]>) -> Result<Self, MeshError> {
+        let (found, vertices) = (colours.len(), self.positions.len());
+        if found != vertices {
+            return Err(MeshError::Colours { found, vertices });
+        }
+        if let Some(vertex) = colours.iter().position(|c| !c.iter().all(is_share)) {
+            return Err(MeshError::Colour { vertex });
+        }
+        Ok(Self { colours: Some(colours), ..self })
+    }
+
+    /// The same faces and colours between vertices at other places.
+    ///
+    /// # Errors
+    ///
+    /// If a position is not finite in 32-bit floats.
+    ///
+    /// # Panics
+    ///
+    /// If there are not as many positions as vertices.
+    pub fn with_positions(&self, positions: Vec<[f64; 3]>) -> Result<Self, MeshError> {
+        all_finite(&positions)?;
+        Ok(self.moved(positions))
+    }
+
+    /// The same surface with each triangle cut into four, at the middles of its edges. There the colour is the mean of both ends.
     #[must_use]
     pub fn subdivided(&self) -> Self {
         let mut positions = self.positions.clone();
+        let mut colours = self.colours.clone();
         let mut middles = BTreeMap::new();
         let mut middle = |a: u32, b: u32| {
             *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                let [p, q] = [a, b].map(|v| self.positions[v as usize]);
-                positions.push([0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0));
+                let between = |of: &[[f64; 3]]| {
+                    let [p, q] = [a, b].map(|v| of[v as usize]);
+                    [0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0)
+                };
+                positions.push(between(&self.positions));
+                if let Some(colours) = &mut colours {
+                    colours.push(between(colours));
+                }
                 (positions.len() - 1) as u32
             })
         };
@@ -54,12 +92,17 @@ impl Mesh {
             [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
         };
         let faces = self.faces.iter().flat_map(cut).collect();
-        Self { positions, faces }
+        Self { positions, faces, colours }
     }
 
     /// The vertices, in world units.
     pub fn positions(&self) -> &[[f64; 3]] {
         &self.positions
+    }
+
+    /// Red, green and blue at each vertex, from 0 to 1 as pictures and screens have them (sRGB); if the mesh has colours.
+    pub fn colours(&self) -> Option<&[[f64; 3]]> {
+        self.colours.as_deref()
     }
 
     /// The triangles: three indices into [`Mesh::positions`] each, counterclockwise from outside
@@ -93,7 +136,30 @@ impl Mesh {
 
     /// A mesh of parts that are valid by construction.
     pub(crate) fn from_valid(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
-        Self { positions, faces }
+        Self { positions, faces, colours: None }
+    }
+
+    /// With colours that are valid by construction.
+    pub(crate) fn painted(self, colours: Vec<[f64; 3]>) -> Self {
+        Self { colours: Some(colours), ..self }
+    }
+
+    /// With its vertices at other places, which are valid by construction.
+    pub(crate) fn moved(&self, positions: Vec<[f64; 3]>) -> Self {
+        assert_eq!(positions.len(), self.positions.len(), "positions of vertices");
+        Self { positions, faces: self.faces.clone(), colours: self.colours.clone() }
+    }
+}
+
+/// Whether a channel of a colour is one.
+pub(crate) fn is_share(x: &f64) -> bool {
+    (0.0..=1.0).contains(x)
+}
+
+fn all_finite(positions: &[[f64; 3]]) -> Result<(), MeshError> {
+    match positions.iter().position(|p| !p.iter().all(|&x| fits_f32(x))) {
+        Some(vertex) => Err(MeshError::Position { vertex }),
+        None => Ok(()),
     }
 }
 
@@ -138,6 +204,32 @@ mod tests {
     fn bounds_leave_out_unused_vertices() {
         let mesh = Mesh::new(CORNER.to_vec(), vec![[0, 1, 2]]).unwrap();
         assert_eq!(mesh.bounds(), [[0.0; 3], [3.0, 4.0, 0.0]]);
+    }
+
+    #[test]
+    fn colours_are_one_for_each_vertex_and_from_0_to_1() {
+        let mesh = Mesh::new(CORNER.to_vec(), vec![[0, 1, 2]]).unwrap();
+        assert_eq!(mesh.colours(), None);
+        let message =
+            |colours: Vec<[f64; 3]>| mesh.clone().with_colours(colours).unwrap_err().to_string();
+        assert_eq!(message(vec![[0.5; 3]; 3]), "3 colours for the 4 vertices of the mesh");
+        for wrong in [f64::NAN, -1e-9, 1.1, f64::INFINITY] {
+            let colours = vec![[0.0; 3], [0.0, 1.0, wrong], [1.0; 3], [1.0; 3]];
+            assert_eq!(message(colours), "the colour of vertex 1 of the mesh is not from 0 to 1");
+        }
+    }
+
+    #[test]
+    fn colours_stay_where_vertices_move_and_are_means_where_there_are_more() {
+        let colours = vec![[0.0; 3], [1.0, 0.5, 0.0], [0.0, 0.5, 1.0], [1.0; 3]];
+        let mesh = Mesh::new(CORNER.to_vec(), vec![[0, 1, 2]]).unwrap();
+        let mesh = mesh.with_colours(colours.clone()).unwrap();
+        assert_eq!(mesh.normalized().colours(), Some(colours.as_slice()));
+        assert_eq!(mesh.with_positions(vec![[1.0; 3]; 4]).unwrap().colours(), mesh.colours());
+        assert!(mesh.with_positions(vec![[f64::NAN; 3]; 4]).is_err());
+        let finer = mesh.subdivided();
+        let middles = [[0.5, 0.25, 0.0], [0.5; 3], [0.0, 0.25, 0.5]];
+        assert_eq!(finer.colours().unwrap(), [colours.as_slice(), &middles].concat());
     }
 
     #[test]

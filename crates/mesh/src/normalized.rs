@@ -20,7 +20,7 @@ impl Mesh {
         let scaled = |x: f64, k: usize| ((x - low[k]) - (high[k] - x)) / divisor;
         let place = |p: &[f64; 3]| [0, 1, 2].map(|k| scaled(p[k], k).clamp(-1.0, 1.0));
         let positions = self.positions().iter().map(place).collect();
-        Mesh::from_valid(positions, self.faces().to_vec())
+        self.moved(positions)
     }
 }
 

@@ -24,7 +24,11 @@ pub(crate) fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
         let polygons = split(&mesh.indices, &mesh.face_arities);
         faces.extend(polygons.skip(1).flat_map(|corners| triangles(&positions, corners)));
     }
-    Mesh::new(positions, faces)
+    let mesh = Mesh::new(positions, faces)?;
+    match clean.colours {
+        Some(colours) => mesh.with_colours(colours),
+        None => Ok(mesh),
+    }
 }
 
 /// The polygons of a parsed model; no `arities` means that all are triangles.
@@ -43,8 +47,12 @@ pub(crate) struct Obj<'a>(pub(crate) &'a Mesh);
 
 impl fmt::Display for Obj<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for [x, y, z] in self.0.positions() {
-            writeln!(f, "v {x} {y} {z}")?;
+        for (vertex, [x, y, z]) in self.0.positions().iter().enumerate() {
+            write!(f, "v {x} {y} {z}")?;
+            if let Some([red, green, blue]) = self.0.colours().map(|colours| colours[vertex]) {
+                write!(f, " {red} {green} {blue}")?;
+            }
+            writeln!(f)?;
         }
         for [a, b, c] in self.0.faces().iter().map(|face| face.map(|v| u64::from(v) + 1)) {
             writeln!(f, "f {a} {b} {c}")?;

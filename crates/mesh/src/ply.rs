@@ -8,15 +8,18 @@ use std::slice::ChunksExact;
 
 use crate::{
     Fault, Mesh,
-    error::{Trouble, shown},
+    error::{Trouble, channel, shown},
     mesh::fits_f32,
     ply_header::{Element, Encoding, Header, Number, Property},
     polygon::triangles,
+    read::Parts,
     statements::next_line,
 };
 
-/// Positions and faces.
-pub(crate) type Parts = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+const AXES: [[&str; 2]; 3] = [["x", "x"], ["y", "y"], ["z", "z"]];
+/// Most programs write the first name of each, some older ones the second.
+const CHANNELS: [[&str; 2]; 3] =
+    [["red", "diffuse_red"], ["green", "diffuse_green"], ["blue", "diffuse_blue"]];
 
 const NO_FACES: Trouble = Trouble::NoFaces("a PLY file lists them in its element face");
 
@@ -34,17 +37,37 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
 
     let mut body = Body { rest: bytes, encoding, line: lines };
     let (mut positions, mut corners, mut polygons) = (Vec::new(), Vec::new(), Vec::new());
+    let mut colours = None;
     for element in &elements {
         match element.name.as_str() {
             "vertex" => {
-                let wanted = ["x", "y", "z"].map(|axis| [axis, axis]);
-                let columns = columns(element, wanted, |p| p.list.is_none(), "number")?;
-                body.rows(element, &columns, |[x, y, z]| {
+                let mut take = |[x, y, z]: [&[f64]; 3]| {
                     let position = [x[0], y[0], z[0]];
                     finite(position)?;
                     positions.push(position);
                     Ok(())
-                })?;
+                };
+                let is_one = |p: &Property| p.list.is_none();
+                let [x, y, z] = columns(element, AXES, is_one, "number")?;
+                // Without all three there is no colour.
+                match columns(element, CHANNELS, is_one, "number") {
+                    Ok([red, green, blue]) => {
+                        let full =
+                            [red, green, blue].map(|column| full(&element.properties[column]));
+                        let columns = [x, y, z, red, green, blue];
+                        let colours = colours.insert(Vec::new());
+                        body.rows(element, &columns, |[x, y, z, red, green, blue]| {
+                            let [r, g, b] = full;
+                            colours.push([
+                                channel(red[0], r)?,
+                                channel(green[0], g)?,
+                                channel(blue[0], b)?,
+                            ]);
+                            take([x, y, z])
+                        })?;
+                    }
+                    Err(_) => body.rows(element, &[x, y, z], take)?,
+                }
             }
             "face" => {
                 let wanted = [["vertex_indices", "vertex_index"]];
@@ -72,7 +95,16 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
         faces.extend(triangles(&positions, polygon));
         rest = after;
     }
-    Ok((positions, faces))
+    Ok(Parts { positions, faces, colours })
+}
+
+/// What stands for full in a channel of a colour.
+fn full(channel: &Property) -> u16 {
+    match channel.number {
+        Number::F32 | Number::F64 => 1,
+        Number::U16 => u16::MAX,
+        _ => u8::MAX.into(),
+    }
 }
 
 /// The one element called `name`, if any.
@@ -276,15 +308,24 @@ fn length(entries: f64) -> Result<usize, Fault> {
 /// See [`Mesh::to_ply`].
 pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     let (positions, faces) = (mesh.positions(), mesh.faces());
+    let channels = match mesh.colours() {
+        Some(_) => "property uchar red\nproperty uchar green\nproperty uchar blue\n",
+        None => "",
+    };
     let mut file = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\n\
-        property double y\nproperty double z\nelement face {}\n\
+        property double y\nproperty double z\n{channels}element face {}\n\
         property list uchar uint vertex_indices\nend_header\n",
         positions.len(),
         faces.len()
     )
     .into_bytes();
-    file.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for (vertex, position) in positions.iter().enumerate() {
+        file.extend(position.iter().flat_map(|x| x.to_le_bytes()));
+        if let Some(colours) = mesh.colours() {
+            file.extend(colours[vertex].map(|x| (x * f64::from(u8::MAX)).round() as u8));
+        }
+    }
     for corners in faces {
         file.push(3);
         file.extend(corners.iter().flat_map(|v| v.to_le_bytes()));

@@ -4,6 +4,14 @@ use std::{fs, io, path::Path};
 
 use crate::{Mesh, MeshError, format::Format, glb, obj, ply, stl};
 
+/// What a file has, before it is known to be a mesh.
+#[derive(Default)]
+pub(crate) struct Parts {
+    pub(crate) positions: Vec<[f64; 3]>,
+    pub(crate) faces: Vec<[u32; 3]>,
+    pub(crate) colours: Option<Vec<[f64; 3]>>,
+}
+
 impl Mesh {
     /// The mesh in the file at `path`: OBJ, PLY, STL or GLB by its ending; see [`Mesh::parse`].
     ///
@@ -26,9 +34,9 @@ impl Mesh {
     /// order of bytes), `.stl` (text or binary) or `.glb` (binary glTF 2.0). Errors begin with the
     /// name.
     ///
-    /// Of every format only positions and faces are read: normals, texture coordinates, colours,
-    /// materials, lines and points are ignored, no other file is opened, and objects and groups are
-    /// merged. Vertices keep their number and order, and degenerate faces stay. Polygons (OBJ, PLY)
+    /// Of every format only positions, faces and colours of vertices are read: normals, texture
+    /// coordinates, colours of faces, materials, lines and points are ignored, no other file is
+    /// opened, and objects and groups are merged. Vertices keep their number and order, and degenerate faces stay. Polygons (OBJ, PLY)
     /// are cut into triangles by clipping ears, which keeps their winding and the area of concave
     /// ones. Numbers in text are read to 64 bits.
     ///
@@ -41,12 +49,22 @@ impl Mesh {
     /// where a node mirrors, the winding is turned. Each node brings a copy of its mesh's vertices.
     /// Skins, morph targets and animations are ignored: the mesh is as it is modelled.
     ///
+    /// Colours are read as pictures and screens have them, from 0 to 1 (sRGB):
+    ///
+    /// - OBJ: `v x y z r g b`, from 0 to 1. A file where only some vertices have six numbers has no
+    ///   colours.
+    /// - PLY: the properties `red`, `green` and `blue` of the vertices, all three: whole numbers up to
+    ///   255 (to 65535 as `ushort`), or floats from 0 to 1.
+    /// - GLB: `COLOR_0`. Its numbers are linear, so they are converted; they are held to 0 to 1, as the
+    ///   format asks, and transparency is ignored. Where only some parts have colours, the others are
+    ///   white, which is what leaving them out means there.
+    ///
     /// # Errors
     ///
     /// If the name has another ending, if there are no faces, or at the first part of the file
     /// that is not as its format says, such as a coordinate which is missing, not a number or not
-    /// finite in 32 bits, an index which is out of range, a face with fewer than three corners, or
-    /// an end that comes too early. Compressed GLB files, and those that need other files, are
+    /// finite in 32 bits, a colour out of its range, an index which is out of range, a face with fewer
+    /// than three corners, or an end that comes too early. Compressed GLB files, and those that need other files, are
     /// refused.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
         format_of(Path::new(name), name)?.parse(bytes, name)
@@ -61,8 +79,13 @@ impl Format {
             Self::Stl => stl::parse(bytes),
             Self::Glb => glb::parse(bytes),
         };
-        let (positions, faces) = parsed.map_err(|trouble| trouble.of_file(name))?;
-        Mesh::new(positions, faces)
+        let Parts { positions, faces, colours } =
+            parsed.map_err(|trouble| trouble.of_file(name))?;
+        let mesh = Mesh::new(positions, faces)?;
+        match colours {
+            Some(colours) => mesh.with_colours(colours),
+            None => Ok(mesh),
+        }
     }
 }
 

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 use crate::{
     Fault,
     error::{Trouble, shown},
-    ply::{Parts, finite},
+    ply::finite,
+    read::Parts,
     statements::next_line,
 };
 
@@ -32,7 +33,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
     } else {
         binary(bytes, &mut surface)?;
     }
-    if surface.faces.is_empty() { Err(NO_FACES) } else { Ok((surface.positions, surface.faces)) }
+    let Surface { positions, faces, .. } = surface;
+    if faces.is_empty() { Err(NO_FACES) } else { Ok(Parts { positions, faces, colours: None }) }
 }
 
 /// The number of triangles that a binary file names.

@@ -9,19 +9,22 @@ use std::{
 use crate::{Mesh, MeshError, format::Format, glb, obj::Obj, ply};
 
 impl Mesh {
-    /// The text of an OBJ file, with as many digits as the numbers need.
+    /// The text of an OBJ file, with as many digits as the numbers need; colours as `v x y z r g b`.
     pub fn to_obj(&self) -> String {
         Obj(self).to_string()
     }
 
-    /// The bytes of a PLY file: binary, little endian, coordinates in 64 bits, so nothing is lost.
+    /// The bytes of a PLY file: binary, little endian, coordinates in 64 bits, so nothing of them is lost.
+    ///
+    /// Colours are rounded to 8 bits, `uchar red`, `green` and `blue`: all programs read these.
     pub fn to_ply(&self) -> Vec<u8> {
         ply::bytes(self)
     }
 
-    /// The bytes of a GLB file (binary glTF 2.0) with one mesh and a grey, two-sided material.
+    /// The bytes of a GLB file (binary glTF 2.0) with one mesh and a two-sided material, grey unless the mesh has colours.
     ///
-    /// Coordinates are rounded to 32 bits: the format has no others.
+    /// Coordinates are rounded to 32 bits: the format has no others. Colours are written as the linear ones that the
+    /// format asks for, in 32 bits.
     ///
     /// # Panics
     ///
@@ -32,8 +35,8 @@ impl Mesh {
 
     /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its ending, in any case.
     ///
-    /// [`Mesh::load`] reads OBJ and PLY back without change, GLB with coordinates rounded to 32
-    /// bits. The file appears whole or not at all: it is written under another name in the same
+    /// [`Mesh::load`] reads OBJ back without change, PLY with colours rounded to 8 bits, GLB with
+    /// all numbers rounded to 32 bits. The file appears whole or not at all: it is written under another name in the same
     /// folder, then renamed.
     ///
     /// # Errors

@@ -123,6 +123,88 @@ fn quantised_and_sparse_positions_are_read() {
     assert_eq!(mesh.positions(), [[0., 0., 0.], [1., 0., 0.], [-1., 1., 1.], [0., 1., 0.]]);
 }
 
+/// The square with colours at its vertices: their component type, shape and bytes.
+fn coloured(component: u32, shape: &str, colours: &[u8]) -> (Value, Vec<u8>) {
+    let (mut json, bin) = bytes();
+    let attributes = &mut json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["COLOR_0"] = json!(2);
+    json["accessors"].as_array_mut().expect("a list").push(json!({
+        "bufferView": 2, "componentType": component, "normalized": component != 5126, "count": 4, "type": shape,
+    }));
+    json["bufferViews"].as_array_mut().expect("a list").push(json!({
+        "buffer": 0, "byteOffset": 56, "byteLength": colours.len(),
+    }));
+    (json, [bin.as_slice(), &[0; 2], colours].concat())
+}
+
+fn colours((json, bin): &(Value, Vec<u8>)) -> Option<Vec<[f64; 3]>> {
+    let mesh = Mesh::parse(&glb(json, bin), "a.glb").expect("a sound file");
+    mesh.colours().map(<[_]>::to_vec)
+}
+
+#[test]
+fn colours_are_floats_bytes_or_shorts_and_linear() {
+    // A fifth of the light is almost a half on the screen.
+    let fifth = 0.484_529_204_481_713;
+    let expected = [[0.0, 1.0, fifth]; 4];
+    let close = |found: &(Value, Vec<u8>), expected: &[[f64; 3]]| {
+        let found = colours(found).unwrap();
+        let mut pairs = found.as_flattened().iter().zip(expected.as_flattened());
+        assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
+    };
+    close(&coloured(5121, "VEC3", &[0, 255, 51].repeat(4)), &expected);
+    close(&coloured(5121, "VEC4", &[0, 255, 51, 7].repeat(4)), &expected);
+    let shorts: Vec<u8> = [0u16, 65535, 13107].iter().flat_map(|x| x.to_le_bytes()).collect();
+    close(&coloured(5123, "VEC3", &shorts.repeat(4)), &expected);
+    // What is beyond 0 and 1 is held there, as the format says.
+    close(&coloured(5126, "VEC3", &floats(&[-1.0, 9.0, 0.2]).repeat(4)), &expected);
+    // Near 0 the curve is a line.
+    close(&coloured(5126, "VEC4", &floats(&[0.002; 16])), &[[0.02584; 3]; 4]);
+}
+
+#[test]
+fn parts_without_colours_are_white_beside_others() {
+    let (mut json, bin) = coloured(5121, "VEC3", &[0, 255, 0].repeat(4));
+    let painted = json["meshes"][0]["primitives"][0].clone();
+    let plain = json!({"attributes": {"POSITION": 0}, "indices": 1});
+    json["meshes"][0]["primitives"] = json!([plain, painted, plain]);
+    let white = [[1.0; 3]; 4];
+    let green = [[0.0, 1.0, 0.0]; 4];
+    let found = colours(&(json.clone(), bin.clone())).unwrap();
+    assert_eq!(found, [white, green].concat(), "both plain parts share their vertices");
+    json["meshes"][0]["primitives"] = json!([painted, plain]);
+    assert_eq!(colours(&(json.clone(), bin.clone())).unwrap(), [green, white].concat());
+    json["meshes"][0]["primitives"] = json!([plain]);
+    assert_eq!(colours(&(json, bin)), None);
+}
+
+#[test]
+fn bad_colours_are_one_line_that_names_the_place() {
+    let place = "a.glb: node 0, mesh 0, primitive 0";
+    let kinds = "accessor 2: colours are VEC3 or VEC4 of floats or of normalized bytes or shorts";
+    let sound = || coloured(5121, "VEC3", &[0; 12]);
+    let (mut whole, mut few) = (sound(), sound());
+    whole.0["accessors"][2]["normalized"] = json!(false);
+    few.0["accessors"][2]["count"] = json!(3);
+    let cases = [
+        (
+            coloured(5126, "VEC3", &floats(&[f32::NAN; 12])),
+            ", vertex 0: colour \"NaN\" is not from 0 to 1",
+        ),
+        (coloured(5121, "VEC2", &[0; 12]), &format!(", {kinds}")),
+        (whole, &format!(", {kinds}")),
+        (few, ": 3 colours for 4 vertices"),
+        (
+            coloured(5126, "VEC3", &[0; 12]),
+            ", accessor 2: 4 entries reach beyond the binary chunk or buffer view 2",
+        ),
+    ];
+    for ((json, bin), message) in cases {
+        let error = Mesh::parse(&glb(&json, &bin), "a.glb").expect_err(message).to_string();
+        assert_eq!(error, format!("{place}{message}"));
+    }
+}
+
 #[test]
 fn bad_files_are_one_line_that_names_the_place() {
     let with = |change: fn(&mut Value)| {

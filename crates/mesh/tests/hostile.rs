@@ -9,7 +9,11 @@ use softrast_mesh::{Mesh, icosphere};
 fn read(bytes: &[u8], name: &str) {
     match Mesh::parse(bytes, name) {
         Ok(mesh) => {
-            Mesh::new(mesh.positions().to_vec(), mesh.faces().to_vec()).expect("a valid mesh");
+            let again = Mesh::new(mesh.positions().to_vec(), mesh.faces().to_vec());
+            let again = again.expect("a valid mesh");
+            if let Some(colours) = mesh.colours() {
+                again.with_colours(colours.to_vec()).expect("valid colours");
+            }
             let normalized = mesh.normalized();
             assert!(normalized.positions().iter().flatten().all(|x| x.abs() <= 1.0));
             assert!(mesh.area().is_finite());
@@ -61,6 +65,7 @@ fn pieces() -> impl Strategy<Value = Vec<u8>> {
         "\nv 1 2 3\n",
         "\nv 3 -1 2\n",
         "\nv 0 0 1\n",
+        "\nv 0 0 1 1 0 .5\n",
         "\nf 1 2 3\n",
         "\nf -1 -2 -3\n",
         "\u{feff}",
@@ -71,7 +76,8 @@ fn pieces() -> impl Strategy<Value = Vec<u8>> {
 }
 
 fn text_of_ply(mesh: &Mesh) -> Vec<u8> {
-    let rows = mesh.to_obj().replace("v ", "");
+    let plain = Mesh::new(mesh.positions().to_vec(), mesh.faces().to_vec()).expect("a valid mesh");
+    let rows = plain.to_obj().replace("v ", "");
     let (vertices, _) = rows.split_once('f').expect("faces");
     let faces: String = mesh.faces().iter().map(|[a, b, c]| format!("3 {a} {b} {c}\n")).collect();
     let header = format!(
@@ -142,6 +148,8 @@ proptest! {
         changes in vec((any::<sample::Index>(), any::<u8>(), 0..4), 1..6),
     ) {
         let sphere = icosphere(0);
+        let colours = sphere.positions().iter().map(|p| p.map(f64::abs)).collect();
+        let sphere = if changes.len() % 2 == 0 { sphere.with_colours(colours).unwrap() } else { sphere };
         let (name, mut bytes) = match format {
             0 => ("a.ply", sphere.to_ply()),
             1 => ("a.ply", text_of_ply(&sphere)),
@@ -179,6 +187,28 @@ proptest! {
         let rounded = mesh.positions().iter().map(|p| p.map(|x| f64::from(x as f32)));
         prop_assert_eq!(glb.positions(), rounded.collect::<Vec<_>>());
         prop_assert_eq!(glb.faces(), mesh.faces());
+    }
+
+    #[test]
+    fn colours_that_are_written_are_read_back(
+        colours in vec(any::<[u16; 3]>(), 1..9),
+        corners in vec(any::<[sample::Index; 3]>(), 1..9),
+    ) {
+        let count = colours.len();
+        let faces = corners.iter().map(|face| face.map(|corner| corner.index(count) as u32)).collect();
+        let colours = colours.iter().map(|c| c.map(|x| f64::from(x) / f64::from(u16::MAX)));
+        let mesh = Mesh::new(vec![[1.0; 3]; count], faces).unwrap();
+        let mesh = mesh.with_colours(colours.collect()).unwrap();
+        prop_assert_eq!(&Mesh::parse(mesh.to_obj().as_bytes(), "a.obj").unwrap(), &mesh);
+        let close = |file: &[u8], name: &str, tolerance: f64| {
+            let found = Mesh::parse(file, name).unwrap();
+            let of = |mesh: &Mesh| mesh.colours().unwrap().concat();
+            let off = of(&found).into_iter().zip(of(&mesh)).map(|(a, b)| (a - b).abs());
+            let off = off.fold(0.0, f64::max);
+            assert!(off < tolerance && found.faces() == mesh.faces(), "{name}: off by {off}");
+        };
+        close(&mesh.to_ply(), "a.ply", 0.5 / 255.0 + 1e-9);
+        close(&mesh.to_glb(), "a.glb", 1e-6);
     }
 
     #[test]

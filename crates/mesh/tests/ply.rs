@@ -50,6 +50,45 @@ fn faces_may_come_first_and_other_elements_and_lists_are_skipped() {
     assert_eq!(mesh.faces(), [[0, 1, 2]]);
 }
 
+/// Three vertices with these properties after x, y and z, and these words after their coordinates.
+fn coloured(properties: &[&str], words: [&str; 3]) -> Result<Mesh, String> {
+    let properties: String = properties.iter().map(|p| format!("property {p}\n")).collect();
+    let [a, b, c] = words;
+    let file = format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n3 0 1 2\n"
+    );
+    Mesh::parse(file.as_bytes(), "a.ply").map_err(|error| error.to_string())
+}
+
+#[test]
+fn colours_are_bytes_shorts_or_floats() {
+    let bytes = ["uchar red", "uchar green", "uchar blue", "uchar alpha"];
+    let mesh = coloured(&bytes, ["255 0 51 255", "0 255 0 0", "102 102 102 9"]).unwrap();
+    assert_eq!(mesh.colours().unwrap(), [[1.0, 0.0, 0.2], [0.0, 1.0, 0.0], [0.4; 3]]);
+    let shorts = ["ushort diffuse_red", "ushort diffuse_green", "ushort diffuse_blue"];
+    let mesh = coloured(&shorts, ["65535 0 13107"; 3]).unwrap();
+    assert_eq!(mesh.colours().unwrap(), [[1.0, 0.0, 0.2]; 3]);
+    // Between other properties, in another order.
+    let floats = ["float nx", "double blue", "float red", "float ny", "float green"];
+    let mesh = coloured(&floats, ["9 .25 1 9 0"; 3]).unwrap();
+    assert_eq!(mesh.colours().unwrap(), [[1.0, 0.0, 0.25]; 3]);
+    assert_eq!(mesh.positions()[1], [1.0, 0.0, 0.0]);
+    // One channel is no colour.
+    assert_eq!(coloured(&["uchar red"], ["7"; 3]).unwrap().colours(), None);
+}
+
+#[test]
+fn colours_out_of_range_name_their_line() {
+    let floats = ["float red", "float green", "float blue"];
+    for (word, message) in [("1.5", "1.5"), ("-0.1", "-0.1"), ("nan", "NaN"), ("inf", "inf")] {
+        let error = coloured(&floats, ["0 0 0", &format!("0 0 {word}"), "0 0 0"]).unwrap_err();
+        assert_eq!(error, format!("a.ply:14: colour \"{message}\" is not from 0 to 1"));
+    }
+    let error = coloured(&["int red", "int green", "int blue"], ["0 0 256"; 3]).unwrap_err();
+    assert_eq!(error, "a.ply:13: colour \"256\" is not from 0 to 255");
+}
+
 #[test]
 fn bad_files_are_one_line_that_names_the_place() {
     let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\

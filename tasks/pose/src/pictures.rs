@@ -333,6 +333,7 @@ fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
     Ok(Viewer {
         positions: mesh.positions().to_vec(),
         faces: mesh.faces().to_vec(),
+        colours: mesh.colours().map(<[_]>::to_vec),
         views: views.collect::<anyhow::Result<_>>()?,
     })
 }

@@ -3,5 +3,6 @@
 mod another_phi;
 mod layout;
 mod minimize;
+mod paint;
 mod square;
 mod surrogate;

@@ -1,6 +1,8 @@
 //! A mesh from pictures that the user gives.
 
+mod answer;
 mod hull;
+mod painted;
 mod problem;
 mod solve;
 

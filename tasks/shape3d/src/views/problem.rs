@@ -49,7 +49,7 @@ impl FromViews {
         let moved = numbers(theta.clone());
         let place = |(p, d): (&[f64; 3], &[f64])| [0, 1, 2].map(|k| p[k] + self.reach * d[k]);
         let positions = self.start.positions().iter().zip(moved.chunks(3)).map(place).collect();
-        Mesh::new(positions, self.start.faces().to_vec())
+        self.start.with_positions(positions)
     }
 }
 

@@ -2,24 +2,19 @@ use std::{path::PathBuf, sync::Arc};
 
 use anyhow::ensure;
 use clap::ValueEnum;
-use serde_json::{Value, json};
-use softrast_cli::{Answer, Given, MaskFlags, seen_by};
+use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
-    Method, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
+    Method, PaintedView, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
 };
-use softrast_lab::{
-    Error, Viewer, contact_sheet, for_page,
-    format::{counted, line},
-    overlay, png,
-    program::Output,
-    report::{Report, Table},
-};
+use softrast_lab::{Error, Progress, format::counted};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::on_backend;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
 use super::{
+    answer::{Scored, answer},
     hull::{ball, hull},
+    painted::{self, Colours},
     problem::FromViews,
 };
 use crate::Args;
@@ -56,8 +51,6 @@ const CELLS: [usize; 3] = [32, 45, 64];
 const GROWS: f64 = 0.01;
 /// A mean `IoU` from which a finer mesh is not worth its time.
 const FITS: f64 = 0.995;
-/// Views that a picture of the result shows.
-const SHOWN: usize = 12;
 
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -74,6 +67,10 @@ pub struct Views {
     /// What is deformed: the visual hull of the masks, or a sphere, which has no holes [default: hull]
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
+
+    /// Look for colours too: the mesh gets those of the pictures at its vertices. With --mesh the shape is known, in the world units of the cameras, and stays
+    #[arg(long)]
+    pub colour: bool,
 
     /// How smooth the surface is kept, against the usual
     #[arg(long, value_name = "FACTOR", requires = "views", value_parser = softrast_lab::parse::positive, allow_negative_numbers = true)]
@@ -94,19 +91,16 @@ pub enum Begin {
     Sphere,
 }
 
-/// A view, how well the result fits it, and whether it was kept aside.
-struct Scored {
-    view: View,
-    silhouette: Vec<f64>,
-    iou: f64,
-    held_out: bool,
-}
-
 /// The mesh that has the silhouettes of a folder's masks, if the flags name one.
 pub(crate) fn solve_views(
     given: &Given<'_, Args>,
     flags: &Views,
 ) -> Option<anyhow::Result<Answer>> {
+    if flags.views.is_none() && flags.colour {
+        return Some(Err(Error::usage(
+            "--colour takes the colours of pictures: name a folder of them with --views",
+        )));
+    }
     if flags.views.is_none() && flags.masks.asked() {
         return Some(Err(Error::usage(
             "--invert and --threshold are about pictures: name a folder of them with --views",
@@ -117,9 +111,16 @@ pub(crate) fn solve_views(
 
 fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::Result<Answer> {
     let args = given.args;
-    if args.mesh.is_some() || args.elevation.is_some() {
+    if args.elevation.is_some() || (args.mesh.is_some() && !flags.colour) {
         return Err(Error::usage(
-            "--mesh and --elevation say what is drawn as a target: leave them out with --views",
+            "--mesh and --elevation say what is drawn as a target: leave them out with --views (--colour takes a --mesh whose colours are \
+             looked for)",
+        ));
+    }
+    let deforms = args.template.is_some() || flags.start.is_some() || flags.smooth.is_some();
+    if args.mesh.is_some() && deforms {
+        return Err(Error::usage(
+            "--template, --start and --smooth say how a shape is found: leave them out where --mesh says what it is",
         ));
     }
     if args.detail.is_some() && flags.start != Some(Begin::Sphere) {
@@ -128,20 +129,57 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         ));
     }
     let all = load_views(folder, |path| flags.masks.load(path))?;
-    let [train, held_out] = parted(all, flags.hold_out.unwrap_or(0))?;
+    // What is wrong with a picture is said before the work.
+    let paint = |views: &[View]| {
+        let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
+        painted.collect::<anyhow::Result<Vec<_>>>()
+    };
+    let parts = parted(all, flags.hold_out.unwrap_or(0))?;
+    let [to_paint, to_compare] = [paint(&parts[0])?, paint(&parts[1])?];
+    let [train, held_out] = parts;
     let clock = std::time::Instant::now();
-    let start = start(given, flags, &train)?;
-    let mesh = deformed(given, flags, start, &train)?;
+    let stages = stages(given, flags);
+    let of_colours = if flags.colour { painted::config(given).steps } else { 0 };
+    let steps = stages.iter().map(|stage| stage.steps).sum::<usize>() + of_colours;
+    let mut progress = given.progress(steps)?;
+    let mut mesh = match &args.mesh {
+        Some(path) => Mesh::load(path)?,
+        None => {
+            let start = start(given, flags, &train)?;
+            deformed(given, flags, &stages, start, &train, &mut progress)?
+        }
+    };
+    if flags.colour {
+        mesh = painted::painted(given, &mesh, &to_paint, |step, loss| {
+            progress.step(steps - of_colours + step, loss)
+        })?;
+    }
+    progress.finish();
     let seconds = clock.elapsed().as_secs_f64();
-    let score = |view: View, held_out: bool| {
+    let score = |(k, view): (usize, &View), painted: &[PaintedView], held_out: bool| {
         let silhouette = silhouette_pixels(&mesh, &view.camera);
         let iou = mask_iou(&silhouette, &view.mask);
-        Scored { view, silhouette, iou, held_out }
+        let colours = painted.get(k).map(|view| Colours::new(view, &mesh));
+        Scored { view: view.clone(), silhouette, iou, colours, held_out }
     };
-    let train = train.iter().map(|view| score(view.clone(), false));
-    let scored: Vec<Scored> =
-        train.chain(held_out.into_iter().map(|view| score(view, true))).collect();
+    let train = train.iter().enumerate().map(|view| score(view, &to_paint, false));
+    let held_out = held_out.iter().enumerate().map(|view| score(view, &to_compare, true));
+    let scored: Vec<Scored> = train.chain(held_out).collect();
     answer(given, &mesh, &scored, seconds)
+}
+
+/// Parts of the work on the shape, with the steps that were asked for; none if it is known.
+fn stages(given: &Given<'_, Args>, flags: &Views) -> Vec<Stage> {
+    let args = given.args;
+    let from_hull = args.template.is_none() && flags.start.unwrap_or_default() == Begin::Hull;
+    let stages: Vec<Stage> = match (args.mesh.is_some(), from_hull) {
+        (true, _) => Vec::new(),
+        (false, true) => FINE.to_vec(),
+        (false, false) => ROUGH.into_iter().chain([FINE[1]]).collect(),
+    };
+    let with_steps =
+        |stage: Stage| Stage { steps: given.common.steps.unwrap_or(stage.steps), ..stage };
+    stages.into_iter().map(with_steps).collect()
 }
 
 /// Views to work with, and so many evenly spaced ones that are kept aside.
@@ -166,8 +204,7 @@ fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Resu
     let placed = |mesh: Mesh, size: f64| {
         let (middle, reach) = ball(views)?;
         let place = |p: &[f64; 3]| [0, 1, 2].map(|k| middle[k] + size * reach * p[k]);
-        let positions = mesh.positions().iter().map(place).collect();
-        anyhow::Ok(Mesh::new(positions, mesh.faces().to_vec())?)
+        anyhow::Ok(mesh.with_positions(mesh.positions().iter().map(place).collect())?)
     };
     match (&given.args.template, flags.start.unwrap_or_default()) {
         (Some(path), _) => placed(Mesh::load(path)?.normalized(), 0.7),
@@ -199,15 +236,12 @@ fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
 fn deformed(
     given: &Given<'_, Args>,
     flags: &Views,
+    stages: &[Stage],
     start: Mesh,
     views: &[View],
+    progress: &mut Progress,
 ) -> anyhow::Result<Mesh> {
     let (backend, views): (_, Arc<[View]>) = (given.backend()?, views.into());
-    let from_hull = given.args.template.is_none() && flags.start.unwrap_or_default() == Begin::Hull;
-    let stages: Vec<Stage> = match from_hull {
-        true => FINE.to_vec(),
-        false => ROUGH.into_iter().chain([FINE[1]]).collect(),
-    };
     let asked = given.method()?;
     let edge = EdgeSoftness { family: Family::Logistic, squared: false };
     let narrow = Method {
@@ -215,8 +249,6 @@ fn deformed(
         softness: ScheduledSoftness::constant(edge, NARROW),
         ..asked.clone()
     };
-    let steps = |stage: &Stage| given.common.steps.unwrap_or(stage.steps);
-    let mut progress = given.progress(stages.iter().map(steps).sum())?;
     let (mut mesh, mut done) = (start, 0);
     for (k, stage) in stages.iter().enumerate() {
         if stage.finer {
@@ -227,7 +259,7 @@ fn deformed(
         let last = k + 1 == stages.len();
         let config = SolveConfig {
             size: given.common.size.filter(|_| last).unwrap_or(stage.size),
-            steps: steps(stage),
+            steps: stage.steps,
             learning_rate: given.learning_rate().unwrap_or(stage.learning_rate),
         };
         let mut best = f64::INFINITY;
@@ -243,139 +275,5 @@ fn deformed(
             break;
         }
     }
-    progress.finish();
     Ok(mesh)
-}
-
-fn mean(scored: &[Scored], held_out: bool) -> Option<f64> {
-    let of: Vec<f64> =
-        scored.iter().filter(|one| one.held_out == held_out).map(|one| one.iou).collect();
-    (!of.is_empty()).then(|| of.iter().sum::<f64>() / of.len() as f64)
-}
-
-/// Scores of a mesh, and where it is written.
-struct Summary {
-    train: f64,
-    held_out: Option<f64>,
-    path: PathBuf,
-    seconds: f64,
-}
-
-fn answer(
-    given: &Given<'_, Args>,
-    mesh: &Mesh,
-    scored: &[Scored],
-    seconds: f64,
-) -> anyhow::Result<Answer> {
-    let summary = Summary {
-        train: mean(scored, false).unwrap_or(f64::NAN),
-        held_out: mean(scored, true),
-        path: given.folder().join("mesh.obj"),
-        seconds,
-    };
-    let mut warnings = Vec::new();
-    if summary.train < 0.9 {
-        warnings.push(format!(
-            "the mean IoU is {:.3} only: check that the cameras belong to the pictures and that the masks are white where the object is \
-             (--invert)",
-            summary.train
-        ));
-    }
-    let sheet: Vec<_> = shown(scored)
-        .map(|one| overlay(&one.silhouette, one.view.mask.pixels(), one.view.camera.size.width))
-        .map(for_page)
-        .collect();
-    let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
-    let text = text(mesh, scored, &summary);
-    let page = page(mesh, scored, &warnings, &text[1..], &picture)?;
-    let json = json(mesh, scored, &summary, &warnings);
-    let files = vec![
-        ("mesh.obj".to_owned(), mesh.to_obj().into_bytes()),
-        ("mesh.ply".to_owned(), mesh.to_ply()),
-        ("mesh.glb".to_owned(), mesh.to_glb()),
-        ("views.png".to_owned(), picture),
-    ];
-    let beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture";
-    let output = Output { text, json, warnings, partial: None };
-    Ok(Answer { page, output, files, beside: beside.to_owned() })
-}
-
-fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
-    let Summary { train, held_out, path, seconds } = summary;
-    let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
-    let head = [
-        format!("3D SHAPE from {}", counted(scored.len(), "view")),
-        line("IoU", &format!("{train:.4}")),
-    ];
-    let rest = [
-        line("mesh", &format!("{}, {vertices} vertices, {faces} faces", path.display())),
-        line("seconds", &format!("{seconds:.1}")),
-    ];
-    let aside = held_out.map(|iou| line("IoU, held out", &format!("{iou:.4}")));
-    head.into_iter().chain(aside).chain(rest).collect()
-}
-
-fn page(
-    mesh: &Mesh,
-    scored: &[Scored],
-    warnings: &[String],
-    text: &[String],
-    picture: &[u8],
-) -> anyhow::Result<Report> {
-    let mut page = Report::new("shape3d", "A mesh that has the silhouettes of given masks");
-    page.warnings(warnings);
-    let views = scored.iter().map(|Scored { view, iou, held_out, .. }| {
-        let note = format!("IoU {iou:.4}{}", if *held_out { ", kept aside" } else { "" });
-        seen_by(view.name.clone(), &view.camera, &view.mask, note)
-    });
-    let viewer = Viewer {
-        positions: mesh.positions().to_vec(),
-        faces: mesh.faces().to_vec(),
-        views: views.collect::<anyhow::Result<_>>()?,
-    };
-    page.viewer(
-        &viewer,
-        picture,
-        "The mesh and the cameras. A view shows it with the outline of its mask.",
-    );
-    page.picture(
-        picture,
-        "Masks with the silhouettes of the result over them: grey where both are, orange where only the mask is, blue where only the \
-         silhouette is. Views that were kept aside come first.",
-    );
-    text.iter().for_each(|line| page.paragraph(line));
-    page.heading("Views");
-    let mut table = Table::new(["view", "IoU", "kept aside"]);
-    for Scored { view, iou, held_out, .. } in scored {
-        let aside = if *held_out { "yes" } else { "" };
-        table.push([view.name.clone(), format!("{iou:.4}"), aside.to_owned()]);
-    }
-    page.table(&table);
-    Ok(page)
-}
-
-fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
-    let Summary { train, held_out, path, seconds } = summary;
-    json!({
-        "train_iou": train,
-        "held_out_iou": held_out,
-        "mesh": path,
-        "vertices": mesh.positions().len(),
-        "faces": mesh.faces().len(),
-        "seconds": seconds,
-        "views": scored.iter().map(|one| json!({
-            "name": one.view.name,
-            "iou": one.iou,
-            "held_out": one.held_out,
-        })).collect::<Vec<_>>(),
-        "warnings": warnings,
-    })
-}
-
-/// Those kept aside, then others evenly spaced.
-fn shown(scored: &[Scored]) -> impl Iterator<Item = &Scored> {
-    let aside = scored.iter().filter(|one| one.held_out);
-    let train: Vec<&Scored> = scored.iter().filter(|one| !one.held_out).collect();
-    let every = train.len().div_ceil(SHOWN);
-    aside.take(SHOWN).chain(train.into_iter().step_by(every.max(1))).take(SHOWN)
 }

@@ -1,0 +1,147 @@
+use softrast_mesh::Mesh;
+use softrast_raster::{NEAR, Pinhole};
+
+/// Samples along each side of a pixel, where there are not too many of them.
+const SAMPLES: usize = 4;
+/// Samples of an image at most, at 32 bytes each. Larger pictures have fewer in a pixel, but one.
+const MOST_SAMPLES: usize = 1 << 24;
+
+/// What a camera sees of a mesh with colours, without softness: red, green and blue over black, then the part of each pixel that the mesh
+/// covers; each row by row from the top, from 0 to 1.
+///
+/// A pixel is the mean of 4 × 4 samples, of fewer where a picture has more than a million pixels. A sample shows the nearest face, its
+/// colour interpolated in perspective. A mesh without colours is white. Faces with a corner behind the camera are not drawn.
+pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
+    let pixels = camera.size.pixels();
+    let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
+    let (width, height) = (each * camera.size.width, each * camera.size.height);
+    let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * height];
+    let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
+    for face in mesh.faces() {
+        let corners = face.map(|v| {
+            let [x, y, z] = seen[v as usize];
+            // The middle of the first sample is (0, 0).
+            [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
+        });
+        let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
+        samples(corners, [width, height], |x, y, depth, weights| {
+            let sample = &mut nearest[y * width + x];
+            if depth < sample[0] {
+                let [r, g, b] = [0, 1, 2].map(|k| {
+                    (0..3).map(|corner| weights[corner] * colours[corner][k]).sum::<f64>()
+                });
+                *sample = [depth, r, g, b];
+            }
+        });
+    }
+    let share = 1.0 / (each * each) as f64;
+    let mut image = [(); 4].map(|()| vec![0.0; pixels]);
+    for (k, [depth, r, g, b]) in nearest.into_iter().enumerate().filter(|(_, s)| s[0].is_finite()) {
+        debug_assert!(depth > 0.0, "depth {depth}");
+        let pixel = k / width / each * camera.size.width + k % width / each;
+        for (channel, value) in image.iter_mut().zip([r, g, b, 1.0]) {
+            channel[pixel] += share * value;
+        }
+    }
+    image
+}
+
+/// Shows each sample inside of a triangle to `show`: its column and row, its depth, and the weights of the corners in space.
+///
+/// Corners are columns and rows in samples, and depths.
+fn samples(
+    corners: [[f64; 3]; 3],
+    [width, height]: [usize; 2],
+    mut show: impl FnMut(usize, usize, f64, [f64; 3]),
+) {
+    let [a, b, c] = corners;
+    let side = |[ax, ay, _]: [f64; 3], [bx, by, _]: [f64; 3], x: f64, y: f64| {
+        (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    };
+    let area = side(a, b, c[0], c[1]);
+    let in_front = corners.iter().all(|corner| corner[2] >= NEAR);
+    if !(in_front && area != 0.0 && area.is_finite()) {
+        return;
+    }
+    let range = |axis: usize, count: usize| {
+        let [low, high] =
+            corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| {
+                [low.min(p[axis]), high.max(p[axis])]
+            });
+        // A cast holds what is too large, and makes 0 of what is below 0.
+        (low.ceil().max(0.0) as usize)..((high.floor() + 1.0).max(0.0) as usize).min(count)
+    };
+    let columns = range(0, width);
+    for row in range(1, height) {
+        for column in columns.clone() {
+            let (x, y) = (column as f64, row as f64);
+            let on_screen = [side(b, c, x, y), side(c, a, x, y), side(a, b, x, y)];
+            let on_screen = on_screen.map(|part| part / area);
+            if on_screen.iter().any(|&part| part < 0.0) {
+                continue;
+            }
+            // On the screen, 1 / z is linear.
+            let [p, q, r] = [0, 1, 2].map(|k| on_screen[k] / corners[k][2]);
+            let depth = 1.0 / (p + q + r);
+            show(column, row, depth, [p, q, r].map(|part| part * depth));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Pinhole {
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Pinhole {
+            rotation,
+            translation: [0.0; 3],
+            focal: [4.0; 2],
+            centre: [2.0; 2],
+            size: 4.into(),
+        }
+    }
+
+    #[test]
+    fn the_nearest_face_is_seen_and_pixels_are_means() {
+        // A red half of the picture before a blue whole.
+        let square = |low: f64, high: f64, z: f64| {
+            [[low * z, -z, z], [high * z, -z, z], [high * z, z, z], [low * z, z, z]]
+        };
+        let positions = [square(-1.0, 1.0, 3.0), square(-1.0, 0.125, 2.0)].concat();
+        let faces = vec![[4, 5, 6], [4, 6, 7], [0, 1, 2], [0, 2, 3]];
+        let colours = [[[0.0, 0.0, 1.0]; 4], [[1.0, 0.0, 0.0]; 4]].concat();
+        let mesh = Mesh::new(positions, faces).unwrap().with_colours(colours).unwrap();
+        let [red, green, blue, covered] = coloured_pixels(&mesh, &camera());
+        let close = |channel: &[f64], row: [f64; 4]| {
+            channel.chunks(4).flatten().zip(row.repeat(4)).all(|(a, b)| (a - b).abs() < 1e-12)
+        };
+        assert!(close(&red, [1.0, 1.0, 0.5, 0.0]), "{red:?}");
+        assert!(close(&blue, [0.0, 0.0, 0.5, 1.0]), "{blue:?}");
+        assert!(green.iter().all(|&x| x == 0.0) && covered.iter().all(|&x| x == 1.0));
+    }
+
+    #[test]
+    fn colours_change_in_space_and_not_on_the_screen() {
+        // A floor from depth 1 to depth 3: its middle, at depth 2, is seen above the middle of the screen.
+        let positions = vec![[-9.0, 0.5, 1.0], [9.0, 0.5, 1.0], [9.0, 0.5, 3.0], [-9.0, 0.5, 3.0]];
+        let mesh = Mesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let mesh = mesh.with_colours(vec![[0.0; 3], [0.0; 3], [1.0; 3], [1.0; 3]]).unwrap();
+        let camera =
+            Pinhole { size: 400.into(), focal: [400.0; 2], centre: [200.0; 2], ..camera() };
+        let [red, ..] = coloured_pixels(&mesh, &camera);
+        // Depth 2 is in row 200 + 400 * 0.5 / 2 = 300.
+        assert!((red[300 * 400 + 200] - 0.5).abs() < 0.01, "{}", red[300 * 400 + 200]);
+    }
+
+    #[test]
+    fn what_is_behind_flat_or_far_off_is_not_drawn() {
+        let positions = vec![[0.0, 0.0, -1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1e30, 0.0, 0.01]];
+        let faces = vec![[0, 1, 2], [1, 1, 2], [1, 2, 3], [3, 3, 3]];
+        let mesh = Mesh::new(positions, faces).unwrap();
+        assert!(
+            coloured_pixels(&mesh, &camera()).iter().flatten().all(|x| (0.0..=1.0).contains(x))
+        );
+    }
+}

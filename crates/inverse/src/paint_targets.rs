@@ -1,0 +1,63 @@
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_softness::tensor;
+
+use crate::PaintedView;
+
+/// Views in which fewer pixels count than this, where the loss is about 0 whatever is drawn, are no reason to divide by 0.
+const LEAST_PIXELS: f64 = 1e-6;
+
+/// Squares of the colours of views as targets.
+#[derive(Clone, Debug)]
+pub struct PaintTargets<B: Backend> {
+    /// Red, green and blue over black, `[views, 3, size, size]`.
+    over_black: Tensor<B, 4>,
+    /// How much of each pixel counts, `[views, 1, size, size]`.
+    part: Tensor<B, 4>,
+    /// The sum of that.
+    pixels: f64,
+}
+
+impl<B: Backend> PaintTargets<B> {
+    /// A square of each view, given by its left, its top and its extent in pixels, on `size` × `size` pixels.
+    pub fn new<'a>(
+        views: impl IntoIterator<Item = (&'a PaintedView, [f64; 3])>,
+        size: usize,
+    ) -> Self {
+        let (mut colours, mut parts, mut count) = (Vec::new(), Vec::new(), 0);
+        for (PaintedView { over_black, part, .. }, square) in views {
+            for channel in over_black {
+                let [levels, _] = channel.part(square, size);
+                colours.extend(levels);
+            }
+            let [levels, _] = part.part(square, size);
+            parts.extend(levels);
+            count += 1;
+        }
+        let pixels = parts.iter().sum();
+        Self {
+            over_black: tensor(colours, [count, 3, size, size]),
+            part: tensor(parts, [count, 1, size, size]),
+            pixels,
+        }
+    }
+
+    /// How many pixels count in all views together.
+    pub fn pixels(&self) -> f64 {
+        self.pixels
+    }
+
+    /// The mean squared difference `[1]` of colours where a view and an image both show something: of an image `[views, 4, size, size]`
+    /// that a `ColourRenderer` drew over black, with the faces' share last.
+    ///
+    /// With S the share, S c what is drawn, a the part that counts and a C what is known over black, this is
+    /// `Σ (a S c - S a C)² / (3 Σ a)`: a pixel counts by `(a S)²`, no division can fail, and neither the background of the view nor that of the
+    /// image comes in.
+    pub fn loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        let drawn = image.clone().narrow(1, 0, 3);
+        let share = image.narrow(1, 3, 1);
+        let shape = drawn.dims();
+        let off =
+            drawn * self.part.clone().expand(shape) - self.over_black.clone() * share.expand(shape);
+        (off.clone() * off).sum() * (3.0 * self.pixels.max(LEAST_PIXELS)).recip()
+    }
+}

@@ -1,0 +1,191 @@
+use anyhow::{Context, ensure};
+use softrast_mesh::Mesh;
+
+use crate::{Picture, View, coloured_pixels};
+
+/// Squared errors below this count as this: 100 dB.
+const LEAST_ERROR: f64 = 1e-10;
+
+/// A view with the colours of its object.
+#[derive(Clone, Debug)]
+pub struct PaintedView {
+    /// The view.
+    pub view: View,
+    /// Red, green and blue, as the numbers of the picture are, times the part of each pixel that counts.
+    pub over_black: [Picture; 3],
+    /// The part of each pixel that counts, from 0 to 1.
+    pub part: Picture,
+    /// Whether a pixel counts in full or not at all.
+    opaque: bool,
+}
+
+impl PaintedView {
+    /// The view with the colours of its picture file.
+    ///
+    /// In a picture with transparency a pixel counts as much as its mask says, and its colour is known without what is behind: so
+    /// the object is seen over black. In one that is opaque all over, pixels at the outline are mixed with what is behind, and a mask of
+    /// luminance says how bright a pixel is and not how much of it the object covers. So there a pixel counts in full if its mask and those
+    /// of all eight around it are at least one half, and else not at all: the outline and what is outside of it are compared with nothing.
+    /// Where that would leave nothing, the outline counts.
+    ///
+    /// # Errors
+    ///
+    /// If the file is missing, no picture, or not of the size of the mask; if no pixel counts.
+    pub fn load(view: &View) -> anyhow::Result<Self> {
+        let of = || {
+            let [red, green, blue, opacity] = Picture::load_with_opacity(&view.picture)?;
+            let (found, mask) = (opacity.size(), view.mask.size());
+            ensure!(
+                found == mask,
+                "the picture has {} x {} pixels, but its mask {} x {}",
+                found.width,
+                found.height,
+                mask.width,
+                mask.height
+            );
+            Ok(Self::new(view.clone(), [red, green, blue], &opacity))
+        };
+        let painted = of().with_context(|| view.name.clone())?;
+        ensure!(
+            painted.part.pixels().iter().any(|&part| part > 0.0),
+            "{}: no pixel of the mask has a colour",
+            view.name
+        );
+        Ok(painted)
+    }
+
+    /// The view with these colours, and how opaque the picture is, all of the size of its mask; see [`PaintedView::load`].
+    ///
+    /// # Panics
+    ///
+    /// If sizes differ.
+    pub fn new(view: View, colours: [Picture; 3], opacity: &Picture) -> Self {
+        let opaque = opacity.pixels().iter().all(|&x| x >= 1.0);
+        let width = view.mask.size().width;
+        let levels = view.mask.pixels().iter().zip(opacity.pixels());
+        // The colour of what is transparent all through is not known.
+        let known = levels.map(|(&mask, &opacity)| mask * f32::from(u8::from(opacity > 0.0)));
+        let part = match opaque {
+            true => within(&view.mask),
+            false => Picture::new(known.collect(), width),
+        };
+        let over_black = colours.map(|channel| {
+            assert_eq!(channel.size(), part.size(), "sizes of a channel and the mask");
+            let pixels = channel.pixels().iter().zip(part.pixels());
+            Picture::new(pixels.map(|(x, part)| x * part).collect(), width)
+        });
+        Self { view, over_black, part, opaque }
+    }
+
+    /// How near a mesh with colours comes to the view, in decibels, at most 100: `-10 log₁₀` of the mean squared difference of red, green and
+    /// blue, each over black, in all pixels that the mesh or what counts of the mask covers at least in part. None if there is no such.
+    ///
+    /// The mesh is drawn by [`coloured_pixels`]. Where pixels of the view count in full or not at all, those of the mesh do too: in full from
+    /// one half covered on. There the outline of the mask, whose colours are not known, is left out.
+    pub fn psnr(&self, mesh: &Mesh) -> Option<f64> {
+        let drawn = coloured_pixels(mesh, &self.view.camera);
+        self.psnr_of(&drawn)
+    }
+
+    /// The same of what [`coloured_pixels`] drew.
+    ///
+    /// # Panics
+    ///
+    /// If it is of another size.
+    pub fn psnr_of(&self, drawn: &[Vec<f64>; 4]) -> Option<f64> {
+        let [colours @ .., covered] = drawn;
+        let part = self.part.pixels();
+        assert_eq!(covered.len(), part.len(), "pixels of what is drawn and of the view");
+        // Times which a pixel of the drawing counts as it is.
+        let gain = |pixel: usize| match (self.opaque, covered[pixel]) {
+            (false, _) => 1.0,
+            (true, share) if share >= 0.5 => 1.0 / share,
+            (true, _) => 0.0,
+        };
+        let mask = self.view.mask.pixels();
+        let unknown = |pixel: usize| self.opaque && mask[pixel] >= 0.5 && part[pixel] == 0.0;
+        let shown = |pixel: usize| covered[pixel] * gain(pixel) > 0.0 || part[pixel] > 0.0;
+        let inside = |&pixel: &usize| shown(pixel) && !unknown(pixel);
+        let pixels: Vec<usize> = (0..part.len()).filter(inside).collect();
+        let error = |pixel: usize| {
+            let known = self.over_black.iter().map(|channel| f64::from(channel.pixels()[pixel]));
+            let drawn = colours.iter().map(|channel| gain(pixel) * channel[pixel]);
+            drawn.zip(known).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 3.0
+        };
+        let mean = pixels.iter().map(|&k| error(k)).sum::<f64>() / pixels.len() as f64;
+        (!pixels.is_empty()).then(|| -10.0 * mean.max(LEAST_ERROR).log10())
+    }
+}
+
+/// White where a mask and all around are at least half white, or where the mask itself is if that is nowhere.
+fn within(mask: &Picture) -> Picture {
+    let (levels, width) = (mask.pixels(), mask.size().width);
+    let height = mask.size().height;
+    let around = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+    let firm = |k: usize| {
+        let mut rows = around(k / width, height);
+        rows.all(|y| around(k % width, width).all(|x| levels[y * width + x] >= 0.5))
+    };
+    let inner: Vec<f32> = (0..levels.len()).map(|k| f32::from(u8::from(firm(k)))).collect();
+    match inner.contains(&1.0) {
+        true => Picture::new(inner, width),
+        false => mask.clone().thresholded(0.5),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use softrast_raster::Pinhole;
+
+    use super::*;
+
+    fn view(mask: Vec<f32>, width: usize) -> View {
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let size = [mask.len() / width, width].into();
+        let camera =
+            Pinhole { rotation, translation: [0.0; 3], focal: [1.0; 2], centre: [0.0; 2], size };
+        View { name: "a".into(), picture: "a.png".into(), mask: Picture::new(mask, width), camera }
+    }
+
+    #[test]
+    fn transparent_pictures_count_by_their_mask_and_opaque_ones_within_it() {
+        let mask = vec![0.0, 0.6, 1.0, 1.0, 1.0, 0.3];
+        let gray = || [(); 3].map(|()| Picture::new(vec![0.5; 6], 6));
+        let clear = Picture::new(vec![0.0, 0.6, 1.0, 1.0, 0.0, 0.3], 6);
+        let seen = PaintedView::new(view(mask.clone(), 6), gray(), &clear);
+        assert_eq!(seen.part.pixels(), [0.0, 0.6, 1.0, 1.0, 0.0, 0.3]);
+        assert_eq!(seen.over_black[2].pixels(), [0.0, 0.3, 0.5, 0.5, 0.0, 0.15]);
+        let opaque = Picture::new(vec![1.0; 6], 6);
+        let seen = PaintedView::new(view(mask, 6), gray(), &opaque);
+        assert_eq!(seen.part.pixels(), [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
+        // A thin mask has nothing but an outline.
+        let seen = PaintedView::new(view(vec![0.0, 1.0, 0.7, 0.0, 0.0, 0.0], 6), gray(), &opaque);
+        assert_eq!(seen.part.pixels(), [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn decibels_count_what_either_shows_and_leave_out_an_outline_that_is_not_known() {
+        let gray = || [(); 3].map(|()| Picture::new(vec![0.5; 6], 6));
+        let drawn = |levels: [f64; 6], covered: [f64; 6]| {
+            let [r, g, b] = [levels; 3].map(|channel| channel.to_vec());
+            [r, g, b, covered.to_vec()]
+        };
+        let mask = vec![0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+        let clear = Picture::new(mask.clone(), 6);
+        let seen = PaintedView::new(view(mask.clone(), 6), gray(), &clear);
+        // One of four pixels is off by 0.2, another is where nothing should be.
+        let image = drawn([0.0, 0.5, 0.5, 0.7, 0.1, 0.0], [0.0, 1.0, 1.0, 1.0, 0.25, 0.0]);
+        let expected = -10.0 * ((0.04f64 + 0.01) / 4.0).log10();
+        assert!((seen.psnr_of(&image).unwrap() - expected).abs() < 1e-5);
+        let opaque = Picture::new(vec![1.0; 6], 6);
+        let seen = PaintedView::new(view(mask, 6), gray(), &opaque);
+        // Of the mask only the middle counts; what covers less than half of a pixel does not.
+        assert_eq!(seen.psnr_of(&image), Some(100.0));
+        let image = drawn([0.0, 0.5, 0.5, 0.7, 0.3, 0.0], [0.0, 1.0, 1.0, 1.0, 0.75, 0.0]);
+        let expected = -10.0 * (0.16f64 / 2.0).log10();
+        assert!((seen.psnr_of(&image).unwrap() - expected).abs() < 1e-5);
+        let nothing = drawn([0.0; 6], [0.0; 6]);
+        let none = PaintedView::new(view(vec![0.0; 6], 6), gray(), &clear);
+        assert_eq!(none.psnr_of(&nothing), None);
+    }
+}

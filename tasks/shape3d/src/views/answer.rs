@@ -1,0 +1,207 @@
+//! What is said of a mesh that was made of views, and what is written beside it.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+use softrast_cli::{Answer, Given, seen_by};
+use softrast_inverse::View;
+use softrast_lab::{
+    Viewer, contact_sheet, for_page,
+    format::{counted, line},
+    overlay, png,
+    program::Output,
+    report::{Report, Table},
+};
+use softrast_mesh::Mesh;
+
+use super::painted::{self, Colours};
+use crate::Args;
+
+/// Views that a picture of the result shows.
+const SHOWN: usize = 12;
+
+/// A view, how well the result fits it, and whether it was kept aside.
+pub(super) struct Scored {
+    pub(super) view: View,
+    pub(super) silhouette: Vec<f64>,
+    pub(super) iou: f64,
+    /// If colours were asked for.
+    pub(super) colours: Option<Colours>,
+    pub(super) held_out: bool,
+}
+
+/// The mean of a score of the views that were kept aside, or of the others.
+fn mean(scored: &[Scored], held_out: bool, score: impl Fn(&Scored) -> Option<f64>) -> Option<f64> {
+    let of: Vec<f64> =
+        scored.iter().filter(|one| one.held_out == held_out).filter_map(score).collect();
+    (!of.is_empty()).then(|| of.iter().sum::<f64>() / of.len() as f64)
+}
+
+/// Scores of a mesh, and where it is written.
+struct Summary {
+    train: f64,
+    held_out: Option<f64>,
+    /// In decibels, of the same two parts.
+    psnr: [Option<f64>; 2],
+    path: PathBuf,
+    seconds: f64,
+}
+
+pub(super) fn answer(
+    given: &Given<'_, Args>,
+    mesh: &Mesh,
+    scored: &[Scored],
+    seconds: f64,
+) -> anyhow::Result<Answer> {
+    let psnr = |one: &Scored| one.colours.as_ref()?.psnr;
+    let iou = |one: &Scored| Some(one.iou);
+    let summary = Summary {
+        train: mean(scored, false, iou).unwrap_or(f64::NAN),
+        held_out: mean(scored, true, iou),
+        psnr: [false, true].map(|held_out| mean(scored, held_out, psnr)),
+        path: given.folder().join("mesh.obj"),
+        seconds,
+    };
+    let mut warnings = Vec::new();
+    if summary.train < 0.9 && given.args.mesh.is_some() {
+        warnings.push(format!(
+            "the mean IoU is {:.3} only: the mesh is taken as it stands, in the world units of the cameras; check that it lies where the \
+             pictures show it",
+            summary.train
+        ));
+    } else if summary.train < 0.9 {
+        warnings.push(format!(
+            "the mean IoU is {:.3} only: check that the cameras belong to the pictures and that the masks are white where the object is \
+             (--invert)",
+            summary.train
+        ));
+    }
+    let sheet: Vec<_> = shown(scored)
+        .map(|one| overlay(&one.silhouette, one.view.mask.pixels(), one.view.camera.size.width))
+        .map(for_page)
+        .collect();
+    let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
+    let colours = painted::sheet(&shown(scored).collect::<Vec<_>>()).map(|sheet| png(&sheet));
+    let colours = colours.transpose()?;
+    let text = text(mesh, scored, &summary);
+    let page = page(mesh, scored, &warnings, &text[1..], &picture, colours.as_deref())?;
+    let json = json(mesh, scored, &summary, &warnings);
+    let mut beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture".to_owned();
+    let mut files = vec![
+        ("mesh.obj".to_owned(), mesh.to_obj().into_bytes()),
+        ("mesh.ply".to_owned(), mesh.to_ply()),
+        ("mesh.glb".to_owned(), mesh.to_glb()),
+        ("views.png".to_owned(), picture),
+    ];
+    if let Some(colours) = colours {
+        files.push(("colours.png".to_owned(), colours));
+        beside += ", colours.png the same in colour";
+    }
+    let output = Output { text, json, warnings, partial: None };
+    Ok(Answer { page, output, files, beside })
+}
+
+fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
+    let Summary { train, held_out, psnr: [psnr, aside_psnr], path, seconds } = summary;
+    let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
+    let head = [
+        format!("3D SHAPE from {}", counted(scored.len(), "view")),
+        line("IoU", &format!("{train:.4}")),
+    ];
+    let rest = [
+        line("mesh", &format!("{}, {vertices} vertices, {faces} faces", path.display())),
+        line("seconds", &format!("{seconds:.1}")),
+    ];
+    let aside = held_out.map(|iou| line("IoU, held out", &format!("{iou:.4}")));
+    let psnr = psnr.map(|psnr| line("PSNR", &format!("{psnr:.2} dB")));
+    let aside_psnr = aside_psnr.map(|psnr| line("PSNR, held out", &format!("{psnr:.2} dB")));
+    head.into_iter().chain(aside).chain(psnr).chain(aside_psnr).chain(rest).collect()
+}
+
+fn page(
+    mesh: &Mesh,
+    scored: &[Scored],
+    warnings: &[String],
+    text: &[String],
+    picture: &[u8],
+    colours: Option<&[u8]>,
+) -> anyhow::Result<Report> {
+    let about = match colours {
+        Some(_) => "A mesh that has the silhouettes and colours of given pictures",
+        None => "A mesh that has the silhouettes of given masks",
+    };
+    let mut page = Report::new("shape3d", about);
+    page.warnings(warnings);
+    let psnr = |one: &Scored| one.colours.as_ref().and_then(|colours| colours.psnr);
+    let views = scored.iter().map(|one| {
+        let Scored { view, iou, held_out, .. } = one;
+        let psnr = psnr(one).map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
+        let note = format!("IoU {iou:.4}{psnr}{}", if *held_out { ", kept aside" } else { "" });
+        seen_by(view.name.clone(), &view.camera, &view.mask, note)
+    });
+    let viewer = Viewer {
+        positions: mesh.positions().to_vec(),
+        faces: mesh.faces().to_vec(),
+        colours: mesh.colours().map(<[_]>::to_vec),
+        views: views.collect::<anyhow::Result<_>>()?,
+    };
+    page.viewer(
+        &viewer,
+        colours.unwrap_or(picture),
+        "The mesh and the cameras. A view shows it with the outline of its mask.",
+    );
+    if let Some(colours) = colours {
+        page.picture(colours, painted::CAPTION);
+    }
+    page.picture(
+        picture,
+        "Masks with the silhouettes of the result over them: grey where both are, orange where only the mask is, blue where only the \
+         silhouette is. Views that were kept aside come first.",
+    );
+    text.iter().for_each(|line| page.paragraph(line));
+    page.heading("Views");
+    let head =
+        ["view", "IoU"].into_iter().chain(colours.map(|_| "PSNR in dB")).chain(["kept aside"]);
+    let mut table = Table::new(head);
+    for one in scored {
+        let aside = if one.held_out { "yes" } else { "" };
+        let row = [one.view.name.clone(), format!("{:.4}", one.iou)];
+        let psnr = colours.map(|_| psnr(one).map(|x| format!("{x:.2}")).unwrap_or_default());
+        table.push(row.into_iter().chain(psnr).chain([aside.to_owned()]));
+    }
+    page.table(&table);
+    Ok(page)
+}
+
+fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
+    let Summary { train, held_out, psnr, path, seconds } = summary;
+    let mut json = json!({
+        "train_iou": train,
+        "held_out_iou": held_out,
+        "mesh": path,
+        "vertices": mesh.positions().len(),
+        "faces": mesh.faces().len(),
+        "seconds": seconds,
+        "views": scored.iter().map(|one| json!({
+            "name": one.view.name,
+            "iou": one.iou,
+            "held_out": one.held_out,
+        })).collect::<Vec<_>>(),
+        "warnings": warnings,
+    });
+    if mesh.colours().is_some() {
+        (json["train_psnr"], json["held_out_psnr"]) = (json!(psnr[0]), json!(psnr[1]));
+        for (view, one) in json["views"].as_array_mut().into_iter().flatten().zip(scored) {
+            view["psnr"] = json!(one.colours.as_ref().and_then(|colours| colours.psnr));
+        }
+    }
+    json
+}
+
+/// Those kept aside, then others evenly spaced.
+fn shown(scored: &[Scored]) -> impl Iterator<Item = &Scored> {
+    let aside = scored.iter().filter(|one| one.held_out);
+    let train: Vec<&Scored> = scored.iter().filter(|one| !one.held_out).collect();
+    let every = train.len().div_ceil(SHOWN);
+    aside.take(SHOWN).chain(train.into_iter().step_by(every.max(1))).take(SHOWN)
+}

@@ -1,0 +1,187 @@
+//! Colours from pictures: of a shape that is known, of one that is found, and what is said of flags and files that do not go together.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{fs, path::Path, process::Command};
+
+use image::{Rgb, RgbImage, Rgba, RgbaImage};
+use serde_json::{Value, json};
+use softrast_inverse::coloured_pixels;
+use softrast_mesh::{Mesh, icosphere};
+use softrast_raster::{Orbit, Pinhole};
+
+/// Runs `shape3d solve` with results in `out`: its JSON, or its error line.
+fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
+    let output = Command::new(env!("CARGO_BIN_EXE_shape3d"))
+        .arg("solve")
+        .args(words)
+        .args(["--quiet", "--json", "--out"])
+        .arg(out)
+        .output()
+        .unwrap();
+    match output.status.success() {
+        true => Ok(serde_json::from_slice(&output.stdout).unwrap()),
+        false => Err(String::from_utf8(output.stderr).unwrap().trim_end().to_owned()),
+    }
+}
+
+/// A ball, wider than high, with colours that follow its shape.
+fn ball() -> Mesh {
+    let ball = icosphere(3);
+    let colours = ball.positions().iter().map(|p| p.map(|x| 0.5 + 0.4 * (3.0 * x).sin())).collect();
+    let wide = ball.positions().iter().map(|&[x, y, z]| [x, 0.7 * y, z]).collect();
+    ball.with_positions(wide).unwrap().with_colours(colours).unwrap()
+}
+
+/// Pictures of the ball in a folder: over nothing, or over white with masks beside them.
+fn pictures(folder: &Path, opaque: bool) {
+    let size = [60usize, 44];
+    let frame = |k: usize| {
+        let elevation_deg = [-50.0, 0.0, 50.0][k % 3];
+        let orbit =
+            Orbit { distance: 4.0, elevation_deg, azimuth_deg: 31.0 * k as f64, fov_deg: 40.0 };
+        let camera = Pinhole::of_orbit(&orbit, [size[1], size[0]]);
+        let [red, green, blue, covered] = coloured_pixels(&ball(), &camera);
+        let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
+        let at = |x: u32, y: u32| y as usize * size[0] + x as usize;
+        let of = |pixel: usize, colour: &dyn Fn(f64) -> f64| {
+            [&red, &green, &blue].map(|channel| byte(colour(channel[pixel])))
+        };
+        let name = format!("{k:02}.png");
+        let [width, height] = size.map(|pixels| pixels as u32);
+        let mut frame = json!({"file_path": name, "transform_matrix": camera.to_opengl()});
+        if opaque {
+            let over_white = |x, y| {
+                let pixel = at(x, y);
+                Rgb(of(pixel, &|level| level + 1.0 - covered[pixel]))
+            };
+            RgbImage::from_fn(width, height, over_white).save(folder.join(&name)).unwrap();
+            let mask = |x, y| Rgb([byte(covered[at(x, y)]); 3]);
+            let beside = format!("mask_{name}");
+            RgbImage::from_fn(width, height, mask).save(folder.join(&beside)).unwrap();
+            frame["mask_path"] = json!(beside);
+        } else {
+            let over_nothing = |x, y| {
+                let pixel = at(x, y);
+                let [r, g, b] = of(pixel, &|level| level / covered[pixel].max(1e-9));
+                Rgba([r, g, b, byte(covered[pixel])])
+            };
+            RgbaImage::from_fn(width, height, over_nothing).save(folder.join(&name)).unwrap();
+        }
+        (camera, frame)
+    };
+    let (cameras, frames): (Vec<_>, Vec<_>) = (0..12).map(frame).unzip();
+    let Pinhole { focal, centre, .. } = cameras[0];
+    let lens = json!({"fl_x": focal[0], "fl_y": focal[1], "cx": centre[0], "cy": centre[1], "frames": frames});
+    fs::write(folder.join("transforms.json"), lens.to_string()).unwrap();
+}
+
+fn number(found: &Value, name: &str) -> f64 {
+    found[name].as_f64().unwrap_or_else(|| panic!("{name} of {found}"))
+}
+
+#[test]
+fn a_known_shape_gets_its_colours_back_over_nothing_and_over_white() {
+    for opaque in [false, true] {
+        let folder = tempfile::tempdir().unwrap();
+        pictures(folder.path(), opaque);
+        let known = folder.path().join("known.ply");
+        Mesh::new(ball().positions().to_vec(), ball().faces().to_vec())
+            .unwrap()
+            .save(&known)
+            .unwrap();
+        let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+        let words = ["--views", views, "--colour", "--mesh", known.to_str().unwrap()];
+        let found = run(&out, &[&words[..], &["--hold-out", "2"]].concat()).unwrap();
+        assert!(number(&found, "held_out_iou") > 0.98, "{found}");
+        assert!(number(&found, "held_out_psnr") > 30.0, "opaque: {opaque}: {found}");
+        assert!(found["views"].as_array().unwrap().iter().all(|view| number(view, "psnr") > 15.0));
+        for (name, tolerance) in [("mesh.obj", 0.0), ("mesh.ply", 0.002), ("mesh.glb", 1e-6)] {
+            let mesh = Mesh::load(out.join(name)).unwrap();
+            let obj = Mesh::load(out.join("mesh.obj")).unwrap();
+            let pairs = mesh
+                .colours()
+                .unwrap()
+                .iter()
+                .flatten()
+                .zip(obj.colours().unwrap().iter().flatten());
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() <= tolerance), "{name}");
+            // Faces may have been cut: vertices that were there come first.
+            let before = ball().positions().to_vec();
+            let moved = before
+                .iter()
+                .zip(mesh.positions())
+                .any(|(a, b)| (0..3).any(|k| (a[k] - b[k]).abs() > 1e-6));
+            assert!(!moved, "{name}");
+        }
+        let page = fs::read_to_string(out.join("report.html")).unwrap();
+        assert!(page.contains("PSNR") && page.contains("\"colours\":\""));
+        assert!(out.join("colours.png").exists());
+    }
+}
+
+#[test]
+fn shape_and_colours_are_found_together_and_without_the_flag_there_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path(), false);
+    let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+    let words = ["--views", views, "--hold-out", "2", "--steps", "40"];
+    let found = run(&out, &[&words[..], &["--colour"]].concat()).unwrap();
+    assert!(number(&found, "held_out_iou") > 0.95, "{found}");
+    assert!(number(&found, "held_out_psnr") > 20.0, "{found}");
+    let found = run(&out.join("plain"), &words).unwrap();
+    assert!(found.get("held_out_psnr").is_none() && found["views"][0].get("psnr").is_none());
+    assert_eq!(Mesh::load(out.join("plain/mesh.ply")).unwrap().colours(), None);
+    assert!(!out.join("plain/colours.png").exists());
+}
+
+#[test]
+fn a_luminance_that_is_the_mask_is_a_white_mesh() {
+    let fox = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");
+    let out = tempfile::tempdir().unwrap();
+    let words = ["--views", fox.to_str().unwrap(), "--colour", "--steps", "5"];
+    run(out.path(), &words).unwrap();
+    let mesh = Mesh::load(out.path().join("mesh.obj")).unwrap();
+    // Where grey pixels lie within the mask, as in a gap between legs, there is some grey.
+    let colours = mesh.colours().unwrap();
+    let white = colours.iter().filter(|colour| colour.iter().all(|&x| x > 0.95)).count();
+    assert!(white * 10 > colours.len() * 9, "{white} of {}", colours.len());
+}
+
+#[test]
+fn what_does_not_go_together_is_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path(), true);
+    let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+    let known = folder.path().join("known.ply");
+    ball().save(&known).unwrap();
+    let known = known.to_str().unwrap();
+    let far = folder.path().join("far.ply");
+    let moved = ball().positions().iter().map(|p| [p[0], p[1] + 900.0, p[2]]).collect();
+    ball().with_positions(moved).unwrap().save(&far).unwrap();
+    let error = |words: &[&str], parts: &[&str]| {
+        let error = run(&out, words).unwrap_err();
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+        assert!(!out.join("report.html").exists());
+    };
+    error(&["--colour"], &["--colour", "--views"]);
+    error(&["--views", views, "--mesh", known], &["--mesh", "--colour"]);
+    error(
+        &["--views", views, "--colour", "--mesh", known, "--smooth", "2"],
+        &["--smooth", "--mesh"],
+    );
+    error(&["--views", views, "--colour", "--mesh", "no.ply"], &["no.ply"]);
+    // A mesh that lies elsewhere is painted by nothing: that is said.
+    let words = ["--views", views, "--colour", "--mesh", far.to_str().unwrap(), "--steps", "1"];
+    match run(&out.join("far"), &words) {
+        Ok(found) => {
+            assert!(found["warnings"][0].as_str().unwrap().contains("as it stands"), "{found}")
+        }
+        Err(error) => assert!(error.contains("no camera has the mesh before it"), "{error}"),
+    }
+    // The picture of a mask of another size.
+    RgbImage::new(3, 3).save(folder.path().join("04.png")).unwrap();
+    let words = ["--views", views, "--colour", "--mesh", known];
+    error(&words, &["04.png", "3 x 3 pixels", "60 x 44"]);
+}
