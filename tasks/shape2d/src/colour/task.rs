@@ -106,9 +106,9 @@ impl Task for Coloured {
     const TITLE: &'static str = "2D SHAPE in colour";
     const ABOUT: &'static str = "Moves loose triangles until they cover a picture in its colours";
 
-    /// From half a pixel of the default size down to where the soft image is nearly hard.
+    /// From a third of a pixel of the default size, so that edges find their place, down to where the soft image is nearly the hard one.
     const SCALES: Scales =
-        Scales { schedule: Schedule::Decay, decay: [0.003, 0.0002], fixed: 0.0004 };
+        Scales { schedule: Schedule::Decay, decay: [0.003, 0.0001], fixed: 0.0004 };
 
     type Args = Args;
     type Pictures = NoArgs;
