@@ -6,7 +6,7 @@ use serde_json::Value;
 use softrast_lab::Failure;
 
 /// Runs a command line with results in `out`; its JSON line.
-pub fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
+pub(crate) fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
     let output = Command::new(env!("CARGO_BIN_EXE_shape2d"))
         .args(line.split_whitespace())
         .args(["--quiet", "--json", "--out"])
@@ -23,17 +23,17 @@ pub fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
 }
 
 /// The same, of which only the JSON line is kept.
-pub fn run(line: &str) -> Result<Value, Failure> {
+pub(crate) fn run(line: &str) -> Result<Value, Failure> {
     run_in(tempfile::tempdir().unwrap().path(), line)
 }
 
 /// Its warnings.
-pub fn warnings(json: &Value) -> String {
+pub(crate) fn warnings(json: &Value) -> String {
     json["warnings"].to_string()
 }
 
 /// Asserts that no error is NaN or infinite.
-pub fn assert_finite(json: &Value) {
+pub(crate) fn assert_finite(json: &Value) {
     for error in ["image_error", "parameter_error"] {
         for key in ["initial", "final", "best"] {
             assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
