@@ -57,9 +57,9 @@ fn the_meta_gradient_through_two_steps_matches_central_differences() {
 
 #[test]
 fn a_short_solve_shows_a_small_picture() {
-    let args = Args { triangles: Some(120), ..Args::default() };
+    let args = Args { triangles: Some(60), ..Args::default() };
     let task = Coloured::new(&args, Variant::Original, &EdgeChoice::default()).unwrap();
-    let softness = ScheduledSoftness::decay(SOFTNESS, 0.02, 0.002);
+    let softness = ScheduledSoftness::decay(SOFTNESS, 0.02, 0.0005);
     let config = SolveConfig { size: 32, steps: 60, learning_rate: 0.01 };
     let instances = [task.instance(0).unwrap()];
     let mut psnr = Vec::new();
@@ -70,5 +70,5 @@ fn a_short_solve_shows_a_small_picture() {
     })
     .unwrap();
     let (first, last) = (psnr[0], psnr[psnr.len() - 1]);
-    assert!(last > 23.0 && last > first + 1.0, "from {first} to {last} dB");
+    assert!(last > 23.5 && last > first + 2.5, "from {first} to {last} dB");
 }
