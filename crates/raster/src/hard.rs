@@ -72,7 +72,11 @@ fn closeness(corners: [[f64; 3]; 3]) -> impl Fn([f64; 2]) -> f64 {
         (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     };
     let area = side(0, [corners[2][0], corners[2][1]]);
-    move |place| (0..3).map(|k| side(k, place) / area / corners[(k + 2) % 3][2]).sum()
+    let [first, second, third] = corners.map(|corner| 1.0 / corner[2]);
+    // By differences, so that faces of one depth all over tie exactly.
+    move |place| {
+        first + (side(2, place) * (second - first) + side(0, place) * (third - first)) / area
+    }
 }
 
 /// The images of `vertices` `[views, 3, vertices]`.

@@ -95,8 +95,8 @@ mod tests {
         assert_eq!(inside(corners), all);
         let [a, b, c] = corners;
         assert_eq!(inside([c, b, a]), all);
-        assert_eq!(inside([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), []);
-        assert_eq!(inside([[2.0, 2.0], [9.0, 2.0], [2.0, 9.0]]), []);
+        assert_eq!(inside([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), [0.0; 0]);
+        assert_eq!(inside([[2.0, 2.0], [9.0, 2.0], [2.0, 9.0]]), [0.0; 0]);
         assert_eq!(inside([[-9.0, -9.0], [9.0, -9.0], [0.0, 99.0]]).len(), 16);
     }
 

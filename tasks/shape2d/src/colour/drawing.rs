@@ -155,7 +155,7 @@ mod tests {
         let ([_, _, blue], [_, green, grass_blue]) = (mean(&large[..64]), mean(&large[960..]));
         assert!(blue > 0.5 && green > grass_blue, "{blue} {green} {grass_blue}");
         let off = add(mean(&small), mean(&large), -1.0);
-        assert!(off.iter().all(|x| x.abs() < 0.02), "{off:?}");
+        assert!(off.iter().all(|x| x.abs() < 0.03), "{off:?}");
         assert!(small.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
     }
 }
