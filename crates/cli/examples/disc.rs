@@ -141,6 +141,7 @@ impl Task for Disc {
             hard: "hard MSE",
             parameter: ["distance", "radii"],
             further: &[],
+            gains: &[],
         }
     }
 

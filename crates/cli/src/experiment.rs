@@ -57,6 +57,14 @@ impl<T: Task> TaskExperiment<T> {
             refuse_what_edges_that_stay_do_not_know(method_args)?;
             method.softness.surrogate = None;
         }
+        if task.faces().is_none() {
+            if method_args.surrogate_scale.is_some() {
+                return Err(Error::usage(
+                    "colours have no gradient but their own: leave out --surrogate-scale",
+                ));
+            }
+            method.softness.surrogate = None;
+        }
         let usual = task.defaults();
         let size = common.size.unwrap_or(usual.size);
         method.resolution.check(size).map_err(Error::usage)?;
@@ -168,7 +176,7 @@ impl<T: Task> TaskExperiment<T> {
             }
             if let Some(image) = &iterate.image {
                 let frame = batch.wants_frame(iterate.step, self.solve.steps);
-                self.keep_picture(&mut all[0], image, frame);
+                self.keep_picture(&mut all[0], scene, image, frame);
             }
             let loss = iterate.loss.iter().sum::<f64>() / iterate.loss.len() as f64;
             if iterate.step == 0 { Ok(()) } else { progress.step(iterate.step, loss) }
@@ -178,7 +186,13 @@ impl<T: Task> TaskExperiment<T> {
     }
 
     /// Keeps an image as the result, if no step before had a lower error of the hard one, and as a frame if so asked.
-    fn keep_picture(&self, solved: &mut Solved, image: &[f64], frame: bool) {
+    fn keep_picture(
+        &self,
+        solved: &mut Solved,
+        scene: &T::Scene<HostBackend>,
+        image: &[f64],
+        frame: bool,
+    ) {
         let size = self.solve.size;
         let step = solved.run.curve.len() - 1;
         let best = best_point(&solved.run.curve, HARD).is_none_or(|best| best.step == step);
@@ -188,9 +202,11 @@ impl<T: Task> TaskExperiment<T> {
             start: now(),
             result: now(),
             frames: Vec::new(),
+            drawing: None,
         });
         if best {
             pictures.result = now();
+            pictures.drawing = self.task.drawing(scene, &solved.theta);
         }
         if frame {
             pictures.frames.push(self.task.frame(image, &solved.target, size));

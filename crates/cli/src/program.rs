@@ -29,7 +29,7 @@ pub fn main<T: Task>() -> ExitCode {
 pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let words = with_command::<T>(words);
     let command = CommandLine::<T::Args, T::Pictures>::command()
-        .name(T::NAME)
+        .name(T::PROGRAM)
         .version(env!("CARGO_PKG_VERSION"))
         .about(T::ABOUT)
         .after_help("Without a command: solve. `COMMAND --help` lists the flags of a command.");
@@ -40,7 +40,8 @@ pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<
     let (command, shared) = line.command.shared();
     let Common { json, quiet, ref out, .. } = shared.common;
     let out = out.clone().unwrap_or_else(|| PathBuf::from("out").join(T::NAME));
-    let session = Session { again: repeated(T::NAME, &words), command, task: T::NAME, out, quiet };
+    let session =
+        Session { again: repeated(T::PROGRAM, &words), command, task: T::NAME, out, quiet };
     let output = match line.command {
         Command::Solve(flags) => commands::evaluate::solve::<T>(&session, *flags)?,
         Command::Evaluate(flags) => commands::evaluate::evaluate::<T>(&session, flags)?,

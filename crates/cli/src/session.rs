@@ -68,12 +68,13 @@ const PAGE: &str = "report.html";
 /// The results of runs, as JSON.
 pub(crate) const RESULT: &str = "result.json";
 /// Files that tell of the last runs; those that a command does not write again would tell of others.
-const OF_RUNS: [&str; 14] = [
+const OF_RUNS: [&str; 15] = [
     "curve.csv",
     "convergence.csv",
     "against_curve.csv",
     "before_after.png",
     "animation.gif",
+    "result.svg",
     "overlay.png",
     "overlay-*",
     "poses.csv",

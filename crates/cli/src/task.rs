@@ -10,8 +10,11 @@ use crate::{Answer, Given, Paper, Scales, Schedule, Variant};
 
 /// An [`InverseProblem`] that has a program: what it is called, which flags it has, how results are measured and shown.
 pub trait Task: InverseProblem + Sized {
-    /// Name of the program and of the default output folder, such as `pose`.
+    /// Name of the task, of its program and of the default output folder, such as `pose`.
     const NAME: &'static str;
+
+    /// Name of the program, where it does more than one task.
+    const PROGRAM: &'static str = Self::NAME;
 
     /// Name in the paper, such as `POSE`.
     const TITLE: &'static str;
@@ -76,7 +79,7 @@ pub trait Task: InverseProblem + Sized {
         1
     }
 
-    /// For each instance a list: the error of the parameters and then the further ones, as [`Task::measures`] names them.
+    /// For each instance a list: the error of the parameters, then the further ones and the gains, as [`Task::measures`] names them.
     fn errors(
         &self,
         instances: &[Self::Instance],
@@ -93,6 +96,11 @@ pub trait Task: InverseProblem + Sized {
     /// An image of an instance as a picture; of grey levels unless the task draws it otherwise.
     fn picture(&self, image: &[f64], size: usize) -> RgbImage {
         rgb_from_gray(image, size, size)
+    }
+
+    /// What is found as a drawing, a file of SVG; none unless the task has one. `theta` is that of the instance.
+    fn drawing(&self, _scene: &Self::Scene<HostBackend>, _theta: &[f64]) -> Option<String> {
+        None
     }
 
     /// An image of an instance as a frame of the animation, with its target.
@@ -170,6 +178,8 @@ pub struct Measures {
     pub parameter: [&'static str; 2],
     /// Further errors: key, name and unit.
     pub further: &'static [[&'static str; 3]],
+    /// What is the better the higher it is, likewise.
+    pub gains: &'static [[&'static str; 3]],
 }
 
 /// Places of the metrics that every task has.
@@ -179,7 +189,7 @@ pub(crate) const SCALE: usize = 3;
 pub(crate) const HARD: usize = 4;
 
 impl Measures {
-    /// All metrics: loss, soft error, error of the parameters, scale, hard error, further errors.
+    /// All metrics: loss, soft error, error of the parameters, scale, hard error, further errors, gains.
     pub(crate) fn metrics(&self) -> Vec<Metric> {
         let metric = |key, [name, unit]: [&'static str; 2], role| Metric { key, name, unit, role };
         let mut metrics = vec![
@@ -189,9 +199,9 @@ impl Measures {
             metric("scale", ["scale", ""], Role::Trace),
             metric("image_error.hard", [self.hard, ""], Role::Score),
         ];
-        let further =
-            self.further.iter().map(|&[key, name, unit]| metric(key, [name, unit], Role::Error));
-        metrics.extend(further);
+        for (all, role) in [(self.further, Role::Error), (self.gains, Role::Gain)] {
+            metrics.extend(all.iter().map(|&[key, name, unit]| metric(key, [name, unit], role)));
+        }
         metrics
     }
 }

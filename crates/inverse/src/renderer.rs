@@ -18,6 +18,7 @@ pub struct ScheduledRenderer {
     values: ScheduledSoftness,
     own: Vec<f64>,
     size: usize,
+    tolerance: f64,
     resolution: Resolution,
     /// What draws silhouettes, if the problem has any: as they are seen, and as their gradient has it, if that is another.
     renderers: Vec<SoftRenderer<EdgeSoftness>>,
@@ -52,8 +53,9 @@ impl ScheduledRenderer {
             let surrogate = values.surrogate.clone().map(|found| of(found.softness, found.phi));
             [of(values.softness, values.phi.clone())].into_iter().chain(surrogate).collect()
         });
-        let (size, phi, kept) = (rasterizer.size.shorter(), phi.to_vec(), RefCell::default());
-        Self { layout, phi, values, own, size, resolution, renderers, kept }
+        let (size, tolerance) = (rasterizer.size.shorter(), rasterizer.tolerance);
+        let (phi, kept) = (phi.to_vec(), RefCell::default());
+        Self { layout, phi, values, own, size, tolerance, resolution, renderers, kept }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
@@ -173,6 +175,21 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
         let below = table.clone().narrow(0, own, rows - own);
         let table = table.narrow(0, 0, own);
         seen.coverage_with_surrogate(vertices, table, &surrogate.clone().sized(side), below)
+    }
+
+    /// Pixels a side of the image.
+    pub fn side(&self) -> usize {
+        self.renderer.side(self.step)
+    }
+
+    /// Largest error of a pixel by leaving out far faces.
+    pub fn tolerance(&self) -> f64 {
+        self.renderer.tolerance
+    }
+
+    /// Which part of the run is over, from 0 to 1.
+    pub fn part(&self) -> f64 {
+        self.renderer.layout.part(self.step)
     }
 
     /// The softness of edges and its parameters `[P]`.

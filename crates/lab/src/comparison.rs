@@ -107,7 +107,7 @@ impl Comparison {
         report.paragraph(&format!("The second method {}.", self.head()));
         report.table(&self.table());
         report.note(&format!(
-            "A difference below 0 means that the first method ({first}) has the smaller error. On the charts it is blue, the second \
+            "A difference below 0 means that the first method ({first}) has the smaller value. On the charts it is blue, the second \
              ({second}) is orange. Intervals are by the bootstrap over the seeds, that of the success by Wilson."
         ));
     }
@@ -118,8 +118,9 @@ impl Difference {
         let last = |run: &Run| run.curve[run.curve.len() - 1].values[place];
         let per_run: Vec<f64> =
             first.iter().zip(second).map(|(one, two)| last(one) - last(two)).collect();
+        let worse = if metric.is_gain() { -1.0 } else { 1.0 };
         let share = |of: fn(f64) -> bool| {
-            per_run.iter().filter(|&&x| of(x)).count() as f64 / per_run.len() as f64
+            per_run.iter().filter(|&&x| of(worse * x)).count() as f64 / per_run.len() as f64
         };
         Self {
             metric,
@@ -133,9 +134,13 @@ impl Difference {
 
     /// Whether the interval of the mean leaves no doubt which is the better one.
     fn verdict(&self) -> &'static str {
+        let [below, above] = match self.metric.is_gain() {
+            false => ["better", "worse"],
+            true => ["worse", "better"],
+        };
         match self.ci95 {
-            [_, high] if high < 0.0 => "better",
-            [low, _] if low > 0.0 => "worse",
+            [_, high] if high < 0.0 => below,
+            [low, _] if low > 0.0 => above,
             _ => "no clear difference",
         }
     }

@@ -78,7 +78,7 @@ pub fn convergence_csv(metrics: &[Metric], experiments: &[(&str, &Convergence)])
 /// that is its interval.
 pub fn charts(metrics: &[Metric], experiments: &[Convergence]) -> Vec<Plot> {
     let shown = |metric: &Metric| {
-        metric.role == Role::Score || metric.is_error() && !metric.key.contains('.')
+        metric.role == Role::Score || metric.role == Role::Error && !metric.key.contains('.')
     };
     let mut places: Vec<usize> = (0..metrics.len()).filter(|&k| shown(&metrics[k])).collect();
     places.sort_by_key(|&k| metrics[k].role != Role::Score);

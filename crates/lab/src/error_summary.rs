@@ -13,7 +13,7 @@ pub(crate) struct ErrorSummary {
     /// Mean after the last step.
     #[serde(rename = "final")]
     pub(crate) last: f64,
-    /// Mean over the runs of the lowest over all steps.
+    /// Mean over the runs of the best over all steps.
     pub(crate) best: f64,
     /// 95 % interval of the mean of `last`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -23,9 +23,9 @@ pub(crate) struct ErrorSummary {
     pub(crate) per_run: Option<Vec<f64>>,
 }
 
-/// The errors among metrics and their places, those of a group one after the other.
+/// What runs are judged by among metrics, and their places, those of a group one after the other.
 pub(crate) fn errors_of(metrics: &[Metric]) -> impl Iterator<Item = (usize, Metric)> {
-    let errors = metrics.iter().copied().enumerate().filter(|(_, metric)| metric.is_error());
+    let errors = metrics.iter().copied().enumerate().filter(|(_, metric)| metric.is_measure());
     let mut errors: Vec<_> = errors.collect();
     errors.sort_by_key(|(_, metric)| metric.key);
     errors.into_iter()
@@ -39,11 +39,15 @@ impl ErrorSummary {
             runs.iter().map(|run| pick(&curve(run))).collect()
         };
         let last = each(|curve| curve[curve.len() - 1]);
+        let best: fn(&[f64]) -> f64 = match metric.is_gain() {
+            false => |curve| curve.iter().copied().fold(f64::INFINITY, f64::min),
+            true => |curve| curve.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        };
         Self {
             metric,
             initial: mean(&each(|curve| curve[0])),
             last: mean(&last),
-            best: mean(&each(|curve| curve.iter().copied().fold(f64::INFINITY, f64::min))),
+            best: mean(&each(best)),
             ci95: many.then(|| mean_interval(&last)),
             per_run: many.then_some(last),
         }

@@ -21,6 +21,8 @@ pub enum Role {
     Score,
     /// Another error: lower is better.
     Error,
+    /// Another measure: higher is better.
+    Gain,
     /// Recorded beside the errors.
     Trace,
 }
@@ -39,9 +41,14 @@ impl Metric {
         self.key.replace('.', "_")
     }
 
-    /// Whether lower is better and it is not what the optimiser lowers.
-    pub fn is_error(&self) -> bool {
-        matches!(self.role, Role::Score | Role::Error)
+    /// Whether runs are judged by it.
+    pub fn is_measure(&self) -> bool {
+        matches!(self.role, Role::Score | Role::Error | Role::Gain)
+    }
+
+    /// Whether higher is better.
+    pub fn is_gain(&self) -> bool {
+        self.role == Role::Gain
     }
 }
 

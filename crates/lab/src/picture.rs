@@ -107,6 +107,9 @@ pub struct Encoded {
     /// GIF: the target on the left, the run on the right.
     #[serde(with = "as_base64")]
     pub animation: Vec<u8>,
+    /// SVG of the result, where the task draws it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drawing: Option<String>,
 }
 
 /// Small pictures are enlarged to at least these widths, in pixels: in the row of four, and in the animation.
@@ -123,10 +126,11 @@ impl Encoded {
     ///
     /// If an encoder fails.
     pub fn new(pictures: &Pictures) -> anyhow::Result<Self> {
-        let Pictures { target, start, result, frames } = pictures;
+        let Pictures { target, start, result, frames, drawing } = pictures;
         let before_after = row(&[target, start, result, &difference(target, result)], WIDTHS[0]);
         let animation = gif(target, frames).context("cannot encode an animation")?;
-        Ok(Self { before_after: png(&before_after)?, animation })
+        let before_after = png(&before_after)?;
+        Ok(Self { before_after, animation, drawing: drawing.clone() })
     }
 }
 

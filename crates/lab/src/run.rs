@@ -97,6 +97,8 @@ pub struct Pictures {
     pub result: RgbImage,
     /// The steps for which [`Batch::wants_frame`] is true, in order.
     pub frames: Vec<RgbImage>,
+    /// The result as SVG, where the task draws it.
+    pub drawing: Option<String>,
 }
 
 impl Run {

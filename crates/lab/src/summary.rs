@@ -182,7 +182,7 @@ impl Summary {
 
     fn table(&self) -> Table {
         let interval = self.many.then_some("95 % interval of the end");
-        let head = ["Error", "Start", "End", "Lowest"].into_iter().chain(interval);
+        let head = ["Error", "Start", "End", "Best"].into_iter().chain(interval);
         let mut table = Table::new(head);
         for error in &self.errors {
             let numbers = [error.initial, error.last, error.best].map(short);
@@ -199,9 +199,13 @@ impl Summary {
         report.table(&self.table());
         report.labelled("Returned", &self.returned.in_words(self.successes[1]));
         report.labelled("Success", &self.success(success_means));
+        let gains = match self.errors.iter().any(|error| error.metric.is_gain()) {
+            false => "",
+            true => ", of dB the higher",
+        };
         let means = if self.successes[1] > 1 { " All are means over the runs." } else { "" };
         report.note(&format!(
-            "The lower the better; \"lowest\" is over all steps, for each error by itself.{means} {}.",
+            "The lower the better{gains}; \"best\" is over all steps, for each by itself.{means} {}.",
             self.time()
         ));
         if let Some(against) = &self.against {

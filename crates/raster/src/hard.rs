@@ -28,6 +28,57 @@ pub fn hard_silhouette<B: Backend>(
     Tensor::from_data(TensorData::new(image, shape), (&device, dtype))
 }
 
+/// The nearest face at the centre of each pixel, edges included: of `vertices` `[vertices, 3]`, x and y in NDC and depth, row by row from
+/// the top; none where there is no face.
+///
+/// The depth of a face there is that of its plane in perspective, as in [`blended`](crate::reference::blended). Of equally near faces the
+/// first is seen. Faces that the soft rasterizer does not draw are not seen either.
+///
+/// Source: docs/notes.md, Colour.
+///
+/// # Panics
+///
+/// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
+pub fn nearest_faces<B: Backend>(
+    vertices: Tensor<B, 2>,
+    faces: &[[u32; 3]],
+    size: impl Into<ImageSize>,
+) -> Vec<Option<u32>> {
+    let size = size.into();
+    let [count, _] = vertices.dims();
+    let vertices: Vec<f64> = vertices.swap_dims(0, 1).into_data().iter().collect();
+    let mut nearest = vec![(0.0, None); size.pixels()];
+    for (k, face) in faces.iter().enumerate() {
+        let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize]));
+        let closeness = closeness(corners);
+        inside_spans(&vertices, face, NEAR, size, |row, start, end| {
+            let y = size.row_centre(row);
+            for column in start..end {
+                let here = closeness([size.column_centre(column), y]);
+                let seen = &mut nearest[row * size.width + column];
+                if here > seen.0 {
+                    *seen = (here, Some(k as u32));
+                }
+            }
+        });
+    }
+    nearest.into_iter().map(|(_, face)| face).collect()
+}
+
+/// One over the depth of the plane through three corners, which is linear over the image. For a face that has an area.
+fn closeness(corners: [[f64; 3]; 3]) -> impl Fn([f64; 2]) -> f64 {
+    let side = move |k: usize, [x, y]: [f64; 2]| {
+        let ([ax, ay, _], [bx, by, _]) = (corners[k], corners[(k + 1) % 3]);
+        (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+    };
+    let area = side(0, [corners[2][0], corners[2][1]]);
+    let [first, second, third] = corners.map(|corner| 1.0 / corner[2]);
+    // By differences, so that faces of one depth all over tie exactly.
+    move |place| {
+        first + (side(2, place) * (second - first) + side(0, place) * (third - first)) / area
+    }
+}
+
 /// The images of `vertices` `[views, 3, vertices]`.
 fn covered(vertices: &[f64], views: usize, faces: &[[u32; 3]], size: ImageSize) -> Vec<f32> {
     let mut image = vec![0.0; views * size.pixels()];
@@ -41,4 +92,47 @@ fn covered(vertices: &[f64], views: usize, faces: &[[u32; 3]], size: ImageSize) 
         }
     });
     image
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::backend::NdArray;
+
+    use super::*;
+
+    #[test]
+    fn of_faces_that_cut_one_another_each_is_seen_where_it_is_nearer() {
+        // A flat one at depth 2, and one whose depth goes from 1 at x = -1 to 4 at x = 1: one over it is 1/2 at x = 1/3.
+        let vertices = [
+            [-9.0, -9.0, 2.0],
+            [9.0, -9.0, 2.0],
+            [0.0, 9.0, 2.0],
+            [-1.0, -1.0, 1.0],
+            [1.0, -1.0, 4.0],
+            [1.0, 1.0, 4.0],
+            [-1.0, 1.0, 1.0],
+        ];
+        let vertices = Tensor::<NdArray, 2>::from_floats(vertices, &Default::default());
+        let faces = [[0, 1, 2], [3, 4, 5], [3, 5, 6]];
+        let row = &nearest_faces(vertices.clone(), &faces, 6)[12..18];
+        assert_eq!(row[..2], [Some(2); 2], "above the diagonal");
+        assert_eq!(row[4..], [Some(0); 2]);
+        assert!(row[2..4].iter().all(|face| matches!(face, Some(1 | 2))), "{row:?}");
+        let away = nearest_faces(vertices + 50.0, &faces, 6);
+        assert_eq!(away, [None; 36]);
+    }
+
+    #[test]
+    fn of_equally_near_faces_the_first_is_seen_and_flat_ones_never() {
+        let vertices = [
+            [-9.0, -9.0, 2.0],
+            [9.0, -9.0, 2.0],
+            [0.0, 9.0, 2.0],
+            [0.0, 9.0, 1.0],
+            [0.0, -9.0, 1.0],
+        ];
+        let vertices = Tensor::<NdArray, 2>::from_floats(vertices, &Default::default());
+        let faces = [[3, 4, 4], [2, 1, 0], [0, 1, 2]];
+        assert_eq!(nearest_faces(vertices, &faces, 3), [Some(1); 9]);
+    }
 }

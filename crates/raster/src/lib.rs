@@ -62,7 +62,7 @@ pub use fused::{ElementaryOp, FusedOp, Pass};
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use gpu::adapter_name;
-pub use hard::hard_silhouette;
+pub use hard::{hard_silhouette, nearest_faces};
 pub use image_size::ImageSize;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};

@@ -148,6 +148,7 @@ impl Task for Occlusion {
                 ["parameter_error.front", "wrong front quad", "of runs"],
                 ["parameter_error.depth", "mean depth error", "world units"],
             ],
+            gains: &[],
         }
     }
 

@@ -159,6 +159,7 @@ impl Task for Pose {
                 ["parameter_error.distance", "camera distance", "world units"],
                 ["parameter_error.released", "squared chord / 3", ""],
             ],
+            gains: &[],
         }
     }
 

@@ -5,7 +5,11 @@ use softrast_lab::parse::whole;
 /// Flags that only 2D SHAPE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Picture to cover, by its luminance [default: our logo of the variant]
+    /// Cover a picture in its colours, by triangles that each have a colour and a depth
+    #[arg(long)]
+    pub colour: bool,
+
+    /// Picture to cover, by its luminance or with --colour in its colours [default: our logo of the variant, or our landscape]
     #[arg(long, value_name = "FILE.png")]
     pub target: Option<PathBuf>,
 

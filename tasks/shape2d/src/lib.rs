@@ -15,8 +15,11 @@
 //! **Seeds.** A seed places and turns the triangles before the first step.
 //!
 //! **Transfer.** 4,000 triangles instead of 800, and another picture; `--target` takes any.
+//!
+//! **Colour.** With `--colour` triangles have colours and depths, and cover any picture in its colours: [`colour`].
 
 mod args;
+pub mod colour;
 mod instance;
 mod letters;
 mod logo;
@@ -30,3 +33,11 @@ pub use instance::Instance;
 pub use logo::Logo;
 pub use scene::Scene;
 pub use task::Shape2d;
+
+/// The whole program: `--colour` makes another task of it, with another θ, image and method.
+pub fn main() -> std::process::ExitCode {
+    match std::env::args_os().any(|word| word == "--colour") {
+        true => softrast_cli::main::<colour::Coloured>(),
+        false => softrast_cli::main::<Shape2d>(),
+    }
+}

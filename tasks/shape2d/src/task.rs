@@ -126,6 +126,7 @@ impl Task for Shape2d {
             hard: "hard MSE",
             parameter: ["hard MSE (stands in)", ""],
             further: &[],
+            gains: &[],
         }
     }
 

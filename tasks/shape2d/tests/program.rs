@@ -2,32 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{fs, path::Path, process::Command};
+mod runs;
+
+use std::fs;
 
 use image::{GrayImage, Luma};
 use serde_json::Value;
-use softrast_lab::Failure;
 
-/// Runs a command line with results in `out`; its JSON line.
-fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
-    let output = Command::new(env!("CARGO_BIN_EXE_shape2d"))
-        .args(line.split_whitespace())
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.code() {
-        Some(0) => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        code => Err(Failure {
-            code: code.unwrap().try_into().unwrap(),
-            message: String::from_utf8(output.stderr).unwrap(),
-        }),
-    }
-}
-
-fn run(line: &str) -> Result<Value, Failure> {
-    run_in(tempfile::tempdir().unwrap().path(), line)
-}
+use runs::{assert_finite, run, run_in, warnings};
 
 /// Runs on a picture of 8 × 8 pixels with these levels.
 fn with_target(level: impl Fn(u32, u32) -> u8, line: &str) -> Value {
@@ -35,18 +17,6 @@ fn with_target(level: impl Fn(u32, u32) -> u8, line: &str) -> Value {
     let path = folder.path().join("target.png");
     GrayImage::from_fn(8, 8, |x, y| Luma([level(x, y)])).save(&path).unwrap();
     run(&format!("{line} --target {}", path.display())).unwrap()
-}
-
-fn warnings(json: &Value) -> String {
-    json["warnings"].to_string()
-}
-
-fn assert_finite(json: &Value) {
-    for error in ["image_error", "parameter_error"] {
-        for key in ["initial", "final", "best"] {
-            assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
-        }
-    }
 }
 
 #[test]

@@ -144,6 +144,7 @@ impl Task for Shape3d {
             hard: "hard IoU loss",
             parameter: ["Chamfer distance", "1e-3 squared units"],
             further: &[],
+            gains: &[],
         }
     }
 

@@ -1,4 +1,5 @@
 //! 2D SHAPE.
 
+mod colour;
 mod golden;
 mod gradient;

@@ -53,6 +53,9 @@ pub(super) fn write<T: Task>(
     if let Some(pictures) = &evaluation.pictures {
         folder.stage("before_after.png", &pictures.before_after)?;
         folder.stage("animation.gif", &pictures.animation)?;
+        if let Some(drawing) = &pictures.drawing {
+            folder.stage("result.svg", drawing.as_bytes())?;
+        }
     }
     folder.stage("curve.csv", csv(metrics, &evaluation.runs).as_bytes())?;
     if summary.many {

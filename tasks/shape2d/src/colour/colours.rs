@@ -1,0 +1,109 @@
+/// A square picture in colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colours {
+    /// Red, green and blue from 0 to 1, row by row from the top.
+    pixels: Vec<[f64; 3]>,
+    size: usize,
+}
+
+impl Colours {
+    /// Of its pixels, row by row from the top.
+    ///
+    /// # Panics
+    ///
+    /// If there are not `size * size` of them, or none.
+    pub fn new(pixels: Vec<[f64; 3]>, size: usize) -> Self {
+        assert!(size > 0 && pixels.len() == size * size, "{} pixels, size {size}", pixels.len());
+        Self { pixels, size }
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// First all of red, then green, then blue: `[3 * size * size]`.
+    pub fn planes(&self) -> Vec<f64> {
+        (0..3).flat_map(|k| self.pixels.iter().map(move |pixel| pixel[k])).collect()
+    }
+
+    /// The mean of all pixels.
+    pub fn mean(&self) -> [f64; 3] {
+        let mean = |k: usize| self.pixels.iter().map(|pixel| pixel[k]).sum::<f64>();
+        [0, 1, 2].map(|k| mean(k) / self.pixels.len() as f64)
+    }
+
+    /// The colour at a place in NDC; outside it is that of the nearest pixel.
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        let index = |place: f64| {
+            let pixel = 0.5 * (place + 1.0) * self.size as f64;
+            pixel.clamp(0.0, self.size as f64 - 0.5) as usize
+        };
+        self.pixels[index(-y) * self.size + index(x)]
+    }
+
+    /// Visits the colour of each pixel whose centre lies in a triangle in NDC.
+    pub fn inside(&self, corners: &[[f64; 2]; 3], mut visit: impl FnMut([f64; 3])) {
+        let size = self.size as f64;
+        let centre = |index: usize| (2.0 * index as f64 + 1.0) / size - 1.0;
+        let range = |axis: usize, sign: f64| {
+            let places = corners.map(|corner| 0.5 * (sign * corner[axis] + 1.0) * size);
+            let low = places.into_iter().fold(size, f64::min).max(0.0).floor();
+            let high = places.into_iter().fold(0.0, f64::max).min(size).ceil();
+            low as usize..high as usize
+        };
+        let edge = |k: usize, [x, y]: [f64; 2]| {
+            let ([ax, ay], [bx, by]) = (corners[k], corners[(k + 1) % 3]);
+            (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+        };
+        let turn = edge(0, corners[2]).signum();
+        for row in range(1, -1.0) {
+            for column in range(0, 1.0) {
+                let place = [centre(column), -centre(row)];
+                if (0..3).all(|k| turn * edge(k, place) >= 0.0) {
+                    visit(self.pixels[row * self.size + column]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered() -> Colours {
+        Colours::new((0..16).map(|k| [k as f64, 0.0, 1.0]).collect(), 4)
+    }
+
+    fn inside(corners: [[f64; 2]; 3]) -> Vec<f64> {
+        let mut seen = Vec::new();
+        numbered().inside(&corners, |colour| seen.push(colour[0]));
+        seen
+    }
+
+    #[test]
+    fn a_place_has_the_colour_of_its_pixel_and_the_nearest_one_outside() {
+        let places = [[-0.9, 0.9], [0.9, 0.9], [0.1, -0.1], [-7.0, -7.0], [f64::MAX, 1.0]];
+        assert_eq!(places.map(|place| numbered().at(place)[0]), [0.0, 3.0, 10.0, 12.0, 3.0]);
+    }
+
+    #[test]
+    fn pixels_are_inside_by_their_centres_whichever_way_corners_turn() {
+        let corners = [[-1.0, 1.0], [1.0, 1.0], [-1.0, -1.0]];
+        let all = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 9.0, 12.0];
+        assert_eq!(inside(corners), all);
+        let [a, b, c] = corners;
+        assert_eq!(inside([c, b, a]), all);
+        assert_eq!(inside([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]]), [0.0; 0]);
+        assert_eq!(inside([[2.0, 2.0], [9.0, 2.0], [2.0, 9.0]]), [0.0; 0]);
+        assert_eq!(inside([[-9.0, -9.0], [9.0, -9.0], [0.0, 99.0]]).len(), 16);
+    }
+
+    #[test]
+    fn planes_and_mean_have_the_channels_apart() {
+        let colours = Colours::new(vec![[0.0, 0.5, 1.0], [1.0, 0.5, 0.0], [0.0; 3], [1.0; 3]], 2);
+        assert_eq!(colours.planes()[..5], [0.0, 1.0, 0.0, 1.0, 0.5]);
+        assert_eq!(colours.mean(), [0.5; 3]);
+    }
+}

@@ -1,0 +1,219 @@
+use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
+
+use burn::tensor::Tensor;
+use image::RgbImage;
+use serde_json::json;
+use softrast_cli::{
+    Description, Detail, EdgeChoice, Ended, Measures, NoArgs, Scales, Schedule, Task, Variant,
+};
+use softrast_inverse::{InverseProblem, Iterate, Picture, SoftnessAt, SolveConfig};
+use softrast_lab::rgb_from_planes;
+use softrast_meta::numbers;
+use softrast_raster::{HostBackend, RasterBackend};
+
+use crate::{
+    Args,
+    colour::{Colours, Scene, Start, landscape},
+};
+
+/// A run succeeds when its hard image ends with this PSNR or more.
+const SUCCESS_DB: f64 = 24.0;
+/// A mean squared error below this counts as this, so that no PSNR is infinite: 100 dB at most.
+const LEAST_MSE: f64 = 1e-10;
+/// Pixels a side of the picture by which triangles start, whatever the size of the image.
+const START_SIZE: usize = 256;
+
+/// 2D SHAPE in colour: loose triangles with colours and depths, and the picture that they should look like.
+pub struct Coloured {
+    name: String,
+    /// Red, green and blue of the picture; none for our own.
+    picture: Option<[Picture; 3]>,
+    /// The picture at every size that was asked for.
+    sizes: RefCell<BTreeMap<usize, Rc<Colours>>>,
+    triangles: usize,
+    /// The number of triangles if nobody says.
+    usual_triangles: usize,
+}
+
+impl Coloured {
+    fn target(&self, size: usize) -> Rc<Colours> {
+        let made = || {
+            let pixels = match &self.picture {
+                None => landscape(size),
+                Some(picture) => {
+                    let [red, green, blue] = picture.each_ref().map(|plane| plane.levels(size));
+                    (0..size * size).map(|k| [red[k], green[k], blue[k]]).collect()
+                }
+            };
+            Rc::new(Colours::new(pixels, size))
+        };
+        self.sizes.borrow_mut().entry(size).or_insert_with(made).clone()
+    }
+}
+
+impl InverseProblem for Coloured {
+    type Instance = Start;
+    type Scene<B: RasterBackend> = Scene<B>;
+
+    fn instance(&self, seed: u64) -> anyhow::Result<Start> {
+        Ok(Start::seeded(seed, self.triangles, &self.target(START_SIZE)))
+    }
+
+    /// Of one instance.
+    fn scene<B: RasterBackend>(&self, instances: &[Start], size: usize) -> Scene<B> {
+        assert_eq!(instances.len(), 1, "a scene has one instance");
+        Scene::new(&self.target(size), &instances[0])
+    }
+
+    /// None: colours are blended, and no silhouette is seen.
+    fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
+        None
+    }
+
+    fn start<B: RasterBackend>(&self, scene: &Scene<B>) -> Tensor<B, 1> {
+        scene.start()
+    }
+
+    fn allowed<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 1> {
+        scene.allowed(theta)
+    }
+
+    fn image<B: RasterBackend>(
+        &self,
+        scene: &Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 3> {
+        scene.image(theta, softness)
+    }
+
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+        scene.hard(theta)
+    }
+
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        scene.image_loss(image)
+    }
+
+    fn defaults(&self) -> SolveConfig {
+        SolveConfig { size: 256, steps: 400, learning_rate: 0.002 }
+    }
+}
+
+impl Task for Coloured {
+    const NAME: &'static str = "shape2d-colour";
+    const PROGRAM: &'static str = "shape2d";
+    const TITLE: &'static str = "2D SHAPE in colour";
+    const ABOUT: &'static str = "Moves loose triangles until they cover a picture in its colours";
+
+    /// From a third of a pixel of the default size, so that edges find their place, down to where the soft image is nearly the hard one.
+    const SCALES: Scales =
+        Scales { schedule: Schedule::Decay, decay: [0.003, 0.0001], fixed: 0.0004 };
+
+    type Args = Args;
+    type Pictures = NoArgs;
+
+    fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
+        let usual_triangles = match variant {
+            Variant::Original => 800,
+            Variant::Transfer => 4000,
+        };
+        let (name, picture) = match &args.target {
+            None => ("landscape".to_owned(), None),
+            Some(path) => (path.display().to_string(), Some(Picture::load_colours(path)?)),
+        };
+        let triangles = args.triangles.unwrap_or(usual_triangles);
+        Ok(Self { name, picture, sizes: RefCell::default(), triangles, usual_triangles })
+    }
+
+    fn measures() -> Measures {
+        Measures {
+            soft: "soft MSE",
+            hard: "hard MSE",
+            parameter: ["hard MSE (stands in)", ""],
+            further: &[],
+            gains: &[["psnr.hard", "hard PSNR", "dB"], ["psnr.soft", "soft PSNR", "dB"]],
+        }
+    }
+
+    fn description(&self) -> Description {
+        let settings = json!({ "target": self.name, "colour": true });
+        Description {
+            faces: self.triangles,
+            runs: 20,
+            success: format!("the hard PSNR ends at {SUCCESS_DB} dB or more"),
+            settings: settings.as_object().cloned().unwrap_or_default(),
+        }
+    }
+
+    fn errors(
+        &self,
+        _instances: &[Start],
+        _scene: &Scene<HostBackend>,
+        iterate: &Iterate,
+    ) -> Vec<Vec<f64>> {
+        let (hard, soft) = (iterate.hard_loss[0], iterate.soft_loss[0]);
+        vec![vec![hard, psnr(hard), psnr(soft)]]
+    }
+
+    fn is_success(&self, hard: f64, _errors: &[f64]) -> bool {
+        psnr(hard) >= SUCCESS_DB
+    }
+
+    fn targets(&self, scene: &Scene<HostBackend>) -> Vec<f64> {
+        numbers(scene.target())
+    }
+
+    fn picture(&self, image: &[f64], size: usize) -> RgbImage {
+        rgb_from_planes(image, size, size)
+    }
+
+    fn drawing(&self, scene: &Scene<HostBackend>, theta: &[f64]) -> Option<String> {
+        Some(scene.svg(theta))
+    }
+
+    fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {
+        let Ended { seed, size, target, hard, .. } = *run;
+        // What the mean colour alone would end with.
+        let variance = target.chunks(size * size).map(|plane| {
+            let mean = plane.iter().sum::<f64>() / plane.len() as f64;
+            plane.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / plane.len() as f64
+        });
+        let variance = variance.sum::<f64>() / 3.0;
+        let warning = if variance < LEAST_MSE {
+            "the target has one colour, so it shows nothing: give another --target or raise --size (what is transparent is black)".to_owned()
+        } else if hard >= variance {
+            format!(
+                "seed {seed}: the triangles end no nearer to the target than its mean colour: try a lower --learning-rate or more --triangles"
+            )
+        } else {
+            return Vec::new();
+        };
+        vec![warning]
+    }
+
+    fn detail(&self, args: &Args) -> Option<Detail<Args>> {
+        let usual = self.usual_triangles;
+        args.triangles.is_none().then(|| Detail {
+            flag: "triangles",
+            values: vec![usual / 4, usual / 2, usual],
+            set: |args: &mut Args, value| args.triangles = Some(value),
+        })
+    }
+}
+
+/// `-10 log₁₀` of a mean squared error, in dB.
+fn psnr(mse: f64) -> f64 {
+    -10.0 * mse.max(LEAST_MSE).log10()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn psnr_is_ten_for_each_power_of_ten_and_never_infinite() {
+        assert!((psnr(1e-3) - 30.0).abs() < 1e-12);
+        assert!((psnr(0.0) - 100.0).abs() < 1e-12);
+    }
+}
