@@ -183,7 +183,7 @@ fn textures_agree_with_the_reference_to_second_order() {
     let mut one = Case::random(1, 20, weighting, phi).textured();
     one.texture = Some(([1, 1], vec![0.3, -0.2, 0.9]));
     let image = numbers(one.image(one.inputs::<B>(), true));
-    one.attributes = vec![0.3, -0.2, 0.9].repeat(one.vertices.len() / 3);
+    one.attributes = [0.3, -0.2, 0.9].repeat(one.vertices.len() / 3);
     one.texture = None;
     let plain = numbers(one.image(one.inputs::<B>(), true));
     assert!(relative(&image, &plain) < 1e-12, "one texel is one colour");
