@@ -1,10 +1,10 @@
-"""DEODR's hard rasterizer on the workloads W1 and W2, for comparison on the same machine.
+"""DEODR's hard rasterizer on the workloads W1 and W2, in one channel and in colour, for comparison on the same machine.
 
     pip install deodr==0.2.3 trimesh
     python crates/raster/benches/hard.py sphere_642.obj spot.obj
 
-Image, squared difference to a disk, and gradient to the vertices of the image, one thread: what DEODR
-offers. Projection is left out here, so the comparison is in DEODR's favour.
+Image, squared difference to a disk, and gradient to the vertices of the image and to their colours, one thread:
+what DEODR offers. Projection is left out here, so the comparison is in DEODR's favour.
 """
 
 import statistics
@@ -36,7 +36,7 @@ def projected(vertices, azimuth, size):
     return (ndc + 1) * size / 2 - 0.5, depth
 
 
-def scene(vertices, faces, azimuth, size):
+def scene(vertices, faces, azimuth, size, channels):
     ij, depth = projected(vertices, azimuth, size)
     clockwise = np.cross(ij[faces[:, 1]] - ij[faces[:, 0]], ij[faces[:, 2]] - ij[faces[:, 0]]) > 0
     # Where one side is drawn and edges between front and back are softened, as DEODR does for meshes.
@@ -54,23 +54,30 @@ def scene(vertices, faces, azimuth, size):
     count = len(vertices)
     return Scene2D(
         faces=faces, faces_uv=faces, ij=ij, depths=depth, textured=np.zeros(len(faces), dtype=bool),
-        uv=np.zeros((count, 2)), shade=np.zeros(count), colors=np.ones((count, 1)),
+        uv=np.zeros((count, 2)), shade=np.zeros(count), colors=colours(count, channels),
         shaded=np.zeros(len(faces), dtype=bool), edgeflags=edgeflags, height=size, width=size,
-        nb_colors=1, texture=np.zeros((0, 0, 1)), background_image=np.zeros((size, size, 1)),
+        nb_colors=channels, texture=np.zeros((0, 0, channels)), background_image=np.zeros((size, size, channels)),
         clockwise=True, backface_culling=True,
     )
 
 
-def disk(size):
+def colours(count, channels):
+    """White, or in colour the waves of `blend.rs`."""
+    if channels == 1:
+        return np.ones((count, 1))
+    return 0.5 + 0.5 * np.sin(0.1 * np.arange(count * channels)).reshape(count, channels)
+
+
+def disk(size, channels):
     centres = (2 * np.arange(size) + 1 - size) / size
     inside = (centres[None, :] + 0.1) ** 2 + (-centres[:, None] - 0.05) ** 2 <= 0.25
-    return inside[:, :, None].astype(float)
+    return inside[:, :, None].repeat(channels, 2).astype(float)
 
 
-def measure(name, path, azimuths, size):
+def measure(name, path, azimuths, size, channels=1):
     vertices, faces = load(path)
-    scenes = [scene(vertices, faces, azimuth, size) for azimuth in azimuths]
-    target = disk(size)
+    scenes = [scene(vertices, faces, azimuth, size, channels) for azimuth in azimuths]
+    target = disk(size, channels)
     times = []
     for _ in range(32):
         start = time.perf_counter()
@@ -84,3 +91,5 @@ if __name__ == "__main__":
     sphere, spot = sys.argv[1:3]
     measure("W1", sphere, range(0, 360, 15), 64)
     measure("W2", spot, [180], 256)
+    measure("W1 in colour", sphere, range(0, 360, 15), 64, 3)
+    measure("W3: W2 in colour", spot, [180], 256, 3)

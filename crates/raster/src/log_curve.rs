@@ -82,7 +82,7 @@ impl LogCurve {
         let outer = support::<B>(&softness, phi, accuracy / 2.0, device).outer;
         // Until the weight is negligible, or at its limit.
         let close = if floor > 0.0 { least.exp() / floor } else { accuracy };
-        let close = close.clamp(ROUNDING, accuracy) / 2.0;
+        let close = close.min(accuracy).max(ROUNDING) / 2.0;
         let inner = settled_beyond::<B>(&softness, phi, -least, close, device);
         let (grid, reached) = refined([outer, inner], &FAR, |grid| {
             let (samples, rounding) =

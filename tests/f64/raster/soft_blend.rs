@@ -530,6 +530,16 @@ fn a_wide_tolerance_leaves_something_out() {
 }
 
 #[test]
+fn a_tolerance_below_rounding_is_as_exact_as_can_be() {
+    let phi = [LOGISTIC.default_phi(0.03), EXP.default_phi(0.1)];
+    let mut case = Case::random(1, 60, weighting(LOGISTIC, EXP), phi);
+    for tolerance in [1e-12, 1e-16, 1e-100] {
+        case.tolerance = tolerance;
+        assert!(error_at(&case) < 1e-9, "{tolerance:e}: {:e}", error_at(&case));
+    }
+}
+
+#[test]
 fn a_softness_that_ends_leaves_the_rest_to_a_background_that_weighs_next_to_nothing() {
     for family in [Family::Uniform, Family::Wigner, Family::ExpForward] {
         let edge = EdgeSoftness { family, squared: false };

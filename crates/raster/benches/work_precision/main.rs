@@ -4,10 +4,15 @@
 //! cargo bench -p softrast-raster --bench work_precision
 //! ```
 //!
-//! Writes `docs/studies/work_precision.svg` and `docs/studies/scaling.svg`, each with its numbers as CSV. Times are
-//! medians, from world vertices to the gradient of a mean squared difference to a disk.
+//! Writes `docs/studies/work_precision.svg` and `docs/studies/scaling.svg`, and both once more for images in colour
+//! (`colour_work_precision.svg`, `colour_scaling.svg`), each with its numbers as CSV. Times are medians, from world vertices to the
+//! gradient of a mean squared difference to a disk; in colour also to the gradient to the colours of the vertices. Words behind `--`
+//! choose: `silhouette`, `colour` or both.
 
 mod chart;
+#[allow(dead_code, reason = "the other benchmark uses the rest")]
+#[path = "../coloured.rs"]
+mod coloured;
 #[path = "../machine.rs"]
 mod machine;
 #[path = "../scalar.rs"]
@@ -15,17 +20,20 @@ mod scalar;
 #[path = "../workload.rs"]
 mod workload;
 
-use std::{fs, hint::black_box, path::Path, sync::Arc, time::Instant};
+use std::{env, fs, hint::black_box, path::Path, sync::Arc, time::Instant};
 
 use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor},
 };
 use chart::Panel;
+use coloured::Coloured;
 use machine::machine;
 use scalar::Scalar;
 use softrast_mesh::icosphere;
-use softrast_raster::{RasterBackend, Silhouette, TConorm, mse_loss, project, reference};
+use softrast_raster::{
+    ColourRenderer, RasterBackend, Silhouette, TConorm, mse_loss, project, reference,
+};
 use softrast_softness::EdgeSoftness;
 use workload::{SOFTNESS, Workload, disk, tensor};
 
@@ -39,27 +47,55 @@ const REPEATS: usize = 15;
 const SECONDS: f64 = 2.0;
 
 fn main() -> anyhow::Result<()> {
+    let words: Vec<String> = env::args().skip(1).collect();
+    let asked = |what: &str| {
+        let none = !words.iter().any(|word| word == "silhouette" || word == "colour");
+        none || words.iter().any(|word| word == what)
+    };
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies");
     fs::create_dir_all(&docs)?;
     let threads = rayon::current_num_threads();
     let header = format!("# {}\n", machine());
-
-    let mut csv =
-        format!("{header}workload,method,tolerance,knots,pairs,ms,image_error,gradient_error\n");
-    let mut panels = Vec::new();
-    for workload in [Workload::w1(), Workload::w2()] {
-        println!("{}: exact to {:.1e}", workload.name, error_of_exact(&workload));
-        panels.extend(work_precision(&workload, &mut csv));
+    let write = |name: &str, title: &str, panels: &[Panel], csv: &str| {
+        fs::write(docs.join(name).with_extension("svg"), chart::svg(title, panels)?)?;
+        anyhow::Ok(fs::write(docs.join(name).with_extension("csv"), csv)?)
+    };
+    if asked("silhouette") {
+        let mut csv = format!(
+            "{header}workload,method,tolerance,knots,pairs,ms,image_error,gradient_error\n"
+        );
+        let mut panels = Vec::new();
+        for workload in [Workload::w1(), Workload::w2()] {
+            println!("{}: exact to {:.1e}", workload.name, error_of_exact(&workload));
+            panels.extend(work_precision(&workload, &mut csv));
+        }
+        let title =
+            format!("Work and precision of a silhouette and its gradient ({threads} threads)");
+        write("work_precision", &title, &panels, &csv)?;
+        let mut csv = format!("{header}varied,faces,size,views,ms\n");
+        let panels = scaling(&mut csv, |workload| {
+            let scene = Scene::<B32>::new(workload, 1e-5, DType::F32);
+            median(|| scene.draw()).ms
+        });
+        let title = format!("Time for a silhouette and its gradient ({threads} threads, f32)");
+        write("scaling", &title, &panels, &csv)?;
     }
-    let title = format!("Work and precision of a silhouette and its gradient ({threads} threads)");
-    fs::write(docs.join("work_precision.svg"), chart::svg(&title, &panels)?)?;
-    fs::write(docs.join("work_precision.csv"), csv)?;
-
-    let mut csv = format!("{header}varied,faces,size,views,pairs,ms\n");
-    let panels = scaling(&mut csv);
-    let title = format!("Time for a silhouette and its gradient ({threads} threads, f32)");
-    fs::write(docs.join("scaling.svg"), chart::svg(&title, &panels)?)?;
-    fs::write(docs.join("scaling.csv"), csv)?;
+    if asked("colour") {
+        let mut csv = format!("{header}workload,method,tolerance,ms,image_error,gradient_error\n");
+        let mut panels = Vec::new();
+        for workload in [Workload::w1(), Workload::w2()] {
+            panels.extend(colour_work_precision(&workload, &mut csv));
+        }
+        let title = format!("Work and precision of colours and their gradient ({threads} threads)");
+        write("colour_work_precision", &title, &panels, &csv)?;
+        let mut csv = format!("{header}varied,faces,size,views,ms\n");
+        let panels = scaling(&mut csv, |workload| {
+            let scene = Coloured::<B32>::new(workload, ColourRenderer::DEPTH_SCALE, DType::F32);
+            median(|| in_colour(&scene)).ms
+        });
+        let title = format!("Time for colours and their gradient ({threads} threads, f32)");
+        write("colour_scaling", &title, &panels, &csv)?;
+    }
     Ok(())
 }
 
@@ -176,6 +212,45 @@ const METHODS: [&str; 4] = [
     "plain scalar f32 on 1 thread, tolerance 1e-2 to 1e-8",
 ];
 
+/// An image in colour and its gradients, one behind the other.
+fn in_colour<B: RasterBackend>(scene: &Coloured<B>) -> Drawn {
+    let (image, gradients, ms) = scene.step();
+    let gradient = gradients.into_iter().flat_map(|of| of.into_data().iter().collect::<Vec<f64>>());
+    Drawn { image: image.into_data().iter().collect(), gradient: gradient.collect(), ms }
+}
+
+/// Both panels of a workload in colour.
+fn colour_work_precision(workload: &Workload, csv: &mut String) -> [Panel; 2] {
+    let f32s = Coloured::<B32>::new(workload, ColourRenderer::DEPTH_SCALE, DType::F32);
+    let f64s = Coloured::<B64>::new(workload, ColourRenderer::DEPTH_SCALE, DType::F64);
+    let exact = in_colour(&f64s.clone().with_tolerance(EXACT));
+    let mut series = [(); 2].map(|()| [Vec::new(), Vec::new()]);
+    for tolerance in (4..=16).map(|k| 10f64.powf(-0.5 * f64::from(k))) {
+        let (f32s, f64s) =
+            (f32s.clone().with_tolerance(tolerance), f64s.clone().with_tolerance(tolerance));
+        let drawn = [median(|| in_colour(&f32s)), median(|| in_colour(&f64s))];
+        for ((series, drawn), method) in series.iter_mut().zip(&drawn).zip(METHODS) {
+            let errors = [
+                largest_difference(&drawn.image, &exact.image),
+                relative_difference(&drawn.gradient, &exact.gradient),
+            ];
+            series
+                .iter_mut()
+                .zip(errors)
+                .for_each(|(points, error)| points.push([error, drawn.ms]));
+            let [image, gradient] = errors;
+            *csv += &format!(
+                "{:?},{method:?},{tolerance:.2e},{:.4},{image:.3e},{gradient:.3e}\n",
+                workload.name, drawn.ms
+            );
+        }
+    }
+    [("largest error of a pixel", 0), ("relative error of the gradient", 1)].map(|(x, which)| {
+        let lines = METHODS.into_iter().zip(series.iter().map(|points| points[which].clone()));
+        Panel::new(&workload.name, x, lines)
+    })
+}
+
 /// The plain version with a given radius, with projection and loss by tensor ops as for the others.
 fn plain(workload: &Workload, radius: f32) -> Drawn {
     type A = Autodiff<B32>;
@@ -247,18 +322,16 @@ fn slope(points: &[[f64; 2]]) -> f64 {
     sum(|x, y| x * y) / sum(|x, _| x * x)
 }
 
-/// Three panels: time against faces, pixels and views, the other two fixed.
-fn scaling(csv: &mut String) -> Vec<Panel> {
+/// Three panels: milliseconds, as `time` gives them, against faces, pixels and views, the other two fixed.
+fn scaling(csv: &mut String, time: impl Fn(&Workload) -> f64) -> Vec<Panel> {
     let mut measure = |varied: &str, level: u32, size: usize, views: usize| {
         let azimuths: Vec<f64> = (0..views).map(|k| 360.0 * k as f64 / views as f64).collect();
         let workload = Workload {
             width: WIDTH_PX * 2.0 / size as f64,
             ..Workload::new("", &icosphere(level), &azimuths, size)
         };
-        let scene = Scene::<B32>::new(&workload, 1e-5, DType::F32);
-        let (faces, pairs) = (workload.faces.len(), scene.pairs());
-        let ms = median(|| scene.draw()).ms;
-        *csv += &format!("{varied},{faces},{size},{views},{pairs},{ms:.4}\n");
+        let (faces, ms) = (workload.faces.len(), time(&workload));
+        *csv += &format!("{varied},{faces},{size},{views},{ms:.4}\n");
         [faces as f64, ms]
     };
     let faces: Vec<_> = (1..=8).map(|level| measure("faces", level, 256, 1)).collect();

@@ -1,0 +1,87 @@
+//! A workload drawn in colour, with its gradient.
+
+use std::{sync::Arc, time::Instant};
+
+use burn::{
+    backend::Autodiff,
+    tensor::{DType, Tensor},
+};
+use softrast_raster::{Attributes, ColourRenderer, RasterBackend, Weighting, mse_loss, project};
+use softrast_softness::{DepthSoftness, Family, Softness};
+
+use crate::workload::{Workload, disk, tensor};
+
+/// Around a mesh that a camera sees from 2.732 away.
+const PLANES: [f64; 2] = [1.7, 3.8];
+/// Channels.
+pub(crate) const COLOURS: usize = 3;
+
+/// A workload in one float type, with waves of colour over its vertices.
+#[derive(Clone)]
+pub(crate) struct Coloured<B: RasterBackend> {
+    renderer: ColourRenderer,
+    world: Tensor<B, 3>,
+    cameras: Tensor<B, 2>,
+    colours: Attributes<B>,
+    picture: Tensor<B, 4>,
+    faces: Arc<[[u32; 3]]>,
+}
+
+impl<B: RasterBackend> Coloured<B> {
+    /// Under the edge softness of the workload and a depth softness of this scale, in units of the distance between the planes.
+    pub(crate) fn new(workload: &Workload, depth_scale: f64, dtype: DType) -> Self {
+        let world = workload.world::<B>(dtype);
+        let [_, vertices, _] = world.dims();
+        let edge = workload.softness;
+        let depth = DepthSoftness::Family(Family::Exp);
+        let phi =
+            [edge.default_phi(workload.width * workload.width), depth.default_phi(depth_scale)];
+        let weighting = Weighting { edge, depth, planes: PLANES };
+        let (faces, size) = (workload.faces.clone(), workload.size);
+        let wave = |k: usize| 0.5 + 0.5 * (0.1 * k as f64).sin();
+        let colours: Vec<f64> = (0..COLOURS * vertices).map(wave).collect();
+        let mask = tensor::<B, 4>(&disk(size), [1, 1, size, size], dtype);
+        Self {
+            renderer: ColourRenderer::with_weighting(faces.clone(), size, weighting, phi),
+            world,
+            cameras: workload.cameras(dtype),
+            colours: Attributes::new(
+                tensor(&colours, [1, vertices, COLOURS], dtype),
+                faces.clone(),
+            ),
+            picture: mask.repeat_dim(1, COLOURS + 1),
+            faces,
+        }
+    }
+
+    pub(crate) fn with_tolerance(mut self, tolerance: f64) -> Self {
+        self.renderer = self.renderer.with_tolerance(tolerance);
+        self
+    }
+
+    /// The image alone, `[views, channels + 1, height, width]`.
+    pub(crate) fn image(&self) -> Tensor<B, 4> {
+        let seen = project(self.world.clone(), self.cameras.clone());
+        let device = &self.world.device();
+        let background = self.renderer.background(&[0.0; COLOURS], device);
+        self.renderer.image(seen, &self.colours, &background)
+    }
+
+    /// The image, its gradients to the world vertices and to their colours, and the milliseconds that both took.
+    pub(crate) fn step(&self) -> (Tensor<B, 4>, [Tensor<B, 3>; 2], f64) {
+        let start = Instant::now();
+        let tracked = |tensor: &Tensor<B, 3>| {
+            Tensor::<Autodiff<B>, 3>::from_inner(tensor.clone()).require_grad()
+        };
+        let (world, colours) = (tracked(&self.world), tracked(self.colours.values()));
+        let seen = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
+        let attributes = Attributes::new(colours.clone(), self.faces.clone());
+        let background = self.renderer.background(&[0.0; COLOURS], &world.device());
+        let image = self.renderer.image(seen, &attributes, &background);
+        let gradients =
+            mse_loss(image.clone(), Tensor::from_inner(self.picture.clone())).mean().backward();
+        let gradient = |of: &Tensor<Autodiff<B>, 3>| of.grad(&gradients).expect("it is seen");
+        let both = [gradient(&world), gradient(&colours)];
+        (image.inner(), both, start.elapsed().as_secs_f64() * 1e3)
+    }
+}
