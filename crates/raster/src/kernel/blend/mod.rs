@@ -39,6 +39,8 @@ type Float<T> = real::Float<T>;
 
 /// Logarithm of the largest ratio of two weights that floats of 32 and of 64 bits add up without losing the sum.
 const RANGE: [f64; 2] = [60.0, 600.0];
+/// Weights below these, relative to what weights of a pixel are relative to, are 0: far less than the range leaves of a sum.
+const VANISHING: [f64; 2] = [1e-36, 1e-300];
 
 /// The inputs of the op in one float type.
 #[derive(Clone, Copy)]
@@ -108,6 +110,7 @@ impl<'a, F: float::Float> Inputs<'a, F> {
         let half = 0.5 * self.size.shorter() as f64;
         Blend {
             least_area: F::from_f64(AREA * half * half),
+            vanishing: F::from_f64(of_type::<F>(VANISHING)),
             scene: Scene::new(vertices, self.faces, edge, self.edge, self.size, rows),
             attributes: [self.attributes, tangents[1]],
             entries: self.entries,
@@ -131,6 +134,11 @@ impl<'a, F: float::Float> Inputs<'a, F> {
     }
 }
 
+/// What is meant for this float type, of 32 or of 64 bits.
+fn of_type<F>([single, double]: [f64; 2]) -> f64 {
+    if size_of::<F>() == size_of::<f64>() { double } else { single }
+}
+
 /// Everything a walk reads, in one number type.
 struct Blend<'a, T: Real> {
     scene: Scene<'a, T>,
@@ -149,6 +157,8 @@ struct Blend<'a, T: Real> {
     floor: Float<T>,
     /// [`AREA`] in pixels.
     least_area: Float<T>,
+    /// [`VANISHING`] of the float type.
+    vanishing: Float<T>,
     /// Logarithm of an edge softness from which on it counts.
     counts_from: Float<T>,
     background: [&'a [Float<T>]; 2],
@@ -539,12 +549,11 @@ impl<T: Real> Band<'_, '_, T> {
         let behind = blend.background[0][blend.channels];
         let number = <Float<T> as float::Float>::from_f64;
         let mut largest = Planes::new(1, length);
-        let double = size_of::<Float<T>>() == size_of::<f64>();
         // No weight is larger than this, and the background is always there: so one number does for all pixels.
         let faces = self.of_view.faces(self.band).iter();
         let highest = faces.map(|&face| self.logs[face as usize]).fold(f32::MIN, f32::max);
         let highest = number(f64::from(highest));
-        if highest <= behind + number(RANGE[usize::from(double)]) {
+        if highest <= behind + number(of_type::<Float<T>>(RANGE)) {
             largest.fill(if highest > behind { highest } else { behind });
         } else {
             largest.fill(behind);

@@ -21,6 +21,12 @@ pub(super) struct Barycentric<T: Real> {
 }
 
 impl<T: Real> Barycentric<T> {
+    /// Of a face without an inside.
+    pub(super) fn nothing() -> Self {
+        let zero = [T::constant(splat(0.0)); 3];
+        Self { constant: zero, x: zero, y: zero, some: false }
+    }
+
     /// `least_area` is [`AREA`] in pixels.
     #[inline(always)]
     pub(super) fn new(face: Face<T>, least_area: Float<T>) -> Self {

@@ -15,6 +15,9 @@ use crate::weighting::NOTHING;
 /// Stands in for a face that counts everywhere, in NDC.
 const EVERYWHERE: f64 = 4e6;
 
+/// Vertices or faces that one thread takes at once.
+const AT_ONCE: usize = 4096;
+
 /// A table with its knots, in plain numbers.
 struct Curve<'a, F> {
     grid: Grid,
@@ -130,28 +133,26 @@ pub(super) fn bands<F: Float>(inputs: &Inputs<F>) -> Reached {
         let (y, z) = rest.split_at(vertices);
         // Both where a vertex is and how far a face counts that is as near as it. The nearest corner of a face, or for a line the
         // farthest, counts most of all its points.
-        let mut places = Vec::with_capacity(vertices);
-        for k in 0..vertices {
+        let place = |k: usize| {
             let drawn = z[k] >= near && z[k] <= far;
             let log = if drawn { log_weight(z[k].to_f64()) } else { f64::NEG_INFINITY };
             let place = in_pixels([x[k], y[k], z[k]], near, inputs.size);
-            places.push((if drawn { place } else { nowhere }, edge.of(least - log), log));
-        }
+            (if drawn { place } else { nowhere }, edge.of(least - log), log)
+        };
+        let places: Vec<_> =
+            (0..vertices).into_par_iter().with_min_len(AT_ONCE).map(place).collect();
         let half = 0.5 * inputs.size.shorter() as f64;
-        let mut radii = Vec::with_capacity(inputs.faces.len());
-        let mut reaches = Vec::with_capacity(inputs.faces.len());
-        let mut logs = Vec::with_capacity(inputs.faces.len());
-        for face in inputs.faces {
+        let reach = |face: &[u32; 3]| {
             let corners = face.map(|v| places[v as usize].0);
             let radius = face.iter().filter_map(|&v| places[v as usize].1).reduce(f64::max);
             let reach = radius
                 .and_then(|radius| Reach::around(corners, F::from_f64(radius * half), inputs.size));
-            reaches.push(reach.unwrap_or(Reach::NOTHING));
-            radii.push(radius.unwrap_or(0.0) as f32);
             let log =
                 face.map(|v| places[v as usize].2).into_iter().fold(f64::NEG_INFINITY, f64::max);
-            logs.push(log as f32);
-        }
+            (reach.unwrap_or(Reach::NOTHING), (radius.unwrap_or(0.0) as f32, log as f32))
+        };
+        let faces = inputs.faces.par_iter().with_min_len(AT_ONCE);
+        let (reaches, (radii, logs)): (_, (_, Vec<f32>)) = faces.map(reach).unzip();
         (View::of_reaches(reaches, radii, count, rows), logs)
     };
     let views = inputs.vertices.par_chunks(3 * vertices.max(1)).map(view);

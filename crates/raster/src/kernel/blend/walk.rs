@@ -26,9 +26,8 @@ pub(super) const OF_CORNERS: usize = 9;
 /// Stands for the logarithm of a weight of 0.
 const HIDDEN: f64 = -1e30;
 
-/// A face of a band, in all lanes.
-pub(super) struct Shown<'a, T: Real> {
-    face: Face<'a, T>,
+/// What the pairs of a face share beside its edges, in all lanes.
+pub(super) struct Shown<T: Real> {
     planes: Barycentric<T>,
     /// The corners as they were given, by their places here.
     order: [usize; 3],
@@ -105,57 +104,63 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
     fn run(self) {
         let (blend, place) = (self.blend, self.place);
         let mut list = List::new();
+        let mut shown = Shown::new(blend.numbers);
         for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
             list.fill(&blend.scene, &place, numbers);
-            let mut shown: Option<(usize, Shown<T>)> = None;
+            let mut of = None;
             for Chunk { places, at, owner } in list.chunks(0) {
-                if shown.as_ref().is_none_or(|&(face, _)| face != owner) {
-                    if let Some((face, shown)) = &shown {
-                        self.visitor.face(&blend.scene, k * LISTED + face, shown);
+                if of != Some(owner) {
+                    if let Some(face) = of {
+                        self.visitor.face(&blend.scene, k * LISTED + face, &shown);
                     }
-                    shown = Some((owner, self.shown(&list, owner, numbers[owner])));
+                    shown.set(blend, &place, self.view, list.face(owner), numbers[owner]);
+                    shown.log = splat(f64::from(self.logs[numbers[owner] as usize]));
+                    of = Some(owner);
                 }
-                let Some((_, shown)) = &shown else { continue };
-                if self.visitor.skips(shown, at) {
+                if self.visitor.skips(&shown, at) {
                     continue;
                 }
                 let (px, py) = T::Lanes::pixels(places);
-                let pair = blend.pair(&place, shown, px, py);
-                self.visitor.pair(blend, shown, &pair, at);
+                let pair = blend.pair(&place, list.face(owner), &shown, px, py);
+                self.visitor.pair(blend, &shown, &pair, at);
             }
-            if let Some((face, shown)) = &shown {
-                self.visitor.face(&blend.scene, k * LISTED + face, shown);
+            if let Some(face) = of {
+                self.visitor.face(&blend.scene, k * LISTED + face, &shown);
             }
         }
     }
 }
 
-impl<T: Real, V> Walk<'_, '_, T, V> {
-    /// Face `owner` of a list, whose number in the scene is given too.
+impl<T: Real> Shown<T> {
+    /// Room for a face with so many numbers at each corner.
+    fn new(numbers: usize) -> Self {
+        let one = T::constant(splat(1.0));
+        Self {
+            planes: Barycentric::nothing(),
+            order: [0, 1, 2],
+            per_depth: [one; 3],
+            attributes: vec![[one; 3]; numbers],
+            log: splat(0.0),
+        }
+    }
+
+    /// Takes a face, whose number in the scene is given too.
     #[inline(always)]
-    fn shown<'l>(&self, list: &'l List<T>, owner: usize, number: u32) -> Shown<'l, T> {
-        let face = list.face(owner);
-        let order = face.corners();
-        let (blend, place) = (self.blend, &self.place);
+    fn set(&mut self, blend: &Blend<T>, place: &Place<T>, view: usize, face: Face<T>, number: u32) {
+        self.order = face.corners();
         let (corners, entries) =
             (blend.scene.faces[number as usize], blend.entries[number as usize]);
-        let count = place.vertices.len() / 3;
-        let one = T::constant(splat(1.0));
-        let mut per_depth = [one; 3];
-        let mut attributes = vec![[one; 3]; blend.numbers];
-        let first = blend.first_attribute(self.view);
+        let depths = 2 * (place.vertices.len() / 3);
+        let first = blend.first_attribute(view);
         for k in 0..3 {
-            let at = 2 * count + corners[order[k]] as usize;
-            per_depth[k] = everywhere(place.vertices, place.tangents, at);
-            per_depth[k] = T::inverse(per_depth[k]);
-            let start = first + entries[order[k]] as usize * blend.numbers;
-            for (c, attribute) in attributes.iter_mut().enumerate() {
+            let at = depths + corners[self.order[k]] as usize;
+            self.per_depth[k] = T::inverse(everywhere(place.vertices, place.tangents, at));
+            let start = first + entries[self.order[k]] as usize * blend.numbers;
+            for (c, attribute) in self.attributes.iter_mut().enumerate() {
                 attribute[k] = everywhere(blend.attributes[0], blend.attributes[1], start + c);
             }
         }
-        let log = splat(f64::from(self.logs[number as usize]));
-        let planes = Barycentric::new(face, blend.least_area);
-        Shown { face, planes, order, per_depth, attributes, log }
+        self.planes = Barycentric::new(face, blend.least_area);
     }
 }
 
@@ -169,8 +174,15 @@ pub(super) fn everywhere<T: Real>(values: &[Float<T>], tangents: &[Float<T>], at
 impl<T: Real> Blend<'_, T> {
     /// What a face is to the pixels at `px`, `py`, from its origin.
     #[inline(always)]
-    fn pair(&self, place: &Place<T>, shown: &Shown<T>, px: T::Lanes, py: T::Lanes) -> Pair<T> {
-        let point = Point::new(shown.face, &shown.planes, px, py);
+    fn pair(
+        &self,
+        place: &Place<T>,
+        face: Face<T>,
+        shown: &Shown<T>,
+        px: T::Lanes,
+        py: T::Lanes,
+    ) -> Pair<T> {
+        let point = Point::new(face, &shown.planes, px, py);
         // 1 / z is what interpolates linearly on the screen.
         let [r0, r1, r2] = shown.per_depth;
         let [l0, l1, l2] = point.barycentric;
@@ -200,6 +212,8 @@ impl<T: Real> Blend<'_, T> {
     fn weight(&self, pair: &Pair<T>, largest: T::Lanes) -> [T; 2] {
         let by_depth = pair.by_depth.log() - T::constant(largest);
         let whole = T::exponential(pair.log_edge + by_depth);
+        // Numbers so small that they lose digits take a hundred times as long to multiply.
+        let whole = whole.masked(T::Lanes::splat(self.vanishing).less(whole.value()));
         if self.floor == Float::<T>::ZERO {
             return [whole, whole];
         }
@@ -301,9 +315,11 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
         let [weight, of_edge] = blend.weight(pair, self.largest.groups(0, at).value());
         let per_total = self.pixels.groups(0, at);
         let [share, of_edge] = [weight * per_total, of_edge * per_total];
-        if nowhere::<T::Lanes>(self.least.less(of_edge.value())) {
+        let counts = self.least.less(of_edge.value());
+        if nowhere::<T::Lanes>(counts) {
             return;
         }
+        let [share, of_edge] = [share.masked(counts), of_edge.masked(counts)];
         let zero = T::constant(splat(0.0));
         // How the objective changes with the attributes of the three corners, were the point there, and what it is at the point.
         let mut at_corners = [zero; 3];
