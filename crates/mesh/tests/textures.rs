@@ -155,7 +155,9 @@ fn a_picture_that_cannot_be_had_leaves_coordinates_and_says_why() {
     assert_eq!(mtl(&[], "newmtl a\nKd 1 0 0"), None);
 }
 
-/// A square of two parts, each with its corners, coordinates and `image`; and the mesh as a file.
+type Change<'a> = &'a dyn Fn(&mut Value, &mut Vec<u8>);
+
+/// A square in two parts that share vertices, coordinates and a picture; `change` spoils it.
 fn glb(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
     let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let mut bin = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
@@ -197,7 +199,7 @@ fn glb(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
 
 #[test]
 fn the_texture_of_a_glb_file_has_v_up_and_its_picture() {
-    let loaded = |files: &[(&str, &[u8])], change: &dyn Fn(&mut Value, &mut Vec<u8>)| {
+    let loaded = |files: &[(&str, &[u8])], change: Change| {
         let file = glb(change);
         let folder = folder(&[files, &[("a.glb", &file)]].concat());
         let (mesh, left_out) = load(folder.path(), "a.glb");
@@ -242,7 +244,7 @@ fn the_texture_of_a_glb_file_has_v_up_and_its_picture() {
 #[test]
 fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
     let part = "a.glb: mesh 0, primitive";
-    let cases: [(&dyn Fn(&mut Value, &mut Vec<u8>), &str, bool); 15] = [
+    let cases: [(Change, &str, bool); 15] = [
         (
             &|j, _| {
                 drop(
