@@ -33,7 +33,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = angle)]
     pub(crate) fov: f64,
 
-    /// Draw what the mesh shows, before white: its texture if it has one, else the colours of its vertices, else grey
+    /// Draw the mesh as it looks, on white: its texture if it has one, else the colours of its vertices, else grey
     #[arg(long, conflicts_with_all = ["reference", "target", "t_conorm"])]
     pub(crate) colour: bool,
 

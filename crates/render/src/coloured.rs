@@ -69,7 +69,7 @@ impl<B: RasterBackend> Coloured<B> {
         Step { image: images.concat(), mean_alpha, loss: None, forward_ms, backward_ms: None }
     }
 
-    /// Red, green and blue `[3, size, size]` before white, and the mean share of the faces.
+    /// Red, green and blue `[3, size, size]` on white, and the mean share of the faces.
     fn view(&self, seen: Tensor<B, 3>, view: usize) -> (Vec<f64>, f64) {
         let [of_colours, of_light] = &self.backgrounds;
         let drawn = numbers(self.renderer.image(seen.clone(), &self.colours, of_colours));
