@@ -109,11 +109,16 @@ impl<B: RasterBackend> Coloured<B> {
     }
 }
 
-/// What draws vertices of these depths in all views.
+/// What draws vertices of these depths `[views, vertices]`.
 fn renderer(scene: &Scene, colour: &Colour, depths: &[f64]) -> ColourRenderer {
-    let before = depths.iter().filter(|&&depth| depth >= NEAR);
-    let ends = [f64::INFINITY, f64::NEG_INFINITY];
-    let [near, far] = before.fold(ends, |[near, far], &depth| [near.min(depth), far.max(depth)]);
+    let corners = || scene.faces.iter().flatten();
+    let views = depths.chunks_exact(scene.vertices.len() / 3);
+    let [near, far] = views
+        .flat_map(|view| corners().map(move |&vertex| view[vertex as usize]))
+        .filter(|&depth| depth >= NEAR)
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[near, far], depth| {
+            [near.min(depth), far.max(depth)]
+        });
     // Nothing is seen where all is behind the camera.
     let [near, far] = if near <= far { [near, far] } else { [NEAR; 2] };
     let planes = [near - BEYOND * far, far + BEYOND * far];

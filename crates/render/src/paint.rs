@@ -5,6 +5,7 @@ use std::{fmt, fs, io::Cursor, path::Path, sync::Arc};
 use anyhow::{Context, bail, ensure};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
 use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage};
+use softrast_lab::Error;
 use softrast_mesh::{Mesh, MeshError, Texture};
 use softrast_raster::Attributes;
 use softrast_softness::tensor;
@@ -41,8 +42,9 @@ pub(crate) enum Paint {
     Grey,
 }
 
-/// Samples along each side of an image at most, unless more are asked for.
-const MOST_SAMPLES: usize = 2048;
+/// Samples along each side of an image: at most so many unless more are asked for, and at most as many as the largest image has pixels.
+const USUAL_SAMPLES: usize = 2048;
+const MOST_SAMPLES: usize = 4096;
 
 impl Colour {
     /// How `args` ask for a mesh, taken as it will be drawn, and what the user should know.
@@ -51,6 +53,13 @@ impl Colour {
         args: &Args,
         left_out: Option<MeshError>,
     ) -> anyhow::Result<(Self, Option<String>)> {
+        if args.size * samples(args) > MOST_SAMPLES {
+            return Err(Error::usage(format!(
+                "--samples {} times --size {} is above {MOST_SAMPLES}: take fewer",
+                samples(args),
+                args.size
+            )));
+        }
         let (paint, warning) = Paint::of(mesh, args, left_out)?;
         let [low, high] = mesh.bounds();
         let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -60,7 +69,7 @@ impl Colour {
 
 /// Samples along each side of a pixel.
 pub(crate) fn samples(args: &Args) -> usize {
-    let usual = || (1..=4).rev().find(|n| n * args.size <= MOST_SAMPLES).unwrap_or(1);
+    let usual = || (1..=4).rev().find(|n| n * args.size <= USUAL_SAMPLES).unwrap_or(1);
     args.samples.unwrap_or_else(usual)
 }
 

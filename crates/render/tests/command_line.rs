@@ -283,7 +283,8 @@ fn what_cannot_be_drawn_in_colour_is_one_line() {
     head[29..33].copy_from_slice(&crc.to_be_bytes());
     let huge = picture("huge.png", &head);
     let text = picture("text.png", b"no picture");
-    let cases: [(&[&str], u8, &str); 10] = [
+    let cases: [(&[&str], u8, &str); 11] = [
+        (&[&obj, "--colour", "--size", "2048", "--samples", "3"], 2, "is above 4096: take fewer"),
         (&[&plain, "--colour", "--texture", &cut], 1, "has no texture coordinates"),
         (
             &[&obj, "--colour", "--texture", "none.png"],
@@ -315,6 +316,8 @@ fn meshes_without_size_or_behind_the_camera_leave_the_picture_white() {
     let out = folder.path().join("out.png");
     for (name, obj) in [
         ("point.obj", "v 1 1 1\nf 1 1 1\n"),
+        // A vertex that no face uses does not blur the depths of those that are used.
+        ("stray.obj", "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 1e30\nf 1 2 3\n"),
         ("behind.obj", "v 0 0 -9\nv 1 0 -9\nv 0 1 -9\nf 1 2 3\n"),
         ("far.obj", "v 0 0 3e38\nv 3e38 0 3e38\nv 0 3e38 3e38\nf 1 2 3\n"),
     ] {
