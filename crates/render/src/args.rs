@@ -45,7 +45,7 @@ pub(crate) struct Args {
     #[arg(long, requires = "colour")]
     pub(crate) shade: bool,
 
-    /// Samples along each side of a pixel in colour [default: 4, fewer above 512 pixels]
+    /// Samples along each side of a pixel in colour [default: 4, fewer above 512 pixels, 1 with --softness or --scale]
     #[arg(long, value_name = "N", value_parser = whole::<1, 4>, requires = "colour")]
     pub(crate) samples: Option<usize>,
 

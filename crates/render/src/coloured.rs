@@ -15,8 +15,6 @@ use crate::{
     scene::{Scene, Step},
 };
 
-/// Scale of the depth softness, against the longest side of the mesh: less than the thickness of what is thin.
-const DEPTH: f64 = 0.005;
 /// The least scale of the depth softness, against the distance between the planes: floats of 32 bits hardly tell nearer depths apart.
 const LEAST_DEPTH: f64 = 1e-5;
 /// Planes of nearness lie beyond the mesh by this part of the farthest depth.
@@ -123,7 +121,10 @@ fn renderer(scene: &Scene, colour: &Colour, depths: &[f64]) -> ColourRenderer {
     let [near, far] = if near <= far { [near, far] } else { [NEAR; 2] };
     let planes = [near - BEYOND * far, far + BEYOND * far];
     let depth = DepthSoftness::Family(Family::Exp);
-    let depth_scale = (DEPTH * colour.longest / (planes[1] - planes[0])).max(LEAST_DEPTH);
+    let depth_scale = match colour.depth_scale {
+        Some(scale) => (scale / (planes[1] - planes[0])).max(LEAST_DEPTH),
+        None => ColourRenderer::DEPTH_SCALE,
+    };
     let phi = [scene.phi.clone(), depth.default_phi(depth_scale)];
     let weighting = Weighting { edge: scene.softness, depth, planes };
     ColourRenderer::with_weighting(scene.faces.clone(), scene.size * colour.samples, weighting, phi)

@@ -17,6 +17,9 @@ const MOST_TEXELS: u64 = 1 << 26;
 /// Red, green and blue of a mesh that has no colours.
 const GREY: [f64; 3] = [0.7; 3];
 
+/// Scale of the depth softness, against the longest side of the mesh: less than the thickness of what is thin.
+const DEPTH: f64 = 0.005;
+
 /// How a mesh is drawn in colour.
 pub(crate) struct Colour {
     pub(crate) paint: Paint,
@@ -24,8 +27,8 @@ pub(crate) struct Colour {
     pub(crate) shade: bool,
     /// Along each side of a pixel.
     pub(crate) samples: usize,
-    /// The longest side of the mesh, in world units.
-    pub(crate) longest: f64,
+    /// Scale of the depth softness in world units; none for that of the op.
+    pub(crate) depth_scale: Option<f64>,
 }
 
 /// Colours of faces, all from 0 to 1 as screens have them.
@@ -63,13 +66,18 @@ impl Colour {
         let (paint, warning) = Paint::of(mesh, args, left_out)?;
         let [low, high] = mesh.bounds();
         let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
-        Ok((Self { paint, shade: args.shade, samples: samples(args), longest }, warning))
+        // Under a softness without end so narrow a one would draw near faces all over the image: docs/notes.md, Colour.
+        let depth_scale = args.softness.is_none().then_some(DEPTH * longest);
+        Ok((Self { paint, shade: args.shade, samples: samples(args), depth_scale }, warning))
     }
 }
 
-/// Samples along each side of a pixel.
+/// Samples along each side of a pixel. Edges that are asked for show as they are.
 pub(crate) fn samples(args: &Args) -> usize {
-    let usual = || (1..=4).rev().find(|n| n * args.size <= USUAL_SAMPLES).unwrap_or(1);
+    let usual = || match (&args.softness, args.scale) {
+        (None, None) => (1..=4).rev().find(|n| n * args.size <= USUAL_SAMPLES).unwrap_or(1),
+        _ => 1,
+    };
     args.samples.unwrap_or_else(usual)
 }
 

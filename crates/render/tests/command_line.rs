@@ -206,8 +206,9 @@ fn a_texture_is_seen_where_its_coordinates_place_it() {
     assert!(report["forward_ms"].as_f64().unwrap() > 0.0);
     assert_eq!(report["t_conorm"], Value::Null);
     assert_eq!(front(&glb, &[]).0, picture);
-    let few = front(&obj, &["--samples", "1"]).1;
-    assert_eq!(few["samples"], 1);
+    for one in [["--samples", "1"], ["--scale", "0.05"], ["--softness", "logistic"]] {
+        assert_eq!(front(&obj, &one).1["samples"], 1);
+    }
 }
 
 #[test]
