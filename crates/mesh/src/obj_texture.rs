@@ -90,22 +90,19 @@ fn rest(statement: &Statement) -> String {
 }
 
 /// (u, v); a second number that is left out is 0, a third is of no use to a picture.
-fn coordinate<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f64; 2], Fault> {
-    let mut uv = [0.0; 2];
-    let mut given = 0;
-    for (k, word) in words.take(2).enumerate() {
+fn coordinate<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 2], Fault> {
+    let read = |word: &str| {
         let x: f64 = word.parse().map_err(|_| Fault::Number(shown(word)))?;
-        if !is_near(&x) {
-            let reason = format!("texture coordinate {word} is not from -{FARTHEST} to {FARTHEST}");
-            return Err(Fault::format(reason));
+        if is_near(&x) {
+            return Ok(x);
         }
-        uv[k] = x;
-        given += 1;
-    }
-    if given == 0 {
-        return Err(Fault::format("a texture coordinate without a number"));
-    }
-    Ok(uv)
+        let word = shown(word);
+        Err(Fault::format(format!(
+            "texture coordinate {word} is not from -{FARTHEST} to {FARTHEST}"
+        )))
+    };
+    let u = words.next().ok_or_else(|| Fault::format("a texture coordinate without a number"))?;
+    Ok([read(u)?, words.next().map_or(Ok(0.0), read)?])
 }
 
 /// The coordinate, from 0, that the second field of a corner means.
@@ -140,11 +137,11 @@ fn of_materials(found: &Found, folder: &Path) -> Result<Option<Vec<u8>>, Trouble
     for material in &found.materials {
         shown.entry(pictures.get(material)).or_insert(material);
     }
-    let of = |part: &str, reason: String| Err(Trouble::part(part, reason));
+    let wrong = |reason: String| Err(Trouble::part("materials", reason));
     match shown.iter().collect::<Vec<_>>()[..] {
         [] | [(None, _)] => Ok(None),
         [(Some((_, name)), material)] if name.starts_with('-') => {
-            of("materials", format!("map_Kd of {material} has options, which are not read: {name}"))
+            wrong(format!("map_Kd of {material:?} has options, which are not read: {name}"))
         }
         [(Some((library, name)), _)] => {
             let folder = library.parent().unwrap_or(folder);
@@ -155,10 +152,9 @@ fn of_materials(found: &Found, folder: &Path) -> Result<Option<Vec<u8>>, Trouble
                 Some((_, name)) => name.as_str(),
                 None => "no picture",
             });
-            let reason = format!(
+            wrong(format!(
                 "faces of {other:?} show {b}, but those of {one:?} {a}: a mesh has one picture, so join them into one"
-            );
-            of("materials", reason)
+            ))
         }
     }
 }

@@ -143,7 +143,10 @@ fn a_picture_that_cannot_be_had_leaves_coordinates_and_says_why() {
     let empty = mtl(&[("a.png", b"")], &both("../../elsewhere/a.png"));
     starts(empty, "a.png: cannot be read: it is neither a PNG nor a JPEG file");
     let options = mtl(&[("a.png", PNG)], &both("-s 2 2 a.png"));
-    starts(options, "a.obj: materials: map_Kd of a has options, which are not read: -s 2 2 a.png");
+    starts(
+        options,
+        "a.obj: materials: map_Kd of \"a\" has options, which are not read: -s 2 2 a.png",
+    );
     let several = mtl(&[("a.png", PNG)], "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png");
     let expected = "a.obj: materials: faces of \"b\" show b.png, but those of \"a\" a.png: a mesh has one picture, so join them into one";
     assert_eq!(several.as_deref(), Some(expected));

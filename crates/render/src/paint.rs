@@ -149,7 +149,7 @@ impl fmt::Display for Paint {
                 write!(f, "texture of {} x {} texels", picture.width(), picture.height())
             }
             Self::Vertices(_) => f.write_str("colours of vertices"),
-            Self::Grey => f.write_str("grey: the mesh has no picture and no colours"),
+            Self::Grey => f.write_str("grey: the mesh has no texture and no colours"),
         }
     }
 }

@@ -227,7 +227,7 @@ fn a_picture_may_be_replaced_and_may_be_missing() {
         }
         let (picture, report) = front(&obj, &[]);
         assert_eq!(picture.get_pixel(20, 20).0, [179; 3], "grey");
-        assert_eq!(report["colour"], "grey: the mesh has no picture and no colours");
+        assert_eq!(report["colour"], "grey: the mesh has no texture and no colours");
         assert_eq!(front(&obj, &texture).0.get_pixel(20, 20).0, [10, 20, 30]);
     }
     let out = folder.path().join("a.png");
