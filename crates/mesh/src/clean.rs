@@ -96,7 +96,11 @@ fn face<'a>(
 }
 
 /// The vertex, counted from 1, that a corner such as `7`, `7/1/2`, `7//2` or `-1` means.
-fn absolute(corner: &str, vertices_read: usize, vertices: usize) -> Result<usize, Fault> {
+pub(crate) fn absolute(
+    corner: &str,
+    vertices_read: usize,
+    vertices: usize,
+) -> Result<usize, Fault> {
     let field = corner.split('/').next().unwrap_or(corner);
     let index = || shown(field);
     let (back, digits) = match field.strip_prefix('-') {

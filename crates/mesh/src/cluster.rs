@@ -7,7 +7,7 @@ impl Mesh {
     ///
     /// `cell` is the side of a cube in world units; no vertex moves further than its diagonal. Faces that shrink to an edge or a point are
     /// left out, and of faces between the same three vertices only the first stays, so walls thinner than a cube become one sheet.
-    /// Colours are means too. `None` if no face is left.
+    /// Colours are means too, a texture is left out. `None` if no face is left.
     ///
     /// Source: vertex clustering, Rossignac and Borrel 1993.
     #[must_use]

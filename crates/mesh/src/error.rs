@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::format::ending;
+use crate::{format::ending, texture::FARTHEST};
 
 /// Why a mesh could not be made, read or written.
 ///
@@ -102,6 +102,35 @@ pub enum MeshError {
         /// Index of the vertex, from 0.
         vertex: usize,
     },
+    /// A coordinate of a texture is NaN, or too far out for 32-bit floats to tell texels apart.
+    #[error("texture coordinate {coordinate} is not from -{FARTHEST} to {FARTHEST}")]
+    Coordinate {
+        /// Index of the coordinate, from 0.
+        coordinate: usize,
+    },
+    /// A corner of a face refers to a coordinate that the texture does not have.
+    #[error(
+        "a corner of face {face} has texture coordinate {coordinate}, but there are {coordinates}"
+    )]
+    Corner {
+        /// Index of the face, from 0.
+        face: usize,
+        /// The coordinate it asks for, from 0.
+        coordinate: u32,
+        /// How many coordinates there are.
+        coordinates: usize,
+    },
+    /// A texture lies on more or fewer faces than the mesh has.
+    #[error("a texture on {found} faces for the {faces} faces of the mesh")]
+    TextureFaces {
+        /// How many faces the texture lies on.
+        found: usize,
+        /// How many faces there are.
+        faces: usize,
+    },
+    /// The first bytes of a picture are not those of a format that is read.
+    #[error("the picture of a texture is neither PNG nor JPEG")]
+    Picture,
     /// A face refers to a vertex that the mesh does not have.
     #[error("face {face} of the mesh uses vertex {vertex}, but there are {vertices}")]
     Vertex {
@@ -191,6 +220,8 @@ pub(crate) enum Trouble {
     Line(usize, Fault),
     Part(String, Fault),
     NoFaces(&'static str),
+    /// With a file that this one names.
+    OtherFile(MeshError),
 }
 
 impl Trouble {
@@ -205,6 +236,7 @@ impl Trouble {
             Self::Line(line, reason) => MeshError::Line { name, line, reason },
             Self::Part(part, reason) => MeshError::Part { name, part, reason },
             Self::NoFaces(expected) => MeshError::NoFaces { name, expected },
+            Self::OtherFile(error) => error,
         }
     }
 }

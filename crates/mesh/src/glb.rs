@@ -1,21 +1,20 @@
-//! A GLB file: binary glTF 2.0, of which the geometry is read and written.
+//! A GLB file: binary glTF 2.0, of which the geometry, colours and a texture are read.
 
-use std::collections::HashMap;
-
-use serde_json::json;
+use std::{collections::HashMap, path::Path};
 
 use crate::{
-    Fault, Mesh,
+    Fault,
     error::{Trouble, shown},
+    glb_texture::Unwrapped,
     gltf::{Gltf, Node, Primitive},
     placement::Placement,
     ply::finite,
     read::Parts,
 };
 
-const MAGIC: &[u8] = b"glTF";
-const JSON: &[u8] = b"JSON";
-const BIN: &[u8] = b"BIN\0";
+pub(crate) const MAGIC: &[u8] = b"glTF";
+pub(crate) const JSON: &[u8] = b"JSON";
+pub(crate) const BIN: &[u8] = b"BIN\0";
 
 /// A small file can place a mesh many times over. From here on, it must have as many bytes as
 /// vertices and faces.
@@ -40,8 +39,8 @@ const WHITE: [f64; 3] = [1.0; 3];
 const NO_FACES: Trouble =
     Trouble::NoFaces("a GLB file has them in meshes of triangles at the nodes of its scene");
 
-/// The mesh in `bytes`; see [`Mesh::parse`].
-pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
+/// The mesh in `bytes`; see [`crate::Mesh::parse`]. With the `folder` of the file also its texture, or why it was left out.
+pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Trouble> {
     let (json, bin) = chunks(bytes)?;
     let gltf: Gltf = serde_json::from_slice(json)
         .map_err(|reason| Trouble::part("JSON chunk", reason.to_string()))?;
@@ -59,7 +58,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
 
     let most = MOST_PLACED.max(bytes.len());
     let parts = Parts::default();
-    let mut surface = Surface { gltf: &gltf, bin, most, parts };
+    let unwrapped = folder.map(|_| Ok(Unwrapped::default()));
+    let mut surface = Surface { gltf: &gltf, bin, most, parts, unwrapped };
     let mut seen = vec![false; gltf.nodes.len()];
     let mut waiting = vec![];
     enter(&roots(&gltf)?, &Placement::IDENTITY, &mut seen, &mut waiting)?;
@@ -75,12 +75,18 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
         }
         enter(&node.children, &placement, &mut seen, &mut waiting)?;
     }
-    let mut parts = surface.parts;
+    let Surface { mut parts, unwrapped, .. } = surface;
     if parts.faces.is_empty() {
         return Err(NO_FACES);
     }
     if let Some(colours) = &mut parts.colours {
         colours.resize(parts.positions.len(), WHITE);
+    }
+    if let (Some(folder), Some(unwrapped)) = (folder, unwrapped) {
+        (parts.texture, parts.left_out) = match unwrapped {
+            Ok(unwrapped) => unwrapped.texture(&gltf, bin, folder),
+            Err(trouble) => (None, Some(trouble)),
+        };
     }
     Ok(parts)
 }
@@ -176,6 +182,8 @@ struct Surface<'a> {
     most: usize,
     /// Colours may be fewer than positions: those at the end are white.
     parts: Parts,
+    /// If it is to be read: what there is of the texture, or what is wrong with it.
+    unwrapped: Option<Result<Unwrapped, Trouble>>,
 }
 
 impl Surface<'_> {
@@ -186,27 +194,35 @@ impl Surface<'_> {
         // Parts of other materials often use the same vertices.
         let mut firsts = HashMap::new();
         for (number, primitive) in primitives.iter().enumerate() {
-            self.add_primitive(primitive, placement, &mut firsts).map_err(|trouble| {
+            let at = |trouble: Trouble| {
                 let here = format!("mesh {mesh}, primitive {number}");
                 match trouble {
                     Trouble::Part(part, why) if part.is_empty() => Trouble::Part(here, why),
                     Trouble::Part(part, why) => Trouble::Part(format!("{here}, {part}"), why),
                     other => other,
                 }
-            })?;
+            };
+            let triangles = self.add_primitive(primitive, placement, &mut firsts).map_err(at)?;
+            if let Some(Ok(unwrapped)) = &mut self.unwrapped
+                && let Err(trouble) =
+                    unwrapped.add(self.gltf, self.bin, primitive, &triangles, self.most)
+            {
+                self.unwrapped = Some(Err(at(trouble)));
+            }
         }
         Ok(())
     }
 
+    /// Adds the triangles of a part, and returns them as its indices say, wound as they are placed.
     fn add_primitive(
         &mut self,
         primitive: &Primitive,
         placement: &Placement,
         firsts: &mut HashMap<(usize, Option<usize>), usize>,
-    ) -> Result<(), Trouble> {
+    ) -> Result<Vec<[u32; 3]>, Trouble> {
         let wrong = |reason: String| Trouble::part("", reason);
         let accessor = match (primitive.mode, primitive.attributes.position) {
-            (0..4, _) | (4..7, None) => return Ok(()),
+            (0..4, _) | (4..7, None) => return Ok(vec![]),
             (4..7, Some(accessor)) => accessor,
             (mode, _) => return Err(wrong(format!("{mode} is not a mode of glTF"))),
         };
@@ -246,13 +262,13 @@ impl Surface<'_> {
         if primitive.mode == 4 && indices.len() % 3 != 0 {
             return Err(wrong(format!("{} corners do not make whole triangles", indices.len())));
         }
+        let mut triangles = triangles(primitive.mode, &indices);
+        if placement.mirrors() {
+            triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
         let first = first as u32;
-        let placed = |[a, b, c]: [u32; 3]| {
-            let [a, b, c] = [first + a, first + b, first + c];
-            if placement.mirrors() { [a, c, b] } else { [a, b, c] }
-        };
-        self.parts.faces.extend(triangles(primitive.mode, &indices).into_iter().map(placed));
-        Ok(())
+        self.parts.faces.extend(triangles.iter().map(|triangle| triangle.map(|v| first + v)));
+        Ok(triangles)
     }
 
     /// Adds the colours of as many vertices, after `first` others.
@@ -310,86 +326,4 @@ fn from_linear(x: f64) -> f64 {
     let root = x.powf(1.0 / 2.4);
     // In this form 1 is exactly 1.
     if x <= 0.003_130_8 { 12.92 * x } else { root + 0.055 * (root - 1.0) }
-}
-
-/// The inverse of [`from_linear`].
-fn to_linear(x: f64) -> f64 {
-    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
-}
-
-/// See [`Mesh::to_glb`].
-pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
-    let positions: Vec<_> = mesh.positions().iter().map(|p| p.map(|x| x as f32)).collect();
-    let extreme = |pick: fn(f32, f32) -> f32| {
-        positions.iter().copied().reduce(|a, b| [0, 1, 2].map(|k| pick(a[k], b[k])))
-    };
-    let (vertices, corners) = (positions.len(), 3 * mesh.faces().len());
-    let mut length = 12 * vertices + 4 * corners;
-    let mut json = json!({
-        "asset": {"version": "2.0", "generator": "softrast-mesh"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
-        "materials": [{
-            "doubleSided": true,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [0.75, 0.75, 0.75, 1.0],
-                "metallicFactor": 0.0,
-                "roughnessFactor": 0.75,
-            },
-        }],
-        "accessors": [
-            {
-                "bufferView": 0,
-                "componentType": 5126,
-                "count": vertices,
-                "type": "VEC3",
-                "min": extreme(f32::min),
-                "max": extreme(f32::max),
-            },
-            {"bufferView": 1, "componentType": 5125, "count": corners, "type": "SCALAR"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": 12 * vertices, "target": 34962},
-            {"buffer": 0, "byteOffset": 12 * vertices, "byteLength": 4 * corners, "target": 34963},
-        ],
-    });
-    if mesh.colours().is_some() {
-        json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(2);
-        json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] =
-            json!([1.0, 1.0, 1.0, 1.0]);
-        let more = [
-            (
-                "accessors",
-                json!({"bufferView": 2, "componentType": 5126, "count": vertices, "type": "VEC3"}),
-            ),
-            (
-                "bufferViews",
-                json!({"buffer": 0, "byteOffset": length, "byteLength": 12 * vertices, "target": 34962}),
-            ),
-        ];
-        for (list, entry) in more {
-            json[list].as_array_mut().expect("a list").push(entry);
-        }
-        length += 12 * vertices;
-    }
-    json["buffers"] = json!([{"byteLength": length}]);
-    let mut json = json.to_string().into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-
-    let all = 12 + 8 + json.len() + 8 + length;
-    let of_32_bits = |length: usize| {
-        u32::try_from(length).expect("a GLB file has less than 4 GiB").to_le_bytes()
-    };
-    let mut file = Vec::with_capacity(all);
-    file.extend([MAGIC, &2u32.to_le_bytes(), &of_32_bits(all)].concat());
-    file.extend([&of_32_bits(json.len()), JSON].concat());
-    file.extend(json);
-    file.extend([&of_32_bits(length), BIN].concat());
-    file.extend(positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    file.extend(mesh.faces().iter().flatten().flat_map(|v| v.to_le_bytes()));
-    let colours = mesh.colours().into_iter().flatten().flatten();
-    file.extend(colours.flat_map(|&x| (to_linear(x) as f32).to_le_bytes()));
-    file
 }

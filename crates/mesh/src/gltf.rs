@@ -4,6 +4,7 @@
 //! forbids, and refuses whole files for materials that it does not know.
 
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::error::Trouble;
 
@@ -19,6 +20,10 @@ pub(crate) struct Gltf {
     buffer_views: Vec<View>,
     buffers: Vec<Buffer>,
     pub(crate) extensions_required: Vec<String>,
+    /// What a mesh can do without is looked at only where it is asked for.
+    pub(crate) materials: Value,
+    pub(crate) textures: Value,
+    pub(crate) images: Value,
 }
 
 #[derive(Deserialize)]
@@ -51,6 +56,8 @@ pub(crate) struct Primitive {
     pub(crate) indices: Option<usize>,
     #[serde(default = "triangles")]
     pub(crate) mode: u64,
+    #[serde(default)]
+    pub(crate) material: Value,
 }
 
 fn triangles() -> u64 {
@@ -63,6 +70,10 @@ pub(crate) struct Attributes {
     pub(crate) position: Option<usize>,
     #[serde(rename = "COLOR_0")]
     pub(crate) colour: Option<usize>,
+    #[serde(rename = "TEXCOORD_0", default)]
+    pub(crate) coordinates: Value,
+    #[serde(rename = "TEXCOORD_1", default)]
+    pub(crate) more_coordinates: Value,
 }
 
 #[derive(Deserialize)]
@@ -99,7 +110,7 @@ struct Part {
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct View {
+pub(crate) struct View {
     buffer: usize,
     #[serde(default)]
     byte_offset: usize,
@@ -213,6 +224,45 @@ impl Gltf {
         values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
     }
 
+    /// The entries of an accessor of texture coordinates, v down; `bin` is the binary chunk.
+    pub(crate) fn coordinates(
+        &self,
+        accessor: usize,
+        bin: Option<&[u8]>,
+    ) -> Result<Vec<[f64; 2]>, Trouble> {
+        let count = self.count(accessor)?;
+        let it = &self.accessors[accessor];
+        let values = if it.shape == "VEC2" {
+            self.values(it, count, bin)
+        } else {
+            Err(format!("texture coordinates are of type VEC2, not {:?}", it.shape))
+        };
+        values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+    }
+
+    /// A buffer view, and its bytes if they are there.
+    pub(crate) fn view<'a>(
+        &self,
+        number: usize,
+        bin: Option<&'a [u8]>,
+    ) -> Result<(&View, Option<&'a [u8]>), String> {
+        let view = self.buffer_views.get(number);
+        let view = view.ok_or_else(|| format!("there is no buffer view {number}"))?;
+        let buffer = self.buffers.get(view.buffer);
+        let buffer = buffer.ok_or_else(|| format!("there is no buffer {}", view.buffer))?;
+        if buffer.uri.is_some() {
+            let reason = "lies outside of the binary chunk: export it as one .glb file";
+            return Err(format!("buffer {} {reason}", view.buffer));
+        }
+        let bin = bin.filter(|_| view.buffer == 0);
+        let bin = bin.ok_or_else(|| {
+            let reason = "has no binary chunk: export it without compression";
+            format!("buffer {} {reason}", view.buffer)
+        })?;
+        let end = view.byte_offset.checked_add(view.byte_length);
+        Ok((view, end.and_then(|end| bin.get(view.byte_offset..end))))
+    }
+
     /// The entries of an accessor of vertex indices; `bin` is the binary chunk.
     pub(crate) fn indices(&self, accessor: usize, bin: Option<&[u8]>) -> Result<Vec<u32>, Trouble> {
         let count = self.count(accessor)?;
@@ -293,27 +343,13 @@ impl<'a> Source<'a> {
         count: usize,
     ) -> Result<impl Iterator<Item = [&'a [u8]; N]> + use<'a, N>, String> {
         let Self { view: number, offset, component, bin } = *self;
-        let view = gltf.buffer_views.get(number);
-        let view = view.ok_or_else(|| format!("there is no buffer view {number}"))?;
-        let buffer = gltf.buffers.get(view.buffer);
-        let buffer = buffer.ok_or_else(|| format!("there is no buffer {}", view.buffer))?;
-        if buffer.uri.is_some() {
-            let reason = "lies outside of the binary chunk: export it as one .glb file";
-            return Err(format!("buffer {} {reason}", view.buffer));
-        }
-        let bin = bin.filter(|_| view.buffer == 0);
-        let bin = bin.ok_or_else(|| {
-            let reason = "has no binary chunk: export it without compression";
-            format!("buffer {} {reason}", view.buffer)
-        })?;
+        let (view, bytes) = gltf.view(number, bin)?;
         let size = component.size();
         let stride = view.byte_stride.unwrap_or(N * size);
         if stride < N * size {
             return Err(format!("a stride of {stride} bytes for entries of {} bytes", N * size));
         }
 
-        let end = view.byte_offset.checked_add(view.byte_length);
-        let bytes = end.and_then(|end| bin.get(view.byte_offset..end));
         let length =
             count.checked_sub(1).map_or(Some(0), |n| n.checked_mul(stride)?.checked_add(N * size));
         let bytes = bytes.and_then(|bytes| bytes.get(offset..)?.get(..length?));

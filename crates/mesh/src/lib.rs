@@ -2,7 +2,7 @@
 //! writer of all but STL, and small generators.
 //!
 //! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
-//! has at least one face. Whatever breaks these rules is a [`MeshError`] of one line that names
+//! has at least one face; it may have colours and a [`Texture`]. Whatever breaks these rules is a [`MeshError`] of one line that names
 //! the file, the place and the reason. Nothing here depends on burn.
 //!
 //! ```
@@ -15,6 +15,7 @@
 //! ```
 
 mod airplane;
+mod beside;
 mod chair;
 mod clean;
 mod cluster;
@@ -23,11 +24,14 @@ mod error;
 mod format;
 mod fox;
 mod glb;
+mod glb_texture;
+mod glb_writer;
 mod gltf;
 mod icosphere;
 mod mesh;
 mod normalized;
 mod obj;
+mod obj_texture;
 mod placement;
 mod ply;
 mod ply_header;
@@ -37,6 +41,7 @@ mod statements;
 mod stl;
 mod stroke;
 mod surface_net;
+mod texture;
 mod write;
 
 pub use airplane::airplane;
@@ -46,6 +51,7 @@ pub use error::{Fault, MeshError};
 pub use fox::fox;
 pub use icosphere::icosphere;
 pub use mesh::Mesh;
+pub use texture::Texture;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::MeshError;
+use crate::{MeshError, Texture};
 
 /// Vertices and the triangles between them.
 ///
@@ -10,16 +10,17 @@ use crate::MeshError;
 /// least one face. Faces may be degenerate (a corner repeated, or no area), vertices may be
 /// doubled or unused, and the surface may be open: none of this keeps a mesh from being rendered.
 ///
-/// A mesh may have a colour at each vertex; then every channel is in [0, 1].
+/// A mesh may have a colour at each vertex; then every channel is in [0, 1]. It may have a [`Texture`] on its faces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     colours: Option<Vec<[f64; 3]>>,
+    texture: Option<Texture>,
 }
 
 impl Mesh {
-    /// A mesh of `positions` (world units, y up) and `faces` (indices from 0), without colours.
+    /// A mesh of `positions` (world units, y up) and `faces` (indices from 0), without colours or texture.
     ///
     /// # Errors
     ///
@@ -35,7 +36,7 @@ impl Mesh {
                 return Err(MeshError::Vertex { face, vertex, vertices });
             }
         }
-        Ok(Self { positions, faces, colours: None })
+        Ok(Self::from_valid(positions, faces))
     }
 
     /// The same mesh with a colour at each vertex: red, green and blue from 0 to 1, as pictures and screens have them (sRGB).
@@ -54,7 +55,20 @@ impl Mesh {
         Ok(Self { colours: Some(colours), ..self })
     }
 
-    /// The same faces and colours between vertices at other places.
+    /// The same mesh with a texture on its faces.
+    ///
+    /// # Errors
+    ///
+    /// If the texture has not as many faces as the mesh.
+    pub fn with_texture(self, texture: Texture) -> Result<Self, MeshError> {
+        let (found, faces) = (texture.corners().len(), self.faces.len());
+        if found != faces {
+            return Err(MeshError::TextureFaces { found, faces });
+        }
+        Ok(Self { texture: Some(texture), ..self })
+    }
+
+    /// The same faces, colours and texture between vertices at other places.
     ///
     /// # Errors
     ///
@@ -68,31 +82,21 @@ impl Mesh {
         Ok(self.moved(positions))
     }
 
-    /// The same surface with each triangle cut into four, at the middles of its edges. There the colour is the mean of both ends.
+    /// The same surface with each triangle cut into four, at the middles of its edges. There the colour is the mean of both ends, and so are
+    /// the coordinates on a texture.
     #[must_use]
     pub fn subdivided(&self) -> Self {
         let mut positions = self.positions.clone();
         let mut colours = self.colours.clone();
-        let mut middles = BTreeMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                let between = |of: &[[f64; 3]]| {
-                    let [p, q] = [a, b].map(|v| of[v as usize]);
-                    [0, 1, 2].map(|k| p[k] / 2.0 + q[k] / 2.0)
-                };
-                positions.push(between(&self.positions));
-                if let Some(colours) = &mut colours {
-                    colours.push(between(colours));
-                }
-                (positions.len() - 1) as u32
-            })
-        };
-        let cut = |&[a, b, c]: &[u32; 3]| {
-            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-        };
-        let faces = self.faces.iter().flat_map(cut).collect();
-        Self { positions, faces, colours }
+        let faces = quartered(&self.faces, |ends| {
+            positions.push(between(&self.positions, ends));
+            if let Some(colours) = &mut colours {
+                colours.push(between(colours, ends));
+            }
+            (positions.len() - 1) as u32
+        });
+        let texture = self.texture.as_ref().map(Texture::subdivided);
+        Self { positions, faces, colours, texture }
     }
 
     /// The vertices, in world units.
@@ -103,6 +107,11 @@ impl Mesh {
     /// Red, green and blue at each vertex, from 0 to 1 as pictures and screens have them (sRGB); if the mesh has colours.
     pub fn colours(&self) -> Option<&[[f64; 3]]> {
         self.colours.as_deref()
+    }
+
+    /// The texture, if the mesh has one; [`Mesh::load_textured`] reads it.
+    pub fn texture(&self) -> Option<&Texture> {
+        self.texture.as_ref()
     }
 
     /// The triangles: three indices into [`Mesh::positions`] each, counterclockwise from outside
@@ -136,7 +145,7 @@ impl Mesh {
 
     /// A mesh of parts that are valid by construction.
     pub(crate) fn from_valid(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
-        Self { positions, faces, colours: None }
+        Self { positions, faces, colours: None, texture: None }
     }
 
     /// With colours that are valid by construction.
@@ -147,8 +156,27 @@ impl Mesh {
     /// With its vertices at other places, which are valid by construction.
     pub(crate) fn moved(&self, positions: Vec<[f64; 3]>) -> Self {
         assert_eq!(positions.len(), self.positions.len(), "positions of vertices");
-        Self { positions, faces: self.faces.clone(), colours: self.colours.clone() }
+        let (faces, colours) = (self.faces.clone(), self.colours.clone());
+        Self { positions, faces, colours, texture: self.texture.clone() }
     }
+}
+
+/// Each triangle cut into four, at the middles of its edges; `add` is called once for the ends of each edge, and gives the number of its middle.
+pub(crate) fn quartered(faces: &[[u32; 3]], mut add: impl FnMut([u32; 2]) -> u32) -> Vec<[u32; 3]> {
+    let mut middles = BTreeMap::new();
+    let mut middle =
+        |a: u32, b: u32| *middles.entry([a.min(b), a.max(b)]).or_insert_with_key(|&ends| add(ends));
+    let cut = |&[a, b, c]: &[u32; 3]| {
+        let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    };
+    faces.iter().flat_map(cut).collect()
+}
+
+/// The mean of two entries, without overflow.
+pub(crate) fn between<const N: usize>(of: &[[f64; N]], ends: [u32; 2]) -> [f64; N] {
+    let [p, q] = ends.map(|end| of[end as usize]);
+    std::array::from_fn(|k| p[k] / 2.0 + q[k] / 2.0)
 }
 
 /// Whether a channel of a colour is one.

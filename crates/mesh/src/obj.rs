@@ -2,10 +2,14 @@
 
 use std::{fmt, path::Path};
 
-use crate::{Mesh, MeshError, clean::clean, polygon::triangles};
+use crate::{Mesh, MeshError, Texture, clean::clean, obj_texture, polygon::triangles};
 
-/// The mesh in `bytes`; see [`Mesh::parse`].
-pub(crate) fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
+/// The mesh in `bytes`; see [`Mesh::parse`]. With the `folder` of the file also its texture, or why it was left out.
+pub(crate) fn parse(
+    bytes: &[u8],
+    name: &str,
+    folder: Option<&Path>,
+) -> Result<(Mesh, Option<MeshError>), MeshError> {
     let clean = clean(bytes).map_err(|trouble| trouble.of_file(name))?;
     // The parser numbers vertices as faces first use them. A first polygon that lists them
     // all keeps the order of the file, and those which no face uses.
@@ -18,17 +22,30 @@ pub(crate) fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
             MeshError::Parser { name: name.to_owned(), reason: reason.to_string() }
         })?;
 
-    let (mut positions, mut faces) = (Vec::new(), Vec::new());
+    // Of each triangle also which corners it has, all corners of the file being numbered in order.
+    let (mut positions, mut faces, mut cut, mut corners) = (vec![], vec![], vec![], 0);
     for tobj::Model { mesh, .. } in models {
         positions.extend(mesh.positions.as_chunks().0);
-        let polygons = split(&mesh.indices, &mesh.face_arities);
-        faces.extend(polygons.skip(1).flat_map(|corners| triangles(&positions, corners)));
+        for polygon in split(&mesh.indices, &mesh.face_arities).skip(1) {
+            for triangle in triangles(&positions, polygon) {
+                faces.push(triangle.map(|k| polygon[k]));
+                cut.push(triangle.map(|k| corners + k));
+            }
+            corners += polygon.len();
+        }
     }
     let mesh = Mesh::new(positions, faces)?;
-    match clean.colours {
-        Some(colours) => mesh.with_colours(colours),
-        None => Ok(mesh),
-    }
+    let mesh = match clean.colours {
+        Some(colours) => mesh.with_colours(colours)?,
+        None => mesh,
+    };
+    let Some(folder) = folder else { return Ok((mesh, None)) };
+    let (texture, left_out) = obj_texture::parse(bytes, folder, &cut);
+    let mesh = match texture {
+        Some(texture) => mesh.with_texture(texture)?,
+        None => mesh,
+    };
+    Ok((mesh, left_out.map(|trouble| trouble.of_file(name))))
 }
 
 /// The polygons of a parsed model; no `arities` means that all are triangles.
@@ -54,8 +71,19 @@ impl fmt::Display for Obj<'_> {
             }
             writeln!(f)?;
         }
-        for [a, b, c] in self.0.faces().iter().map(|face| face.map(|v| u64::from(v) + 1)) {
-            writeln!(f, "f {a} {b} {c}")?;
+        let texture = self.0.texture();
+        for [u, v] in texture.into_iter().flat_map(Texture::coordinates) {
+            writeln!(f, "vt {u} {v}")?;
+        }
+        for (number, face) in self.0.faces().iter().enumerate() {
+            f.write_str("f")?;
+            for (k, &vertex) in face.iter().enumerate() {
+                write!(f, " {}", u64::from(vertex) + 1)?;
+                if let Some(texture) = texture {
+                    write!(f, "/{}", u64::from(texture.corners()[number][k]) + 1)?;
+                }
+            }
+            writeln!(f)?;
         }
         Ok(())
     }

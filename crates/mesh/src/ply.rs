@@ -92,10 +92,10 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
     let mut rest = corners.as_slice();
     for corners in polygons {
         let (polygon, after) = rest.split_at(corners);
-        faces.extend(triangles(&positions, polygon));
+        faces.extend(triangles(&positions, polygon).iter().map(|face| face.map(|k| polygon[k])));
         rest = after;
     }
-    Ok(Parts { positions, faces, colours })
+    Ok(Parts { positions, faces, colours, ..Parts::default() })
 }
 
 /// What stands for full in a channel of a colour.

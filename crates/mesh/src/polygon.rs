@@ -6,14 +6,14 @@ use crate::mesh::{cross, difference};
 /// of thousands of corners is more likely an accident than a concave outline.
 const MOST_CORNERS_CLIPPED: usize = 1024;
 
-/// The `n - 2` triangles of a polygon with the `n >= 3` corners `polygon`, in its winding.
+/// The `n - 2` triangles of a polygon with the `n >= 3` corners `polygon`, in its winding; of each triangle, which of the corners it has.
 ///
 /// The polygon is seen along the axis that shows most of its area. Again and again a convex corner with no other
 /// corner in its triangle is cut off, so a concave outline keeps its area; a convex one becomes the
 /// fan from its first corner. What has no such corner (crossing itself, no area) is cut anyhow.
-pub(crate) fn triangles(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[u32; 3]> {
+pub(crate) fn triangles(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[usize; 3]> {
     if polygon.len() <= 3 || polygon.len() > MOST_CORNERS_CLIPPED {
-        return (2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]]).collect();
+        return (2..polygon.len()).map(|i| [0, i - 1, i]).collect();
     }
     let flat = flattened(positions, polygon);
     let mut left: Vec<usize> = (0..polygon.len()).collect();
@@ -24,7 +24,7 @@ pub(crate) fn triangles(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[u32; 3]
         let around = |i: usize| [left[(i + n - 1) % n], left[i % n], left[(i + 1) % n]];
         let is_ear = |i: &usize| ear(&flat, &left, around(*i));
         let tip = (start..start + n).find(is_ear).unwrap_or(start) % n;
-        cut.push(around(tip).map(|i| polygon[i]));
+        cut.push(around(tip));
         left.remove(tip);
         start = tip;
     }
@@ -69,7 +69,8 @@ mod tests {
     fn cut(outline: &[[f64; 2]]) -> Mesh {
         let positions: Vec<_> = outline.iter().map(|&[y, z]| [2.0 * y, y, z]).collect();
         let polygon: Vec<_> = (0..outline.len() as u32).collect();
-        let faces = triangles(&positions, &polygon);
+        let faces: Vec<_> =
+            triangles(&positions, &polygon).iter().map(|face| face.map(|k| polygon[k])).collect();
         assert_eq!(faces.len(), outline.len() - 2);
         Mesh::new(positions, faces).unwrap()
     }

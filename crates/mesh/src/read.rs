@@ -1,8 +1,8 @@
 //! Reading a mesh, in the format that the name of its file ends in.
 
-use std::{fs, io, path::Path};
+use std::path::Path;
 
-use crate::{Mesh, MeshError, format::Format, glb, obj, ply, stl};
+use crate::{Mesh, MeshError, Texture, beside, error::Trouble, format::Format, glb, obj, ply, stl};
 
 /// What a file has, before it is known to be a mesh.
 #[derive(Default)]
@@ -10,6 +10,9 @@ pub(crate) struct Parts {
     pub(crate) positions: Vec<[f64; 3]>,
     pub(crate) faces: Vec<[u32; 3]>,
     pub(crate) colours: Option<Vec<[f64; 3]>>,
+    pub(crate) texture: Option<Texture>,
+    /// Why the texture or its picture was left out.
+    pub(crate) left_out: Option<Trouble>,
 }
 
 impl Mesh {
@@ -19,13 +22,31 @@ impl Mesh {
     ///
     /// If the path is not a regular file or cannot be read, or for the reasons of [`Mesh::parse`].
     pub fn load(path: impl AsRef<Path>) -> Result<Mesh, MeshError> {
+        let (bytes, name, format) = opened(path.as_ref())?;
+        format.parse(&bytes, &name, None).map(|(mesh, _)| mesh)
+    }
+
+    /// The mesh in the file at `path` with its [`Texture`], if it has one; otherwise as [`Mesh::load`]. And why a texture that the file
+    /// speaks of, or its picture alone, was left out: this never keeps the mesh from being read.
+    ///
+    /// A mesh has one texture on all of its faces, with one picture. So it is left out where only some corners have coordinates, and
+    /// the picture is left out where materials show several, or some show one and others none. Coordinates stay where the picture alone
+    /// is missing. Colours and other properties of materials are ignored, beyond 0 to 1 pictures always repeat.
+    ///
+    /// - OBJ: `vt` at the corners of faces, and `map_Kd` of the materials of `mtllib`. Options of `map_Kd` are not read.
+    /// - GLB: `TEXCOORD_0` or `TEXCOORD_1`, whichever the base colour texture names, turned so that v is up. Its picture lies in the
+    ///   file, in a data URI, or in a file of its own.
+    ///
+    /// Pictures are PNG or JPEG. Other files are looked for in the folder of the mesh and below it, and nowhere else: of a path that leads
+    /// out of it the last part counts.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Mesh::load`].
+    pub fn load_textured(path: impl AsRef<Path>) -> Result<(Mesh, Option<MeshError>), MeshError> {
         let path = path.as_ref();
-        let unreadable = |reason| MeshError::Read { path: path.into(), reason };
-        regular(path).map_err(unreadable)?;
-        let name = path.display().to_string();
-        // The ending comes before the bytes: a film may be large.
-        let format = format_of(path, &name)?;
-        format.parse(&fs::read(path).map_err(unreadable)?, &name)
+        let (bytes, name, format) = opened(path)?;
+        format.parse(&bytes, &name, Some(path.parent().unwrap_or(Path::new(""))))
     }
 
     /// The mesh in `bytes`, the content of a file called `name`.
@@ -34,8 +55,8 @@ impl Mesh {
     /// order of bytes), `.stl` (text or binary) or `.glb` (binary glTF 2.0). Errors begin with the
     /// name.
     ///
-    /// Of every format only positions, faces and colours of vertices are read: normals, texture
-    /// coordinates, colours of faces, materials, lines and points are ignored, no other file is
+    /// Of every format only positions, faces and colours of vertices are read: normals, textures
+    /// (see [`Mesh::load_textured`]), colours of faces, materials, lines and points are ignored, no other file is
     /// opened, and objects and groups are merged. Vertices keep their number and order, and degenerate faces stay. Polygons (OBJ, PLY)
     /// are cut into triangles by clipping ears, which keeps their winding and the area of concave
     /// ones. Numbers in text are read to 64 bits.
@@ -67,38 +88,48 @@ impl Mesh {
     /// than three corners, or an end that comes too early. Compressed GLB files, and those that need other files, are
     /// refused.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
-        format_of(Path::new(name), name)?.parse(bytes, name)
+        format_of(Path::new(name), name)?.parse(bytes, name, None).map(|(mesh, _)| mesh)
     }
 }
 
 impl Format {
-    fn parse(self, bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
+    /// With the `folder` of the file the mesh has its texture too, and why that was left out comes along.
+    fn parse(
+        self,
+        bytes: &[u8],
+        name: &str,
+        folder: Option<&Path>,
+    ) -> Result<(Mesh, Option<MeshError>), MeshError> {
         let parsed = match self {
-            Self::Obj => return obj::parse(bytes, name),
+            Self::Obj => return obj::parse(bytes, name, folder),
             Self::Ply => ply::parse(bytes),
             Self::Stl => stl::parse(bytes),
-            Self::Glb => glb::parse(bytes),
+            Self::Glb => glb::parse(bytes, folder),
         };
-        let Parts { positions, faces, colours } =
+        let Parts { positions, faces, colours, texture, left_out } =
             parsed.map_err(|trouble| trouble.of_file(name))?;
-        let mesh = Mesh::new(positions, faces)?;
-        match colours {
-            Some(colours) => mesh.with_colours(colours),
-            None => Ok(mesh),
+        let mut mesh = Mesh::new(positions, faces)?;
+        if let Some(colours) = colours {
+            mesh = mesh.with_colours(colours)?;
         }
+        if let Some(texture) = texture {
+            mesh = mesh.with_texture(texture)?;
+        }
+        Ok((mesh, left_out.map(|trouble| trouble.of_file(name))))
     }
+}
+
+/// The content of the file at `path`, its name and its format.
+fn opened(path: &Path) -> Result<(Vec<u8>, String, Format), MeshError> {
+    let name = path.display().to_string();
+    beside::regular(path)?;
+    // The ending comes before the bytes: a film may be large.
+    let format = format_of(path, &name)?;
+    Ok((beside::read(path)?, name, format))
 }
 
 fn format_of(path: &Path, name: &str) -> Result<Format, MeshError> {
     Format::of(path).ok_or_else(|| MeshError::UnknownFormat { name: name.to_owned() })
-}
-
-/// An error unless `path` is a regular file: reading a device could take for ever.
-fn regular(path: &Path) -> io::Result<()> {
-    if fs::metadata(path)?.is_file() {
-        return Ok(());
-    }
-    Err(io::Error::other("it is a folder or a device, not a file"))
 }
 
 #[cfg(test)]

@@ -34,7 +34,11 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
         binary(bytes, &mut surface)?;
     }
     let Surface { positions, faces, .. } = surface;
-    if faces.is_empty() { Err(NO_FACES) } else { Ok(Parts { positions, faces, colours: None }) }
+    if faces.is_empty() {
+        Err(NO_FACES)
+    } else {
+        Ok(Parts { positions, faces, ..Parts::default() })
+    }
 }
 
 /// The number of triangles that a binary file names.

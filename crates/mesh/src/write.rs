@@ -6,17 +6,18 @@ use std::{
     path::Path,
 };
 
-use crate::{Mesh, MeshError, format::Format, glb, obj::Obj, ply};
+use crate::{Mesh, MeshError, format::Format, glb_writer, obj::Obj, ply};
 
 impl Mesh {
-    /// The text of an OBJ file, with as many digits as the numbers need; colours as `v x y z r g b`.
+    /// The text of an OBJ file, with as many digits as the numbers need; colours as `v x y z r g b`. Of a texture the coordinates are written,
+    /// but not the picture: GLB holds both.
     pub fn to_obj(&self) -> String {
         Obj(self).to_string()
     }
 
     /// The bytes of a PLY file: binary, little endian, coordinates in 64 bits, so nothing of them is lost.
     ///
-    /// Colours are rounded to 8 bits, `uchar red`, `green` and `blue`: all programs read these.
+    /// Colours are rounded to 8 bits, `uchar red`, `green` and `blue`: all programs read these. A texture is left out.
     pub fn to_ply(&self) -> Vec<u8> {
         ply::bytes(self)
     }
@@ -24,19 +25,21 @@ impl Mesh {
     /// The bytes of a GLB file (binary glTF 2.0) with one mesh and a two-sided material, grey unless the mesh has colours.
     ///
     /// Coordinates are rounded to 32 bits: the format has no others. Colours are written as the linear ones that the
-    /// format asks for, in 32 bits.
+    /// format asks for, in 32 bits. A texture is written with its picture, as it is; then colours are left out, since programs would
+    /// show the product of both. The format has one texture coordinate for each vertex, so vertices on seams are doubled, and those that no
+    /// face uses are left out.
     ///
     /// # Panics
     ///
     /// If the file would have 4 GiB or more, which the format cannot say.
     pub fn to_glb(&self) -> Vec<u8> {
-        glb::bytes(self)
+        glb_writer::bytes(self)
     }
 
     /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its ending, in any case.
     ///
     /// [`Mesh::load`] reads OBJ back without change, PLY with colours rounded to 8 bits, GLB with
-    /// all numbers rounded to 32 bits. The file appears whole or not at all: it is written under another name in the same
+    /// all numbers rounded to 32 bits; [`Mesh::load_textured`] with the texture, as far as it was written. The file appears whole or not at all: it is written under another name in the same
     /// folder, then renamed.
     ///
     /// # Errors

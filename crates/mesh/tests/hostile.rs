@@ -3,7 +3,7 @@
 use std::fs;
 
 use proptest::{collection::vec, prelude::*, sample};
-use softrast_mesh::{Mesh, icosphere};
+use softrast_mesh::{Mesh, Texture, icosphere};
 
 /// Reads `bytes` and checks what every mesh promises.
 fn read(bytes: &[u8], name: &str) {
@@ -24,6 +24,22 @@ fn read(bytes: &[u8], name: &str) {
             assert!(message.starts_with(&format!("{name}:")) && one_line, "{message:?}");
         }
     }
+}
+
+/// The same with textures, for a file of its own.
+fn read_textured(bytes: &[u8], name: &str) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).expect("a file");
+    let Ok((mesh, left_out)) = Mesh::load_textured(&path) else { return };
+    let message = left_out.map(|error| error.to_string()).unwrap_or_default();
+    assert!(!message.contains(char::is_control), "{message:?}");
+    if let Some(texture) = mesh.texture() {
+        Texture::new(texture.coordinates().to_vec(), texture.corners().to_vec()).expect("valid");
+        assert_eq!(texture.corners().len(), mesh.faces().len());
+    }
+    let plain = Mesh::load(&path).expect("the same mesh");
+    assert_eq!((plain.positions(), plain.faces()), (mesh.positions(), mesh.faces()));
 }
 
 fn nasty_files() -> Vec<Vec<u8>> {
@@ -67,12 +83,23 @@ fn pieces() -> impl Strategy<Value = Vec<u8>> {
         "\nv 0 0 1\n",
         "\nv 0 0 1 1 0 .5\n",
         "\nf 1 2 3\n",
+        "\nvt 0 1\n",
+        "\nf 1/1 2/1 3/-1\n",
+        "\nmtllib /dev/zero\n",
         "\nf -1 -2 -3\n",
         "\u{feff}",
         "\u{85}",
         "\u{2028}",
     ]);
     vec(piece, 0..60).prop_map(|pieces| pieces.concat().into_bytes())
+}
+
+/// Every vertex at its x and y on a picture.
+fn textured(mesh: Mesh) -> Mesh {
+    let coordinates = mesh.positions().iter().map(|&[x, y, _]| [x, y]).collect();
+    let texture = Texture::new(coordinates, mesh.faces().to_vec()).expect("valid");
+    let texture = texture.with_picture(b"\x89PNG\r\n\x1a\n".to_vec()).expect("a picture");
+    mesh.with_texture(texture).expect("as many faces")
 }
 
 fn text_of_ply(mesh: &Mesh) -> Vec<u8> {
@@ -121,6 +148,7 @@ proptest! {
     #[test]
     fn random_pieces_never_break_the_reader(bytes in pieces()) {
         read(&bytes, "a.obj");
+        read_textured(&bytes, "a.obj");
     }
 
     #[test]
@@ -150,6 +178,7 @@ proptest! {
         let sphere = icosphere(0);
         let colours = sphere.positions().iter().map(|p| p.map(f64::abs)).collect();
         let sphere = if changes.len() % 2 == 0 { sphere.with_colours(colours).unwrap() } else { sphere };
+        let sphere = if changes.len() % 3 == 0 { textured(sphere) } else { sphere };
         let (name, mut bytes) = match format {
             0 => ("a.ply", sphere.to_ply()),
             1 => ("a.ply", text_of_ply(&sphere)),
@@ -171,6 +200,7 @@ proptest! {
             }
         }
         read(&bytes, name);
+        read_textured(&bytes, name);
     }
 
     #[test]

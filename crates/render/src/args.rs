@@ -5,7 +5,7 @@ use softrast_lab::parse::{count, positive, share, whole};
 use softrast_raster::{Rasterizer, TConorm};
 use softrast_softness::{Family, NameOrFile};
 
-/// Draws soft silhouettes of a mesh and measures what they cost.
+/// Draws soft silhouettes or colours of a mesh and measures what they cost.
 #[derive(Debug, Parser)]
 #[command(name = "render", version, allow_negative_numbers = true)]
 pub(crate) struct Args {
@@ -33,11 +33,28 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = angle)]
     pub(crate) fov: f64,
 
-    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file, taken as at the last step if its scale moves
-    #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
-    pub(crate) softness: NameOrFile<Family>,
+    /// Draw the mesh as it looks, on white: its texture if it has one, else the colours of its vertices, else grey
+    #[arg(long, conflicts_with_all = ["reference", "target", "t_conorm"])]
+    pub(crate) colour: bool,
 
-    /// Scale of a named softness in NDC, NDC² with --squared; by default edges are about half a pixel wide
+    /// Picture to draw in place of the mesh's own, by its texture coordinates
+    #[arg(long, value_name = "FILE.png", requires = "colour")]
+    pub(crate) texture: Option<PathBuf>,
+
+    /// Light the mesh from the camera
+    #[arg(long, requires = "colour")]
+    pub(crate) shade: bool,
+
+    /// Samples along each side of a pixel in colour [default: 4, fewer above 512 pixels, 1 with --softness or --scale]
+    #[arg(long, value_name = "N", value_parser = whole::<1, 4>, requires = "colour")]
+    pub(crate) samples: Option<usize>,
+
+    /// Softness: a name such as logistic, gauss, exp, gamma or mlp, or a softness file, taken as at the last step if its scale moves
+    /// [default: logistic, uniform with --colour]
+    #[arg(long, value_name = "NAME|FILE.json")]
+    pub(crate) softness: Option<NameOrFile<Family>>,
+
+    /// Scale of a named softness in NDC, NDC² with --squared; by default edges are about half a pixel wide, half a sample with --colour
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) scale: Option<f64>,
 

@@ -63,7 +63,7 @@ impl<B: RasterBackend> Fused<B> {
         let Some(target) = &self.target else {
             let image = self.coverage(self.vertices.clone(), orbits, table);
             let forward_ms = milliseconds::<B>(start);
-            return Step { image: values(image), loss: None, forward_ms, backward_ms: None };
+            return Step::of_silhouettes(values(image), None, forward_ms, None);
         };
         let vertices = Tensor::<Autodiff<B>, 3>::from_inner(self.vertices.clone()).require_grad();
         let [orbits, table] = [orbits, table].map(Tensor::from_inner);
@@ -76,7 +76,7 @@ impl<B: RasterBackend> Fused<B> {
         let backward_ms = Some(milliseconds::<B>(start));
         let norm = grad.to_data().iter::<f64>().map(|g| g * g).sum::<f64>().sqrt();
         let loss = Some([loss.into_scalar().elem(), norm]);
-        Step { image: values(image.inner()), loss, forward_ms, backward_ms }
+        Step::of_silhouettes(values(image.inner()), loss, forward_ms, backward_ms)
     }
 
     /// From world vertices to coverage.
@@ -91,7 +91,7 @@ impl<B: RasterBackend> Fused<B> {
 }
 
 /// Time since `start`, once the device has done what it was asked.
-fn milliseconds<B: RasterBackend>(start: Instant) -> f64 {
+pub(crate) fn milliseconds<B: RasterBackend>(start: Instant) -> f64 {
     B::sync(&Default::default()).expect("the device finishes its work");
     start.elapsed().as_secs_f64() * 1e3
 }

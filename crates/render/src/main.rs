@@ -1,4 +1,4 @@
-//! Draws soft silhouettes of a mesh and measures what they cost.
+//! Draws soft silhouettes or colours of a mesh and measures what they cost.
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;

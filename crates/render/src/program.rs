@@ -8,13 +8,15 @@ use softrast_lab::{
     format::counted,
     median, peak_rss_mib, png,
     program::{Output, parse, repeated},
-    rgb_from_gray,
+    rgb_from_gray, rgb_from_planes,
 };
 use softrast_raster::{BackendChoice, RasterBackend, Rasterizer, compiled_backends, on_backend};
 
 use crate::{
     args::Args,
+    coloured::Coloured,
     fused::Fused,
+    paint::Colour,
     reference,
     scene::{Scene, Step},
 };
@@ -43,7 +45,7 @@ pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failu
 /// All passes, and what is known of the fused op.
 struct Measured {
     steps: Vec<Step>,
-    pairs: usize,
+    pairs: Option<usize>,
     culled: Option<f64>,
     prepare_ms: Option<f64>,
     profile: Option<(usize, [f64; 2])>,
@@ -52,6 +54,9 @@ struct Measured {
 fn draw(args: &Args) -> anyhow::Result<Output> {
     let backend = BackendChoice::among(compiled_backends!(), args.backend.as_deref());
     let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
+    if args.colour && backend == BackendChoice::Wgpu {
+        return Err(Error::usage("--colour draws on the CPU: choose --backend ndarray or flex"));
+    }
     if !args.reference {
         backend.set_up()?;
     }
@@ -65,12 +70,14 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
 
     let repeat = args.repeat.unwrap_or(if args.reference { 1 } else { REPEAT });
     let base_rss_mib = peak_rss_mib();
-    let measured = match args.reference {
-        true => by_reference(&scene, repeat, args.quiet),
-        false => on_backend!(backend, B => by_fused_op::<B>(&scene, repeat)),
+    let measured = match &scene.colour {
+        _ if args.reference => by_reference(&scene, repeat, args.quiet),
+        None => on_backend!(backend, B => by_fused_op::<B>(&scene, repeat)),
+        Some(colour) => on_backend!(backend, B => in_colour::<B>(&scene, colour, repeat)),
     };
     let last = &measured.steps[repeat - 1];
-    folder.stage(name, &png(&picture(&last.image, scene.size))?)?;
+    folder
+        .stage(name, &png(&picture(&last.image, scene.size, if args.colour { 3 } else { 1 }))?)?;
     folder.commit(&[])?;
 
     let title = if args.reference { reference::BACKEND } else { backend.title() };
@@ -85,14 +92,17 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
         "softness": scene.softness.family.to_string(),
         "squared": scene.softness.squared,
         "phi": scene.phi,
-        "t_conorm": scene.t_conorm.to_string(),
+        "t_conorm": scene.colour.is_none().then(|| scene.t_conorm.to_string()),
+        "colour": scene.colour.as_ref().map(|colour| colour.paint.to_string()),
+        "shade": scene.colour.as_ref().map(|colour| colour.shade),
+        "samples": scene.colour.as_ref().map(|colour| colour.samples),
         "tolerance": scene.tolerance,
         "backend": title,
         "threads": rayon::current_num_threads(),
         "repeat": repeat,
         "pairs": measured.pairs,
         "culled_by_tolerance": measured.culled,
-        "mean_alpha": last.image.iter().sum::<f64>() / last.image.len() as f64,
+        "mean_alpha": last.mean_alpha,
         "loss": last.loss.map(|[loss, _]| loss),
         "gradient_norm": last.loss.map(|[_, norm]| norm),
         "forward_ms": times(&|step| step.forward_ms),
@@ -105,7 +115,7 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
         "support_ndc": measured.profile.map(|(_, support)| support),
         "out": args.out,
     });
-    let warnings = measured.culled.filter(|&culled| culled > 0.5).map(|culled| {
+    let culled = measured.culled.filter(|&culled| culled > 0.5).map(|culled| {
         format!(
             "--tolerance {} culls {:.0} % of the pairs that the default {:e} keeps: faces get no gradient from pixels that they still \
              cover a little; try a smaller one",
@@ -115,13 +125,21 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
         )
     });
     let text = lines(&json);
-    Ok(Output { json, text, warnings: warnings.into_iter().collect(), partial: None })
+    let warnings = culled.into_iter().chain(scene.warning).collect();
+    Ok(Output { json, text, warnings, partial: None })
 }
 
 fn by_reference(scene: &Scene, repeat: usize, quiet: bool) -> Measured {
     let steps = (0..repeat).map(|_| reference::step(scene, quiet)).collect();
     let pairs = scene.views() * scene.size * scene.size * scene.faces.len();
-    Measured { steps, pairs, culled: None, prepare_ms: None, profile: None }
+    Measured { steps, pairs: Some(pairs), culled: None, prepare_ms: None, profile: None }
+}
+
+/// After one pass to warm up.
+fn in_colour<B: RasterBackend>(scene: &Scene, colour: &Colour, repeat: usize) -> Measured {
+    let coloured = Coloured::<B>::new(scene, colour);
+    let steps = (0..=repeat).map(|_| coloured.step()).skip(1).collect();
+    Measured { steps, pairs: None, culled: None, prepare_ms: None, profile: None }
 }
 
 /// After one pass to warm up.
@@ -130,7 +148,8 @@ fn by_fused_op<B: RasterBackend>(scene: &Scene, repeat: usize) -> Measured {
     let steps = (0..=repeat).map(|_| fused.step()).skip(1).collect();
     let (pairs, culled) = fused.pairs(scene);
     let prepare_ms = Some(fused.prepare_ms);
-    Measured { steps, pairs, culled: Some(culled), prepare_ms, profile: Some(fused.profile()) }
+    let profile = Some(fused.profile());
+    Measured { steps, pairs: Some(pairs), culled: Some(culled), prepare_ms, profile }
 }
 
 /// The results for people.
@@ -140,12 +159,19 @@ fn lines(json: &Value) -> Vec<String> {
     let text = |key: &str| json[key].as_str().unwrap_or_default();
     let (size, views) = (count("size"), count("views"));
     let squared = if json["squared"] == true { " of the squared distance" } else { "" };
-    let share = 100.0 * count("pairs") as f64 / (views * size * size * count("faces")) as f64;
-    let mut lines = vec![
-        ("mesh", format!("{}, {} faces", text("mesh"), count("faces"))),
-        ("image", format!("{} of {size} x {size} pixels", counted(views, "view"))),
-        ("softness", format!("{}{squared}, joined by {}", text("softness"), text("t_conorm"))),
-    ];
+    let softness = format!("{}{squared}", text("softness"));
+    let image = format!("{} of {size} x {size} pixels", counted(views, "view"));
+    let mut lines = vec![("mesh", format!("{}, {} faces", text("mesh"), count("faces")))];
+    if json["colour"].is_null() {
+        lines.push(("image", image));
+        lines.push(("softness", format!("{softness}, joined by {}", text("t_conorm"))));
+    } else {
+        let samples = count("samples");
+        let light = if json["shade"] == true { ", lit from the camera" } else { "" };
+        lines.push(("image", format!("{image}, {samples} x {samples} samples each")));
+        lines.push(("colour", format!("{}{light}", text("colour"))));
+        lines.push(("softness", softness));
+    }
     let support = [0, 1].map(|k| json["support_ndc"][k].as_f64());
     if let [Some(outside), Some(inside)] = support.map(|ndc| Some(ndc? * size as f64 / 2.0)) {
         let knots = count("profile_knots");
@@ -153,7 +179,10 @@ fn lines(json: &Value) -> Vec<String> {
             format!("{knots} knots, {outside:.2} px outside to {inside:.2} px inside an edge");
         lines.push(("profile", value));
     }
-    lines.push(("pairs", format!("{} visited, {share:.3} % of all", count("pairs"))));
+    if let Some(pairs) = number("pairs") {
+        let share = 100.0 * pairs / (views * size * size * count("faces")) as f64;
+        lines.push(("pairs", format!("{pairs} visited, {share:.3} % of all")));
+    }
     lines.extend(number("mean_alpha").map(|mean| ("mean alpha", format!("{mean:.7}"))));
     if let (Some(loss), Some(norm)) = (number("loss"), number("gradient_norm")) {
         lines.push(("loss", format!("{loss:.7}, gradient norm {norm:.7}")));
@@ -176,10 +205,13 @@ fn lines(json: &Value) -> Vec<String> {
     lines.into_iter().map(|(name, value)| format!("{name:<12}{value}")).collect()
 }
 
-/// The views `[views, size, size]` as one picture: itself if there is one, else a contact sheet.
-fn picture(image: &[f64], size: usize) -> image::RgbImage {
-    let views: Vec<_> =
-        image.chunks_exact(size * size).map(|view| rgb_from_gray(view, size, size)).collect();
+/// The views `[views, channels, size, size]`, of one channel or three, as one picture: itself if there is one, else a contact sheet.
+fn picture(image: &[f64], size: usize, channels: usize) -> image::RgbImage {
+    let drawn = |view: &[f64]| match channels {
+        1 => rgb_from_gray(view, size, size),
+        _ => rgb_from_planes(view, size, size),
+    };
+    let views: Vec<_> = image.chunks_exact(channels * size * size).map(drawn).collect();
     match &views[..] {
         [view] => view.clone(),
         views => contact_sheet(views, columns(views.len())),

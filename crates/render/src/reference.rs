@@ -49,7 +49,8 @@ pub(crate) fn step(scene: &Scene, quiet: bool) -> Step {
         [loss.into_scalar(), norm]
     });
     let backward_ms = loss.map(|_| milliseconds(start));
-    Step { image: image.inner().to_data().iter().collect(), loss, forward_ms, backward_ms }
+    let image = image.inner().to_data().iter().collect();
+    Step::of_silhouettes(image, loss, forward_ms, backward_ms)
 }
 
 /// The sum of `of` over all parts of the scene's faces, in the order of the faces.

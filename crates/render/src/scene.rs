@@ -6,9 +6,14 @@ use image::{ImageReader, imageops};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, NameOrFile, ScheduledSoftness, Softness, tensor, vector};
+use softrast_softness::{
+    EdgeSoftness, Family, NameOrFile, ScheduledSoftness, Softness, tensor, vector,
+};
 
-use crate::args::{Args, Target};
+use crate::{
+    args::{Args, Target},
+    paint::{Colour, samples},
+};
 
 /// Everything that a measurement needs, in plain numbers.
 pub(crate) struct Scene {
@@ -24,18 +29,36 @@ pub(crate) struct Scene {
     pub(crate) tolerance: f64,
     /// `[size, size]`, top row first.
     pub(crate) target: Option<Vec<f64>>,
+    /// How it is drawn in colour; none for silhouettes.
+    pub(crate) colour: Option<Colour>,
+    /// What the user should know.
+    pub(crate) warning: Option<String>,
 }
 
 /// What one pass gave and took. Times are in milliseconds.
 pub(crate) struct Step {
-    /// `[views, size, size]`, top row first.
+    /// `[views, size, size]`, or `[views, 3, size, size]` in colour; top row first.
     pub(crate) image: Vec<f64>,
+    /// Mean over views and pixels of what the faces cover.
+    pub(crate) mean_alpha: f64,
     /// Mean squared difference to the target, and the norm of its gradient to the vertices.
     pub(crate) loss: Option<[f64; 2]>,
-    /// From world vertices to coverage.
+    /// From world vertices to coverage, or to colours.
     pub(crate) forward_ms: f64,
     /// From coverage to the loss and its gradient to the world vertices.
     pub(crate) backward_ms: Option<f64>,
+}
+
+impl Step {
+    pub(crate) fn of_silhouettes(
+        image: Vec<f64>,
+        loss: Option<[f64; 2]>,
+        forward_ms: f64,
+        backward_ms: Option<f64>,
+    ) -> Self {
+        let mean_alpha = image.iter().sum::<f64>() / image.len() as f64;
+        Self { image, mean_alpha, loss, forward_ms, backward_ms }
+    }
 }
 
 /// Scale of the logistic that rises from 10 % to 90 % within half a pixel, in pixels.
@@ -45,8 +68,13 @@ impl Scene {
     /// Reads the files that `args` names.
     pub(crate) fn load(args: &Args) -> anyhow::Result<Self> {
         let (softness, phi) = softness(args)?;
-        let mesh = Mesh::load(&args.mesh)?;
+        let (mesh, left_out) = match args.colour {
+            true => Mesh::load_textured(&args.mesh)?,
+            false => (Mesh::load(&args.mesh)?, None),
+        };
         let mesh = if args.raw { mesh } else { mesh.normalized() };
+        let coloured = args.colour.then(|| Colour::of(&mesh, args, left_out)).transpose()?;
+        let (colour, warning) = coloured.map_or((None, None), |(c, warning)| (Some(c), warning));
         let target = args.target.as_ref().map(|target| pixels(target, args.size)).transpose()?;
         let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov];
         Ok(Self {
@@ -59,6 +87,8 @@ impl Scene {
             t_conorm: args.t_conorm,
             tolerance: args.tolerance,
             target,
+            colour,
+            warning,
         })
     }
 
@@ -89,18 +119,21 @@ impl Scene {
 }
 
 fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
-    match &args.softness {
+    let across = args.size * if args.colour { samples(args) } else { 1 };
+    // In colour a softness that ends keeps what is in front as slim as it is: docs/notes.md, Colour.
+    let usual = NameOrFile::Name(if args.colour { Family::Uniform } else { Family::Logistic });
+    match args.softness.as_ref().unwrap_or(&usual) {
         NameOrFile::File(_) if args.scale.is_some() || args.squared => {
             Err(Error::usage("--scale and --squared are for a named softness: a file has its own"))
         }
         NameOrFile::File(path) => {
             let file = ScheduledSoftness::load(path).context("--softness")?;
             // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
-            Ok((file.softness, file.phi_at(1.0, args.size)))
+            Ok((file.softness, file.phi_at(1.0, across)))
         }
         &NameOrFile::Name(family) => {
             let softness = EdgeSoftness { family, squared: args.squared };
-            let narrow = HALF_PIXEL * 2.0 / args.size as f64;
+            let narrow = HALF_PIXEL * 2.0 / across as f64;
             let scale = args.scale.unwrap_or(if args.squared { narrow * narrow } else { narrow });
             Ok((softness, softness.default_phi(scale)))
         }

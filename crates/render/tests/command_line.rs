@@ -4,9 +4,10 @@
 
 use std::{fs, path::Path, process::Command};
 
-use serde_json::Value;
+use image::{Rgb, RgbImage};
+use serde_json::{Value, json};
 use softrast_lab::Failure;
-use softrast_mesh::icosphere;
+use softrast_mesh::{Mesh, icosphere};
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
 fn mesh(folder: &Path) -> String {
@@ -136,4 +137,200 @@ fn bad_input_is_one_line_and_leaves_no_picture() {
         assert_eq!(failure.code, code, "{line}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the mesh alone is left");
+}
+
+/// A square from -1 to 1 in x and y at z = 0, which looks along z. A picture on it has its v up and its u along x.
+const SQUARE: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+    f 1/1 2/2 3/3 4/4\n";
+const RED: [u8; 3] = [255, 0, 0];
+const GREEN: [u8; 3] = [0, 255, 0];
+const BLUE: [u8; 3] = [0, 0, 255];
+const WHITE: [u8; 3] = [255; 3];
+/// Looks at the square from the front: it takes up the middle half of the image in each direction.
+const FRONT: [&str; 10] = [
+    "--colour",
+    "--raw",
+    "--azimuths",
+    "180",
+    "--elevation",
+    "0",
+    "--fov",
+    "90",
+    "--distance",
+    "2",
+];
+
+/// The square with a picture that is red and green above, blue and black below; as OBJ and, the same, as GLB.
+fn pictured(folder: &Path) -> [String; 2] {
+    let picture = RgbImage::from_fn(32, 16, |x, y| {
+        Rgb(match (x < 16, y < 8) {
+            (true, true) => RED,
+            (false, true) => GREEN,
+            (true, false) => BLUE,
+            (false, false) => [0; 3],
+        })
+    });
+    picture.save(folder.join("square.png")).unwrap();
+    fs::write(folder.join("square.mtl"), "newmtl a\nmap_Kd square.png\n").unwrap();
+    fs::write(folder.join("square.obj"), format!("mtllib square.mtl\nusemtl a\n{SQUARE}")).unwrap();
+    let [obj, glb] = ["square.obj", "square.glb"].map(|name| folder.join(name));
+    let (mesh, left_out) = Mesh::load_textured(&obj).unwrap();
+    assert!(left_out.is_none());
+    mesh.save(&glb).unwrap();
+    [obj, glb].map(|path| path.to_str().expect("a path in ASCII").to_owned())
+}
+
+/// The picture and the results of a square from the front, on 64 pixels a side.
+fn front(mesh: &str, words: &[&str]) -> (RgbImage, Value) {
+    let out = format!("{mesh}.out.png");
+    let common = [mesh, "--size", "64", "--json", "--out", &out];
+    let report = json(&[&common[..], &FRONT, words].concat());
+    (image::open(out).unwrap().into_rgb8(), report)
+}
+
+#[test]
+fn a_texture_is_seen_where_its_coordinates_place_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let [obj, glb] = pictured(folder.path());
+    let (picture, report) = front(&obj, &[]);
+    for (x, y, colour) in
+        [(20, 20, RED), (44, 20, GREEN), (20, 44, BLUE), (44, 44, [0; 3]), (8, 32, WHITE)]
+    {
+        assert_eq!(picture.get_pixel(x, y).0, colour, "at {x}, {y}");
+    }
+    assert_eq!(report["colour"], "texture of 32 x 16 texels");
+    assert_eq!([&report["samples"], &report["shade"]], [&json!(4), &json!(false)]);
+    // A fourth of the image, but for a thousandth of it that is left to the background.
+    let covered = report["mean_alpha"].as_f64().unwrap();
+    assert!((0.2497..0.2503).contains(&covered), "{covered}");
+    assert!(report["forward_ms"].as_f64().unwrap() > 0.0);
+    assert_eq!(report["t_conorm"], Value::Null);
+    assert_eq!(front(&glb, &[]).0, picture);
+    for one in [["--samples", "1"], ["--scale", "0.05"], ["--softness", "logistic"]] {
+        assert_eq!(front(&obj, &one).1["samples"], 1);
+    }
+}
+
+#[test]
+fn a_picture_may_be_replaced_and_may_be_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let [obj, _] = pictured(folder.path());
+    let other = folder.path().join("other.png");
+    RgbImage::from_pixel(2, 3, Rgb([10, 20, 30])).save(&other).unwrap();
+    let texture = ["--texture", other.to_str().unwrap()];
+    let own = folder.path().join("square.png");
+    let truncated = fs::read(&own).unwrap()[..40].to_vec();
+    for broken in [None, Some(truncated)] {
+        match broken {
+            None => fs::remove_file(&own).unwrap(),
+            Some(bytes) => fs::write(&own, bytes).unwrap(),
+        }
+        let (picture, report) = front(&obj, &[]);
+        assert_eq!(picture.get_pixel(20, 20).0, [179; 3], "grey");
+        assert_eq!(report["colour"], "grey: the mesh has no texture and no colours");
+        assert_eq!(front(&obj, &texture).0.get_pixel(20, 20).0, [10, 20, 30]);
+    }
+    let out = folder.path().join("a.png");
+    let words = [&[obj.as_str(), "--out", out.to_str().unwrap()], &FRONT[..]].concat();
+    let warned = Command::new(env!("CARGO_BIN_EXE_render")).args(words).output().unwrap();
+    let warned = String::from_utf8(warned.stderr).unwrap();
+    assert!(warned.starts_with("warning: drawn without its texture: "), "{warned}");
+    assert!(warned.contains("square.obj: its picture: ") && warned.trim().lines().count() == 1);
+}
+
+#[test]
+fn colours_of_vertices_are_lit_from_the_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    let square = Mesh::parse(SQUARE.as_bytes(), "a.obj").unwrap();
+    let painted = square.clone().with_colours(vec![[1.0, 0.4, 0.0]; 4]).unwrap();
+    painted.save(&path).unwrap();
+    let path = path.to_str().unwrap();
+    let (plain, report) = front(path, &[]);
+    assert_eq!(plain.get_pixel(20, 40).0, [255, 102, 0]);
+    assert_eq!(report["colour"], "colours of vertices");
+    // All four corners are seen at the same angle, from 2 away and √2 from the middle.
+    let light = 0.3 + 0.7 * 2.0 / 6f64.sqrt();
+    let lit = [255.0, 102.0, 0.0].map(|level: f64| (level * light).round() as u8);
+    let (shaded, _) = front(path, &["--shade"]);
+    assert_eq!(shaded.get_pixel(20, 40).0, lit);
+    assert_eq!(shaded.get_pixel(2, 2).0, WHITE);
+    // Its back is as bright, whichever way the faces turn.
+    let (back, _) = front(path, &["--shade", "--azimuths", "0"]);
+    assert_eq!(back.get_pixel(20, 40).0, lit);
+}
+
+#[test]
+fn what_cannot_be_drawn_in_colour_is_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let [obj, _] = pictured(folder.path());
+    let plain = mesh(folder.path());
+    let picture = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let whole = fs::read(folder.path().join("square.png")).unwrap();
+    let cut = picture("cut.png", &whole[..40]);
+    // A head that claims 60,000 x 60,000 pixels.
+    let mut head = whole.clone();
+    head[16..24].copy_from_slice(&[0, 0, 234, 96, 0, 0, 234, 96]);
+    let crc = 0xffff_ffff
+        ^ head[12..29].iter().fold(0xffff_ffffu32, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+                (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
+            })
+        });
+    head[29..33].copy_from_slice(&crc.to_be_bytes());
+    let huge = picture("huge.png", &head);
+    let text = picture("text.png", b"no picture");
+    let cases: [(&[&str], u8, &str); 11] = [
+        (&[&obj, "--colour", "--size", "2048", "--samples", "3"], 2, "is above 4096: take fewer"),
+        (&[&plain, "--colour", "--texture", &cut], 1, "has no texture coordinates"),
+        (
+            &[&obj, "--colour", "--texture", "none.png"],
+            1,
+            "--texture: cannot read none.png: No such",
+        ),
+        (&[&obj, "--colour", "--texture", &cut], 1, "cut.png: "),
+        (&[&obj, "--colour", "--texture", &text], 1, "text.png: "),
+        (&[&obj, "--colour", "--texture", &huge], 1, "60000 x 60000 texels: a texture has 1 to"),
+        (&[&obj, "--texture", &cut], 2, "--colour"),
+        (&[&obj, "--shade"], 2, "--colour"),
+        (&[&obj, "--colour", "--target", "disk:0,0,1"], 2, "cannot be used with"),
+        (&[&obj, "--colour", "--reference"], 2, "cannot be used with"),
+        (&[&obj, "--colour", "--t-conorm", "einstein"], 2, "cannot be used with"),
+    ];
+    let out = folder.path().join("out.png");
+    for (words, code, message) in cases {
+        let failure = run(&[words, &["--out", out.to_str().unwrap()]].concat()).unwrap_err();
+        let line = failure.to_string();
+        assert!(line.contains(message) && !line.contains('\n'), "{words:?}: {line}");
+        assert_eq!(failure.code, code, "{line}");
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn meshes_without_size_or_behind_the_camera_leave_the_picture_white() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.png");
+    for (name, obj) in [
+        ("point.obj", "v 1 1 1\nf 1 1 1\n"),
+        // A vertex that no face uses does not blur the depths of those that are used.
+        ("stray.obj", "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 1e30\nf 1 2 3\n"),
+        ("behind.obj", "v 0 0 -9\nv 1 0 -9\nv 0 1 -9\nf 1 2 3\n"),
+        ("far.obj", "v 0 0 3e38\nv 3e38 0 3e38\nv 0 3e38 3e38\nf 1 2 3\n"),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, obj).unwrap();
+        let words = ["--colour", "--shade", "--raw", "--azimuths", "0", "--elevation", "0"];
+        let paths =
+            [path.to_str().unwrap(), "--json", "--size", "32", "--out", out.to_str().unwrap()];
+        let report = json(&[&paths[..], &words].concat());
+        let covered = report["mean_alpha"].as_f64().unwrap();
+        assert!((0.0..=1.0).contains(&covered), "{name}: {covered}");
+        let picture = image::open(&out).unwrap().into_rgb8();
+        assert_eq!(picture.get_pixel(31, 31).0, WHITE, "{name}");
+    }
 }

@@ -1,0 +1,150 @@
+//! Writes a GLB file.
+
+use serde_json::{Value, json};
+
+use crate::{
+    Mesh,
+    glb::{BIN, JSON, MAGIC},
+    texture::media_type,
+};
+
+const FLOATS: u32 = 5126;
+const WHOLE: u32 = 5125;
+const OF_VERTICES: u32 = 34962;
+const OF_INDICES: u32 = 34963;
+
+/// The binary chunk, and what the JSON says of it.
+#[derive(Default)]
+struct Buffer {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl Buffer {
+    /// Adds bytes and returns the number of their view; numbers begin at whole multiples of four bytes.
+    fn view(&mut self, bytes: impl IntoIterator<Item = u8>) -> usize {
+        let start = self.bytes.len();
+        self.bytes.extend(bytes);
+        let view =
+            json!({"buffer": 0, "byteOffset": start, "byteLength": self.bytes.len() - start});
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// Adds entries of `N` numbers of four bytes each, and returns the number of their accessor.
+    fn accessor<const N: usize>(
+        &mut self,
+        entries: impl IntoIterator<Item = [[u8; 4]; N]>,
+        [component, target]: [u32; 2],
+    ) -> usize {
+        let view = self.view(entries.into_iter().flatten().flatten());
+        let bytes = self.views[view]["byteLength"].as_u64().unwrap_or(0);
+        self.views[view]["target"] = json!(target);
+        self.accessors.push(json!({
+            "bufferView": view,
+            "componentType": component,
+            "count": bytes / (4 * N as u64),
+            "type": if N == 1 { "SCALAR".to_owned() } else { format!("VEC{N}") },
+        }));
+        self.accessors.len() - 1
+    }
+
+    fn floats<const N: usize>(&mut self, entries: impl IntoIterator<Item = [f64; N]>) -> usize {
+        let entries = entries.into_iter().map(|entry| entry.map(|x| (x as f32).to_le_bytes()));
+        self.accessor(entries, [FLOATS, OF_VERTICES])
+    }
+}
+
+/// See [`Mesh::to_glb`].
+pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
+    let (vertices, faces) = split(mesh);
+    let places = || vertices.iter().map(|&[vertex, _]| mesh.positions()[vertex as usize]);
+    let rounded = || places().map(|p| p.map(|x| x as f32));
+    let extreme =
+        |pick: fn(f32, f32) -> f32| rounded().reduce(|a, b| [0, 1, 2].map(|k| pick(a[k], b[k])));
+
+    let mut buffer = Buffer::default();
+    let position = buffer.floats(places());
+    buffer.accessors[position]["min"] = json!(extreme(f32::min));
+    buffer.accessors[position]["max"] = json!(extreme(f32::max));
+    let corners = faces.as_flattened().iter().map(|v| [v.to_le_bytes()]);
+    let indices = buffer.accessor(corners, [WHOLE, OF_INDICES]);
+    let mut attributes = json!({"POSITION": position});
+    let mut colour = json!({
+        "baseColorFactor": [0.75, 0.75, 0.75, 1.0],
+        "metallicFactor": 0.0,
+        "roughnessFactor": 0.75,
+    });
+    let picture = mesh.texture().and_then(|texture| texture.picture());
+    // Others would show the product of both.
+    if let (Some(colours), None) = (mesh.colours(), picture) {
+        let linear = vertices.iter().map(|&[vertex, _]| colours[vertex as usize].map(to_linear));
+        attributes["COLOR_0"] = json!(buffer.floats(linear));
+        colour["baseColorFactor"] = json!([1.0, 1.0, 1.0, 1.0]);
+    }
+    let mut json = json!({
+        "asset": {"version": "2.0", "generator": "softrast-mesh"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+    });
+    if let Some(texture) = mesh.texture() {
+        let down = vertices.iter().map(|&[_, k]| texture.coordinates()[k as usize]);
+        attributes["TEXCOORD_0"] = json!(buffer.floats(down.map(|[u, v]| [u, 1.0 - v])));
+    }
+    if let Some(picture) = picture {
+        let view = buffer.view(picture.iter().copied());
+        json["images"] = json!([{"bufferView": view, "mimeType": media_type(picture)}]);
+        json["textures"] = json!([{"source": 0}]);
+        colour["baseColorTexture"] = json!({"index": 0});
+        colour["baseColorFactor"] = json!([1.0, 1.0, 1.0, 1.0]);
+    }
+    json["materials"] = json!([{"doubleSided": true, "pbrMetallicRoughness": colour}]);
+    let primitive = json!({"attributes": attributes, "indices": indices, "material": 0});
+    json["meshes"] = json!([{"primitives": [primitive]}]);
+    json["buffers"] = json!([{"byteLength": buffer.bytes.len()}]);
+    json["bufferViews"] = json!(buffer.views);
+    json["accessors"] = json!(buffer.accessors);
+    file(json.to_string().into_bytes(), &buffer.bytes)
+}
+
+/// The vertices as the format has them, each with one coordinate on a texture: the numbers of vertex and coordinate, and the faces between
+/// them. Without a texture the vertices are as they are; with one, those that no face uses are left out.
+fn split(mesh: &Mesh) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
+    let Some(texture) = mesh.texture() else {
+        let all = (0..mesh.positions().len() as u32).map(|vertex| [vertex, 0]).collect();
+        return (all, mesh.faces().to_vec());
+    };
+    let corners = mesh.faces().as_flattened().iter().zip(texture.corners().as_flattened());
+    let corners: Vec<[u32; 2]> = corners.map(|(&vertex, &k)| [vertex, k]).collect();
+    let mut vertices = corners.clone();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let number = |corner| vertices.binary_search(corner).expect("all corners are there") as u32;
+    let numbers: Vec<u32> = corners.iter().map(number).collect();
+    let faces = numbers.as_chunks().0.to_vec();
+    (vertices, faces)
+}
+
+/// A channel that is proportional to light, of one as screens have it: the inverse of how they are read.
+fn to_linear(x: f64) -> f64 {
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Both chunks and their heads.
+fn file(mut json: Vec<u8>, bin: &[u8]) -> Vec<u8> {
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let all = 12 + 8 + json.len() + 8 + bin.len();
+    let of_32_bits = |length: usize| {
+        u32::try_from(length).expect("a GLB file has less than 4 GiB").to_le_bytes()
+    };
+    let mut file = Vec::with_capacity(all);
+    file.extend([MAGIC, &2u32.to_le_bytes(), &of_32_bits(all)].concat());
+    file.extend([&of_32_bits(json.len()), JSON].concat());
+    file.extend(json);
+    file.extend([&of_32_bits(bin.len()), BIN].concat());
+    file.extend(bin);
+    file
+}

@@ -1,0 +1,172 @@
+//! A picture on the faces of a mesh.
+
+use std::sync::Arc;
+
+use crate::{
+    MeshError,
+    error::Trouble,
+    mesh::{between, quartered},
+};
+
+/// Coordinates of textures reach so far in either direction. Floats of 32 bits would not tell the texels of a picture apart much farther out.
+pub(crate) const FARTHEST: f64 = 1e4;
+
+/// Where the corners of faces lie on a picture, and the picture if it is there.
+///
+/// A coordinate is (u, v): u goes from 0 at the left end of the picture to 1 at the right one, v from 0 at the bottom to 1 at the top. Beyond
+/// them the picture repeats. Each corner of each face has one of its own, so vertices on a seam have several. All coordinates are from
+/// -10000 to 10000, and every index is in range.
+///
+/// The picture is kept as the content of its file, PNG or JPEG. Nothing here decodes it, so it may still be broken.
+///
+/// ```
+/// use softrast_mesh::{Mesh, Texture};
+///
+/// let mesh = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])?;
+/// let texture = Texture::new(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], vec![[0, 1, 2]])?;
+/// let mesh = mesh.with_texture(texture)?;
+/// assert_eq!(mesh.texture().unwrap().coordinates().len(), 3);
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    coordinates: Vec<[f64; 2]>,
+    corners: Vec<[u32; 3]>,
+    picture: Option<Arc<[u8]>>,
+}
+
+impl Texture {
+    /// `coordinates` (u, v), and for each face of a mesh the three of its corners, as indices from 0; without a picture.
+    ///
+    /// # Errors
+    ///
+    /// If a coordinate is not from -10000 to 10000, or an index is out of range.
+    pub fn new(coordinates: Vec<[f64; 2]>, corners: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        if let Some(coordinate) = coordinates.iter().position(|uv| !uv.iter().all(is_near)) {
+            return Err(MeshError::Coordinate { coordinate });
+        }
+        let coordinates_found = coordinates.len();
+        for (face, of_face) in corners.iter().enumerate() {
+            if let Some(&coordinate) = of_face.iter().find(|&&k| k as usize >= coordinates_found) {
+                return Err(MeshError::Corner { face, coordinate, coordinates: coordinates_found });
+            }
+        }
+        Ok(Self { coordinates, corners, picture: None })
+    }
+
+    /// With this picture: the content of a PNG or JPEG file.
+    ///
+    /// # Errors
+    ///
+    /// If its first bytes are those of neither.
+    pub fn with_picture(self, picture: Vec<u8>) -> Result<Self, MeshError> {
+        if media_type(&picture).is_none() {
+            return Err(MeshError::Picture);
+        }
+        Ok(Self { picture: Some(picture.into()), ..self })
+    }
+
+    /// The coordinates (u, v), v up.
+    pub fn coordinates(&self) -> &[[f64; 2]] {
+        &self.coordinates
+    }
+
+    /// For each face of the mesh, three indices into [`Texture::coordinates`].
+    pub fn corners(&self) -> &[[u32; 3]] {
+        &self.corners
+    }
+
+    /// The content of a PNG or JPEG file.
+    pub fn picture(&self) -> Option<&[u8]> {
+        self.picture.as_deref()
+    }
+
+    /// With a picture of a kind that is known, if there is one; or without, and why.
+    pub(crate) fn pictured(
+        self,
+        picture: Result<Option<Vec<u8>>, Trouble>,
+    ) -> (Option<Self>, Option<Trouble>) {
+        match picture {
+            Ok(picture) => (Some(Self { picture: picture.map(Arc::from), ..self }), None),
+            Err(trouble) => (Some(self), Some(trouble)),
+        }
+    }
+
+    /// For faces cut as by [`crate::Mesh::subdivided`].
+    pub(crate) fn subdivided(&self) -> Self {
+        let mut coordinates = self.coordinates.clone();
+        let corners = quartered(&self.corners, |ends| {
+            coordinates.push(between(&self.coordinates, ends));
+            (coordinates.len() - 1) as u32
+        });
+        Self { coordinates, corners, picture: self.picture.clone() }
+    }
+}
+
+/// Whether a coordinate is one.
+pub(crate) fn is_near(x: &f64) -> bool {
+    x.abs() <= FARTHEST
+}
+
+/// The media type of a PNG or JPEG file, by its first bytes.
+pub(crate) fn media_type(picture: &[u8]) -> Option<&'static str> {
+    if picture.starts_with(b"\x89PNG\r\n\x1a\n") {
+        return Some("image/png");
+    }
+    picture.starts_with(b"\xff\xd8\xff").then_some("image/jpeg")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Mesh, icosphere};
+
+    const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+    /// Two faces between four vertices, and a seam: they share no coordinate.
+    fn mesh() -> Mesh {
+        let positions = SQUARE.map(|[x, y]| [x, y, 3.0]).to_vec();
+        let coordinates = [SQUARE, [[0.5, 0.5], [0.25, 0.5], [3.0, -2.0], [0.0; 2]]].concat();
+        let texture = Texture::new(coordinates, vec![[0, 1, 2], [4, 5, 6]]).unwrap();
+        let texture = texture.with_picture(b"\xff\xd8\xff\xe0".to_vec()).unwrap();
+        let mesh = Mesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        mesh.with_texture(texture).unwrap()
+    }
+
+    #[test]
+    fn bad_parts_are_refused_by_name() {
+        let message = |coordinates: &[[f64; 2]], corners: &[[u32; 3]]| {
+            Texture::new(coordinates.to_vec(), corners.to_vec()).unwrap_err().to_string()
+        };
+        assert_eq!(
+            message(&SQUARE, &[[0, 1, 2], [0, 4, 0]]),
+            "a corner of face 1 has texture coordinate 4, but there are 4"
+        );
+        for wrong in [f64::NAN, f64::NEG_INFINITY, 1e5] {
+            let expected = "texture coordinate 1 is not from -10000 to 10000";
+            assert_eq!(message(&[[0.0; 2], [0.0, wrong]], &[[0; 3]]), expected);
+        }
+        let texture = Texture::new(SQUARE.to_vec(), vec![[0, 1, 2]]).unwrap();
+        let gif = texture.clone().with_picture(b"GIF89a".to_vec()).unwrap_err();
+        assert_eq!(gif.to_string(), "the picture of a texture is neither PNG nor JPEG");
+        let ball = icosphere(0).with_texture(texture).unwrap_err();
+        assert_eq!(ball.to_string(), "a texture on 1 faces for the 20 faces of the mesh");
+    }
+
+    #[test]
+    fn a_texture_stays_on_faces_that_move_or_are_cut() {
+        let mesh = mesh();
+        assert_eq!(mesh.normalized().texture(), mesh.texture());
+        assert_eq!(mesh.with_positions(vec![[1.0; 3]; 4]).unwrap().texture(), mesh.texture());
+        let finer = mesh.subdivided();
+        let [coarse, fine] = [&mesh, &finer].map(|mesh| mesh.texture().unwrap());
+        assert_eq!(fine.picture(), coarse.picture());
+        let at = |corner: u32| fine.coordinates()[corner as usize];
+        // The fourth part of the first face lies between the middles of its edges.
+        assert_eq!(fine.corners()[3].map(at), [[0.5, 0.0], [1.0, 0.5], [0.5, 0.5]]);
+        // The edge that both faces share has another middle on each.
+        assert_eq!(at(fine.corners()[4][1]), [0.375, 0.5]);
+        assert_eq!((fine.corners().len(), finer.faces().len()), (8, 8));
+        assert_eq!(fine.coordinates().len(), 8 + 6);
+    }
+}

@@ -1,0 +1,400 @@
+//! Textures in OBJ and GLB files: as programs write them, as they should not, and as they come back.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{fs, path::Path};
+
+use serde_json::{Value, json};
+use softrast_mesh::{Mesh, Texture, icosphere};
+use tempfile::TempDir;
+
+/// What starts as a PNG file does; nothing decodes it here.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n and so on";
+const JPEG: &[u8] = b"\xff\xd8\xff\xe0 and so on";
+
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+
+fn folder(files: &[(&str, &[u8])]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, content) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, content).unwrap();
+    }
+    folder
+}
+
+/// The mesh of a file, and why its texture was left out, without the name of the folder.
+fn load(folder: &Path, name: &str) -> (Mesh, Option<String>) {
+    let path = folder.join(name);
+    let (mesh, left_out) = Mesh::load_textured(&path).unwrap();
+    let plain = Mesh::load(&path).unwrap();
+    assert_eq!(plain.texture(), None);
+    assert_eq!((plain.positions(), plain.faces()), (mesh.positions(), mesh.faces()));
+    let left_out = left_out.map(|error| error.to_string());
+    let prefix = format!("{}/", folder.display());
+    assert!(left_out.iter().all(|text| !text.contains(char::is_control)), "{left_out:?}");
+    (mesh, left_out.map(|text| text.replace(&prefix, "")))
+}
+
+/// The coordinates of the corners of each face.
+fn corners(mesh: &Mesh) -> Vec<[[f64; 2]; 3]> {
+    let texture = mesh.texture().expect("a texture");
+    let at = |k: u32| texture.coordinates()[k as usize];
+    texture.corners().iter().map(|face| face.map(at)).collect()
+}
+
+#[test]
+fn polygons_of_an_obj_file_keep_the_coordinates_of_their_corners() {
+    // A concave polygon, whose first ear is not at its first corner; then a seam, and the latest coordinate.
+    let obj = "v 0 0 0\nv 4 0 0\nv 1 1 0\nv 0 4 0\nvt 0 0\nvt 1 0 0.5\nvt .25 .25\nvt -2 1\nvt 9\n\
+        f 2/2 3/3/1 4/4 1/1\nf 1/-1/7 2/5 3/2\n";
+    let folder = folder(&[("a.obj", obj.as_bytes())]);
+    let (mesh, left_out) = load(folder.path(), "a.obj");
+    assert_eq!(left_out, None);
+    assert_eq!(mesh.faces().len(), 3);
+    for (face, uvs) in mesh.faces().iter().zip(corners(&mesh)).take(2) {
+        for (vertex, [u, v]) in face.iter().zip(uvs) {
+            let [x, y, _] = mesh.positions()[*vertex as usize];
+            let expected = if x == 0.0 && y == 4.0 { [-2.0, 1.0] } else { [x / 4.0, y / 4.0] };
+            assert_eq!([u, v], expected);
+        }
+    }
+    assert_eq!(corners(&mesh)[2], [[9.0, 0.0], [9.0, 0.0], [1.0, 0.0]]);
+    assert_eq!(mesh.texture().unwrap().picture(), None);
+}
+
+#[test]
+fn the_picture_of_an_obj_file_is_that_of_its_materials() {
+    let faces = "f 1/1 2/2 3/3\nusemtl dull paint\nf 1/1 3/3 4/4\n";
+    let head = "mtllib lib/the paint.mtl\nusemtl shiny\n";
+    let obj = format!("{head}{SQUARE}{faces}");
+    let mtl = "newmtl dull paint\nKd .5 1 1\nmap_Kd maps\\a b.png\nnewmtl other\nmap_Kd c.png\n\
+        newmtl shiny\nmap_kd maps\\a b.png\n";
+    let folder = folder(&[
+        ("a.obj", obj.as_bytes()),
+        ("lib/the paint.mtl", mtl.as_bytes()),
+        ("lib/maps/a b.png", PNG),
+    ]);
+    let (mesh, left_out) = load(folder.path(), "a.obj");
+    assert_eq!(left_out, None);
+    assert_eq!(mesh.texture().unwrap().picture(), Some(PNG));
+}
+
+#[test]
+fn what_is_wrong_with_the_texture_of_an_obj_file_leaves_it_out_by_name() {
+    let wrong = |faces: &str| load(folder(&[("a.obj", faces.as_bytes())]).path(), "a.obj");
+    for (text, message) in [
+        (
+            "f 1/1 2/5 3/3",
+            "a.obj:9: texture coordinate 5 is out of range: the file has 4, 4 of them before it",
+        ),
+        (
+            "f 1/1 2/-5 3/3",
+            "a.obj:9: texture coordinate -5 is out of range: the file has 4, 4 of them before it",
+        ),
+        (
+            "f 1/1 2/0 3/x",
+            "a.obj:9: texture coordinate 0 is out of range: the file has 4, 4 of them before it",
+        ),
+        (
+            "f 1/1 2/2 3/99999999999999999999",
+            "a.obj:9: texture coordinate 99999999999999999999 is out of range: the file has 4, 4 of them before it",
+        ),
+        ("vt 1 nan\nf 1/1 2/2 3/3", "a.obj:9: texture coordinate nan is not from -10000 to 10000"),
+        ("vt 1e5 0\nf 1/1 2/2 3/3", "a.obj:9: texture coordinate 1e5 is not from -10000 to 10000"),
+        ("vt a 0\nf 1/1 2/2 3/3", "a.obj:9: \"a\" is not a number"),
+        ("vt\nf 1/1 2/2 3/3", "a.obj:9: a texture coordinate without a number"),
+        (
+            "f 1/1 2/2 3/3\nf 1/1 3//7 4/4",
+            "a.obj:10: a corner has no texture coordinate, but one of line 9 has: all need one",
+        ),
+    ] {
+        let (mesh, left_out) = wrong(&format!("{SQUARE}{text}\n"));
+        assert_eq!(left_out.as_deref(), Some(message));
+        assert_eq!(mesh.texture(), None);
+    }
+    // No corner has a coordinate: nothing is missing, and no material is looked for.
+    let (mesh, left_out) = wrong(&format!("mtllib none.mtl\n{SQUARE}f 1 2 3\nf 1/ 3//1 4/\n"));
+    assert_eq!((mesh.texture(), left_out), (None, None));
+}
+
+#[test]
+fn a_picture_that_cannot_be_had_leaves_coordinates_and_says_why() {
+    let mtl = |files: &[(&str, &[u8])], mtl: &str| {
+        let obj = format!("mtllib a.mtl\n{SQUARE}usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 4/4");
+        let fixed = [("a.obj", obj.as_bytes()), ("a.mtl", mtl.as_bytes())];
+        let folder = folder(&[files, &fixed[..if mtl.is_empty() { 1 } else { 2 }]].concat());
+        let (mesh, left_out) = load(folder.path(), "a.obj");
+        assert_eq!(corners(&mesh).len(), 2);
+        assert_eq!(mesh.texture().unwrap().picture(), None);
+        left_out
+    };
+    let both = |name: &str| format!("newmtl a\nmap_Kd {name}\nnewmtl b\nmap_Kd {name}");
+    let starts = |found: Option<String>, start: &str| {
+        assert!(found.as_ref().is_some_and(|text| text.starts_with(start)), "{found:?}");
+    };
+    starts(mtl(&[], ""), "a.mtl: cannot be read: ");
+    starts(mtl(&[], &both("a.png")), "a.png: cannot be read: ");
+    starts(mtl(&[], &both("/dev/zero")), "zero: cannot be read: ");
+    starts(mtl(&[], &both("..")), ": cannot be read: it is a folder");
+    let gif = mtl(&[("a.gif", b"GIF89a")], &both("a.gif"));
+    starts(gif, "a.gif: cannot be read: it is neither a PNG nor a JPEG file");
+    let empty = mtl(&[("a.png", b"")], &both("../../elsewhere/a.png"));
+    starts(empty, "a.png: cannot be read: it is neither a PNG nor a JPEG file");
+    let options = mtl(&[("a.png", PNG)], &both("-s 2 2 a.png"));
+    starts(
+        options,
+        "a.obj: materials: map_Kd of \"a\" has options, which are not read: -s 2 2 a.png",
+    );
+    let several = mtl(&[("a.png", PNG)], "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png");
+    let expected = "a.obj: materials: faces of \"b\" show b.png, but those of \"a\" a.png: a mesh has one picture, so join them into one";
+    assert_eq!(several.as_deref(), Some(expected));
+    starts(
+        mtl(&[("a.png", PNG)], "newmtl a\nmap_Kd a.png\nnewmtl b"),
+        "a.obj: materials: faces of \"a\" show a.png, but those of \"b\" no picture",
+    );
+    // Materials without pictures are as good as none.
+    assert_eq!(mtl(&[], "newmtl a\nKd 1 0 0"), None);
+}
+
+type Change<'a> = &'a dyn Fn(&mut Value, &mut Vec<u8>);
+
+/// A square in two parts that share vertices, coordinates and a picture; `change` spoils it.
+fn glb(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
+    let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bin = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
+    bin.extend(floats(&[0.0, 0.75, 0.5, 0.75, 0.5, 0.0, 0.0, 0.0]));
+    bin.extend([0, 1, 2, 0, 2, 3, 0, 0]);
+    bin.extend(PNG);
+    let part = |indices: u32| json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": indices, "material": 0});
+    let mut json = json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [part(2), part(3)]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}],
+        "images": [{"bufferView": 3, "mimeType": "image/png"}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5121, "count": 3, "type": "SCALAR"},
+            {"bufferView": 2, "byteOffset": 3, "componentType": 5121, "count": 3, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 32},
+            {"buffer": 0, "byteOffset": 80, "byteLength": 6},
+            {"buffer": 0, "byteOffset": 88, "byteLength": PNG.len()},
+        ],
+    });
+    change(&mut json, &mut bin);
+    json["buffers"] = json!([{"byteLength": bin.len()}]);
+    let mut json = json.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let word = |length: usize| (length as u32).to_le_bytes();
+    let mut file = b"glTF".to_vec();
+    file.extend([word(2), word(28 + json.len() + bin.len()), word(json.len())].concat());
+    file.extend([b"JSON", json.as_slice(), &word(bin.len()), b"BIN\0", &bin].concat());
+    file
+}
+
+#[test]
+fn the_texture_of_a_glb_file_has_v_up_and_its_picture() {
+    let loaded = |files: &[(&str, &[u8])], change: Change| {
+        let file = glb(change);
+        let folder = folder(&[files, &[("a.glb", &file)]].concat());
+        let (mesh, left_out) = load(folder.path(), "a.glb");
+        assert_eq!(left_out, None);
+        mesh
+    };
+    let embedded = loaded(&[], &|_, _| ());
+    let expected = [[[0., 0.25], [0.5, 0.25], [0.5, 1.]], [[0., 0.25], [0.5, 1.], [0., 1.]]];
+    assert_eq!(corners(&embedded), expected);
+    assert_eq!(embedded.texture().unwrap().coordinates().len(), 4, "both parts share them");
+    assert_eq!(embedded.texture().unwrap().picture(), Some(PNG));
+
+    let uri = |uri: &'static str| {
+        move |json: &mut Value, _: &mut Vec<u8>| json["images"] = json!([{"uri": uri}])
+    };
+    let beside = loaded(&[("maps/a.jpg", JPEG)], &uri("maps/a.jpg"));
+    assert_eq!(beside.texture().unwrap().picture(), Some(JPEG));
+    let coded = loaded(&[], &uri("data:image/jpeg;base64,/9j/4CBhbmQgc28gb24="));
+    assert_eq!(coded.texture().unwrap().picture(), Some(JPEG));
+
+    let bytes = loaded(&[], &|json, bin| {
+        json["accessors"][1]["componentType"] = json!(5121);
+        json["accessors"][1]["normalized"] = json!(true);
+        bin[48..56].copy_from_slice(&[0, 255, 255, 255, 255, 0, 0, 51]);
+    });
+    assert_eq!(corners(&bytes)[1], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.8]]);
+    let second = loaded(&[], &|json, _| {
+        for primitive in json["meshes"][0]["primitives"].as_array_mut().unwrap() {
+            primitive["attributes"] = json!({"POSITION": 0, "TEXCOORD_1": 1, "TEXCOORD_0": "?"});
+        }
+        json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = json!(1);
+    });
+    assert_eq!(second.texture(), embedded.texture());
+    let mirrored = loaded(&[], &|json, _| json["nodes"][0]["scale"] = json!([-1, 1, 1]));
+    assert_eq!(corners(&mirrored)[0], [[0., 0.25], [0.5, 1.], [0.5, 0.25]]);
+    assert_eq!(mirrored.faces()[0], [0, 2, 1]);
+    let plain = loaded(&[], &|json, _| json["materials"] = json!("none"));
+    assert_eq!(corners(&plain), expected);
+    assert_eq!(plain.texture().unwrap().picture(), None);
+}
+
+#[test]
+fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
+    let part = "a.glb: mesh 0, primitive";
+    let cases: [(Change, &str, bool); 15] = [
+        (
+            &|j, _| {
+                drop(
+                    j["meshes"][0]["primitives"][1]["attributes"]
+                        .as_object_mut()
+                        .unwrap()
+                        .remove("TEXCOORD_0"),
+                )
+            },
+            " 1: it has no texture coordinates, but parts before it have",
+            false,
+        ),
+        (
+            &|j, _| {
+                drop(
+                    j["meshes"][0]["primitives"][0]["attributes"]
+                        .as_object_mut()
+                        .unwrap()
+                        .remove("TEXCOORD_0"),
+                )
+            },
+            " 1: it has texture coordinates, but parts before it have none",
+            false,
+        ),
+        (
+            &|j, _| j["meshes"][0]["primitives"][1]["material"] = json!(7),
+            " 1: it shows no image, parts before it image 0: a mesh has one picture, so join them into one",
+            false,
+        ),
+        (
+            &|j, _| j["accessors"][1]["type"] = json!("VEC3"),
+            " 0, accessor 1: texture coordinates are of type VEC2, not \"VEC3\"",
+            false,
+        ),
+        (
+            &|j, _| j["accessors"][1]["count"] = json!(9),
+            " 0, accessor 1: 9 entries reach beyond the binary chunk or buffer view 1",
+            false,
+        ),
+        (
+            &|j, _| j["accessors"][1]["count"] = json!(2),
+            " 0: index 2 is beyond its 2 texture coordinates",
+            false,
+        ),
+        (
+            &|j, _| j["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(99),
+            " 0, accessor 99: there is none",
+            false,
+        ),
+        (
+            &|_, bin| bin[52..56].copy_from_slice(&f32::NAN.to_le_bytes()),
+            " 0, vertex 0: texture coordinate (0, NaN) is not from -10000 to 10000",
+            false,
+        ),
+        (
+            &|_, bin| bin[48..52].copy_from_slice(&1e30f32.to_le_bytes()),
+            " 0, vertex 0: texture coordinate (1000000015047466200000000000000, 0.75) is not from -10000 to 10000",
+            false,
+        ),
+        (
+            &|j, _| {
+                j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
+                    json!({"KHR_texture_transform": {}})
+            },
+            " 0: KHR_texture_transform is not read: apply it to the coordinates",
+            false,
+        ),
+        (
+            &|j, _| j["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]),
+            " 0: its texture has no image of PNG or JPEG",
+            false,
+        ),
+        (&|j, _| j["images"] = json!([]), "image 0: it has no content", true),
+        (
+            &|j, _| j["images"][0]["bufferView"] = json!(0),
+            "image 0: it is neither PNG nor JPEG",
+            true,
+        ),
+        (
+            &|j, _| j["bufferViews"][3]["byteLength"] = json!(1u64 << 40),
+            "image 0: it reaches beyond the binary chunk",
+            true,
+        ),
+        (
+            &|j, _| j["images"] = json!([{"uri": "data:image/png;base64,?"}]),
+            "image 0: its data URI is not base64: data:image/png;base64,?",
+            true,
+        ),
+    ];
+    for (change, message, coordinates) in cases {
+        let file = glb(change);
+        let (mesh, left_out) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
+        let expected =
+            if coordinates { format!("a.glb: {message}") } else { format!("{part}{message}") };
+        assert_eq!(left_out, Some(expected));
+        assert_eq!(mesh.texture().is_some(), coordinates);
+        assert_eq!(mesh.faces().len(), 2);
+    }
+    let file = glb(|json, _| json["images"] = json!([{"uri": "../none.png"}]));
+    let (_, left_out) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
+    assert!(left_out.unwrap().starts_with("none.png: cannot be read: "));
+}
+
+/// A ball with a seam: faces of its right half have coordinates of their own.
+fn ball() -> Mesh {
+    let ball = icosphere(1);
+    let flat = |[x, y, _]: [f64; 3], side: f64| [side + x / 4.0, 0.5 + y / 2.0];
+    let sides = [0.25, 0.75].map(|side| ball.positions().iter().map(move |&p| flat(p, side)));
+    let count = ball.positions().len() as u32;
+    let corners = ball.faces().iter().map(|face| {
+        let right = face.iter().any(|&v| ball.positions()[v as usize][2] > 0.5);
+        face.map(|v| v + if right { count } else { 0 })
+    });
+    let texture = Texture::new(sides.into_iter().flatten().collect(), corners.collect()).unwrap();
+    let colours = ball.positions().iter().map(|p| p.map(f64::abs)).collect();
+    let texture = texture.with_picture(PNG.to_vec()).unwrap();
+    ball.with_colours(colours).unwrap().with_texture(texture).unwrap()
+}
+
+#[test]
+fn a_texture_that_is_written_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let ball = ball();
+    for name in ["a.obj", "a.glb", "a.ply"] {
+        ball.save(folder.path().join(name)).unwrap();
+    }
+    let (obj, left_out) = load(folder.path(), "a.obj");
+    assert_eq!(left_out, None);
+    let [written, found] = [&ball, &obj].map(|mesh| mesh.texture().unwrap());
+    assert_eq!((found.coordinates(), found.corners()), (written.coordinates(), written.corners()));
+    assert_eq!(found.picture(), None, "OBJ has no room for it");
+    assert_eq!((obj.positions(), obj.colours()), (ball.positions(), ball.colours()));
+
+    let (glb, left_out) = load(folder.path(), "a.glb");
+    assert_eq!(left_out, None);
+    assert_eq!(glb.texture().unwrap().picture(), Some(PNG));
+    assert!(glb.positions().len() > ball.positions().len(), "vertices on the seam are doubled");
+    assert_eq!(glb.colours(), None, "others would show the product of colours and texture");
+    let off = |a: f64, b: f64| assert!((a - b).abs() < 1e-7, "{a} and {b}");
+    for (a, b) in glb.triangles().zip(ball.triangles()) {
+        a.as_flattened().iter().zip(b.as_flattened()).for_each(|(&a, &b)| off(a, b));
+    }
+    for (a, b) in corners(&glb).iter().zip(&corners(&ball)) {
+        a.as_flattened().iter().zip(b.as_flattened()).for_each(|(&a, &b)| off(a, b));
+    }
+    assert_eq!(load(folder.path(), "a.ply").0.texture(), None, "PLY leaves it out");
+    // Once more, now that vertices are split.
+    glb.save(folder.path().join("b.glb")).unwrap();
+    assert_eq!(load(folder.path(), "b.glb").0, glb);
+}

@@ -1,0 +1,173 @@
+//! What the faces of a mesh show: a texture, colours of its vertices, or grey.
+
+use std::{fmt, fs, io::Cursor, path::Path, sync::Arc};
+
+use anyhow::{Context, bail, ensure};
+use burn::tensor::{Tensor, TensorData, backend::Backend};
+use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage};
+use softrast_lab::Error;
+use softrast_mesh::{Mesh, MeshError, Texture};
+use softrast_raster::Attributes;
+use softrast_softness::tensor;
+
+use crate::args::Args;
+
+/// Texels that the op draws at most.
+const MOST_TEXELS: u64 = 1 << 26;
+/// Red, green and blue of a mesh that has no colours.
+const GREY: [f64; 3] = [0.7; 3];
+
+/// Scale of the depth softness, against the longest side of the mesh: less than the thickness of what is thin.
+const DEPTH: f64 = 0.005;
+
+/// How a mesh is drawn in colour.
+pub(crate) struct Colour {
+    pub(crate) paint: Paint,
+    /// Whether a lamp at the camera lights it.
+    pub(crate) shade: bool,
+    /// Along each side of a pixel.
+    pub(crate) samples: usize,
+    /// Scale of the depth softness in world units; none for that of the op.
+    pub(crate) depth_scale: Option<f64>,
+}
+
+/// Colours of faces, all from 0 to 1 as screens have them.
+pub(crate) enum Paint {
+    Texture {
+        /// `[entries, 2]`, v up.
+        coordinates: Vec<f64>,
+        /// The entry of each corner.
+        corners: Arc<[[u32; 3]]>,
+        picture: RgbImage,
+    },
+    /// `[vertices, 3]`.
+    Vertices(Vec<f64>),
+    Grey,
+}
+
+/// Samples along each side of an image: at most so many unless more are asked for, and at most as many as the largest image has pixels.
+const USUAL_SAMPLES: usize = 2048;
+const MOST_SAMPLES: usize = 4096;
+
+impl Colour {
+    /// How `args` ask for a mesh, taken as it will be drawn, and what the user should know.
+    pub(crate) fn of(
+        mesh: &Mesh,
+        args: &Args,
+        left_out: Option<MeshError>,
+    ) -> anyhow::Result<(Self, Option<String>)> {
+        if args.size * samples(args) > MOST_SAMPLES {
+            return Err(Error::usage(format!(
+                "--samples {} times --size {} is above {MOST_SAMPLES}: take fewer",
+                samples(args),
+                args.size
+            )));
+        }
+        let (paint, warning) = Paint::of(mesh, args, left_out)?;
+        let [low, high] = mesh.bounds();
+        let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        // Under a softness without end so narrow a one would draw near faces all over the image: docs/notes.md, Colour.
+        let depth_scale = args.softness.is_none().then_some(DEPTH * longest);
+        Ok((Self { paint, shade: args.shade, samples: samples(args), depth_scale }, warning))
+    }
+}
+
+/// Samples along each side of a pixel. Edges that are asked for show as they are.
+pub(crate) fn samples(args: &Args) -> usize {
+    let usual = || match (&args.softness, args.scale) {
+        (None, None) => (1..=4).rev().find(|n| n * args.size <= USUAL_SAMPLES).unwrap_or(1),
+        _ => 1,
+    };
+    args.samples.unwrap_or_else(usual)
+}
+
+impl Paint {
+    /// What `args` ask for of a mesh; `left_out` says why its own texture is not there. And a warning, if that matters.
+    fn of(
+        mesh: &Mesh,
+        args: &Args,
+        left_out: Option<MeshError>,
+    ) -> anyhow::Result<(Self, Option<String>)> {
+        let name = args.mesh.display();
+        if let Some(path) = &args.texture {
+            return match (mesh.texture(), left_out) {
+                (Some(texture), _) => {
+                    Ok((Self::textured(texture, read(path).context("--texture")?), None))
+                }
+                (None, Some(reason)) => bail!("--texture has no place on the mesh: {reason}"),
+                (None, None) => bail!("--texture: {name} has no texture coordinates"),
+            };
+        }
+        let mut warning = left_out.map(|reason| reason.to_string());
+        if let Some((texture, picture)) = mesh.texture().and_then(|it| Some((it, it.picture()?))) {
+            match decoded(picture) {
+                Ok(picture) => return Ok((Self::textured(texture, picture), None)),
+                Err(reason) => warning = Some(format!("{name}: its picture: {reason:#}")),
+            }
+        }
+        let paint = match mesh.colours() {
+            Some(colours) => Self::Vertices(colours.as_flattened().to_vec()),
+            None => Self::Grey,
+        };
+        Ok((paint, warning.map(|reason| format!("drawn without its texture: {reason}"))))
+    }
+
+    fn textured(texture: &Texture, picture: RgbImage) -> Self {
+        Self::Texture {
+            coordinates: texture.coordinates().as_flattened().to_vec(),
+            corners: texture.corners().into(),
+            picture,
+        }
+    }
+
+    /// As the op takes it, for these faces: three channels.
+    pub(crate) fn attributes<B: Backend>(&self, faces: &Arc<[[u32; 3]]>) -> Attributes<B> {
+        match self {
+            Self::Texture { coordinates, corners, picture } => {
+                let places = tensor(coordinates.clone(), [1, coordinates.len() / 2, 2]);
+                let (width, height) = picture.dimensions();
+                let levels: Vec<f32> = picture.iter().map(|&x| f32::from(x) / 255.0).collect();
+                let data = TensorData::new(levels, [height as usize, width as usize, 3]);
+                let texels = Tensor::from_data(data, (&Default::default(), places.dtype()));
+                Attributes::new(places, corners.clone()).with_texture(texels)
+            }
+            Self::Vertices(colours) => {
+                let values = tensor(colours.clone(), [1, colours.len() / 3, 3]);
+                Attributes::new(values, faces.clone())
+            }
+            Self::Grey => {
+                Attributes::new(tensor(GREY.to_vec(), [1, 1, 3]), vec![[0; 3]; faces.len()].into())
+            }
+        }
+    }
+}
+
+impl fmt::Display for Paint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Texture { picture, .. } => {
+                write!(f, "texture of {} x {} texels", picture.width(), picture.height())
+            }
+            Self::Vertices(_) => f.write_str("colours of vertices"),
+            Self::Grey => f.write_str("grey: the mesh has no texture and no colours"),
+        }
+    }
+}
+
+/// The picture in a file.
+fn read(path: &Path) -> anyhow::Result<RgbImage> {
+    let read = || decoded(&fs::read(path)?);
+    read().with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// The picture that is the content of a file, without its transparency.
+fn decoded(content: &[u8]) -> anyhow::Result<RgbImage> {
+    let decoder = ImageReader::new(Cursor::new(content)).with_guessed_format()?.into_decoder()?;
+    let (width, height) = decoder.dimensions();
+    let texels = u64::from(width) * u64::from(height);
+    ensure!(
+        (1..=MOST_TEXELS).contains(&texels),
+        "{width} x {height} texels: a texture has 1 to {MOST_TEXELS} of them"
+    );
+    Ok(DynamicImage::from_decoder(decoder)?.into_rgb8())
+}
