@@ -43,3 +43,8 @@ pub use softrast_softness as softness;
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;
+
+/// The same of the guide to colours.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/colour.md")]
+pub struct Colours;
