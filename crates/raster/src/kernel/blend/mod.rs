@@ -587,7 +587,6 @@ impl<T: Real> Band<'_, '_, T> {
             corners: [splat(0.0); OF_CORNERS],
             attributes: vec![[splat(0.0); 3]; numbers],
             texels: of_texels.then_some(&mut walked.texels),
-            least: splat(self.least.exp()),
         });
         walked.tables = tables;
     }

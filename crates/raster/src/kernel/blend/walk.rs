@@ -212,8 +212,6 @@ impl<T: Real> Blend<'_, T> {
     fn weight(&self, pair: &Pair<T>, largest: T::Lanes) -> [T; 2] {
         let by_depth = pair.by_depth.log() - T::constant(largest);
         let whole = T::exponential(pair.log_edge + by_depth);
-        // Numbers so small that they lose digits take a hundred times as long to multiply.
-        let whole = whole.masked(T::Lanes::splat(self.vanishing).less(whole.value()));
         if self.floor == Float::<T>::ZERO {
             return [whole, whole];
         }
@@ -250,6 +248,8 @@ impl<T: Real> Visitor<T> for Sums<'_, T> {
     #[inline(always)]
     fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
         let [weight, _] = blend.weight(pair, self.largest.groups(0, at).value());
+        // Numbers so small that they lose digits take a hundred times as long to multiply.
+        let weight = weight.masked(T::Lanes::splat(blend.vanishing).less(weight.value()));
         self.sums.add(0, at, weight);
         if let Some(texture) = &blend.texture {
             let seen = texture.sample(pair.place_on_texture(shown)).channels();
@@ -281,8 +281,6 @@ pub(super) struct Pull<'a, T: Real> {
     pub(super) attributes: Vec<[T::Lanes; 3]>,
     /// Gradient to the texels, if it is wanted.
     pub(super) texels: Option<&'a mut TexelSums<Float<T>>>,
-    /// The share of a pixel that a face may have and be left out of its gradient, as it may be left out of its image.
-    pub(super) least: T::Lanes,
 }
 
 impl<T: Real> Pull<'_, T> {
@@ -300,7 +298,7 @@ impl<T: Real> Pull<'_, T> {
 /// Whether a mask holds nowhere.
 #[inline(always)]
 fn nowhere<L: Lanes>(mask: L::Mask) -> bool {
-    L::pick(mask, splat(1.0), splat(0.0)).sum() == L::Float::ZERO
+    L::bits(mask) == 0
 }
 
 impl<T: Real> Visitor<T> for Pull<'_, T> {
@@ -312,14 +310,15 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
 
     #[inline(always)]
     fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
-        let [weight, of_edge] = blend.weight(pair, self.largest.groups(0, at).value());
-        let per_total = self.pixels.groups(0, at);
-        let [share, of_edge] = [weight * per_total, of_edge * per_total];
-        let counts = self.least.less(of_edge.value());
+        let log = pair.log_edge.value() + pair.by_depth.log().value();
+        let counts = self.pixels.groups(2, at).value().less(log);
         if nowhere::<T::Lanes>(counts) {
             return;
         }
-        let [share, of_edge] = [share.masked(counts), of_edge.masked(counts)];
+        let weights = blend.weight(pair, self.largest.groups(0, at).value());
+        let per_total = self.pixels.groups(0, at);
+        let [share, of_edge] =
+            [weights[0].masked(counts) * per_total, weights[1].masked(counts) * per_total];
         let zero = T::constant(splat(0.0));
         // How the objective changes with the attributes of the three corners, were the point there, and what it is at the point.
         let mut at_corners = [zero; 3];
