@@ -45,14 +45,20 @@ impl<T: Task> TaskExperiment<T> {
         // Before the first tensor.
         let backend = backend(common.backend.as_deref())?;
         let learned_by_default = purpose != Purpose::Finding;
+        let mut method_args = method_args.clone();
+        if let (true, true, Some(kind)) = (learned_by_default, method_args.is_silent(), T::LEARNED)
+        {
+            method_args.softness = Some(SoftnessChoice::Learned(Some(kind.to_owned())));
+        }
+        let method_args = &method_args;
         let family = match method_args.softness {
             Some(SoftnessChoice::Family(family)) => Some(family),
             _ => None,
         };
-        let learned = learned_name(method_args, T::METHODS, learned_by_default);
+        let learned = learned_name(method_args, T::NAME, learned_by_default);
         let edges = EdgeChoice { family, learned, schedule: method_args.schedule };
         let task = T::new(args, common.variant, &edges)?;
-        let mut method = method_args.method(T::METHODS, &T::SCALES, learned_by_default)?;
+        let mut method = method_args.method(T::NAME, &T::SCALES, learned_by_default)?;
         if !T::MOVES_EDGES {
             refuse_what_edges_that_stay_do_not_know(method_args)?;
             method.softness.surrogate = None;

@@ -16,8 +16,9 @@ pub trait Task: InverseProblem + Sized {
     /// Name of the program, where it does more than one task.
     const PROGRAM: &'static str = Self::NAME;
 
-    /// Name of the task whose learned softness, learning rate and presets it takes, where they are not its own.
-    const METHODS: &'static str = Self::NAME;
+    /// The kind of learned softness that it takes where nobody says otherwise, as `learned-KIND` on the command line; none for what was
+    /// learned on it.
+    const LEARNED: Option<&'static str> = None;
 
     /// Name in the paper, such as `POSE`.
     const TITLE: &'static str;

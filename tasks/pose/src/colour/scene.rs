@@ -11,7 +11,7 @@ use super::Coat;
 /// Weight of the error of colours beside the `IoU` loss.
 const COLOURS: f64 = 5.0;
 /// Colours are compared on pictures of so many pixels a side: on more, only what nearly fits pulls.
-const SIDES: std::ops::RangeInclusive<usize> = 4..=16;
+const SIDES: std::ops::RangeInclusive<usize> = 4..=8;
 
 /// Instances of POSE by colour that are solved together, one view each.
 ///
@@ -48,7 +48,8 @@ impl<B: RasterBackend> Scene<B> {
         let world = vertices::<B>(mesh.positions(), &device);
         let target = coat.hard(project(world, Orbit::tensors(&cameras, &device)), size);
         let covered: Tensor<B, 2> = silhouettes.target().flatten(1, 2);
-        let covered = covered.mean_dim(1).reshape([views]).clamp_min(((size * size) as f64).recip());
+        let covered =
+            covered.mean_dim(1).reshape([views]).clamp_min(((size * size) as f64).recip());
         let colours = Targets::new(target.reshape([3 * views, size, size]));
         Self { silhouettes, coat, colours, covered, size }
     }
@@ -95,8 +96,8 @@ impl<B: RasterBackend> Scene<B> {
     /// colours. The side is the size of the scene, or that halved some times.
     ///
     /// The error of colours is their mean squared difference over black, divided by the part of the target picture that the mesh covers, so
-    /// that it does not depend on how large the mesh is seen: the mean of it on pictures of 16, 8 and 4 pixels a side, or as many halves of
-    /// halves of the side as there are within 4 to 16. Where there is none, it is that of the fewest pixels that halving leads to.
+    /// that it does not depend on how large the mesh is seen: the mean of it on pictures of 8 and 4 pixels a side, or whatever halves of
+    /// halves of the side there are from 4 to 8. Where there is none, it is that of the fewest pixels that halving leads to.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         let [planes, side, _] = image.dims();
         let views = planes / 4;
@@ -114,7 +115,8 @@ impl<B: RasterBackend> Scene<B> {
             }
         }
         let count = errors.len() as f64;
-        let error = Tensor::stack::<2>(errors, 0).sum_dim(0).reshape([views]) / self.covered.clone();
+        let error =
+            Tensor::stack::<2>(errors, 0).sum_dim(0).reshape([views]) / self.covered.clone();
         self.silhouettes.image_loss(coverage) + error * (COLOURS / count)
     }
 }
