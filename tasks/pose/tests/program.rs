@@ -181,7 +181,7 @@ fn a_camera_that_its_silhouette_leaves_elsewhere_is_found_by_colour() {
     let picture = image::open(out.path().join("before_after.png")).unwrap().into_rgb8();
     assert!(picture.pixels().any(|p| p.0[0] > p.0[2] + 50), "the pictures have no colours");
     let page = fs::read_to_string(out.path().join("report.html")).unwrap();
-    assert!(page.contains("-p pose -- --colour"), "the page names another command");
+    assert!(page.contains("-p pose -- solve --colour"), "the page names another command");
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn every_command_runs_by_colour_at_any_size_and_with_a_mesh_of_its_own() {
     }
     for command in [
         "evaluate --runs 3 --resolution auto --optimise-fov --instances released24",
-        "search --runs 1 --search-runs 1 --scales 0.02 --learning-rates 0.2",
+        "search --runs 1 --search-runs 1 --scales 0.02 --learning-rates 0.2,0.4",
         "choose --search-runs 1",
         "learn --outer 1 --batch 1 --validation-runs 1 --scale 0.02",
         "solve --softness mlp --schedule decay --range 55-75 --variant transfer",

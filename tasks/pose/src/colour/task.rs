@@ -13,10 +13,7 @@ use softrast_raster::{HostBackend, RasterBackend};
 use super::Scene;
 use crate::{Args, Pictures, Pose, picture::outlined};
 
-/// Larger than that of silhouettes: it leaves more of what fits but is not the pose.
-///
-/// On the 28 of 300 seeds from 1000 on that POSE leaves in another pose, 22 are found at 0.6 and 23 at 1 where colours are compared on
-/// 16 and fewer pixels; 24 at 1 on 8 and fewer.
+/// Larger than that of silhouettes, so that a camera leaves more of the poses that only nearly fit (docs/notes.md, Pose by colour).
 const LEARNING_RATE: f64 = 1.0;
 
 /// POSE by colour: a camera that orbits a mesh with colours, and the picture that it should see.
