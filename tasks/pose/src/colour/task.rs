@@ -13,7 +13,7 @@ use softrast_raster::{HostBackend, RasterBackend};
 use super::Scene;
 use crate::{Args, Pictures, Pose, picture::outlined};
 
-/// Larger than that of silhouettes, so that a camera leaves more of the poses that only nearly fit (docs/notes.md, Pose by colour).
+/// Larger than that of silhouettes (docs/notes.md, Pose by colour).
 const LEARNING_RATE: f64 = 1.0;
 
 /// POSE by colour: a camera that orbits a mesh with colours, and the picture that it should see.
