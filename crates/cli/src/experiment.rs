@@ -45,6 +45,12 @@ impl<T: Task> TaskExperiment<T> {
         // Before the first tensor.
         let backend = backend(common.backend.as_deref())?;
         let learned_by_default = purpose != Purpose::Finding;
+        let mut method_args = method_args.clone();
+        if let (true, true, Some(kind)) = (learned_by_default, method_args.is_silent(), T::LEARNED)
+        {
+            method_args.softness = Some(SoftnessChoice::Learned(Some(kind.to_owned())));
+        }
+        let method_args = &method_args;
         let family = match method_args.softness {
             Some(SoftnessChoice::Family(family)) => Some(family),
             _ => None,

@@ -16,6 +16,10 @@ pub trait Task: InverseProblem + Sized {
     /// Name of the program, where it does more than one task.
     const PROGRAM: &'static str = Self::NAME;
 
+    /// The kind of learned softness that it takes where nobody says otherwise, as `learned-KIND` on the command line; none for what was
+    /// learned on it.
+    const LEARNED: Option<&'static str> = None;
+
     /// Name in the paper, such as `POSE`.
     const TITLE: &'static str;
 

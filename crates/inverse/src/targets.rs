@@ -28,6 +28,11 @@ impl<B: Backend> Targets<B> {
         self.levels[0].clone()
     }
 
+    /// The target at all sizes, the largest first.
+    pub fn levels(&self) -> &[Tensor<B, 3>] {
+        &self.levels
+    }
+
     /// The target for an `image` `[views, side, side]`.
     ///
     /// # Panics

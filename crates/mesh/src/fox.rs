@@ -2,6 +2,7 @@
 
 use crate::{
     Mesh,
+    mesh::{difference, norm},
     stroke::{Stroke, distance, joined, rounded},
     surface_net::{Grid, surface_net},
 };
@@ -16,6 +17,40 @@ pub fn fox() -> Mesh {
     let grid = Grid { low: [-0.47, -0.82, -1.08], step: 0.07, cubes: [16, 27, 31] };
     let (positions, faces) = surface_net(&grid, solid);
     Mesh::from_valid(positions.into_iter().map(|p| p.map(rounded)).collect(), faces)
+}
+
+/// The same fox in colours that tell its sides apart: orange, with a white chest, belly and tail tip, and dark legs, ears, eyes and nose.
+pub fn painted_fox() -> Mesh {
+    let fox = fox();
+    let colours = fox.positions().iter().map(|&p| coat(p)).collect();
+    fox.painted(colours)
+}
+
+const ORANGE: [f64; 3] = [0.85, 0.42, 0.12];
+const RUST: [f64; 3] = [0.55, 0.22, 0.07];
+const WHITE: [f64; 3] = [0.95, 0.93, 0.88];
+const DARK: [f64; 3] = [0.14, 0.10, 0.09];
+
+/// Balls of dark fur: the nose and both eyes.
+const SPOTS: [([f64; 3], f64); 3] =
+    [([0.19, 0.42, -0.92], 0.075), ([0.21, 0.59, -0.65], 0.06), ([0.0, 0.59, -0.73], 0.06)];
+
+/// The colour of the fur at a point of the surface.
+fn coat(p: [f64; 3]) -> [f64; 3] {
+    let [x, y, z] = p;
+    let spot = SPOTS.iter().any(|&(middle, radius)| norm(difference(p, middle)) < radius);
+    let (head, tail) = (z < -0.4 && y > 0.34, x > 0.1 && z > 0.6);
+    if spot || (head && y > 0.76) || (!tail && y < -0.24) {
+        return DARK;
+    }
+    let (tip, muzzle) = (tail && y > 0.6, head && z < -0.62 && y < 0.46);
+    let (chest, belly) = (!head && z < -0.46, !tail && y < -0.06 && x.abs() < 0.16);
+    if tip || muzzle || chest || belly {
+        return WHITE;
+    }
+    // Darker along the back.
+    let back = ((y - 0.2) / 0.15).clamp(0.0, 1.0) * f64::from(u8::from(!head && !tail && z > -0.3));
+    [0, 1, 2].map(|k| ORANGE[k] + back * (RUST[k] - ORANGE[k]))
 }
 
 /// Parts in the middle or on one side.

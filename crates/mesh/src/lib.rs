@@ -48,7 +48,7 @@ pub use airplane::airplane;
 pub use chair::chair;
 pub use edges::Edges;
 pub use error::{Fault, MeshError};
-pub use fox::fox;
+pub use fox::{fox, painted_fox};
 pub use icosphere::icosphere;
 pub use mesh::Mesh;
 pub use texture::Texture;

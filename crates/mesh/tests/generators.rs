@@ -4,7 +4,7 @@
 
 use std::{collections::HashSet, path::Path};
 
-use softrast_mesh::{Mesh, airplane, chair, fox};
+use softrast_mesh::{Mesh, airplane, chair, fox, painted_fox};
 
 /// Each with the least and the largest volume it may have.
 fn generated() -> [(&'static str, Mesh, [f64; 2]); 3] {
@@ -71,4 +71,18 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
+}
+
+#[test]
+fn the_fox_in_colours_is_the_fox_with_a_white_tail_tip_and_a_dark_nose() {
+    let painted = painted_fox();
+    assert_eq!(Mesh::new(painted.positions().to_vec(), painted.faces().to_vec()).unwrap(), fox());
+    let colours = painted.colours().unwrap();
+    let at = |key: fn(&[f64; 3]) -> f64| {
+        let vertices = painted.positions().iter().zip(colours);
+        *vertices.max_by(|(p, _), (q, _)| key(p).total_cmp(&key(q))).unwrap().1
+    };
+    let (nose, tail_tip) = (at(|p| -p[2]), at(|p| p[0] + p[1] + p[2]));
+    assert!(nose.iter().all(|&x| x < 0.2), "{nose:?}");
+    assert!(tail_tip.iter().all(|&x| x > 0.8), "{tail_tip:?}");
 }

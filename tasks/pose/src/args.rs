@@ -5,6 +5,10 @@ use clap::ValueEnum;
 /// Flags that only POSE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
+    /// Find the camera by a picture in colours, of a mesh with colours at its vertices
+    #[arg(long)]
+    pub colour: bool,
+
     /// Mesh to view (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,

@@ -1,4 +1,4 @@
-use softrast_mesh::{Mesh, fox};
+use softrast_mesh::{Mesh, fox, painted_fox};
 use softrast_raster::Pinhole;
 
 use crate::{Args, Instances};
@@ -6,6 +6,7 @@ use crate::{Args, Instances};
 /// The mesh to view and its name.
 pub(crate) fn mesh(args: &Args) -> anyhow::Result<(Mesh, String, Framing)> {
     let (mesh, name) = match &args.mesh {
+        None if args.colour => (painted_fox(), "fox".to_owned()),
         None => (fox(), "fox".to_owned()),
         Some(path) => (Mesh::load(path)?, path.display().to_string()),
     };

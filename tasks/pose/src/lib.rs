@@ -16,9 +16,12 @@
 //! such as front for back. The image tells: `solve` then tries other starts around the given one and
 //! keeps the run whose image fits best; `--starts 1` is the single start.
 //!
+//! **Colour.** With `--colour` the mesh has colours and the target is a picture in colours: [`colour`].
+//!
 //! **Transfer.** Fewer steps and a larger learning rate, on whichever mesh `--mesh` names.
 
 mod args;
+pub mod colour;
 mod error;
 mod framing;
 mod paper;
@@ -32,3 +35,11 @@ pub use error::PoseError;
 pub use pictures::Pictures;
 pub use released::released24;
 pub use task::Pose;
+
+/// The whole program: `--colour` makes another task of it, with another image and loss.
+pub fn main() -> std::process::ExitCode {
+    match std::env::args_os().any(|word| word == "--colour") {
+        true => softrast_cli::main::<colour::Coloured>(),
+        false => softrast_cli::main::<Pose>(),
+    }
+}

@@ -1,5 +1,5 @@
 //! POSE: recovers the pose of a camera from a silhouette.
 
 fn main() -> std::process::ExitCode {
-    softrast_cli::main::<pose::Pose>()
+    pose::main()
 }

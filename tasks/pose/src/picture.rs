@@ -1,13 +1,12 @@
 use image::{Rgb, RgbImage};
-use softrast_lab::rgb_from_gray;
 
 /// Colour of the target's outline in frames, and how much of the frame shows through.
 const OUTLINE: [f64; 3] = [255.0, 120.0, 0.0];
 const SHINE: f64 = 0.35;
 
-/// A silhouette `[size * size]` with the outline of a target over it.
-pub(crate) fn outlined(image: &[f64], target: &[f64], size: usize) -> RgbImage {
-    let mut picture = rgb_from_gray(image, size, size);
+/// A square picture with the outline of a target over it, a silhouette `[size * size]`.
+pub(crate) fn outlined(mut picture: RgbImage, target: &[f64]) -> RgbImage {
+    let size = picture.width() as usize;
     for (x, y, pixel) in picture.enumerate_pixels_mut() {
         if is_outline(target, size, x as usize, y as usize) {
             let mixed = |k: usize| SHINE * f64::from(pixel.0[k]) + (1.0 - SHINE) * OUTLINE[k];

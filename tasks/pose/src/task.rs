@@ -42,6 +42,13 @@ enum Source {
     Released(Vec<PoseInstance>),
 }
 
+impl Pose {
+    /// What is solved, wherever its instances come from.
+    pub(crate) fn problem(&self) -> &PoseProblem {
+        &self.problem
+    }
+}
+
 impl InverseProblem for Pose {
     type Instance = PoseInstance;
     type Scene<B: RasterBackend> = PoseScene<B>;
@@ -218,7 +225,7 @@ impl Task for Pose {
     }
 
     fn frame(&self, image: &[f64], target: &[f64], size: usize) -> RgbImage {
-        outlined(image, target, size)
+        outlined(self.picture(image, size), target)
     }
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {

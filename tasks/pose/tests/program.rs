@@ -170,6 +170,44 @@ fn every_named_softness_ends_with_finite_numbers_at_any_scale() {
 }
 
 #[test]
+fn a_camera_that_its_silhouette_leaves_elsewhere_is_found_by_colour() {
+    let out = tempfile::tempdir().unwrap();
+    let line = "--starts 1 --seed 1116 --size 32 --steps 100";
+    let json = run(line).unwrap();
+    assert_eq!(json["success_rate"], 0.0, "{json}");
+    let json = run_in(out.path(), &format!("--colour {line}")).unwrap();
+    assert_eq!(json["success_rate"], 1.0, "{json}");
+    assert_eq!((&json["task"], &json["settings"]["colour"]), (&"pose-colour".into(), &true.into()));
+    let picture = image::open(out.path().join("before_after.png")).unwrap().into_rgb8();
+    assert!(picture.pixels().any(|p| p.0[0] > p.0[2] + 50), "the pictures have no colours");
+    let page = fs::read_to_string(out.path().join("report.html")).unwrap();
+    assert!(page.contains("-p pose -- solve --colour"), "the page names another command");
+}
+
+#[test]
+fn every_command_runs_by_colour_at_any_size_and_with_a_mesh_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ball.ply");
+    let ball = icosphere(1);
+    let colours = ball.positions().iter().map(|p| p.map(|x| 0.5 + 0.5 * x.clamp(-1.0, 1.0)));
+    let colours = colours.collect();
+    ball.with_colours(colours).unwrap().save(&path).unwrap();
+    for size in [1, 2, 7, 12, 20] {
+        let line = format!("--colour --size {size} --steps 3 --mesh {}", path.display());
+        assert_finite(&run(&line).unwrap());
+    }
+    for command in [
+        "evaluate --runs 3 --resolution auto --optimise-fov --instances released24",
+        "search --runs 1 --search-runs 1 --scales 0.02 --learning-rates 0.2,0.4",
+        "choose --search-runs 1",
+        "learn --outer 1 --batch 1 --validation-runs 1 --scale 0.02",
+        "solve --softness mlp --schedule decay --range 55-75 --variant transfer",
+    ] {
+        run(&format!("{command} --colour --size 8 --steps 2")).unwrap();
+    }
+}
+
+#[test]
 fn contradictions_are_usage_errors_and_missing_files_are_not() {
     for (line, code, part) in [
         ("evaluate --instances released24 --runs 25", 2, "24 pairs"),
@@ -192,11 +230,15 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("learn --resolution 32", 2, "learn draws at --size"),
         ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
         ("--mesh missing.obj", 1, "missing.obj"),
+        ("--colour --target missing.png", 2, "--colour draws its own targets"),
+        ("--colour --mesh missing.obj", 1, "missing.obj"),
     ] {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");
         assert!(failure.message.contains(part), "{line}: {failure}");
     }
+    let failure = with_mesh("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "--colour").unwrap_err();
+    assert!(failure.code == 2 && failure.message.contains("mesh.obj has none"), "{failure}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
 //! POSE.
 
+mod colour;
 mod golden;
 mod gradient;

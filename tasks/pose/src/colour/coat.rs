@@ -1,0 +1,139 @@
+use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
+
+use burn::tensor::{Tensor, TensorData};
+use softrast_meta::{numbers, tensor};
+use softrast_raster::{
+    Attributes, ColourRenderer, HostBackend, RasterBackend, Weighting, nearest_faces, vertices,
+};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+
+const EDGE: EdgeSoftness = EdgeSoftness { family: Family::Uniform, squared: false };
+/// Half the width of the edge of a face, in pixels. A near face outweighs those behind it up to where its softness ends, so this one ends
+/// soon (docs/notes.md, Colour).
+const EDGE_PX: f64 = 0.1;
+const DEPTH: DepthSoftness = DepthSoftness::Family(Family::Exp);
+/// A face that is nearer by this part of the distance of the camera counts e times as much.
+const DEPTH_SCALE: f64 = 0.01;
+/// Depths of nearness 1 and 0, in distances of the camera from the origin, which is in the middle of the mesh.
+const PLANES: [f64; 2] = [0.0, 2.0];
+/// Largest error of a channel.
+const TOLERANCE: f64 = 1e-3;
+
+/// The colours of the vertices of a mesh, as cameras at any distance see them.
+#[derive(Debug)]
+pub struct Coat<B: RasterBackend> {
+    colours: Vec<[f64; 3]>,
+    attributes: Attributes<B>,
+    faces: Arc<[[u32; 3]]>,
+    /// By pixels a side. They are kept because their tables are.
+    renderers: RefCell<BTreeMap<usize, ColourRenderer>>,
+}
+
+impl<B: RasterBackend> Coat<B> {
+    /// Of faces between vertices of these colours.
+    ///
+    /// # Panics
+    ///
+    /// If a face has a vertex without a colour.
+    pub fn new(colours: &[[f64; 3]], faces: Arc<[[u32; 3]]>) -> Self {
+        let values = vertices(colours, &Default::default());
+        Self {
+            colours: colours.to_vec(),
+            attributes: Attributes::new(values, faces.clone()),
+            faces,
+            renderers: RefCell::default(),
+        }
+    }
+
+    /// What the mesh shows, `[views, 3, side, side]`, hardly softened: over black where it shows nothing.
+    ///
+    /// `seen` `[views, vertices, 3]` holds x and y in NDC and the depth, `distance` `[views, 1]` that of each camera.
+    pub fn soft(&self, seen: Tensor<B, 3>, distance: Tensor<B, 2>, side: usize) -> Tensor<B, 4> {
+        let [views, count, _] = seen.dims();
+        let distance = distance.reshape([views, 1, 1]).expand([views, count, 1]);
+        // Perspective is the same in any unit, and in this one all meshes lie between the same planes.
+        let depth = seen.clone().narrow(2, 2, 1) / distance;
+        let seen = Tensor::cat(vec![seen.narrow(2, 0, 2), depth], 2);
+        let mut kept = self.renderers.borrow_mut();
+        let renderer = kept.entry(side).or_insert_with(|| {
+            let phi = [
+                EDGE.default_phi(EDGE_PX * 2.0 / side as f64),
+                DEPTH.default_phi(DEPTH_SCALE / (PLANES[1] - PLANES[0])),
+            ];
+            let weighting = Weighting { edge: EDGE, depth: DEPTH, planes: PLANES };
+            ColourRenderer::with_weighting(self.faces.clone(), side, weighting, phi)
+                .with_tolerance(TOLERANCE)
+        });
+        let background = renderer.background(&[0.0; 3], &seen.device());
+        renderer.image(seen, &self.attributes, &background).narrow(1, 0, 3)
+    }
+
+    /// The same without softness: at the centre of each pixel the colour of the nearest face. It has no gradient.
+    pub fn hard(&self, seen: Tensor<B, 3>, size: usize) -> Tensor<B, 4> {
+        let [views, count, _] = seen.dims();
+        let options = (&seen.device(), seen.dtype());
+        let mut image = vec![0.0; 3 * views * size * size];
+        let corners = numbers(seen.clone());
+        for (corners, image) in corners.chunks(3 * count).zip(image.chunks_mut(3 * size * size)) {
+            let view = tensor::<HostBackend, 2>(corners.to_vec(), [count, 3]);
+            for (pixel, face) in nearest_faces(view, &self.faces, size).into_iter().enumerate() {
+                let Some(face) = face else { continue };
+                let face = self.faces[face as usize].map(|vertex| vertex as usize);
+                let centre = |k: usize| (2 * k + 1) as f64 / size as f64 - 1.0;
+                let place = [centre(pixel % size), -centre(pixel / size)];
+                let weights = in_space(face.map(|v| [0, 1, 2].map(|k| corners[3 * v + k])), place);
+                for k in 0..3 {
+                    let share = |corner: usize| weights[corner] * self.colours[face[corner]][k];
+                    let level: f64 = (0..3).map(share).sum();
+                    // Rounding may place a centre just outside of its face.
+                    image[k * size * size + pixel] = level.clamp(0.0, 1.0);
+                }
+            }
+        }
+        Tensor::from_data(TensorData::new(image, [views, 3, size, size]), options)
+    }
+}
+
+/// How much the corners of a face count in space at a place on the screen; of a face that has an area there and is before the camera.
+fn in_space(corners: [[f64; 3]; 3], [x, y]: [f64; 2]) -> [f64; 3] {
+    let on_screen = [0, 1, 2].map(|k| {
+        let ([ax, ay, _], [bx, by, _]) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
+        ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / corners[k][2]
+    });
+    let sum: f64 = on_screen.iter().sum();
+    on_screen.map(|weight| weight / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A floor from depth 1 below the picture to depth 3 above it, black at the near end and white at the far one.
+    fn floor() -> (Coat<HostBackend>, Tensor<HostBackend, 3>) {
+        let corners = [-9.0, -1.0, 1.0, 9.0, -1.0, 1.0, 3.0, 1.0, 3.0, -3.0, 1.0, 3.0].to_vec();
+        let colours = [[0.0; 3], [0.0; 3], [1.0, 0.5, 0.25], [1.0, 0.5, 0.25]];
+        let faces = [[0, 1, 2], [0, 2, 3]];
+        (Coat::new(&colours, faces.into()), tensor(corners, [1, 4, 3]))
+    }
+
+    #[test]
+    fn a_hard_pixel_has_the_colour_in_space_of_what_is_seen() {
+        let (coat, seen) = floor();
+        let image = numbers(coat.hard(seen, 5));
+        // In the middle 1/z = (1 + 1/3) / 2, so z = 3/2, a quarter of the way.
+        for (channel, colour) in image.chunks(25).zip([1.0, 0.5, 0.25]) {
+            assert!((channel[12] - 0.25 * colour).abs() < 1e-6, "{channel:?}");
+        }
+    }
+
+    #[test]
+    fn the_soft_picture_is_nearly_the_hard_one_at_any_distance() {
+        let (coat, seen) = floor();
+        let hard = numbers(coat.hard(seen.clone(), 5));
+        for distance in [2.0, 20.0] {
+            let near = seen.clone() * tensor([1.0, 1.0, distance / 2.0].to_vec(), [1, 1, 3]);
+            let soft = numbers(coat.soft(near, tensor(vec![distance], [1, 1]), 5));
+            assert!(soft.iter().zip(&hard).all(|(a, b)| (a - b).abs() < 0.01), "{soft:?} {hard:?}");
+        }
+    }
+}
