@@ -187,11 +187,6 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
         self.renderer.tolerance
     }
 
-    /// Which part of the run is over, from 0 to 1.
-    pub fn part(&self) -> f64 {
-        self.renderer.layout.part(self.step)
-    }
-
     /// The softness of edges and its parameters `[P]`.
     pub fn edge(&self) -> (EdgeSoftness, Tensor<B, 1>) {
         let ScheduledRenderer { layout, values, .. } = self.renderer;
