@@ -2,7 +2,7 @@
 //!
 //! The reference visits up to 190 million pairs for a row. Its full runs are left to
 //! `cargo bench -p softrast-tests --bench exact_row -- fox reference`; the tests hold it against the
-//! fused op on small images of the same.
+//! fused op on a small image of the same; views beside one another are in the exact rows.
 
 use burn::backend::NdArray;
 use softrast_tests::{KnownRow, Workload};
@@ -26,7 +26,7 @@ fn fused_op_has_the_exact_rows() {
 #[test]
 fn reference_has_the_rows_of_the_fused_op_on_small_images() {
     for KnownRow { name, workload, .. } in KnownRow::ours() {
-        let azimuths_deg = workload.azimuths_deg.into_iter().take(2).collect();
+        let azimuths_deg = workload.azimuths_deg.into_iter().take(1).collect();
         let small = Workload { azimuths_deg, size: 40, ..workload };
         let exact = small.by_reference::<B>();
         small.by_fused_op::<B>(TOLERANCE).assert_agrees(name, &exact, BOUNDS);

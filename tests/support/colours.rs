@@ -7,12 +7,12 @@ use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers};
 
 use crate::{outputs::Outputs, tensors::tensor};
 
-/// Height and width of the image in pixels: more rows than are computed at once, three times over.
+/// Height and width of the image in pixels: more rows than are computed at once, twice over.
 const SIZE: [usize; 2] = [101, 110];
-const AZIMUTHS_DEG: [f64; 3] = [0.0, 100.0, 230.0];
+const AZIMUTHS_DEG: [f64; 2] = [0.0, 100.0];
 const CHANNELS: usize = 3;
 
-/// Image, gradients and gradients of these, on three views of the fox with colours at its vertices, in the float type of `B`.
+/// Image, gradients and gradients of these, on two views of the fox with colours at its vertices, in the float type of `B`.
 ///
 /// # Panics
 ///

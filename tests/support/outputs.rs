@@ -10,14 +10,14 @@ use softrast_softness::{EdgeSoftness, Family, Softness, numbers};
 
 use crate::tensors::tensor;
 
-/// Width and height of the image in pixels: more rows than are computed at once, four times over.
+/// Width and height of the image in pixels: more rows than are computed at once, twice over.
 const SIZE: usize = 150;
-const AZIMUTHS_DEG: [f64; 4] = [0.0, 70.0, 160.0, 250.0];
+const AZIMUTHS_DEG: [f64; 2] = [0.0, 70.0];
 
 /// What an op gives, by name.
 pub type Outputs = Vec<(&'static str, Vec<f64>)>;
 
-/// All outputs of the fused op on four views of the fox, 150 × 150, in the float type of `B`.
+/// All outputs of the fused op on two views of the fox, 150 × 150, in the float type of `B`.
 ///
 /// They are the sums; the gradients of a weighted sum of these to vertices and table; and the
 /// gradients of a weighted sum of both to vertices, table and first weights.

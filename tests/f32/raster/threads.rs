@@ -14,7 +14,7 @@ fn the_number_of_threads_changes_no_bit_of_any_output() {
     let alone = on_threads(1);
     assert!(alone.iter().all(|(_, values)| values.iter().any(|&x| x != 0.0)));
     // Twice on many threads: which of them is done first differs from run to run.
-    for count in [2, 3, 7, 7] {
+    for count in [2, 7, 7] {
         for ((name, found), (_, expected)) in on_threads(count).iter().zip(&alone) {
             assert!(bits(found) == bits(expected), "{name} differs on {count} threads");
         }
