@@ -108,7 +108,12 @@ impl<T: Task> TaskExperiment<T> {
         if T::FITS.is_finite() {
             set("starts", self.starts.into());
         }
-        set("schedule", if softness.is_constant() { "static" } else { "decay" }.into());
+        let schedule = match (softness.is_constant(), softness.feedback) {
+            (true, _) => "static",
+            (false, None) => "decay",
+            (false, Some(_)) => "feedback",
+        };
+        set("schedule", schedule.into());
         set("squared", softness.softness.squared.into());
         for (name, part) in [("scale", 0.0), ("scale_end", 1.0)] {
             set(name, softness.scale_at(part, size).into());
@@ -270,7 +275,7 @@ impl<T: Task> Experiment for TaskExperiment<T> {
     }
 
     fn batch_size(&self) -> usize {
-        self.task.batch_size()
+        if self.method.softness.feedback.is_some() { 1 } else { self.task.batch_size() }
     }
 
     /// Where the image does not fit, other starts are tried, and that with the best image is kept.

@@ -23,15 +23,19 @@ pub(crate) struct LearnArgs {
     /// Learn the inner learning rate along with the softness; with --estimator es
     #[arg(long)]
     learn_rate: bool,
+    /// Learn to move the scale, and the size of steps, by what a run sees; it begins with a decay
+    #[arg(long)]
+    feedback: bool,
     /// Instances that decide which softness is kept
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     validation_runs: usize,
     /// End after so many validations that found nothing better [default: never]
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     patience: Option<usize>,
-    /// What the outer loss is taken of: a fixed narrow softness on a finer image or on the image's own pixels, the hard image, which has
-    /// no gradient, or the loss that was optimised, as in the paper [default: fixed; own for direct, which sees nothing else]
-    #[arg(long, value_name = "fixed|pixels|hard|own", value_parser = named::<OuterLoss>)]
+    /// What the outer loss is taken of: a fixed narrow softness on a finer image or on the image's own pixels, the hard image of the last
+    /// step or of the one that a run returns, which have no gradient, or the loss that was optimised, as in the paper [default: fixed;
+    /// own for direct, which sees nothing else; returned with feedback]
+    #[arg(long, value_name = "fixed|pixels|hard|returned|own", value_parser = named::<OuterLoss>)]
     outer_loss: Option<OuterLoss>,
     /// The inner steps after which the outer loss is taken: the last, or a quarter, half and all of them [default: last]
     #[arg(long, value_name = "last|quarters", value_parser = named::<OuterSteps>)]
@@ -77,6 +81,7 @@ impl LearnArgs {
             batch: self.batch,
             outer_rate: self.outer_rate,
             learn_rate: self.learn_rate,
+            feedback: self.feedback,
             seed: usual.seed.saturating_add(seed),
             validation_seed: usual.validation_seed.saturating_add(seed),
             validation_runs: self.validation_runs,

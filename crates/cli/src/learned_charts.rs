@@ -51,9 +51,15 @@ pub(crate) fn learned_charts(
         });
         let name = if learned.softness.squared { "root of the scale" } else { "scale" };
         let scale = Axis::logarithmic(&format!("{name} (pixels)"));
-        let axes = Plot::new(Axis::linear("inner step"), scale);
-        let chart = Plot { series: series.into(), ..axes };
-        charts.push((chart, "The scale of the softness over the inner steps."));
+        let (along, caption) = match learned.feedback {
+            None => ("inner step", "The scale of the softness over the inner steps."),
+            Some(_) => (
+                "place on the path (steps, if it were followed by time)",
+                "The scale of the softness along its path. When a run is where follows from what it sees.",
+            ),
+        };
+        let chart = Plot { series: series.into(), ..Plot::new(Axis::linear(along), scale) };
+        charts.push((chart, caption));
     }
     charts
 }

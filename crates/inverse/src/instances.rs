@@ -7,7 +7,7 @@ use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, numbers, vector
 
 use crate::{
     Inner, InverseProblem, LearnConfig, Method, Outer, OuterLoss, PhiLayout, Resolution,
-    ScheduledRenderer, SolveConfig, objectives::OuterImage,
+    ScheduledRenderer, SolveConfig, minimize, objectives::OuterImage,
 };
 
 /// Scale of the softness that judges, in pixels of the image that judges: the least one whose gradient does not depend on where between
@@ -42,14 +42,12 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
         solve: &SolveConfig,
         config: &LearnConfig,
     ) -> anyhow::Result<Self> {
-        let has_surrogate = method.softness.surrogate.is_some();
         let own = problem.own_phi();
-        let parameters = method.softness.parameters() + own.len();
-        let config = config.resolved(parameters, has_surrogate)?;
+        let config = config.resolved(&method.softness, own.len())?;
         let layout = PhiLayout::learned(&method.softness, own, solve.steps, solve.size, &config);
         let tolerance = method.learning_tolerance(config.differentiates());
         let judge = match config.outer_loss {
-            Some(OuterLoss::Hard) => OuterImage::Hard,
+            Some(OuterLoss::Hard | OuterLoss::Returned) => OuterImage::Hard,
             _ => OuterImage::Sharp(sharp(&problem, config.finer() * solve.size, &config).into()),
         };
         let (problem, solve, latest) = (Rc::new(problem), *solve, RefCell::new(None));
@@ -109,8 +107,28 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
     /// The outer loss of a whole run.
     fn outer_loss(&self, seed: u64, phi: &Tensor<B, 1>, own: bool) -> f64 {
         let phi = numbers(phi.clone());
+        if self.config.outer_loss == Some(OuterLoss::Returned) {
+            return self.returned(seed, &phi).sqrt();
+        }
         let (softness, _) = self.parted(&phi);
         self.made(seed, &phi, own).loss(&vector(softness))
+    }
+
+    /// The least hard error of a whole run; not a number where none is finite.
+    fn returned(&self, seed: u64, phi: &[f64]) -> f64 {
+        let (softness, Adam { learning_rate, .. }) = self.parted(phi);
+        let (softness, _) = self.layout.softness(softness);
+        let tolerance = Some(self.tolerance);
+        let method = Method { tolerance, ..Method::new("learned", softness) };
+        let instance = self.problem.instance(seed).expect("instances of all seeds can be made");
+        let mut least = f64::NAN;
+        let solve = SolveConfig { learning_rate, ..self.solve };
+        minimize::<P, B>(&self.problem, &[instance], &method, &solve, false, |iterate, _| {
+            least = least.min(iterate.hard_loss[0]);
+            Ok(())
+        })
+        .expect("a run on the host has no errors of its own");
+        least
     }
 
     fn is_own(&self) -> bool {

@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 use softrast_raster::RasterBackend;
 use softrast_softness::{
-    EdgeSoftness, ScaleSchedule, ScheduledSoftness, Softness, Surrogate, tensor, vector,
+    EdgeSoftness, Feedback, ScaleSchedule, ScheduledSoftness, Softness, Surrogate, tensor, vector,
 };
 
 use crate::{Input, LearnConfig};
@@ -16,7 +16,7 @@ const KNOTS: usize = 3;
 ///
 /// First come the knots of the schedule, if the scale moves or is learned apart. Then the parameters of the softness, at scale 1 and
 /// without the logarithm of the scale where there is a schedule, which replaces it. Then those of the surrogate, whole, as it keeps a
-/// ratio to the schedule that is its own. Last come parameters of the problem's own.
+/// ratio to the schedule that is its own. Then those of the feedback. Last come parameters of the problem's own.
 ///
 /// ```
 /// use softrast_inverse::PhiLayout;
@@ -69,7 +69,8 @@ impl PhiLayout {
                 && config.floor_px.is_none()
         });
         if kept.is_some() {
-            return Self::new(start.clone(), own, steps, size);
+            let feedback = start.feedback.or(config.feedback.then_some(Feedback::START));
+            return Self::new(ScheduledSoftness { feedback, ..start.clone() }, own, steps, size);
         }
         let floor_px = config.floor_px.unwrap_or(FLOOR_PX);
         let mut schedule = ScaleSchedule { knots: Vec::new(), floor_px };
@@ -82,7 +83,9 @@ impl PhiLayout {
             (scale - floor).max(ABOVE_FLOOR * scale).ln()
         };
         schedule.knots = (0..knots).map(knot).collect();
-        let start = ScheduledSoftness { schedule: Some(schedule), ..at_unit_scale(start) };
+        let feedback = start.feedback.or(config.feedback.then_some(Feedback::START));
+        let start =
+            ScheduledSoftness { schedule: Some(schedule), feedback, ..at_unit_scale(start) };
         Self::new(start, own, steps, size)
     }
 
@@ -91,15 +94,26 @@ impl PhiLayout {
         let knots = self.start.schedule.iter().flat_map(|schedule| &schedule.knots);
         let surrogate = self.start.surrogate.iter().flat_map(|surrogate| &surrogate.phi);
         let phi = &self.start.phi[self.replaced()..];
-        knots.chain(phi).chain(surrogate).chain(&self.own).copied().collect()
+        let feedback = self.start.feedback.iter().flat_map(Feedback::parameters);
+        let edges = knots.chain(phi).chain(surrogate).copied();
+        edges.chain(feedback).chain(self.own.iter().copied()).collect()
     }
 
     /// The softness that a vector stands for, and the parameters of the problem's own.
+    ///
+    /// # Panics
+    ///
+    /// If the vector is shorter than that of [`start`](Self::start).
     pub fn softness(&self, learned: &[f64]) -> (ScheduledSoftness, Vec<f64>) {
         let (knots, rest) = learned.split_at(self.knots());
         let (phi, rest) = rest.split_at(self.start.phi.len() - self.replaced());
-        let (surrogate, own) = rest.split_at(self.surrogate_len());
+        let (surrogate, rest) = rest.split_at(self.surrogate_len());
         let mut softness = self.start.clone();
+        let mut own = rest;
+        if let Some(feedback) = &mut softness.feedback {
+            let (numbers, rest) = rest.split_first_chunk().expect("φ holds the feedback too");
+            (*feedback, own) = (Feedback::of(*numbers), rest);
+        }
         softness.phi[self.replaced()..].copy_from_slice(phi);
         softness.schedule.iter_mut().for_each(|schedule| schedule.knots = knots.to_vec());
         softness.surrogate.iter_mut().for_each(|found| found.phi = surrogate.to_vec());

@@ -1,6 +1,7 @@
 use anyhow::{bail, ensure};
 use serde::{Deserialize, Serialize};
 use softrast_meta::{MetaGradient, OuterSteps};
+use softrast_softness::ScheduledSoftness;
 
 /// How a softness is learned.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -16,6 +17,8 @@ pub struct LearnConfig {
     pub outer_rate: f64,
     /// Whether the logarithm of the inner learning rate is learned too.
     pub learn_rate: bool,
+    /// Whether a softness whose scale moves learns to move it by what a run sees, beginning with [`Feedback::START`](softrast_softness::Feedback::START).
+    pub feedback: bool,
     /// Seed of the first training instance.
     pub seed: u64,
     /// Seed of the first validation instance.
@@ -46,6 +49,9 @@ pub enum OuterLoss {
     Pixels,
     /// The hard image, by which tables compare. It has no gradient, so it goes with what takes none of it.
     Hard,
+    /// The hard image of the step that a run returns, that of the least error, under an evolution strategy. It is the root of the error,
+    /// so that few runs that fail do not hide how near the others come.
+    Returned,
     /// The loss that was optimised, under the learned softness itself, as in the paper.
     Own,
 }
@@ -75,6 +81,7 @@ impl Default for LearnConfig {
             batch: 8,
             outer_rate: 0.03,
             learn_rate: false,
+            feedback: false,
             seed: TRAINING_SEED,
             validation_seed: 2 * TRAINING_SEED,
             validation_runs: 8,
@@ -89,19 +96,31 @@ impl Default for LearnConfig {
 }
 
 impl LearnConfig {
-    /// The same with what follows from the number of parameters.
+    /// The same with what follows from the softness that learning begins with, and from the number of parameters of the problem's `own`.
     ///
     /// # Errors
     ///
     /// If choices contradict each other.
-    pub fn resolved(&self, parameters: usize, has_surrogate: bool) -> anyhow::Result<Self> {
+    pub fn resolved(&self, softness: &ScheduledSoftness, own: usize) -> anyhow::Result<Self> {
+        let (parameters, has_surrogate) =
+            (softness.parameters() + own, softness.surrogate.is_some());
+        let has_feedback = self.feedback || softness.feedback.is_some();
+        ensure!(
+            !self.feedback || !softness.is_constant(),
+            "--feedback moves the scale along its path: add --schedule decay"
+        );
         let es = MetaGradient::EvolutionStrategy { sigma: SIGMA, pairs: 1 };
-        let usual = if parameters <= FEW { es } else { MetaGradient::default() };
+        let few = parameters <= FEW || has_feedback || self.outer_loss == Some(OuterLoss::Returned);
+        let usual = if few { es } else { MetaGradient::default() };
         let estimator = self.estimator.unwrap_or(usual);
         let differences = matches!(estimator, MetaGradient::EvolutionStrategy { .. });
         let along = matches!(estimator, MetaGradient::AlternatingDescent { .. });
         let direct = estimator == MetaGradient::Direct;
-        let usual = if direct { OuterLoss::Own } else { OuterLoss::Fixed };
+        let usual = match direct {
+            true => OuterLoss::Own,
+            false if has_feedback => OuterLoss::Returned,
+            false => OuterLoss::Fixed,
+        };
         let outer_loss = self.outer_loss.unwrap_or(usual);
         ensure!(
             !direct || outer_loss == OuterLoss::Own,
@@ -110,6 +129,14 @@ impl LearnConfig {
         ensure!(
             outer_loss != OuterLoss::Hard || differences || along,
             "a hard image has no gradient: --outer-loss hard needs --estimator es or alternating"
+        );
+        ensure!(
+            outer_loss != OuterLoss::Returned || (differences && own == 0),
+            "--outer-loss returned needs --estimator es, and a task whose softness is that of its edges alone"
+        );
+        ensure!(
+            !has_feedback || outer_loss == OuterLoss::Returned,
+            "a softness with feedback goes by the hard image, which has no gradient: it needs --estimator es and --outer-loss returned"
         );
         ensure!(
             !self.learn_rate || differences,
@@ -129,7 +156,7 @@ impl LearnConfig {
     pub(crate) fn finer(&self) -> usize {
         match self.outer_loss {
             None | Some(OuterLoss::Fixed | OuterLoss::Own) => 2,
-            Some(OuterLoss::Pixels | OuterLoss::Hard) => 1,
+            Some(OuterLoss::Pixels | OuterLoss::Hard | OuterLoss::Returned) => 1,
         }
     }
 
@@ -141,30 +168,60 @@ impl LearnConfig {
 
 #[cfg(test)]
 mod tests {
+    use softrast_softness::{EdgeSoftness, Family};
+
     use super::*;
 
     fn with(estimator: MetaGradient) -> LearnConfig {
         LearnConfig { estimator: Some(estimator), ..LearnConfig::default() }
     }
 
+    /// A softness with one parameter or many.
+    fn start(family: Family, has_surrogate: bool) -> ScheduledSoftness {
+        let start = ScheduledSoftness::constant(EdgeSoftness { family, squared: false }, 0.1);
+        if has_surrogate { start.with_surrogate_scale(0.2) } else { start }
+    }
+
+    fn resolved(config: &LearnConfig, family: Family) -> anyhow::Result<LearnConfig> {
+        config.resolved(&start(family, false), 0)
+    }
+
     #[test]
     fn a_direct_gradient_needs_a_loss_that_sees_the_softness() {
         let direct = with(MetaGradient::Direct);
-        assert_eq!(direct.resolved(1, false).unwrap().outer_loss, Some(OuterLoss::Own));
+        let found = resolved(&direct, Family::Gauss).unwrap();
+        assert_eq!(found.outer_loss, Some(OuterLoss::Own));
         let fixed = LearnConfig { outer_loss: Some(OuterLoss::Fixed), ..direct };
-        assert!(fixed.resolved(1, false).is_err());
+        assert!(resolved(&fixed, Family::Gauss).is_err());
     }
 
     #[test]
     fn few_parameters_are_learned_by_differences_and_many_by_derivatives() {
-        let estimator = |n| LearnConfig::default().resolved(n, false).unwrap().estimator.unwrap();
-        assert!(matches!(estimator(4), MetaGradient::EvolutionStrategy { .. }));
-        assert_eq!(estimator(56), MetaGradient::default());
+        let usual = LearnConfig::default();
+        let estimator = |family| resolved(&usual, family).unwrap().estimator.unwrap();
+        assert!(matches!(estimator(Family::Gauss), MetaGradient::EvolutionStrategy { .. }));
+        assert_eq!(estimator(Family::Mlp), MetaGradient::default());
         let hard = LearnConfig { outer_loss: Some(OuterLoss::Hard), ..LearnConfig::default() };
         let rate = LearnConfig { learn_rate: true, ..LearnConfig::default() };
         for config in [hard, rate] {
-            assert!(config.resolved(4, false).is_ok() && config.resolved(56, false).is_err());
+            assert!(resolved(&config, Family::Gauss).is_ok());
+            assert!(resolved(&config, Family::Mlp).is_err());
         }
+    }
+
+    #[test]
+    fn feedback_is_learned_by_differences_of_what_runs_return() {
+        let config = LearnConfig { feedback: true, ..LearnConfig::default() };
+        assert!(resolved(&config, Family::Gauss).is_err(), "a scale that stays has no path");
+        let gauss = EdgeSoftness { family: Family::Gauss, squared: false };
+        let moving = ScheduledSoftness::decay(gauss, 0.1, 0.01);
+        let found = config.resolved(&moving, 0).unwrap();
+        assert_eq!(found.outer_loss, Some(OuterLoss::Returned));
+        assert!(matches!(found.estimator, Some(MetaGradient::EvolutionStrategy { .. })));
+        let unrolled = LearnConfig { feedback: true, ..with(MetaGradient::default()) };
+        let hard = LearnConfig { outer_loss: Some(OuterLoss::Hard), ..config.clone() };
+        assert!(unrolled.resolved(&moving, 0).is_err() && hard.resolved(&moving, 0).is_err());
+        assert!(config.resolved(&moving, 1).is_err());
     }
 
     #[test]
@@ -174,7 +231,8 @@ mod tests {
             with(along),
             LearnConfig { outer_loss: Some(OuterLoss::Own), ..with(MetaGradient::default()) },
         ] {
-            assert!(config.resolved(1, true).is_err() && config.resolved(1, false).is_ok());
+            let found = [true, false].map(|has| config.resolved(&start(Family::Gauss, has), 0));
+            assert!(found[0].is_err() && found[1].is_ok());
         }
     }
 }

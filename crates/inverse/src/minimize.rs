@@ -5,9 +5,9 @@ use burn::{
     backend::Autodiff,
     tensor::{Tensor, TensorData, Transaction, backend::Backend},
 };
-use softrast_meta::{InnerLoop, descend};
+use softrast_meta::{Adam, Optimizer};
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
-use softrast_softness::numbers;
+use softrast_softness::{Place, ScaleSchedule, numbers};
 
 use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
 
@@ -40,7 +40,8 @@ pub struct Iterate {
 ///
 /// # Errors
 ///
-/// Those of `visit` and of the device, which end the descent; if there is no instance.
+/// Those of `visit` and of the device, which end the descent; if there is no instance, or more than one where the softness has feedback:
+/// each run goes its own way then.
 pub fn minimize<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     instances: &[P::Instance],
@@ -50,33 +51,46 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
     mut visit: impl FnMut(&Iterate, &P::Scene<HostBackend>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Iterate> {
     ensure!(!instances.is_empty(), "there is no instance to solve");
+    let SolveConfig { steps, learning_rate, .. } = *config;
+    let feedback = method.softness.feedback;
+    ensure!(
+        instances.len() == 1 || feedback.is_none(),
+        "a softness with feedback solves one instance at a time, found {}",
+        instances.len()
+    );
     let run = Run::<P, B>::new(problem, instances, method, config);
     // Time of drawing, and since when the step has gone on.
     let mut spent: Option<(Duration, Instant)> = None;
-    let mut look = |step: usize, leaf: Tensor<Autodiff<B>, 1>| {
+    let mut look = |step: usize, part: f64, leaf: Tensor<Autodiff<B>, 1>| {
         let seconds = spent.map(|(drawing, since)| (drawing + since.elapsed()).as_secs_f64());
         let clock = Instant::now();
-        let seen = run.seen(step, leaf);
+        let seen = run.seen(part, leaf);
         // A GPU has only been asked so far, also for the end of the step before.
         B::sync(&seen.theta.device())?;
         let drawing = clock.elapsed();
         let loss = seen.loss.clone();
-        let iterate = Iterate { seconds, ..run.read(step, seen, pictures)? };
+        let iterate = Iterate { seconds, ..run.read(step, part, seen, pictures)? };
         visit(&iterate, &run.host)?;
         spent = Some((drawing, Instant::now()));
         anyhow::Ok((loss, iterate))
     };
-    let SolveConfig { steps, learning_rate, .. } = *config;
-    let inner = InnerLoop { optimizer: problem.optimizer(learning_rate), steps };
-    let gradient = |step: usize, theta: &Tensor<B, 1>| {
+    let mut follower = feedback.map(|feedback| feedback.follow(steps));
+    let by_time = |step| Place { part: ScaleSchedule::part(step, steps), rate: 1.0 };
+    let optimizer = problem.optimizer(learning_rate);
+    let mut theta = problem.start(&run.scene).inner();
+    let mut state = optimizer.init(&theta);
+    let (mut place, mut error) = (by_time(0), None);
+    for step in 0..steps {
+        place = follower.as_mut().map_or_else(|| by_time(step), |run| run.next(error));
         let leaf = Tensor::from_inner(theta.clone()).require_grad();
-        let (loss, _) = look(step, Tensor::clone(&leaf))?;
-        Ok(leaf.grad(&loss.sum().backward()).unwrap_or_else(|| theta.zeros_like()))
-    };
-    let allowed = |theta| problem.allowed(&run.scene, Tensor::from_inner(theta)).inner();
-    let start = problem.start(&run.scene).inner();
-    let theta = descend::<B, _, anyhow::Error>(&inner, start, gradient, allowed, |_, _, _| ())?;
-    Ok(look(steps, Tensor::from_inner(theta))?.1)
+        let (loss, iterate) = look(step, place.part, Tensor::clone(&leaf))?;
+        error = Some(iterate.hard_loss[0]);
+        let gradient = leaf.grad(&loss.sum().backward()).unwrap_or_else(|| theta.zeros_like());
+        let optimizer = Adam { learning_rate: place.rate * learning_rate, ..optimizer };
+        (theta, state) = optimizer.step(theta, gradient, state);
+        theta = problem.allowed(&run.scene, Tensor::from_inner(theta)).inner();
+    }
+    Ok(look(steps, place.part, Tensor::from_inner(theta))?.1)
 }
 
 /// Instances that are solved side by side, and what draws them.
@@ -115,16 +129,22 @@ impl<'a, P: InverseProblem, B: RasterBackend> Run<'a, P, B> {
         Self { problem, instances: instances.len(), size, renderer, scene, host }
     }
 
-    fn seen(&self, step: usize, theta: Tensor<Autodiff<B>, 1>) -> Seen<B> {
+    fn seen(&self, part: f64, theta: Tensor<Autodiff<B>, 1>) -> Seen<B> {
         let Self { problem, scene, renderer, .. } = self;
-        let image = problem.image(scene, theta.clone(), &renderer.at(step));
+        let image = problem.image(scene, theta.clone(), &renderer.at_part(part));
         let soft = problem.image_loss(scene, image.clone());
         let loss = lowered(*problem, scene, theta.clone(), soft.clone());
         Seen { theta: theta.inner(), image: image.inner(), soft_loss: soft.inner(), loss }
     }
 
     /// The numbers of what is seen, with its hard error.
-    fn read(&self, step: usize, seen: Seen<B>, picture: bool) -> anyhow::Result<Iterate> {
+    fn read(
+        &self,
+        step: usize,
+        part: f64,
+        seen: Seen<B>,
+        picture: bool,
+    ) -> anyhow::Result<Iterate> {
         let image = picture.then(|| of_first(seen.image, self.instances));
         let rows = image.as_ref().map(|image| image.dims()[2]);
         // One round trip to the device for all of it.
@@ -141,7 +161,7 @@ impl<'a, P: InverseProblem, B: RasterBackend> Run<'a, P, B> {
         let hard = self.problem.hard_image(&self.host, theta.clone());
         Ok(Iterate {
             step,
-            scale: self.renderer.scale(step),
+            scale: self.renderer.scale(part),
             theta,
             loss: loss.iter().collect(),
             soft_loss: soft_loss.iter().collect(),

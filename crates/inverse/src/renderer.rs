@@ -22,8 +22,8 @@ pub struct ScheduledRenderer {
     resolution: Resolution,
     /// What draws silhouettes, if the problem has any: as they are seen, and as their gradient has it, if that is another.
     renderers: Vec<SoftRenderer<EdgeSoftness>>,
-    /// What was drawn with so far, by [`PhiLayout::stage`].
-    kept: RefCell<BTreeMap<usize, Rc<Kept>>>,
+    /// What was drawn with so far, by its place on the path.
+    kept: RefCell<BTreeMap<u64, Rc<Kept>>>,
 }
 
 /// What draws at a step, always the same: tables belong to its knots.
@@ -60,7 +60,12 @@ impl ScheduledRenderer {
 
     /// The softness at a step of which nothing is differentiated by φ.
     pub fn at<B: RasterBackend>(&self, step: usize) -> SoftnessAt<'_, B> {
-        SoftnessAt { renderer: self, step: step.min(self.layout.steps()), prepared: None }
+        self.at_part(self.layout.part(step))
+    }
+
+    /// The softness at a part of its path, 0 to 1, of which nothing is differentiated by φ.
+    pub(crate) fn at_part<B: RasterBackend>(&self, part: f64) -> SoftnessAt<'_, B> {
+        SoftnessAt { renderer: self, part, prepared: None }
     }
 
     /// The softness at a step from what [`ScheduledRenderer::prepared`] gave.
@@ -84,7 +89,7 @@ impl ScheduledRenderer {
             return Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0);
         }
         let phi = [self.layout.phi(phi, step)].into_iter().chain(self.layout.surrogate(phi, step));
-        let kept = self.kept::<B>(step);
+        let kept = self.kept::<B>(self.layout.part(step));
         let tables = kept.silhouettes.iter().zip(phi).map(|(of, phi)| of.table(phi).flatten(0, 1));
         Tensor::cat(tables.collect(), 0)
     }
@@ -105,25 +110,29 @@ impl ScheduledRenderer {
         &self.layout
     }
 
-    /// Scale of the softness at a step.
-    pub fn scale(&self, step: usize) -> f64 {
-        self.values.scale_at(self.layout.part(step), self.layout.size())
+    /// Scale of the softness at a part of its path, 0 to 1.
+    pub(crate) fn scale(&self, part: f64) -> f64 {
+        self.values.scale_at(part, self.layout.size())
     }
 
-    /// Pixels a side of the image at a step.
-    pub fn side(&self, step: usize) -> usize {
-        let width = self.values.width_at(self.layout.part(step), self.layout.size());
-        self.resolution.side(self.size, width)
+    /// Parts of the path with the same number have the same softness.
+    fn place(&self, part: f64) -> u64 {
+        if self.values.is_constant() { 0 } else { part.to_bits() }
+    }
+
+    /// Pixels a side of the image at a part of the path, 0 to 1.
+    fn side(&self, part: f64) -> usize {
+        self.resolution.side(self.size, self.values.width_at(part, self.layout.size()))
     }
 
     /// # Panics
     ///
     /// If the problem has no faces.
-    fn kept<B: RasterBackend>(&self, step: usize) -> Rc<Kept> {
+    fn kept<B: RasterBackend>(&self, part: f64) -> Rc<Kept> {
         let mut kept = self.kept.borrow_mut();
-        let kept = kept.entry(self.layout.stage(step)).or_insert_with(|| {
+        let kept = kept.entry(self.place(part)).or_insert_with(|| {
             assert!(!self.renderers.is_empty(), "a problem that sees silhouettes has faces");
-            let (part, size) = (self.layout.part(step), self.layout.size());
+            let size = self.layout.size();
             let surrogate = self.values.surrogate_at(part, size).map(|found| found.phi);
             let phi = [self.values.phi_at(part, size)].into_iter().chain(surrogate);
             let dtype = <B::FloatElem as Element>::dtype();
@@ -141,11 +150,12 @@ impl ScheduledRenderer {
     }
 }
 
-/// The softness at one step of a run, as [`InverseProblem::image`](crate::InverseProblem::image) sees it.
+/// The softness at one place of its path, as [`InverseProblem::image`](crate::InverseProblem::image) sees it.
 #[derive(Clone, Debug)]
 pub struct SoftnessAt<'a, B: RasterBackend> {
     renderer: &'a ScheduledRenderer,
-    step: usize,
+    /// Part of the path.
+    part: f64,
     /// What was prepared of a vector φ; without it, the renderer's own values count.
     prepared: Option<Tensor<B, 1>>,
 }
@@ -158,7 +168,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     ///
     /// If the problem has no faces.
     pub fn silhouette(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
-        let kept = self.renderer.kept::<B>(self.step);
+        let kept = self.renderer.kept::<B>(self.part);
         let table = match &self.prepared {
             Some(table) => table.clone().reshape([-1, 4]),
             None => {
@@ -166,7 +176,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
                 Tensor::from_data(kept.table.clone(), options)
             }
         };
-        let side = self.renderer.side(self.step);
+        let side = self.renderer.side(self.part);
         let seen = kept.silhouettes[0].clone().sized(side);
         let Some(surrogate) = kept.silhouettes.get(1) else {
             return seen.coverage_by_table(vertices, table);
@@ -179,7 +189,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
 
     /// Pixels a side of the image.
     pub fn side(&self) -> usize {
-        self.renderer.side(self.step)
+        self.renderer.side(self.part)
     }
 
     /// Largest error of a pixel by leaving out far faces.
@@ -192,7 +202,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
         let ScheduledRenderer { layout, values, .. } = self.renderer;
         let phi = match &self.prepared {
             Some(prepared) => prepared.clone().narrow(0, 0, values.phi.len()),
-            None => vector(&values.phi_at(layout.part(self.step), layout.size())),
+            None => vector(&values.phi_at(self.part, layout.size())),
         };
         (layout.edge(), phi)
     }
@@ -205,9 +215,9 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
         }
     }
 
-    /// The number of the stage, where nothing is differentiated by φ: what follows from the softness alone may be kept as long as it
-    /// is the same.
-    pub fn fixed_stage(&self) -> Option<usize> {
-        self.prepared.is_none().then(|| self.renderer.layout.stage(self.step))
+    /// A number for its place on the path, where nothing is differentiated by φ: what follows from the softness alone may be kept as
+    /// long as it is the same.
+    pub fn fixed_place(&self) -> Option<u64> {
+        self.prepared.is_none().then(|| self.renderer.place(self.part))
     }
 }

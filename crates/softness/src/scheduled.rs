@@ -3,7 +3,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    EdgeSoftness, ScaleSchedule, Softness, SoftnessFileError,
+    EdgeSoftness, Feedback, ScaleSchedule, Softness, SoftnessFileError,
     file::{Stored, check_phi, learned, stored},
     math::ln_scale,
 };
@@ -43,6 +43,9 @@ pub struct ScheduledSoftness {
     /// How its width moves over a run; a softness without one stays as it is.
     #[serde(rename = "path", default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<ScaleSchedule>,
+    /// How a run goes along its schedule by what it sees; without it, by time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feedback: Option<Feedback>,
     /// What the gradient is taken of, where that is not the softness itself; it moves along the same
     /// schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -82,8 +85,8 @@ impl ScheduledSoftness {
 
     fn new(softness: EdgeSoftness, scale: f64, schedule: Option<ScaleSchedule>) -> Self {
         let phi = softness.default_phi(scale);
-        let (surrogate, learning_rate, task, note) = (None, None, None, None);
-        Self { softness, phi, schedule, surrogate, learning_rate, task, note }
+        let (feedback, surrogate, learning_rate, task, note) = (None, None, None, None, None);
+        Self { softness, phi, schedule, feedback, surrogate, learning_rate, task, note }
     }
 
     /// With the same softness at `scale`, in NDC (NDC² if squared), as its surrogate.
@@ -106,12 +109,13 @@ impl ScheduledSoftness {
         self.schedule.as_ref().is_none_or(|schedule| schedule.knots.len() == 1)
     }
 
-    /// How many numbers may be chosen: φ and that of the surrogate, and the knots of a schedule,
-    /// which take the place of a family's own scale.
+    /// How many numbers may be chosen: φ and that of the surrogate, the knots of a schedule, which
+    /// take the place of a family's own scale, and what moves a run along them.
     pub fn parameters(&self) -> usize {
         let replaced = self.softness.logarithms().min(1);
         let knots = self.schedule.as_ref().map_or(0, |schedule| schedule.knots.len() - replaced);
-        self.phi.len() + knots + self.surrogate.as_ref().map_or(0, |of| of.phi.len())
+        let feedback = self.feedback.map_or(0, |_| Feedback::PARAMETERS);
+        self.phi.len() + knots + feedback + self.surrogate.as_ref().map_or(0, |of| of.phi.len())
     }
 
     /// The scale of the schedule at `part` of a run, 0 to 1, on images of `size` × `size` pixels;
@@ -186,6 +190,15 @@ impl Stored for ScheduledSoftness {
         if let Some(rate) = self.learning_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
             return Err(format!(": the learning rate is {rate}, expected a positive number"));
         }
+        match &self.feedback {
+            Some(_) if self.is_constant() => {
+                return Err(" has feedback, which moves along a path, but no path".into());
+            }
+            Some(feedback) => {
+                feedback.check().map_err(|wrong| format!(" has feedback with {wrong}"))?;
+            }
+            None => {}
+        }
         let Some(schedule) = &self.schedule else { return Ok(()) };
         schedule.check().map_err(|wrong| format!(" has a path with {wrong}"))
     }
@@ -205,6 +218,7 @@ mod tests {
             softness,
             phi: softness.default_phi(1e-4),
             schedule: Some(schedule),
+            feedback: Some(Feedback::START),
             surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
             learning_rate: Some(0.3),
             task: Some("pose".into()),

@@ -30,8 +30,8 @@ pub struct Scene<B: RasterBackend> {
     colour: Tensor<B, 4>,
     start: Tensor<B, 2>,
     target: Tensor<B, 3>,
-    /// The edge part of a softness that nothing is differentiated by, and the stage of the run that it is of.
-    fixed_edges: RefCell<Option<(usize, Tensor<B, 3>)>>,
+    /// The edge part of a softness that nothing is differentiated by, and its place on the path.
+    fixed_edges: RefCell<Option<(u64, Tensor<B, 3>)>>,
 }
 
 impl<B: RasterBackend> Scene<B> {
@@ -82,19 +82,19 @@ impl<B: RasterBackend> Scene<B> {
         softness.log_value(phi, self.distance.clone())
     }
 
-    /// [`Scene::edges`] of a softness that nothing is differentiated by, made anew only at another `stage` of a run.
+    /// [`Scene::edges`] of a softness that nothing is differentiated by, made anew only at another `place` on its path.
     pub(crate) fn fixed_edges(
         &self,
-        stage: usize,
+        place: u64,
         softness: EdgeSoftness,
         phi: Tensor<B, 1>,
     ) -> Tensor<B, 3> {
         let mut kept = self.fixed_edges.borrow_mut();
-        match kept.as_ref().filter(|(of, _)| *of == stage) {
+        match kept.as_ref().filter(|(of, _)| *of == place) {
             Some((_, edges)) => edges.clone(),
             None => {
                 let edges = self.edges(softness, phi).detach();
-                *kept = Some((stage, edges.clone()));
+                *kept = Some((place, edges.clone()));
                 edges
             }
         }

@@ -78,8 +78,8 @@ impl InverseProblem for Occlusion {
         softness: &SoftnessAt<'_, B>,
     ) -> Tensor<B, 3> {
         let (edge, phi) = softness.edge();
-        let edges = match softness.fixed_stage() {
-            Some(stage) => scene.fixed_edges(stage, edge, phi),
+        let edges = match softness.fixed_place() {
+            Some(place) => scene.fixed_edges(place, edge, phi),
             None => scene.edges(edge, phi),
         };
         scene.image(scene.by_view(theta), edges, self.depth.softness, softness.own())

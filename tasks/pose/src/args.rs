@@ -47,6 +47,9 @@ pub enum Range {
     /// 55 to 75 degrees.
     #[value(name = "55-75")]
     Far,
+    /// 15 to 75 degrees.
+    #[value(name = "15-75")]
+    All,
 }
 
 impl Range {
@@ -58,6 +61,7 @@ impl Range {
             Range::Near => [15.0, 35.0],
             Range::Middle => [35.0, 55.0],
             Range::Far => [55.0, 75.0],
+            Range::All => [15.0, 75.0],
         }
     }
 
@@ -67,6 +71,7 @@ impl Range {
             Range::Near => "15-35",
             Range::Middle => "35-55",
             Range::Far => "55-75",
+            Range::All => "15-75",
         }
     }
 }

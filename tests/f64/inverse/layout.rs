@@ -6,7 +6,9 @@ use burn::backend::{Autodiff, NdArray};
 use softrast_cli::{MethodArgs, Scales, Schedule};
 use softrast_inverse::{Input, Instances, LearnConfig, Method, OuterLoss, PhiLayout, SolveConfig};
 use softrast_meta::{MetaGradient, Objective, TaskDistribution};
-use softrast_softness::{EdgeSoftness, Family, ScaleSchedule, ScheduledSoftness, Softness};
+use softrast_softness::{
+    EdgeSoftness, Family, Feedback, ScaleSchedule, ScheduledSoftness, Softness,
+};
 use softrast_tests::{numbers, vector};
 
 use super::square::Square;
@@ -178,4 +180,23 @@ fn a_surrogate_goes_only_with_estimators_that_follow_what_replaces_the_derivativ
         assert_eq!(found.is_ok(), learns, "{config:?}");
         assert!(instances("logistic", &config).is_ok());
     }
+}
+
+#[test]
+fn feedback_is_part_of_the_vector_and_judged_by_what_a_run_returns() {
+    let config = LearnConfig { feedback: true, ..LearnConfig::default() };
+    let line = "logistic --schedule decay --surrogate-scale 0.2";
+    let softness = method(line).softness;
+    let layout = PhiLayout::learned(&softness, vec![7.0], STEPS, SIZE, &config);
+    let start = layout.start();
+    // Three knots and the surrogate before it, a parameter of the problem's own behind it.
+    assert_eq!((start.len(), &start[4..11]), (12, &Feedback::START.parameters()[..]));
+    let (learned, own) = layout.softness(&start);
+    assert_eq!((learned.feedback, own), (Some(Feedback::START), vec![7.0]));
+
+    // From 5, ten steps of 0.1 come to 4, whose image of whole numbers has an error of 16.
+    let instances = instances(line, &config).unwrap();
+    let rates = Feedback { kick: 0.0, ..Feedback::START };
+    let phi = [&start[..4], &rates.parameters()].concat();
+    assert!((instances.loss(5, &vector(&phi)) - 4.0).abs() < 1e-12);
 }

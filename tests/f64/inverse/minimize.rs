@@ -3,7 +3,7 @@
 use burn::backend::NdArray;
 use softrast_inverse::{InverseProblem, Iterate, Method, minimize};
 use softrast_meta::{Adam, Optimizer};
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, Family, Feedback, ScheduledSoftness};
 use softrast_tests::{numbers, vector};
 
 use super::square::Square;
@@ -89,4 +89,53 @@ fn parameters_without_a_gradient_stay_and_an_error_ends_the_descent() {
 fn nothing_to_solve_is_an_error() {
     let end = iterates(&Square { floor: 0.0, seen: true }, &[], |_| Ok(()));
     assert_eq!(end.unwrap_err().to_string(), "there is no instance to solve");
+}
+
+/// A scale that moves with feedback: a path of one step, and four times the learning rate after going back.
+fn with_feedback() -> Method {
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let third = (1.0_f64 / 3.0).ln();
+    let feedback = Feedback {
+        passage: third,
+        patience: 0.0,
+        stuck: 0.0,
+        room: -1.0,
+        kick: 4.0_f64.ln(),
+        kick_steps: third,
+        rate_end: 0.0,
+    };
+    let decay = ScheduledSoftness::decay(softness, 0.1, 0.01);
+    Method::new("none", ScheduledSoftness { feedback: Some(feedback), ..decay })
+}
+
+#[test]
+fn a_run_that_is_stuck_takes_larger_steps_from_the_beginning_of_its_path() {
+    let problem = Square { floor: -10.0, seen: true };
+    let (mut places, mut scales) = (Vec::new(), Vec::new());
+    let mut visit = |now: &Iterate| {
+        places.push(numbers(now.theta.clone())[0]);
+        scales.push(now.scale);
+        Ok(())
+    };
+    let (method, config) = (with_feedback(), problem.defaults());
+    minimize::<_, B>(&problem, &[4.0], &method, &config, false, |now, _| visit(now)).unwrap();
+
+    let adam = Adam::new(0.25);
+    let mut theta = vector::<B>(&[4.0]);
+    let mut state = adam.init(&theta);
+    for (k, rate) in [0.25, 1.0, 0.25].into_iter().enumerate() {
+        assert_eq!(places[k], numbers(theta.clone())[0]);
+        assert!((scales[k] - 0.1).abs() < 1e-12, "{scales:?}");
+        let gradient = theta.clone() * 2.0;
+        (theta, state) = Adam { learning_rate: rate, ..adam }.step(theta, gradient, state);
+    }
+    assert_eq!(places[3], numbers(theta)[0]);
+}
+
+#[test]
+fn runs_with_feedback_are_solved_one_at_a_time() {
+    let problem = Square { floor: 0.0, seen: true };
+    let (method, config) = (with_feedback(), problem.defaults());
+    let end = minimize::<_, B>(&problem, &START, &method, &config, false, |_, _| Ok(()));
+    assert!(end.unwrap_err().to_string().contains("one instance at a time, found 2"));
 }

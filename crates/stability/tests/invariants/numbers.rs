@@ -147,6 +147,7 @@ fn parameters(tested: &Tested) -> Levels {
             softness: edge,
             phi,
             schedule: None,
+            feedback: None,
             surrogate: None,
             learning_rate: None,
             task: None,

@@ -93,7 +93,7 @@ impl<B: RasterBackend> Scene<B> {
     pub fn image(&self, theta: Tensor<B, 1>, softness: &SoftnessAt<'_, B>) -> Tensor<B, 3> {
         let (edge, phi) = softness.edge();
         let (side, tolerance) = (softness.side(), softness.tolerance());
-        match softness.fixed_stage() {
+        match softness.fixed_place() {
             Some(_) => self.drawn(theta, edge, numbers(phi), side, tolerance, None),
             None => self.drawn(theta, edge, numbers(phi.clone()), side, tolerance, Some(phi)),
         }

@@ -1,0 +1,201 @@
+use serde::{Deserialize, Serialize};
+
+use crate::file::LARGEST_LOGARITHM;
+
+/// How a run goes along the path of its scale by what it sees, and not by time: a closed loop.
+///
+/// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a share of all steps, the slower the more its error
+/// falls. Where it comes to the end with a large error it is stuck: then it goes back to the beginning, and takes larger steps for a
+/// while, as often as time allows. All fields but `patience` and `rate_end` are logarithms of positive numbers.
+///
+/// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
+/// whatever happens.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Feedback {
+    /// Logarithm of the share of all steps that the path takes while the error stays as it is.
+    pub passage: f64,
+    /// How much slower it goes while the error falls: the pace is multiplied by `(recent / earlier)^patience`, two running means of the
+    /// error over about 5 and 20 steps.
+    pub patience: f64,
+    /// Logarithm of the error above which a run at the end of its path is stuck.
+    pub stuck: f64,
+    /// Logarithm of the share of a passage that has to be left of a run to go back.
+    pub room: f64,
+    /// Logarithm of what the learning rate is multiplied by after going back.
+    pub kick: f64,
+    /// Logarithm of the share of all steps that this takes.
+    pub kick_steps: f64,
+    /// Logarithm of what the learning rate is multiplied by at the end of the path, in proportion on the way there.
+    pub rate_end: f64,
+}
+
+/// Where a run is that follows its softness: a step of it is taken there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Part of the path, 0 to 1.
+    pub part: f64,
+    /// What the learning rate is multiplied by.
+    pub rate: f64,
+}
+
+/// A run that follows a [`Feedback`].
+#[derive(Clone, Debug)]
+pub struct Follower {
+    feedback: Feedback,
+    steps: usize,
+    /// Steps taken so far.
+    step: usize,
+    part: f64,
+    seen: Option<Seen>,
+    /// Steps still to take at the larger rate.
+    kicked: usize,
+}
+
+/// What a run has seen of its error.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    recent: f64,
+    earlier: f64,
+    least: f64,
+}
+
+/// Shares of the newest error in its running means.
+const RECENT: f64 = 0.2;
+const EARLIER: f64 = 0.05;
+/// Added to both means, so that an error of 0 has a trend too.
+const SMALL: f64 = 1e-3;
+
+impl Feedback {
+    /// How many numbers it has.
+    pub const PARAMETERS: usize = 7;
+
+    /// Where learning begins: a path that takes two fifths of a run, larger steps for a thirtieth of it, and an error of 0.05 that is
+    /// too large.
+    pub const START: Self = Self {
+        passage: -0.9,
+        patience: 0.0,
+        stuck: -3.0,
+        room: -0.7,
+        kick: 1.5,
+        kick_steps: -3.4,
+        rate_end: 0.0,
+    };
+
+    /// Its numbers, in the order of the fields.
+    pub fn parameters(&self) -> [f64; Self::PARAMETERS] {
+        let Self { passage, patience, stuck, room, kick, kick_steps, rate_end } = *self;
+        [passage, patience, stuck, room, kick, kick_steps, rate_end]
+    }
+
+    /// That of these numbers, in the order of the fields.
+    pub fn of(
+        [passage, patience, stuck, room, kick, kick_steps, rate_end]: [f64; Self::PARAMETERS],
+    ) -> Self {
+        Self { passage, patience, stuck, room, kick, kick_steps, rate_end }
+    }
+
+    /// A run of so many steps that begins.
+    pub fn follow(&self, steps: usize) -> Follower {
+        Follower { feedback: *self, steps, step: 0, part: 0.0, seen: None, kicked: 0 }
+    }
+
+    /// If it cannot be followed, says what was found and what was expected.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        match self.parameters().into_iter().find(|x| x.is_nan() || x.abs() > LARGEST_LOGARITHM) {
+            None => Ok(()),
+            Some(wrong) => Err(format!(
+                "a number of {wrong}, expected -{LARGEST_LOGARITHM} to {LARGEST_LOGARITHM}"
+            )),
+        }
+    }
+}
+
+impl Follower {
+    /// Where the next step is taken, given the error of the latest hard image; none before the first. An error that is not finite tells
+    /// nothing.
+    pub fn next(&mut self, error: Option<f64>) -> Place {
+        if let Some(error) = error.filter(|error| error.is_finite()) {
+            let seen = self.seen.unwrap_or(Seen { recent: error, earlier: error, least: error });
+            self.seen = Some(Seen {
+                recent: seen.recent + RECENT * (error - seen.recent),
+                earlier: seen.earlier + EARLIER * (error - seen.earlier),
+                least: seen.least.min(error),
+            });
+        }
+        let Feedback { passage, patience, stuck, room, kick, kick_steps, rate_end } = self.feedback;
+        let steps = self.steps as f64;
+        let passage = (passage.exp() * steps).max(1.0);
+        let left = self.steps.saturating_sub(self.step + 1) as f64;
+        let is_stuck = self.seen.is_some_and(|seen| seen.least > stuck.exp());
+        if self.part >= 1.0 && is_stuck && left > room.exp() * passage {
+            self.part = 0.0;
+            self.kicked = (kick_steps.exp() * steps).round().min(left) as usize;
+        }
+        self.step += 1;
+        if self.kicked > 0 {
+            self.kicked -= 1;
+            return Place { part: 0.0, rate: kick.exp() };
+        }
+        let place = Place { part: self.part, rate: (rate_end * self.part).exp() };
+        let trend =
+            self.seen.map_or(0.0, |seen| ((seen.recent + SMALL) / (seen.earlier + SMALL)).ln());
+        // A run always comes to the end of its path.
+        let pace = ((patience * trend).exp() / passage).max((1.0 - self.part) / (left + 1.0));
+        self.part = (self.part + pace).min(1.0);
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All places of a run with these errors at its steps.
+    fn places(feedback: Feedback, steps: usize, error: impl Fn(usize) -> f64) -> Vec<Place> {
+        let mut run = feedback.follow(steps);
+        (0..steps).map(|step| run.next(step.checked_sub(1).map(&error))).collect()
+    }
+
+    #[test]
+    fn a_run_that_fits_goes_to_the_end_and_stays_there() {
+        let places = places(Feedback::START, 300, |_| 0.01);
+        assert_eq!((places[0], places[299].part), (Place { part: 0.0, rate: 1.0 }, 1.0));
+        assert!(places.windows(2).all(|two| two[0].part <= two[1].part));
+        let arrived = places.iter().position(|place| place.part >= 1.0).unwrap();
+        assert!((121..125).contains(&arrived), "{arrived}");
+    }
+
+    #[test]
+    fn a_run_that_is_stuck_begins_anew_with_larger_steps() {
+        let places = places(Feedback::START, 300, |_| 0.5);
+        let large = places.iter().filter(|place| place.rate > 1.0).count();
+        assert_eq!(large, 20, "twice a thirtieth of the steps");
+        assert_eq!(places[299].part, 1.0);
+        let backward = places.windows(2).filter(|two| two[1].part < two[0].part);
+        assert_eq!(backward.count(), 2);
+    }
+
+    #[test]
+    fn a_run_waits_while_its_error_falls() {
+        let patient = Feedback { patience: 2.0, ..Feedback::START };
+        let falls = |step: usize| 0.9_f64.powi(step as i32);
+        let [waits, goes] = [patient, Feedback::START].map(|one| places(one, 300, falls)[60].part);
+        assert!(waits < 0.5 * goes, "{waits} and {goes}");
+    }
+
+    #[test]
+    fn whatever_it_sees_its_places_are_numbers() {
+        for size in [-80.0, 0.0, 80.0] {
+            let extreme = Feedback::of([size; Feedback::PARAMETERS]);
+            for steps in [1, 2, 300] {
+                for error in [0.0, 1e-300, 0.5, 1e300, f64::NAN, f64::INFINITY] {
+                    for place in places(extreme, steps, |_| error) {
+                        assert!((0.0..=1.0).contains(&place.part), "{place:?}");
+                        assert!(place.rate.is_finite() && place.rate > 0.0, "{place:?}");
+                    }
+                }
+            }
+        }
+    }
+}
