@@ -175,7 +175,7 @@ impl Stored for ScheduledSoftness {
     const LEARNED: &'static [(&'static str, &'static str)] = learned![
         ".json":
         "shape2d", "shape2d-mlp", "shape2d-surrogate", "shape3d", "shape3d-mlp", "shape3d-surrogate",
-        "pose", "pose-mlp", "pose-surrogate", "occlusion", "occlusion-mlp", "networks/pose",
+        "pose", "pose-mlp", "pose-surrogate", "pose-feedback", "occlusion", "occlusion-mlp", "networks/pose",
         "networks/pose-15-35", "networks/pose-55-75", "networks/shape3d", "networks/shape3d-0",
         "networks/shape3d-30", "networks/shape3d-60", "networks/shape3d-minus30",
         "networks/shape3d-minus60"
