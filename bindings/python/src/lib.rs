@@ -26,7 +26,7 @@ mod _native {
     };
 
     #[pymodule_init]
-    fn init(_: &Bound<'_, PyModule>) -> PyResult<()> {
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
         // What panics becomes an error with the same message; this hook is of this library alone.
         std::panic::set_hook(Box::new(|_| {}));
         Ok(())

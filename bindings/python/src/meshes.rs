@@ -61,7 +61,7 @@ pub(crate) fn icosphere(py: Python<'_>, subdivisions: u32) -> PyResult<Parts<'_>
             "a sphere of {subdivisions} subdivisions is too large, expected 0 to 9"
         )));
     }
-    parts(py, &softrast_mesh::icosphere(subdivisions as _))
+    parts(py, &softrast_mesh::icosphere(subdivisions))
 }
 
 fn parts<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Parts<'py>> {

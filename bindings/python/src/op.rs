@@ -200,11 +200,13 @@ impl Kind {
                     .then(|| vec![views, size[0], size[1]])?
             }
             (Self::OrbitMatrix, [orbits]) => {
-                let &[views @ 1.., 4] = &orbits[..] else { return None };
+                let &[views @ 1..=usize::MAX, 4] = &orbits[..] else { return None };
                 vec![views, 3, 4]
             }
             (Self::Perspective, [points, matrices]) => match (&points[..], &matrices[..]) {
-                (&[held @ 1.., count, 3], &[views @ 1.., 3, 4]) if held == 1 || held == views => {
+                (&[held @ 1..=usize::MAX, count, 3], &[views @ 1..=usize::MAX, 3, 4])
+                    if held == 1 || held == views =>
+                {
                     vec![views, 3, count]
                 }
                 _ => return None,
