@@ -74,3 +74,31 @@ def test_tensors_of_another_type_are_refused():
     corners, camera = leaves()
     with pytest.raises(ValueError, match="vertices must be a float32 or float64 tensor on the CPU, found torch.int64"):
         st.project(corners.long(), camera)
+
+
+def test_a_meta_gradient_through_30_steps_is_that_of_differences():
+    draw = renderer()
+    prepared = draw.prepared(draw.phi)
+    truth = torch.from_numpy(softrast.orbit(2.5, 10.0, 20.0))
+    corners = torch.tensor(CORNERS, dtype=torch.float64)
+
+    def image(angles, phi):
+        camera = torch.cat([truth[:, :1], angles, truth[:, 3:]], 1)
+        table = st._Value.apply(prepared.table(), phi)
+        seen = st.project(corners, camera).transpose(1, 2).contiguous()
+        return st._Value.apply(prepared.coverage(), st._Value.apply(prepared.sum(), seen, table))
+
+    def result(phi):
+        angles = torch.tensor([[22.0, 35.0]], dtype=torch.float64, requires_grad=True)
+        target = image(truth[:, 1:3], phi.detach() * 0 + np.log(0.05))
+        for _ in range(30):
+            loss = (image(angles, phi) - target).pow(2).mean()
+            angles = angles - 100.0 * torch.autograd.grad(loss, angles, create_graph=True)[0]
+        return (angles - truth[:, 1:3]).pow(2).sum()
+
+    phi = torch.from_numpy(draw.phi).requires_grad_()
+    (gradient,) = torch.autograd.grad(result(phi), phi)
+    phi = phi.detach()
+    difference = (result(phi + 1e-5) - result(phi - 1e-5)) / 2e-5
+    assert gradient.abs().item() > 1e-3
+    assert gradient.item() == pytest.approx(difference.item(), rel=1e-5)
