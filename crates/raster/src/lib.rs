@@ -57,7 +57,7 @@ pub use camera::{Orbit, project, vertices};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
 #[doc(hidden)]
-pub use fused::{ElementaryOp, FusedOp, Pass};
+pub use fused::{ElementaryOp, FusedOp, Numbers, Pass};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]

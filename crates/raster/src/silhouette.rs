@@ -6,7 +6,7 @@ use softrast_softness::Softness;
 use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
     backend::{elementary, pairs, primitive},
-    fused::ElementaryOp,
+    fused::{ElementaryOp, FusedOp},
     profile_sum,
 };
 
@@ -171,6 +171,12 @@ impl<S: Softness> Silhouette<S> {
         table: Tensor<B, D>,
     ) -> Tensor<B, 3> {
         profile_sum(&self.op, vertices, table)
+    }
+
+    /// The op behind [`Silhouette::sums`], for callers that run it on slices.
+    #[doc(hidden)]
+    pub fn op(&self) -> FusedOp {
+        FusedOp::ProfileSum(self.op.clone())
     }
 
     /// What draws with the softness stretched by `factor` along the distance, if it can be told from this.

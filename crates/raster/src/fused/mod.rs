@@ -33,9 +33,19 @@ pub enum FusedOp {
     Elementary(ElementaryOp),
 }
 
+/// Floats that an op can run on without tensors, for callers that hold slices: f32 and f64.
+pub trait Numbers: Element {
+    /// Runs a pass over `slices` with the shapes `dims`; see [`Pass`] for what stands behind the inputs.
+    ///
+    /// # Panics
+    ///
+    /// If lengths and shapes do not fit the op.
+    fn run_pass(op: &FusedOp, pass: &Pass, slices: &[&[Self]], dims: &[Vec<usize>]) -> TensorData;
+}
+
 impl FusedOp {
-    /// The op of one call whose passes share what they find out.
-    pub(crate) fn keeping(&self) -> Self {
+    /// The op of one call whose passes share what they find out: to be run on the same vertices only.
+    pub fn keeping(&self) -> Self {
         match self {
             Self::ProfileSum(op) => Self::ProfileSum(op.keeping()),
             Self::SoftBlend(op) => Self::SoftBlend(op.keeping()),
@@ -99,6 +109,17 @@ macro_rules! host_float {
 
             fn pairs(inputs: &Inputs<Self>) -> usize {
                 kernel::pairs(inputs)
+            }
+        }
+
+        impl Numbers for $float {
+            fn run_pass(
+                op: &FusedOp,
+                pass: &Pass,
+                slices: &[&[Self]],
+                dims: &[Vec<usize>],
+            ) -> TensorData {
+                run(op, pass, slices, dims)
             }
         }
     };

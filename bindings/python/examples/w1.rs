@@ -1,0 +1,40 @@
+//! The step that `benches/w1.py` times, in Rust: `cargo run --release --example w1`.
+
+use std::time::Instant;
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
+use softrast_raster::{Orbit, SoftRenderer, mse_loss, project, vertices};
+use softrast_softness::{EdgeSoftness, Family};
+
+type B = Autodiff<NdArray<f32>>;
+
+fn main() {
+    let device = Default::default();
+    let mesh = softrast_mesh::icosphere(3);
+    let orbit = |k| Orbit {
+        distance: 2.732,
+        elevation_deg: 0.0,
+        azimuth_deg: 15.0 * f64::from(k),
+        fov_deg: 60.0,
+    };
+    let cameras: Vec<_> = (0..24).map(orbit).collect();
+    let cameras = Orbit::tensors::<B>(&cameras, &device);
+    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let renderer = SoftRenderer::new(mesh.faces(), 64, softness, 1e-4);
+    let target = Tensor::<B, 3>::zeros([24, 64, 64], &device);
+    let mut times = Vec::new();
+    for _ in 0..220 {
+        let corners = vertices::<B>(mesh.positions(), &device).require_grad();
+        let start = Instant::now();
+        let image = renderer.silhouette(project(corners.clone(), cameras.clone()));
+        let gradients = mse_loss(image, target.clone()).mean().backward();
+        assert!(corners.grad(&gradients).is_some());
+        times.push(start.elapsed().as_secs_f64());
+    }
+    let times = &mut times[20..];
+    times.sort_by(f64::total_cmp);
+    println!("Rust {:.2} ms", 1e3 * times[times.len() / 2]);
+}

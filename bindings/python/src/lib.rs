@@ -1,0 +1,34 @@
+//! The Rust side of the Python package `softrast`: ops over NumPy arrays, each with the two passes back. It has no kernel of its own.
+//!
+//! The Python side (`python/softrast`) checks shapes in the user's terms; here only what would be wrong or unsafe to run is refused. Every
+//! error and panic arrives there as a `ValueError` of one line.
+
+mod guard;
+mod meshes;
+mod op;
+mod renderer;
+mod softness;
+mod taped;
+
+use pyo3::prelude::*;
+
+/// The compiled half of the package.
+#[pymodule(gil_used = false)]
+mod _native {
+    use super::*;
+
+    #[pymodule_export]
+    use crate::{
+        meshes::{fox, icosphere, load_mesh, save_mesh},
+        op::{Op, orbit_matrix, perspective},
+        renderer::{Prepared, Renderer, hard_silhouette},
+        softness::{Softness, families, learned_names},
+    };
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        // What panics becomes an error with the same message; this hook is of this library alone.
+        std::panic::set_hook(Box::new(|_| {}));
+        Ok(())
+    }
+}

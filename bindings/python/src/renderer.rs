@@ -1,0 +1,163 @@
+//! Renderers: faces, image size, softness, T-conorm and tolerance.
+
+use std::sync::Arc;
+
+use burn::tensor::{DType, Tensor, TensorData};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use softrast_raster::{HostBackend, ImageSize, Rasterizer, Silhouette, SoftRenderer, TConorm};
+use softrast_softness::{EdgeSoftness, Softness as _};
+
+use crate::{
+    guard::{guarded, refused},
+    op::Op,
+    softness::Softness,
+};
+
+/// What an image depends on beside vertices and φ; it chooses supports and knots.
+#[pyclass(frozen, module = "softrast._native", subclass)]
+pub(crate) struct Renderer {
+    renderer: SoftRenderer<EdgeSoftness>,
+    softness: EdgeSoftness,
+    t_conorm: TConorm,
+    least_vertices: usize,
+    size: [usize; 2],
+}
+
+/// What draws under some φ, with support and knots for it.
+#[pyclass(frozen, module = "softrast._native")]
+pub(crate) struct Prepared {
+    silhouette: Silhouette<EdgeSoftness>,
+    t_conorm: TConorm,
+    parameters: usize,
+    least_vertices: usize,
+    size: [usize; 2],
+}
+
+#[pymethods]
+impl Renderer {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        faces: PyReadonlyArray2<'_, i64>,
+        size: [usize; 2],
+        softness: &Softness,
+        part: f64,
+        tolerance: f64,
+        t_conorm: &str,
+    ) -> PyResult<Self> {
+        let t_conorm: TConorm = t_conorm.parse().map_err(refused)?;
+        if !(tolerance > 0.0 && tolerance < 1.0) {
+            return Err(refused(format!(
+                "the tolerance is {tolerance}, expected more than 0 and less than 1"
+            )));
+        }
+        if size.contains(&0) {
+            return Err(refused(format!("the image is {size:?}, expected at least one pixel")));
+        }
+        if softness.0.surrogate.is_some() {
+            return Err(refused("this softness has a surrogate, which Python does not draw"));
+        }
+        let faces = corners(&faces)?;
+        let least_vertices = faces.iter().flatten().max().map_or(0, |&most| most as usize + 1);
+        let phi = softness.parameters_at(part, size[0].min(size[1]))?;
+        let softness = softness.0.softness;
+        let rasterizer = Rasterizer { size: ImageSize::from(size), tolerance, t_conorm };
+        let of = || SoftRenderer::with_rasterizer(rasterizer, faces, softness, phi);
+        Ok(Self { renderer: guarded(py, of)?, softness, t_conorm, least_vertices, size })
+    }
+
+    /// Parameters φ `[P]`, float64: those that are drawn with where no others are given.
+    #[getter]
+    fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.renderer.phi())
+    }
+
+    /// Height and width of the image, in pixels.
+    #[getter]
+    fn size(&self) -> (usize, usize) {
+        (self.size[0], self.size[1])
+    }
+
+    /// How many vertices the faces ask for.
+    #[getter]
+    fn least_vertices(&self) -> usize {
+        self.least_vertices
+    }
+
+    /// Support and knots for `phi`.
+    fn prepared(&self, py: Python<'_>, phi: Vec<f64>) -> PyResult<Prepared> {
+        let parameters = self.softness.parameters();
+        if let Some(k) = phi.iter().position(|x| !x.is_finite()) {
+            return Err(refused(format!("phi[{k}] is {}, expected a finite number", phi[k])));
+        }
+        let silhouette = guarded(py, || self.renderer.prepared::<HostBackend>(&phi))?;
+        let &Self { t_conorm, least_vertices, size, .. } = self;
+        Ok(Prepared { silhouette, t_conorm, parameters, least_vertices, size })
+    }
+}
+
+#[pymethods]
+impl Prepared {
+    /// The op from vertices `[views, 3, V]` and a table to sums `[views, height, width]`.
+    fn sum(&self) -> Op {
+        Op::sum(&self.silhouette, self.least_vertices, self.size)
+    }
+
+    /// The op from φ `[P]` to a table `[rows, 4]`.
+    fn table(&self) -> Op {
+        Op::table(&self.silhouette, self.parameters)
+    }
+
+    /// The op from sums to coverage in [0, 1].
+    fn coverage(&self) -> Op {
+        Op::coverage(self.t_conorm)
+    }
+
+    /// Distances in NDC beyond which a pixel outside and inside sees a constant.
+    #[getter]
+    fn support(&self) -> (f64, f64) {
+        let [outer, inner] = self.silhouette.profile().support();
+        (outer, inner)
+    }
+}
+
+/// Hard silhouettes `[views, height, width]`, float32: 1 where the centre of a pixel lies in a face, else 0. `vertices` is `[views, V, 3]`.
+#[pyfunction]
+pub(crate) fn hard_silhouette<'py>(
+    py: Python<'py>,
+    vertices: PyReadonlyArray3<'py, f64>,
+    faces: PyReadonlyArray2<'py, i64>,
+    size: [usize; 2],
+) -> PyResult<Bound<'py, PyAny>> {
+    let faces = corners(&faces)?;
+    let shape = vertices.shape().to_vec();
+    let values = vertices.as_array().iter().copied().collect::<Vec<_>>();
+    let image = guarded(py, || {
+        let data = TensorData::new(values, shape);
+        let vertices = Tensor::<HostBackend, 3>::from_data(data, (&Default::default(), DType::F64));
+        let image = softrast_raster::hard_silhouette(vertices, &faces, size).into_data();
+        (image.shape.to_vec(), image.iter::<f32>().collect::<Vec<_>>())
+    })?;
+    Ok(PyArray1::from_vec(py, image.1).reshape(image.0)?.into_any())
+}
+
+/// Corners of faces `[F, 3]` as vertex numbers.
+fn corners(faces: &PyReadonlyArray2<'_, i64>) -> PyResult<Arc<[[u32; 3]]>> {
+    let &[count, three] = faces.shape() else { unreachable!("two axes") };
+    if count == 0 || three != 3 {
+        return Err(refused(format!(
+            "faces must be [F, 3] with at least one face, found [{count}, {three}]"
+        )));
+    }
+    let faces = faces.as_array();
+    let corner = |face: usize, k: usize| {
+        let number = faces[[face, k]];
+        // One more than the largest must be a number too.
+        u32::try_from(number).ok().filter(|&number| number < u32::MAX).ok_or_else(|| {
+            refused(format!("face {face} uses vertex {number}, expected 0 to 4294967294"))
+        })
+    };
+    let of = |face: usize| Ok([corner(face, 0)?, corner(face, 1)?, corner(face, 2)?]);
+    (0..count).map(of).collect()
+}

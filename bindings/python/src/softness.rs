@@ -1,0 +1,118 @@
+//! Softnesses: by name, from a file, or those that come along.
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness as _};
+
+use crate::guard::{guarded, refused};
+
+/// A soft step with its parameters φ: how much a face covers a pixel at a signed distance (NDC, positive inside).
+///
+/// `Softness("logistic", scale=0.01)` is a family at a scale in NDC; with `squared=True` it sees the signed square of the distance and the
+/// scale is in NDC². One pixel is `2 / min(height, width)`. Names are those of `families()`. Raises `ValueError` for an unknown name or a
+/// scale that is not positive.
+#[pyclass(frozen, module = "softrast")]
+pub(crate) struct Softness(pub(crate) ScheduledSoftness);
+
+#[pymethods]
+impl Softness {
+    #[new]
+    #[pyo3(signature = (family, scale, *, squared=false))]
+    fn new(py: Python<'_>, family: &str, scale: f64, squared: bool) -> PyResult<Self> {
+        let family = family.parse::<Family>().map_err(refused)?;
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(refused(format!(
+                "the scale of a softness is {scale}, expected a positive number"
+            )));
+        }
+        let softness = EdgeSoftness { family, squared };
+        guarded(py, || Self(ScheduledSoftness::constant(softness, scale)))
+    }
+
+    /// What was learned on a task and comes along; `learned_names()` lists them.
+    #[staticmethod]
+    fn learned(name: &str) -> PyResult<Self> {
+        ScheduledSoftness::learned(name).map(Self).map_err(refused)
+    }
+
+    /// Reads and checks a JSON file, as the command line writes them.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: std::path::PathBuf) -> PyResult<Self> {
+        guarded(py, || ScheduledSoftness::load(path))?.map(Self).map_err(refused)
+    }
+
+    /// Writes a JSON file at `path`, whole or not at all.
+    fn save(&self, py: Python<'_>, path: std::path::PathBuf) -> PyResult<()> {
+        guarded(py, || self.0.save(path))?.map_err(refused)
+    }
+
+    /// The same softness with other parameters, `[P]`, and no schedule.
+    fn with_phi(&self, phi: Vec<f64>) -> PyResult<Self> {
+        let (found, expected) = (phi.len(), self.0.softness.parameters());
+        if found != expected {
+            return Err(refused(format!(
+                "{} has {expected} parameters, found {found}",
+                self.0.softness.family
+            )));
+        }
+        Ok(Self(ScheduledSoftness { phi, schedule: None, ..self.0.clone() }))
+    }
+
+    /// Parameters φ `[P]`, float64, at `part` of a run (0 to 1), on images whose shorter side has `size` pixels. A softness without a
+    /// schedule has the same all along.
+    #[pyo3(signature = (part=0.0, size=64))]
+    fn phi_at<'py>(
+        &self,
+        py: Python<'py>,
+        part: f64,
+        size: usize,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_vec(py, self.parameters_at(part, size)?))
+    }
+
+    /// The name of the family.
+    #[getter]
+    fn family(&self) -> &'static str {
+        self.0.softness.family.name()
+    }
+
+    /// Whether the family sees the signed square of the distance.
+    #[getter]
+    fn squared(&self) -> bool {
+        self.0.softness.squared
+    }
+
+    /// The learning rate of the runs that it was learned on, if it was.
+    #[getter]
+    fn learning_rate(&self) -> Option<f64> {
+        self.0.learning_rate
+    }
+
+    fn __repr__(&self) -> String {
+        let squared = if self.squared() { ", squared" } else { "" };
+        let moving = if self.0.is_constant() { "" } else { ", its scale moves over a run" };
+        format!("Softness({}{squared}, {} parameters{moving})", self.family(), self.0.phi.len())
+    }
+}
+
+impl Softness {
+    /// Parameters at `part` of a run, on images whose shorter side has `size` pixels.
+    pub(crate) fn parameters_at(&self, part: f64, size: usize) -> PyResult<Vec<f64>> {
+        match (0.0..=1.0).contains(&part) {
+            true => Ok(self.0.phi_at(part, size)),
+            false => Err(refused(format!("the part of a run is {part}, expected 0 to 1"))),
+        }
+    }
+}
+
+/// The names of all families.
+#[pyfunction]
+pub(crate) fn families() -> Vec<&'static str> {
+    Family::ALL.map(Family::name).to_vec()
+}
+
+/// The names of the softnesses that come along, for `Softness.learned`.
+#[pyfunction]
+pub(crate) fn learned_names() -> Vec<&'static str> {
+    ScheduledSoftness::learned_names().collect()
+}

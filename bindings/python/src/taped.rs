@@ -1,0 +1,73 @@
+//! Functions of one vector that are tensor ops: their gradients come from automatic differentiation, in f64.
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::{DType, Tensor, TensorData, backend::Backend},
+};
+use softrast_raster::{Silhouette, TConorm};
+use softrast_softness::EdgeSoftness;
+
+type Plain = NdArray<f64>;
+type Once = Autodiff<Plain>;
+type Twice = Autodiff<Once>;
+
+/// Which function.
+#[derive(Clone, Debug)]
+pub(crate) enum Taped {
+    /// Parameters φ to a table, row by row.
+    Table(Box<Silhouette<EdgeSoftness>>),
+    /// Sums to coverage, each by itself.
+    Coverage(TConorm),
+}
+
+impl Taped {
+    fn of<B: Backend>(&self, x: Tensor<B, 1>) -> Tensor<B, 1> {
+        match self {
+            Self::Table(silhouette) => {
+                let table = silhouette.table(x);
+                let count = table.shape().num_elements();
+                table.reshape([count])
+            }
+            Self::Coverage(t_conorm) => t_conorm.coverage(x),
+        }
+    }
+
+    /// The values.
+    pub(crate) fn forward(&self, x: &[f64]) -> Vec<f64> {
+        numbers(self.of(vector::<Plain>(x)))
+    }
+
+    /// The gradient of `Σ upstream · f(x)`.
+    pub(crate) fn vjp(&self, x: &[f64], upstream: &[f64]) -> Vec<f64> {
+        let x = vector::<Once>(x).require_grad();
+        let gradients = (self.of(x.clone()) * vector(upstream)).sum().backward();
+        numbers(x.grad(&gradients).unwrap_or_else(|| x.inner().zeros_like()))
+    }
+
+    /// The gradients of `Σ direction · vjp` to x and to the upstream.
+    pub(crate) fn vjp_of_vjp(
+        &self,
+        x: &[f64],
+        upstream: &[f64],
+        direction: &[f64],
+    ) -> [Vec<f64>; 2] {
+        let [outer, weights] = [x, upstream].map(|numbers| vector::<Once>(numbers).require_grad());
+        let inner = Tensor::<Twice, 1>::from_inner(outer.clone()).require_grad();
+        let sum = (self.of(inner.clone()) * Tensor::from_inner(weights.clone())).sum();
+        let nothing = || [x, upstream].map(|numbers| vec![0.0; numbers.len()]);
+        let Some(gradient) = inner.grad(&sum.backward()) else { return nothing() };
+        let gradients = (gradient * vector(direction)).sum().backward();
+        [outer, weights]
+            .map(|leaf| numbers(leaf.grad(&gradients).unwrap_or_else(|| leaf.inner().zeros_like())))
+    }
+}
+
+fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
+    let data = TensorData::new(values.to_vec(), [values.len()]);
+    // Whatever float type the device has by default.
+    Tensor::from_data(data, (&Default::default(), DType::F64))
+}
+
+fn numbers(tensor: Tensor<Plain, 1>) -> Vec<f64> {
+    tensor.into_data().iter().collect()
+}
