@@ -17,8 +17,8 @@ mod learn_args;
 mod learned_charts;
 mod method;
 mod paper;
-mod presets;
 mod program;
+mod searched;
 mod session;
 mod task;
 
@@ -34,6 +34,6 @@ pub use given::{Answer, Given, MaskFlags, seen_by};
 use method::learned_name;
 pub use method::{Scales, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};
-pub use presets::Preset;
 pub use program::{execute, main};
+pub use searched::Searched;
 pub use task::{Description, Detail, EdgeChoice, Ended, Measures, NoArgs, OwnAxis, Task, theta_of};

@@ -4,9 +4,9 @@ use softrast_inverse::{Method, distilled_mlp, mlp_like};
 use softrast_lab::Error;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness, Surrogate};
 
-use crate::{Init, MethodArgs, Preset, Schedule, SoftnessChoice};
+use crate::{Init, MethodArgs, Schedule, Searched, SoftnessChoice};
 
-/// Scales of a task that neither the command line nor a [`Preset`] names, as widths in NDC.
+/// Scales of a task that neither the command line nor a [`Searched`] names, as widths in NDC.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
     /// How the scale moves if neither a schedule nor a scale is given.
@@ -107,9 +107,10 @@ impl MethodArgs {
         let fitted = self.init == Some(Init::Fitted);
         let like = if fitted { Family::Logistic } else { family };
         // Found together, so taken whole or not at all.
-        let preset = Preset::of(task, like.name(), self.asked_schedule(), scales.schedule);
-        let preset = preset.filter(|_| !self.is_scaled());
-        let [first, last] = self.scales(&preset.map_or(*scales, |preset| scales.with(preset)));
+        let searched = Searched::of(task, like.name(), self.asked_schedule(), scales.schedule);
+        let searched = searched.filter(|_| !self.is_scaled());
+        let [first, last] =
+            self.scales(&searched.map_or(*scales, |searched| scales.with(searched)));
         let edge = EdgeSoftness { family, squared: self.squared };
         let mut softness = match first == last {
             true => ScheduledSoftness::constant(edge, first),
@@ -120,7 +121,7 @@ impl MethodArgs {
             let factor = if first == last { first } else { 1.0 };
             softness.phi = edge.with_scale_values(&weights, factor);
         }
-        softness.learning_rate = preset.and_then(|preset| preset.learning_rate);
+        softness.learning_rate = searched.and_then(|searched| searched.learning_rate);
         match self.surrogate_scale {
             None => Ok((family.name().to_owned(), softness)),
             Some(scale) => {
@@ -158,11 +159,11 @@ pub fn method_colour(name: &str) -> [u8; 3] {
 }
 
 impl Scales {
-    /// With the schedule and the scale of a preset.
-    fn with(self, preset: &Preset) -> Self {
-        match preset.scale_end {
-            None => Self { schedule: Schedule::Static, fixed: preset.scale, ..self },
-            Some(end) => Self { schedule: Schedule::Decay, decay: [preset.scale, end], ..self },
+    /// With the schedule and the scale of what was searched for.
+    fn with(self, searched: &Searched) -> Self {
+        match searched.scale_end {
+            None => Self { schedule: Schedule::Static, fixed: searched.scale, ..self },
+            Some(end) => Self { schedule: Schedule::Decay, decay: [searched.scale, end], ..self },
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The tables of the paper with our figures.
 
-use softrast_cli::{Preset, Schedule, SoftnessChoice, Variant};
+use softrast_cli::{Schedule, Searched, SoftnessChoice, Variant};
 use softrast_lab::{mean, paired, report::Table};
 
 use crate::{Cell, MeanError, Measured, Purpose, TASKS, measured::short};
@@ -116,9 +116,9 @@ fn is_chosen(cell: &Cell) -> bool {
     if method.scale.is_some() || method.init.is_some() {
         return true;
     }
-    [Schedule::Static, Schedule::Decay]
-        .into_iter()
-        .any(|usual| Preset::of(cell.task.name(), family.name(), method.schedule, usual).is_some())
+    [Schedule::Static, Schedule::Decay].into_iter().any(|usual| {
+        Searched::of(cell.task.name(), family.name(), method.schedule, usual).is_some()
+    })
 }
 
 /// Mean and interval, where there are several runs.

@@ -1,5 +1,5 @@
 use anyhow::ensure;
-use softrast_cli::{EdgeChoice, Preset, Schedule};
+use softrast_cli::{EdgeChoice, Schedule, Searched};
 use softrast_lab::Error;
 use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
@@ -54,9 +54,9 @@ impl Depth {
             }
             return Ok(Self { softness, phi: softness.default_phi(1.0), name, scale: None });
         }
-        let preset = Preset::of(NAME, softness.name(), edges.schedule, Schedule::Static);
-        let preset = preset.and_then(|found| found.depth_scale);
-        let scale = args.depth_scale.or(preset).unwrap_or(DEPTH_SCALE);
+        let searched = Searched::of(NAME, softness.name(), edges.schedule, Schedule::Static);
+        let searched = searched.and_then(|found| found.depth_scale);
+        let scale = args.depth_scale.or(searched).unwrap_or(DEPTH_SCALE);
         Self { softness, phi: softness.default_phi(scale), name, scale: Some(scale) }.checked()
     }
 

@@ -7,11 +7,11 @@ use crate::Schedule;
 /// What `search` found best for a softness family on a task's original variant, on training seeds; in OCCLUSION, where most settings solve
 /// the original without an error, on the transfer.
 ///
-/// All of them stand in `presets.json` beside this file, with the command that made each: for every task and family a static setting, a
+/// All stand in `searched.json` beside this file, with the command that made each: for every task and family a static setting, a
 /// decay, or both.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
-pub struct Preset {
+pub struct Searched {
     /// Scale, at first if it decays, in NDC.
     pub scale: f64,
     /// Scale at the last step of a decay; none for a static one.
@@ -31,18 +31,18 @@ pub struct Preset {
 #[serde(deny_unknown_fields)]
 struct Found {
     #[serde(rename = "static")]
-    fixed: Option<Preset>,
-    decay: Option<Preset>,
+    fixed: Option<Searched>,
+    decay: Option<Searched>,
 }
 
 type Tasks = BTreeMap<String, BTreeMap<String, Found>>;
 
 static TASKS: LazyLock<Tasks> = LazyLock::new(|| {
-    serde_json::from_str(include_str!("presets.json"))
-        .expect("presets.json is part of the program and tested")
+    serde_json::from_str(include_str!("searched.json"))
+        .expect("searched.json is part of the program and tested")
 });
 
-impl Preset {
+impl Searched {
     /// The setting of a family in a task under the schedule that is asked for; else under the better of the two, or under the `usual`
     /// one of the task as long as not both were searched for. None where nothing was.
     pub fn of(
@@ -78,18 +78,18 @@ mod tests {
             assert!(fixed.iter().all(|found| found.scale_end.is_none()), "{task} {family}");
             assert!(decay.iter().all(|f| f.scale_end.is_some_and(|end| end < f.scale)), "{task}");
             for found in fixed.iter().chain(decay) {
-                let Preset { scale, scale_end, learning_rate, depth_scale, .. } = found;
+                let Searched { scale, scale_end, learning_rate, depth_scale, .. } = found;
                 let numbers = [Some(*scale), *scale_end, *learning_rate, *depth_scale];
                 assert!(numbers.into_iter().flatten().all(|x| x > 0.0), "{task} {family}");
                 let schedule = found.schedule();
                 for usual in [Schedule::Static, Schedule::Decay] {
-                    let asked = Preset::of(task, family, Some(schedule), usual);
+                    let asked = Searched::of(task, family, Some(schedule), usual);
                     assert_eq!(asked, Some(found));
                 }
-                let better = Preset::of(task, family, None, schedule).unwrap();
+                let better = Searched::of(task, family, None, schedule).unwrap();
                 assert!(better.error <= found.error, "{task} {family}");
             }
         }
-        assert_eq!(Preset::of("teapot", "logistic", None, Schedule::Static), None);
+        assert_eq!(Searched::of("teapot", "logistic", None, Schedule::Static), None);
     }
 }
