@@ -201,7 +201,11 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("learn --softness auto", 2, "--softness auto goes with solve and evaluate"),
         ("evaluate --against auto", 2, "--against: --softness auto goes with"),
         ("learn --backend flex", 2, "learn is compiled for ndarray alone"),
-        ("learn --outer-loss soft", 2, "expected one of `fixed`, `pixels`, `hard`, `own`"),
+        (
+            "learn --outer-loss soft",
+            2,
+            "expected one of `fixed`, `pixels`, `hard`, `returned`, `own`",
+        ),
         ("learn --inner 3", 2, "unexpected argument '--inner'"),
     ];
     let root = tempfile::tempdir().unwrap();
