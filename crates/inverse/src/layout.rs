@@ -62,6 +62,7 @@ impl PhiLayout {
             let start = ScheduledSoftness { phi, surrogate, schedule: None, ..start.clone() };
             return Self::new(start, own, steps, size);
         }
+        let feedback = start.feedback.or(config.feedback.then_some(Feedback::START));
         let kept = start.schedule.as_ref().filter(|kept| {
             kept.floor_px > 0.0
                 && kept.knots.len() > 1
@@ -69,7 +70,6 @@ impl PhiLayout {
                 && config.floor_px.is_none()
         });
         if kept.is_some() {
-            let feedback = start.feedback.or(config.feedback.then_some(Feedback::START));
             return Self::new(ScheduledSoftness { feedback, ..start.clone() }, own, steps, size);
         }
         let floor_px = config.floor_px.unwrap_or(FLOOR_PX);
@@ -83,7 +83,6 @@ impl PhiLayout {
             (scale - floor).max(ABOVE_FLOOR * scale).ln()
         };
         schedule.knots = (0..knots).map(knot).collect();
-        let feedback = start.feedback.or(config.feedback.then_some(Feedback::START));
         let start =
             ScheduledSoftness { schedule: Some(schedule), feedback, ..at_unit_scale(start) };
         Self::new(start, own, steps, size)

@@ -17,7 +17,8 @@ pub struct LearnConfig {
     pub outer_rate: f64,
     /// Whether the logarithm of the inner learning rate is learned too.
     pub learn_rate: bool,
-    /// Whether a softness whose scale moves learns to move it by what a run sees, beginning with [`Feedback::START`](softrast_softness::Feedback::START).
+    /// Whether a softness whose scale moves learns to move it by what a run sees, beginning with
+    /// [`Feedback::START`](softrast_softness::Feedback::START).
     pub feedback: bool,
     /// Seed of the first training instance.
     pub seed: u64,

@@ -77,7 +77,7 @@ fn on_host<B: RasterBackend, F: HostFloat>(
     };
     let copies: Vec<Option<TensorData>> = tensors.iter().map(read).collect();
     let slices: Vec<&[F]> = tensors.iter().zip(&copies).map(numbers::<B, F>).collect();
-    B::float_from_data(F::run(op, pass, &slices, &dims), &device)
+    B::float_from_data(F::run_pass(op, pass, &slices, &dims), &device)
 }
 
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]

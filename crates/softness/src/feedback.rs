@@ -6,7 +6,7 @@ use crate::file::LARGEST_LOGARITHM;
 ///
 /// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a share of all steps, the slower the more its error
 /// falls. Where it comes to the end with a large error it is stuck: then it goes back to the beginning, and takes larger steps for a
-/// while, as often as time allows. All fields but `patience` and `rate_end` are logarithms of positive numbers.
+/// while, as often as time allows. All fields but `patience` are logarithms.
 ///
 /// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
 /// whatever happens.

@@ -86,10 +86,7 @@ trait Elementary: Sync {
 }
 
 /// Floats of the ops that run on the host.
-pub(crate) trait HostFloat: Element + Float + Number<Float = Self> {
-    /// Runs a pass. `dims` are the shapes of all `slices`.
-    fn run(op: &FusedOp, pass: &Pass, slices: &[&[Self]], dims: &[Vec<usize>]) -> TensorData;
-
+pub(crate) trait HostFloat: Numbers + Float + Number<Float = Self> {
     /// Number of pixel-face pairs that a walk visits.
     fn pairs(inputs: &Inputs<Self>) -> usize;
 }
@@ -98,15 +95,6 @@ macro_rules! host_float {
     ($float:ty) => {
         // Functions that are not generic, so that the kernels are compiled here and not again in every crate that draws.
         impl HostFloat for $float {
-            fn run(
-                op: &FusedOp,
-                pass: &Pass,
-                slices: &[&[Self]],
-                dims: &[Vec<usize>],
-            ) -> TensorData {
-                run(op, pass, slices, dims)
-            }
-
             fn pairs(inputs: &Inputs<Self>) -> usize {
                 kernel::pairs(inputs)
             }
