@@ -55,7 +55,7 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
     let feedback = method.softness.feedback;
     ensure!(
         instances.len() == 1 || feedback.is_none(),
-        "a softness with feedback solves one instance at a time, found {}",
+        "a softness with feedback solves one instance at a time, found {} side by side: name another softness",
         instances.len()
     );
     let run = Run::<P, B>::new(problem, instances, method, config);
