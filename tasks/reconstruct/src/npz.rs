@@ -159,7 +159,8 @@ impl Head {
         ensure!(size <= 1 << 16, "its head of {size} bytes is too long");
         let mut text = vec![0; size];
         from.read_exact(&mut text).context("it is cut off")?;
-        let text = String::from_utf8_lossy(&text);
+        // So that a message that quotes it is one line.
+        let text = String::from_utf8_lossy(&text).replace(char::is_control, " ");
         let value = |key: &str| -> anyhow::Result<&str> {
             let found = text.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
             found.with_context(|| format!("its head has no {key}"))
@@ -217,6 +218,8 @@ mod tests {
         let message = |text| head(text).unwrap_err().to_string();
         let wrong = message("{'descr': '<i8', 'fortran_order': False, 'shape': (7,), }");
         assert_eq!(wrong, "its elements are <i8, expected |u1, |b1, |i1, <f4 or <f8");
+        let wrong = message("{'descr': '<\ni8', 'fortran_order': False, 'shape': (7,), }");
+        assert_eq!(wrong, "its elements are < i8, expected |u1, |b1, |i1, <f4 or <f8");
         let wrong = message("{'descr': '|u1', 'fortran_order': True, 'shape': (7,), }");
         assert_eq!(wrong, "it is in Fortran order, expected C");
         let wrong = message("{'descr': '|u1', 'fortran_order': False, 'shape': (-7,), }");
