@@ -20,7 +20,7 @@ pub(crate) enum Command<A: Args, P: Args> {
     Solve(Box<Solve<A, P>>),
     /// Solve many seeds and give means with confidence intervals
     Evaluate(Evaluate<A>),
-    /// Find the best scale and learning rate on training seeds, then evaluate them on others
+    /// Find the best scales, surrogate and learning rate on training seeds, then evaluate them on others
     Search(Search<A>),
     /// Find the simplest softness, the fewest pixels, the largest tolerance and the coarsest mesh that are as good as the best
     Choose(Choose<A>),
@@ -85,11 +85,14 @@ pub(crate) struct Search<A: Args> {
     /// Number of seeds to evaluate what is found on
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub(crate) runs: Option<usize>,
-    /// Scales to try; each pair of a wider and a narrower one is a decay
-    #[arg(long, value_name = "X,X...", value_delimiter = ',', value_parser = positive)]
+    /// Runs that the search may make: inner loops
+    #[arg(long, value_name = "N", value_parser = count, default_value_t = 400, allow_negative_numbers = true)]
+    pub(crate) loops: usize,
+    /// Least and largest scale to try
+    #[arg(long, value_name = "X,X", value_delimiter = ',', value_parser = positive)]
     pub(crate) scales: Vec<f64>,
-    /// Learning rates to try
-    #[arg(long, value_name = "X,X...", value_delimiter = ',', value_parser = positive)]
+    /// Least and largest learning rate to try
+    #[arg(long, value_name = "X,X", value_delimiter = ',', value_parser = positive)]
     pub(crate) learning_rates: Vec<f64>,
     #[command(flatten)]
     pub(crate) training: Training,
@@ -129,7 +132,7 @@ pub(crate) struct Auto {
 
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Training {
-    /// Training seeds, counted from 1000000, that every setting is tried on
+    /// Training seeds, counted from 1000000, that answers, or the last settings of a search, are compared on
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     pub(crate) search_runs: usize,
 }

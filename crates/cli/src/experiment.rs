@@ -8,7 +8,6 @@ use softrast_softness::{Softness, Surrogate};
 
 use crate::{
     Common, Description, EdgeChoice, MethodArgs, SoftnessChoice, Task, Variant, backend,
-    learned_name,
     task::{Ended, HARD, PARAMETER, theta_of},
 };
 
@@ -44,10 +43,9 @@ impl<T: Task> TaskExperiment<T> {
     ) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(common.backend.as_deref())?;
-        let learned_by_default = purpose != Purpose::Finding;
+        let preset_by_default = purpose != Purpose::Finding;
         let mut method_args = method_args.clone();
-        if let (true, true, Some(kind)) = (learned_by_default, method_args.is_silent(), T::LEARNED)
-        {
+        if let (true, true, Some(kind)) = (preset_by_default, method_args.is_silent(), T::PRESET) {
             method_args.softness = Some(SoftnessChoice::Learned(Some(kind.to_owned())));
         }
         let method_args = &method_args;
@@ -55,10 +53,10 @@ impl<T: Task> TaskExperiment<T> {
             Some(SoftnessChoice::Family(family)) => Some(family),
             _ => None,
         };
-        let learned = learned_name(method_args, T::NAME, learned_by_default);
-        let edges = EdgeChoice { family, learned, schedule: method_args.schedule };
+        let shipped = method_args.shipped(T::NAME, preset_by_default).map(|shipped| shipped.name);
+        let edges = EdgeChoice { family, shipped, schedule: method_args.schedule };
         let task = T::new(args, common.variant, &edges)?;
-        let mut method = method_args.method(T::NAME, &T::SCALES, learned_by_default)?;
+        let mut method = method_args.method(T::NAME, &T::SCALES, preset_by_default)?;
         if !T::MOVES_EDGES {
             refuse_what_edges_that_stay_do_not_know(method_args)?;
             method.softness.surrogate = None;

@@ -69,7 +69,7 @@ pub fn usual_args<A: Args>() -> A {
 /// The method: a softness, how its scale moves, and how finely it is drawn. What is `None` is as the task has it.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
 pub struct MethodArgs {
-    /// A family such as logistic, gauss, exp, gamma or mlp, a file, learned[-KIND], or auto
+    /// A family such as logistic, gauss, exp, gamma or mlp, a file, preset, learned[-KIND], or auto
     #[arg(long, value_name = "NAME|FILE.json", help_heading = "Softness")]
     pub softness: Option<SoftnessChoice>,
 
@@ -158,13 +158,16 @@ pub enum SoftnessChoice {
     Family(Family),
     /// A file, not opened yet.
     File(PathBuf),
-    /// One that comes with the program: the default of the task, or the one of this kind.
+    /// What the task takes where nobody says otherwise, whoever found it.
+    Preset,
+    /// What a learning run found for the task and comes with the program, or that of this kind.
     Learned(Option<String>),
     /// What `choose` finds.
     Auto,
 }
 
-/// What a softness that comes with the program is called, and with what its name begins.
+/// What softnesses that come with the program are called, and with what their names begin.
+const PRESET: &str = "preset";
 const LEARNED: &str = "learned";
 
 impl fmt::Display for SoftnessChoice {
@@ -172,6 +175,7 @@ impl fmt::Display for SoftnessChoice {
         match self {
             Self::Family(family) => family.fmt(f),
             Self::File(path) => path.display().fmt(f),
+            Self::Preset => f.write_str(PRESET),
             Self::Learned(None) => f.write_str(LEARNED),
             Self::Learned(Some(kind)) => write!(f, "{LEARNED}-{kind}"),
             Self::Auto => f.write_str("auto"),
@@ -193,11 +197,15 @@ impl FromStr for SoftnessChoice {
             Some((_, Some(kind))) => return Ok(Self::Learned(Some(kind.to_owned()))),
             _ => {}
         }
-        if text == "auto" {
-            return Ok(Self::Auto);
+        match text {
+            PRESET => return Ok(Self::Preset),
+            "auto" => return Ok(Self::Auto),
+            _ => {}
         }
         let families = Family::ALL.map(Family::name).join(", ");
-        Err(format!("expected learned, auto, a file that ends in .json, or one of {families}"))
+        Err(format!(
+            "expected preset, learned, auto, a file that ends in .json, or one of {families}"
+        ))
     }
 }
 
@@ -298,7 +306,7 @@ mod tests {
 
     #[test]
     fn every_family_is_a_softness_and_is_read_as_it_is_written() {
-        let others = ["learned", "learned-mlp", "auto", "a/b.json"];
+        let others = ["preset", "learned", "learned-mlp", "auto", "a/b.json"];
         for name in Family::ALL.map(Family::name).into_iter().chain(others) {
             assert_eq!(name.parse::<SoftnessChoice>().unwrap().to_string(), name);
         }

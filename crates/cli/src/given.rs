@@ -35,7 +35,8 @@ pub struct Answer {
 }
 
 impl<A> Given<'_, A> {
-    /// The softness, as always without a word: what was learned on the task.
+    /// The softness; without a word the preset of the task, or what was learned on it where the preset has feedback: that goes with one run
+    /// at a time, and pictures are solved from many starts side by side.
     ///
     /// # Errors
     ///
@@ -47,7 +48,12 @@ impl<A> Given<'_, A> {
             ));
         }
         let (name, scales) = &self.task;
-        self.method.method(name, scales, true)
+        let method = self.method.method(name, scales, true)?;
+        if self.names_softness() || method.softness.feedback.is_none() {
+            return Ok(method);
+        }
+        let softness = Some(SoftnessChoice::Learned(None));
+        MethodArgs { softness, ..self.method.clone() }.method(name, scales, true)
     }
 
     /// Whether the command line says which softness.

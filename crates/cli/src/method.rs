@@ -2,7 +2,9 @@
 
 use softrast_inverse::{Method, distilled_mlp, mlp_like};
 use softrast_lab::Error;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness, Surrogate};
+use softrast_softness::{
+    EdgeSoftness, Family, ScheduledSoftness, Softness, SoftnessFileError, Surrogate,
+};
 
 use crate::{Init, MethodArgs, Schedule, Searched, SoftnessChoice};
 
@@ -18,8 +20,8 @@ pub struct Scales {
 }
 
 impl MethodArgs {
-    /// The method that the flags ask for on a task. Where they say nothing of the softness, it is what comes with the program for the
-    /// task if that is `learned_by_default`; else it is a logistic.
+    /// The method that the flags ask for on a task. Where they say nothing of the softness, it is the preset of the task if there is one
+    /// and that is `preset_by_default`; else it is a logistic.
     ///
     /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are squared, so that they mean the same
     /// widths.
@@ -31,7 +33,7 @@ impl MethodArgs {
         &self,
         task: &str,
         scales: &Scales,
-        learned_by_default: bool,
+        preset_by_default: bool,
     ) -> anyhow::Result<Method> {
         let (name, softness) = match &self.softness {
             Some(SoftnessChoice::Auto) => {
@@ -43,17 +45,15 @@ impl MethodArgs {
                 self.check_goes_with_file()?;
                 (file.display().to_string(), self.of_file(ScheduledSoftness::load(file)?, task)?)
             }
-            choice => match learned_name(self, task, learned_by_default) {
-                Some(learned) => {
+            _ => match self.shipped(task, preset_by_default) {
+                Some(Shipped { called, file, .. }) => {
                     self.check_goes_with_file()?;
-                    let called =
-                        choice.clone().unwrap_or(SoftnessChoice::Learned(None)).to_string();
-                    let found = ScheduledSoftness::learned(&learned).map_err(|_| {
+                    let file = file.map_err(|_| {
                         Error::usage(format!(
                             "no softness {called} comes with the program for {task}: name a family or a file"
                         ))
                     })?;
-                    (called, self.of_file(found, task)?)
+                    (called, self.of_file(file, task)?)
                 }
                 None => self.of_family(task, scales)?,
             },
@@ -122,7 +122,8 @@ impl MethodArgs {
             softness.phi = edge.with_scale_values(&weights, factor);
         }
         softness.learning_rate = searched.and_then(|searched| searched.learning_rate);
-        match self.surrogate_scale {
+        let surrogate = searched.and_then(|searched| searched.surrogate_scale);
+        match self.surrogate_scale.or(surrogate) {
             None => Ok((family.name().to_owned(), softness)),
             Some(scale) => {
                 Ok((format!("{family} with surrogate"), softness.with_surrogate_scale(scale)))
@@ -147,6 +148,7 @@ impl MethodArgs {
 /// Colour of a method in every chart; told apart also by those who see no red. Methods that have none share one dark colour.
 pub fn method_colour(name: &str) -> [u8; 3] {
     match name.split([' ', '.']).next().unwrap_or_default() {
+        "preset" => [110, 110, 110],
         "learned-mlp" => [170, 20, 60],
         "learned-surrogate" => [110, 80, 190],
         "logistic" => [31, 96, 168],
@@ -168,20 +170,36 @@ impl Scales {
     }
 }
 
-/// The name of what flags mean among what comes with the program, whether it is there or not: they say so, or they say nothing,
-/// there is one for the task and it is `learned_by_default`.
-pub(crate) fn learned_name(
-    method: &MethodArgs,
-    task: &str,
-    learned_by_default: bool,
-) -> Option<String> {
-    match &method.softness {
-        Some(SoftnessChoice::Learned(None)) => Some(task.to_owned()),
-        Some(SoftnessChoice::Learned(Some(kind))) => Some(learned_kind(task, kind)),
-        Some(_) => None,
-        None => {
-            let there = || ScheduledSoftness::learned(task).is_ok();
-            (learned_by_default && method.is_silent() && there()).then(|| task.to_owned())
+/// A softness that comes with the program, or should.
+pub(crate) struct Shipped {
+    /// What the flags call it.
+    called: String,
+    /// The name under which a task may have one of its own beside it.
+    pub(crate) name: String,
+    file: Result<ScheduledSoftness, SoftnessFileError>,
+}
+
+impl MethodArgs {
+    /// What flags mean of what comes with the program, whether it is there or not: they say so, or they say nothing, the task has a preset
+    /// and that is `preset_by_default`.
+    pub(crate) fn shipped(&self, task: &str, preset_by_default: bool) -> Option<Shipped> {
+        let preset = |called: &SoftnessChoice| Shipped {
+            called: called.to_string(),
+            name: task.to_owned(),
+            file: ScheduledSoftness::preset(task),
+        };
+        match &self.softness {
+            Some(choice @ SoftnessChoice::Preset) => Some(preset(choice)),
+            Some(choice @ SoftnessChoice::Learned(kind)) => {
+                let name = kind.as_ref().map_or(task.to_owned(), |kind| learned_kind(task, kind));
+                let file = ScheduledSoftness::learned(&name);
+                Some(Shipped { called: choice.to_string(), name, file })
+            }
+            Some(_) => None,
+            None => {
+                let preset = preset(&SoftnessChoice::Preset);
+                (preset_by_default && self.is_silent() && preset.file.is_ok()).then_some(preset)
+            }
         }
     }
 }
@@ -191,6 +209,12 @@ pub fn learned_kind(task: &str, kind: &str) -> String {
     let (own, there) =
         (format!("{task}-{kind}"), |name: &str| ScheduledSoftness::learned(name).is_ok());
     if !there(&own) && there(kind) { kind.to_owned() } else { own }
+}
+
+/// Whether the preset of a task is what was learned on it.
+pub fn is_preset_learned(task: &str) -> bool {
+    let learned = ScheduledSoftness::learned(task).ok();
+    learned.is_some() && learned == ScheduledSoftness::preset(task).ok()
 }
 
 /// A network, and its weights, in the place of a softness.
@@ -248,7 +272,7 @@ mod tests {
         let silent = MethodArgs::default();
         let name =
             |args: &MethodArgs, task, default| args.method(task, &SCALES, default).unwrap().name;
-        assert_eq!(name(&silent, "pose", true), "learned");
+        assert_eq!(name(&silent, "pose", true), "preset");
         assert_eq!(name(&silent, "pose", false), "logistic");
         assert_eq!(name(&silent, "none", true), "logistic");
         let scaled = MethodArgs { scale: Some(0.1), ..silent };
@@ -294,6 +318,7 @@ mod tests {
         for (line, part) in [
             ("learned", "no softness learned comes with the program for"),
             ("learned-x", "no softness learned-x comes"),
+            ("preset", "no softness preset comes"),
             ("learned-pose --scale 0.1", "holds its own parameters"),
             ("auto", "goes with solve and evaluate"),
         ] {

@@ -16,13 +16,19 @@ pub struct Searched {
     pub scale: f64,
     /// Scale at the last step of a decay; none for a static one.
     pub scale_end: Option<f64>,
+    /// Width of the gradient, at first if it moves, where that is another.
+    #[serde(default)]
+    pub surrogate_scale: Option<f64>,
     /// Learning rate in the original variant; none leaves the task's own.
     pub learning_rate: Option<f64>,
     /// Width of the soft depth, where the task has one.
     pub depth_scale: Option<f64>,
     /// Mean over the training seeds of the error that the search went by.
     pub error: f64,
-    /// The flags of the search.
+    /// Runs that the search made; none where an earlier grid search did not count them.
+    #[serde(default)]
+    pub loops: Option<usize>,
+    /// The flags of the search; without `--loops` those of a grid search that `search` was before.
     pub command: String,
 }
 
@@ -78,8 +84,11 @@ mod tests {
             assert!(fixed.iter().all(|found| found.scale_end.is_none()), "{task} {family}");
             assert!(decay.iter().all(|f| f.scale_end.is_some_and(|end| end < f.scale)), "{task}");
             for found in fixed.iter().chain(decay) {
-                let Searched { scale, scale_end, learning_rate, depth_scale, .. } = found;
-                let numbers = [Some(*scale), *scale_end, *learning_rate, *depth_scale];
+                let Searched {
+                    scale, scale_end, surrogate_scale, learning_rate, depth_scale, ..
+                } = found;
+                let numbers =
+                    [Some(*scale), *scale_end, *surrogate_scale, *learning_rate, *depth_scale];
                 assert!(numbers.into_iter().flatten().all(|x| x > 0.0), "{task} {family}");
                 let schedule = found.schedule();
                 for usual in [Schedule::Static, Schedule::Decay] {

@@ -16,9 +16,9 @@ pub trait Task: InverseProblem + Sized {
     /// Name of the program, where it does more than one task.
     const PROGRAM: &'static str = Self::NAME;
 
-    /// The kind of learned softness that it takes where nobody says otherwise, as `learned-KIND` on the command line; none for what was
-    /// learned on it.
-    const LEARNED: Option<&'static str> = None;
+    /// The kind of learned softness that it takes where nobody says otherwise, as `learned-KIND` on the command line; none for a preset of
+    /// its own, if there is one.
+    const PRESET: Option<&'static str> = None;
 
     /// Name in the paper, such as `POSE`.
     const TITLE: &'static str;
@@ -162,7 +162,7 @@ pub struct EdgeChoice {
     /// A family.
     pub family: Option<Family>,
     /// What comes with the program under this name.
-    pub learned: Option<String>,
+    pub shipped: Option<String>,
     /// Whether its scale is to stay or fall.
     pub schedule: Option<Schedule>,
 }

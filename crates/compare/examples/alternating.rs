@@ -1,4 +1,4 @@
-//! A softness that adapts inside every run, against one that stays and the learned one.
+//! A softness that adapts inside every run, against one that stays and the preset.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example alternating              # as many seeds as in docs/results.md
@@ -32,7 +32,7 @@ const TRAINING: u64 = 6;
 fn main() -> anyhow::Result<()> {
     let study = Study::parse();
     let head = ["task", "softness", "seeds", "stays", "adapts, at its rate", "adapts less stays"];
-    let mut table = Table::new(head.into_iter().chain(["`learned`", "adapts less `learned`"]));
+    let mut table = Table::new(head.into_iter().chain(["`preset`", "adapts less `preset`"]));
     rows::<Pose>(&mut table, 48, &study)?;
     rows::<Occlusion>(&mut table, 50, &study)?;
     rows::<Shape3d>(&mut table, 12, &study)?;
@@ -53,11 +53,11 @@ fn rows<T: Task>(table: &mut Table, seeds: u64, study: &Study) -> anyhow::Result
         let config = LearnConfig { estimator, outer_loss, ..LearnConfig::default() };
         Instances::new(task, &method, &solve, &config)
     };
-    let softness = Some(SoftnessChoice::Learned(None));
-    let learned = MethodArgs { softness, ..MethodArgs::default() };
-    let learned = |variant| Ok(stays(&of(variant, &learned)?, seeds));
-    let learned: Vec<Vec<f64>> =
-        Variant::ALL.into_iter().map(learned).collect::<anyhow::Result<_>>()?;
+    let softness = Some(SoftnessChoice::Preset);
+    let preset = MethodArgs { softness, ..MethodArgs::default() };
+    let preset = |variant| Ok(stays(&of(variant, &preset)?, seeds));
+    let preset: Vec<Vec<f64>> =
+        Variant::ALL.into_iter().map(preset).collect::<anyhow::Result<_>>()?;
     let network = MethodArgs { init: Some(Init::Fitted), ..constant(Family::Mlp) };
     for (name, method) in [
         ("logistic", constant(Family::Logistic)),
@@ -71,7 +71,7 @@ fn rows<T: Task>(table: &mut Table, seeds: u64, study: &Study) -> anyhow::Result
         println!("{} {name}: {tried:?}", T::NAME);
         let finite = tried.into_iter().filter(|(_, loss)| loss.is_finite());
         let Some((rate, _)) = finite.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
-        for (variant, learned) in Variant::ALL.into_iter().zip(&learned) {
+        for (variant, preset) in Variant::ALL.into_iter().zip(&preset) {
             let start = of(variant, &method)?;
             let (stays, adapts) = (stays(&start, seeds), adapts(&start, 0..seeds, rate));
             let row = [
@@ -81,8 +81,8 @@ fn rows<T: Task>(table: &mut Table, seeds: u64, study: &Study) -> anyhow::Result
                 short(mean(&stays)),
                 format!("{}, {rate}", short(mean(&adapts))),
                 less(&adapts, &stays),
-                short(mean(learned)),
-                less(&adapts, learned),
+                short(mean(preset)),
+                less(&adapts, preset),
             ];
             println!("  {}", row.join(" | "));
             table.push(row);

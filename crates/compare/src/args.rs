@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use softrast_cli::{MethodArgs, SoftnessChoice, Variant, learned_kind};
+use softrast_cli::{MethodArgs, SoftnessChoice, Variant, is_preset_learned, learned_kind};
 use softrast_inverse::{Method, Resolution};
 use softrast_raster::compiled_backends;
 use softrast_softness::ScheduledSoftness;
@@ -13,12 +13,12 @@ use crate::{
 
 /// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start reaches the whole image, which
 /// takes over twenty times as long as a logistic; the fitted one does not.
-const METHODS: &str = "learned,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
+const METHODS: &str = "preset,learned,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
                        gamma --schedule static,mlp --init fitted --schedule static,logistic --schedule decay,gauss --schedule decay,\
                        exp --schedule decay,gamma --schedule decay";
 
 /// What is varied unless said otherwise: the default of the tasks and the simplest method.
-const VARIED: &str = "learned,logistic --schedule static";
+const VARIED: &str = "preset,logistic --schedule static";
 
 /// Evaluates all methods on all tasks, original and transfer, and writes the tables.
 ///
@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "all")]
     pub tasks: Vec<String>,
 
-    /// Methods: softness families or files, or learned for what comes with the program; behind one may stand flags of its own
+    /// Methods: softness families or files, preset, or learned for what was learned on the task; behind one may stand flags of its own
     #[arg(long, value_name = "NAME|FILE.json,...", value_delimiter = ',', default_value = METHODS, value_parser = named)]
     pub methods: Vec<NamedMethod>,
 
@@ -62,6 +62,10 @@ pub struct Args {
     /// File for the tables [default: results.md in the folder]
     #[arg(long, value_name = "FILE.md")]
     pub tables: Option<PathBuf>,
+
+    /// Evaluate nothing, but make the tables of these documents again from the records that they keep; an error if one was different
+    #[arg(long, value_name = "FILE.md,...", value_delimiter = ',', conflicts_with = "tables")]
+    pub recompute: Vec<PathBuf>,
 
     /// Print one JSON object instead of the summary
     #[arg(long)]
@@ -111,6 +115,7 @@ fn crossing(text: &str) -> Result<String, String> {
 fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
     let there = |name: &str| ScheduledSoftness::learned(name).is_ok();
     match &method.softness {
+        Some(SoftnessChoice::Preset) => ScheduledSoftness::preset(task.name()).is_ok(),
         Some(SoftnessChoice::Learned(None)) => there(task.name()),
         Some(SoftnessChoice::Learned(Some(kind))) => there(&learned_kind(task.name(), kind)),
         _ => true,
@@ -162,6 +167,8 @@ impl Args {
     }
 
     /// Methods as they are, and varied.
+    ///
+    /// What was learned on a task is left out where it is the preset, if that is compared.
     fn compared(
         &self,
         task: &'static dyn AnyTask,
@@ -179,10 +186,19 @@ impl Args {
             runs,
             purpose,
         };
+        let is = |method: &MethodArgs, choice| {
+            *method == MethodArgs { softness: Some(choice), ..MethodArgs::default() }
+        };
+        let mut methods = self.methods.iter().filter_map(|one| one.method.as_ref());
+        let has_preset = methods.any(|method| is(method, SoftnessChoice::Preset));
         for NamedMethod { name, method } in &self.methods {
             let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
                 continue;
             };
+            let is_learned = is(method, SoftnessChoice::Learned(None));
+            if is_learned && has_preset && is_preset_learned(task.name()) {
+                continue;
+            }
             cells.push(cell(name.clone(), method.clone(), None, Purpose::Compared));
         }
         for NamedMethod { name, method } in &self.varied {
@@ -264,10 +280,19 @@ mod tests {
     #[test]
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick --tasks shape2d,shape3d,pose,occlusion").cells().unwrap();
-        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + 4 * 2 * 3);
+        // Beside eleven of all tasks a surrogate and four that are varied where edges move, and on two tasks what was learned beside the
+        // preset.
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + 2 * 2 + 4 * 2 * 3);
         assert_eq!((cells[0].task.name(), cells[18].variant), ("shape2d", Variant::Transfer));
-        assert_eq!(cells[12].name, "learned resolution 128");
+        assert_eq!((&*cells[0].name, &*cells[12].name), ("preset", "preset resolution 128"));
         assert!(cells[0].is_default() && !cells[12].is_default());
+        let learned =
+            |task: &str| cells.iter().any(|c| c.task.name() == task && c.name == "learned");
+        assert!(learned("shape3d") && learned("pose"));
+        assert!(!learned("occlusion"), "what is the preset is not shown twice");
+        let alone =
+            args("--tasks occlusion --methods learned --varied= --crossed=").cells().unwrap();
+        assert_eq!(alone.len(), 2);
         let crossed: Vec<&str> = cells
             .iter()
             .filter(|c| matches!(c.purpose, Purpose::Crossed(_)))
@@ -311,7 +336,8 @@ mod tests {
 
     #[test]
     fn a_new_task_is_compared_by_what_needs_nothing_learned_on_it() {
-        let line = "--methods learned,learned-mlp,learned-surrogate,gauss,learned-pose --varied=";
+        let line =
+            "--methods preset,learned,learned-mlp,learned-surrogate,gauss,learned-pose --varied=";
         let mut cells = Vec::new();
         args(line).compared(&Disc, Variant::Original, 1, &[], &mut cells).unwrap();
         let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();

@@ -47,7 +47,7 @@ impl Cell {
     /// Whether it is what the task's program does without flags.
     pub fn is_default(&self) -> bool {
         self.method
-            == MethodArgs { softness: Some(SoftnessChoice::Learned(None)), ..MethodArgs::default() }
+            == MethodArgs { softness: Some(SoftnessChoice::Preset), ..MethodArgs::default() }
             && self.purpose == Purpose::Compared
     }
 }

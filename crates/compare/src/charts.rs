@@ -1,6 +1,6 @@
 //! Charts of speed against accuracy, for one task in one variant or over all of them.
 
-use softrast_cli::method_colour;
+use softrast_cli::{Variant, method_colour};
 use softrast_lab::{
     Run, mean, median, paired,
     plot::{Axis, Mark, Plot, Series},
@@ -10,7 +10,7 @@ use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
 use softrast_softness::Softness;
 
-use crate::{Measured, Purpose, Variation, measured::short};
+use crate::{Measured, Purpose, Variation, measured::short, tables::grouped};
 
 /// A run is solved where its hard error has fallen to this share of what it began with. Fixed before anything was measured.
 const TARGET: f64 = 0.1;
@@ -29,7 +29,7 @@ pub(crate) struct Chart {
 
 /// All charts of a comparison.
 pub(crate) struct Charts {
-    /// Of each task in each variant, in the order of [`by_variant`](crate::tables::by_variant).
+    /// Of each task in each variant, in the order of [`by_variant`].
     pub(crate) of_variants: Vec<Vec<Chart>>,
     /// Over all of them.
     pub(crate) profile: Option<Chart>,
@@ -44,6 +44,14 @@ impl Charts {
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Chart> {
         self.of_variants.iter().flatten().chain(&self.profile)
     }
+}
+
+/// The cells of each task in each variant, in the order of the tables, without those of Table 6 alone.
+pub(crate) fn by_variant(measured: &[Measured]) -> Vec<Vec<&Measured>> {
+    grouped(measured, |one| {
+        let shown = !matches!(one.cell.purpose, Purpose::Crossed(_));
+        shown.then_some((one.cell.task.name(), one.cell.variant == Variant::Original))
+    })
 }
 
 fn named(one: &Measured) -> Series {

@@ -7,6 +7,7 @@ mod args;
 mod cell;
 mod charts;
 mod crossed;
+mod documents;
 mod measured;
 mod program;
 mod records;
@@ -16,6 +17,8 @@ mod tasks;
 
 pub use args::{Args, NamedMethod};
 pub use cell::{Cell, Purpose, Variation};
+pub use documents::recomputed;
 pub use measured::{MeanError, Measured};
 pub use program::{compare, main};
+pub use records::Record;
 pub use tasks::{AnyTask, Entry, TASKS, task};

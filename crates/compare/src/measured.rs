@@ -1,7 +1,7 @@
 use anyhow::ensure;
 use softrast_cli::{Common, InOurUnits, Variant};
 use softrast_lab::{
-    Encoded, Metric, Role, Run, Runner, mean, mean_interval, place, sweep::rounded,
+    Encoded, Metric, Role, Run, Runner, halving::rounded, mean, mean_interval, place,
 };
 
 use crate::{Cell, tasks::Entry};

@@ -1,6 +1,6 @@
 use std::{ffi::OsString, fs, io::Write, process::ExitCode};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::CommandFactory;
 use serde_json::json;
 use softrast_lab::{
@@ -10,11 +10,11 @@ use softrast_lab::{
 };
 
 use crate::{
-    Args, Measured,
-    charts::Charts,
+    Args, Measured, Record,
+    charts::{Charts, by_variant},
+    documents::recomputed,
     records,
     results::{html, markdown},
-    tables::by_variant,
 };
 
 /// The whole `main` of the program.
@@ -25,7 +25,34 @@ pub fn main() -> ExitCode {
 fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     let again = repeated("compare", &words);
-    compare(&args, &again)?.print(args.json, &again, stdout)
+    let output =
+        if args.recompute.is_empty() { compare(&args, &again)? } else { recompute(&args)? };
+    output.print(args.json, &again, stdout)
+}
+
+/// Makes the tables of documents again of the records that they keep.
+///
+/// # Errors
+///
+/// If a document cannot be made again or written, or had another table; it is written then.
+fn recompute(args: &Args) -> anyhow::Result<Output> {
+    let mut others = Vec::new();
+    for document in &args.recompute {
+        let [old, new] = recomputed(document)?;
+        if old != new {
+            write_atomically(document, new.as_bytes())
+                .with_context(|| format!("cannot write {document:?}"))?;
+            others.push(document.display().to_string());
+        }
+    }
+    ensure!(
+        others.is_empty(),
+        "other tables than its records give had {}: written anew",
+        others.join(", ")
+    );
+    let text =
+        vec![format!("{} documents have the tables that their records give", args.recompute.len())];
+    Ok(Output { json: json!({ "documents": args.recompute }), text, ..Output::default() })
 }
 
 /// Evaluates all cells, writes tables, report and charts after each, and says where. `command` is what they name as what made them.
@@ -61,7 +88,8 @@ pub fn compare(args: &Args, command: &str) -> anyhow::Result<Output> {
         tables.display(),
         report.display()
     );
-    let json = json!({ "cells": records::json(&measured), "tables": tables, "report": report });
+    let records: Vec<Record> = measured.iter().map(Record::of).collect();
+    let json = json!({ "cells": records, "tables": tables, "report": report });
     Ok(Output { json, text: vec![text], ..Output::default() })
 }
 
@@ -71,10 +99,7 @@ fn write(args: &Args, measured: &[Measured], command: &str) -> anyhow::Result<()
         write_atomically(path, text.as_bytes()).with_context(|| format!("cannot write {path:?}"))
     };
     let tables = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
-    let folder = match &args.tables {
-        Some(tables) => tables.with_extension(""),
-        None => args.out.join("charts"),
-    };
+    let folder = tables.with_extension("");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {folder:?}"))?;
     let charts = Charts::new(&by_variant(measured));
     for chart in charts.iter() {
@@ -82,8 +107,9 @@ fn write(args: &Args, measured: &[Measured], command: &str) -> anyhow::Result<()
         replace(&folder.join(format!("{}.csv", chart.name)), &chart.plot.csv())?;
     }
     let shown = folder.file_name().and_then(|name| name.to_str());
-    replace(&tables, &markdown(measured, &charts, command, shown))?;
-    replace(&args.out.join("cells.csv"), &records::csv(measured))?;
-    replace(&args.out.join("cells.json"), &format!("{:#}\n", records::json(measured)))?;
-    replace(&args.out.join("report.html"), &html(measured, &charts, command)?)
+    let records: Vec<Record> = measured.iter().map(Record::of).collect();
+    replace(&folder.join("cells.jsonl"), &records::text(&records)?)?;
+    replace(&tables, &markdown(measured, &records, &charts, command, shown)?)?;
+    replace(&args.out.join("cells.csv"), &records::csv(&records))?;
+    replace(&args.out.join("report.html"), &html(measured, &records, &charts, command)?)
 }

@@ -1,31 +1,176 @@
-//! The numbers behind tables and charts, a record for every cell.
+//! The numbers that tables are made of, a record for every cell: what documents keep, so that their tables can be made again.
 
 use std::fmt::Write;
 
-use serde_json::{Value, json};
-use softrast_lab::mean;
+use anyhow::Context;
+use serde::{Deserialize, Serialize};
+use softrast_cli::{Schedule, Searched, SoftnessChoice, Variant};
+use softrast_lab::{mean, mean_interval};
 
-use crate::Measured;
+use crate::{Cell, Measured, Purpose, TASKS, crossed::learned_on, tasks::AnyTask};
 
-/// One line for every cell.
-pub(crate) fn csv(measured: &[Measured]) -> String {
+/// Digits of a number that is kept.
+const DIGITS: usize = 5;
+
+/// What a cell came to, as it stands on a line of `cells.jsonl`.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// Name of the task.
+    pub task: String,
+    /// Which variant.
+    pub original: bool,
+    /// What the method is called.
+    pub method: String,
+    /// Its family, where it has one of those of the paper's tables.
+    pub family: String,
+    /// Scales, learning rate and what else was chosen.
+    pub setting: String,
+    /// Whether the setting was searched for, learned, or named by its flags.
+    pub chosen: bool,
+    /// Whether it stands in Table 3, and not in Table 6 alone.
+    pub compared: bool,
+    /// Whether it only varies another.
+    pub varied: bool,
+    /// Kind of what comes along and the task it was learned on, for Table 6.
+    pub learned_on: Option<[String; 2]>,
+    /// Pixels a side.
+    pub size: usize,
+    /// Steps of a run.
+    pub steps: usize,
+    /// Faces of the scene.
+    pub faces: usize,
+    /// Titles of the hard error and of that of the parameters.
+    pub titles: [String; 2],
+    /// Time of the optimisation steps of a run, in seconds.
+    pub seconds: f64,
+    /// Image and parameter error in the unit of the paper's Table 3.
+    pub in_papers_unit: [Option<f64>; 2],
+    /// Runs that succeed.
+    pub successes: usize,
+    /// Hard error at the last step, in the order of the seeds, which count from 0.
+    pub last: Vec<f64>,
+    /// Hard error of the step that is returned.
+    pub returned: Vec<f64>,
+    /// Error of the parameters at the last step.
+    pub parameter: Vec<f64>,
+}
+
+impl Record {
+    /// Of a cell that is measured.
+    pub fn of(one: &Measured) -> Self {
+        let (cell, metrics) = (&one.cell, one.metrics());
+        let family = match &cell.method.softness {
+            Some(SoftnessChoice::Family(family)) => family.name(),
+            _ => "",
+        };
+        let parameter = metrics.iter().position(|metric| metric.key == "parameter_error");
+        let title = |place: Option<usize>| place.map(|place| one.title(place)).unwrap_or_default();
+        let kept = |values: Vec<f64>| values.into_iter().map(kept).collect();
+        Self {
+            task: cell.task.name().to_owned(),
+            original: cell.variant == Variant::Original,
+            method: cell.name.clone(),
+            family: family.to_owned(),
+            setting: one.setting(),
+            chosen: is_chosen(cell),
+            compared: !matches!(cell.purpose, Purpose::Crossed(_)),
+            varied: matches!(cell.purpose, Purpose::Varied(_)),
+            learned_on: learned_on(cell),
+            size: one.entry.solve.size,
+            steps: one.entry.solve.steps,
+            faces: one.entry.faces,
+            titles: [title(Some(one.hard_place())), title(parameter)],
+            seconds: self::kept(one.seconds),
+            in_papers_unit: one.in_papers_unit().map(|error| error.map(self::kept)),
+            successes: one.runs.iter().filter(|run| run.success).count(),
+            last: kept(one.hard().per_run),
+            returned: kept(one.returned()),
+            parameter: kept(one.parameter().per_run),
+        }
+    }
+
+    /// The task.
+    ///
+    /// # Panics
+    ///
+    /// If there is none of its name, which [`read`] makes sure of.
+    pub fn task(&self) -> &'static dyn AnyTask {
+        let task = TASKS.iter().find(|task| task.name() == self.task);
+        *task.unwrap_or_else(|| panic!("there is no task {}", self.task))
+    }
+
+    /// Name of the variant.
+    pub fn variant(&self) -> &'static str {
+        if self.original { Variant::Original.name() } else { Variant::Transfer.name() }
+    }
+
+    /// Share of runs that succeed.
+    pub fn success_rate(&self) -> f64 {
+        self.successes as f64 / self.last.len() as f64
+    }
+}
+
+/// To as many digits as are kept.
+fn kept(x: f64) -> f64 {
+    format!("{x:.*e}", DIGITS - 1).parse().unwrap_or(x)
+}
+
+/// Whether the setting of a cell was searched for, learned, or named by its flags.
+fn is_chosen(cell: &Cell) -> bool {
+    let method = &cell.method;
+    let Some(SoftnessChoice::Family(family)) = &method.softness else { return true };
+    if method.scale.is_some() || method.init.is_some() {
+        return true;
+    }
+    [Schedule::Static, Schedule::Decay].into_iter().any(|usual| {
+        Searched::of(cell.task.name(), family.name(), method.schedule, usual).is_some()
+    })
+}
+
+/// The records as text, one a line.
+///
+/// # Errors
+///
+/// If a number is not finite.
+pub(crate) fn text(records: &[Record]) -> anyhow::Result<String> {
+    let lines = records.iter().map(|record| Ok(serde_json::to_string(record)? + "\n"));
+    lines.collect()
+}
+
+/// The records of a text.
+///
+/// # Errors
+///
+/// If a line is none, or of no task.
+pub(crate) fn read(text: &str) -> anyhow::Result<Vec<Record>> {
+    let line = |(k, line): (usize, &str)| -> anyhow::Result<Record> {
+        let record: Record = serde_json::from_str(line)
+            .with_context(|| format!("line {} is no record of a cell", k + 1))?;
+        crate::task(&record.task)?;
+        Ok(record)
+    };
+    text.lines().enumerate().map(line).collect()
+}
+
+/// One line for every cell, for spreadsheets.
+pub(crate) fn csv(records: &[Record]) -> String {
     let mut text = String::from(
         "task,variant,method,runs,hard_last,hard_low,hard_high,hard_best_step,parameter_last,success_rate,seconds_a_run\n",
     );
-    for one in measured {
-        let (hard, cell) = (one.hard(), &one.cell);
-        let [low, high] = hard.ci95;
+    for one in records {
+        let [low, high] = mean_interval(&one.last);
         // Writing to a string does not fail.
         let _ = writeln!(
             text,
             "{},{},{},{},{},{low},{high},{},{},{},{}",
-            cell.task.name(),
-            cell.variant.name(),
-            cell.name,
-            cell.runs,
-            hard.mean,
-            mean(&one.returned()),
-            one.parameter().mean,
+            one.task,
+            one.variant(),
+            one.method,
+            one.last.len(),
+            mean(&one.last),
+            mean(&one.returned),
+            mean(&one.parameter),
             one.success_rate(),
             one.seconds
         );
@@ -33,25 +178,18 @@ pub(crate) fn csv(measured: &[Measured]) -> String {
     text
 }
 
-/// The same with the settings and the values of every run.
-pub(crate) fn json(measured: &[Measured]) -> Value {
-    let record = |one: &Measured| -> Value {
-        json!({
-            "task": one.cell.task.name(),
-            "variant": one.cell.variant.name(),
-            "method": one.cell.name,
-            "setting": one.setting(),
-            "runs": one.cell.runs,
-            "hard_error": {
-                "name": one.title(one.hard_place()),
-                "last": one.hard().per_run,
-                "best_step": one.returned(),
-            },
-            "parameter_error": { "last": one.parameter().per_run },
-            "success_rate": one.success_rate(),
-            "seconds_a_run": one.seconds,
-            "steps": one.entry.solve.steps,
-        })
-    };
-    measured.iter().map(record).collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn five_digits_are_kept() {
+        assert_eq!([0.0, 1.234_567_8, 0.000_123_456_78].map(kept), [0.0, 1.2346, 0.000_123_46]);
+    }
+
+    #[test]
+    fn a_line_that_is_no_record_is_named() {
+        let error = format!("{:#}", read("{\"task\": 1}\n").unwrap_err());
+        assert!(error.starts_with("line 1 is no record of a cell"), "{error}");
+    }
 }

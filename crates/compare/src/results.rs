@@ -6,10 +6,10 @@ use softrast_cli::Variant;
 use softrast_lab::{machine, report::Report};
 
 use crate::{
-    Measured,
-    charts::{Chart, Charts},
-    crossed::crossed,
-    tables::{by_variant, errors, seconds, tasks},
+    Measured, Record,
+    charts::{Chart, Charts, by_variant},
+    documents::block,
+    tables,
 };
 
 const HEAD: &str = include_str!("text/head.md");
@@ -19,37 +19,44 @@ const CROSSED: &str = include_str!("text/crossed.md");
 
 /// The tables of the paper with our figures, as Markdown. `command` made them; `pictures` is where the charts are, seen from the file, if
 /// they are to be shown.
+///
+/// # Errors
+///
+/// If a table has no records.
 pub(crate) fn markdown(
     measured: &[Measured],
+    records: &[Record],
     charts: &Charts,
     command: &str,
     pictures: Option<&str>,
-) -> String {
+) -> anyhow::Result<String> {
+    let table = |name: &str| block(records, name);
     let mut text = format!(
-        "{HEAD}\n```\n{command}\n```\n\non {}.\n\n{READING}\n## Table 2: tasks\n",
-        machine()
+        "{HEAD}\n```\n{command}\n```\n\non {}.\n\n{READING}\n## Table 2: tasks\n\n{}\n## Table 3: errors\n",
+        machine(),
+        table("tasks")?
     );
-    text += &tasks(measured).markdown();
-    text += "## Table 3: errors\n";
     for (group, charts) in by_variant(measured).iter().zip(&charts.of_variants) {
         let cell = &group[0].cell;
         // Writing to a string does not fail.
         if cell.variant == Variant::Original {
             let _ = write!(text, "\n### {}\n\n{}\n", cell.task.title(), cell.task.paper().note);
         }
-        let _ = write!(text, "\n**{}**, seeds: {}\n", cell.variant.name(), cell.runs);
-        text += &errors(group).markdown();
+        let variant = cell.variant.name();
+        let errors = table(&format!("errors {} {variant}", cell.task.name()))?;
+        let _ = write!(text, "\n**{variant}**, seeds: {}\n\n{errors}", cell.runs);
         text.extend(charts.iter().map(|chart| shown(chart, pictures)));
     }
-    let _ = write!(text, "\n## Table 5: seconds\n\n{SECONDS}{}", seconds(measured).markdown());
-    if let Some(table) = crossed(measured) {
-        let _ = write!(text, "\n## Table 6: cross evaluation\n\n{CROSSED}{}", table.markdown());
+    let _ = write!(text, "\n## Table 5: seconds\n\n{SECONDS}\n{}", table("seconds")?);
+    if records.iter().any(|record| !record.compared) {
+        let crossed = table("crossed")?;
+        let _ = write!(text, "\n## Table 6: cross evaluation\n\n{CROSSED}\n{crossed}");
     }
     if let Some(chart) = &charts.profile {
         text += "\n## Who is fast how often\n";
         text += &shown(chart, pictures);
     }
-    text
+    Ok(text)
 }
 
 fn shown(chart: &Chart, pictures: Option<&str>) -> String {
@@ -60,6 +67,7 @@ fn shown(chart: &Chart, pictures: Option<&str>) -> String {
 /// The same as one HTML page, with the pictures of the first seed of every cell.
 pub(crate) fn html(
     measured: &[Measured],
+    records: &[Record],
     charts: &Charts,
     command: &str,
 ) -> anyhow::Result<String> {
@@ -67,13 +75,15 @@ pub(crate) fn html(
     report.paragraph(&format!("On {}.", machine()));
     READING.split("\n\n").for_each(|text| report.paragraph(&text.replace("**", "")));
     report.heading("Tasks");
-    report.table(&tasks(measured));
-    for (group, charts) in by_variant(measured).iter().zip(&charts.of_variants) {
+    report.table(&tables::tasks(records));
+    let errors = tables::by_variant(records);
+    let groups = by_variant(measured);
+    for ((group, charts), errors) in groups.iter().zip(&charts.of_variants).zip(&errors) {
         let cell = &group[0].cell;
         report.heading(&format!("{}, {}", cell.task.title(), cell.variant.name()));
         report.paragraph(cell.task.paper().note);
         report.paragraph(&format!("Seeds: {}", cell.runs));
-        report.table(&errors(group));
+        report.table(&tables::errors(errors));
         for chart in charts {
             report.chart(&chart.plot.svg()?, &chart.caption);
         }
@@ -85,8 +95,8 @@ pub(crate) fn html(
     }
     report.heading("Seconds");
     report.paragraph(SECONDS);
-    report.table(&seconds(measured));
-    if let Some(table) = crossed(measured) {
+    report.table(&tables::seconds(records));
+    if let Some(table) = tables::named(records, "crossed")? {
         report.heading("Cross evaluation");
         report.paragraph(CROSSED);
         report.table(&table);
@@ -95,7 +105,7 @@ pub(crate) fn html(
         report.heading("Who is fast how often");
         report.chart(&chart.plot.svg()?, &chart.caption);
     }
-    let beside = "runs.jsonl with every run, cells.csv and cells.json with the numbers behind the tables, charts with the charts as SVG \
+    let beside = "runs.jsonl with every run, cells.csv with the numbers behind the tables, results with those of all runs, the charts as SVG \
                   and their points as CSV";
     Ok(report.finish(command, beside))
 }

@@ -1,23 +1,31 @@
 //! The tables of the paper with our figures.
 
-use softrast_cli::{Schedule, Searched, SoftnessChoice, Variant};
-use softrast_lab::{mean, paired, report::Table};
+use softrast_cli::Variant;
+use softrast_lab::{mean, mean_interval, median, paired_among, report::Table, wilson_interval};
 
-use crate::{Cell, MeanError, Measured, Purpose, TASKS, measured::short};
+use crate::{Record, TASKS, measured::short};
 
-/// The cells of each task in each variant, in the order of the tables, without those of Table 6 alone.
-pub(crate) fn by_variant(measured: &[Measured]) -> Vec<Vec<&Measured>> {
-    let places = TASKS.iter().flat_map(|task| Variant::ALL.map(|variant| (task.name(), variant)));
-    let group = |(task, variant)| {
-        let of = |one: &&Measured| one.cell.task.name() == task && one.cell.variant == variant;
-        let crossed = |one: &&Measured| matches!(one.cell.purpose, Purpose::Crossed(_));
-        measured.iter().filter(of).filter(|one| !crossed(one)).collect::<Vec<_>>()
-    };
+/// Hard error of what is returned above which a run has not found its pose.
+const FAILS: f64 = 0.05;
+
+/// The records of each task in each variant, in the order of the tables, without those of Table 6 alone.
+pub(crate) fn by_variant(records: &[Record]) -> Vec<Vec<&Record>> {
+    grouped(records, |one| one.compared.then_some((one.task.as_str(), one.original)))
+}
+
+/// What has a task, and whether it is the original, in the order of the tables; what has none is left out.
+pub(crate) fn grouped<'a, T>(
+    all: &'a [T],
+    key: impl Fn(&'a T) -> Option<(&'a str, bool)>,
+) -> Vec<Vec<&'a T>> {
+    let places =
+        TASKS.iter().flat_map(|task| [true, false].map(|original| (task.name(), original)));
+    let group = |place| all.iter().filter(|one| key(one) == Some(place)).collect::<Vec<_>>();
     places.map(group).filter(|group| !group.is_empty()).collect()
 }
 
 /// Table 2: what each task is.
-pub(crate) fn tasks(measured: &[Measured]) -> Table {
+pub(crate) fn tasks(records: &[Record]) -> Table {
     let mut table = Table::new([
         "task",
         "variant",
@@ -28,66 +36,58 @@ pub(crate) fn tasks(measured: &[Measured]) -> Table {
         "parameter error",
         "degrees of freedom, paper",
     ]);
-    for group in by_variant(measured) {
+    for group in by_variant(records) {
         let one = group[0];
-        let (cell, size) = (&one.cell, one.entry.solve.size);
-        let parameter = one.metrics().iter().position(|metric| metric.key == "parameter_error");
-        let freedom = cell.task.paper().freedom[usize::from(cell.variant == Variant::Transfer)];
+        let [hard, parameter] = one.titles.clone();
         table.push([
-            cell.task.title().to_owned(),
-            cell.variant.name().to_owned(),
-            one.entry.faces.to_string(),
-            format!("{size} × {size}"),
-            one.entry.solve.steps.to_string(),
-            one.title(one.hard_place()),
-            parameter.map(|place| one.title(place)).unwrap_or_default(),
-            freedom.to_owned(),
+            one.task().title().to_owned(),
+            one.variant().to_owned(),
+            one.faces.to_string(),
+            format!("{0} × {0}", one.size),
+            one.steps.to_string(),
+            hard,
+            parameter,
+            one.task().paper().freedom[usize::from(!one.original)].to_owned(),
         ]);
     }
     table
 }
 
 /// Table 3: the rows of one task in one variant.
-pub(crate) fn errors(group: &[&Measured]) -> Table {
+pub(crate) fn errors(group: &[&Record]) -> Table {
     let first = group[0];
-    let less = format!("less {}", first.cell.name);
-    let parameter = first.metrics().iter().position(|metric| metric.key == "parameter_error");
+    let less = format!("less {}", first.method);
+    let [hard, parameter] = first.titles.clone();
     let mut table = Table::new([
         "method".to_owned(),
         "setting".into(),
-        first.title(first.hard_place()),
+        hard,
         less.clone(),
         "best step".into(),
         less,
-        parameter.map(|place| first.title(place)).unwrap_or_default(),
+        parameter,
         "success".into(),
         "in the paper's unit".into(),
         "paper".into(),
     ]);
-    let (of_first, first_hard) = (first.returned(), first.hard());
+    let comparisons = group.iter().filter(|one| !one.varied).count() - 1;
     for one in group {
-        let (name, hard, returned) = (&one.cell.name, one.hard(), one.returned());
-        let less = |errors: &[f64], reference: &[f64]| match *name == first.cell.name {
+        let less = |errors: &[f64], reference: &[f64]| match one.method == first.method {
             true => String::new(),
-            false => difference(errors, reference),
+            false => difference(comparisons, errors, reference),
         };
-        let family = match &one.cell.method.softness {
-            Some(SoftnessChoice::Family(family)) => family.name(),
-            _ => "",
-        };
-        let original = one.cell.variant == Variant::Original;
-        let printed = one.cell.task.paper().printed(family, original);
-        let star = if is_chosen(&one.cell) { "" } else { " *" };
+        let printed = one.task().paper().printed(&one.family, one.original);
+        let star = if one.chosen { "" } else { " *" };
         table.push([
-            name.clone(),
-            format!("{}{star}", one.setting()),
-            with_interval(&hard),
-            less(&hard.per_run, &first_hard.per_run),
-            short(mean(&returned)),
-            less(&returned, &of_first),
-            with_interval(&one.parameter()),
+            one.method.clone(),
+            format!("{}{star}", one.setting),
+            with_interval(&one.last),
+            less(&one.last, &first.last),
+            short(mean(&one.returned)),
+            less(&one.returned, &first.returned),
+            with_interval(&one.parameter),
             format!("{:.0} %", 100.0 * one.success_rate()),
-            pair(one.in_papers_unit()),
+            pair(one.in_papers_unit),
             printed.map(pair).unwrap_or_default(),
         ]);
     }
@@ -95,41 +95,108 @@ pub(crate) fn errors(group: &[&Measured]) -> Table {
 }
 
 /// Table 5: what a run costs.
-pub(crate) fn seconds(measured: &[Measured]) -> Table {
+pub(crate) fn seconds(records: &[Record]) -> Table {
     let mut table = Table::new(["task", "variant", "method", "seconds a run", "ms a step"]);
-    for one in by_variant(measured).into_iter().flatten() {
+    for one in by_variant(records).into_iter().flatten() {
         table.push([
-            one.cell.task.title().to_owned(),
-            one.cell.variant.name().to_owned(),
-            one.cell.name.clone(),
+            one.task().title().to_owned(),
+            one.variant().to_owned(),
+            one.method.clone(),
             short(one.seconds),
-            short(1e3 * one.seconds / one.entry.solve.steps.max(1) as f64),
+            short(1e3 * one.seconds / one.steps.max(1) as f64),
         ]);
     }
     table
 }
 
-/// Whether the setting of a cell was searched for, learned, or named by its flags.
-fn is_chosen(cell: &Cell) -> bool {
-    let method = &cell.method;
-    let Some(SoftnessChoice::Family(family)) = &method.softness else { return true };
-    if method.scale.is_some() || method.init.is_some() {
-        return true;
+/// What matters most of Table 3: the preset beside the best searched static softness and the best searched decay, by the hard error that
+/// is returned; in bold where the preset is clearly below both.
+pub(crate) fn summary(records: &[Record]) -> Table {
+    let mut table = Table::new([
+        "task",
+        "seeds",
+        "preset",
+        "best family, scale searched",
+        "best family, decay searched",
+    ]);
+    for group in by_variant(records) {
+        let Some(preset) = group.iter().find(|one| one.method == "preset") else { continue };
+        let searched = |end: &str| {
+            let of = |one: &&&Record| !one.varied && one.chosen && one.method.ends_with(end);
+            let families = group.iter().filter(of).filter(|one| !one.family.is_empty());
+            families.min_by(|a, b| mean(&a.returned).total_cmp(&mean(&b.returned)))
+        };
+        let others = [searched(" static"), searched(" decay")];
+        let known = others.iter().flatten().count();
+        let clear = others
+            .iter()
+            .flatten()
+            .all(|other| paired_among(known, &preset.returned, &other.returned).1[1] < 0.0);
+        let shown = short(mean(&preset.returned));
+        let variant = if preset.original { "" } else { ", transfer" };
+        let named = |one: Option<&&Record>| {
+            one.map_or(String::new(), |one| {
+                format!("{} ({})", short(mean(&one.returned)), one.family)
+            })
+        };
+        let [fixed, decay] = others.map(named);
+        table.push([
+            format!("{}{variant}", preset.task().title()),
+            preset.returned.len().to_string(),
+            if clear && known > 0 { format!("**{shown}**") } else { shown },
+            fixed,
+            decay,
+        ]);
     }
-    [Schedule::Static, Schedule::Decay].into_iter().any(|usual| {
-        Searched::of(cell.task.name(), family.name(), method.schedule, usual).is_some()
-    })
+    table
+}
+
+/// What bounds poses: runs that fail, and how near the others come; for each method of each variant.
+fn poses(records: &[Record]) -> Table {
+    let mut table = Table::new([
+        "variant",
+        "method",
+        "seeds",
+        "failing",
+        "returned",
+        "less preset",
+        "median",
+        "mean of the rest",
+        "s a run",
+    ]);
+    for group in by_variant(records) {
+        let preset = group.iter().find(|one| one.method == "preset");
+        for one in &group {
+            let returned = &one.returned;
+            let (fails, rest): (Vec<f64>, Vec<f64>) = returned.iter().partition(|x| **x > FAILS);
+            let [low, high] = wilson_interval(fails.len(), returned.len()).map(|x| 100.0 * x);
+            let less = preset.filter(|preset| preset.method != one.method);
+            let less = less.map(|preset| difference(group.len() - 1, returned, &preset.returned));
+            table.push([
+                one.variant().to_owned(),
+                one.method.clone(),
+                returned.len().to_string(),
+                format!("{} ({low:.1} to {high:.1} %)", fails.len()),
+                with_interval(returned),
+                less.unwrap_or_default(),
+                short(median(returned)),
+                short(mean(&rest)),
+                short(one.seconds),
+            ]);
+        }
+    }
+    table
 }
 
 /// Mean and interval, where there are several runs.
-pub(crate) fn with_interval(error: &MeanError) -> String {
-    let (mean, [low, high]) = (short(error.mean), error.ci95.map(short));
-    if error.per_run.len() == 1 { mean } else { format!("{mean} ({low} to {high})") }
+pub(crate) fn with_interval(errors: &[f64]) -> String {
+    let (mean, [low, high]) = (short(mean(errors)), mean_interval(errors).map(short));
+    if errors.len() == 1 { mean } else { format!("{mean} ({low} to {high})") }
 }
 
-/// Mean and interval of the differences on the seeds that both have; in bold where one is clear.
-fn difference(errors: &[f64], reference: &[f64]) -> String {
-    let (mean, [low, high]) = paired(errors, reference);
+/// Mean and interval of the differences on the seeds that both have; in bold where one is clear among so many comparisons.
+fn difference(comparisons: usize, errors: &[f64], reference: &[f64]) -> String {
+    let (mean, [low, high]) = paired_among(comparisons, errors, reference);
     if errors.len() == 1 {
         return short(mean);
     }
@@ -139,4 +206,27 @@ fn difference(errors: &[f64], reference: &[f64]) -> String {
 
 fn pair(errors: [Option<f64>; 2]) -> String {
     errors.into_iter().flatten().map(short).collect::<Vec<_>>().join(" / ")
+}
+
+/// The table of this name: `tasks`, `summary`, `seconds`, `poses`, `crossed`, or `errors TASK VARIANT`; none where there is nothing to show.
+///
+/// # Errors
+///
+/// If there is no table of this name.
+pub(crate) fn named(records: &[Record], name: &str) -> anyhow::Result<Option<Table>> {
+    let words: Vec<&str> = name.split_whitespace().collect();
+    Ok(match words[..] {
+        ["tasks"] => Some(tasks(records)),
+        ["summary"] => Some(summary(records)),
+        ["seconds"] => Some(seconds(records)),
+        ["poses"] => Some(poses(records)),
+        ["crossed"] => crate::crossed::crossed(records),
+        ["errors", task, variant] => {
+            let original = variant == Variant::Original.name();
+            let groups = by_variant(records);
+            let of = |group: &&Vec<&Record>| group[0].task == task && group[0].original == original;
+            groups.iter().find(of).map(|group| errors(group))
+        }
+        _ => anyhow::bail!("there is no table {name:?}"),
+    })
 }

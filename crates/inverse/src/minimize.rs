@@ -11,6 +11,9 @@ use softrast_softness::{Place, ScaleSchedule, numbers};
 
 use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
 
+/// Starts of a problem that a run with feedback goes through at most; then it begins again where it is.
+const STARTS: usize = 8;
+
 /// All instances after some steps.
 #[derive(Clone, Debug)]
 pub struct Iterate {
@@ -36,7 +39,8 @@ pub struct Iterate {
 /// Goes down the gradient of a problem's loss from its start, all `instances` side by side: what it ends with.
 ///
 /// It shows every iterate from the start to the end to `visit`, along with the scene on the CPU. `visit` does not count as time of a
-/// step. Parameters without a gradient, as where nothing was drawn, stay as they are.
+/// step. Parameters without a gradient, as where nothing was drawn, stay as they are. Where the softness has feedback and a run is stuck, it
+/// begins again from the next start of the problem, as the softness says.
 ///
 /// # Errors
 ///
@@ -75,13 +79,19 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
         anyhow::Ok((loss, iterate))
     };
     let mut follower = feedback.map(|feedback| feedback.follow(steps));
-    let by_time = |step| Place { part: ScaleSchedule::part(step, steps), rate: 1.0 };
+    let by_time = |step| Place { part: ScaleSchedule::part(step, steps), rate: 1.0, again: false };
     let optimizer = problem.optimizer(learning_rate);
     let mut theta = problem.start(&run.scene).inner();
     let mut state = optimizer.init(&theta);
-    let (mut place, mut error) = (by_time(0), None);
+    let (mut place, mut error, mut starts) = (by_time(0), None, 1);
     for step in 0..steps {
         place = follower.as_mut().map_or_else(|| by_time(step), |run| run.next(error));
+        if place.again {
+            if let Some(other) = problem.restart(&instances[0], starts, STARTS) {
+                theta = problem.start(&problem.scene::<B>(&[other], config.size));
+            }
+            (state, starts) = (optimizer.init(&theta), starts + 1);
+        }
         let leaf = Tensor::from_inner(theta.clone()).require_grad();
         let (loss, iterate) = look(step, place.part, Tensor::clone(&leaf))?;
         error = Some(iterate.hard_loss[0]);

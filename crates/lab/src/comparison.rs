@@ -7,6 +7,7 @@ use crate::{
     format::short,
     mean, mean_interval,
     report::{Report, Table},
+    statistics::mean_interval_at,
 };
 
 /// A second experiment on the same seeds, and how the first differs from it.
@@ -36,6 +37,13 @@ struct Difference {
 pub fn paired(values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
     let differences: Vec<f64> = values.iter().zip(reference).map(|(a, b)| a - b).collect();
     (mean(&differences), mean_interval(&differences))
+}
+
+/// The same, with an interval so wide that those of so many `comparisons` all hold together at 95 %. Source: Bonferroni's correction.
+pub fn paired_among(comparisons: usize, values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
+    let differences: Vec<f64> = values.iter().zip(reference).map(|(a, b)| a - b).collect();
+    let level = 1.0 - 0.05 / comparisons.max(1) as f64;
+    (mean(&differences), mean_interval_at(level, &differences))
 }
 
 impl Comparison {
@@ -108,7 +116,7 @@ impl Comparison {
         report.table(&self.table());
         report.note(&format!(
             "A difference below 0 means that the first method ({first}) has the smaller value. On the charts it is blue, the second \
-             ({second}) is orange. Intervals are by the bootstrap over the seeds, that of the success by Wilson."
+             ({second}) is orange. Intervals are Student's over the seeds, that of the success is Wilson's."
         ));
     }
 }

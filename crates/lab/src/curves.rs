@@ -3,14 +3,10 @@
 use std::{collections::BTreeMap, fmt::Write};
 
 use crate::{
-    Metric, Point, Role, Run, mean,
+    Metric, Point, Role, Run, mean, mean_interval,
     plot::{Axis, Plot, Series},
-    statistics::mean_intervals,
 };
 
-/// Samples behind the interval at a step: fewer than behind those of the results, because there are as many as steps and they are
-/// only drawn.
-const RESAMPLES: usize = 1000;
 /// Of the first experiment and of the one it is compared with.
 const COLOURS: [[u8; 3]; 2] = [[31, 96, 168], [196, 84, 24]];
 
@@ -43,9 +39,12 @@ impl Convergence {
         }
         let row = |(step, points): (usize, Vec<&Point>)| {
             let values = |k: usize| points.iter().map(|point| point.values[k]).collect();
-            let lists: Vec<Vec<f64>> = (0..metrics.len()).map(values).collect();
-            let intervals = mean_intervals(&lists, RESAMPLES).into_iter().zip(&lists);
-            let spreads = intervals.map(|([low, high], list)| [mean(list), low, high]).collect();
+            let lists = (0..metrics.len()).map(values);
+            let spreads = lists.map(|list: Vec<f64>| {
+                let [low, high] = mean_interval(&list);
+                [mean(&list), low, high]
+            });
+            let spreads = spreads.collect();
             (step, points.len(), spreads)
         };
         Self { rows: steps.into_iter().map(row).collect() }

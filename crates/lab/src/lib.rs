@@ -1,8 +1,8 @@
 //! What serves every experiment that is run on seeds, whatever it is about.
 //!
 //! An [`Experiment`] is something that can be run on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same
-//! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. A [`Sweep`](sweep::Sweep) tries a
-//! grid, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
+//! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. [`Halving`](halving::Halving) searches
+//! for a setting, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
 //! [`report::Report`] writes pages, on which a [`Viewer`] turns a mesh.
 //!
 //! Nothing here knows of rendering: it sees seeds, numbers, RGB images, and meshes as plain numbers.
@@ -16,6 +16,8 @@ mod error_summary;
 mod evaluate;
 mod files;
 pub mod format;
+/// Grid search.
+pub mod halving;
 mod machine;
 mod metric;
 pub mod parse;
@@ -29,15 +31,14 @@ mod run;
 pub mod select;
 mod statistics;
 mod summary;
-/// Grid search.
-pub mod sweep;
 mod viewer;
 
 pub use cache::Cache;
-pub use comparison::{Comparison, paired};
+pub use comparison::{Comparison, paired, paired_among};
 pub use error::{Error, Failure, INTERRUPTED, found};
 pub use evaluate::{Evaluation, Runner, seeds, was_interrupted};
 pub use files::{OutputFolder, write_atomically};
+pub use halving::check_held_out;
 pub use machine::{machine, peak_rss_mib};
 pub use metric::{Metric, Role, place};
 pub use picture::{
@@ -48,5 +49,4 @@ pub use progress::{Progress, stop_on_ctrl_c};
 pub use run::{Batch, Experiment, Pictures, Point, Run, best_point};
 pub use statistics::{mean, mean_interval, median, quantile, wilson_interval};
 pub use summary::{Partial, Summary, headline};
-pub use sweep::check_held_out;
 pub use viewer::{Viewer, ViewerView};

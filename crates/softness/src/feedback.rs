@@ -5,8 +5,8 @@ use crate::file::LARGEST_LOGARITHM;
 /// How a run goes along the path of its scale by what it sees, and not by time: a closed loop.
 ///
 /// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a share of all steps, the slower the more its error
-/// falls. Where it comes to the end with a large error it is stuck: then it goes back to the beginning, and takes larger steps for a
-/// while, as often as time allows. All fields but `patience` are logarithms.
+/// falls. Where its error is too large for its place it is stuck: then it goes back to the beginning, from another start if the problem has
+/// one, as often as time allows. All fields but `patience` and `early` are logarithms.
 ///
 /// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
 /// whatever happens.
@@ -18,14 +18,12 @@ pub struct Feedback {
     /// How much slower it goes while the error falls: the pace is multiplied by `(recent / earlier)^patience`, two running means of the
     /// error over about 5 and 20 steps.
     pub patience: f64,
-    /// Logarithm of the error above which a run at the end of its path is stuck.
+    /// Logarithm of the least error so far above which a run at the end of its path is stuck.
     pub stuck: f64,
+    /// What is added to that at the beginning of the path, in proportion on the way to the end.
+    pub early: f64,
     /// Logarithm of the share of a passage that has to be left of a run to go back.
     pub room: f64,
-    /// Logarithm of what the learning rate is multiplied by after going back.
-    pub kick: f64,
-    /// Logarithm of the share of all steps that this takes.
-    pub kick_steps: f64,
     /// Logarithm of what the learning rate is multiplied by at the end of the path, in proportion on the way there.
     pub rate_end: f64,
 }
@@ -37,6 +35,8 @@ pub struct Place {
     pub part: f64,
     /// What the learning rate is multiplied by.
     pub rate: f64,
+    /// Whether the run was stuck, and begins again here.
+    pub again: bool,
 }
 
 /// A run that follows a [`Feedback`].
@@ -48,11 +48,9 @@ pub struct Follower {
     step: usize,
     part: f64,
     seen: Option<Seen>,
-    /// Steps still to take at the larger rate.
-    kicked: usize,
 }
 
-/// What a run has seen of its error.
+/// What a run has seen of its error since it last began.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     recent: f64,
@@ -65,39 +63,31 @@ const RECENT: f64 = 0.2;
 const EARLIER: f64 = 0.05;
 /// Added to both means, so that an error of 0 has a trend too.
 const SMALL: f64 = 1e-3;
+/// Places are multiples of one over this, so that what is drawn with can be kept for the next time.
+const PLACES: f64 = 512.0;
 
 impl Feedback {
     /// How many numbers it has.
-    pub const PARAMETERS: usize = 7;
+    pub const PARAMETERS: usize = 6;
 
-    /// Where learning begins: a path that takes two fifths of a run, larger steps for a thirtieth of it, and an error of 0.05 that is
-    /// too large.
-    pub const START: Self = Self {
-        passage: -0.9,
-        patience: 0.0,
-        stuck: -3.0,
-        room: -0.7,
-        kick: 1.5,
-        kick_steps: -3.4,
-        rate_end: 0.0,
-    };
+    /// Where learning begins: a path that takes a third of a run, and an error above 0.05 at its end, or 0.22 halfway, that is too large.
+    pub const START: Self =
+        Self { passage: -1.1, patience: 0.0, stuck: -3.0, early: 3.0, room: -0.5, rate_end: 0.0 };
 
     /// Its numbers, in the order of the fields.
     pub fn parameters(&self) -> [f64; Self::PARAMETERS] {
-        let Self { passage, patience, stuck, room, kick, kick_steps, rate_end } = *self;
-        [passage, patience, stuck, room, kick, kick_steps, rate_end]
+        let Self { passage, patience, stuck, early, room, rate_end } = *self;
+        [passage, patience, stuck, early, room, rate_end]
     }
 
     /// That of these numbers, in the order of the fields.
-    pub fn of(
-        [passage, patience, stuck, room, kick, kick_steps, rate_end]: [f64; Self::PARAMETERS],
-    ) -> Self {
-        Self { passage, patience, stuck, room, kick, kick_steps, rate_end }
+    pub fn of([passage, patience, stuck, early, room, rate_end]: [f64; Self::PARAMETERS]) -> Self {
+        Self { passage, patience, stuck, early, room, rate_end }
     }
 
     /// A run of so many steps that begins.
     pub fn follow(&self, steps: usize) -> Follower {
-        Follower { feedback: *self, steps, step: 0, part: 0.0, seen: None, kicked: 0 }
+        Follower { feedback: *self, steps, step: 0, part: 0.0, seen: None }
     }
 
     /// If it cannot be followed, says what was found and what was expected.
@@ -123,21 +113,18 @@ impl Follower {
                 least: seen.least.min(error),
             });
         }
-        let Feedback { passage, patience, stuck, room, kick, kick_steps, rate_end } = self.feedback;
-        let steps = self.steps as f64;
-        let passage = (passage.exp() * steps).max(1.0);
+        let Feedback { passage, patience, stuck, early, room, rate_end } = self.feedback;
+        let passage = (passage.exp() * self.steps as f64).max(1.0);
         let left = self.steps.saturating_sub(self.step + 1) as f64;
-        let is_stuck = self.seen.is_some_and(|seen| seen.least > stuck.exp());
-        if self.part >= 1.0 && is_stuck && left > room.exp() * passage {
-            self.part = 0.0;
-            self.kicked = (kick_steps.exp() * steps).round().min(left) as usize;
+        let too_large = (stuck + early * (1.0 - self.part)).exp();
+        let is_stuck = self.seen.is_some_and(|seen| seen.least > too_large);
+        let again = is_stuck && left > room.exp() * passage;
+        if again {
+            (self.part, self.seen) = (0.0, None);
         }
         self.step += 1;
-        if self.kicked > 0 {
-            self.kicked -= 1;
-            return Place { part: 0.0, rate: kick.exp() };
-        }
-        let place = Place { part: self.part, rate: (rate_end * self.part).exp() };
+        let part = (self.part * PLACES).round() / PLACES;
+        let place = Place { part, rate: (rate_end * part).exp(), again };
         let trend =
             self.seen.map_or(0.0, |seen| ((seen.recent + SMALL) / (seen.earlier + SMALL)).ln());
         // A run always comes to the end of its path.
@@ -160,20 +147,26 @@ mod tests {
     #[test]
     fn a_run_that_fits_goes_to_the_end_and_stays_there() {
         let places = places(Feedback::START, 300, |_| 0.01);
-        assert_eq!((places[0], places[299].part), (Place { part: 0.0, rate: 1.0 }, 1.0));
-        assert!(places.windows(2).all(|two| two[0].part <= two[1].part));
+        assert_eq!(places[0], Place { part: 0.0, rate: 1.0, again: false });
+        assert_eq!(places[299].part, 1.0);
+        assert!(places.windows(2).all(|two| two[0].part <= two[1].part && !two[1].again));
         let arrived = places.iter().position(|place| place.part >= 1.0).unwrap();
-        assert!((121..125).contains(&arrived), "{arrived}");
+        assert!((99..102).contains(&arrived), "{arrived}");
     }
 
     #[test]
-    fn a_run_that_is_stuck_begins_anew_with_larger_steps() {
-        let places = places(Feedback::START, 300, |_| 0.5);
-        let large = places.iter().filter(|place| place.rate > 1.0).count();
-        assert_eq!(large, 10, "a thirtieth of the steps");
-        assert_eq!(places[299].part, 1.0);
-        let backward = places.windows(2).filter(|two| two[1].part < two[0].part);
-        assert_eq!(backward.count(), 1, "there is no time for a third way");
+    fn a_run_that_is_stuck_begins_again_as_often_as_there_is_room() {
+        let begun = |error: f64| {
+            let places = places(Feedback::START, 300, |_| error);
+            assert_eq!(places[299].part, 1.0);
+            let begun = (0..300).filter(|&step| places[step].again).collect::<Vec<_>>();
+            assert!(begun.iter().all(|&step| places[step].part == 0.0));
+            begun
+        };
+        let (late, early) = (begun(0.051), begun(0.5));
+        assert!(late.len() == 2 && (99..103).contains(&late[0]), "{late:?}");
+        // exp(3 (1 - part) - 3) is below a half from a part of 0.77 on.
+        assert!(early.len() == 3 && (76..80).contains(&early[0]), "{early:?}");
     }
 
     #[test]

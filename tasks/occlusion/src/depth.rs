@@ -42,7 +42,7 @@ impl Depth {
                 return Self::of_file(path.display().to_string(), file);
             }
             Some(NameOrFile::Name(softness)) => *softness,
-            None => match learned(args, edges) {
+            None => match shipped(args, edges) {
                 Some(file) => return Self::of_file("learned".to_owned(), file),
                 None => like_edges(edges),
             },
@@ -88,8 +88,8 @@ impl Depth {
 }
 
 /// The depth softness that was learned along with the edges that come with the program, where those are used.
-fn learned(args: &Args, edges: &EdgeChoice) -> Option<DepthSoftnessFile> {
-    let name = edges.learned.as_ref().filter(|_| args.depth_scale.is_none())?;
+fn shipped(args: &Args, edges: &EdgeChoice) -> Option<DepthSoftnessFile> {
+    let name = edges.shipped.as_ref().filter(|_| args.depth_scale.is_none())?;
     DepthSoftnessFile::learned(name).ok()
 }
 

@@ -198,7 +198,7 @@ fn every_command_runs_by_colour_at_any_size_and_with_a_mesh_of_its_own() {
     }
     for command in [
         "evaluate --runs 3 --resolution auto --optimise-fov --instances released24",
-        "search --runs 1 --search-runs 1 --scales 0.02 --learning-rates 0.2,0.4",
+        "search --runs 1 --search-runs 1 --loops 3 --scales 0.02,0.03 --learning-rates 0.2,0.4",
         "choose --search-runs 1",
         "learn --outer 1 --batch 1 --validation-runs 1 --scale 0.02",
         "solve --softness mlp --schedule decay --range 55-75 --variant transfer",

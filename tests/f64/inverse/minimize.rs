@@ -91,45 +91,35 @@ fn nothing_to_solve_is_an_error() {
     assert_eq!(end.unwrap_err().to_string(), "there is no instance to solve");
 }
 
-/// A scale that moves with feedback: a path of one step, and four times the learning rate after going back.
+/// A scale that moves with feedback, on a path of one step.
 fn with_feedback() -> Method {
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let third = (1.0_f64 / 3.0).ln();
-    let feedback = Feedback {
-        passage: third,
-        patience: 0.0,
-        stuck: 0.0,
-        room: -1.0,
-        kick: 4.0_f64.ln(),
-        kick_steps: third,
-        rate_end: 0.0,
-    };
+    let passage = (1.0_f64 / 3.0).ln();
+    let feedback =
+        Feedback { passage, patience: 0.0, stuck: 0.0, early: 0.0, room: -1.0, rate_end: 0.0 };
     let decay = ScheduledSoftness::decay(softness, 0.1, 0.01);
     Method::new("none", ScheduledSoftness { feedback: Some(feedback), ..decay })
 }
 
 #[test]
-fn a_run_that_is_stuck_takes_larger_steps_from_the_beginning_of_its_path() {
+fn a_run_that_is_stuck_begins_again_from_another_start_if_there_is_one() {
     let problem = Square { floor: -10.0, seen: true };
-    let (mut places, mut scales) = (Vec::new(), Vec::new());
-    let mut visit = |now: &Iterate| {
-        places.push(numbers(now.theta.clone())[0]);
-        scales.push(now.scale);
-        Ok(())
-    };
     let (method, config) = (with_feedback(), problem.defaults());
-    minimize::<_, B>(&problem, &[4.0], &method, &config, false, |now, _| visit(now)).unwrap();
-
-    let adam = Adam::new(0.25);
-    let mut theta = vector::<B>(&[4.0]);
-    let mut state = adam.init(&theta);
-    for (k, rate) in [0.25, 1.0, 0.25].into_iter().enumerate() {
-        assert_eq!(places[k], numbers(theta.clone())[0]);
-        assert!((scales[k] - 0.1).abs() < 1e-12, "{scales:?}");
-        let gradient = theta.clone() * 2.0;
-        (theta, state) = Adam { learning_rate: rate, ..adam }.step(theta, gradient, state);
+    for (start, second) in [(Square::MANY, Square::OTHER), (7.0, 6.75)] {
+        let (mut places, mut scales) = (Vec::new(), Vec::new());
+        let mut visit = |now: &Iterate| {
+            places.push(numbers(now.theta.clone())[0]);
+            scales.push(now.scale);
+            Ok(())
+        };
+        minimize::<_, B>(&problem, &[start], &method, &config, false, |now, _| visit(now)).unwrap();
+        assert!((places[1] - second).abs() < 1e-6 && places[0] == start, "{places:?}");
+        // The first step of an Adam that begins again has the length of the learning rate.
+        assert!((places[1] - places[2] - 0.25).abs() < 1e-6, "{places:?}");
+        for (scale, expected) in scales.iter().zip([0.1, 0.1, 0.01]) {
+            assert!((scale / expected - 1.0).abs() < 1e-9, "{scales:?}");
+        }
     }
-    assert_eq!(places[3], numbers(theta)[0]);
 }
 
 #[test]

@@ -14,6 +14,12 @@ pub(super) struct Square {
     pub(super) seen: bool,
 }
 
+impl Square {
+    /// The start that has another, and the other.
+    pub(super) const MANY: f64 = 4.0;
+    pub(super) const OTHER: f64 = 6.0;
+}
+
 impl InverseProblem for Square {
     /// The number to start from.
     type Instance = f64;
@@ -21,6 +27,10 @@ impl InverseProblem for Square {
 
     fn instance(&self, seed: u64) -> anyhow::Result<f64> {
         Ok(seed as f64)
+    }
+
+    fn restart(&self, instance: &f64, k: usize, _count: usize) -> Option<f64> {
+        (*instance == Self::MANY && k == 1).then_some(Self::OTHER)
     }
 
     fn scene<B: RasterBackend>(&self, instances: &[f64], _size: usize) -> Vec<f64> {

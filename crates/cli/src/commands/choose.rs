@@ -4,11 +4,11 @@ use softrast_inverse::Resolution;
 use softrast_lab::{
     Cache, Error, Experiment, Progress, Runner, check_held_out,
     format::{counted, exact, line},
+    halving::TRAINING_SEED,
     program::Output,
     report::Report,
     seeds,
     select::{Budget, Candidate, Selection, chosen_flags, price, section},
-    sweep::TRAINING_SEED,
 };
 use softrast_softness::Family;
 

@@ -3,10 +3,10 @@
 use softrast_lab::{
     Evaluation, Experiment, OutputFolder, Summary,
     curves::{Convergence, charts, convergence_csv, csv},
+    halving::Halving,
     headline,
     program::Output,
     report::Report,
-    sweep::Sweep,
 };
 
 use super::settings_section;
@@ -44,7 +44,7 @@ pub(super) fn write<T: Task>(
     first: &Finished<'_, T>,
     second: Option<&Finished<'_, T>>,
     summary: &Summary,
-    search: Option<&Sweep>,
+    search: Option<&Halving>,
 ) -> anyhow::Result<Output> {
     let Finished { experiment, evaluation } = first;
     let (metrics, success) = (experiment.metrics(), &experiment.description.success);
@@ -72,7 +72,7 @@ pub(super) fn write<T: Task>(
     let mut json = summary.json(&experiment.about(), success);
     json.extend(search.map(|search| ("search".to_owned(), search.json())));
     let mut text = vec![head];
-    text.extend(search.into_iter().flat_map(Sweep::text));
+    text.extend(search.into_iter().flat_map(Halving::text));
     text.extend(summary.text(success));
     let (warnings, partial) = (summary.warnings.clone(), summary.partial.map(|p| p.of("runs")));
     let output = Output { json: json.into(), text, warnings, partial };
@@ -88,7 +88,7 @@ fn page<T: Task>(
     convergences: &[Convergence],
     summary: &Summary,
     head: &str,
-    search: Option<&Sweep>,
+    search: Option<&Halving>,
 ) -> anyhow::Result<Report> {
     let Finished { experiment, evaluation } = first;
     let mut report = Report::new(T::NAME, T::ABOUT);
@@ -97,7 +97,7 @@ fn page<T: Task>(
     report.stopped(stopped.as_deref());
     report.warnings(&summary.warnings);
     if let Some(search) = search {
-        search.section(&mut report, "learning-rate");
+        search.section(&mut report)?;
     }
     summary.section(&mut report, &evaluation.runs, &experiment.description.success);
     pictures(&mut report, summary, evaluation);
@@ -105,7 +105,8 @@ fn page<T: Task>(
     for plot in charts(experiment.metrics(), convergences) {
         report.chart(&plot.svg()?, "");
     }
-    let means = " A line is the mean of all runs, the band around it the 95 % interval of the mean, by the bootstrap.";
+    let means =
+        " A line is the mean of all runs, the band around it the 95 % interval of the mean.";
     report.note(&format!("All errors should fall to 0.{}", if summary.many { means } else { "" }));
     let mut about = experiment.about();
     about.retain(|_, value| !value.is_object());

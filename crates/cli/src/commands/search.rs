@@ -2,11 +2,10 @@ use serde_json::json;
 use softrast_lab::{
     Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, check_held_out,
     format::exact,
+    halving::{Halving, SearchAxis, SearchSpace, Setting, TRAINING_SEED, rounded},
     program::Output,
     report::Report,
-    seeds,
-    sweep::{GridPoint, SearchAxis, SearchSpace, Sweep, TRAINING_SEED, rounded},
-    was_interrupted,
+    seeds, was_interrupted,
 };
 use softrast_softness::ScheduledSoftness;
 
@@ -21,7 +20,7 @@ use crate::{
     task::HARD,
 };
 
-/// Ratio of neighbours where nothing asks for another: half a decade.
+/// Half a decade.
 const RATIO: f64 = 3.162_277_660_168_379_5;
 /// Most steps from the last scale of the default decay to its first.
 const STEPS: f64 = 4.0;
@@ -29,7 +28,10 @@ const STEPS: f64 = 4.0;
 const SCALE: usize = 0;
 const END: usize = 1;
 const RATE: usize = 2;
-const OWN: usize = 3;
+const SURROGATE: usize = 3;
+const OWN: usize = 4;
+/// How wide a surrogate may be, as a share of the scale.
+const SURROGATES: [f64; 2] = [0.7, 6.0];
 
 /// Searches for the best setting, then evaluates it on seeds that the search never saw.
 pub(crate) fn search<T: Task>(
@@ -41,15 +43,16 @@ pub(crate) fn search<T: Task>(
     let base = TaskExperiment::<T>::new(args, common, method, Purpose::Finding)?;
     let space = space::<T>(&flags, &base)?;
     let set_own = base.task.own_axis(args).map(|own| own.set);
-    let make = |point: &GridPoint| {
+    let make = |setting: &Setting| {
         let (mut args, mut method) = (args.clone(), method.clone());
-        if let Some(scale) = point[SCALE] {
-            let schedule = if point[END].is_some() { Schedule::Decay } else { Schedule::Static };
-            (method.scale, method.scale_end) = (Some(scale), point[END]);
+        if let Some(scale) = setting[SCALE] {
+            let schedule = if setting[END].is_some() { Schedule::Decay } else { Schedule::Static };
+            (method.scale, method.scale_end) = (Some(scale), setting[END]);
             method.schedule = Some(schedule);
+            method.surrogate_scale = setting[SURROGATE].or(method.surrogate_scale);
         }
-        method.learning_rate = point[RATE].or(method.learning_rate);
-        if let (Some(set), Some(Some(value))) = (set_own, point.get(OWN)) {
+        method.learning_rate = setting[RATE].or(method.learning_rate);
+        if let (Some(set), Some(Some(value))) = (set_own, setting.get(OWN)) {
             set(&mut args, *value);
         }
         TaskExperiment::<T>::new(&args, common, &method, Purpose::Finding)
@@ -60,46 +63,47 @@ pub(crate) fn search<T: Task>(
     let mut folder = session.folder()?;
     let mut runner = session.runner(&folder, flags.resume.resume)?;
     let score = base.metrics()[HARD];
-    let mut sweep = Sweep::new(space.clone(), [score.name, score.unit], training);
+    let score_name = [score.name, score.unit];
+    let mut halving = Halving::new(space.clone(), score_name, training, flags.loops);
     let steps = [base.steps(), base.steps() * held_out.len()];
-    let tried = sweep
-        .run(&mut runner, steps, &mut |point| Ok(Box::new(make(point)?) as Box<dyn Experiment>));
+    let mut boxed = |setting: &Setting| Ok(Box::new(make(setting)?) as Box<dyn Experiment>);
+    let tried = halving.run(&mut runner, steps, &mut boxed);
     runner.progress.finish();
-    let best = tried.map_err(|error| ended(error, runner.cache.kept()))?.point.clone();
-    sweep.best_flags = all_flags(common.variant, method, &space, &best);
+    let best = tried.map_err(|error| ended(error, runner.cache.kept()))?.clone();
+    halving.best_flags = all_flags(common.variant, method, &space, &best);
     let found = make(&best)?;
-    let (evaluation, stopped) = match sweep.partial() {
+    let (evaluation, stopped) = match halving.partial() {
         Some(_) => (Evaluation::default(), true),
         None => on_held_out(&mut runner, &found, &held_out)?,
     };
-    let last = |run: &Run| run.curve.last().map_or(f64::NAN, |point| point.values[HARD]);
-    sweep.held_out = evaluation.runs.iter().map(last).collect();
-    folder.stage("search.csv", sweep.csv().as_bytes())?;
-    folder.stage("search.json", &serde_json::to_vec_pretty(&sweep.json())?)?;
+    let returned = |run: &Run| run.returned(HARD).map_or(f64::NAN, |point| point.values[HARD]);
+    halving.held_out = evaluation.runs.iter().map(returned).collect();
+    folder.stage("search.csv", halving.csv().as_bytes())?;
+    folder.stage("search.json", &serde_json::to_vec_pretty(&halving.json())?)?;
     if evaluation.runs.is_empty() {
-        return stopped_early::<T>(session, folder, &sweep);
+        return stopped_early::<T>(session, folder, &halving);
     }
     let finished = Finished { experiment: &found, evaluation: &evaluation };
     let mut summary = finished.summary(true)?;
-    summary.warnings.extend(sweep.warnings());
+    summary.warnings.extend(halving.warnings());
     let partial = Partial { finished: evaluation.runs.len(), asked: held_out.len() };
     summary.partial = stopped.then_some(partial);
-    write(session, folder, &finished, None, &summary, Some(&sweep))
+    write(session, folder, &finished, None, &summary, Some(&halving))
 }
 
 /// Writes what a search found that ended before the first run on other seeds.
 fn stopped_early<T: Task>(
     session: &Session,
     folder: OutputFolder,
-    sweep: &Sweep,
+    halving: &Halving,
 ) -> anyhow::Result<Output> {
     let mut report = Report::new(T::NAME, T::ABOUT);
-    sweep.section(&mut report, "learning-rate");
-    let json = json!({ "partial": sweep.done(), "search": sweep.json() });
+    halving.section(&mut report)?;
+    let json = json!({ "partial": halving.done(), "search": halving.json() });
     let mut text = vec![format!("{}: search stopped early", T::NAME)];
-    text.extend(sweep.text());
-    let partial = Some(format!("{}, no held-out run", sweep.done().of("settings")));
-    let output = Output { json, text, warnings: sweep.warnings(), partial };
+    text.extend(halving.text());
+    let partial = Some(format!("{}, no held-out run", halving.done().of("runs")));
+    let output = Output { json, text, warnings: halving.warnings(), partial };
     session.finish(
         folder,
         report,
@@ -124,51 +128,61 @@ fn on_held_out<T: Task>(
     }
 }
 
-/// What is tried: what the command line fixes is fixed, what it lists is tried, the rest is a grid around the task's own numbers.
+/// What is tried: what the command line fixes is fixed, a range that it gives is searched, the rest is searched around the task's own numbers.
+/// Where a silhouette is drawn, half of the settings have a surrogate.
 fn space<T: Task>(
     flags: &Search<T::Args>,
     base: &TaskExperiment<T>,
 ) -> anyhow::Result<SearchSpace> {
     let Shared { args, method, .. } = &flags.shared;
-    let is_file =
-        matches!(method.softness, Some(SoftnessChoice::File(_) | SoftnessChoice::Learned(_)));
-    if is_file && !flags.scales.is_empty() {
+    let is_family = matches!(method.softness, None | Some(SoftnessChoice::Family(_)));
+    if !is_family && !flags.scales.is_empty() {
         return Err(Error::usage("a softness file holds its own scale: leave out --scales"));
     }
-    let around = || T::searched_scales(scales_around(&base.method.softness, base.solve.size));
-    let around = if is_file { Vec::new() } else { around() };
-    let values = |fixed: Option<f64>, listed: &[f64], own: &[f64]| -> Vec<f64> {
-        let values = if listed.is_empty() { own } else { listed };
-        let mut values = fixed.map_or_else(|| values.to_vec(), |x| vec![x]);
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        values
+    let around = match (is_family, flags.scales.as_slice()) {
+        (false, _) => Vec::new(),
+        (_, []) => T::searched_scales(scales_around(&base.method.softness, base.solve.size)),
+        (_, given) => given.to_vec(),
     };
-    let scales = values(method.scale, &flags.scales, &around);
-    let ends = values(method.scale_end, &flags.scales, &around);
-    let rates = geometric(base.solve.learning_rate, RATIO, -1..=1);
-    let rates = values(method.learning_rate, &flags.learning_rates, &rates);
-    let [statics, decays] =
-        [Schedule::Decay, Schedule::Static].map(|other| method.schedule != Some(other));
-    let some = |values: &[f64]| values.iter().copied().map(Some).collect::<Vec<_>>();
-    let axis = |flag, values: Vec<Option<f64>>| SearchAxis { flag, values };
-    let no_end = (statics || scales.is_empty()).then_some(None);
-    let some_end = if decays && !scales.is_empty() { some(&ends) } else { Vec::new() };
-    let scales = if scales.is_empty() { vec![None] } else { some(&scales) };
+    let rates = match flags.learning_rates.as_slice() {
+        [] => geometric(base.solve.learning_rate, RATIO, -1..=1),
+        given => given.to_vec(),
+    };
+    let axis = |flag, fixed: Option<f64>, values: &[f64]| match fixed {
+        Some(fixed) => SearchAxis::among(flag, &[fixed]),
+        None => SearchAxis::among(flag, values),
+    };
+    let none: &[f64] = &[];
+    let ends = if method.schedule == Some(Schedule::Static) { none } else { &around };
+    let optional = method.schedule != Some(Schedule::Decay);
+    let end = SearchAxis { optional, ..axis("scale-end", method.scale_end, ends) };
+    let has_surrogate = T::MOVES_EDGES && base.task.faces().is_some();
+    let wider: Vec<f64> =
+        around.iter().flat_map(|scale| SURROGATES.map(|ratio| scale * ratio)).collect();
+    let wider = if has_surrogate && method.surrogate_scale.is_none() { &wider } else { none };
+    let surrogate = SearchAxis { optional: true, ..SearchAxis::among("surrogate-scale", wider) };
     let mut axes = vec![
-        axis("scale", scales),
-        axis("scale-end", no_end.into_iter().chain(some_end).collect()),
-        axis("learning-rate", some(&rates)),
+        axis("scale", method.scale, &around),
+        end,
+        axis("learning-rate", method.learning_rate, &rates),
+        surrogate,
     ];
-    axes.extend(base.task.own_axis(args).map(|own| axis(own.flag, some(&own.values))));
-    let valid = |point: &GridPoint| point[END].is_none() || point[END] < point[SCALE];
-    let space = SearchSpace { axes, valid };
-    if space.coarse().len() < 2 {
+    axes.extend(base.task.own_axis(args).map(|own| SearchAxis::among(own.flag, &own.values)));
+    let space = SearchSpace { axes, valid: is_valid };
+    if !space.is_free() {
         return Err(Error::usage(
-            "there is nothing to choose from: fix less, or list more with --scales and --learning-rates",
+            "there is nothing to choose from: fix less, or give ranges with --scales and --learning-rates",
         ));
     }
     Ok(space)
+}
+
+/// Whether a decay narrows and a surrogate is about as wide as the softness.
+fn is_valid(setting: &Setting) -> bool {
+    let [scale, end, surrogate] = [SCALE, END, SURROGATE].map(|axis| setting[axis]);
+    let Some(scale) = scale else { return true };
+    let [least, most] = SURROGATES.map(|ratio| ratio * scale);
+    end.is_none_or(|end| end < scale) && surrogate.is_none_or(|one| (least..=most).contains(&one))
 }
 
 /// Scales around the first and the last one of a softness on images of `size` pixels a side.
@@ -190,12 +204,12 @@ fn geometric(from: f64, ratio: f64, steps: std::ops::RangeInclusive<i32>) -> Vec
     steps.map(|k| rounded(from * ratio.powi(k))).collect()
 }
 
-/// The flags that ask for a point of this method and variant.
+/// The flags that ask for a setting of this method and variant.
 fn all_flags(
     variant: Variant,
     method: &MethodArgs,
     space: &SearchSpace,
-    point: &GridPoint,
+    setting: &Setting,
 ) -> String {
     let mut flags = Vec::new();
     if variant != Variant::Original {
@@ -207,10 +221,10 @@ fn all_flags(
     }
     flags.extend(method.surrogate_scale.map(|x| format!("--surrogate-scale {}", exact(x))));
     // Nobody should have to know what a scale alone means to a task that decays by default.
-    if point[SCALE].is_some() && point[END].is_none() {
+    if setting[SCALE].is_some() && setting[END].is_none() {
         flags.push("--schedule static".into());
     }
-    flags.push(space.flags(point));
+    flags.push(space.flags(setting));
     flags.join(" ")
 }
 

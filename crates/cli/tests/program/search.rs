@@ -7,8 +7,8 @@ use crate::line::{file, json, numbers, run_in, solved};
 use serde_json::Value;
 
 /// In so few steps a small rate goes nowhere, and a large one far beyond.
-const KNOWN: &str = "search --size 16 --steps 3 --runs 6 --search-runs 4 --schedule static \
-                     --scale 0.05 --learning-rates 0.001,0.1,10";
+const KNOWN: &str = "search --size 16 --steps 3 --runs 6 --search-runs 4 --loops 60 --schedule static \
+                     --scale 0.05 --learning-rates 0.001,10";
 
 #[test]
 fn a_search_keeps_the_best_of_what_it_tries() {
@@ -16,25 +16,27 @@ fn a_search_keeps_the_best_of_what_it_tries() {
     let found = &json["search"];
     assert_eq!(found, &file(out.path(), "search.json"));
     let best = found["best"]["learning_rate"].as_f64().unwrap();
-    assert!(best > 0.001 && best < 10.0, "{best}");
-    let flags = format!("--schedule static --scale 0.05 --learning-rate {best}");
-    assert_eq!(found["best"]["flags"], flags);
+    assert!(best > 0.003 && best < 3.0, "{best}");
+    let flags = found["best"]["flags"].as_str().unwrap();
+    assert!(flags.starts_with("--schedule static --scale 0.05 --learning-rate "), "{flags}");
     assert_eq!(found["score"]["name"], "hard MSE");
-    let means =
-        found["cells"].as_array().unwrap().iter().map(|cell| cell["mean"].as_f64().unwrap());
+    let trials = found["trials"].as_array().unwrap();
+    let round = |k: u64| trials.iter().filter(move |trial| trial["round"] == k);
+    assert!([1, 2, 3].map(|k| round(k).count() > 1) == [true; 3] && round(4).count() == 0);
+    let means = round(3).map(|trial| trial["mean"].as_f64().unwrap());
     assert_eq!(found["best"]["mean"], means.fold(f64::INFINITY, f64::min));
-    let cells = found["cells"].as_array().unwrap();
-    let stages: Vec<&str> = cells.iter().map(|cell| cell["grid"].as_str().unwrap()).collect();
-    assert_eq!(stages, ["coarse", "coarse", "coarse", "fine", "fine"]);
-    for cell in cells {
-        assert_eq!((&cell["n"], &cell["non_finite"]), (&4.into(), &0.into()));
-        let scores = numbers(&cell["per_run"]);
-        let mean = scores.iter().sum::<f64>() / 4.0;
-        assert!((cell["mean"].as_f64().unwrap() - mean).abs() < 1e-14);
-        assert!(cell["seconds"].as_f64().unwrap() > 0.0);
+    let loops = found["loops"].as_u64().unwrap();
+    assert!((40..=60).contains(&loops), "{loops}");
+    for trial in trials {
+        let scores = numbers(&trial["per_run"]);
+        let (n, seeds) = (scores.len(), 1 << (trial["round"].as_u64().unwrap() - 1));
+        assert_eq!((n, &trial["non_finite"]), (seeds, &0.into()));
+        let mean = scores.iter().sum::<f64>() / n as f64;
+        assert!((trial["mean"].as_f64().unwrap() - mean).abs() < 1e-14);
+        assert!(trial["seconds"].as_f64().unwrap() > 0.0);
     }
     let table = fs::read_to_string(out.path().join("search.csv")).unwrap();
-    assert_eq!(table.lines().count(), 1 + cells.len());
+    assert_eq!(table.lines().count(), 1 + trials.len());
     let page = fs::read_to_string(out.path().join("report.html")).unwrap();
     assert!(page.contains("Search</h2>") && page.contains("<svg") && page.contains("<table"));
 }
@@ -48,28 +50,23 @@ fn the_score_is_of_seeds_that_the_search_never_saw() {
     let line = format!("evaluate --size 16 --steps 3 {flags}");
     let (_out, held_out) = solved::<Disc>(&format!("{line} --runs 6"));
     assert_eq!(json["image_error"], held_out["image_error"]);
-    assert_eq!(found["held_out"]["mean"], held_out["image_error"]["hard"]["final"]);
-    assert_eq!(found["held_out"]["ci95"], held_out["image_error"]["hard"]["ci95"]);
+    assert_eq!(found["held_out"]["mean"], held_out["image_error"]["hard"]["best"]);
     let (_out, training) = solved::<Disc>(&format!("{line} --runs 4 --seed 1000000"));
-    assert_eq!(found["best"]["per_run"], training["image_error"]["hard"]["per_run"]);
+    assert_eq!(found["best"]["mean"], training["image_error"]["hard"]["best"]);
 }
 
 #[test]
 fn a_setting_that_blows_up_is_counted_and_not_chosen() {
-    let line = "search --size 8 --steps 40 --runs 2 --search-runs 3 --scale 0.1 --schedule static \
+    let line = "search --size 8 --steps 40 --runs 2 --search-runs 1 --loops 12 --scale 0.1 --schedule static \
                 --learning-rates 0.3,1e39";
     let (out, json) = solved::<Disc>(line);
-    let bad: Vec<&Value> = json["search"]["cells"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|cell| cell["non_finite"] == 3)
-        .collect();
+    let trials = json["search"]["trials"].as_array().unwrap();
+    let bad: Vec<&Value> = trials.iter().filter(|trial| trial["non_finite"] == 1).collect();
     assert!(!bad.is_empty());
-    assert!(bad.iter().all(|cell| cell["n"] == 0 && cell["mean"].is_null()));
+    assert!(bad.iter().all(|trial| trial["n"] == 0 && trial["mean"].is_null()));
     assert_eq!(json["search"]["best"]["non_finite"], 0);
     let table = fs::read_to_string(out.path().join("search.csv")).unwrap();
-    assert!(table.contains(",1e39,,0,3,0,"), "{table}");
+    assert!(table.contains(",,0,1,0,"), "{table}");
 }
 
 #[test]
@@ -84,13 +81,23 @@ fn no_setting_that_works_is_an_error() {
 
 #[test]
 fn a_task_that_says_nothing_is_searched_around_its_defaults() {
-    let line = "search --size 8 --steps 2 --runs 2 --search-runs 1";
+    let line = "search --size 8 --steps 2 --runs 2 --search-runs 1 --loops 60";
     let (_out, json) = solved::<Disc>(line);
-    let cells = json["search"]["cells"].as_array().unwrap();
-    let coarse = cells.iter().filter(|cell| cell["grid"] == "coarse");
-    assert_eq!(coarse.clone().count(), (5 + 10) * 3);
-    let own = |cell: &&Value| cell["scale"] == 0.05 && cell["learning_rate"] == 0.02;
-    assert_eq!(coarse.clone().filter(own).count(), 1 + 2);
+    let trials = json["search"]["trials"].as_array().unwrap();
+    let of =
+        |axis: &str| trials.iter().filter_map(|trial| trial[axis].as_f64()).collect::<Vec<_>>();
+    assert_eq!((trials.len(), of("scale").len()), (60, 60));
+    assert!(of("scale").iter().all(|x| (0.005..=0.5).contains(x)), "{:?}", of("scale"));
+    assert!(of("learning_rate").iter().all(|x| (0.006..0.07).contains(x)));
+    let (ends, surrogates) = (of("scale_end").len(), of("surrogate_scale").len());
+    assert!((5..55).contains(&ends) && (5..55).contains(&surrogates), "{ends} {surrogates}");
+    for trial in trials {
+        let [scale, end, surrogate] =
+            ["scale", "scale_end", "surrogate_scale"].map(|axis| trial[axis].as_f64());
+        assert!(end.is_none_or(|end| Some(end) < scale), "{trial}");
+        let ratio = surrogate.map(|one| one / scale.unwrap());
+        assert!(ratio.is_none_or(|ratio| (0.69..6.01).contains(&ratio)), "{trial}");
+    }
 }
 
 #[test]

@@ -76,7 +76,7 @@ impl InverseProblem for Coloured {
 impl Task for Coloured {
     const NAME: &'static str = "pose-colour";
     const PROGRAM: &'static str = Pose::NAME;
-    const LEARNED: Option<&'static str> = Some(Pose::NAME);
+    const PRESET: Option<&'static str> = Some(Pose::NAME);
     const TITLE: &'static str = "POSE by colour";
     const ABOUT: &'static str = "Recovers the pose of a camera from a picture in colours";
     const SCALES: Scales = Pose::SCALES;
