@@ -1,9 +1,9 @@
 //! Soft colours of one mesh topology.
 
-use burn::tensor::Tensor;
+use burn::{backend::NdArray, tensor::Tensor};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use softrast_raster::{HostBackend, ImageSize, Weighting};
+use softrast_raster::{ImageSize, Weighting};
 use softrast_softness::{DepthSoftness, Softness as _};
 
 use crate::{
@@ -64,8 +64,8 @@ impl ColourRenderer {
             let renderer =
                 softrast_raster::ColourRenderer::with_weighting(faces, size, weighting, phi)
                     .with_tolerance(tolerance);
-            let behind = renderer.background::<HostBackend>(&[], &Default::default());
-            (renderer, f64::from(behind.log_weight.into_scalar()))
+            let behind = renderer.background::<NdArray<f64>>(&[], &Default::default());
+            (renderer, behind.log_weight.into_scalar())
         };
         let (renderer, log_weight) = guarded(py, of)?;
         Ok(Self { renderer, faces, size, log_weight })
