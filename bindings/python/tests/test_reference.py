@@ -32,12 +32,6 @@ def same(reference, name, tensor):
     assert np.array_equal(reference[name], tensor.detach().numpy().ravel()), name
 
 
-def near(reference, name, tensor):
-    """For sums of three and more, which both sides take in an order of their own."""
-    expected, found = reference[name], tensor.detach().numpy().ravel()
-    assert np.abs(expected - found).max() <= 1e-13 * np.abs(expected).max(), name
-
-
 def scene():
     positions, faces, _ = softrast.icosphere(1)
     camera = torch.from_numpy(softrast.orbit(2.5, 10.0, [20.0, 75.0]))
@@ -99,5 +93,4 @@ def test_a_meta_gradient_through_30_steps_of_adam(reference):
     (gradient,) = torch.autograd.grad(loss, phi)
     assert abs(gradient.item()) > 1.0
     assert loss.item() == pytest.approx(reference["meta-loss"][0], rel=1e-8)
-    assert gradient.item() == pytest.approx(reference["meta-phi"][0], rel=1e-4)
-    print("relative difference", gradient.item() / reference["meta-phi"][0] - 1.0)
+    assert gradient.item() == pytest.approx(reference["meta-phi"][0], rel=1e-9)

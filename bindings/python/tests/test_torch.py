@@ -109,7 +109,7 @@ def test_gradients_of_colours_of_both_orders_are_those_of_differences():
     assert torch.equal(image(*inputs), drawn)
     assert torch.autograd.gradcheck(image, inputs, eps=1e-6, atol=1e-5, rtol=1e-3)
     torch.manual_seed(1)
-    assert torch.autograd.gradgradcheck(image, inputs, eps=1e-6, atol=1e-4, rtol=1e-2)
+    assert torch.autograd.gradgradcheck(image, inputs, eps=1e-6, atol=1e-4, rtol=1e-2, fast_mode=True)
 
 
 def test_a_texture_and_the_places_on_it_receive_gradients():
