@@ -97,11 +97,7 @@ impl Softness {
         let squared = if self.squared() { ", squared" } else { "" };
         let felt = if self.0.surrogate.is_some() { ", with a surrogate" } else { "" };
         let moving = if self.0.is_constant() { "" } else { ", its scale moves over a run" };
-        format!(
-            "Softness({}{squared}, {} parameters{felt}{moving})",
-            self.family(),
-            self.0.phi.len()
-        )
+        format!("Softness({}{squared}, φ [{}]{felt}{moving})", self.family(), self.0.phi.len())
     }
 }
 

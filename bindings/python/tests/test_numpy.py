@@ -1,5 +1,6 @@
 """What needs NumPy alone."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -152,6 +153,23 @@ def test_threads_draw_the_same_bits():
     [thread.start() for thread in threads]
     [thread.join() for thread in threads]
     assert len(images) == 8 and all(np.array_equal(image, expected) for image in images)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_process_that_was_forked_draws_too():
+    script = """
+import os, signal, numpy as np, softrast
+positions, faces, _ = softrast.icosphere(2)
+draw = softrast.Renderer(faces, 64, softrast.Softness("logistic", 0.02))
+image = lambda: softrast.silhouette(draw, softrast.project(positions, softrast.orbit(2.7, 0.0, [0.0, 10.0])))
+expected = image()
+child = os.fork()
+if not child:
+    signal.alarm(20)
+    os._exit(0 if np.array_equal(image(), expected) else 1)
+assert os.waitpid(child, 0)[1] == 0
+"""
+    assert subprocess.run([sys.executable, "-c", script], timeout=60).returncode == 0
 
 
 def test_memory_does_not_grow():
