@@ -110,7 +110,7 @@ class Silhouette:
         parts = _split(flat, [*scene[:1 + learns], to_sums])
         # The gradient changes with the image as well: through what the coverage makes of the sums.
         by_sums, to_upstream = _vjp_of_vjp(coverage, list(kept), upstream, [parts[-1]])
-        # The image itself is not felt where there is a surrogate, but for φ of neither.
+        # Where there is a surrogate, sums move as its own do.
         again = _split(sums.vjp(scene, by_sums, [True, learns]), scene[:1 + learns])
         to_vertices = parts[0] + again[0]
         if not learns:

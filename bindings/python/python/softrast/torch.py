@@ -182,9 +182,11 @@ def blend(
     width, channels]`; `background` is a number or `[channels]`; see `softrast.blend`. All of them, `log_weight` (a number or `[1]`), `phi`
     `[P]` and `phi_depth` `[Q]` receive gradients of both orders.
     """
-    given = {"attributes": attributes, "background": background, "texture": texture, "log_weight": log_weight}
-    given = {name: x for name, x in given.items() if name == "attributes" or name == "texture" and x is not None or isinstance(x, _torch.Tensor)}
-    _tensors(vertices=vertices, **given)
+    numbers = {"background": background, "log_weight": log_weight}
+    given = {name: x for name, x in numbers.items() if isinstance(x, _torch.Tensor)}
+    if texture is not None:
+        given["texture"] = texture
+    _tensors(vertices=vertices, attributes=attributes, **given)
     _shapes.vertices(vertices.shape, renderer.least_vertices)
     dtype = vertices.dtype
     attributes = attributes[None] if attributes.dim() == 2 else attributes
