@@ -1,9 +1,12 @@
 """A step of an optimisation on W1: 1,280 faces, 24 views of 64 x 64, float32: projection, image, mean squared difference, gradient to the
 vertices. Beside it the published formula `1 - prod(1 - sigmoid(-dists / sigma))` in plain torch ops, over all pairs of pixel and face.
 
-`python bindings/python/benches/w1.py`, in an environment with the wheel and torch.
+`python bindings/python/benches/w1.py [target/release/examples/w1]`, in an environment with the wheel and torch. With the path of the example
+`w1` its step in Rust is timed in turn with ours, so that both have the same neighbours on the machine.
 """
 
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -65,7 +68,16 @@ def theirs_of_one_view():
 with torch.no_grad():
     seen = st.project(vertices, cameras[:1])
     difference = (st.silhouette(renderer, seen)[0] - formula(seen[0], corners)).abs().max()
-median(ours, 20)
-step, plain = median(ours, 200), VIEWS * median(theirs_of_one_view, 2)
 print(f"largest difference of a pixel {difference:.1e}")
-print(f"softrast {1e3 * step:.2f} ms; the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {plain / step:.0f}")
+median(ours, 20)
+rounds = []
+for _ in range(7 if sys.argv[1:] else 1):
+    rust = sys.argv[1:] and float(subprocess.run(sys.argv[1:], stdout=subprocess.PIPE, text=True, check=True).stdout.split()[1])
+    rounds.append((1e3 * median(ours, 200), rust))
+steps = [step for step, _ in rounds]
+print(f"softrast {np.median(steps):.2f} ms")
+if sys.argv[1:]:
+    print("Rust {:.2f} ms; ratio, round by round:".format(np.median([rust for _, rust in rounds])), *(f"{a / b:.2f}" for a, b in rounds))
+    sys.exit()
+plain = VIEWS * median(theirs_of_one_view, 2)
+print(f"the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {1e3 * plain / np.median(steps):.0f}")

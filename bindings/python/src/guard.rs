@@ -4,14 +4,48 @@ use std::{
     any::Any,
     fmt::Display,
     panic::{AssertUnwindSafe, catch_unwind},
+    process,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use pyo3::{exceptions::PyValueError, prelude::*};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// The process that loaded this library.
+static LOADED_BY: OnceLock<u32> = OnceLock::new();
+/// Threads of a process that was forked from it, and which one.
+static FORKED: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// Works without the interpreter's lock; a panic becomes an error.
 pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let done = py.detach(|| catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(&*panic)));
+    let caught = || catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(&*panic));
+    let done = py.detach(|| match own_threads()? {
+        None => caught(),
+        Some(threads) => threads.install(caught),
+    });
     done.map_err(PyValueError::new_err)
+}
+
+/// To be called as the library is loaded.
+pub(crate) fn remember_process() {
+    LOADED_BY.get_or_init(process::id);
+}
+
+/// Threads for a process that was forked: it has none of those that the other one started, and would wait for them for ever.
+fn own_threads() -> Result<Option<Arc<ThreadPool>>, String> {
+    let id = process::id();
+    if LOADED_BY.get() == Some(&id) {
+        return Ok(None);
+    }
+    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, threads)) = forked.as_ref().filter(|(of, _)| *of == id) {
+        return Ok(Some(threads.clone()));
+    }
+    let threads = ThreadPoolBuilder::new().build().map_err(|error| error.to_string())?;
+    let threads = Arc::new(threads);
+    // Those of a process before this one are not ended, which would wait for them too.
+    std::mem::forget(forked.replace((id, threads.clone())));
+    Ok(Some(threads))
 }
 
 /// An error of one line.

@@ -3,6 +3,7 @@
 //! The Python side (`python/softrast`) checks shapes in the user's terms; here only what would be wrong or unsafe to run is refused. Every
 //! error and panic arrives there as a `ValueError` of one line.
 
+mod colour;
 mod guard;
 mod meshes;
 mod op;
@@ -19,6 +20,7 @@ mod _native {
 
     #[pymodule_export]
     use crate::{
+        colour::{ColourRenderer, PreparedColour},
         meshes::{fox, icosphere, load_mesh, save_mesh},
         op::{Op, orbit_matrix, perspective},
         renderer::{Prepared, Renderer, hard_silhouette},
@@ -26,9 +28,10 @@ mod _native {
     };
 
     #[pymodule_init]
-    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         // What panics becomes an error with the same message; this hook is of this library alone.
         std::panic::set_hook(Box::new(|_| {}));
-        Ok(())
+        guard::remember_process();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

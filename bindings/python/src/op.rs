@@ -4,8 +4,8 @@ use burn::tensor::{Shape, TensorData};
 use numpy::{
     Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
-use pyo3::{exceptions::PyTypeError, prelude::*};
-use softrast_raster::{ElementaryOp, FusedOp, Numbers, Pass, Silhouette, TConorm};
+use pyo3::prelude::*;
+use softrast_raster::{ElementaryOp, FusedOp, Numbers, Pass, Silhouette, TConorm, WeightTables};
 use softrast_softness::EdgeSoftness;
 
 use crate::{
@@ -16,15 +16,18 @@ use crate::{
 /// An array that came from Python, of any kind yet.
 type Given<'py> = Bound<'py, PyAny>;
 
-/// A differentiable function of one or two arrays. All arrays of a call are C-contiguous and of one float type, float32 or float64; they
+/// A differentiable function of arrays. All arrays of a call are C-contiguous and of one float type, float32 or float64; they
 /// are borrowed, not copied.
 #[pyclass(frozen, module = "softrast._native")]
+#[derive(Clone)]
 pub(crate) struct Op(Kind);
 
 #[derive(Clone)]
 enum Kind {
     /// Vertices `[views, 3, V]` and a table to sums `[views, height, width]`.
     Sum { op: FusedOp, rows: usize, least_vertices: usize, size: [usize; 2] },
+    /// Vertices, attributes, tables, a background and maybe a texture to an image in colours.
+    Blend(Box<Blend>),
     /// Orbits `[views, 4]` to matrices `[views, 3, 4]`.
     OrbitMatrix,
     /// Points `[1 or views, V, 3]` and matrices `[views, 3, 4]` to `[views, 3, V]`.
@@ -35,6 +38,16 @@ enum Kind {
     Table { of: Taped, parameters: usize, rows: usize },
     /// Sums to coverage of the same shape, under any T-conorm.
     AnyCoverage(Taped),
+}
+
+#[derive(Clone)]
+struct Blend {
+    op: FusedOp,
+    rows: usize,
+    least_vertices: usize,
+    least_entries: usize,
+    size: [usize; 2],
+    texture: Option<[usize; 2]>,
 }
 
 impl Op {
@@ -50,6 +63,31 @@ impl Op {
     pub(crate) fn table(silhouette: &Silhouette<EdgeSoftness>, parameters: usize) -> Self {
         let rows = silhouette.profile().knots();
         Self(Kind::Table { of: Taped::Table(Box::new(silhouette.clone())), parameters, rows })
+    }
+
+    /// `least` are the numbers of vertices and of entries that faces ask for.
+    pub(crate) fn blend(
+        op: FusedOp,
+        rows: usize,
+        least: [usize; 2],
+        size: [usize; 2],
+        texture: Option<[usize; 2]>,
+    ) -> Self {
+        let [least_vertices, least_entries] = least;
+        Self(Kind::Blend(Box::new(Blend {
+            op,
+            rows,
+            least_vertices,
+            least_entries,
+            size,
+            texture,
+        })))
+    }
+
+    /// `split`: how many of the parameters are of the softness by edge.
+    pub(crate) fn weight_tables(tables: WeightTables, split: usize, parameters: usize) -> Self {
+        let rows = tables.rows();
+        Self(Kind::Table { of: Taped::Weights(Box::new(tables), split), parameters, rows })
     }
 
     pub(crate) fn coverage(t_conorm: TConorm) -> Self {
@@ -83,6 +121,9 @@ impl Op {
                 least_vertices: *least_vertices,
                 size: *size,
             },
+            Kind::Blend(blend) => {
+                Kind::Blend(Box::new(Blend { op: blend.op.keeping(), ..Blend::clone(blend) }))
+            }
             other => other.clone(),
         })
     }
@@ -170,8 +211,11 @@ impl Float for f32 {}
 impl Float for f64 {}
 
 fn read<'py, F: Element>(arrays: &[Given<'py>]) -> PyResult<Vec<PyReadonlyArrayDyn<'py, F>>> {
-    let wrong =
-        || PyTypeError::new_err("the arrays of a call must be of one type, float32 or float64");
+    let wrong = || {
+        refused(
+            "the arrays of a call must be of one type, float32 or float64: convert them with astype",
+        )
+    };
     arrays.iter().map(|array| array.extract().map_err(|_| wrong())).collect()
 }
 
@@ -186,6 +230,7 @@ impl Kind {
     fn inputs(&self) -> usize {
         match self {
             Self::Sum { .. } | Self::Perspective => 2,
+            Self::Blend(blend) => 4 + usize::from(blend.texture.is_some()),
             _ => 1,
         }
     }
@@ -198,6 +243,13 @@ impl Kind {
                 let tables = table == &[*rows, 4] || table == &[views, *rows, 4];
                 (views > 0 && count >= *least_vertices && tables)
                     .then(|| vec![views, size[0], size[1]])?
+            }
+            (Self::Blend(blend), [vertices, attributes, tables, background, texture @ ..]) => {
+                let (&[views, 3, _], &[behind]) = (&vertices[..], &background[..]) else {
+                    return None;
+                };
+                let fits = blend.fits([vertices, attributes, tables], behind, texture);
+                (views > 0 && fits).then(|| vec![views, behind, blend.size[0], blend.size[1]])?
             }
             (Self::OrbitMatrix, [orbits]) => {
                 let &[views @ 1..=usize::MAX, 4] = &orbits[..] else { return None };
@@ -243,6 +295,7 @@ impl Kind {
         let of = |op| F::run_pass(&FusedOp::Elementary(op), pass, slices, dims);
         match self {
             Self::Sum { op, .. } => F::run_pass(op, pass, slices, dims),
+            Self::Blend(blend) => F::run_pass(&blend.op, pass, slices, dims),
             Self::OrbitMatrix => of(ElementaryOp::OrbitMatrix),
             Self::Perspective => of(ElementaryOp::Perspective),
             Self::Coverage => of(ElementaryOp::Coverage),
@@ -254,6 +307,30 @@ impl Kind {
                 taped(of, pass, slices, shape)
             }
         }
+    }
+}
+
+impl Blend {
+    /// Whether vertices `[views, 3, V]`, attributes, tables, the numbers of a background and what there is of a texture go together.
+    fn fits(
+        &self,
+        [vertices, attributes, tables]: [&Vec<usize>; 3],
+        behind: usize,
+        texture: &[Vec<usize>],
+    ) -> bool {
+        let &[held, entries, numbers] = &attributes[..] else { return false };
+        let shown = match (self.texture, texture) {
+            (None, []) => behind > 1 && numbers == behind - 1,
+            (Some([height, width]), [texels]) => {
+                texels == &[height * width, 4] && numbers == 2 && (2..=5).contains(&behind)
+            }
+            _ => false,
+        };
+        shown
+            && (held == 1 || held == vertices[0])
+            && entries >= self.least_entries
+            && vertices[2] >= self.least_vertices
+            && tables == &[self.rows, 4]
     }
 }
 

@@ -19,6 +19,9 @@ use crate::{
 pub(crate) struct Renderer {
     renderer: SoftRenderer<EdgeSoftness>,
     softness: EdgeSoftness,
+    /// What the gradient to vertices is taken of, where that is not the image itself, and its softness.
+    felt: Option<(SoftRenderer<EdgeSoftness>, EdgeSoftness)>,
+    faces: usize,
     t_conorm: TConorm,
     least_vertices: usize,
     size: [usize; 2],
@@ -47,24 +50,25 @@ impl Renderer {
         t_conorm: &str,
     ) -> PyResult<Self> {
         let t_conorm: TConorm = t_conorm.parse().map_err(refused)?;
-        if !(tolerance > 0.0 && tolerance < 1.0) {
-            return Err(refused(format!(
-                "the tolerance is {tolerance}, expected more than 0 and less than 1"
-            )));
-        }
-        if size.contains(&0) {
-            return Err(refused(format!("the image is {size:?}, expected at least one pixel")));
-        }
-        if softness.0.surrogate.is_some() {
-            return Err(refused("this softness has a surrogate, which Python does not draw"));
-        }
+        check_tolerance(tolerance)?;
+        check_size(size)?;
         let faces = corners(&faces)?;
-        let least_vertices = faces.iter().flatten().max().map_or(0, |&most| most as usize + 1);
-        let phi = softness.parameters_at(part, size[0].min(size[1]))?;
+        let (least_vertices, count) = (least(&faces), faces.len());
+        let side = size[0].min(size[1]);
+        let phi = softness.parameters_at(part, side)?;
+        let felt = softness.0.surrogate_at(part, side);
         let softness = softness.0.softness;
         let rasterizer = Rasterizer { size: ImageSize::from(size), tolerance, t_conorm };
-        let of = || SoftRenderer::with_rasterizer(rasterizer, faces, softness, phi);
-        Ok(Self { renderer: guarded(py, of)?, softness, t_conorm, least_vertices, size })
+        let of = |softness, phi| {
+            let faces = faces.clone();
+            guarded(py, || SoftRenderer::with_rasterizer(rasterizer, faces, softness, phi))
+        };
+        let renderer = of(softness, phi)?;
+        let felt = match felt {
+            Some(felt) => Some((of(felt.softness, felt.phi)?, felt.softness)),
+            None => None,
+        };
+        Ok(Self { renderer, softness, felt, faces: count, t_conorm, least_vertices, size })
     }
 
     /// Parameters φ `[P]`, float64: those that are drawn with where no others are given.
@@ -85,13 +89,40 @@ impl Renderer {
         self.least_vertices
     }
 
+    fn __repr__(&self) -> String {
+        let ([height, width], softness, faces) = (self.size, self.softness.family, self.faces);
+        let felt = if self.felt.is_some() { ", with a surrogate" } else { "" };
+        format!("Renderer({height} x {width} pixels, {faces} faces, {softness}{felt})")
+    }
+
     /// Support and knots for `phi`.
     fn prepared(&self, py: Python<'_>, phi: Vec<f64>) -> PyResult<Prepared> {
-        let parameters = self.softness.parameters();
-        if let Some(k) = phi.iter().position(|x| !x.is_finite()) {
-            return Err(refused(format!("phi[{k}] is {}, expected a finite number", phi[k])));
-        }
-        let silhouette = guarded(py, || self.renderer.prepared::<HostBackend>(&phi))?;
+        self.prepared_of(py, &self.renderer, self.softness, &phi)
+    }
+
+    /// The surrogate, if the softness has one: its φ `[P]`, float64, and support and knots for it.
+    #[allow(clippy::type_complexity)]
+    fn surrogate<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Prepared)>> {
+        let Some((renderer, softness)) = &self.felt else { return Ok(None) };
+        let prepared = self.prepared_of(py, renderer, *softness, renderer.phi())?;
+        Ok(Some((PyArray1::from_slice(py, renderer.phi()), prepared)))
+    }
+}
+
+impl Renderer {
+    fn prepared_of(
+        &self,
+        py: Python<'_>,
+        renderer: &SoftRenderer<EdgeSoftness>,
+        softness: EdgeSoftness,
+        phi: &[f64],
+    ) -> PyResult<Prepared> {
+        let parameters = softness.parameters();
+        check_phi("phi", softness.family.name(), parameters, phi)?;
+        let silhouette = guarded(py, || renderer.prepared::<HostBackend>(phi))?;
         let &Self { t_conorm, least_vertices, size, .. } = self;
         Ok(Prepared { silhouette, t_conorm, parameters, least_vertices, size })
     }
@@ -142,8 +173,39 @@ pub(crate) fn hard_silhouette<'py>(
     Ok(PyArray1::from_vec(py, image.1).reshape(image.0)?.into_any())
 }
 
+pub(crate) fn check_tolerance(tolerance: f64) -> PyResult<()> {
+    if tolerance > 0.0 && tolerance < 1.0 {
+        return Ok(());
+    }
+    Err(refused(format!("the tolerance is {tolerance}, expected more than 0 and less than 1")))
+}
+
+pub(crate) fn check_size(size: [usize; 2]) -> PyResult<()> {
+    if !size.contains(&0) {
+        return Ok(());
+    }
+    Err(refused(format!("the image is {size:?}, expected at least one pixel")))
+}
+
+/// `name` is that of the argument, `of` that of the softness, which has `expected` parameters.
+pub(crate) fn check_phi(name: &str, of: &str, expected: usize, phi: &[f64]) -> PyResult<()> {
+    if phi.len() != expected {
+        let found = phi.len();
+        return Err(refused(format!("{name} of {of} has {expected} parameters, found {found}")));
+    }
+    match phi.iter().position(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(k) => Err(refused(format!("{name}[{k}] is {}, expected a finite number", phi[k]))),
+    }
+}
+
+/// How many vertices or entries these corners ask for.
+pub(crate) fn least(corners: &[[u32; 3]]) -> usize {
+    corners.iter().flatten().max().map_or(0, |&most| most as usize + 1)
+}
+
 /// Corners of faces `[F, 3]` as vertex numbers.
-fn corners(faces: &PyReadonlyArray2<'_, i64>) -> PyResult<Arc<[[u32; 3]]>> {
+pub(crate) fn corners(faces: &PyReadonlyArray2<'_, i64>) -> PyResult<Arc<[[u32; 3]]>> {
     let &[count, three] = faces.shape() else { unreachable!("two axes") };
     if count == 0 || three != 3 {
         return Err(refused(format!(

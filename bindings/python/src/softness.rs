@@ -4,7 +4,10 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness as _};
 
-use crate::guard::{guarded, refused};
+use crate::{
+    guard::{guarded, refused},
+    renderer::check_phi,
+};
 
 /// A soft step with its parameters φ: how much a face covers a pixel at a signed distance (NDC, positive inside).
 ///
@@ -46,16 +49,12 @@ impl Softness {
         guarded(py, || self.0.save(path))?.map_err(refused)
     }
 
-    /// The same softness with other parameters, `[P]`, and no schedule.
+    /// The same softness with other parameters, `[P]`, without a schedule and without a surrogate.
     fn with_phi(&self, phi: Vec<f64>) -> PyResult<Self> {
-        let (found, expected) = (phi.len(), self.0.softness.parameters());
-        if found != expected {
-            return Err(refused(format!(
-                "{} has {expected} parameters, found {found}",
-                self.0.softness.family
-            )));
-        }
-        Ok(Self(ScheduledSoftness { phi, schedule: None, ..self.0.clone() }))
+        let softness = self.0.softness;
+        check_phi("phi", softness.family.name(), softness.parameters(), &phi)?;
+        let (schedule, feedback, surrogate) = (None, None, None);
+        Ok(Self(ScheduledSoftness { phi, schedule, feedback, surrogate, ..self.0.clone() }))
     }
 
     /// Parameters φ `[P]`, float64, at `part` of a run (0 to 1), on images whose shorter side has `size` pixels. A softness without a
@@ -82,6 +81,12 @@ impl Softness {
         self.0.softness.squared
     }
 
+    /// Whether its gradient to vertices is that of another softness.
+    #[getter]
+    fn has_surrogate(&self) -> bool {
+        self.0.surrogate.is_some()
+    }
+
     /// The learning rate of the runs that it was learned on, if it was.
     #[getter]
     fn learning_rate(&self) -> Option<f64> {
@@ -90,8 +95,9 @@ impl Softness {
 
     fn __repr__(&self) -> String {
         let squared = if self.squared() { ", squared" } else { "" };
+        let felt = if self.0.surrogate.is_some() { ", with a surrogate" } else { "" };
         let moving = if self.0.is_constant() { "" } else { ", its scale moves over a run" };
-        format!("Softness({}{squared}, {} parameters{moving})", self.family(), self.0.phi.len())
+        format!("Softness({}{squared}, φ [{}]{felt}{moving})", self.family(), self.0.phi.len())
     }
 }
 

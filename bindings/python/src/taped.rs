@@ -4,8 +4,10 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor, TensorData, backend::Backend},
 };
-use softrast_raster::{Silhouette, TConorm};
+use softrast_raster::{Silhouette, TConorm, WeightTables};
 use softrast_softness::EdgeSoftness;
+
+use crate::colour::both;
 
 type Plain = NdArray<f64>;
 type Once = Autodiff<Plain>;
@@ -16,20 +18,21 @@ type Twice = Autodiff<Once>;
 pub(crate) enum Taped {
     /// Parameters φ to a table, row by row.
     Table(Box<Silhouette<EdgeSoftness>>),
+    /// Parameters of the softnesses by edge, of which there are so many, and by depth to their tables, row by row.
+    Weights(Box<WeightTables>, usize),
     /// Sums to coverage, each by itself.
     Coverage(TConorm),
 }
 
 impl Taped {
     fn of<B: Backend>(&self, x: Tensor<B, 1>) -> Tensor<B, 1> {
-        match self {
-            Self::Table(silhouette) => {
-                let table = silhouette.table(x);
-                let count = table.shape().num_elements();
-                table.reshape([count])
-            }
-            Self::Coverage(t_conorm) => t_conorm.coverage(x),
-        }
+        let table = match self {
+            Self::Table(silhouette) => silhouette.table(x),
+            Self::Weights(tables, split) => tables.of(both(x, *split)),
+            Self::Coverage(t_conorm) => return t_conorm.coverage(x),
+        };
+        let count = table.shape().num_elements();
+        table.reshape([count])
     }
 
     /// The values.

@@ -1,6 +1,11 @@
 """What needs NumPy alone."""
 
+import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -46,7 +51,7 @@ def test_nan_never_comes_out():
 
 
 @pytest.mark.parametrize("call, message", [
-    (lambda: softrast.silhouette(renderer(), CORNERS[0]), r"vertices must be \[views, V, 3\] with at least one view, found \[3, 3\]"),
+    (lambda: softrast.silhouette(renderer(), CORNERS[0]), r"vertices must be \[views, V, 3\] with at least one view, as project returns them, found \[3, 3\]"),
     (lambda: softrast.silhouette(renderer(), CORNERS[:0]), "at least one view"),
     (lambda: softrast.silhouette(renderer(), CORNERS[:, :2]), "a face uses vertex 2, but there are 2"),
     (lambda: softrast.silhouette(renderer(), CORNERS, [np.nan]), r"phi\[0\] is NaN, expected a finite number"),
@@ -69,9 +74,66 @@ def test_bad_input_is_an_error_of_one_line(call, message):
     assert "\n" not in str(error.value)
 
 
-def test_arrays_of_two_float_types_are_refused():
-    with pytest.raises(TypeError, match="of one type"):
-        softrast.project(CORNERS, softrast.orbit(3.0).astype("f4"))
+def test_cameras_of_another_float_type_are_taken_in_that_of_the_vertices():
+    assert softrast.project(CORNERS.astype("f4"), softrast.orbit(3.0)).dtype == np.float32
+    with pytest.raises(ValueError, match="of one type, float32 or float64"):
+        softrast._native.perspective().forward([CORNERS, softrast._native.orbit_matrix().forward([softrast.orbit(3.0).astype("f4")])])
+
+
+def test_a_softness_with_a_surrogate_draws_its_own_image():
+    softness = softrast.Softness.learned("shape3d-surrogate")
+    assert softness.has_surrogate and "surrogate" in repr(softness)
+    plain = softness.with_phi(softness.phi_at(0.5, 9))
+    assert not plain.has_surrogate
+    images = [softrast.silhouette(softrast.Renderer(FACES, 9, kind, part=0.5), CORNERS) for kind in (softness, plain)]
+    assert np.array_equal(*images)
+
+
+def colours(**settings):
+    return softrast.ColourRenderer(FACES, 9, softrast.Softness("logistic", 0.01), [0.5, 1.5], **settings)
+
+
+def test_a_face_of_one_colour_hides_the_background_where_it_covers_a_pixel():
+    image = softrast.blend(colours(), CORNERS, np.full((3, 2), [0.25, 0.75]), [1.0, 0.0])
+    assert image.shape == (1, 3, 9, 9)
+    assert image[0, :, 4, 4] == pytest.approx([0.25, 0.75, 1.0], abs=2e-3)
+    assert image[0, :, 0, 0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-5)
+
+
+def test_entries_of_corners_and_a_texture_show_what_vertices_would():
+    values = np.array([[0.1], [0.5], [0.9]])
+    expected = softrast.blend(colours(), CORNERS, values)
+    assert np.array_equal(softrast.blend(colours(), CORNERS, values[::-1].copy(), corners=[[2, 1, 0]]), expected)
+    # A picture of one row is a straight line between the centres of its texels.
+    places = np.stack([0.25 + 0.5 * values[:, 0], np.full(3, 0.5)], 1)
+    painted = softrast.blend(colours(), CORNERS, places, texture=[[[0.0], [1.0]]])
+    assert painted == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("call, message", [
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((2, 3))), "a corner has entry 2, but there are attributes of 2"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((2, 3, 3))), r"attributes must be \[entries, channels\] or \[1 or 1"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((3, 2)), [0.0] * 3), r"background must be a number or \[2\], found \[3\]"),
+    (lambda: softrast.blend(colours(), CORNERS, np.full((3, 2), np.nan)), "attributes must be finite"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((3, 3)), texture=np.zeros((2, 2, 1))), "places with 2 numbers"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((3, 2)), texture=np.zeros((2, 2, 5))), "1 to 4 channels"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((3, 1)), corners=[[0, 1, 2]] * 2), "a row for each of the 1 faces, found 2"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((3, 1)), log_weight=np.inf), "log_weight is inf"),
+    (lambda: softrast.blend(colours(), CORNERS, np.zeros((3, 1)), phi_depth=[0.0]), "phi_depth of exp has 2 parameters, found 1"),
+    (lambda: softrast.ColourRenderer(FACES, 9, softrast.Softness("logistic", 0.01), [2.0, 1.0]), "the planes are"),
+    (lambda: softrast.ColourRenderer(FACES, 9, softrast.Softness("logistic", 0.01), 2.0), "planes must be a near and a far depth"),
+    (lambda: colours(depth="deep"), "unknown depth softness"),
+    (lambda: colours(depth_scale=0.0), "the scale of the depth softness is 0"),
+    (lambda: softrast.ColourRenderer(FACES, 9, softrast.Softness.learned("shape3d-surrogate"), [1.0, 2.0]), "only silhouettes use"),
+    (lambda: softrast.Renderer(FACES, 9, "logistic"), "softness must be a softrast.Softness .* found str"),
+    (lambda: softrast.project([[0, 0, 0]], softrast.orbit(3.0)), "vertices must be float32 or float64, found int64"),
+    (lambda: softrast.project([[0.0, 0.0], [0.0]], softrast.orbit(3.0)), "vertices is no array"),
+    (lambda: softrast.save_mesh("a.ply", np.zeros((3, 2)), FACES), r"positions must be \[N, 3\], found \[3, 2\]"),
+])
+def test_bad_colours_and_types_are_errors_of_one_line(call, message):
+    with pytest.raises(ValueError, match=message) as error:
+        call()
+    assert "\n" not in str(error.value)
 
 
 def test_meshes_and_softnesses_come_back_from_files(tmp_path):
@@ -93,6 +155,23 @@ def test_threads_draw_the_same_bits():
     assert len(images) == 8 and all(np.array_equal(image, expected) for image in images)
 
 
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_process_that_was_forked_draws_too():
+    script = """
+import os, signal, numpy as np, softrast
+positions, faces, _ = softrast.icosphere(2)
+draw = softrast.Renderer(faces, 64, softrast.Softness("logistic", 0.02))
+image = lambda: softrast.silhouette(draw, softrast.project(positions, softrast.orbit(2.7, 0.0, [0.0, 10.0])))
+expected = image()
+child = os.fork()
+if not child:
+    signal.alarm(20)
+    os._exit(0 if np.array_equal(image(), expected) else 1)
+assert os.waitpid(child, 0)[1] == 0
+"""
+    assert subprocess.run([sys.executable, "-c", script], timeout=60).returncode == 0
+
+
 def test_memory_does_not_grow():
     resource = pytest.importorskip("resource")
     draw = renderer()
@@ -103,3 +182,24 @@ def test_memory_does_not_grow():
     for _ in range(10_000):
         softrast.silhouette(draw, CORNERS)
     assert of(1) - before < 4096, "kB"
+
+
+def test_ctrl_c_is_seen_once_a_long_call_ends():
+    script = """
+import signal, sys, numpy as np, softrast
+positions, faces, _ = softrast.icosphere(4)
+seen = softrast.project(positions, softrast.orbit(2.7, 0.0, [0.0, 10.0]))
+draw = softrast.Renderer(faces, 256, softrast.Softness("logistic", 0.02))
+print("ready", flush=True)
+try:
+    for _ in range(1000):
+        softrast.silhouette(draw, seen)
+except KeyboardInterrupt:
+    sys.exit(7)
+"""
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    # A thousand calls would take minutes.
+    assert process.wait(timeout=30) == 7

@@ -201,7 +201,7 @@ impl ColourRenderer {
             });
             return self.by_reference(vertices, attributes, phi, background);
         }
-        let mut prepared = self.prepared(&self.phi, background);
+        let mut prepared = self.prepared(&self.phi, number(background));
         let data = match prepared.tables.take() {
             Some((phi, of, data)) if phi == self.phi && of == dtype => data,
             _ => {
@@ -238,9 +238,30 @@ impl ColourRenderer {
         }
         let values = [edge, depth].map(|phi| phi.to_data().iter().collect::<Vec<f64>>());
         check(&self.weighting, &values);
-        let prepared = self.prepared(&values, background);
+        let prepared = self.prepared(&values, number(background));
         let tables = prepared.tables(phi);
         self.drawn(&prepared, vertices, attributes, tables, background)
+    }
+
+    /// The op behind [`image_with`](Self::image_with), and what makes its tables, for callers that run it on slices: for these values of
+    /// the parameters and of the logarithm of the background's weight, and attributes with these `entries` at the corners of faces, if
+    /// they are places on a texture with its rows and columns.
+    ///
+    /// # Panics
+    ///
+    /// If a `phi` has the wrong length, or the logarithm is not finite.
+    #[doc(hidden)]
+    pub fn op(
+        &self,
+        phi: &[Vec<f64>; 2],
+        log_weight: f64,
+        entries: Arc<[[u32; 3]]>,
+        texture: Option<[usize; 2]>,
+    ) -> (FusedOp, WeightTables) {
+        check(&self.weighting, phi);
+        let prepared = self.prepared(phi, log_weight);
+        let op = self.blend_op(&prepared, entries, texture);
+        (FusedOp::SoftBlend(op), WeightTables(prepared))
     }
 
     fn by_reference<B: RasterBackend>(
@@ -262,10 +283,21 @@ impl ColourRenderer {
         tables: Tensor<B, 2>,
         background: &Background<B>,
     ) -> Tensor<B, 4> {
-        let op = SoftBlend {
+        let texture = attributes.texture.as_ref().map(texture_size);
+        let op = self.blend_op(prepared, attributes.entries.clone(), texture);
+        soft_blend(op, vertices, attributes, tables, background)
+    }
+
+    fn blend_op(
+        &self,
+        prepared: &Prepared,
+        entries: Arc<[[u32; 3]]>,
+        texture: Option<[usize; 2]>,
+    ) -> SoftBlend {
+        SoftBlend {
             faces: self.faces.clone(),
-            entries: attributes.entries.clone(),
-            texture: attributes.texture.as_ref().map(texture_size),
+            entries,
+            texture,
             edge: prepared.edge.grid,
             depth: prepared.depth.grid(),
             floor: floor(&self.weighting.edge),
@@ -273,15 +305,12 @@ impl ColourRenderer {
             size: self.size,
             tolerance: 0.5 * self.tolerance,
             kept: None,
-        };
-        soft_blend(op, vertices, attributes, tables, background)
+        }
     }
 
-    /// Knots for these parameters and this background.
-    fn prepared<B: Backend>(&self, phi: &[Vec<f64>; 2], background: &Background<B>) -> Prepared {
-        let numbers = background.log_weight.to_data().iter().collect::<Vec<f64>>();
-        assert!(numbers.len() == 1 && numbers[0].is_finite(), "log weight {numbers:?}");
-        let log_weight = numbers[0];
+    /// Knots for these parameters and this logarithm of the background's weight.
+    fn prepared(&self, phi: &[Vec<f64>; 2], log_weight: f64) -> Prepared {
+        assert!(log_weight.is_finite(), "log weight {log_weight}");
         let mut kept = self.kept();
         if let Some(prepared) = kept.as_ref().filter(|kept| log_weight >= kept.log_weight) {
             if prepared.phi == *phi {
@@ -358,6 +387,30 @@ impl Prepared {
     fn tables<B: Backend>(&self, [edge, depth]: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
         tables(self.edge.table(edge), self.depth.table(depth))
     }
+}
+
+/// Makes the tables of an op that runs on slices.
+#[doc(hidden)]
+#[derive(Clone, Debug)]
+pub struct WeightTables(Prepared);
+
+impl WeightTables {
+    /// Rows of both tables.
+    pub fn rows(&self) -> usize {
+        self.0.edge.grid.rows() + self.0.depth.grid().rows()
+    }
+
+    /// Both tables, `[rows, 4]`, of parameters of the softnesses by edge and by depth.
+    pub fn of<B: Backend>(&self, phi: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
+        self.0.tables(phi)
+    }
+}
+
+/// The logarithm of the background's weight.
+fn number<B: Backend>(background: &Background<B>) -> f64 {
+    let numbers = background.log_weight.to_data().iter().collect::<Vec<f64>>();
+    assert_eq!(numbers.len(), 1, "logarithms of the background's weight");
+    numbers[0]
 }
 
 fn check(weighting: &Weighting, phi: &[Vec<f64>; 2]) {

@@ -57,6 +57,8 @@ pub use camera::{Orbit, project, vertices};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
 #[doc(hidden)]
+pub use colour_renderer::WeightTables;
+#[doc(hidden)]
 pub use fused::{ElementaryOp, FusedOp, Numbers, Pass};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;

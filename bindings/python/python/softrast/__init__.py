@@ -1,91 +1,208 @@
-"""Soft silhouettes of triangle meshes, with exact first and second derivatives, on any CPU.
+"""Soft silhouettes and colours of triangle meshes, with exact first and second derivatives, on any CPU.
 
-This module needs NumPy alone and draws; `softrast.torch` has the same functions with gradients.
+This module needs NumPy alone and draws. `softrast.torch` and `softrast.jax` have the same functions with gradients.
 
 Vertices are `[views, V, 3]`: world units with y up before `project`, then x and y in NDC (x right, y up, the shorter side of the image is
-[-1, 1]) and the camera depth in world units. Images are `[views, height, width]`, top row first. Float types are float32 and float64.
+[-1, 1]) and the camera depth in world units. Images are `[views, height, width]`, top row first. Float types are float32 and float64; an
+image has that of its vertices. Whatever is wrong is a `ValueError` of one line.
 """
 
+from __future__ import annotations
+
+import os as _os
+from typing import Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple, Union as _Union
+
 import numpy as _np
+from numpy.typing import ArrayLike as _ArrayLike
 
 from . import _native, _shapes
-from ._native import Softness, families, learned_names
+from ._native import Softness, __version__, families, learned_names
 
 __all__ = [
-    "Renderer", "Softness", "families", "fox", "hard_silhouette", "icosphere", "learned_names", "load_mesh", "orbit", "project",
-    "save_mesh", "silhouette",
+    "ColourRenderer", "Renderer", "Softness", "blend", "families", "fox", "hard_silhouette", "icosphere", "learned_names", "load_mesh",
+    "orbit", "project", "save_mesh", "silhouette",
 ]
+
+_Size = _Union[int, _Sequence[int]]
+_Path = _Union[str, "_os.PathLike[str]"]
+_Mesh = _Tuple[_np.ndarray, _np.ndarray, _Optional[_np.ndarray]]
 
 
 class Renderer(_native.Renderer):
-    """What an image depends on beside the vertices and φ.
+    """What a silhouette depends on beside the vertices and φ.
 
     `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. `softness` is a
-    `Softness`, at `part` (0 to 1) of its run. `tolerance` bounds the error of any pixel. `t_conorm` combines the coverages of faces:
-    "probabilistic", "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p".
+    `Softness`, at `part` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
+    surrogate. `tolerance` (0 to 1) bounds the error of any pixel. `t_conorm` combines the coverages of faces: "probabilistic",
+    "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p".
 
     Raises `ValueError` if one of them is out of range.
     """
 
-    def __new__(cls, faces, size, softness, *, part=0.0, tolerance=1e-5, t_conorm="probabilistic"):
-        return super().__new__(cls, _shapes.faces(faces), _shapes.size(size), softness, part, tolerance, t_conorm)
+    def __new__(
+        cls, faces: _ArrayLike, size: _Size, softness: Softness, *, part: float = 0.0, tolerance: float = 1e-5,
+        t_conorm: str = "probabilistic",
+    ) -> Renderer:
+        _shapes.softness(softness)
+        renderer = super().__new__(cls, _shapes.faces(faces), _shapes.size(size), softness, part, tolerance, t_conorm)
+        renderer._tables = {}
+        return renderer
+
+    def _own(self, dtype) -> _Tuple[_native.Prepared, _np.ndarray]:
+        """What draws under the renderer's own φ, and its table in a float type."""
+        kept = self._tables.get(dtype)
+        if kept is None:
+            prepared = self.prepared(self.phi)
+            kept = self._tables[dtype] = prepared, prepared.table().forward([self.phi]).astype(dtype)
+        return kept
+
+    def _felt(self, dtype) -> _Optional[_Tuple[_native.Prepared, _np.ndarray]]:
+        """The same of the surrogate, if there is one."""
+        key = "surrogate", dtype
+        if key not in self._tables:
+            found = self.surrogate()
+            self._tables[key] = found and (found[1], found[1].table().forward([found[0]]).astype(dtype))
+        return self._tables[key]
 
 
-def load_mesh(path):
+class ColourRenderer(_native.ColourRenderer):
+    """What an image in colours depends on beside vertices, attributes, background and φ.
+
+    `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. A face weighs what
+    `softness`, a `Softness` at `part` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
+    of a family, or "depth_mlp". `planes` are a near and a far depth in world units, around the mesh; they do not cut. `depth_scale` is in
+    units of the distance between them: with "exp" a face counts e times as much as one that lies so far behind it. `tolerance` (0 to 1)
+    bounds the error of any pixel, as a part of the range of what is shown.
+
+    Raises `ValueError` if one of them is out of range, or the softness has a surrogate.
+    """
+
+    def __new__(
+        cls, faces: _ArrayLike, size: _Size, softness: Softness, planes: _Sequence[float], *, part: float = 0.0, depth: str = "exp",
+        depth_scale: float = 0.05, tolerance: float = 1e-5,
+    ) -> ColourRenderer:
+        _shapes.softness(softness)
+        planes = _shapes.planes(planes)
+        return super().__new__(
+            cls, _shapes.faces(faces), _shapes.size(size), softness, planes, part, depth, depth_scale, tolerance,
+        )
+
+
+def load_mesh(path: _Path) -> _Mesh:
     """Reads OBJ, PLY, STL or GLB: positions `[V, 3]` (float64), faces `[F, 3]` (int64), and colours `[V, 3]` in [0, 1] or None."""
     return _native.load_mesh(path)
 
 
-def save_mesh(path, positions, faces, colours=None):
-    """Writes OBJ, PLY or GLB by the ending of `path`, whole or not at all; arguments as `load_mesh` returns them."""
-    colours = None if colours is None else _np.asarray(colours, _np.float64)
-    _native.save_mesh(path, _np.asarray(positions, _np.float64), _shapes.faces(faces), colours)
+def save_mesh(path: _Path, positions: _ArrayLike, faces: _ArrayLike, colours: _Optional[_ArrayLike] = None) -> None:
+    """Writes OBJ, PLY or GLB by the ending of `path`, whole or not at all.
+
+    `positions` are `[V, 3]`, `faces` `[F, 3]`, `colours` `[V, 3]` in [0, 1] or None, as `load_mesh` returns them.
+    """
+    colours = None if colours is None else _shapes.rows(colours, "colours")
+    _native.save_mesh(path, _shapes.rows(positions, "positions"), _shapes.faces(faces), colours)
 
 
-def fox():
-    """The fox of the examples, as `load_mesh` returns a mesh."""
+def fox() -> _Mesh:
+    """The fox of the examples: positions `[V, 3]`, faces `[F, 3]` and None, as `load_mesh` returns a mesh."""
     return _native.fox()
 
 
-def icosphere(subdivisions):
-    """A sphere of radius 1 with `20 * 4**subdivisions` faces, as `load_mesh` returns a mesh."""
+def icosphere(subdivisions: int) -> _Mesh:
+    """A sphere of radius 1 with `F = 20 * 4**subdivisions` faces: `[V, 3]`, `[F, 3]` and None, as `load_mesh` returns a mesh."""
     return _native.icosphere(subdivisions)
 
 
-def orbit(distance, elevation_deg=0.0, azimuth_deg=0.0, fov_deg=60.0):
+def orbit(
+    distance: _ArrayLike, elevation_deg: _ArrayLike = 0.0, azimuth_deg: _ArrayLike = 0.0, fov_deg: _ArrayLike = 60.0,
+) -> _np.ndarray:
     """Cameras `[views, 4]` (float64) that look at the origin: distance in world units, angles and whole field of view in degrees.
 
-    Numbers or vectors `[views]`. At azimuth 0 a camera stands at -z with +x on its left.
+    Numbers or vectors `[views]`. At azimuth 0 a camera stands at -z with +x on its left, at 90 at +x.
     """
     return _np.stack(_np.broadcast_arrays(*map(_np.atleast_1d, (distance, elevation_deg, azimuth_deg, fov_deg))), -1).astype(_np.float64)
 
 
-def project(vertices, cameras):
-    """World vertices `[1 or views, V, 3]` as cameras see them, `[views, V, 3]`.
+def project(vertices: _ArrayLike, cameras: _ArrayLike) -> _np.ndarray:
+    """World vertices `[V, 3]` or `[1 or views, V, 3]` as cameras see them, `[views, V, 3]`.
 
     `cameras` are orbits `[views, 4]` or matrices `[views, 3, 4]`, of which two rows give x and y in NDC times the depth, the third the
-    depth. Both must have one float type.
+    depth. The result has x and y in NDC and the depth in world units, in the float type of the vertices.
     """
-    vertices, cameras = _np.ascontiguousarray(vertices), _np.ascontiguousarray(cameras)
+    vertices = _shapes.floats(vertices, "vertices")
+    cameras = _np.ascontiguousarray(_shapes.floats(cameras, "cameras"), vertices.dtype)
+    vertices = vertices[None] if vertices.ndim == 2 else vertices
     _shapes.project(vertices.shape, cameras.shape)
     if cameras.ndim == 2:
         cameras = _native.orbit_matrix().forward([cameras])
-    return _native.perspective().forward([vertices, cameras]).swapaxes(1, 2)
+    return _native.perspective().forward([_np.ascontiguousarray(vertices), cameras]).swapaxes(1, 2)
 
 
-def silhouette(renderer, vertices, phi=None):
-    """Coverage `[views, height, width]` in [0, 1] of projected `vertices` `[views, V, 3]`, under φ `[P]` or the renderer's own."""
-    vertices = _np.asarray(vertices)
+def silhouette(renderer: Renderer, vertices: _ArrayLike, phi: _Optional[_ArrayLike] = None) -> _np.ndarray:
+    """Coverage `[views, height, width]` in [0, 1] of projected `vertices` `[views, V, 3]`, under φ `[P]` or the renderer's own.
+
+    A face with a corner nearer than 0.01 world units, or beyond 1e6 NDC, is not drawn.
+    """
+    vertices = _shapes.floats(vertices, "vertices")
     _shapes.vertices(vertices.shape, renderer.least_vertices)
-    phi = renderer.phi if phi is None else _np.asarray(phi, _np.float64)
-    prepared = renderer.prepared(phi)
-    table = prepared.table().forward([_np.ascontiguousarray(phi)]).astype(vertices.dtype)
+    if phi is None:
+        prepared, table = renderer._own(vertices.dtype)
+    else:
+        phi = _shapes.vector(phi, "phi")
+        prepared = renderer.prepared(phi)
+        table = prepared.table().forward([phi]).astype(vertices.dtype)
     sums = prepared.sum().forward([_np.ascontiguousarray(vertices.swapaxes(1, 2)), table])
     return prepared.coverage().forward([sums])
 
 
-def hard_silhouette(vertices, faces, size):
-    """1 where the centre of a pixel lies in a face, else 0: `[views, height, width]`, float32, of projected `vertices` `[views, V, 3]`."""
-    vertices, faces = _np.asarray(vertices, _np.float64), _shapes.faces(faces)
+def hard_silhouette(vertices: _ArrayLike, faces: _ArrayLike, size: _Size) -> _np.ndarray:
+    """1 where the centre of a pixel lies in a face, else 0: `[views, height, width]`, float32, of projected `vertices` `[views, V, 3]`.
+
+    `faces` are `[F, 3]`; `size` is a number of pixels, or `(height, width)`.
+    """
+    vertices, faces = _np.asarray(_shapes.floats(vertices, "vertices"), _np.float64), _shapes.faces(faces)
     _shapes.vertices(vertices.shape, faces.max() + 1 if faces.size else 0)
     return _native.hard_silhouette(vertices, faces, _shapes.size(size))
+
+
+def blend(
+    renderer: ColourRenderer, vertices: _ArrayLike, attributes: _ArrayLike, background: _ArrayLike = 0.0, *,
+    corners: _Optional[_ArrayLike] = None, texture: _Optional[_ArrayLike] = None, log_weight: _Optional[float] = None,
+    phi: _Optional[_ArrayLike] = None, phi_depth: _Optional[_ArrayLike] = None,
+) -> _np.ndarray:
+    """Soft colours, `[views, channels + 1, height, width]`, of projected `vertices` `[views, V, 3]`; the last is the share of the faces.
+
+    `attributes` `[V, channels]` or `[1 or views, V, channels]` are what vertices show, as many channels as you like, interpolated in
+    perspective. With `corners` `[F, 3]` they have entries of their own, `[1 or views, entries, channels]`, and corners say which one each
+    corner of a face has. With a `texture` `[height, width, channels]` (1 to 4 channels, top row first) they are places on it, u and v from 0
+    to 1 with v up, and it is what is seen.
+
+    `background` is a number or a colour `[channels]`, `log_weight` the logarithm of its weight; without one it weighs a thousandth of a face
+    at the far plane. `phi` `[P]` and `phi_depth` `[Q]` are parameters of the softnesses by edge and by depth, or the renderer's own.
+    """
+    vertices = _shapes.floats(vertices, "vertices")
+    _shapes.vertices(vertices.shape, renderer.least_vertices)
+    dtype = vertices.dtype
+    attributes = _shapes.floats(attributes, "attributes").astype(dtype)
+    attributes = attributes[None] if attributes.ndim == 2 else attributes
+    texture = None if texture is None else _shapes.floats(texture, "texture").astype(dtype)
+    corners = None if corners is None else _shapes.faces(corners, "corners")
+    channels = _shapes.attributes(
+        attributes.shape, vertices.shape[0], renderer.least_vertices if corners is None else corners.max(initial=-1) + 1,
+        None if texture is None else texture.shape,
+    )
+    background = _np.asarray(background, dtype)
+    _shapes.background(background.shape, channels)
+    log_weight = renderer.log_weight if log_weight is None else float(log_weight)
+    phi, phi_depth = (
+        _shapes.vector(own if given is None else given, name)
+        for given, own, name in [(phi, renderer.phi, "phi"), (phi_depth, renderer.phi_depth, "phi_depth")]
+    )
+    for array, name in [(attributes, "attributes"), (background, "background"), (texture, "texture")]:
+        _shapes.finite(array is None or bool(_np.isfinite(array).all()), name)
+    prepared = renderer.prepared(phi, phi_depth, log_weight, corners, None if texture is None else texture.shape[:2])
+    tables = prepared.tables().forward([_np.concatenate([phi, phi_depth])]).astype(dtype)
+    behind = _np.append(_np.broadcast_to(background, channels), log_weight).astype(dtype)
+    inputs = [vertices.swapaxes(1, 2), attributes, tables, behind]
+    if texture is not None:
+        inputs.append(_np.pad(texture.reshape(-1, channels), ((0, 0), (0, 4 - channels))))
+    return prepared.blend().forward([_np.ascontiguousarray(array) for array in inputs])

@@ -1,0 +1,184 @@
+//! Soft colours of one mesh topology.
+
+use burn::{backend::NdArray, tensor::Tensor};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use softrast_raster::{ImageSize, Weighting};
+use softrast_softness::{DepthSoftness, Softness as _};
+
+use crate::{
+    guard::{guarded, refused},
+    op::Op,
+    renderer::{check_phi, check_size, check_tolerance, corners, least},
+    softness::Softness,
+};
+
+/// What an image in colours depends on beside vertices, attributes, background and φ.
+#[pyclass(frozen, module = "softrast._native", subclass)]
+pub(crate) struct ColourRenderer {
+    renderer: softrast_raster::ColourRenderer,
+    faces: std::sync::Arc<[[u32; 3]]>,
+    size: [usize; 2],
+    log_weight: f64,
+}
+
+#[pymethods]
+impl ColourRenderer {
+    #[new]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        faces: PyReadonlyArray2<'_, i64>,
+        size: [usize; 2],
+        softness: &Softness,
+        planes: [f64; 2],
+        part: f64,
+        depth: &str,
+        depth_scale: f64,
+        tolerance: f64,
+    ) -> PyResult<Self> {
+        check_tolerance(tolerance)?;
+        check_size(size)?;
+        if !(planes[0] < planes[1] && planes.iter().all(|plane| plane.is_finite())) {
+            return Err(refused(format!(
+                "the planes are {planes:?}, expected a near depth and a larger far one"
+            )));
+        }
+        if !(depth_scale > 0.0 && depth_scale.is_finite()) {
+            return Err(refused(format!(
+                "the scale of the depth softness is {depth_scale}, expected a positive number"
+            )));
+        }
+        if softness.0.surrogate.is_some() {
+            return Err(refused(
+                "this softness has a surrogate, which only silhouettes use: take Softness.with_phi(softness.phi_at(part)) for colours",
+            ));
+        }
+        let depth: DepthSoftness = depth.parse().map_err(refused)?;
+        let phi = softness.parameters_at(part, size[0].min(size[1]))?;
+        let weighting = Weighting { edge: softness.0.softness, depth, planes };
+        let faces = corners(&faces)?;
+        let of = || {
+            let phi = [phi, depth.default_phi(depth_scale)];
+            let (faces, size) = (faces.clone(), ImageSize::from(size));
+            let renderer =
+                softrast_raster::ColourRenderer::with_weighting(faces, size, weighting, phi)
+                    .with_tolerance(tolerance);
+            let behind = renderer.background::<NdArray<f64>>(&[], &Default::default());
+            (renderer, behind.log_weight.into_scalar())
+        };
+        let (renderer, log_weight) = guarded(py, of)?;
+        Ok(Self { renderer, faces, size, log_weight })
+    }
+
+    /// Parameters φ of the softness by edge, `[P]`, float64: those that are drawn with where no others are given.
+    #[getter]
+    fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.renderer.phi()[0])
+    }
+
+    /// Parameters φ of the softness by depth, `[Q]`, float64: those that are drawn with where no others are given.
+    #[getter]
+    fn phi_depth<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.renderer.phi()[1])
+    }
+
+    /// Logarithm of the weight of a background that is given none: a thousandth of a face at the far plane.
+    #[getter]
+    fn log_weight(&self) -> f64 {
+        self.log_weight
+    }
+
+    /// Height and width of the image, in pixels.
+    #[getter]
+    fn size(&self) -> (usize, usize) {
+        (self.size[0], self.size[1])
+    }
+
+    /// How many faces there are.
+    #[getter]
+    fn face_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    /// How many vertices the faces ask for.
+    #[getter]
+    fn least_vertices(&self) -> usize {
+        least(&self.faces)
+    }
+
+    fn __repr__(&self) -> String {
+        let ([height, width], weighting) = (self.size, self.renderer.weighting());
+        let (edge, depth, count) = (weighting.edge.family, weighting.depth, self.faces.len());
+        format!(
+            "ColourRenderer({height} x {width} pixels, {count} faces, {edge} by edge, {depth} by depth)"
+        )
+    }
+
+    /// Knots for these parameters and this logarithm of the background's weight; `entries` `[F, 3]` say which entry of the attributes each
+    /// corner has, and are those of the vertices where None is given. `texture` has its rows and columns.
+    #[pyo3(signature = (phi, phi_depth, log_weight, entries, texture))]
+    fn prepared(
+        &self,
+        py: Python<'_>,
+        phi: Vec<f64>,
+        phi_depth: Vec<f64>,
+        log_weight: f64,
+        entries: Option<PyReadonlyArray2<'_, i64>>,
+        texture: Option<[usize; 2]>,
+    ) -> PyResult<PreparedColour> {
+        let weighting = self.renderer.weighting();
+        check_phi("phi", weighting.edge.family.name(), weighting.edge.parameters(), &phi)?;
+        check_phi("phi_depth", weighting.depth.name(), weighting.depth.parameters(), &phi_depth)?;
+        if !log_weight.is_finite() {
+            return Err(refused(format!("log_weight is {log_weight}, expected a finite number")));
+        }
+        let entries =
+            entries.map_or_else(|| Ok(self.faces.clone()), |entries| corners(&entries))?;
+        if entries.len() != self.faces.len() {
+            return Err(refused(format!(
+                "corners must have a row for each of the {} faces, found {}",
+                self.faces.len(),
+                entries.len()
+            )));
+        }
+        let split = phi.len();
+        let least_entries = least(&entries);
+        let phi = [phi, phi_depth];
+        let (op, tables) = guarded(py, || self.renderer.op(&phi, log_weight, entries, texture))?;
+        let sizes = [least(&self.faces), least_entries];
+        let blend = Op::blend(op, tables.rows(), sizes, self.size, texture);
+        let parameters = phi.iter().map(Vec::len).sum();
+        Ok(PreparedColour { blend, tables: Op::weight_tables(tables, split, parameters) })
+    }
+}
+
+/// What draws colours under some φ, with knots for it.
+#[pyclass(frozen, module = "softrast._native")]
+pub(crate) struct PreparedColour {
+    blend: Op,
+    tables: Op,
+}
+
+#[pymethods]
+impl PreparedColour {
+    /// The op from vertices `[views, 3, V]`, attributes `[1 or views, entries, numbers]`, tables `[rows, 4]`, a background `[channels + 1]`
+    /// and, if there is one, a texture `[texels, 4]` to an image `[views, channels + 1, height, width]`.
+    fn blend(&self) -> Op {
+        self.blend.clone()
+    }
+
+    /// The op from both φ in a row, `[P + Q]`, to tables `[rows, 4]`.
+    fn tables(&self) -> Op {
+        self.tables.clone()
+    }
+}
+
+/// Both φ of a vector that has one behind the other.
+pub(crate) fn both<B: burn::tensor::backend::Backend>(
+    phi: Tensor<B, 1>,
+    split: usize,
+) -> [Tensor<B, 1>; 2] {
+    let [count] = phi.dims();
+    [phi.clone().narrow(0, 0, split), phi.narrow(0, split, count - split)]
+}

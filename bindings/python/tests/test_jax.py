@@ -1,0 +1,138 @@
+"""The functions for JAX: values, derivatives of both orders, jit and vmap."""
+
+import numpy as np
+import pytest
+
+import softrast
+
+jax = pytest.importorskip("jax")
+import jax.numpy as jnp  # noqa: E402
+from jax.test_util import check_grads  # noqa: E402
+
+import softrast.jax as sj  # noqa: E402
+
+FACES = [[0, 1, 2], [1, 3, 2]]
+CORNERS = np.array([[-0.6, -0.5, 0.1], [0.5, -0.6, -0.2], [0.05, 0.55, 0.0], [0.8, 0.4, 0.3]])
+CAMERAS = softrast.orbit(2.5, 10.0, [20.0, 70.0])
+
+
+@pytest.fixture(autouse=True)
+def wide():
+    jax.config.update("jax_enable_x64", True)
+    yield
+    jax.config.update("jax_enable_x64", False)
+
+
+def renderer(**settings):
+    softness = settings.pop("softness", softrast.Softness("logistic", 0.1))
+    return softrast.Renderer(FACES, (6, 5), softness, tolerance=1e-9, **settings)
+
+
+def image(draw, corners, cameras, *phi):
+    return sj.silhouette(draw, sj.project(corners, cameras), *phi)
+
+
+def test_jax_and_numpy_draw_the_same_bits_also_compiled():
+    draw = renderer()
+    expected = softrast.silhouette(draw, softrast.project(CORNERS, CAMERAS))
+    of = lambda corners, cameras: image(draw, corners, cameras)
+    for found in (of(CORNERS, CAMERAS), jax.jit(of)(CORNERS, CAMERAS)):
+        assert found.shape == (2, 6, 5) and np.array_equal(found, expected)
+
+
+@pytest.mark.parametrize("t_conorm", ["probabilistic", "yager:2"])
+def test_gradients_of_both_orders_are_those_of_differences(t_conorm):
+    draw = renderer(t_conorm=t_conorm)
+    check_grads(lambda *x: image(draw, *x), (CORNERS, CAMERAS), order=2, modes=["rev"], eps=1e-5)
+
+
+def test_gradients_of_phi_are_those_of_torch():
+    torch = pytest.importorskip("torch")
+    import softrast.torch as st
+
+    draw = renderer()
+
+    def loss(corners, phi):
+        return (image(draw, corners, CAMERAS, phi) ** 2).sum()
+
+    def second(corners, phi):
+        by_corners, by_phi = jax.grad(loss, (0, 1))(corners, phi)
+        return (by_corners ** 2).sum() + 3.0 * (by_phi ** 2).sum()
+
+    corners, phi = (torch.from_numpy(x).requires_grad_() for x in (CORNERS.copy(), draw.phi))
+    value = st.silhouette(draw, st.project(corners, torch.from_numpy(CAMERAS)), phi).pow(2).sum()
+    first = torch.autograd.grad(value, (corners, phi), create_graph=True)
+    expected = torch.autograd.grad(first[0].pow(2).sum() + 3.0 * first[1].pow(2).sum(), (corners, phi))
+    for of in (lambda f: f, jax.jit):
+        found = of(jax.grad(loss, (0, 1)))(CORNERS, draw.phi)
+        assert all(np.allclose(a, b.detach(), rtol=1e-12, atol=1e-14) for a, b in zip(found, first))
+        found = of(jax.grad(second, (0, 1)))(CORNERS, draw.phi)
+        assert all(np.allclose(a, b, rtol=1e-12, atol=1e-12) for a, b in zip(found, expected))
+
+
+def test_views_can_be_mapped_over():
+    draw = renderer()
+    one = lambda corners, camera: image(draw, corners, camera[None])[0]
+    loss = lambda corners, camera: (one(corners, camera) ** 2).sum()
+    expected = image(draw, CORNERS, CAMERAS)
+    assert np.array_equal(jax.vmap(one, (None, 0))(CORNERS, CAMERAS), expected)
+    # Gradients of each view by itself, of first and second order.
+    first = jax.grad(loss, (0, 1))
+    second = jax.grad(lambda *x: sum((part ** 2).sum() for part in first(*x)), (0, 1))
+    for derivative in (first, second):
+        mapped = jax.jit(jax.vmap(derivative, (None, 0)))(CORNERS, CAMERAS)
+        each = [derivative(CORNERS, camera) for camera in CAMERAS]
+        assert all(np.allclose(a, np.stack(b), rtol=1e-12, atol=1e-14) for a, b in zip(mapped, zip(*each)))
+
+
+def test_softnesses_can_be_mapped_over():
+    draw = renderer()
+    phis = draw.phi + np.array([[0.0], [0.3], [-0.2]])
+    loss = lambda phi: (image(draw, CORNERS, CAMERAS, phi) ** 2).sum()
+    for of in (loss, jax.grad(loss), jax.grad(lambda phi: jax.grad(loss)(phi).sum())):
+        assert np.allclose(jax.vmap(of)(phis), np.stack([of(phi) for phi in phis]), rtol=1e-12)
+
+
+def test_the_gradient_of_a_surrogate_is_that_of_torch():
+    torch = pytest.importorskip("torch")
+    import softrast.torch as st
+
+    draw = renderer(softness=softrast.Softness.learned("shape3d-surrogate"))
+    corners = torch.from_numpy(CORNERS.copy()).requires_grad_()
+    value = st.silhouette(draw, st.project(corners, torch.from_numpy(CAMERAS))).pow(2).sum()
+    (first,) = torch.autograd.grad(value, corners, create_graph=True)
+    (second,) = torch.autograd.grad(first.pow(2).sum(), corners)
+    gradient = jax.grad(lambda corners: (image(draw, corners, CAMERAS) ** 2).sum())
+    assert np.allclose(gradient(CORNERS), first.detach(), rtol=1e-12, atol=1e-14)
+    assert np.allclose(jax.grad(lambda x: (gradient(x) ** 2).sum())(CORNERS), second, rtol=1e-12, atol=1e-12)
+
+
+def test_floats_of_32_bits_stay_so():
+    jax.config.update("jax_enable_x64", False)
+    draw = renderer()
+    corners, cameras = CORNERS.astype("f4"), CAMERAS.astype("f4")
+    found = image(draw, jnp.asarray(corners), jnp.asarray(cameras))
+    assert found.dtype == jnp.float32
+    assert np.array_equal(found, softrast.silhouette(draw, softrast.project(corners, cameras)))
+    assert sj.orbit(2.5, 10.0, [20.0, 70.0]).shape == (2, 4)
+
+
+@pytest.mark.parametrize("call, message", [
+    (lambda: sj.project(CORNERS, np.zeros((1, 5))), "cameras must be orbits"),
+    (lambda: sj.project(jnp.zeros((4, 3), int), CAMERAS), "vertices must be float32 or float64"),
+    (lambda: sj.silhouette(renderer(), CORNERS[None, :2]), "a face uses vertex 3, but there are 2"),
+    (lambda: sj.silhouette(renderer(), CORNERS[None], np.zeros(2)), r"phi must be \[1\], found \[2\]"),
+])
+def test_bad_input_is_an_error_of_one_line(call, message):
+    with pytest.raises(ValueError, match=message) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+def test_a_third_derivative_is_refused():
+    draw = renderer()
+    f = lambda x: (image(draw, x, CAMERAS) ** 2).sum()
+    for _ in range(2):
+        f = (lambda g: lambda x: (jax.grad(g)(x) ** 2).sum())(f)
+    with pytest.raises(ValueError, match="JVP"):
+        jax.grad(f)(CORNERS)
