@@ -94,7 +94,7 @@ impl Record {
     ///
     /// # Panics
     ///
-    /// If there is none of its name, which [`read`] makes sure of.
+    /// If there is none of its name, which is checked where records are read.
     pub fn task(&self) -> &'static dyn AnyTask {
         let task = TASKS.iter().find(|task| task.name() == self.task);
         *task.unwrap_or_else(|| panic!("there is no task {}", self.task))

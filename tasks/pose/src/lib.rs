@@ -11,10 +11,10 @@
 //! calibrated camera does, or optimise it with `--optimise-fov`. `--instances released24` keeps the
 //! released values, right or wrong, so that its numbers compare with the released curves.
 //!
-//! **Method.** By default the softness that was learned here, a Gauss curve whose scale falls. From one start, as in the paper and in
-//! `evaluate`, about one run in twenty from 35 to 55 degrees ends in a wrong pose that looks alike,
-//! such as front for back. The image tells: `solve` then tries other starts around the given one and
-//! keeps the run whose image fits best; `--starts 1` is the single start.
+//! **Method.** By default the softness that was learned here, a Gauss curve whose scale falls, with feedback: where the image tells that
+//! a run is stuck, it begins again from another start around the given one, within the same steps. Without feedback about one run in
+//! twenty from 35 to 55 degrees ends in a wrong pose that looks alike, such as front for back. Where the image still does not fit,
+//! `solve` makes whole runs from other starts and keeps the one that fits best; `--starts 1` is one run, as `evaluate` has it.
 //!
 //! **Colour.** With `--colour` the mesh has colours and the target is a picture in colours: [`colour`].
 //!
