@@ -4,8 +4,7 @@ use crate::file::LARGEST_LOGARITHM;
 
 /// How a run goes along the path of its scale by what it sees, and not by time: a closed loop.
 ///
-/// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a share of all steps, the slower the more its error
-/// falls. Where its error is too large for its place it is stuck: then it goes back to the beginning, from another start if the problem has
+/// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a number of steps, the slower the more its error falls. Where its error is too large for its place it is stuck: then it goes back to the beginning, from another start if the problem has
 /// one, as often as time allows. All fields but `patience` and `early` are logarithms.
 ///
 /// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
@@ -13,7 +12,7 @@ use crate::file::LARGEST_LOGARITHM;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feedback {
-    /// Logarithm of the share of all steps that the path takes while the error stays as it is.
+    /// Logarithm of the number of steps that the path takes while the error stays as it is. It takes no more than there are.
     pub passage: f64,
     /// How much slower it goes while the error falls: the pace is multiplied by `(recent / earlier)^patience`, two running means of the
     /// error over about 5 and 20 steps.
@@ -70,9 +69,9 @@ impl Feedback {
     /// How many numbers it has.
     pub const PARAMETERS: usize = 6;
 
-    /// Where learning begins: a path that takes a third of a run, and an error above 0.05 at its end, or 0.22 halfway, that is too large.
+    /// Where learning begins: a path that takes 100 steps, and an error above 0.05 at its end, or 0.22 halfway, that is too large.
     pub const START: Self =
-        Self { passage: -1.1, patience: 0.0, stuck: -3.0, early: 3.0, room: -0.5, rate_end: 0.0 };
+        Self { passage: 4.6, patience: 0.0, stuck: -3.0, early: 3.0, room: -0.5, rate_end: 0.0 };
 
     /// Its numbers, in the order of the fields.
     pub fn parameters(&self) -> [f64; Self::PARAMETERS] {
@@ -114,7 +113,7 @@ impl Follower {
             });
         }
         let Feedback { passage, patience, stuck, early, room, rate_end } = self.feedback;
-        let passage = (passage.exp() * self.steps as f64).max(1.0);
+        let passage = passage.exp().clamp(1.0, self.steps.max(1) as f64);
         let left = self.steps.saturating_sub(self.step + 1) as f64;
         let too_large = (stuck + early * (1.0 - self.part)).exp();
         let is_stuck = self.seen.is_some_and(|seen| seen.least > too_large);

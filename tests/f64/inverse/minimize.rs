@@ -94,9 +94,8 @@ fn nothing_to_solve_is_an_error() {
 /// A scale that moves with feedback, on a path of one step.
 fn with_feedback() -> Method {
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let passage = (1.0_f64 / 3.0).ln();
     let feedback =
-        Feedback { passage, patience: 0.0, stuck: 0.0, early: 0.0, room: -1.0, rate_end: 0.0 };
+        Feedback { passage: 0.0, patience: 0.0, stuck: 0.0, early: 0.0, room: -1.0, rate_end: 0.0 };
     let decay = ScheduledSoftness::decay(softness, 0.1, 0.01);
     Method::new("none", ScheduledSoftness { feedback: Some(feedback), ..decay })
 }
