@@ -62,7 +62,8 @@ impl PhiLayout {
             let start = ScheduledSoftness { phi, surrogate, schedule: None, ..start.clone() };
             return Self::new(start, own, steps, size);
         }
-        let feedback = start.feedback.or(config.feedback.then_some(Feedback::START));
+        let begun = Feedback { steps, ..Feedback::START };
+        let feedback = start.feedback.or(config.feedback.then_some(begun));
         let kept = start.schedule.as_ref().filter(|kept| {
             kept.floor_px > 0.0
                 && kept.knots.len() > 1
@@ -111,7 +112,7 @@ impl PhiLayout {
         let mut own = rest;
         if let Some(feedback) = &mut softness.feedback {
             let (numbers, rest) = rest.split_first_chunk().expect("φ holds the feedback too");
-            (*feedback, own) = (Feedback::of(*numbers), rest);
+            (*feedback, own) = (feedback.with(*numbers), rest);
         }
         softness.phi[self.replaced()..].copy_from_slice(phi);
         softness.schedule.iter_mut().for_each(|schedule| schedule.knots = knots.to_vec());

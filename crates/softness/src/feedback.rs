@@ -7,12 +7,17 @@ use crate::file::LARGEST_LOGARITHM;
 /// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a number of steps, the slower the more its error falls. Where its error is too large for its place it is stuck: then it goes back to the beginning, from another start if the problem has
 /// one, as often as time allows. All fields but `patience` and `early` are logarithms.
 ///
+/// A run of fewer steps than it was learned on goes the same way in larger steps: the path takes so many fewer of them, at a learning rate
+/// that is so much larger.
+///
 /// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
 /// whatever happens.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feedback {
-    /// Logarithm of the number of steps that the path takes while the error stays as it is. It takes no more than there are.
+    /// Steps of the runs that it was learned on; not learned itself.
+    pub steps: usize,
+    /// Logarithm of the number of steps that the path takes while the error stays as it is, in a run of `steps` or more.
     pub passage: f64,
     /// How much slower it goes while the error falls: the pace is multiplied by `(recent / earlier)^patience`, two running means of the
     /// error over about 5 and 20 steps.
@@ -70,18 +75,29 @@ impl Feedback {
     pub const PARAMETERS: usize = 6;
 
     /// Where learning begins: a path that takes 100 steps, and an error above 0.05 at its end, or 0.22 halfway, that is too large.
-    pub const START: Self =
-        Self { passage: 4.6, patience: 0.0, stuck: -3.0, early: 3.0, room: -0.5, rate_end: 0.0 };
+    pub const START: Self = Self {
+        steps: 300,
+        passage: 4.6,
+        patience: 0.0,
+        stuck: -3.0,
+        early: 3.0,
+        room: -0.5,
+        rate_end: 0.0,
+    };
 
-    /// Its numbers, in the order of the fields.
+    /// Its numbers, in the order of the fields but the first.
     pub fn parameters(&self) -> [f64; Self::PARAMETERS] {
-        let Self { passage, patience, stuck, early, room, rate_end } = *self;
+        let Self { steps: _, passage, patience, stuck, early, room, rate_end } = *self;
         [passage, patience, stuck, early, room, rate_end]
     }
 
-    /// That of these numbers, in the order of the fields.
-    pub fn of([passage, patience, stuck, early, room, rate_end]: [f64; Self::PARAMETERS]) -> Self {
-        Self { passage, patience, stuck, early, room, rate_end }
+    /// The same with these numbers, in the order of the fields but the first.
+    #[must_use]
+    pub fn with(
+        self,
+        [passage, patience, stuck, early, room, rate_end]: [f64; Self::PARAMETERS],
+    ) -> Self {
+        Self { passage, patience, stuck, early, room, rate_end, ..self }
     }
 
     /// A run of so many steps that begins.
@@ -112,8 +128,9 @@ impl Follower {
                 least: seen.least.min(error),
             });
         }
-        let Feedback { passage, patience, stuck, early, room, rate_end } = self.feedback;
-        let passage = passage.exp().clamp(1.0, self.steps.max(1) as f64);
+        let Feedback { steps, passage, patience, stuck, early, room, rate_end } = self.feedback;
+        let shorter = (self.steps.max(1) as f64 / steps.max(1) as f64).min(1.0);
+        let passage = (passage.exp() * shorter).max(1.0);
         let left = self.steps.saturating_sub(self.step + 1) as f64;
         let too_large = (stuck + early * (1.0 - self.part)).exp();
         let is_stuck = self.seen.is_some_and(|seen| seen.least > too_large);
@@ -123,7 +140,7 @@ impl Follower {
         }
         self.step += 1;
         let part = (self.part * PLACES).round() / PLACES;
-        let place = Place { part, rate: (rate_end * part).exp(), again };
+        let place = Place { part, rate: (rate_end * part).exp() / shorter, again };
         let trend =
             self.seen.map_or(0.0, |seen| ((seen.recent + SMALL) / (seen.earlier + SMALL)).ln());
         // A run always comes to the end of its path.
@@ -169,6 +186,18 @@ mod tests {
     }
 
     #[test]
+    fn a_shorter_run_goes_the_same_way_in_larger_steps() {
+        let [long, short] = [300, 100].map(|steps| places(Feedback::START, steps, |_| 0.5));
+        let begun = |places: &[Place]| places.iter().filter(|place| place.again).count();
+        assert_eq!((begun(&long), short[0].rate, long[0].rate), (begun(&short), 3.0, 1.0));
+        assert_eq!(
+            places(Feedback::START, 900, |_| 0.01)[0].rate,
+            1.0,
+            "a longer one has time for more"
+        );
+    }
+
+    #[test]
     fn a_run_waits_while_its_error_falls() {
         let patient = Feedback { patience: 2.0, ..Feedback::START };
         let falls = |step: usize| 0.9_f64.powi(step as i32);
@@ -179,7 +208,7 @@ mod tests {
     #[test]
     fn whatever_it_sees_its_places_are_numbers() {
         for size in [-80.0, 0.0, 80.0] {
-            let extreme = Feedback::of([size; Feedback::PARAMETERS]);
+            let extreme = Feedback::START.with([size; Feedback::PARAMETERS]);
             for steps in [1, 2, 300] {
                 for error in [0.0, 1e-300, 0.5, 1e300, f64::NAN, f64::INFINITY] {
                     for place in places(extreme, steps, |_| error) {

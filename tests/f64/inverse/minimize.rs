@@ -94,8 +94,15 @@ fn nothing_to_solve_is_an_error() {
 /// A scale that moves with feedback, on a path of one step.
 fn with_feedback() -> Method {
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let feedback =
-        Feedback { passage: 0.0, patience: 0.0, stuck: 0.0, early: 0.0, room: -1.0, rate_end: 0.0 };
+    let feedback = Feedback {
+        steps: 3,
+        passage: 0.0,
+        patience: 0.0,
+        stuck: 0.0,
+        early: 0.0,
+        room: -1.0,
+        rate_end: 0.0,
+    };
     let decay = ScheduledSoftness::decay(softness, 0.1, 0.01);
     Method::new("none", ScheduledSoftness { feedback: Some(feedback), ..decay })
 }
