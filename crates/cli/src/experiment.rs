@@ -43,7 +43,7 @@ impl<T: Task> TaskExperiment<T> {
     ) -> anyhow::Result<Self> {
         // Before the first tensor.
         let backend = backend(common.backend.as_deref())?;
-        let preset_by_default = purpose != Purpose::Finding;
+        let preset_by_default = matches!(purpose, Purpose::Solving | Purpose::Evaluating);
         let mut method_args = method_args.clone();
         if let (true, true, Some(kind)) = (preset_by_default, method_args.is_silent(), T::PRESET) {
             method_args.softness = Some(SoftnessChoice::Learned(Some(kind.to_owned())));
@@ -68,6 +68,11 @@ impl<T: Task> TaskExperiment<T> {
                 ));
             }
             method.softness.surrogate = None;
+        }
+        let of_family = matches!(method_args.softness, None | Some(SoftnessChoice::Family(_)));
+        if purpose == Purpose::Learning && of_family && method_args.surrogate_scale.is_none() {
+            method.softness.surrogate = None;
+            method.name = method.softness.softness.family.name().to_owned();
         }
         let usual = task.defaults();
         let size = common.size.unwrap_or(usual.size);
@@ -247,6 +252,8 @@ pub enum Purpose {
     Evaluating,
     /// Finding a method, from a family on unless another is named.
     Finding,
+    /// The same by learning: a family has a surrogate only where one is asked for, whatever a search found.
+    Learning,
 }
 
 impl<T: Task> Experiment for TaskExperiment<T> {

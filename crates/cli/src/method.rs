@@ -273,7 +273,7 @@ mod tests {
         let name =
             |args: &MethodArgs, task, default| args.method(task, &SCALES, default).unwrap().name;
         assert_eq!(name(&silent, "pose", true), "preset");
-        assert_eq!(name(&silent, "pose", false), "logistic");
+        assert_eq!(name(&silent, "pose", false), "logistic with surrogate");
         assert_eq!(name(&silent, "none", true), "logistic");
         let scaled = MethodArgs { scale: Some(0.1), ..silent };
         assert_eq!(name(&scaled, "pose", true), "logistic");

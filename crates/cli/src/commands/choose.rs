@@ -95,7 +95,7 @@ fn find<T: Task>(
 ) -> anyhow::Result<Found<T::Args>> {
     if shared.method.surrogate_scale.is_some() {
         return Err(Error::usage(
-            "--surrogate-scale does not go with choose or --softness auto, whose methods have none",
+            "--surrogate-scale does not go with choose or --softness auto, whose methods have what a search found",
         ));
     }
     check_held_out(training, &[shared.common.seed])?;

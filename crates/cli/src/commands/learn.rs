@@ -45,7 +45,7 @@ pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow
         let message = format!("learn is compiled for {host} alone: leave out --backend");
         return Err(Error::usage(message));
     }
-    let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Finding)?;
+    let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Learning)?;
     let (about, identity) = (experiment.about(), experiment.identity());
     let TaskExperiment { task, method, solve, .. } = experiment;
     let own_start = task.own_phi();

@@ -195,7 +195,11 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
         ("evaluate --scales 1,2", 2, "--scales goes with search"),
         ("search --scales 0.1,0", 2, "positive"),
         ("search --search-runs 0", 2, "from 1"),
-        ("search --schedule static --scale 1 --learning-rate 1", 2, "nothing to choose from"),
+        (
+            "search --schedule static --scale 1 --learning-rate 1 --surrogate-scale 2",
+            2,
+            "nothing to choose from",
+        ),
         ("search --seed 999999", 2, "seeds 1000000 to 1000007"),
         ("search --softness auto", 2, "--softness auto goes with solve and evaluate"),
         ("learn --softness auto", 2, "--softness auto goes with solve and evaluate"),

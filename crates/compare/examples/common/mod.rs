@@ -65,7 +65,7 @@ pub(crate) fn setup<T: Task>(
     common: &Common,
     method: &MethodArgs,
 ) -> anyhow::Result<(T, Method, SolveConfig)> {
-    let experiment = TaskExperiment::<T>::new(args, common, method, Purpose::Finding)?;
+    let experiment = TaskExperiment::<T>::new(args, common, method, Purpose::Learning)?;
     let task = Rc::into_inner(experiment.task).context("a task has one owner")?;
     Ok((task, experiment.method, experiment.solve))
 }
