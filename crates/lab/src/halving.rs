@@ -604,7 +604,8 @@ mod tests {
             let made = halving.made();
             assert!(made <= loops && made * 10 >= loops * 6, "{made} of {loops}");
             let least = halving.trials.iter().filter_map(Trial::mean).fold(1.0, f64::min);
-            assert!(halving.best().unwrap().mean().unwrap() <= least, "{loops}");
+            // Means of more or fewer equal numbers differ by rounding.
+            assert!(halving.best().unwrap().mean().unwrap() <= least * (1.0 + 1e-9), "{loops}");
         }
     }
 

@@ -8,7 +8,7 @@ use crate::file::LARGEST_LOGARITHM;
 /// one, as often as time allows. All fields but `patience` and `early` are logarithms.
 ///
 /// A run of fewer steps than it was learned on goes the same way in larger steps: the path takes so many fewer of them, at a learning rate
-/// that is so much larger.
+/// that is so much larger, but at most twice as large.
 ///
 /// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
 /// whatever happens.
@@ -67,6 +67,8 @@ const RECENT: f64 = 0.2;
 const EARLIER: f64 = 0.05;
 /// Added to both means, so that an error of 0 has a trend too.
 const SMALL: f64 = 1e-3;
+/// Least share of the steps that it was learned on in which a run goes the same way: in larger steps it would miss the pose.
+const SHORTEST: f64 = 0.5;
 /// Places are multiples of one over this, so that what is drawn with can be kept for the next time.
 const PLACES: f64 = 512.0;
 
@@ -129,7 +131,7 @@ impl Follower {
             });
         }
         let Feedback { steps, passage, patience, stuck, early, room, rate_end } = self.feedback;
-        let shorter = (self.steps.max(1) as f64 / steps.max(1) as f64).min(1.0);
+        let shorter = (self.steps as f64 / steps.max(1) as f64).clamp(SHORTEST, 1.0);
         let passage = (passage.exp() * shorter).max(1.0);
         let left = self.steps.saturating_sub(self.step + 1) as f64;
         let too_large = (stuck + early * (1.0 - self.part)).exp();
@@ -174,27 +176,24 @@ mod tests {
     fn a_run_that_is_stuck_begins_again_as_often_as_there_is_room() {
         let begun = |error: f64| {
             let places = places(Feedback::START, 300, |_| error);
-            assert_eq!(places[299].part, 1.0);
+            assert!(places[299].part > 0.95);
             let begun = (0..300).filter(|&step| places[step].again).collect::<Vec<_>>();
             assert!(begun.iter().all(|&step| places[step].part == 0.0));
             begun
         };
         let (late, early) = (begun(0.051), begun(0.5));
         assert!(late.len() == 2 && (99..103).contains(&late[0]), "{late:?}");
-        // exp(3 (1 - part) - 3) is below a half from a part of 0.77 on.
-        assert!(early.len() == 3 && (76..80).contains(&early[0]), "{early:?}");
+        // exp(3 (1 - part) - 3) is below a half from a part of 0.23 on.
+        assert!(early.len() > 7 && (22..26).contains(&early[0]), "{early:?}");
     }
 
     #[test]
     fn a_shorter_run_goes_the_same_way_in_larger_steps() {
-        let [long, short] = [300, 100].map(|steps| places(Feedback::START, steps, |_| 0.5));
+        let [long, short] = [300, 150].map(|steps| places(Feedback::START, steps, |_| 0.051));
         let begun = |places: &[Place]| places.iter().filter(|place| place.again).count();
-        assert_eq!((begun(&long), short[0].rate, long[0].rate), (begun(&short), 3.0, 1.0));
-        assert_eq!(
-            places(Feedback::START, 900, |_| 0.01)[0].rate,
-            1.0,
-            "a longer one has time for more"
-        );
+        assert_eq!((begun(&long), begun(&short)), (2, 2));
+        let rate = |steps| places(Feedback::START, steps, |_| 0.01)[0].rate;
+        assert_eq!([300, 150, 30, 900].map(rate), [1.0, 2.0, 2.0, 1.0]);
     }
 
     #[test]

@@ -174,7 +174,9 @@ impl Task for Occlusion {
 
     fn method_name(&self, edges: &str) -> String {
         let depths = &self.depth.name;
-        if edges == depths { depths.clone() } else { format!("{edges} edges and {depths} depths") }
+        // Edges that were learned and depths that were learned along with them are one preset.
+        let alike = edges == depths || (edges == "preset" && depths == "learned");
+        if alike { edges.to_owned() } else { format!("{edges} edges and {depths} depths") }
     }
 
     fn shares_learning_rate(&self) -> bool {

@@ -52,7 +52,7 @@ fn assert_finite(json: &Value) {
 #[test]
 fn a_few_steps_lower_the_loss_and_write_every_file() {
     let out = tempfile::tempdir().unwrap();
-    let json = run_in(out.path(), "--range 15-35 --size 24 --steps 30").unwrap();
+    let json = run_in(out.path(), "--softness learned --range 15-35 --size 24 --steps 30").unwrap();
     let of = |key: &str| json["image_error"][key].as_f64().unwrap();
     assert!(of("final") < 0.8 * of("initial"), "{json}");
     assert!(json["image_error"]["hard"]["final"].is_number());
@@ -66,8 +66,8 @@ fn a_few_steps_lower_the_loss_and_write_every_file() {
 
 #[test]
 fn a_camera_is_found_in_a_few_steps_on_a_small_image() {
-    let json =
-        run("--range 15-35 --seed 4 --size 32 --steps 30 --learning-rate 1 --starts 1").unwrap();
+    let line = "--softness learned --range 15-35 --seed 4 --size 32 --steps 30 --learning-rate 1 --starts 1";
+    let json = run(line).unwrap();
     assert_eq!(json["success_rate"], 1.0, "{json}");
     assert!(json["image_error"]["hard"]["best"].as_f64().unwrap() < 0.1, "{json}");
 }
