@@ -114,9 +114,9 @@ impl SearchSpace {
 
     /// Whether more than one setting can be drawn.
     pub fn is_free(&self) -> bool {
-        self.axes
-            .iter()
-            .any(|axis| axis.optional || axis.range.is_some_and(|[low, high]| low < high))
+        let is_free =
+            |axis: &SearchAxis| axis.range.is_some_and(|[low, high]| axis.optional || low < high);
+        self.axes.iter().any(is_free)
     }
 
     /// The flags that ask for a setting.
