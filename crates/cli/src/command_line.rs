@@ -1,7 +1,10 @@
 //! The commands of a task and their flags.
 
 use clap::{Args, Parser, Subcommand};
-use softrast_lab::parse::{count, positive};
+use softrast_lab::{
+    Shard,
+    parse::{count, positive},
+};
 
 use crate::{Common, MethodArgs, learn_args::LearnArgs};
 
@@ -73,7 +76,7 @@ pub(crate) struct Evaluate<A: Args> {
     #[arg(long, value_name = "NAME|FILE.json", value_parser = MethodArgs::parse)]
     pub(crate) against: Option<MethodArgs>,
     #[command(flatten)]
-    pub(crate) resume: Resume,
+    pub(crate) kept: Kept,
     #[command(flatten)]
     pub(crate) auto: Auto,
 }
@@ -97,7 +100,7 @@ pub(crate) struct Search<A: Args> {
     #[command(flatten)]
     pub(crate) training: Training,
     #[command(flatten)]
-    pub(crate) resume: Resume,
+    pub(crate) kept: Kept,
 }
 
 #[derive(Args, Clone, Debug)]
@@ -109,7 +112,7 @@ pub(crate) struct Choose<A: Args> {
     #[command(flatten)]
     pub(crate) training: Training,
     #[command(flatten)]
-    pub(crate) resume: Resume,
+    pub(crate) kept: Kept,
 }
 
 #[derive(Args, Clone, Debug)]
@@ -135,6 +138,18 @@ pub(crate) struct Training {
     /// Training seeds, counted from 1000000, that answers, or the last settings of a search, are compared on
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     pub(crate) search_runs: usize,
+}
+
+/// What of earlier calls is used, and what part of the runs is made.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub(crate) struct Kept {
+    /// Go on from what an interrupted call, or shards, have finished
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Make only every N-th run, from the I-th on, as one of N processes that share the output folder; auto takes both numbers from
+    /// Slurm or mpirun
+    #[arg(long, value_name = "I/N|auto", value_parser = Shard::parse)]
+    pub(crate) shard: Option<Shard>,
 }
 
 #[derive(Args, Clone, Copy, Debug)]

@@ -2,8 +2,10 @@ use std::path::PathBuf;
 
 use serde_json::json;
 use softrast_lab::{
-    Cache, OutputFolder, Progress, Runner, format::line, program::Output, report::Report,
+    OutputFolder, Progress, Runner, Store, Work, format::line, program::Output, report::Report,
 };
+
+use crate::{command_line::Kept, commands::ended};
 
 /// What a command works with, beside its flags.
 pub(crate) struct Session {
@@ -25,19 +27,39 @@ impl Session {
     }
 
     /// Somebody to run experiments, who keeps what is finished on file unless the command is `solve`.
-    pub(crate) fn runner(&self, folder: &OutputFolder, resume: bool) -> anyhow::Result<Runner> {
+    pub(crate) fn runner(&self, folder: &OutputFolder, kept: Kept) -> anyhow::Result<Runner> {
         let progress = Progress::of_program(self.quiet);
         let path = folder.file(&format!("{}.jsonl", self.command));
-        let cache = match (self.command, resume) {
-            ("solve", _) => Cache::in_memory(),
-            (_, false) => Cache::fresh(&path),
-            (_, true) => {
-                let (cache, note) = Cache::open(&path)?;
+        let store = match kept {
+            _ if self.command == "solve" => Store::in_memory(),
+            Kept { shard: Some(shard), .. } => Store::of_shard(&path, shard)?,
+            Kept { resume: false, .. } => Store::fresh(&path),
+            Kept { resume: true, .. } => {
+                let (store, note) = Store::open(&path)?;
                 note.iter().for_each(|note| eprintln!("{note}"));
-                cache
+                store
             }
         };
-        Ok(Runner { progress, cache })
+        Ok(Runner { progress, store })
+    }
+
+    /// Does the part of a job that is the shard's, and says what is still to do. No result file is written.
+    pub(crate) fn part(&self, runner: &mut Runner, job: &[Work<'_>]) -> anyhow::Result<Output> {
+        let shard = runner.store.shard().map(|shard| shard.to_string()).unwrap_or_default();
+        let part = runner.part(job);
+        let part = part.map_err(|error| ended(error, runner.store.kept()))?;
+        let json = json!({
+            "task": self.task, "command": self.command, "out": self.out, "shard": shard, "finished": part.finished,
+        });
+        let text = vec![
+            format!("{}: shard {shard} has finished its {} runs", self.task, part.finished),
+            line(
+                "then",
+                "the same command with --resume instead of --shard, for the results of all shards",
+            ),
+        ];
+        let partial = (part.finished < part.asked).then(|| part.of("runs of this shard"));
+        Ok(Output { json, text, partial, ..Output::default() })
     }
 
     /// Writes the page, and the JSON if it has a `file` of its own, beside what `folder` holds, and says where they are. `beside` says

@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use clap::Parser;
 use softrast_cli::{MethodArgs, SoftnessChoice, Variant, is_preset_learned, learned_kind};
 use softrast_inverse::{Method, Resolution};
+use softrast_lab::Shard;
 use softrast_raster::compiled_backends;
 use softrast_softness::ScheduledSoftness;
 
@@ -66,6 +67,11 @@ pub struct Args {
     /// Evaluate nothing, but make the tables of these documents again from the records that they keep; an error if one was different
     #[arg(long, value_name = "FILE.md,...", value_delimiter = ',', conflicts_with = "tables")]
     pub recompute: Vec<PathBuf>,
+
+    /// Make only every N-th run, from the I-th on, as one of N processes that share the folder; auto takes both numbers from Slurm or
+    /// mpirun
+    #[arg(long, value_name = "I/N|auto", value_parser = Shard::parse, conflicts_with = "recompute")]
+    pub shard: Option<Shard>,
 
     /// Print one JSON object instead of the summary
     #[arg(long)]

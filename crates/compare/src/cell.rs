@@ -1,6 +1,6 @@
-use softrast_cli::{MethodArgs, SoftnessChoice, Variant};
+use softrast_cli::{Common, MethodArgs, SoftnessChoice, Variant};
 
-use crate::tasks::AnyTask;
+use crate::tasks::{AnyTask, Entry};
 
 /// A task in one variant, solved with one method.
 #[derive(Clone)]
@@ -44,6 +44,22 @@ pub enum Variation {
 }
 
 impl Cell {
+    /// What is run, on the `backend` that all cells are computed on.
+    ///
+    /// # Errors
+    ///
+    /// Those of the task.
+    pub fn entry(&self, backend: Option<&str>) -> anyhow::Result<Entry> {
+        let backend = self.backend.or(backend).map(str::to_owned);
+        let common = Common { variant: self.variant, backend, ..Common::default() };
+        self.task.entry(&common, &self.method)
+    }
+
+    /// Its seeds.
+    pub fn seeds(&self) -> Vec<u64> {
+        softrast_lab::seeds(0, self.runs as usize)
+    }
+
     /// Whether it is what the task's program does without flags.
     pub fn is_default(&self) -> bool {
         self.method

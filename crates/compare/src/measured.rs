@@ -1,5 +1,5 @@
 use anyhow::ensure;
-use softrast_cli::{Common, InOurUnits, Variant};
+use softrast_cli::{InOurUnits, Variant};
 use softrast_lab::{
     Encoded, Metric, Role, Run, Runner, halving::rounded, mean, mean_interval, place,
 };
@@ -38,13 +38,7 @@ impl Measured {
     ///
     /// Those of the task.
     pub fn of(cell: &Cell, runner: &mut Runner, backend: Option<&str>) -> anyhow::Result<Self> {
-        let common = Common {
-            variant: cell.variant,
-            backend: cell.backend.or(backend).map(str::to_owned),
-            ..Common::default()
-        };
-        let entry = cell.task.entry(&common, &cell.method)?;
-        let seeds = softrast_lab::seeds(0, cell.runs as usize);
+        let (entry, seeds) = (cell.entry(backend)?, cell.seeds());
         runner.progress.expect(entry.solve.steps * seeds.len());
         let (mut evaluations, stopped) =
             runner.evaluate(&[entry.experiment.as_ref()], &seeds, true, Some(&cell.name))?;

@@ -4,13 +4,13 @@ use anyhow::{Context, ensure};
 use clap::CommandFactory;
 use serde_json::json;
 use softrast_lab::{
-    Cache, Failure, Progress, Runner,
+    Error, Failure, Progress, Runner, Store, Work,
     program::{Output, parse, repeated, run_main},
     write_atomically,
 };
 
 use crate::{
-    Args, Measured, Record,
+    Args, Cell, Measured, Record,
     charts::{Charts, by_variant},
     documents::recomputed,
     records,
@@ -65,9 +65,13 @@ pub fn compare(args: &Args, command: &str) -> anyhow::Result<Output> {
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {:?}", args.out))?;
     let runs = args.out.join("runs.jsonl");
-    let (cache, note) = Cache::open(&runs)?;
+    let progress = Progress::of_program(args.quiet);
+    if let Some(shard) = args.shard {
+        return part(args, &cells, Runner { progress, store: Store::of_shard(&runs, shard)? });
+    }
+    let (store, note) = Store::open(&runs)?;
     note.filter(|_| runs.exists()).iter().for_each(|note| eprintln!("{note}"));
-    let mut runner = Runner { progress: Progress::of_program(args.quiet), cache };
+    let mut runner = Runner { progress, store };
     let mut measured = Vec::with_capacity(cells.len());
     for (k, cell) in cells.iter().enumerate() {
         let (task, variant) = (cell.task.name(), cell.variant.name());
@@ -91,6 +95,25 @@ pub fn compare(args: &Args, command: &str) -> anyhow::Result<Output> {
     let records: Vec<Record> = measured.iter().map(Record::of).collect();
     let json = json!({ "cells": records, "tables": tables, "report": report });
     Ok(Output { json, text: vec![text], ..Output::default() })
+}
+
+/// Makes the runs that are a shard's; no table is written.
+fn part(args: &Args, cells: &[Cell], mut runner: Runner) -> anyhow::Result<Output> {
+    let backend = args.backend.as_deref();
+    let entries = cells.iter().map(|cell| Ok((cell.entry(backend)?, cell.seeds())));
+    let entries: Vec<_> = entries.collect::<anyhow::Result<_>>()?;
+    let job: Vec<Work<'_>> = entries
+        .iter()
+        .map(|(entry, seeds)| Work { experiment: entry.experiment.as_ref(), seeds, pictures: true })
+        .collect();
+    let part = runner.part(&job)?;
+    let text = vec![
+        format!("{} runs of this shard are finished", part.finished),
+        "then: the same command without --shard, for the tables of all shards".to_owned(),
+    ];
+    let json = json!({ "finished": part.finished, "out": args.out });
+    ensure!(part.finished == part.asked, Error::Interrupted);
+    Ok(Output { json, text, ..Output::default() })
 }
 
 /// Tables, report, charts and numbers; each file is the old one or the new one, whole.

@@ -1,9 +1,9 @@
 use std::{collections::BTreeMap, time::Instant};
 
+use serde::{Deserialize, Serialize};
+
 use crate::{
-    Batch, Cache, Encoded, Error, Experiment, Progress, Role, Run,
-    cache::{Finished, key},
-    mean, place,
+    Batch, Encoded, Error, Experiment, Progress, Role, Run, Store, mean, place, store::key,
 };
 
 /// Runs experiments, and recalls what an earlier call has finished.
@@ -11,7 +11,16 @@ pub struct Runner {
     /// How far the work is.
     pub progress: Progress,
     /// What is finished.
-    pub cache: Cache,
+    pub store: Store<Finished>,
+}
+
+/// A run that is finished, and its pictures if it was asked for them.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Finished {
+    pub(crate) run: Run,
+    /// Wall time, with errors and pictures: its share of the batch.
+    pub(crate) seconds: f64,
+    pub(crate) pictures: Option<Encoded>,
 }
 
 /// Finished runs of one experiment, in the order of the seeds.
@@ -35,7 +44,7 @@ impl Evaluation {
 impl Runner {
     /// One that shows and keeps nothing, for experiments that are run as a library.
     pub fn hidden() -> Self {
-        Self { progress: Progress::hidden(), cache: Cache::in_memory() }
+        Self { progress: Progress::hidden(), store: Store::in_memory() }
     }
 
     /// Runs all seeds with each of the experiments, and says whether the user cut that short.
@@ -45,7 +54,7 @@ impl Runner {
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the cache; [`Error::Interrupted`] if a single run was stopped.
+    /// Those of the experiments and of the store; [`Error::Interrupted`] if a single run was stopped.
     pub fn evaluate(
         &mut self,
         experiments: &[&dyn Experiment],
@@ -98,12 +107,12 @@ impl Runner {
 
     /// Whether the runs of all seeds are finished.
     pub(crate) fn is_finished(&self, experiment: &dyn Experiment, seeds: &[u64]) -> bool {
-        let kept_as = key(&experiment.identity());
-        seeds.iter().all(|&seed| self.cache.get(&kept_as, seed).is_some())
+        let experiment = key(&experiment.identity());
+        seeds.iter().all(|&seed| self.store.get(&key_of(&experiment, seed)).is_some())
     }
 
-    /// The runs of some seeds: from the cache, or made together.
-    fn batch(
+    /// The runs of some seeds: from the store, or made together.
+    pub(crate) fn batch(
         &mut self,
         experiment: &dyn Experiment,
         seeds: &[u64],
@@ -119,7 +128,7 @@ impl Runner {
                 found.run.fits(seed, metrics, steps)
                     && (found.pictures.is_some() || !needs_pictures)
             };
-            let found = self.cache.get(&kept_as, seed).filter(suits);
+            let found = self.store.get(&key_of(&kept_as, seed)).filter(suits);
             finished.extend(found.map(|found| (seed, found.clone())));
         }
         self.progress.skip(finished.len(), steps);
@@ -131,7 +140,8 @@ impl Runner {
             let made = run(experiment, &Batch { seeds: missing, pictures }, &mut self.progress)?;
             self.progress.end();
             for one in made {
-                self.cache.put(&kept_as, experiment.name(), &one)?;
+                let key = key_of(&kept_as, one.run.seed);
+                self.store.put(&key, experiment.name(), &one)?;
                 finished.insert(one.run.seed, one);
             }
         }
@@ -147,6 +157,11 @@ impl Evaluation {
             self.pictures = self.pictures.take().or(pictures);
         }
     }
+}
+
+/// What a run is kept under.
+pub(crate) fn key_of(experiment: &str, seed: u64) -> String {
+    format!("{experiment}-{seed}")
 }
 
 /// Runs one batch.
@@ -188,7 +203,7 @@ pub fn seeds(first: u64, runs: usize) -> Vec<u64> {
     (0..runs as u64).map(|k| first.wrapping_add(k)).collect()
 }
 
-fn range(first: usize, last: usize, all: usize) -> String {
+pub(crate) fn range(first: usize, last: usize, all: usize) -> String {
     match (first, last) {
         (1, 1) if all == 1 => "solving".into(),
         _ if first == last => format!("run {first} of {all}"),

@@ -1,14 +1,13 @@
 //! What serves every experiment that is run on seeds, whatever it is about.
 //!
 //! An [`Experiment`] is something that can be run on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same
-//! seeds and keeps what is finished in a [`Cache`]; a [`Summary`] and a [`Comparison`] say what came of it. [`Halving`](halving::Halving) searches
+//! seeds and keeps what is finished in a [`Store`]; a [`Summary`] and a [`Comparison`] say what came of it. [`Halving`](halving::Halving) searches
 //! for a setting, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
 //! [`report::Report`] writes pages, on which a [`Viewer`] turns a mesh.
 //!
 //! Nothing here knows of rendering: it sees seeds, numbers, RGB images, and meshes as plain numbers.
 
 mod axis;
-mod cache;
 mod comparison;
 pub mod curves;
 mod error;
@@ -16,7 +15,7 @@ mod error_summary;
 mod evaluate;
 mod files;
 pub mod format;
-/// Grid search.
+/// Search by successive halving.
 pub mod halving;
 mod machine;
 mod metric;
@@ -29,14 +28,17 @@ pub mod report;
 mod run;
 /// The cheapest of several answers that is as good as the best.
 pub mod select;
+mod shard;
+mod sharded;
 mod statistics;
+mod store;
 mod summary;
 mod viewer;
+mod world;
 
-pub use cache::Cache;
 pub use comparison::{Comparison, paired, paired_among};
 pub use error::{Error, Failure, INTERRUPTED, found};
-pub use evaluate::{Evaluation, Runner, seeds, was_interrupted};
+pub use evaluate::{Evaluation, Finished, Runner, seeds, was_interrupted};
 pub use files::{OutputFolder, write_atomically};
 pub use halving::check_held_out;
 pub use machine::{machine, peak_rss_mib};
@@ -47,6 +49,10 @@ pub use picture::{
 };
 pub use progress::{Progress, stop_on_ctrl_c};
 pub use run::{Batch, Experiment, Pictures, Point, Run, best_point};
+pub use shard::Shard;
+pub use sharded::Work;
 pub use statistics::{mean, mean_interval, median, quantile, wilson_interval};
+pub use store::{Store, key};
 pub use summary::{Partial, Summary, headline};
 pub use viewer::{Viewer, ViewerView};
+pub use world::World;

@@ -67,11 +67,11 @@ impl Runner {
     /// reasons. None if no answer has only finite errors.
     ///
     /// The first answer is always tried. Another is left out when it would go beyond the budget; it is expected to take as long as
-    /// those so far on average. What was run before costs nothing.
+    /// those so far on average. What was run before costs nothing. Shards have no budget: they share all answers.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the cache.
+    /// Those of the experiments and of the store.
     pub fn select<A>(
         &mut self,
         of: &'static str,
@@ -79,6 +79,8 @@ impl Runner {
         seeds: &[u64],
         budget: &mut Budget,
     ) -> anyhow::Result<Option<(A, Selection)>> {
+        let experiments: Vec<_> = candidates.iter().map(|one| one.experiment.as_ref()).collect();
+        self.complete(&experiments, seeds)?;
         let (mut reasons, mut answers, mut spent) = (Vec::new(), Vec::new(), Vec::new());
         for Candidate { flags, with, experiment, answer } in candidates {
             let known = self.is_finished(experiment.as_ref(), seeds);

@@ -1,15 +1,16 @@
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
-        Mutex,
+        Mutex, PoisonError,
         atomic::{AtomicUsize, Ordering},
     },
     time::Instant,
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
-use softrast_lab::{median, wilson_interval};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use softrast_lab::{Store, key, median, wilson_interval};
 
 use crate::{Case, Level, Tested, drawing::largest};
 
@@ -24,7 +25,7 @@ pub struct Matrix {
     pub trials: usize,
     /// Trials with a number that is not finite.
     pub non_finite: usize,
-    /// Wall time of all of them.
+    /// Wall time of all of them, one after the other.
     pub seconds: f64,
 }
 
@@ -39,7 +40,7 @@ pub struct Row {
 }
 
 /// What one case made of one method.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outcome {
     /// The method.
     pub method: String,
@@ -60,7 +61,7 @@ pub struct Outcome {
 }
 
 /// What one level made of one method.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LevelOutcome {
     /// The strength of the perturbation as a word.
     pub label: String,
@@ -80,32 +81,54 @@ pub struct LevelOutcome {
     pub worst: Option<f64>,
 }
 
-/// Runs every case with every method, on so many threads.
+/// Runs every case with every method, on so many threads, but for what is in the store; a shard every one that is its.
 ///
 /// The threads are plain ones, outside of the pool in which images are drawn: a thread of that pool that waits for an image may begin
 /// another case meanwhile, while it holds what the first needs.
-pub fn run(cases: &[&'static Case], methods: &[Tested], threads: usize, quiet: bool) -> Matrix {
-    let clock = Instant::now();
-    let cells: Vec<(&Case, &Tested)> =
-        cases.iter().flat_map(|&case| methods.iter().map(move |method| (case, method))).collect();
+///
+/// # Errors
+///
+/// If the store cannot be written.
+pub fn run(
+    cases: &[&'static Case],
+    methods: &[Tested],
+    store: Store<Outcome>,
+    threads: usize,
+    quiet: bool,
+) -> anyhow::Result<Matrix> {
+    let all = cases.iter().flat_map(|&case| methods.iter().map(move |method| (case, method)));
+    let is_mine = |(k, _): &(usize, _)| store.shard().is_none_or(|shard| shard.takes(*k));
+    let cells = all.enumerate().filter(is_mine).map(|(_, cell)| cell);
+    let cells: Vec<(&'static Case, &Tested)> = cells.collect();
     let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(cells.len() as u64) };
     if let Ok(style) = ProgressStyle::with_template("[{bar:32}] {pos}/{len}, {msg}, {eta} left") {
         bar.set_style(style.progress_chars("=> "));
     }
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(cells.len())));
+    let (next, done) = (AtomicUsize::new(0), Mutex::new((store, Vec::with_capacity(cells.len()))));
+    let failed = Mutex::new(None);
     let work = || {
         while let Some((case, method)) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
             bar.set_message(format!("{} {}: {}", case.id, case.name, method.name));
-            let outcome = Outcome::of(case, method);
+            let (key, name) = (key_of(case, method), format!("{} {}", case.id, method.name));
+            let lock = || done.lock().unwrap_or_else(PoisonError::into_inner);
+            let kept = lock().0.get(&key).cloned();
+            let outcome = kept.unwrap_or_else(|| {
+                let outcome = Outcome::of(case, method);
+                if let Err(error) = lock().0.put(&key, &name, &outcome) {
+                    failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                }
+                outcome
+            });
             bar.inc(1);
-            if let Ok(mut done) = done.lock() {
-                done.push((case.id, outcome));
-            }
+            lock().1.push((case.id, outcome));
         }
     };
     std::thread::scope(|scope| (0..threads.max(1)).for_each(|_| drop(scope.spawn(work))));
     bar.finish_and_clear();
-    let done = done.into_inner().unwrap_or_default();
+    if let Some(failed) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(failed);
+    }
+    let (_, done) = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     let row = |&case: &&'static Case| {
         let of_method = |method: &Tested| {
             let found = |(id, o): &&(&str, Outcome)| *id == case.id && o.method == method.name;
@@ -114,13 +137,18 @@ pub fn run(cases: &[&'static Case], methods: &[Tested], threads: usize, quiet: b
         Row { case, outcomes: methods.iter().filter_map(of_method).collect() }
     };
     let sum = |of: fn(&Outcome) -> usize| done.iter().map(|(_, outcome)| of(outcome)).sum();
-    Matrix {
+    Ok(Matrix {
         methods: methods.iter().map(|method| method.name.clone()).collect(),
         rows: cases.iter().map(row).collect(),
         trials: sum(|outcome| outcome.trials),
         non_finite: sum(|outcome| outcome.non_finite),
-        seconds: clock.elapsed().as_secs_f64(),
-    }
+        seconds: done.iter().map(|(_, outcome)| outcome.seconds).sum(),
+    })
+}
+
+/// What an outcome is kept under.
+fn key_of(case: &Case, method: &Tested) -> String {
+    key(&json!({ "case": case.id, "method": method.identity() }))
 }
 
 impl Matrix {

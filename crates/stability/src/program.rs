@@ -2,8 +2,9 @@ use std::{ffi::OsString, io::Write, path::PathBuf};
 
 use anyhow::anyhow;
 use clap::{CommandFactory, Parser};
+use serde_json::json;
 use softrast_lab::{
-    Error, Failure, OutputFolder,
+    Error, Failure, OutputFolder, Shard, Store,
     parse::count,
     program::{Output, parse, repeated},
 };
@@ -34,6 +35,15 @@ struct Args {
     #[arg(long, value_name = "N", value_parser = count)]
     threads: Option<usize>,
 
+    /// Go on from what an interrupted call, or shards, have finished
+    #[arg(long)]
+    resume: bool,
+
+    /// Test only every N-th pair of case and method, from the I-th on, as one of N processes that share the folder; auto takes both numbers
+    /// from Slurm or mpirun
+    #[arg(long, value_name = "I/N|auto", value_parser = Shard::parse)]
+    shard: Option<Shard>,
+
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -53,6 +63,13 @@ pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failu
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     let again = repeated("stability", &words);
     let matrix = work(&args, &again)?;
+    if args.shard.is_some() {
+        let count: usize = matrix.rows.iter().map(|row| row.outcomes.len()).sum();
+        let then = "then: the same command with --resume instead of --shard, for the results of all shards";
+        let text = vec![format!("{count} pairs of case and method are finished"), then.to_owned()];
+        let json = json!({ "finished": count, "out": args.out });
+        return Output { json, text, ..Output::default() }.print(args.json, &again, stdout);
+    }
     let json = serde_json::to_value(&matrix).map_err(anyhow::Error::from)?;
     let mut text = report::lines(&matrix);
     text.push(format!("report: {}", args.out.join("report.html").display()));
@@ -68,11 +85,25 @@ fn work(args: &Args, again: &str) -> anyhow::Result<Matrix> {
     let methods = methods(args)?;
     let mut folder = OutputFolder::open(&args.out)?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let path = folder.file("stability.jsonl");
+    let store = match args.shard {
+        Some(shard) => Store::of_shard(&path, shard)?,
+        None if args.resume => {
+            let (store, note) = Store::open(&path)?;
+            note.iter().for_each(|note| eprintln!("{note}"));
+            store
+        }
+        None => Store::fresh(&path),
+    };
     // A panic in a case is part of its outcome.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
-    let matrix = run(&chosen, &methods, args.threads.unwrap_or(cores), args.quiet);
+    let matrix = run(&chosen, &methods, store, args.threads.unwrap_or(cores), args.quiet);
     std::panic::set_hook(hook);
+    let matrix = matrix?;
+    if args.shard.is_some() {
+        return Ok(matrix);
+    }
     folder.stage("report.html", report::html(&matrix, again)?.as_bytes())?;
     folder.stage("stability.json", &serde_json::to_vec_pretty(&matrix)?)?;
     folder.commit(&[])?;

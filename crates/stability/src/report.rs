@@ -52,7 +52,7 @@ fn ended(matrix: &Matrix) -> String {
     let Matrix { methods, rows, trials, non_finite, seconds } = matrix;
     let (cases, methods) = (rows.len(), methods.len());
     format!(
-        "{cases} cases, {methods} methods, {trials} trials in {seconds:.0} s; not finite: {non_finite}."
+        "{cases} cases, {methods} methods, {trials} trials, {seconds:.0} s one after the other; not finite: {non_finite}."
     )
 }
 

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use anyhow::Context;
+use serde_json::{Value, json};
 use softrast_cli::{
     Common, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment, Variant,
 };
@@ -70,6 +71,12 @@ impl Tested {
             all[4].file = Some((SoftnessChoice::File(path.into()), Box::new(file)));
         }
         Ok(all)
+    }
+
+    /// All that decides what it does.
+    pub(crate) fn identity(&self) -> Value {
+        let file = self.file.as_ref().and_then(|(_, softness)| softness.text(Path::new("")).ok());
+        json!({ "name": self.name, "file": file })
     }
 
     /// Whether it is a network.

@@ -30,6 +30,41 @@ fn the_program_writes_its_matrix_as_a_page_and_as_json() {
     assert_eq!(serde_json::from_slice::<Value>(&kept).unwrap(), json);
 }
 
+/// The JSON of a command that goes well.
+fn run(line: &str, out: &std::path::Path) -> Value {
+    let mut words: Vec<OsString> = line.split(' ').map(OsString::from).collect();
+    words.extend(["--quiet".into(), "--json".into(), "--out".into(), out.into()]);
+    let mut stdout = Vec::new();
+    execute(words, &mut stdout).unwrap();
+    serde_json::from_slice(&stdout).unwrap()
+}
+
+/// Without what differs from one day to another.
+fn timeless(mut matrix: Value) -> Value {
+    matrix["seconds"] = Value::Null;
+    for row in matrix["rows"].as_array_mut().unwrap() {
+        for outcome in row["outcomes"].as_array_mut().unwrap() {
+            outcome["seconds"] = Value::Null;
+        }
+    }
+    matrix
+}
+
+#[test]
+fn shards_part_the_pairs_of_case_and_method_and_together_make_the_matrix() {
+    let line = "stability --cases F16,G01,O06 --methods logistic,decay";
+    let [whole, parts] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let expected = timeless(run(line, whole.path()));
+    for [shard, finished] in [["2/4", "2"], ["1/4", "2"], ["3/4", "1"]] {
+        let part = run(&format!("{line} --shard {shard}"), parts.path());
+        assert_eq!(part["finished"].to_string(), finished);
+    }
+    assert!(!parts.path().join("stability.json").exists(), "a shard has no matrix");
+    assert_eq!(timeless(run(&format!("{line} --resume"), parts.path())), expected);
+    let made = std::fs::read_to_string(parts.path().join("stability.jsonl")).unwrap();
+    assert_eq!(made.lines().count(), 1, "only what no shard has made is made");
+}
+
 #[test]
 fn a_case_that_does_not_exist_is_answered_with_those_that_do() {
     let words = ["stability", "--cases", "O01,X99"].map(OsString::from).to_vec();

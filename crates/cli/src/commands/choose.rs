@@ -2,7 +2,7 @@ use anyhow::Context;
 use serde_json::json;
 use softrast_inverse::Resolution;
 use softrast_lab::{
-    Cache, Error, Experiment, Progress, Runner, check_held_out,
+    Error, Experiment, Progress, Runner, Store, check_held_out,
     format::{counted, exact, line},
     halving::TRAINING_SEED,
     program::Output,
@@ -33,14 +33,20 @@ const RUNS: usize = 8;
 
 /// Finds the cheapest way to solve the task that is as good as the best, and gives its reasons.
 pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyhow::Result<Output> {
-    let Choose { mut shared, auto, training, resume } = flags;
+    let Choose { mut shared, auto, training, kept } = flags;
     shared.method.reconcile().map_err(Error::usage)?;
+    if kept.shard.is_some() && auto.budget.is_some() {
+        return Err(Error::usage("shards try all answers: leave out --budget"));
+    }
     let folder = session.folder()?;
-    let mut runner = session.runner(&folder, resume.resume)?;
+    let mut runner = session.runner(&folder, kept)?;
     let training = seeds(TRAINING_SEED, training.search_runs);
     let found = find::<T>(&shared, auto.budget, &training, &mut runner);
     runner.progress.finish();
-    let found = found.map_err(|error| ended(error, runner.cache.kept()))?;
+    let found = found.map_err(|error| ended(error, runner.store.kept()))?;
+    if kept.shard.is_some() {
+        return session.part(&mut runner, &[]);
+    }
     let (score, variant) = (T::measures().hard, shared.common.variant.name());
     let head = format!(
         "{} ({variant}): the cheapest within one standard error of the best, by {score} of what is returned on {} training seeds",
@@ -77,7 +83,7 @@ pub(crate) fn chosen<T: Task>(
     session: &Session,
 ) -> anyhow::Result<Found<T::Args>> {
     let progress = Progress::of_program(session.quiet);
-    let mut runner = Runner { progress, cache: Cache::in_memory() };
+    let mut runner = Runner { progress, store: Store::in_memory() };
     let training = seeds(TRAINING_SEED, RUNS);
     let found = find::<T>(shared, budget, &training, &mut runner);
     runner.progress.finish();

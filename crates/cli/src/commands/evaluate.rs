@@ -1,5 +1,7 @@
 use anyhow::Context;
-use softrast_lab::{Comparison, Error, Evaluation, Experiment, Partial, program::Output, seeds};
+use softrast_lab::{
+    Comparison, Error, Evaluation, Experiment, Partial, Work, program::Output, seeds,
+};
 
 use super::{
     choose::chosen,
@@ -8,7 +10,7 @@ use super::{
 };
 use crate::{
     Answer, Given, Purpose, SoftnessChoice, Task, TaskExperiment,
-    command_line::{Auto, Evaluate, Shared, Solve},
+    command_line::{Auto, Evaluate, Kept, Shared, Solve},
     session::{RESULT, Session},
 };
 
@@ -22,7 +24,7 @@ pub(crate) fn solve<T: Task>(
         return answer;
     }
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
-    run(session, &first, None, &[shared.common.seed], false, false)
+    run(session, &first, None, &[shared.common.seed], false, Kept::default())
 }
 
 /// What the task makes of the pictures, if the flags name some.
@@ -53,7 +55,11 @@ pub(crate) fn evaluate<T: Task>(
     session: &Session,
     flags: Evaluate<T::Args>,
 ) -> anyhow::Result<Output> {
-    let Evaluate { mut shared, runs, against, resume, auto } = flags;
+    let Evaluate { mut shared, runs, against, kept, auto } = flags;
+    if kept.shard.is_some() && shared.method.softness == Some(SoftnessChoice::Auto) {
+        let message = "shards may be of different speed, and so choose differently: run choose first, and name what it finds";
+        return Err(Error::usage(message));
+    }
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Evaluating)?;
     let second = against.map(|method| {
         let method = method.beside(&shared.method);
@@ -64,7 +70,7 @@ pub(crate) fn evaluate<T: Task>(
     let seeds = seeds(shared.common.seed, runs.unwrap_or(first.description.runs));
     // What would fail in the middle fails at once.
     seeds.iter().try_for_each(|&seed| first.task.instance(seed).map(drop))?;
-    run(session, &first, second.as_ref(), &seeds, true, resume.resume)
+    run(session, &first, second.as_ref(), &seeds, true, kept)
 }
 
 /// The experiment of the flags; `--softness auto` is what `choose` finds.
@@ -89,17 +95,22 @@ fn run<T: Task>(
     second: Option<&TaskExperiment<T>>,
     seeds: &[u64],
     many: bool,
-    resume: bool,
+    kept: Kept,
 ) -> anyhow::Result<Output> {
     let folder = session.folder()?;
-    let mut runner = session.runner(&folder, resume)?;
+    let mut runner = session.runner(&folder, kept)?;
     let experiments: Vec<&dyn Experiment> =
         [Some(first), second].into_iter().flatten().map(|one| one as &dyn Experiment).collect();
+    if kept.shard.is_some() {
+        let work = |&experiment| Work { experiment, seeds, pictures: true };
+        let job: Vec<Work<'_>> = experiments.iter().map(work).collect();
+        return session.part(&mut runner, &job);
+    }
     let steps: usize = experiments.iter().map(|one| one.steps() * seeds.len()).sum();
     runner.progress.expect(steps);
     let solved = runner.evaluate(&experiments, seeds, true, None);
     runner.progress.finish();
-    let (evaluations, stopped) = solved.map_err(|error| ended(error, runner.cache.kept()))?;
+    let (evaluations, stopped) = solved.map_err(|error| ended(error, runner.store.kept()))?;
     let finished = Finished { experiment: first, evaluation: &evaluations[0] };
     if finished.evaluation.runs.is_empty() {
         return Err(Error::Interrupted.into());

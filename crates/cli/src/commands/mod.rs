@@ -21,7 +21,7 @@ fn settings_section(report: &mut Report, settings: [&Map<String, Value>; 2]) {
 }
 
 /// An error that ended the work, with a word on what is kept.
-fn ended(error: anyhow::Error, kept: usize) -> anyhow::Error {
+pub(crate) fn ended(error: anyhow::Error, kept: usize) -> anyhow::Error {
     if kept == 0 || softrast_lab::was_interrupted(&error) {
         return error;
     }

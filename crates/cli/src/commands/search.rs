@@ -1,6 +1,6 @@
 use serde_json::json;
 use softrast_lab::{
-    Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, check_held_out,
+    Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, Work, check_held_out,
     format::exact,
     halving::{Halving, SearchAxis, SearchSpace, Setting, TRAINING_SEED, rounded},
     program::Output,
@@ -61,7 +61,7 @@ pub(crate) fn search<T: Task>(
     let held_out = seeds(common.seed, flags.runs.unwrap_or(base.description.runs));
     check_held_out(&training, &held_out)?;
     let mut folder = session.folder()?;
-    let mut runner = session.runner(&folder, flags.resume.resume)?;
+    let mut runner = session.runner(&folder, flags.kept)?;
     let score = base.metrics()[HARD];
     let score_name = [score.name, score.unit];
     let mut halving = Halving::new(space.clone(), score_name, training, flags.loops);
@@ -69,9 +69,13 @@ pub(crate) fn search<T: Task>(
     let mut boxed = |setting: &Setting| Ok(Box::new(make(setting)?) as Box<dyn Experiment>);
     let tried = halving.run(&mut runner, steps, &mut boxed);
     runner.progress.finish();
-    let best = tried.map_err(|error| ended(error, runner.cache.kept()))?.clone();
+    let best = tried.map_err(|error| ended(error, runner.store.kept()))?.clone();
     halving.best_flags = all_flags(common.variant, method, &space, &best);
     let found = make(&best)?;
+    if flags.kept.shard.is_some() {
+        let job = Work { experiment: &found, seeds: &held_out, pictures: true };
+        return session.part(&mut runner, &[job]);
+    }
     let (evaluation, stopped) = match halving.partial() {
         Some(_) => (Evaluation::default(), true),
         None => on_held_out(&mut runner, &found, &held_out)?,
@@ -124,7 +128,7 @@ fn on_held_out<T: Task>(
     match evaluated {
         Ok((mut evaluations, stopped)) => Ok((evaluations.remove(0), stopped)),
         Err(stopped) if was_interrupted(&stopped) => Ok((Evaluation::default(), true)),
-        Err(failed) => Err(ended(failed, runner.cache.kept())),
+        Err(failed) => Err(ended(failed, runner.store.kept())),
     }
 }
 

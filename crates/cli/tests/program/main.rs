@@ -10,3 +10,4 @@ mod line;
 mod results;
 mod resume;
 mod search;
+mod shards;

@@ -111,7 +111,7 @@ proptest! {
 
 /// The example as a program, which cargo builds along with its tests.
 #[cfg(unix)]
-fn program() -> std::path::PathBuf {
+pub(crate) fn program() -> std::path::PathBuf {
     let mut path = std::env::current_exe().unwrap();
     path.pop();
     path.pop();

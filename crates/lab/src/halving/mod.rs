@@ -92,7 +92,7 @@ impl Halving {
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the cache; if no setting is valid or gave finite numbers; [`Error::Interrupted`] if none has yet.
+    /// Those of the experiments and of the store; if no setting is valid or gave finite numbers; [`Error::Interrupted`] if none has yet.
     pub fn run(
         &mut self,
         runner: &mut Runner,
@@ -104,6 +104,7 @@ impl Halving {
         let rounds = self.rounds();
         for (k, &seeds) in rounds.iter().enumerate() {
             let settings = self.settings(k, &rounds, &mut random)?;
+            self.complete(runner, &settings, seeds, make)?;
             for (i, setting) in settings.iter().enumerate() {
                 let label = format!(
                     "round {} of {}, setting {} of {}",
@@ -169,6 +170,22 @@ impl Halving {
             settings.push(self.space.near(&parent.setting, random).context(none)?);
         }
         Ok(settings)
+    }
+
+    /// Makes sure that a round is finished where shards share it.
+    fn complete(
+        &self,
+        runner: &mut Runner,
+        settings: &[Setting],
+        seeds: usize,
+        make: &mut MakeSetting<'_>,
+    ) -> anyhow::Result<()> {
+        if runner.store.shard().is_none() {
+            return Ok(());
+        }
+        let experiments: Vec<_> = settings.iter().map(&mut *make).collect::<anyhow::Result<_>>()?;
+        let experiments: Vec<_> = experiments.iter().map(Box::as_ref).collect();
+        runner.complete(&experiments, &self.seeds[..seeds])
     }
 
     fn trial(
