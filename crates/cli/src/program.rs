@@ -47,7 +47,10 @@ pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<
         Command::Evaluate(flags) => commands::evaluate::evaluate::<T>(&session, flags)?,
         Command::Search(flags) => commands::search::search::<T>(&session, flags)?,
         Command::Choose(flags) => commands::choose::choose::<T>(&session, flags)?,
-        Command::Learn(flags) => commands::learn::learn::<T>(&session, flags)?,
+        Command::Learn(flags) => match commands::learn::learn::<T>(&session, flags)? {
+            Some(output) => output,
+            None => return Ok(()),
+        },
     };
     output.print(json, &session.again, stdout)
 }

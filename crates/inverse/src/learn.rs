@@ -1,5 +1,5 @@
 use serde_json::{Value, json};
-use softrast_meta::{Adam, OuterLoop, Progress, Record, Validation};
+use softrast_meta::{Adam, Alone, OuterLoop, Progress, Ranks, Record, Validation};
 use softrast_raster::RasterBackend;
 use softrast_softness::ScheduledSoftness;
 
@@ -71,7 +71,16 @@ impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
     ///
     /// If learning cannot go on.
     pub fn step(&mut self) -> anyhow::Result<Option<Record>> {
-        Ok(self.outer_loop.step(&self.instances, &mut self.progress)?)
+        self.step_shared(&Alone)
+    }
+
+    /// The same with other processes, which all do this at once: [`OuterLoop::step_shared`].
+    ///
+    /// # Errors
+    ///
+    /// If learning cannot go on.
+    pub fn step_shared(&mut self, ranks: &dyn Ranks) -> anyhow::Result<Option<Record>> {
+        Ok(self.outer_loop.step_shared(&self.instances, &mut self.progress, ranks)?)
     }
 
     /// How far it has come.

@@ -4,8 +4,8 @@ use burn::tensor::{Tensor, backend::Backend};
 use serde::Serialize;
 
 use crate::{
-    Adam, MetaEstimate, MetaGradient, Optimizer, Progress, Record, TaskDistribution, adjoint::norm,
-    numbers, progress::Best, vector,
+    Adam, Alone, MetaEstimate, MetaGradient, Optimizer, Progress, Ranks, Record, TaskDistribution,
+    adjoint::norm, numbers, progress::Best, ranks::shared, vector,
 };
 
 /// The outer loop: Adam on the mean meta-gradient of batches of instances.
@@ -76,6 +76,25 @@ impl OuterLoop {
         tasks: &impl TaskDistribution<B>,
         progress: &mut Progress,
     ) -> Result<Option<Record>, LearnError> {
+        self.step_shared(tasks, progress, &Alone)
+    }
+
+    /// The same with other processes, which all call this with the same numbers. Each makes some of the instances, and all get the same
+    /// result, to the last bit that of one process.
+    ///
+    /// # Errors
+    ///
+    /// If no instance of the batch has a finite loss and gradient; the same on all ranks.
+    ///
+    /// # Panics
+    ///
+    /// If the batch or the validation is empty, or its interval is 0.
+    pub fn step_shared<B: Backend>(
+        &self,
+        tasks: &impl TaskDistribution<B>,
+        progress: &mut Progress,
+        ranks: &dyn Ranks,
+    ) -> Result<Option<Record>, LearnError> {
         assert!(self.batch > 0, "a batch needs an instance");
         if progress.finished {
             return Ok(None);
@@ -83,7 +102,7 @@ impl OuterLoop {
         let start = Instant::now();
         let mut next = progress.clone();
         let phi = vector::<B>(&progress.phi);
-        let validation_loss = self.validation.validate(tasks, &phi, self.steps, &mut next);
+        let validation_loss = self.validation.validate(tasks, &phi, self.steps, &mut next, ranks);
         let mut record = Record {
             step: progress.step,
             loss: None,
@@ -96,7 +115,7 @@ impl OuterLoop {
             phi: progress.phi.clone(),
         };
         if !next.finished {
-            self.update(tasks, phi, &mut next, &mut record)?;
+            self.update(tasks, phi, &mut next, &mut record, ranks)?;
         }
         record.seconds = start.elapsed().as_secs_f64();
         next.seconds += record.seconds;
@@ -110,25 +129,27 @@ impl OuterLoop {
         phi: Tensor<B, 1>,
         progress: &mut Progress,
         record: &mut Record,
+        ranks: &dyn Ranks,
     ) -> Result<(), LearnError> {
         let step = progress.step;
-        let estimates = (0..self.batch).map(|k| {
+        let estimates = shared(ranks, self.batch, |k| {
             let seed = self.seed.wrapping_add((step * self.batch + k) as u64);
-            self.estimator.estimate_on(tasks, seed, &phi)
+            Estimated::of(&self.estimator.estimate_on(tasks, seed, &phi)).packed()
         });
-        let estimates: Vec<_> = estimates.filter(MetaEstimate::is_finite).collect();
+        let estimates = estimates.iter().map(|packed| Estimated::unpacked(packed));
+        let estimates: Vec<_> = estimates.filter(Estimated::is_finite).collect();
         if estimates.is_empty() {
             return Err(LearnError::AllDropped { step, batch: self.batch });
         }
         let share = (estimates.len() as f64).recip();
-        let gradients = estimates.iter().map(|estimate| estimate.gradient.clone());
+        let gradients = estimates.iter().map(|estimate| vector::<B>(&estimate.gradient));
         let mean = gradients.fold(phi.zeros_like(), |sum, gradient| sum + gradient * share);
         let length = norm(&numbers(mean.clone()));
 
         record.loss = Some(estimates.iter().map(|estimate| estimate.loss * share).sum());
         record.gradient_norm = Some(length);
         record.adjoint_growth = median_growth(&estimates);
-        record.clips = estimates.iter().map(|estimate| estimate.clips).sum();
+        record.clips = estimates.iter().map(|estimate| estimate.clips as usize).sum();
         record.dropped = self.batch - estimates.len();
 
         let phi = match self.estimator {
@@ -176,6 +197,7 @@ impl Validation {
         phi: &Tensor<B, 1>,
         steps: usize,
         progress: &mut Progress,
+        ranks: &dyn Ranks,
     ) -> Option<f64> {
         assert!(self.count > 0 && self.every > 0, "validation needs an instance and an interval");
         let last = progress.step >= steps;
@@ -183,8 +205,10 @@ impl Validation {
         if !last && !progress.step.is_multiple_of(self.every) {
             return None;
         }
-        let seeds = (0..self.count).map(|k| self.seed.wrapping_add(k as u64));
-        let loss = seeds.map(|seed| tasks.validation_loss(seed, phi)).sum::<f64>();
+        let losses = shared(ranks, self.count, |k| {
+            vec![tasks.validation_loss(self.seed.wrapping_add(k as u64), phi)]
+        });
+        let loss = losses.into_iter().flatten().sum::<f64>();
         // A softness under which some instance breaks down is not a good one.
         let loss = Some(loss / self.count as f64).filter(|loss| loss.is_finite());
         match loss.filter(|loss| progress.best.as_ref().is_none_or(|best| *loss < best.loss)) {
@@ -200,10 +224,44 @@ impl Validation {
     }
 }
 
+/// What an outer step needs of a [`MetaEstimate`], as numbers that can be sent.
+struct Estimated {
+    loss: f64,
+    /// Not a number where no step was walked back.
+    adjoint_growth: f64,
+    clips: f64,
+    gradient: Vec<f64>,
+}
+
+impl Estimated {
+    fn of<B: Backend>(estimate: &MetaEstimate<B>) -> Self {
+        let walked = !estimate.adjoint_norms.is_empty();
+        Self {
+            loss: estimate.loss,
+            adjoint_growth: if walked { estimate.adjoint_growth } else { f64::NAN },
+            clips: estimate.clips as f64,
+            gradient: numbers(estimate.gradient.clone()),
+        }
+    }
+
+    fn packed(self) -> Vec<f64> {
+        [self.loss, self.adjoint_growth, self.clips].into_iter().chain(self.gradient).collect()
+    }
+
+    fn unpacked(numbers: &[f64]) -> Self {
+        let [loss, adjoint_growth, clips] = [numbers[0], numbers[1], numbers[2]];
+        Self { loss, adjoint_growth, clips, gradient: numbers[3..].to_vec() }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.loss.is_finite() && self.gradient.iter().all(|x| x.is_finite())
+    }
+}
+
 /// `None` where no mode walked back.
-fn median_growth<B: Backend>(estimates: &[MetaEstimate<B>]) -> Option<f64> {
-    let walked = estimates.iter().filter(|estimate| !estimate.adjoint_norms.is_empty());
-    let mut growth: Vec<f64> = walked.map(|estimate| estimate.adjoint_growth).collect();
+fn median_growth(estimates: &[Estimated]) -> Option<f64> {
+    let growth = estimates.iter().map(|estimate| estimate.adjoint_growth);
+    let mut growth: Vec<f64> = growth.filter(|growth| !growth.is_nan()).collect();
     growth.sort_by(f64::total_cmp);
     growth.get(growth.len() / 2).copied().filter(|growth| growth.is_finite())
 }

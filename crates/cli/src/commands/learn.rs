@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use softrast_inverse::Learning;
 use softrast_lab::{
-    Error, Experiment, OutputFolder, Progress,
+    Error, Experiment, OutputFolder, Progress, World,
     format::{line, short, short_or_none},
     peak_rss_mib,
     plot::{Axis, Plot, Series},
@@ -18,7 +18,7 @@ use softrast_lab::{
     report::Report,
     write_atomically,
 };
-use softrast_meta::{Best, Record};
+use softrast_meta::{Best, Ranks, Record};
 use softrast_raster::HostBackend;
 use softrast_softness::ScheduledSoftness;
 
@@ -30,11 +30,24 @@ use crate::{
     session::Session,
 };
 
-/// Learns a softness, and writes it with a report.
+/// Learns a softness, and writes it with a report; with the other processes that `mpirun` started, of which the first alone writes and has
+/// something to say.
 ///
 /// Every outer step leaves a line in `learn.jsonl` and then a checkpoint, so that a program that was killed at any moment goes on with
 /// `--resume` as though it had not been.
-pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow::Result<Output> {
+pub(crate) fn learn<T: Task>(
+    session: &Session,
+    flags: Learn<T::Args>,
+) -> anyhow::Result<Option<Output>> {
+    let world = World::join()?;
+    learn_with::<T>(session, flags, &world).map_err(|error| world.fail(error))
+}
+
+fn learn_with<T: Task>(
+    session: &Session,
+    flags: Learn<T::Args>,
+    world: &World,
+) -> anyhow::Result<Option<Output>> {
     let Learn { shared: Shared { args, mut common, mut method }, learn, resume } = flags;
     method.reconcile().map_err(Error::usage)?;
     if method.resolution.is_some() {
@@ -55,12 +68,16 @@ pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow
     let mut learning = learning.map_err(|error| Error::usage(error.to_string()))?;
     let job = json!({ "task": T::NAME, "method": identity, "learned": learning.identity() });
     let folder = session.folder()?;
-    let mut log = Log::new(&folder, resume.resume, &mut learning, &job.to_string())?;
-    let mut progress = Progress::of_program(session.quiet);
-    let stopped = walk(&mut learning, &mut log, &mut progress);
+    let mut log =
+        Log::new(&folder, resume.resume, &mut learning, &job.to_string(), world.is_first())?;
+    let mut progress = Progress::of_program(session.quiet || !world.is_first());
+    let stopped = walk(&mut learning, &mut log, &mut progress, world);
     progress.finish();
     let kept = "learning stopped; what was learned before is kept, and --resume goes on from it";
     let stopped = stopped.context(kept)?;
+    if !world.is_first() {
+        return Ok(None);
+    }
 
     let (mut softness, own) = learning.learned();
     softness.note = Some(note(session, &learning, &log));
@@ -68,7 +85,7 @@ pub(crate) fn learn<T: Task>(session: &Session, flags: Learn<T::Args>) -> anyhow
     // The rate is one for the original variant.
     softness.learning_rate = softness.learning_rate.filter(|_| common.variant == Variant::Original);
     let learned = Learned { softness, own: [own_start, own], stopped };
-    write(session, folder, &learning, &log, &about, &learned)
+    write(session, folder, &learning, &log, &about, &learned).map(Some)
 }
 
 /// What came of learning.
@@ -141,27 +158,49 @@ fn walk<T: Task>(
     learning: &mut Learning<T, HostBackend>,
     log: &mut Log,
     progress: &mut Progress,
+    world: &World,
 ) -> anyhow::Result<bool> {
     let outer = learning.config().updates;
     let before = log.updates();
     progress.expect(outer);
     progress.skip(1, before);
-    if progress.begin("learn".into(), 1, outer - before.min(outer)).is_err() {
+    if world.any(progress.begin("learn".into(), 1, outer - before.min(outer)).is_err()) {
         return Ok(true);
     }
     let mut loss = f64::NAN;
-    while let Some(record) = learning.step()? {
+    while let Some(record) = learning.step_shared(&Processes(world))? {
         log.add(&record, learning)?;
         loss = record.loss.unwrap_or(loss);
-        if progress.step((record.step + 1).min(outer) - before, loss).is_err() {
+        let stopped = progress.step((record.step + 1).min(outer) - before, loss).is_err();
+        // The signal may reach only some of the ranks.
+        if world.any(stopped) {
             return Ok(true);
         }
     }
     Ok(false)
 }
 
+/// The processes of `mpirun`, for the outer loop.
+struct Processes<'a>(&'a World);
+
+impl Ranks for Processes<'_> {
+    fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn gather(&self, numbers: &[f64]) -> Vec<f64> {
+        self.0.gather(numbers)
+    }
+}
+
 /// The records of all outer steps so far, on file and here.
 struct Log {
+    /// Whether it writes them.
+    writes: bool,
     records: PathBuf,
     checkpoint: PathBuf,
     job: String,
@@ -183,15 +222,17 @@ impl Log {
         resume: bool,
         learning: &mut Learning<T, HostBackend>,
         job: &str,
+        writes: bool,
     ) -> anyhow::Result<Self> {
         let (records, checkpoint) =
             (folder.file("learn.jsonl"), folder.file("learn.checkpoint.json"));
-        let mut log = Self { records, checkpoint, job: job.to_owned(), steps: Vec::new() };
+        let (job, steps) = (job.to_owned(), Vec::new());
+        let mut log = Self { writes, records, checkpoint, job, steps };
         let mut kept = String::new();
         if resume && log.checkpoint.exists() {
             let named = || log.checkpoint.display().to_string();
             let checkpoint = fs::read(&log.checkpoint).with_context(named)?;
-            learning.resume(&checkpoint, job).with_context(named)?;
+            learning.resume(&checkpoint, &log.job).with_context(named)?;
             let progress = learning.progress();
             // The record of the last step, after which there is no update, is on file too.
             let next = progress.step + usize::from(progress.finished);
@@ -206,17 +247,20 @@ impl Log {
                     kept += line;
                 }
             }
-            if log.steps.len() < next {
+            if log.steps.len() < next && writes {
                 eprintln!(
                     "{} of {next} records of {} are missing or damaged: the charts leave them out",
                     next - log.steps.len(),
                     log.records.display()
                 );
             }
-        } else if resume {
+        } else if resume && writes {
             eprintln!("there is no {}, so nothing to go on from", log.checkpoint.display());
         }
-        fs::write(&log.records, kept).with_context(|| format!("cannot write {:?}", log.records))?;
+        if writes {
+            fs::write(&log.records, kept)
+                .with_context(|| format!("cannot write {:?}", log.records))?;
+        }
         Ok(log)
     }
 
@@ -225,14 +269,16 @@ impl Log {
         record: &Record,
         learning: &Learning<T, HostBackend>,
     ) -> anyhow::Result<()> {
-        let written = OpenOptions::new().append(true).open(&self.records);
-        let line = serde_json::to_string(record)?;
-        written
-            .and_then(|mut file| writeln!(file, "{line}"))
-            .with_context(|| format!("cannot write {:?}", self.records))?;
-        let checkpoint = learning.checkpoint(&self.job)?;
-        write_atomically(&self.checkpoint, checkpoint.as_bytes())
-            .with_context(|| format!("cannot write {:?}", self.checkpoint))?;
+        if self.writes {
+            let written = OpenOptions::new().append(true).open(&self.records);
+            let line = serde_json::to_string(record)?;
+            written
+                .and_then(|mut file| writeln!(file, "{line}"))
+                .with_context(|| format!("cannot write {:?}", self.records))?;
+            let checkpoint = learning.checkpoint(&self.job)?;
+            write_atomically(&self.checkpoint, checkpoint.as_bytes())
+                .with_context(|| format!("cannot write {:?}", self.checkpoint))?;
+        }
         let &Record { step, loss, validation_loss, .. } = record;
         self.steps.push(Point { step, loss, validation_loss });
         Ok(())

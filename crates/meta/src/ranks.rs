@@ -1,0 +1,107 @@
+/// Processes that share the work of an outer step. Each is a rank of them, counted from 0.
+pub trait Ranks {
+    /// Which one this is.
+    fn rank(&self) -> usize;
+
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// The numbers of all ranks, in their order. Each may bring another number of them. All must call this, and wait for each other in it.
+    fn gather(&self, numbers: &[f64]) -> Vec<f64>;
+}
+
+/// One process by itself.
+#[derive(Clone, Copy, Debug)]
+pub struct Alone;
+
+impl Ranks for Alone {
+    fn rank(&self) -> usize {
+        0
+    }
+
+    fn count(&self) -> usize {
+        1
+    }
+
+    fn gather(&self, numbers: &[f64]) -> Vec<f64> {
+        numbers.to_vec()
+    }
+}
+
+/// `of(k)` for every k below `count`, in order, on all ranks; each makes every so many-th of them.
+///
+/// # Panics
+///
+/// If they are not of the same length.
+pub(crate) fn shared(
+    ranks: &dyn Ranks,
+    count: usize,
+    of: impl Fn(usize) -> Vec<f64>,
+) -> Vec<Vec<f64>> {
+    let (rank, all) = (ranks.rank(), ranks.count());
+    let own: Vec<f64> = (rank..count).step_by(all).flat_map(of).collect();
+    let gathered = ranks.gather(&own);
+    assert!(gathered.len().is_multiple_of(count), "pieces of a batch are of one length");
+    let width = gathered.len() / count;
+    // The pieces of a rank stand together, those of the first rank first.
+    let first =
+        |rank: usize| (0..rank).map(|before| (before..count).step_by(all).count()).sum::<usize>();
+    let place = |k: usize| first(k % all) + k / all;
+    (0..count).map(|k| gathered[place(k) * width..(place(k) + 1) * width].to_vec()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        sync::{Barrier, Mutex},
+        thread,
+    };
+
+    use super::*;
+
+    /// Threads that stand for processes.
+    struct Threads<'a> {
+        rank: usize,
+        board: &'a [Mutex<Vec<f64>>],
+        barrier: &'a Barrier,
+    }
+
+    impl Ranks for Threads<'_> {
+        fn rank(&self) -> usize {
+            self.rank
+        }
+
+        fn count(&self) -> usize {
+            self.board.len()
+        }
+
+        fn gather(&self, numbers: &[f64]) -> Vec<f64> {
+            *self.board[self.rank].lock().unwrap() = numbers.to_vec();
+            self.barrier.wait();
+            let all = self.board.iter().flat_map(|one| one.lock().unwrap().clone()).collect();
+            self.barrier.wait();
+            all
+        }
+    }
+
+    #[test]
+    fn every_rank_gets_all_pieces_in_order_also_where_there_are_more_ranks_than_pieces() {
+        for count in [1, 2, 5, 8] {
+            let of = |k: usize| vec![k as f64, -0.0, f64::NAN];
+            let expected = format!("{:?}", shared(&Alone, count, of));
+            for ranks in [1, 2, 3, 7] {
+                let board: Vec<_> = (0..ranks).map(|_| Mutex::default()).collect();
+                let barrier = Barrier::new(ranks);
+                thread::scope(|scope| {
+                    for rank in 0..ranks {
+                        let (board, barrier, expected) = (&board, &barrier, &expected);
+                        scope.spawn(move || {
+                            let threads = Threads { rank, board, barrier };
+                            assert_eq!(&format!("{:?}", shared(&threads, count, of)), expected);
+                        });
+                    }
+                });
+            }
+        }
+    }
+}
