@@ -11,6 +11,14 @@ pub struct World {
 }
 
 impl World {
+    /// One process by itself.
+    pub fn alone() -> Self {
+        Self {
+            #[cfg(feature = "mpi")]
+            joined: None,
+        }
+    }
+
     /// Joins the other processes, for as long as this lives.
     ///
     /// A rank that panics ends them all.
@@ -60,6 +68,15 @@ impl World {
             return joined.gather(numbers);
         }
         numbers.to_vec()
+    }
+
+    /// Gives all ranks the numbers that `root` has. All must call this, with as many of them.
+    pub fn broadcast(&self, root: usize, numbers: &mut [f32]) {
+        #[cfg(feature = "mpi")]
+        if let Some(joined) = &self.joined {
+            return joined.broadcast(root, numbers);
+        }
+        let _ = (root, numbers);
     }
 
     /// Whether any rank says yes. All must call this.
@@ -129,6 +146,11 @@ mod joined {
             let mut parts = PartitionMut::new(&mut all[..], counts, &starts[..]);
             world.all_gather_varcount_into(numbers, &mut parts);
             all
+        }
+
+        pub(super) fn broadcast(&self, root: usize, numbers: &mut [f32]) {
+            let root = i32::try_from(root).expect("a rank is an i32");
+            self.universe.world().process_at_rank(root).broadcast_into(numbers);
         }
 
         pub(super) fn fail(&self, failure: &Failure) -> ! {

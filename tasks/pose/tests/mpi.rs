@@ -13,8 +13,12 @@ use std::{
 
 use serde_json::Value;
 
-const EXACT: &str = "learn --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness logistic --quiet --json";
+const EXACT: &str = "learn --estimator unrolled --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness logistic --quiet --json";
 const ES: &str = "learn --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness gauss --estimator es:0.2 --quiet --json";
+
+/// A mesh of few faces, because programs for tests may be slow.
+const MESH: &str =
+    "v 0 0 0\nv 1 0 0\nv 0 0.7 0\nv 0.2 0.1 0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 
 /// The program alone, or so many processes of it.
 fn start(out: &Path, processes: Option<usize>, line: &str) -> Child {
@@ -33,7 +37,10 @@ fn start(out: &Path, processes: Option<usize>, line: &str) -> Child {
             command
         }
     };
-    command.args(line.split_whitespace()).arg("--out").arg(out);
+    let mesh = out.join("mesh.obj");
+    // Where that is not possible the program says so.
+    let _ = fs::write(&mesh, MESH);
+    command.args(line.split_whitespace()).arg("--mesh").arg(mesh).arg("--out").arg(out);
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
@@ -46,7 +53,7 @@ fn learned(out: &Path, processes: Option<usize>, line: &str) -> [Value; 2] {
     let mut result: Value = serde_json::from_str(&stdout).unwrap();
     let mut softness: Value =
         serde_json::from_slice(&fs::read(out.join("softness.json")).unwrap()).unwrap();
-    for key in ["seconds", "peak_memory_mib", "out", "files"] {
+    for key in ["seconds", "peak_memory_mib", "out", "files", "settings"] {
         result.as_object_mut().unwrap().remove(key);
     }
     // It tells of the command and the seconds.
@@ -95,9 +102,9 @@ fn a_lost_process_ends_all_and_another_number_goes_on() {
 #[test]
 fn what_is_wrong_for_all_is_said_once() {
     let out = tempfile::tempdir().unwrap();
-    fs::write(out.path().join("file"), "").unwrap();
-    let output = start(&out.path().join("file/folder"), Some(2), EXACT).wait_with_output().unwrap();
+    let line = format!("{EXACT} --resolution 8");
+    let output = start(out.path(), Some(2), &line).wait_with_output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(!output.status.success());
-    assert_eq!(stderr.matches("cannot write to the folder").count(), 1, "{stderr}");
+    assert_eq!(stderr.matches("leave out --resolution").count(), 1, "{stderr}");
 }

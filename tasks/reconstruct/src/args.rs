@@ -67,6 +67,10 @@ pub(crate) struct Common {
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) pairs: Option<usize>,
 
+    /// Parts of a step, which the processes of mpirun share; batch norms see a part at a time.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count)]
+    pub(crate) parts: usize,
+
     /// Steps in an epoch [default: 100].
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) steps: Option<usize>,
@@ -202,6 +206,7 @@ impl Common {
             learning_rate: self.learning_rate.unwrap_or(rate),
             softness_rate: self.softness_rate,
             pairs: self.pairs.unwrap_or(pairs),
+            parts: self.parts,
             steps: self.steps.unwrap_or(100),
             val: self.val,
             seed: self.seed,

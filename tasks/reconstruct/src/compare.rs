@@ -1,6 +1,6 @@
 use anyhow::Context;
 use serde_json::json;
-use softrast_lab::{Error, program::Output, report::Table};
+use softrast_lab::{Error, World, program::Output, report::Table};
 use softrast_raster::{RasterBackend, TConorm};
 
 use crate::{
@@ -47,7 +47,7 @@ pub(crate) fn compare<B: RasterBackend>(
         if training.visible {
             eprintln!("{name}");
         }
-        let (header, _) = training.run::<B>(device)?;
+        let (header, _) = training.run::<B>(&World::alone(), device)?;
         let (_, network) = trained::<B>(&training.out.join(CHECKPOINT), device)?;
         let shapes = data_set::open(&training.settings.data, Split::Test, training.settings.seed)?;
         let views = [args.test_shapes, VIEWS];

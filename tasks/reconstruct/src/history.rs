@@ -42,6 +42,9 @@ pub struct Settings {
     pub softness_rate: f64,
     /// Pairs of pictures in a step.
     pub pairs: usize,
+    /// Parts of a step: gradients are means over them, and batch norms see one at a time.
+    #[serde(default = "one")]
+    pub parts: usize,
     /// Steps in an epoch.
     pub steps: usize,
     /// Shapes of a class that the `IoU` after every epoch is taken from.
@@ -69,6 +72,11 @@ impl fmt::Display for Data {
             Self::Files(folder) => folder.display().fmt(f),
         }
     }
+}
+
+/// Before a step had parts it was one.
+fn one() -> usize {
+    1
 }
 
 impl Settings {

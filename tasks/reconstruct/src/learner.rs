@@ -12,6 +12,7 @@ use burn::{
     record::{FullPrecisionSettings, NamedMpkBytesRecorder, Recorder},
     tensor::Tensor,
 };
+use softrast_lab::World;
 use softrast_raster::RasterBackend;
 use softrast_softness::{SoftStep, numbers};
 
@@ -19,6 +20,7 @@ use crate::{
     Checkpoint, Network, Settings, Template, Time,
     objective::{Objective, soft_step},
     pairs::PairBatch,
+    parts::{received, sent},
 };
 
 /// Added to the root of Adam's second moment. Source: the default that the released code leaves as it is.
@@ -39,6 +41,15 @@ pub(crate) struct Step {
     pub(crate) silhouette: f64,
     pub(crate) smoothness: f64,
     pub(crate) time: Time,
+}
+
+/// What a batch gives.
+struct Gradients {
+    silhouette: f64,
+    smoothness: f64,
+    of_network: GradientsParams,
+    of_softness: GradientsParams,
+    time: Time,
 }
 
 /// burn has one seed for the whole process: held while weights are drawn from it.
@@ -82,16 +93,71 @@ impl<B: RasterBackend> Learner<B> {
         self.objective.begin();
     }
 
-    /// One step of both optimisers.
+    /// One step of both optimisers; `rates` are those of the network and of the softness.
+    pub(crate) fn step(&mut self, batch: &PairBatch<Autodiff<B>>, rates: [f64; 2]) -> Step {
+        self.objective.renew(&self.softness);
+        let start = Instant::now();
+        let gradients = self.gradients(batch);
+        self.apply(gradients, rates, start)
+    }
+
+    /// One step on a batch that comes in `parts` of one size, which the processes of `world` share: each brings every so many-th. The means
+    /// of what the parts give are summed in their order, so that the number of processes changes nothing.
+    ///
+    /// Batch norms see a part at a time.
+    pub(crate) fn step_in_parts(
+        &mut self,
+        own: &[PairBatch<Autodiff<B>>],
+        parts: usize,
+        world: &World,
+        rates: [f64; 2],
+    ) -> Step {
+        self.objective.renew(&self.softness);
+        let (start, mut time) = (Instant::now(), Time::default());
+        let before = sent(&self.network, &GradientsParams::new());
+        let mut given = Vec::new();
+        for part in own {
+            self.network = received(self.network.clone(), &before).0;
+            let gradients = self.gradients(part);
+            // Its states are there once a record is taken.
+            let _ = self.network.clone().into_record();
+            time.add(&gradients.time);
+            let losses = [gradients.silhouette, gradients.smoothness].map(|loss| loss as f32);
+            let numbers = [
+                losses.to_vec(),
+                sent(&self.network, &gradients.of_network),
+                sent(&self.softness, &gradients.of_softness),
+            ];
+            given.push(numbers.concat());
+        }
+        let mut mean = Vec::new();
+        for part in 0..parts {
+            let owner = part % world.count();
+            let mut numbers = match owner == world.rank() {
+                true => std::mem::take(&mut given[part / world.count()]),
+                false => vec![0.0; 2 + before.len() + self.phi().len()],
+            };
+            world.broadcast(owner, &mut numbers);
+            if mean.is_empty() {
+                mean = vec![0.0; numbers.len()];
+            }
+            mean.iter_mut().zip(numbers).for_each(|(sum, x)| *sum += x / parts as f32);
+        }
+        let (losses, mean) = mean.split_at(2);
+        let (network, softness) = mean.split_at(before.len());
+        let (with_states, of_network) = received(self.network.clone(), network);
+        self.network = with_states;
+        let (_, of_softness) = received(self.softness.clone(), softness);
+        let [silhouette, smoothness] = [losses[0], losses[1]].map(f64::from);
+        let gradients = Gradients { silhouette, smoothness, of_network, of_softness, time };
+        self.apply(gradients, rates, start)
+    }
+
+    /// Losses and gradients of a batch.
     ///
     /// The way back has parts, so that what each takes is known: from either loss to the vertices (and
     /// φ), then from the vertices through the network.
-    pub(crate) fn step(
-        &mut self,
-        batch: &PairBatch<Autodiff<B>>,
-        network_rate: f64,
-        softness_rate: f64,
-    ) -> Step {
+    fn gradients(&mut self, batch: &PairBatch<Autodiff<B>>) -> Gradients {
         let start = Instant::now();
         let mut time = Time { pictures: batch.views.len(), ..Time::default() };
         let (centre, displacement) = self.network.forward(batch.pictures.clone());
@@ -125,7 +191,13 @@ impl<B: RasterBackend> Learner<B> {
         let of_network = GradientsParams::from_module(&mut grads, &self.network);
         network += clock.elapsed();
         time.network = network.as_secs_f64();
+        Gradients { silhouette, smoothness, of_network, of_softness, time }
+    }
 
+    /// A step down gradients that took their time since `start`.
+    fn apply(&mut self, gradients: Gradients, rates: [f64; 2], start: Instant) -> Step {
+        let Gradients { silhouette, smoothness, of_network, of_softness, mut time } = gradients;
+        let [network_rate, softness_rate] = rates;
         let clock = Instant::now();
         self.network = self.of_network.step(network_rate, self.network.clone(), of_network);
         if softness_rate > 0.0 {

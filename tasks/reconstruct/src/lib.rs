@@ -29,6 +29,7 @@ mod npz;
 mod npz_folder;
 mod objective;
 mod pairs;
+mod parts;
 mod procedural;
 mod program;
 mod report;

@@ -42,6 +42,16 @@ impl<B: RasterBackend> Objective<B> {
         self.uses = 0;
     }
 
+    /// Starts a step with this softness.
+    pub(crate) fn renew(&mut self, softness: &SoftStep<B>) {
+        if self.uses.is_multiple_of(RENEW) {
+            let phi = softness.phi.val();
+            self.silhouette =
+                self.rasterizer.prepare(self.template.faces(), softness.softness, &phi);
+        }
+        self.uses += 1;
+    }
+
     /// The template that centres and displacements deform.
     pub(crate) fn template(&self) -> &Template<B> {
         &self.template
@@ -59,18 +69,12 @@ impl<B: RasterBackend> Objective<B> {
     /// Either prediction of a pair is drawn from both of its views, four silhouettes; the mean is over
     /// all of them. Source: docs/notes.md, Reconstruction.
     pub(crate) fn silhouettes(
-        &mut self,
+        &self,
         vertices: Tensor<B, 3>,
         pictures: &Tensor<B, 4>,
         views: &[usize],
         softness: &SoftStep<B>,
     ) -> Tensor<B, 1> {
-        if self.uses.is_multiple_of(RENEW) {
-            let phi = softness.phi.val();
-            self.silhouette =
-                self.rasterizer.prepare(self.template.faces(), softness.softness, &phi);
-        }
-        self.uses += 1;
         let pairs = views.len() / 2;
         let alpha = pictures.clone().narrow(1, 3, 1).reshape([2 * pairs, SIZE, SIZE]);
         // Each prediction from its own view, then from that of the other picture of its pair.

@@ -5,7 +5,7 @@ use clap::CommandFactory;
 use image::{ImageReader, imageops};
 use serde_json::json;
 use softrast_lab::{
-    Error, Failure, INTERRUPTED, mean,
+    Error, Failure, INTERRUPTED, World, mean,
     program::{Output, parse, repeated},
 };
 use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
@@ -39,7 +39,7 @@ pub fn execute(
     let backend = backend(line.backend.as_deref())?;
     let output = on_backend!(backend, B => work::<B>(line.command, again.clone()))
         .map_err(|error| stopped(error, &again))?;
-    output.print(line.json, &again, stdout)
+    output.map_or(Ok(()), |output| output.print(line.json, &again, stdout))
 }
 
 /// A training that the user stops has kept the epochs before.
@@ -65,21 +65,22 @@ fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
     Ok(backend)
 }
 
-fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<Output> {
+fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<Option<Output>> {
     let device = B::Device::default();
     match command {
         Command::Train(args) => train::<B>(&args, again, &device),
-        Command::Evaluate(args) => evaluate::<B>(&args, &device),
-        Command::Predict(args) => predict_mesh::<B>(&args, &device),
-        Command::Compare(args) => compare::<B>(&args, &again, &device),
+        Command::Evaluate(args) => evaluate::<B>(&args, &device).map(Some),
+        Command::Predict(args) => predict_mesh::<B>(&args, &device).map(Some),
+        Command::Compare(args) => compare::<B>(&args, &again, &device).map(Some),
     }
 }
 
+/// Trains, with the other processes that `mpirun` started; the first of them alone has something to say.
 fn train<B: RasterBackend>(
     args: &TrainArgs,
     command: String,
     device: &B::Device,
-) -> anyhow::Result<Output> {
+) -> anyhow::Result<Option<Output>> {
     let softness = args::softness(&args.softness, args.scale, args.squared)?;
     let training = Training {
         settings: args.common.settings(softness, args.t_conorm),
@@ -89,7 +90,12 @@ fn train<B: RasterBackend>(
         visible: !args.common.quiet,
         command,
     };
-    let (header, sphere) = training.run::<B>(device)?;
+    let world = World::join()?;
+    let trained = training.run::<B>(&world, device);
+    let (header, sphere) = trained.map_err(|error| world.fail(error))?;
+    if !world.is_first() {
+        return Ok(None);
+    }
     let iou = header.epochs.last().map(|epoch| epoch.voxel_iou.clone()).unwrap_or_default();
     let page = training.out.join(crate::train::REPORT);
     let text = vec![table(&header.classes, &iou, &sphere), format!("report: {}", page.display())];
@@ -100,7 +106,7 @@ fn train<B: RasterBackend>(
         "epochs": header.epochs.len() - 1,
         "report": page,
     });
-    Ok(Output { json, text, ..Output::default() })
+    Ok(Some(Output { json, text, ..Output::default() }))
 }
 
 fn evaluate<B: RasterBackend>(args: &EvaluateArgs, device: &B::Device) -> anyhow::Result<Output> {

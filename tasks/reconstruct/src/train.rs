@@ -6,7 +6,7 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use burn::backend::Autodiff;
-use softrast_lab::Progress;
+use softrast_lab::{Error, Progress, World};
 use softrast_raster::RasterBackend;
 
 use crate::{
@@ -55,13 +55,30 @@ impl Training {
     ///
     /// If shapes cannot be read, the folder holds another training, files cannot be written, or the
     /// loss is not finite any more.
-    pub fn run<B: RasterBackend>(&self, device: &B::Device) -> anyhow::Result<(Header, Vec<f64>)> {
+    pub fn run<B: RasterBackend>(
+        &self,
+        world: &World,
+        device: &B::Device,
+    ) -> anyhow::Result<(Header, Vec<f64>)> {
+        let Settings { pairs, parts, .. } = self.settings;
+        if !pairs.is_multiple_of(parts) {
+            let message =
+                format!("the {pairs} pairs of a step cannot be divided by --parts {parts}");
+            return Err(Error::usage(message));
+        }
+        if world.count() > parts {
+            let count = world.count();
+            let message = format!(
+                "{count} processes cannot share a step in {parts} parts: give --parts {count}"
+            );
+            return Err(Error::usage(message));
+        }
         let path = self.out.join(CHECKPOINT);
         let shapes = data_set::open(&self.settings.data, Split::Train, self.settings.seed)?;
         let held_out = data_set::open(&self.settings.data, Split::Val, self.settings.seed)?;
         let (mut header, mut learner) = self.start::<B>(&path, shapes.as_ref(), device)?;
         let template = Template::new(device);
-        let mut bar = Progress::of_program(!self.visible);
+        let mut bar = Progress::of_program(!self.visible || !world.is_first());
         bar.expect(self.epochs * self.settings.steps);
         bar.skip(header.epochs.len().saturating_sub(1), self.settings.steps);
         let views = [self.settings.val, 2];
@@ -73,23 +90,32 @@ impl Training {
             let phi = learner.phi();
             let time = Time::default();
             let first = Epoch { number: 0, loss: None, silhouette_iou: None, voxel_iou, phi, time };
-            self.say(&first);
+            self.say(&first, world);
             header.epochs.push(first);
         }
         let mut sphere = Vec::new();
         while header.epochs.len() <= self.epochs || sphere.is_empty() {
             if header.epochs.len() <= self.epochs {
-                let epoch =
-                    self.epoch(&mut learner, &shapes, header.epochs.len(), &mut bar, device)?;
+                let epoch = self.epoch(
+                    &mut learner,
+                    &shapes,
+                    header.epochs.len(),
+                    &mut bar,
+                    world,
+                    device,
+                )?;
                 header.epochs.push(epoch);
             }
             let judged = judge(&learner)?;
             sphere = judged.sphere;
             if let Some(epoch) = header.epochs.last_mut() {
                 epoch.voxel_iou = judged.classes;
-                self.say(epoch);
+                self.say(epoch, world);
             }
-            self.write(&header, &learner, &path, &sphere, &template, held_out.as_ref(), device)?;
+            if world.is_first() {
+                let shapes = held_out.as_ref();
+                self.write(&header, &learner, &path, &sphere, &template, shapes, device)?;
+            }
         }
         bar.finish();
         Ok((header, sphere))
@@ -141,9 +167,11 @@ impl Training {
         shapes: &Arc<dyn Shapes>,
         number: usize,
         bar: &mut Progress,
+        world: &World,
         device: &B::Device,
     ) -> anyhow::Result<Epoch> {
-        let Settings { pairs, steps, seed, learning_rate, softness_rate, .. } = self.settings;
+        let Settings { pairs, parts, steps, seed, learning_rate, softness_rate, .. } =
+            self.settings;
         let late = number as f64 > LATE.0 * self.epochs as f64;
         let factor = if late { LATE.1 } else { 1.0 };
         let all = Pairs { shapes: shapes.clone(), seed, epoch: number as u64 };
@@ -152,10 +180,19 @@ impl Training {
         let (mut loss, mut soft, mut time) = (0.0, 0.0, Time::default());
         let mut clock = Instant::now();
         for step_number in 0..steps {
-            let batch =
-                all.batch::<Autodiff<B>>(step_number * pairs..(step_number + 1) * pairs, device)?;
+            // Those of this process.
+            let size = pairs / parts;
+            let own = (step_number * parts..(step_number + 1) * parts).skip(world.rank());
+            let own = own.step_by(world.count()).map(|part| part * size..(part + 1) * size);
+            let own: Vec<_> = own
+                .map(|pairs| all.batch::<Autodiff<B>>(pairs, device))
+                .collect::<anyhow::Result<_>>()?;
             let data = clock.elapsed().as_secs_f64();
-            let step = learner.step(&batch, factor * learning_rate, factor * softness_rate);
+            let rates = [learning_rate, softness_rate].map(|rate| factor * rate);
+            let step = match own.as_slice() {
+                [batch] if parts == 1 => learner.step(batch, rates),
+                own => learner.step_in_parts(own, parts, world, rates),
+            };
             let now = step.silhouette + step.smoothness;
             ensure!(
                 now.is_finite(),
@@ -210,8 +247,8 @@ impl Training {
     }
 
     /// Tells on stderr what an epoch brought.
-    fn say(&self, epoch: &Epoch) {
-        if self.visible {
+    fn say(&self, epoch: &Epoch, world: &World) {
+        if self.visible && world.is_first() {
             let loss = epoch.loss.map_or_else(String::new, |loss| format!("loss {loss:.4}, "));
             let (iou, time) = (epoch.mean_iou(), epoch.time);
             let share = 100.0 * time.rasterizer_share();
