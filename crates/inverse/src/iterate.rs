@@ -15,6 +15,8 @@ use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, p
 pub struct Iterate {
     /// Steps taken so far.
     pub step: usize,
+    /// How often a run with feedback was stuck and began again so far.
+    pub begun_again: usize,
     /// Where on its path the softness is, 0 to 1.
     pub part: f64,
     /// Scale of the softness, in NDC (NDC² if squared).
@@ -104,6 +106,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
         let hard = problem.hard_image(&self.host, theta.clone());
         Ok(Iterate {
             step,
+            begun_again: 0,
             part,
             scale: self.renderer.scale(part),
             theta,

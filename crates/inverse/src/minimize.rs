@@ -168,7 +168,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
         B::sync(&seen.theta.device())?;
         let (drawing, loss) = (clock.elapsed(), seen.loss.clone());
         let read = self.run.read(step, self.place.part, seen, self.pictures)?;
-        let iterate = Iterate { seconds, ..read };
+        let iterate = Iterate { seconds, begun_again: self.starts - 1, ..read };
         let hard_loss = iterate.hard_loss[0];
         self.latest = Some(Latest { step, leaf, loss, hard_loss, drawing });
         Ok(iterate)
