@@ -1,7 +1,6 @@
-use std::time::Instant;
-
 use burn::tensor::{Tensor, backend::Backend};
 use serde::Serialize;
+use web_time::Instant;
 
 use crate::{
     Adam, Alone, MetaEstimate, MetaGradient, Optimizer, Progress, Ranks, Record, TaskDistribution,

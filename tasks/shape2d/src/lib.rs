@@ -20,18 +20,15 @@
 
 mod args;
 pub mod colour;
-mod instance;
 mod letters;
 mod logo;
 mod paper;
-mod scene;
 mod target;
 mod task;
 
 pub use args::Args;
-pub use instance::Instance;
 pub use logo::Logo;
-pub use scene::Scene;
+pub use softrast_inverse::triangles::{Instance, Scene};
 pub use task::Shape2d;
 
 /// The whole program: `--colour` makes another task of it, with another θ, image and method.

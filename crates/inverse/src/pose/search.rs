@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
 use softrast_raster::{
@@ -116,43 +118,61 @@ impl PoseSearch {
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
         Self::check(mesh, mask, camera, started)?;
-        let square = mask.looked_at()?;
-        let posed = |start: Pinhole| MaskPose { mask: mask.clone(), square, start };
-        let (_, radius) = ball(mesh);
-        let merged = mesh
-            .clustered(DETAIL * 2.0 * radius)
-            .filter(|few| few.area() > LEAST_AREA * mesh.area());
-        let few = merged.as_ref().unwrap_or(mesh);
-        let starts = if started {
-            vec![*camera]
-        } else {
-            let mut found = apart(glance(few, mask, square, camera), STARTS.0, APART_DEG, None);
-            let mut begun = 0;
-            // Few steps already tell the hopeless apart: many starts are had for little.
-            for ((_, steps), left) in [(STARTS, COARSE.0), (COARSE, FINE)] {
-                let poses = found.into_iter().map(|(start, _)| posed(start)).collect();
-                let stage = Stage { steps, size: COARSE_SIZE, rate: self.learning_rate };
-                let better = self.improved::<B>(few, poses, method, stage, begun, &mut visit)?;
-                found = apart(better, left, APART_DEG, Some(few));
-                begun += steps;
-            }
-            let least = found.first().map_or(0.0, |&(_, loss)| loss);
-            let found = found.into_iter().filter(|&(_, loss)| loss <= least + HOPEFUL);
-            found.map(|(start, _)| start).collect()
+        let starts = match started {
+            true => vec![*camera],
+            false => self.starts::<B>(mesh, mask, camera, method, &mut visit)?,
         };
         let begun = self.steps(started) - self.fine_steps;
-        let fine =
-            Stage { steps: self.fine_steps, size: self.fine_size, rate: self.learning_rate / 3.0 };
-        let poses = starts.into_iter().map(posed).collect();
-        let found = self.improved::<B>(mesh, poses, method, fine, begun, &mut visit)?;
+        let square = mask.looked_at()?;
+        let poses = starts.into_iter().map(|start| MaskPose { mask: mask.clone(), square, start });
+        let (poses, fine) = (poses.collect(), self.fine());
+        let found = self.improved::<B>(mesh, poses, method, &fine, begun, &mut visit)?;
         let scored = found
             .into_iter()
             .map(|(camera, _)| (camera, 1.0 - mask_iou(&silhouette_pixels(mesh, &camera), mask)));
         let scored: Vec<(Pinhole, f64)> =
-            apart(scored.collect(), FINE, ANSWERS_APART_DEG, Some(few));
+            apart(scored.collect(), FINE, ANSWERS_APART_DEG, Some(&coarse(mesh)));
         let best = scored.first().context("no pose was tried")?.1;
         let nearly = scored.iter().filter(|(_, loss)| *loss <= best + NEARLY);
         Ok(nearly.map(|&(camera, loss)| FoundPose { camera, iou: 1.0 - loss }).collect())
+    }
+
+    /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most hopeful first; at most six.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PoseSearch::check`], of `visit` and of the device.
+    pub fn starts<B: RasterBackend>(
+        &self,
+        mesh: &Mesh,
+        mask: &Picture,
+        camera: &Pinhole,
+        method: &Method,
+        mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<Pinhole>> {
+        Self::check(mesh, mask, camera, false)?;
+        let square = mask.looked_at()?;
+        let posed = |start: Pinhole| MaskPose { mask: mask.clone(), square, start };
+        let few = coarse(mesh);
+        let mut found = apart(glance(&few, mask, square, camera), STARTS.0, APART_DEG, None);
+        let mut begun = 0;
+        // Few steps already tell the hopeless apart: many starts are had for little.
+        for ((_, steps), left) in [(STARTS, COARSE.0), (COARSE, FINE)] {
+            let poses = found.into_iter().map(|(start, _)| posed(start)).collect();
+            let stage = SolveConfig { steps, size: COARSE_SIZE, learning_rate: self.learning_rate };
+            let better = self.improved::<B>(&few, poses, method, &stage, begun, &mut visit)?;
+            found = apart(better, left, APART_DEG, Some(&few));
+            begun += steps;
+        }
+        let least = found.first().map_or(0.0, |&(_, loss)| loss);
+        let found = found.into_iter().filter(|&(_, loss)| loss <= least + HOPEFUL);
+        Ok(found.map(|(start, _)| start).collect())
+    }
+
+    /// How poses are improved on many pixels.
+    pub fn fine(&self) -> SolveConfig {
+        let learning_rate = self.learning_rate / 3.0;
+        SolveConfig { size: self.fine_size, steps: self.fine_steps, learning_rate }
     }
 
     /// Poses that are improved side by side: the best of the way of each by its hard image, and the error of that.
@@ -161,15 +181,13 @@ impl PoseSearch {
         mesh: &Mesh,
         poses: Vec<MaskPose>,
         method: &Method,
-        stage: Stage,
+        stage: &SolveConfig,
         begun: usize,
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
         let problem = MaskPoses::new(mesh, poses.clone(), self.optimise_fov);
-        let config =
-            SolveConfig { size: stage.size, steps: stage.steps, learning_rate: stage.rate };
         let mut best = vec![None; poses.len()];
-        minimize::<_, B>(&problem, &poses, method, &config, false, |iterate: &Iterate, scene| {
+        minimize::<_, B>(&problem, &poses, method, stage, false, |iterate: &Iterate, scene| {
             let now = scene.found(iterate.theta.clone(), &poses);
             for ((best, camera), &loss) in best.iter_mut().zip(now).zip(&iterate.hard_loss) {
                 if best.is_none_or(|(_, least)| loss < least) {
@@ -183,11 +201,12 @@ impl PoseSearch {
     }
 }
 
-#[derive(Clone, Copy)]
-struct Stage {
-    steps: usize,
-    size: usize,
-    rate: f64,
+/// A mesh without what cannot be told on few pixels.
+fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
+    let (_, radius) = ball(mesh);
+    let merged = mesh.clustered(DETAIL * 2.0 * radius);
+    let merged = merged.filter(|few| few.area() > LEAST_AREA * mesh.area());
+    merged.map_or(Cow::Borrowed(mesh), Cow::Owned)
 }
 
 /// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error before

@@ -1,11 +1,10 @@
 use std::sync::Arc;
 
 use burn::tensor::Tensor;
-use softrast_inverse::Targets;
 use softrast_meta::tensor;
 use softrast_raster::{RasterBackend, hard_silhouette, mse_loss};
 
-use crate::Instance;
+use crate::{Targets, triangles::Instance};
 
 /// Weight of the Laplacian in the loss.
 ///

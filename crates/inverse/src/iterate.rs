@@ -1,0 +1,158 @@
+use std::borrow::Borrow;
+
+use anyhow::Context;
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, TensorData, Transaction, backend::Backend},
+};
+use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
+use softrast_softness::numbers;
+
+use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
+
+/// All instances after some steps.
+#[derive(Clone, Debug)]
+pub struct Iterate {
+    /// Steps taken so far.
+    pub step: usize,
+    /// How often a run with feedback was stuck and began again so far.
+    pub begun_again: usize,
+    /// Where on its path the softness is, 0 to 1.
+    pub part: f64,
+    /// Scale of the softness, in NDC (NDC² if squared).
+    pub scale: f64,
+    /// The parameters of the scene, on the CPU, `[N]`.
+    pub theta: Tensor<HostBackend, 1>,
+    /// What is lowered, of each instance.
+    pub loss: Vec<f64>,
+    /// What is wrong with its soft image.
+    pub soft_loss: Vec<f64>,
+    /// What is wrong with its hard image at full size: what can be told without knowing the answer.
+    pub hard_loss: Vec<f64>,
+    /// The soft image of the first instance, at full size, where pictures are wanted: row by row, the views or channels one after the
+    /// other.
+    pub image: Option<Vec<f64>>,
+    /// Time of the step that ended here, in seconds; none before the first.
+    pub seconds: Option<f64>,
+}
+
+/// Instances that are solved side by side, and what draws them.
+pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R> {
+    pub(crate) problem: R,
+    instances: usize,
+    size: usize,
+    renderer: ScheduledRenderer,
+    pub(crate) scene: P::Scene<Autodiff<B>>,
+    /// The scene on the CPU.
+    pub(crate) host: P::Scene<HostBackend>,
+}
+
+/// What is seen at a step, on the device.
+pub(crate) struct Seen<B: RasterBackend> {
+    pub(crate) theta: Tensor<B, 1>,
+    image: Tensor<B, 3>,
+    soft_loss: Tensor<B, 1>,
+    /// What is lowered, of each instance, with a tape.
+    pub(crate) loss: Tensor<Autodiff<B>, 1>,
+}
+
+impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
+    pub(crate) fn new(
+        of: R,
+        instances: &[P::Instance],
+        method: &Method,
+        SolveConfig { size, steps, .. }: &SolveConfig,
+    ) -> Self {
+        let (problem, size) = (of.borrow(), *size);
+        let layout = PhiLayout::new(method.softness.clone(), problem.own_phi(), *steps, size);
+        let rasterizer = Rasterizer { tolerance: method.tolerance(), ..Rasterizer::new(size) };
+        let (phi, faces) = (layout.start(), problem.faces());
+        let renderer = ScheduledRenderer::new(layout, &phi, rasterizer, method.resolution, faces);
+        let (scene, host) = (problem.scene(instances, size), problem.scene(instances, size));
+        Self { problem: of, instances: instances.len(), size, renderer, scene, host }
+    }
+
+    /// What is seen at `theta` `[N]`, under the softness at a part of its path, 0 to 1.
+    pub(crate) fn seen(&self, part: f64, theta: Tensor<Autodiff<B>, 1>) -> Seen<B> {
+        let (problem, Self { scene, renderer, .. }) = (self.problem.borrow(), self);
+        let image = problem.image(scene, theta.clone(), &renderer.at_part(part));
+        let soft = problem.image_loss(scene, image.clone());
+        let loss = lowered(problem, scene, theta.clone(), soft.clone());
+        Seen { theta: theta.inner(), image: image.inner(), soft_loss: soft.inner(), loss }
+    }
+
+    /// The numbers of what is seen, with its hard error.
+    pub(crate) fn read(
+        &self,
+        step: usize,
+        part: f64,
+        seen: Seen<B>,
+        picture: bool,
+    ) -> anyhow::Result<Iterate> {
+        let image = picture.then(|| of_first(seen.image, self.instances));
+        let rows = image.as_ref().map(|image| image.dims()[2]);
+        // One round trip to the device for all of it.
+        let read = Transaction::default().register(seen.theta).register(seen.loss.inner());
+        let read = read.register(seen.soft_loss);
+        let read = image.into_iter().fold(read, |read, image| read.register(image));
+        let mut read = read.execute().into_iter();
+        let mut next = || read.next().context("fewer tensors were read than were asked for");
+        let (theta, loss, soft_loss) = (on_host(next()?), next()?, next()?);
+        let image = rows.map(|side| {
+            let pixels: Vec<f64> = next()?.iter().collect();
+            anyhow::Ok(enlarged(&pixels, side, self.size))
+        });
+        let problem = self.problem.borrow();
+        let hard = problem.hard_image(&self.host, theta.clone());
+        Ok(Iterate {
+            step,
+            begun_again: 0,
+            part,
+            scale: self.renderer.scale(part),
+            theta,
+            loss: loss.iter().collect(),
+            soft_loss: soft_loss.iter().collect(),
+            hard_loss: numbers(problem.image_loss(&self.host, hard)),
+            image: image.transpose()?,
+            seconds: None,
+        })
+    }
+}
+
+/// The views of the first of so many instances.
+fn of_first<B: Backend>(image: Tensor<B, 3>, instances: usize) -> Tensor<B, 3> {
+    let [views, _, _] = image.dims();
+    image.narrow(0, 0, views / instances)
+}
+
+/// What was read of a device as a tensor on the CPU, in the same float type.
+fn on_host(data: TensorData) -> Tensor<HostBackend, 1> {
+    let dtype = data.dtype;
+    Tensor::from_data(data, (&Default::default(), dtype))
+}
+
+/// Views of `side` × `side` pixels on `size` × `size` ones: each pixel is repeated. Images of another shape stay as they are.
+fn enlarged(image: &[f64], side: usize, size: usize) -> Vec<f64> {
+    if side >= size {
+        return image.to_vec();
+    }
+    // Resolutions divide the size.
+    let times = size / side;
+    let view = |view: &[f64]| -> Vec<f64> {
+        (0..size * size).map(|k| view[k / size / times * side + k % size / times]).collect()
+    };
+    image.chunks(side * side).flat_map(view).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coarse_image_is_enlarged_by_repeating_its_pixels() {
+        let (few, many) = ([1.0, 2.0, 3.0, 4.0], [1.0, 1.0, 2.0, 2.0]);
+        assert_eq!(enlarged(&few, 2, 4)[..8], [many, many].concat());
+        assert_eq!(enlarged(&few, 2, 2), few);
+        assert_eq!(enlarged(&[few, few].concat(), 2, 4).len(), 32);
+    }
+}

@@ -1,0 +1,226 @@
+//! What the page's worker calls. Numbers that belong together come as JSON, pictures as bytes, errors as one line of text.
+
+use std::cell::RefCell;
+
+use serde_json::json;
+use softrast_mesh::{Mesh, fox};
+use wasm_bindgen::prelude::wasm_bindgen;
+
+use crate::{
+    Frame, MaskRun, Playground, PoseRun, Run, Scene, Settings, ShapeRun, SoftnessChoice, curves,
+    frame::bytes, loaded, luminance, mask,
+};
+
+thread_local! {
+    static FAULT: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+/// Keeps what a panic says, which a browser shows as `unreachable` only.
+#[wasm_bindgen(start)]
+fn start() {
+    std::panic::set_hook(Box::new(|panic| {
+        FAULT.with(|fault| *fault.borrow_mut() = panic.to_string().replace('\n', " "));
+    }));
+}
+
+/// What the latest panic said.
+#[wasm_bindgen]
+pub fn fault() -> String {
+    FAULT.with(|fault| fault.borrow().clone())
+}
+
+/// Names that can be chosen, as JSON: `preset`, `families` and `learned`.
+#[wasm_bindgen]
+pub fn names() -> String {
+    let [preset, families, learned] = SoftnessChoice::names();
+    json!({ "preset": preset, "families": families, "learned": learned }).to_string()
+}
+
+/// The curve of a softness at `part` of its path, on images of `size` pixels, as JSON: `curves` (that of the softness, and of its surrogate
+/// if it has one, at `count` distances from `-reach` to `reach` in NDC), `width` in NDC, `scale`, `moves`, `feedback` and `note`.
+#[wasm_bindgen]
+pub fn curve(
+    choice: &str,
+    task: &str,
+    part: f64,
+    size: usize,
+    reach: f64,
+    count: usize,
+) -> Result<String, String> {
+    let choice: SoftnessChoice = serde_json::from_str(choice).map_err(|e| e.to_string())?;
+    let softness = choice.of_task(task).map_err(line)?;
+    let part = part.clamp(0.0, 1.0);
+    let values = curves(&softness, part, size, reach, count);
+    let curves: Vec<&[f32]> = values.chunks(count).collect();
+    let (width, scale) = (softness.width_at(part, size), softness.scale_at(part, size));
+    let told = json!({
+        "curves": curves, "width": width, "scale": scale, "moves": !softness.is_constant(),
+        "feedback": softness.feedback.is_some(), "family": softness.softness.family, "note": softness.note,
+    });
+    Ok(told.to_string())
+}
+
+/// The file of a softness, as other programs read it.
+#[wasm_bindgen]
+pub fn softness_file(choice: &str, task: &str) -> Result<String, String> {
+    let choice: SoftnessChoice = serde_json::from_str(choice).map_err(|e| e.to_string())?;
+    choice.of_task(task).map_err(line)?.text(&choice.name).map_err(|e| e.to_string())
+}
+
+/// A mesh to look for.
+#[wasm_bindgen]
+pub struct PageMesh {
+    mesh: Mesh,
+    faces: usize,
+}
+
+#[wasm_bindgen]
+impl PageMesh {
+    /// The fox.
+    pub fn fox() -> Self {
+        let mesh = fox();
+        Self { faces: mesh.faces().len(), mesh }
+    }
+
+    /// The mesh in the bytes of a file of this name.
+    pub fn parse(bytes: &[u8], name: &str) -> Result<Self, String> {
+        loaded(bytes, name).map(|of| Self { mesh: of.mesh, faces: of.faces }).map_err(line)
+    }
+
+    /// Faces of the file, which may be more than are used.
+    pub fn file_faces(&self) -> usize {
+        self.faces
+    }
+
+    /// Vertices, `[vertices * 3]`.
+    pub fn positions(&self) -> Vec<f32> {
+        self.mesh.positions().iter().flatten().map(|&x| x as f32).collect()
+    }
+
+    /// Corners of the faces as vertex numbers, `[faces * 3]`.
+    pub fn faces(&self) -> Vec<u32> {
+        self.mesh.faces().as_flattened().to_vec()
+    }
+}
+
+/// A run of a task.
+#[wasm_bindgen]
+pub struct PageRun {
+    run: Box<dyn Run>,
+    positions: Vec<f32>,
+    frame: Option<Frame>,
+}
+
+#[wasm_bindgen]
+impl PageRun {
+    /// POSE with a target of its own.
+    pub fn pose(mesh: &PageMesh, settings: &str) -> Result<Self, String> {
+        let settings = Settings::parse(settings).map_err(line)?;
+        let run = PoseRun::new(&mesh.mesh, &settings).map_err(line)?;
+        let positions = run.turned(&mesh.mesh);
+        Ok(Self { run: Box::new(run), positions, frame: None })
+    }
+
+    /// POSE from a picture of `[height, width, 4]` bytes, whose transparency or luminance is the mask.
+    pub fn mask(
+        mesh: &PageMesh,
+        rgba: &[u8],
+        width: usize,
+        invert: bool,
+        settings: &str,
+    ) -> Result<Self, String> {
+        let settings = Settings::parse(settings).map_err(line)?;
+        let picture = mask(rgba, width);
+        let picture = if invert { picture.inverted() } else { picture };
+        let run = MaskRun::new(&mesh.mesh, picture, &settings).map_err(line)?;
+        Ok(Self { run: Box::new(run), positions: mesh.positions(), frame: None })
+    }
+
+    /// 2D SHAPE on a picture of `[height, width, 4]` bytes.
+    pub fn shape(rgba: &[u8], width: usize, invert: bool, settings: &str) -> Result<Self, String> {
+        let settings = Settings::parse(settings).map_err(line)?;
+        let picture = luminance(rgba, width);
+        let picture = if invert { picture.inverted() } else { picture };
+        let run = ShapeRun::new(picture, &settings).map_err(line)?;
+        Ok(Self { run: Box::new(run), positions: Vec::new(), frame: None })
+    }
+
+    /// Finds out what the first step needs; `told` is called with the share that is done, 0 to 1.
+    pub fn prepare(&mut self, told: &js_sys::Function) -> Result<(), String> {
+        let mut tell = |share: f64| {
+            // That nobody hears it ends nothing.
+            let _ = told.call1(&wasm_bindgen::JsValue::NULL, &share.into());
+        };
+        self.run.prepare(&mut tell).map_err(line)
+    }
+
+    /// The next frame as JSON; none after the last. Its pictures are [`PageRun::soft`] and [`PageRun::hard`].
+    pub fn next(&mut self) -> Result<Option<String>, String> {
+        self.frame = self.run.next().map_err(line)?;
+        self.frame
+            .as_ref()
+            .map(|frame| serde_json::to_string(frame).map_err(|e| e.to_string()))
+            .transpose()
+    }
+
+    /// The soft image of the latest frame, `[size * size]`.
+    pub fn soft(&self) -> Vec<u8> {
+        self.frame.as_ref().map(|frame| frame.soft.clone()).unwrap_or_default()
+    }
+
+    /// The hard image of the latest frame, `[size * size]`.
+    pub fn hard(&self) -> Vec<u8> {
+        self.frame.as_ref().map(|frame| frame.hard.clone()).unwrap_or_default()
+    }
+
+    /// What it should arrive at, `[size * size]`.
+    pub fn target(&self) -> Vec<u8> {
+        bytes(&self.run.target())
+    }
+
+    /// Vertices in the frame in which cameras are told, `[vertices * 3]`.
+    pub fn positions(&self) -> Vec<f32> {
+        self.positions.clone()
+    }
+
+    /// Size, steps and the camera of the target as JSON.
+    pub fn about(&self) -> String {
+        json!({ "size": self.run.size(), "steps": self.run.steps(), "truth": self.run.truth() })
+            .to_string()
+    }
+}
+
+/// Triangles and the gradients of pixels.
+#[wasm_bindgen]
+#[derive(Default)]
+pub struct PagePlayground {
+    playground: Playground,
+    gradient: Vec<f32>,
+}
+
+#[wasm_bindgen]
+impl PagePlayground {
+    /// An empty one.
+    #[wasm_bindgen(constructor)]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The soft picture of a [`Scene`] in JSON, `[size * size]`.
+    pub fn draw(&mut self, scene: &str) -> Result<Vec<f32>, String> {
+        let scene: Scene = serde_json::from_str(scene).map_err(|e| e.to_string())?;
+        let field = self.playground.draw(&scene).map_err(line)?;
+        self.gradient = field.gradient;
+        Ok(field.image)
+    }
+
+    /// Derivatives of the picture that was just drawn, `[grid * grid, triangles, 3, 2]`.
+    pub fn gradient(&mut self) -> Vec<f32> {
+        std::mem::take(&mut self.gradient)
+    }
+}
+
+/// An error with what led to it, on one line.
+fn line(error: anyhow::Error) -> String {
+    format!("{error:#}").replace('\n', " ")
+}

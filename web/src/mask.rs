@@ -1,0 +1,138 @@
+use anyhow::Context;
+use softrast_inverse::{
+    InverseProblem, Lens, Method, Minimization, Picture, SolveConfig,
+    pose::{MaskPose, MaskPoses, PoseSearch},
+};
+use softrast_mesh::Mesh;
+use softrast_raster::Pinhole;
+use softrast_softness::numbers;
+
+use crate::{Backend, CameraView, Frame, Run, Settings};
+
+/// Field of view along the shorter side of a mask, in degrees: nothing is known of the lens.
+const ASSUMED_FOV_DEG: f64 = 45.0;
+/// Starts that are gone through at most.
+const STARTS: usize = 3;
+
+/// POSE from a mask: first all directions and rolls are looked at, then the most hopeful starts are improved, one after the other.
+pub struct MaskRun {
+    mesh: Mesh,
+    mask: Picture,
+    camera: Pinhole,
+    square: [f64; 3],
+    method: Method,
+    /// That of each start.
+    config: SolveConfig,
+    starts: Vec<Pinhole>,
+    /// Number of the start that is improved, counted from 0.
+    start: usize,
+    run: Option<(Minimization<MaskPoses, Backend>, MaskPose)>,
+    /// What had the least error so far.
+    best: Option<Frame>,
+    step: usize,
+}
+
+impl MaskRun {
+    /// The run for a mask of any size, not begun.
+    ///
+    /// # Errors
+    ///
+    /// If the mask is empty or full, the mesh has no extent, or the softness is not one.
+    pub fn new(mesh: &Mesh, mask: Picture, settings: &Settings) -> anyhow::Result<Self> {
+        let camera = Lens::of_fov(ASSUMED_FOV_DEG, mask.size()).pinhole(mask.size())?;
+        PoseSearch::check(mesh, &mask, &camera, false)?;
+        let (method, config) =
+            settings.method("mask", PoseSearch::default().fine().learning_rate)?;
+        let square = mask.looked_at()?;
+        Ok(Self {
+            mesh: mesh.clone(),
+            mask,
+            camera,
+            square,
+            method,
+            config,
+            starts: vec![],
+            start: 0,
+            run: None,
+            best: None,
+            step: 0,
+        })
+    }
+
+    /// Begins with the next start, if there is one.
+    fn begin(&mut self) -> anyhow::Result<()> {
+        let Some(&start) = self.starts.get(self.start) else { return Ok(()) };
+        let pose = MaskPose { mask: self.mask.clone(), square: self.square, start };
+        let problem = MaskPoses::new(&self.mesh, vec![pose.clone()], false);
+        let run = Minimization::new(problem, vec![pose.clone()], &self.method, &self.config, true)?;
+        self.run = Some((run, pose));
+        Ok(())
+    }
+}
+
+impl Run for MaskRun {
+    fn size(&self) -> usize {
+        self.config.size
+    }
+
+    fn steps(&self) -> usize {
+        let each = self.config.steps + 1;
+        each * self.starts.len().max(1)
+    }
+
+    fn target(&self) -> Vec<f64> {
+        let [levels, _] = self.mask.part(self.square, self.config.size);
+        levels
+    }
+
+    fn prepare(&mut self, told: &mut dyn FnMut(f64)) -> anyhow::Result<()> {
+        let search = PoseSearch { fine_steps: 0, ..PoseSearch::default() };
+        // A softness with feedback solves one instance at a time; here there are many, and only coarse.
+        let mut method = self.method.clone();
+        method.softness.feedback = None;
+        told(0.0);
+        let steps = search.steps(false) as f64;
+        let starts = search.starts::<Backend>(
+            &self.mesh,
+            &self.mask,
+            &self.camera,
+            &method,
+            |step, _| {
+                told(step as f64 / steps);
+                Ok(())
+            },
+        )?;
+        self.starts = starts.into_iter().take(STARTS).collect();
+        self.begin()
+    }
+
+    /// The last frame is the best of all again.
+    fn next(&mut self) -> anyhow::Result<Option<Frame>> {
+        let Some((run, pose)) = &mut self.run else { return Ok(None) };
+        let Some(iterate) = run.next().transpose()? else {
+            self.start += 1;
+            self.run = None;
+            self.begin()?;
+            return match &self.run {
+                Some(_) => self.next(),
+                None => Ok(self.best.take().map(|best| Frame { step: self.step, ..best })),
+            };
+        };
+        let hard = run.problem().hard_image(run.scene(), iterate.theta.clone());
+        let cameras = run.scene().found(iterate.theta.clone(), std::slice::from_ref(pose));
+        let camera = cameras.first().context("a pose has a camera")?;
+        let [down, ahead] = [1, 2].map(|row| camera.rotation[row]);
+        let view = CameraView { eye: camera.eye(), ahead, up: down.map(|x| -x) };
+        let frame = Frame {
+            step: self.step,
+            camera: Some(view),
+            start: [self.start, self.starts.len()],
+            ..Frame::new(&iterate, &numbers(hard), numbers(iterate.theta.clone()))
+        };
+        self.step += 1;
+        if self.best.as_ref().is_none_or(|best| frame.hard_loss < best.hard_loss) {
+            self.best = Some(frame.clone());
+        }
+        Ok(Some(frame))
+    }
+}

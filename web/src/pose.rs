@@ -1,0 +1,76 @@
+use softrast_inverse::{
+    InverseProblem, Minimization, PoseProblem, SolveConfig, pose::PoseInstance,
+};
+use softrast_mesh::Mesh;
+use softrast_raster::{HostBackend, view_rotation};
+use softrast_softness::{numbers, vector};
+
+use crate::{Backend, CameraView, Frame, Run, Settings};
+
+/// POSE: the camera of a target that was drawn from a pose of its own.
+pub struct PoseRun {
+    run: Minimization<PoseProblem, Backend>,
+    instance: PoseInstance,
+    config: SolveConfig,
+}
+
+impl PoseRun {
+    /// The run of a seed, not begun.
+    ///
+    /// # Errors
+    ///
+    /// If the softness is not one.
+    pub fn new(mesh: &Mesh, settings: &Settings) -> anyhow::Result<Self> {
+        let problem = PoseProblem::new(mesh);
+        let (method, config) = settings.method("pose", problem.defaults().learning_rate)?;
+        let instance = problem.instance(settings.seed.into())?;
+        let run = Minimization::new(problem, vec![instance], &method, &config, true)?;
+        Ok(Self { run, instance, config })
+    }
+
+    /// Vertices as the target camera has its axes: a frame in which that camera stands at elevation 0 and azimuth 0, flat.
+    pub fn turned(&self, mesh: &Mesh) -> Vec<f32> {
+        let target = self.instance.target;
+        let of = |angle: f64| vector::<HostBackend>(&[angle]);
+        let r = numbers(view_rotation(of(target.elevation_deg), of(target.azimuth_deg)));
+        let turned = |p: &[f64; 3]| {
+            [0, 1, 2].map(|i| (0..3).map(|k| r[3 * i + k] * p[k]).sum::<f64>() as f32)
+        };
+        mesh.positions().iter().flat_map(turned).collect()
+    }
+
+    fn target_camera(&self) -> CameraView {
+        CameraView::orbiting([self.instance.target.distance, 0.0, 0.0])
+    }
+}
+
+impl Run for PoseRun {
+    fn size(&self) -> usize {
+        self.config.size
+    }
+
+    fn steps(&self) -> usize {
+        self.config.steps
+    }
+
+    fn target(&self) -> Vec<f64> {
+        numbers(self.run.scene().target())
+    }
+
+    fn truth(&self) -> Option<CameraView> {
+        Some(self.target_camera())
+    }
+
+    fn next(&mut self) -> anyhow::Result<Option<Frame>> {
+        let Some(iterate) = self.run.next().transpose()? else { return Ok(None) };
+        let hard = self.run.problem().hard_image(self.run.scene(), iterate.theta.clone());
+        let theta = numbers(iterate.theta.clone());
+        let camera = CameraView::orbiting([theta[0], theta[1], theta[2]]);
+        let angle_deg = Some(camera.angle_deg(&self.target_camera()));
+        Ok(Some(Frame {
+            angle_deg,
+            camera: Some(camera),
+            ..Frame::new(&iterate, &numbers(hard), theta)
+        }))
+    }
+}
