@@ -18,7 +18,8 @@ fn main() -> anyhow::Result<()> {
         losses.push(frame.loss);
         angles.push(frame.angle_deg);
     }
-    let told = serde_json::json!({ "losses": losses, "angles": angles, "milliseconds": milliseconds });
+    let told =
+        serde_json::json!({ "losses": losses, "angles": angles, "milliseconds": milliseconds });
     println!("{told}");
     Ok(())
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     float::Float,
-    lanes::{LANES, Lanes, Plain, has_avx2},
+    lanes::{LANES, Lanes, Plain, has_vectors},
     reach::{Reach, grown, in_pixels},
     real::splat,
 };
@@ -72,8 +72,8 @@ impl Bands {
             let place = |((&x, &y), &z)| in_pixels([x, y, z], near, size);
             let places: Vec<_> = x.iter().zip(y).zip(z).map(place).collect();
             let mut reaches = vec![Reach::NOTHING; faces.len()];
-            let drawn = if has_avx2() {
-                reach_of_faces::<F::Avx2>(&places, faces, radius, size, &mut reaches)
+            let drawn = if has_vectors() {
+                reach_of_faces::<F::Best>(&places, faces, radius, size, &mut reaches)
             } else {
                 reach_of_faces::<Plain<F>>(&places, faces, radius, size, &mut reaches)
             };
@@ -111,7 +111,7 @@ fn reach_of_faces<L: Lanes>(
             #[allow(unsafe_code)]
             return unsafe { avx2::<L>(places, faces, radius, size, reaches) };
         }
-        if L::GAINS_AVX2 && has_avx2() {
+        if L::GAINS_AVX2 && has_vectors() {
             // SAFETY: the feature was just detected.
             #[allow(unsafe_code)]
             return unsafe { avx2::<L>(places, faces, radius, size, reaches) };

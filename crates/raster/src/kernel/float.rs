@@ -23,8 +23,8 @@ pub(crate) trait Float:
     + Neg<Output = Self>
     + AddAssign
 {
-    /// The best vectors of a machine with AVX2.
-    type Avx2: Lanes<Float = Self>;
+    /// The best vectors of a machine that has them; see [`has_vectors`](super::lanes::has_vectors).
+    type Best: Lanes<Float = Self>;
     const ZERO: Self;
     const ONE: Self;
     /// Nearest float.
@@ -52,12 +52,9 @@ pub(crate) trait Float:
 }
 
 macro_rules! float {
-    ($float:ty, $bits:ty, $mantissa:expr, $bias:expr, $avx2:ty, $exp:path) => {
+    ($float:ty, $bits:ty, $mantissa:expr, $bias:expr, $best:ty, $exp:path) => {
         impl Float for $float {
-            #[cfg(target_arch = "x86_64")]
-            type Avx2 = $avx2;
-            #[cfg(not(target_arch = "x86_64"))]
-            type Avx2 = Plain<Self>;
+            type Best = $best;
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             #[inline(always)]
@@ -119,7 +116,7 @@ macro_rules! float {
     };
 }
 
-float!(f32, u32, 23, 127, super::lanes::x86::F32x8, exp);
+float!(f32, u32, 23, 127, super::lanes::F32x8, exp);
 float!(f64, u64, 52, 1023, Plain<f64>, f64::exp);
 
 /// `e^x` without a branch or a call, so that loops over it become vectors; to 2 units in the last

@@ -1,18 +1,30 @@
 //! Eight numbers that are computed together.
 //!
-//! Every operation is one that all machines round alike, and none is contracted. So explicit vectors
-//! ([`x86`]) and plain arrays ([`Plain`]) give the same bits.
+//! Every operation is one that all machines round alike, and none is contracted. So explicit vectors (`x86`, `wasm`) and plain arrays
+//! ([`Plain`]) give the same bits.
 //!
 //! Loops run over numbers of lanes: an iterator's closure is a function without the features of its caller, and is not turned
 //! into vectors.
 #![allow(clippy::needless_range_loop, clippy::assign_op_pattern)]
 
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 #[cfg(target_arch = "x86_64")]
-pub(crate) mod x86;
+mod x86;
 
 use std::ops::{Add, AddAssign, Mul, Sub};
 
 use super::float::Float;
+
+/// The best vectors of `f32`, for machines that [have them](has_vectors).
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub(crate) type F32x8 = wasm::F32x8;
+/// The best vectors of `f32`, for machines that [have them](has_vectors).
+#[cfg(target_arch = "x86_64")]
+pub(crate) type F32x8 = x86::F32x8;
+/// The best vectors of `f32`, for machines that [have them](has_vectors).
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128"))))]
+pub(crate) type F32x8 = Plain<f32>;
 
 /// Numbers in a vector.
 pub(crate) const LANES: usize = 8;
@@ -160,7 +172,7 @@ pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
             #[allow(unsafe_code)]
             return unsafe { avx2(work) };
         }
-        if L::GAINS_AVX2 && has_avx2() {
+        if L::GAINS_AVX2 && has_vectors() {
             // SAFETY: the feature was just detected.
             #[allow(unsafe_code)]
             return unsafe { avx2(work) };
@@ -174,8 +186,9 @@ pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
 pub(crate) static PORTABLE: std::sync::atomic::AtomicBool =
     std::sync::atomic::AtomicBool::new(false);
 
-/// Whether this machine has AVX2.
-pub(crate) fn has_avx2() -> bool {
+/// Whether this machine has vectors that are better than arrays: AVX2, which is asked for at run time, or those of WebAssembly, for which
+/// all of a program is compiled or nothing.
+pub(crate) fn has_vectors() -> bool {
     #[cfg(test)]
     if PORTABLE.load(std::sync::atomic::Ordering::SeqCst) {
         return false;
@@ -183,13 +196,13 @@ pub(crate) fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
     return is_x86_feature_detected!("avx2");
     #[cfg(not(target_arch = "x86_64"))]
-    false
+    cfg!(all(target_arch = "wasm32", target_feature = "simd128"))
 }
 
 /// Rows of a table, one for each lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Places {
-    /// Each below `rows`; of vectors as explicit as in [`x86`], bytes from the first row.
+    /// Each below `rows`; of vectors as explicit as in `x86`, bytes from the first row.
     at: [u32; LANES],
     /// What the table has at least.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]

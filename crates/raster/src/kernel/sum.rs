@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{
     bands::{Bands, View},
     float::Float,
-    lanes::{Plain, has_avx2},
+    lanes::{Plain, has_vectors},
     list::rows_of_bands,
     real::{self, Dual, Real, Table},
     scene::Scene,
@@ -53,8 +53,8 @@ impl<F: Float> Inputs<'_, F> {
 
 /// Sums of the profile, `[views, height, width]`. `bands` are those of these inputs.
 pub(crate) fn forward<F: Float>(inputs: &Inputs<F>, bands: &Bands) -> Vec<F> {
-    if has_avx2() {
-        image::<F::Avx2>(&inputs.scene([&[]; 2]), bands)
+    if has_vectors() {
+        image::<F::Best>(&inputs.scene([&[]; 2]), bands)
     } else {
         image::<Plain<F>>(&inputs.scene([&[]; 2]), bands)
     }
@@ -68,8 +68,8 @@ pub(crate) fn vjp<F: Float>(
     wanted: [bool; 2],
 ) -> Vec<F> {
     let wanted = [wanted[0], wanted[1], false];
-    if has_avx2() {
-        gradient::<F::Avx2>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
+    if has_vectors() {
+        gradient::<F::Best>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
     } else {
         gradient::<Plain<F>>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
     }
@@ -97,8 +97,8 @@ pub(crate) fn vjp_of_vjp<F: Float>(
         if along[0] { to_vertices } else { &still[0] },
         if along[1] { to_table } else { &still[1] },
     ];
-    if has_avx2() {
-        gradient::<Dual<F::Avx2>>(&inputs.scene(tangents), bands, upstream, wanted)
+    if has_vectors() {
+        gradient::<Dual<F::Best>>(&inputs.scene(tangents), bands, upstream, wanted)
     } else {
         gradient::<Dual<Plain<F>>>(&inputs.scene(tangents), bands, upstream, wanted)
     }

@@ -237,7 +237,7 @@ macro_rules! dispatched {
                     return unsafe { avx2(scene, place, upstream, image, gradient) };
                 }
                 if T::Lanes::GAINS_AVX2 {
-                    if super::lanes::has_avx2() {
+                    if super::lanes::has_vectors() {
                         // SAFETY: the feature was just detected.
                         #[allow(unsafe_code)]
                         return unsafe { avx2(scene, place, upstream, image, gradient) };

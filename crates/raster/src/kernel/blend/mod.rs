@@ -27,7 +27,7 @@ use self::{
 use super::{
     bands::View,
     float,
-    lanes::{Lanes, Plain, Work, has_avx2, run},
+    lanes::{Lanes, Plain, Work, has_vectors, run},
     list::rows_of_bands,
     real::{self, Dual, Real, Table, splat},
     scene::Scene,
@@ -203,8 +203,8 @@ impl<F: float::Float> Kept<F> {
 /// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` is of these inputs.
 pub(crate) fn forward<F: float::Float>(inputs: &Inputs<F>, kept: &Kept<F>) -> Vec<F> {
     let tangents = [&[][..]; 5];
-    if has_avx2() {
-        passes::<F::Avx2>(inputs, &inputs.blend(tangents), kept, None).image()
+    if has_vectors() {
+        passes::<F::Best>(inputs, &inputs.blend(tangents), kept, None).image()
     } else {
         passes::<Plain<F>>(inputs, &inputs.blend(tangents), kept, None).image()
     }
@@ -219,8 +219,8 @@ pub(crate) fn vjp<F: float::Float>(
 ) -> Vec<F> {
     let tangents = [&[][..]; 5];
     let pull = Some((upstream, wanted));
-    if has_avx2() {
-        passes::<F::Avx2>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
+    if has_vectors() {
+        passes::<F::Best>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
     } else {
         passes::<Plain<F>>(inputs, &inputs.blend(tangents), kept, pull).gradient(wanted)
     }
@@ -251,8 +251,8 @@ pub(crate) fn vjp_of_vjp<F: float::Float>(
     });
     let [wanted @ .., to_upstream] = wanted;
     let pull = Some((upstream, wanted));
-    let passed = if has_avx2() {
-        passes::<Dual<F::Avx2>>(inputs, &inputs.blend(tangents), kept, pull)
+    let passed = if has_vectors() {
+        passes::<Dual<F::Best>>(inputs, &inputs.blend(tangents), kept, pull)
     } else {
         passes::<Dual<Plain<F>>>(inputs, &inputs.blend(tangents), kept, pull)
     };

@@ -1,7 +1,7 @@
 //! Eight `f32` in a vector of AVX2.
 //!
 //! Values of this type come to be only behind a check that the machine has AVX2
-//! ([`has_avx2`](super::has_avx2)), and all is inlined into functions that are compiled for it.
+//! ([`has_vectors`](super::has_vectors)), and all is inlined into functions that are compiled for it.
 #![allow(unsafe_code)]
 
 use std::{
