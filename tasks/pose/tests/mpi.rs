@@ -76,7 +76,7 @@ fn any_number_of_processes_learns_the_same_to_the_last_bit() {
 
 #[test]
 fn a_lost_process_ends_all_and_another_number_goes_on() {
-    let long = EXACT.replace("--outer 3", "--outer 40");
+    let long = EXACT.replace("--outer 3", "--outer 12");
     let alone = tempfile::tempdir().unwrap();
     let expected = learned(alone.path(), None, &long);
     let out = tempfile::tempdir().unwrap();
