@@ -59,11 +59,12 @@ onPage("the camera of the fox is found, by the steps of a native run", "", async
   const { runs: [run] } = await saved(page);
   assert.equal(run.losses.length, 301);
   assert.ok(run.angle_deg < 5, `the camera ends ${run.angle_deg} degrees off`);
-  // Made by the example `native`. Rounding of sines and exponentials differs between machines, and later steps go apart by it.
+  assert.equal(run.hard_loss, Math.min(...run.hard_losses), "the step that fits best is returned");
+  // Sines and exponentials are rounded differently in a browser, and after some fifty steps runs have gone apart by it.
   const native = JSON.parse(await readFile(new URL("native.json", import.meta.url)));
-  const differences = native.losses.map((loss, k) => Math.abs(loss - run.losses[k]));
-  const largest = Math.max(...differences.slice(0, native.compared));
-  assert.ok(largest < 1e-4, `losses of the first ${native.compared} steps differ by ${largest}`);
+  assert.equal(native.losses.length, 41);
+  const largest = Math.max(...native.losses.map((loss, k) => Math.abs(loss - run.losses[k])));
+  assert.ok(largest < 1e-4, `losses of the first 40 steps differ by ${largest}`);
   assert.equal(await error(page), "");
 });
 
