@@ -1,4 +1,4 @@
-// The page in a real browser: `node --test tests/`, after `./build`. Chromium is CHROMIUM or /usr/bin/chromium.
+// The page in a real browser: `node --test tests/page.test.mjs`, after `./build`. Chromium is CHROMIUM or /usr/bin/chromium.
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
