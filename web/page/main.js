@@ -73,7 +73,7 @@ async function begin() {
     return;
   }
   const solver = (task, usual) => new Solver(section(task), { task, usual, engine, names, say });
-  tabs.pose = solver("pose", { tab: "", seed: 0, steps: 300, size: 64 });
+  tabs.pose = solver("pose", { tab: "", seed: 4, steps: 300, size: 64 });
   tabs.shape = solver("shape", { tab: "", seed: 0, steps: 200, size: 96, triangles: 200 });
   tabs.play = new Playground(section("play"), { engine, names, say });
   addEventListener("hashchange", route);

@@ -330,11 +330,16 @@ export class Solver {
     frames.forEach((frame, k) => {
       if (!frame || !this.runs[k]) return;
       const { soft, hard, ...numbers } = frame;
-      this.runs[k].latest = { ...numbers, soft, hard };
-      this.runs[k].frames.push(numbers);
+      const run = this.runs[k];
+      run.latest = { ...numbers, soft, hard };
+      run.frames.push(numbers);
+      // Of steps that are equally good the last, as in the other programs.
+      if (!run.best || frame.hard_loss <= run.best.hard_loss) run.best = run.latest;
     });
     if (ended) {
       this.state = "ended";
+      // What a run returns is what fits best, which can be told without knowing the answer.
+      for (const run of this.runs) run.latest = run.best;
       this.draw();
     }
     const shown = this.runs[0]?.latest;
@@ -383,18 +388,25 @@ export class Solver {
       this.status.textContent = state === "ready" ? `${this.note ?? ""}Press Start.` : (this.note ?? "");
       return;
     }
-    this.bar.value = latest[0].step / this.steps;
-    const [first] = latest;
-    const of = latest.map((frame, k) => (frame ? `${latest.length > 1 ? `${titled(this.asked[k].softness.name)}: ` : ""}${this.#errorOf(frame)}` : "")).join(" ");
+    const first = this.runs[0].frames.at(-1);
+    this.bar.value = first.step / this.steps;
+    const of = latest.map((frame, k) => (frame ? `${this.#nameOf(frame, k)}${this.#errorOf(frame)}` : "")).join("");
     const [start, starts] = first.start;
     const which = starts > 1 ? `, start ${start + 1} of ${starts}` : start > 0 ? `, start ${start + 1}` : "";
     const ms = this.#milliseconds;
-    this.status.textContent = `${this.note ?? ""}Step ${first.step} of ${this.steps}${which}. ${of}${ms ? ` ${ms.toFixed(1)} ms a step.` : ""}`;
+    this.status.textContent = `${this.note ?? ""}Step ${first.step} of ${this.steps}${which}${of}.${ms ? ` ${ms.toFixed(1)} ms a step.` : ""}`;
+  }
+
+  /** Which run, and at the end which step of it is shown. */
+  #nameOf(frame, k) {
+    const isBest = this.state === "ended" && frame.step < this.steps;
+    if (this.runs.length === 1) return isBest ? `, the best at step ${frame.step}: ` : ": ";
+    return `. ${titled(this.asked[k].softness.name)}${isBest ? `, the best at step ${frame.step}` : ""}: `;
   }
 
   #errorOf(frame) {
-    if (frame.angle_deg !== null) return `Loss ${frame.loss.toFixed(4)}, camera ${frame.angle_deg.toFixed(1)}° off.`;
-    return this.kind === "mask" ? `Overlap over union ${(1 - frame.hard_loss).toFixed(3)}.` : `Loss ${frame.loss.toFixed(4)}, hard error ${frame.hard_loss.toFixed(4)}.`;
+    if (frame.angle_deg !== null) return `loss ${frame.loss.toFixed(4)}, camera ${frame.angle_deg.toFixed(1)}° off`;
+    return this.kind === "mask" ? `overlap over union ${(1 - frame.hard_loss).toFixed(3)}` : `loss ${frame.loss.toFixed(4)}, hard error ${frame.hard_loss.toFixed(4)}`;
   }
 
   /** The median of the steps so far, all runs together. */
@@ -469,7 +481,8 @@ export class Solver {
       runs: runs.map(({ frames, latest }, k) => ({
         settings: asked[k],
         softness: softnesses[k],
-        steps: latest.step,
+        steps: frames.at(-1).step,
+        returned_step: latest.step,
         loss: latest.loss,
         hard_loss: latest.hard_loss,
         angle_deg: latest.angle_deg ?? undefined,
