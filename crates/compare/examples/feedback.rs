@@ -7,6 +7,7 @@
 //!
 //! Writes `docs/studies/feedback-*.svg` and their points as CSV.
 
+#[allow(dead_code, reason = "not every study uses all of it")]
 mod common;
 
 use std::path::Path;

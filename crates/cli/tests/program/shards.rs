@@ -148,17 +148,14 @@ fn killed_and_doubled_processes_change_nothing() {
     let expected = result(start(whole.path(), &[]));
     let shards = ["1/8", "2/8", "3/8", "4/8", "5/8", "6/8", "7/8", "8/8", "8/8"];
     let mut children = shards.map(|shard| start(out.path(), &["--shard", shard])).into_iter();
-    let mut killed = 0;
-    for child in children.by_ref().take(2) {
-        let mut child = child;
+    for (k, mut child) in (1..).zip(children.by_ref().take(2)) {
         // As soon as it has a file, if not before it has finished.
-        let file = out.path().join(format!("evaluate.{}-of-8.jsonl", killed + 1));
+        let file = out.path().join(format!("evaluate.{k}-of-8.jsonl"));
         while !file.exists() && child.try_wait().unwrap().is_none() {
             thread::yield_now();
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        killed += 1;
     }
     children.for_each(|child| drop(result(child)));
     assert_eq!(result(start(out.path(), &["--resume"])), expected);
