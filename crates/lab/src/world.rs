@@ -105,9 +105,20 @@ mod joined {
 
     use crate::Failure;
 
-    /// Processes that are joined.
+    /// Processes that are joined. The universe is left first, and then waited after.
     pub(super) struct Joined {
         universe: Universe,
+        _left: Left,
+    }
+
+    /// Waits a little when it is dropped: on a busy machine, `mpirun` of Open MPI 4 may take a process that ends right after it has left for
+    /// one that crashed.
+    struct Left;
+
+    impl Drop for Left {
+        fn drop(&mut self) {
+            thread::sleep(Duration::from_millis(300));
+        }
     }
 
     impl Joined {
@@ -118,7 +129,7 @@ mod joined {
                 hook(panic);
                 SimpleCommunicator::world().abort(101);
             }));
-            Some(Self { universe })
+            Some(Self { universe, _left: Left })
         }
 
         pub(super) fn rank(&self) -> usize {
