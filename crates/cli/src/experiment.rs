@@ -78,8 +78,8 @@ impl<T: Task> TaskExperiment<T> {
         let size = common.size.unwrap_or(usual.size);
         method.resolution.check(size).map_err(Error::usage)?;
         // A passage of so many steps goes as far as the rate takes it.
-        let shares = task.shares_learning_rate() || method.softness.feedback.is_some();
-        let of_method = method.softness.learning_rate.filter(|_| shares);
+        let takes = task.takes_learning_rate() || method.softness.feedback.is_some();
+        let of_method = method.softness.learning_rate.filter(|_| takes);
         let learning_rate = method_args.learning_rate.or(of_method).unwrap_or(usual.learning_rate);
         let steps = common.steps.unwrap_or(usual.steps);
         Ok(Self {

@@ -166,8 +166,10 @@ pub enum SoftnessChoice {
     Auto,
 }
 
-/// What softnesses that come with the program are called, and with what their names begin.
-const PRESET: &str = "preset";
+/// What the preset of a task is called.
+pub const PRESET: &str = "preset";
+
+/// With what the names of learned softnesses that come with the program begin.
 const LEARNED: &str = "learned";
 
 impl fmt::Display for SoftnessChoice {

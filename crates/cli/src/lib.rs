@@ -29,7 +29,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pub use backend::backend;
 pub use experiment::{Purpose, TaskExperiment};
-pub use flags::{Common, Init, MethodArgs, Schedule, SoftnessChoice, Variant, usual_args};
+pub use flags::{Common, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args};
 pub use given::{Answer, Given, MaskFlags, seen_by};
 pub use method::{Scales, is_preset_learned, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};

@@ -6,7 +6,7 @@ use softrast_softness::{
     EdgeSoftness, Family, ScheduledSoftness, Softness, SoftnessFileError, Surrogate,
 };
 
-use crate::{Init, MethodArgs, Schedule, Searched, SoftnessChoice};
+use crate::{Init, MethodArgs, PRESET, Schedule, Searched, SoftnessChoice};
 
 /// Scales of a task that neither the command line nor a [`Searched`] names, as widths in NDC.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,7 +185,7 @@ impl MethodArgs {
     pub(crate) fn shipped(&self, task: &str, preset_by_default: bool) -> Option<Shipped> {
         let preset = |called: &SoftnessChoice| Shipped {
             called: called.to_string(),
-            name: task.to_owned(),
+            name: PRESET.to_owned(),
             file: ScheduledSoftness::preset(task),
         };
         match &self.softness {

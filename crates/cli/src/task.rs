@@ -68,8 +68,8 @@ pub trait Task: InverseProblem + Sized {
         edges.to_owned()
     }
 
-    /// Whether the learning rate of a method, which was found on the original variant, is for this one too.
-    fn shares_learning_rate(&self) -> bool {
+    /// Whether the learning rate that was found with a method is for this variant; else the variant keeps its own.
+    fn takes_learning_rate(&self) -> bool {
         true
     }
 
@@ -161,7 +161,7 @@ pub trait Task: InverseProblem + Sized {
 pub struct EdgeChoice {
     /// A family.
     pub family: Option<Family>,
-    /// What comes with the program under this name.
+    /// What comes with the program under this name; [`PRESET`](crate::PRESET) for the preset of the task.
     pub shipped: Option<String>,
     /// Whether its scale is to stay or fall.
     pub schedule: Option<Schedule>,

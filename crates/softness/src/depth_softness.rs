@@ -168,6 +168,20 @@ pub struct DepthSoftnessFile {
     pub note: Option<String>,
 }
 
+impl DepthSoftnessFile {
+    /// What the program of a task takes along with [`ScheduledSoftness::preset`](crate::ScheduledSoftness::preset).
+    ///
+    /// # Errors
+    ///
+    /// If there is none for a task of this name.
+    pub fn preset(task: &str) -> Result<Self, SoftnessFileError> {
+        match task {
+            "occlusion" => Self::parse(include_str!("../searched/occlusion_depth.json"), task),
+            _ => Self::learned(task),
+        }
+    }
+}
+
 stored!(DepthSoftnessFile);
 
 impl Stored for DepthSoftnessFile {

@@ -64,7 +64,7 @@ pub struct ScheduledSoftness {
 impl ScheduledSoftness {
     /// What the program of a task takes where nobody says otherwise: the best that is known, whoever found it. Its note says how.
     ///
-    /// It is what was learned on the task, for `pose` with feedback, but for `shape3d`, where a search found a better one.
+    /// It is what was learned on the task, for `pose` with feedback, but for `shape3d` and `occlusion`, where a search found a better one.
     ///
     /// # Errors
     ///
@@ -72,6 +72,7 @@ impl ScheduledSoftness {
     pub fn preset(task: &str) -> Result<Self, SoftnessFileError> {
         match task {
             "shape3d" => Self::parse(include_str!("../searched/shape3d.json"), task),
+            "occlusion" => Self::parse(include_str!("../searched/occlusion.json"), task),
             "pose" => Self::learned("pose-feedback"),
             _ => Self::learned(task),
         }

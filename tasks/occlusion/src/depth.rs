@@ -1,5 +1,5 @@
 use anyhow::ensure;
-use softrast_cli::{EdgeChoice, Schedule, Searched};
+use softrast_cli::{EdgeChoice, PRESET, Schedule, Searched};
 use softrast_lab::Error;
 use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
@@ -43,7 +43,7 @@ impl Depth {
             }
             Some(NameOrFile::Name(softness)) => *softness,
             None => match shipped(args, edges) {
-                Some(file) => return Self::of_file("learned".to_owned(), file),
+                Some((name, file)) => return Self::of_file(name.to_owned(), file),
                 None => like_edges(edges),
             },
         };
@@ -87,10 +87,14 @@ impl Depth {
     }
 }
 
-/// The depth softness that was learned along with the edges that come with the program, where those are used.
-fn shipped(args: &Args, edges: &EdgeChoice) -> Option<DepthSoftnessFile> {
+/// The depth softness that was found along with the edges that come with the program, where those are used; and what it is called.
+fn shipped(args: &Args, edges: &EdgeChoice) -> Option<(&'static str, DepthSoftnessFile)> {
     let name = edges.shipped.as_ref().filter(|_| args.depth_scale.is_none())?;
-    DepthSoftnessFile::learned(name).ok()
+    let (called, file) = match name.as_str() {
+        PRESET => (PRESET, DepthSoftnessFile::preset(NAME)),
+        name => ("learned", DepthSoftnessFile::learned(name)),
+    };
+    Some((called, file.ok()?))
 }
 
 fn like_edges(edges: &EdgeChoice) -> DepthSoftness {

@@ -174,13 +174,16 @@ impl Task for Occlusion {
 
     fn method_name(&self, edges: &str) -> String {
         let depths = &self.depth.name;
-        // Edges that were learned and depths that were learned along with them are one preset.
-        let alike = edges == depths || (edges == "preset" && depths == "learned");
-        if alike { edges.to_owned() } else { format!("{edges} edges and {depths} depths") }
+        if edges == depths {
+            edges.to_owned()
+        } else {
+            format!("{edges} edges and {depths} depths")
+        }
     }
 
-    fn shares_learning_rate(&self) -> bool {
-        self.variant == Variant::Original
+    /// Methods are found on the transfer, because most settings solve the original without an error.
+    fn takes_learning_rate(&self) -> bool {
+        self.variant == Variant::Transfer
     }
 
     fn batch_size(&self) -> usize {

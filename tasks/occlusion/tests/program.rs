@@ -88,7 +88,8 @@ fn the_depth_softness_is_that_of_the_edges_unless_named() {
         (json["softness"].as_str().unwrap().to_owned(), depth, json["parameters"].as_u64().unwrap())
     };
     let named = |softness: &str, depth: &str, n| (softness.to_owned(), depth.to_owned(), n);
-    assert_eq!(softness(""), named("preset", "learned", 4));
+    assert_eq!(softness("--softness learned"), named("learned", "learned", 4));
+    assert_eq!(softness(""), named("preset", "preset", 2));
     assert_eq!(softness("--softness logistic"), named("logistic", "logistic", 2));
     assert_eq!(softness("--softness exp"), named("exp", "exp", 4));
     let mlp = named("mlp edges and depth_mlp depths", "depth_mlp", 112);

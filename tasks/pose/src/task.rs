@@ -189,7 +189,7 @@ impl Task for Pose {
         }
     }
 
-    fn shares_learning_rate(&self) -> bool {
+    fn takes_learning_rate(&self) -> bool {
         self.variant == Variant::Original
     }
 

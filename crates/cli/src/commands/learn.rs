@@ -24,7 +24,7 @@ use softrast_softness::ScheduledSoftness;
 
 use super::settings_section;
 use crate::{
-    Purpose, Task, TaskExperiment, Variant,
+    Purpose, Task, TaskExperiment,
     command_line::{Learn, Shared},
     learned_charts::learned_charts,
     session::Session,
@@ -61,7 +61,7 @@ fn learn_with<T: Task>(
     let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Learning)?;
     let (about, identity) = (experiment.about(), experiment.identity());
     let TaskExperiment { task, method, solve, .. } = experiment;
-    let own_start = task.own_phi();
+    let (own_start, takes_rate) = (task.own_phi(), task.takes_learning_rate());
     let task = std::rc::Rc::into_inner(task).context("a task has one owner")?;
     let config = learn.config(common.seed);
     let learning = Learning::<T, HostBackend>::new(task, &method, &solve, &config);
@@ -82,8 +82,7 @@ fn learn_with<T: Task>(
     let (mut softness, own) = learning.learned();
     softness.note = Some(note(session, &learning, &log));
     softness.task = Some(T::NAME.to_owned());
-    // The rate is one for the original variant.
-    softness.learning_rate = softness.learning_rate.filter(|_| common.variant == Variant::Original);
+    softness.learning_rate = softness.learning_rate.filter(|_| takes_rate);
     let learned = Learned { softness, own: [own_start, own], stopped };
     write(session, folder, &learning, &log, &about, &learned).map(Some)
 }
