@@ -123,12 +123,15 @@ impl MethodArgs {
         }
         softness.learning_rate = searched.and_then(|searched| searched.learning_rate);
         let surrogate = searched.and_then(|searched| searched.surrogate_scale);
-        match self.surrogate_scale.or(surrogate) {
-            None => Ok((family.name().to_owned(), softness)),
-            Some(scale) => {
-                Ok((format!("{family} with surrogate"), softness.with_surrogate_scale(scale)))
-            }
+        let Some(scale) = self.surrogate_scale.or(surrogate) else {
+            return Ok((family.name().to_owned(), softness));
+        };
+        let mut softness = softness.with_surrogate_scale(scale);
+        if let (true, Some(surrogate)) = (fitted, &mut softness.surrogate) {
+            let factor = if first == last { scale } else { scale / first };
+            surrogate.phi = edge.with_scale_values(&distilled_mlp(), factor);
         }
+        Ok((format!("{family} with surrogate"), softness))
     }
 
     /// First and last scale.
@@ -306,6 +309,15 @@ mod tests {
             let width = |softness: &str| {
                 let softness = method(&format!("{softness} {line}")).unwrap().softness;
                 softness.width_at(0.3, 64)
+            };
+            let ratio = width("mlp --init fitted") / width("logistic");
+            assert!((ratio - 1.0).abs() < 0.04, "{line}: {ratio}");
+        }
+        for line in ["--scale 0.05", "--scale 0.05 --scale-end 0.01"] {
+            let width = |softness: &str| {
+                let line = format!("{softness} {line} --surrogate-scale 0.1");
+                let surrogate = method(&line).unwrap().softness.surrogate_at(0.3, 64).unwrap();
+                surrogate.softness.width(&surrogate.phi)
             };
             let ratio = width("mlp --init fitted") / width("logistic");
             assert!((ratio - 1.0).abs() < 0.04, "{line}: {ratio}");
