@@ -91,7 +91,7 @@ fn the_depth_softness_is_that_of_the_edges_unless_named() {
     assert_eq!(softness("--softness learned"), named("learned", "learned", 4));
     assert_eq!(softness(""), named("preset", "preset", 2));
     assert_eq!(softness("--softness logistic"), named("logistic", "logistic", 2));
-    assert_eq!(softness("--softness exp"), named("exp", "exp", 4));
+    assert_eq!(softness("--softness exp"), named("exp", "exp", 5));
     let mlp = named("mlp edges and depth_mlp depths", "depth_mlp", 112);
     assert_eq!(softness("--softness mlp"), mlp);
     let gauss = named("logistic edges and gauss depths", "gauss", 2);
