@@ -5,5 +5,6 @@
 mod exact_rows;
 mod meta;
 mod raster;
+mod reconstruct;
 mod shape3d;
 mod softness;

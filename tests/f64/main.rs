@@ -12,6 +12,7 @@ mod meta_gradients;
 mod occlusion;
 mod pose;
 mod raster;
+mod reconstruct;
 mod shape2d;
 mod shape3d;
 mod softness;

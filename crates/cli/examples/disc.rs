@@ -8,7 +8,8 @@ use burn::tensor::Tensor;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::{Map, json};
 use softrast_cli::{
-    Description, EdgeChoice, Measures, NoArgs, Scales, Schedule, Task, Variant, theta_of,
+    Common, Description, EdgeChoice, Entry, Measures, MethodArgs, NoArgs, Scales, Schedule, Task,
+    Variant, theta_of,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, Targets};
 use softrast_mesh::icosphere;
@@ -133,6 +134,10 @@ impl Task for Disc {
         let ball = icosphere(1);
         let vertices = ball.positions().iter().flatten().map(|x| args.radius * x).collect();
         Ok(Self { radius: args.radius, vertices, faces: ball.faces().into() })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

@@ -256,6 +256,42 @@ pub enum Purpose {
     Learning,
 }
 
+/// A task with a method, ready to be evaluated, whichever task it is.
+pub struct Entry {
+    /// What is run.
+    pub experiment: Box<dyn Experiment>,
+    /// The method.
+    pub method: Method,
+    /// Size, steps and learning rate.
+    pub solve: SolveConfig,
+    /// Every choice behind the numbers.
+    pub settings: Map<String, Value>,
+    /// Faces of the scene.
+    pub faces: usize,
+}
+
+impl Entry {
+    /// The task `T` with the method that flags ask for.
+    ///
+    /// # Errors
+    ///
+    /// If flags contradict each other or a file cannot be used.
+    pub fn new<T: Task>(
+        args: &T::Args,
+        common: &Common,
+        method: &MethodArgs,
+    ) -> anyhow::Result<Self> {
+        let experiment = TaskExperiment::<T>::new(args, common, method, Purpose::Evaluating)?;
+        Ok(Self {
+            method: experiment.method.clone(),
+            solve: experiment.solve,
+            settings: experiment.settings(),
+            faces: experiment.description.faces,
+            experiment: Box::new(experiment),
+        })
+    }
+}
+
 impl<T: Task> Experiment for TaskExperiment<T> {
     fn name(&self) -> &str {
         &self.name

@@ -28,7 +28,7 @@ mod task;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pub use backend::backend;
-pub use experiment::{Purpose, TaskExperiment};
+pub use experiment::{Entry, Purpose, TaskExperiment};
 pub use flags::{Common, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args};
 pub use given::{Answer, Given, MaskFlags, seen_by};
 pub use method::{Scales, is_preset_learned, learned_kind, method_colour};

@@ -6,7 +6,7 @@ use softrast_lab::{Metric, Role, plot::Plot, rgb_from_gray};
 use softrast_raster::HostBackend;
 use softrast_softness::Family;
 
-use crate::{Answer, Given, Paper, Scales, Schedule, Variant};
+use crate::{Answer, Common, Entry, Given, MethodArgs, Paper, Scales, Schedule, Variant};
 
 /// An [`InverseProblem`] that has a program: what it is called, which flags it has, how results are measured and shown.
 pub trait Task: InverseProblem + Sized {
@@ -56,6 +56,14 @@ pub trait Task: InverseProblem + Sized {
     /// [`Error::Usage`](softrast_lab::Error::Usage) where the command line is at fault (exit code 2); anything else, such as a file that
     /// cannot be read, ends with exit code 1. The message becomes one line and should say what to do.
     fn new(args: &Self::Args, variant: Variant, edges: &EdgeChoice) -> anyhow::Result<Self>;
+
+    /// The task and the method that flags ask for: [`Entry::new`], called here so that the steps are compiled once, in the crate of the
+    /// task, and not in every program that runs it.
+    ///
+    /// # Errors
+    ///
+    /// If flags contradict each other or a file cannot be used.
+    fn entry(args: &Self::Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry>;
 
     /// What is measured.
     fn measures() -> Measures;

@@ -277,7 +277,7 @@ impl Args {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Entry;
+    use softrast_cli::Entry;
 
     fn args(line: &str) -> Args {
         Args::parse_from(["compare"].into_iter().chain(line.split_whitespace()))

@@ -1,6 +1,6 @@
-use softrast_cli::{Common, MethodArgs, SoftnessChoice, Variant};
+use softrast_cli::{Common, Entry, MethodArgs, SoftnessChoice, Variant};
 
-use crate::tasks::{AnyTask, Entry};
+use crate::tasks::AnyTask;
 
 /// A task in one variant, solved with one method.
 #[derive(Clone)]

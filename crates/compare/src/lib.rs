@@ -21,4 +21,4 @@ pub use documents::recomputed;
 pub use measured::{MeanError, Measured};
 pub use program::{compare, main};
 pub use records::Record;
-pub use tasks::{AnyTask, Entry, TASKS, task};
+pub use tasks::{AnyTask, TASKS, task};

@@ -1,10 +1,11 @@
 use anyhow::ensure;
+use softrast_cli::Entry;
 use softrast_cli::{InOurUnits, Variant};
 use softrast_lab::{
     Encoded, Metric, Role, Run, Runner, halving::rounded, mean, mean_interval, place,
 };
 
-use crate::{Cell, tasks::Entry};
+use crate::Cell;
 
 /// What a cell came to.
 pub struct Measured {

@@ -1,9 +1,6 @@
 use std::marker::PhantomData;
 
-use serde_json::{Map, Value};
-use softrast_cli::{Common, MethodArgs, Paper, Purpose, Task, TaskExperiment};
-use softrast_inverse::{Method, SolveConfig};
-use softrast_lab::Experiment;
+use softrast_cli::{Common, Entry, MethodArgs, Paper, Task};
 
 /// The tasks that are compared, in the order of the tables.
 macro_rules! tasks {
@@ -42,20 +39,6 @@ pub trait AnyTask: Sync {
     fn entry(&self, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry>;
 }
 
-/// A task with a method, ready to be evaluated.
-pub struct Entry {
-    /// What is run.
-    pub experiment: Box<dyn Experiment>,
-    /// The method.
-    pub method: Method,
-    /// Size, steps and learning rate.
-    pub solve: SolveConfig,
-    /// Every choice behind the numbers.
-    pub settings: Map<String, Value>,
-    /// Faces of the scene.
-    pub faces: usize,
-}
-
 struct Of<T>(PhantomData<fn() -> T>);
 
 impl<T: Task> AnyTask for Of<T> {
@@ -76,15 +59,7 @@ impl<T: Task> AnyTask for Of<T> {
     }
 
     fn entry(&self, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
-        let args = softrast_cli::usual_args::<T::Args>();
-        let experiment = TaskExperiment::<T>::new(&args, common, method, Purpose::Evaluating)?;
-        Ok(Entry {
-            method: experiment.method.clone(),
-            solve: experiment.solve,
-            settings: experiment.settings(),
-            faces: experiment.description.faces,
-            experiment: Box::new(experiment),
-        })
+        T::entry(&softrast_cli::usual_args(), common, method)
     }
 }
 

@@ -2,11 +2,9 @@ use std::path::Path;
 
 use anyhow::Context;
 use serde_json::{Value, json};
-use softrast_cli::{
-    Common, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment, Variant,
-};
+use softrast_cli::{Common, MethodArgs, Schedule, SoftnessChoice, Task, Variant};
 use softrast_inverse::{InverseProblem, Method, SolveConfig, minimize};
-use softrast_lab::{Batch, Experiment, Progress, Run};
+use softrast_lab::{Batch, Progress, Run};
 use softrast_meta::numbers;
 use softrast_raster::Rasterizer;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
@@ -120,7 +118,7 @@ impl Tested {
             steps: config.steps,
             ..Common::default()
         };
-        let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Evaluating)?;
+        let experiment = T::entry(&args, &common, &method)?.experiment;
         let seeds: Vec<u64> = (0..config.runs as u64).collect();
         let mut runs = Vec::with_capacity(seeds.len());
         for seeds in seeds.chunks(experiment.batch_size().max(1)) {

@@ -41,3 +41,8 @@ pub use quad::Quad;
 pub use scene::{BACKGROUND, Scene};
 pub use task::Occlusion;
 pub use texture::{Pattern, Texture};
+
+/// The whole program.
+pub fn main() -> std::process::ExitCode {
+    softrast_cli::main::<Occlusion>()
+}

@@ -1,5 +1,5 @@
 //! OCCLUSION: finds which of several overlapping quads is in front.
 
 fn main() -> std::process::ExitCode {
-    softrast_cli::main::<occlusion::Occlusion>()
+    occlusion::main()
 }

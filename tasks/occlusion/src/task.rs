@@ -4,8 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Description, EdgeChoice, Ended, Measures, NoArgs, OwnAxis, Paper, Scales, Schedule, Task,
-    Variant, theta_of,
+    Common, Description, EdgeChoice, Ended, Entry, Measures, MethodArgs, NoArgs, OwnAxis, Paper,
+    Scales, Schedule, Task, Variant, theta_of,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{
@@ -137,6 +137,10 @@ impl Task for Occlusion {
 
     fn new(args: &Args, variant: Variant, edges: &EdgeChoice) -> anyhow::Result<Self> {
         Ok(Self { problem: Problem::of(variant), depth: Depth::new(args, edges)?, variant })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

@@ -4,8 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Answer, Description, EdgeChoice, Ended, Given, Measures, Paper, Scales, Schedule, Task,
-    Variant, theta_of,
+    Answer, Common, Description, EdgeChoice, Ended, Entry, Given, Measures, MethodArgs, Paper,
+    Scales, Schedule, Task, Variant, theta_of,
 };
 use softrast_inverse::{
     InverseProblem, Iterate, PoseProblem, SoftnessAt, SolveConfig,
@@ -155,6 +155,10 @@ impl Task for Pose {
         let range_deg = args.range.unwrap_or_default().degrees();
         let problem = PoseProblem { mesh, range_deg, optimise_fov: args.optimise_fov };
         Ok(Self { problem, mesh_name, faces, source, variant })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

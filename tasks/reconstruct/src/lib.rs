@@ -42,7 +42,7 @@ mod train;
 mod view;
 mod voxels;
 
-pub use checkpoint::Checkpoint;
+pub use checkpoint::{Checkpoint, sealed};
 pub use history::{Data, Epoch, Header, Settings, Time};
 pub use network::{Network, Width, convolution, convolved};
 pub use npz_folder::NpzFolder;

@@ -5,5 +5,5 @@
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> std::process::ExitCode {
-    softrast_lab::program::run_main(|words, stdout| reconstruct::execute(words, stdout))
+    softrast_lab::program::run_main(reconstruct::execute)
 }

@@ -27,11 +27,7 @@ use crate::{
 /// # Errors
 ///
 /// Everything that should end the program with an error line.
-pub fn execute(
-    words: impl IntoIterator<Item = OsString>,
-    stdout: &mut dyn Write,
-) -> Result<(), Failure> {
-    let words: Vec<OsString> = words.into_iter().collect();
+pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(line) = parse::<CommandLine>(CommandLine::command(), &words, stdout)? else {
         return Ok(());
     };

@@ -3,8 +3,8 @@ use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 use burn::tensor::Tensor;
 use serde_json::json;
 use softrast_cli::{
-    Description, Detail, EdgeChoice, Ended, Measures, NoArgs, Paper, Scales, Schedule, Task,
-    Variant,
+    Common, Description, Detail, EdgeChoice, Ended, Entry, Measures, MethodArgs, NoArgs, Paper,
+    Scales, Schedule, Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_meta::numbers;
@@ -118,6 +118,10 @@ impl Task for Shape2d {
         let triangles = args.triangles.unwrap_or(usual_triangles);
         let faces = (0..triangles as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         Ok(Self { target, sizes: RefCell::default(), triangles, usual_triangles, faces })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

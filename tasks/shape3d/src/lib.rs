@@ -32,3 +32,8 @@ pub use instance::Instance;
 pub use scene::{Scene, VIEWS};
 pub use task::Shape3d;
 pub use views::{Begin, Views};
+
+/// The whole program.
+pub fn main() -> std::process::ExitCode {
+    softrast_cli::main::<Shape3d>()
+}

@@ -4,8 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Answer, Description, Detail, EdgeChoice, Ended, Given, Measures, Paper, Scales, Schedule, Task,
-    Variant,
+    Answer, Common, Description, Detail, EdgeChoice, Ended, Entry, Given, Measures, MethodArgs,
+    Paper, Scales, Schedule, Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{contact_sheet, rgb_from_gray};
@@ -136,6 +136,10 @@ impl Task for Shape3d {
         let chamfer = Chamfer::new(target.positions(), target.faces());
         let (faces, elevation_deg) = (template.faces().into(), args.elevation);
         Ok(Self { target, target_name, template, template_name, faces, elevation_deg, chamfer })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

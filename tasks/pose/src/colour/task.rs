@@ -3,7 +3,8 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use image::RgbImage;
 use softrast_cli::{
-    Answer, Description, EdgeChoice, Ended, Given, Measures, Scales, Task, Variant,
+    Answer, Common, Description, EdgeChoice, Ended, Entry, Given, Measures, MethodArgs, Scales,
+    Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, pose::PoseInstance};
 use softrast_lab::{Error, rgb_from_planes};
@@ -106,6 +107,10 @@ impl Task for Coloured {
             ))
         })?;
         Ok(Self { pose, colours })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

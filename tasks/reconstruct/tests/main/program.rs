@@ -7,8 +7,9 @@ use reconstruct::{Checkpoint, execute};
 use serde_json::Value;
 
 /// Runs the program; what it prints, or its error line.
-fn run(line: &str) -> Result<String, String> {
-    let words = ["reconstruct"].into_iter().chain(line.split_whitespace()).map(Into::into);
+pub(crate) fn run(line: &str) -> Result<String, String> {
+    let words =
+        ["reconstruct"].into_iter().chain(line.split_whitespace()).map(Into::into).collect();
     let mut printed = Vec::new();
     match execute(words, &mut printed) {
         Ok(()) => Ok(String::from_utf8(printed).unwrap()),

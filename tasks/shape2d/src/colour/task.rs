@@ -4,7 +4,8 @@ use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
-    Description, Detail, EdgeChoice, Ended, Measures, NoArgs, Scales, Schedule, Task, Variant,
+    Common, Description, Detail, EdgeChoice, Ended, Entry, Measures, MethodArgs, NoArgs, Scales,
+    Schedule, Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, Picture, SoftnessAt, SolveConfig};
 use softrast_lab::rgb_from_planes;
@@ -124,6 +125,10 @@ impl Task for Coloured {
         };
         let triangles = args.triangles.unwrap_or(usual_triangles);
         Ok(Self { name, picture, sizes: RefCell::default(), triangles, usual_triangles })
+    }
+
+    fn entry(args: &Args, common: &Common, method: &MethodArgs) -> anyhow::Result<Entry> {
+        Entry::new::<Self>(args, common, method)
     }
 
     fn measures() -> Measures {

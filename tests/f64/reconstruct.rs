@@ -1,8 +1,4 @@
 //! Convolutions as products of matrices against those of burn.
-//!
-//! A binary of its own, because burn fixes the float type of a device per process.
-
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use burn::{
     backend::{Autodiff, NdArray},
