@@ -188,6 +188,9 @@ impl<T: Task> TaskExperiment<T> {
                 // The steps of a batch are shared by its runs.
                 let share = iterate.seconds.map(|time| time / instances.len() as f64);
                 solved.run.step_seconds.extend(share);
+                if iterate.begun_again > solved.run.begun_again.len() {
+                    solved.run.begun_again.push(iterate.step);
+                }
                 solved.theta.clone_from(&thetas[k]);
             }
             if let Some(image) = &iterate.image {

@@ -82,7 +82,7 @@ fn of_variant(all: &[&Measured]) -> Vec<Chart> {
         Axis::logarithmic("seconds of optimisation in a run"),
         Axis::logarithmic(&format!("lowest {hard_title} so far")),
     );
-    vec![
+    let mut charts = vec![
         over_steps(hard, "steps", format!("{of}: {hard_title} over the steps, {quartiles}.")),
         over_steps(
             parameter,
@@ -101,8 +101,10 @@ fn of_variant(all: &[&Measured]) -> Vec<Chart> {
             },
         },
         pareto(all, &stem, &of),
-        functions(&cells, &stem, &of),
-    ]
+    ];
+    // Edges that stay are so sharp that all of them would be one step.
+    charts.extend(first.cell.task.moves_edges().then(|| functions(&cells, &stem, &of)));
+    charts
 }
 
 fn place_of(one: &Measured, key: &str) -> usize {

@@ -112,7 +112,11 @@ fn part(args: &Args, cells: &[Cell], mut runner: Runner) -> anyhow::Result<Outpu
         "then: the same command without --shard, for the tables of all shards".to_owned(),
     ];
     let json = json!({ "finished": part.finished, "out": args.out });
-    ensure!(part.finished == part.asked, Error::Interrupted);
+    if part.finished < part.asked {
+        let kept = part.of("runs of this shard");
+        let stopped = anyhow::Error::from(Error::Interrupted);
+        return Err(stopped.context(format!("{kept}, and the same command goes on from them")));
+    }
     Ok(Output { json, text, ..Output::default() })
 }
 

@@ -15,7 +15,7 @@ pub enum Error {
         reason: std::io::Error,
     },
     /// The user asked the program to stop. Exit code 130.
-    #[error("stopped before anything was finished")]
+    #[error("stopped before it was finished")]
     Interrupted,
 }
 

@@ -68,6 +68,9 @@ pub struct Run {
     pub success: bool,
     /// Wall time of each step, in seconds: its share of the batch; without pictures and errors.
     pub step_seconds: Vec<f64>,
+    /// Steps at which it was stuck and began again from another start.
+    #[serde(default)]
+    pub begun_again: Vec<usize>,
     /// What the user should know, one line each, such as an empty target.
     pub warnings: Vec<String>,
     /// The first step whose numbers were not finite; the curve ends before it.

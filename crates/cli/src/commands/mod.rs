@@ -22,7 +22,7 @@ fn settings_section(report: &mut Report, settings: [&Map<String, Value>; 2]) {
 
 /// An error that ended the work, with a word on what is kept.
 pub(crate) fn ended(error: anyhow::Error, kept: usize) -> anyhow::Error {
-    if kept == 0 || softrast_lab::was_interrupted(&error) {
+    if kept == 0 {
         return error;
     }
     error.context("what was finished before is kept, and --resume goes on from it")

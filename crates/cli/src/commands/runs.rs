@@ -1,7 +1,7 @@
 //! What runs came to, as files, a page, JSON and lines.
 
 use softrast_lab::{
-    Evaluation, Experiment, OutputFolder, Summary,
+    Evaluation, Experiment, OutputFolder, Run, Summary,
     curves::{Convergence, charts, convergence_csv, csv},
     halving::Halving,
     headline,
@@ -107,7 +107,11 @@ fn page<T: Task>(
     }
     let means =
         " A line is the mean of all runs, the band around it the 95 % interval of the mean.";
-    report.note(&format!("All errors should fall to 0.{}", if summary.many { means } else { "" }));
+    let again = begun_again(&evaluation.runs);
+    report.note(&format!(
+        "All errors should fall to 0.{}{again}",
+        if summary.many { means } else { "" }
+    ));
     let mut about = experiment.about();
     about.retain(|_, value| !value.is_object());
     settings_section(&mut report, [&about, &experiment.settings()]);
@@ -116,6 +120,23 @@ fn page<T: Task>(
          its scale is the width of that step.",
     );
     Ok(report)
+}
+
+/// A sentence about runs that were stuck, if there are any.
+fn begun_again(runs: &[Run]) -> String {
+    match runs {
+        [Run { begun_again, .. }] if !begun_again.is_empty() => {
+            let steps: Vec<String> = begun_again.iter().map(usize::to_string).collect();
+            format!(
+                " The run was stuck and began again from another start at step {}.",
+                steps.join(" and at step ")
+            )
+        }
+        _ => match runs.iter().filter(|run| !run.begun_again.is_empty()).count() {
+            0 => String::new(),
+            count => format!(" {count} of the runs were stuck and began again from another start."),
+        },
+    }
 }
 
 fn pictures(report: &mut Report, summary: &Summary, evaluation: &Evaluation) {
