@@ -62,7 +62,7 @@ impl MaskRun {
     /// Begins with the next start, if there is one.
     fn begin(&mut self) -> anyhow::Result<()> {
         let Some(&start) = self.starts.get(self.start) else { return Ok(()) };
-        let pose = MaskPose { mask: self.mask.clone(), square: self.square, start };
+        let pose = MaskPose { mask: self.mask.clone(), square: self.square, start, painted: None };
         let problem = MaskPoses::new(&self.mesh, vec![pose.clone()], false);
         let run = Minimization::new(problem, vec![pose.clone()], &self.method, &self.config, true)?;
         self.run = Some((run, pose));

@@ -17,20 +17,7 @@ pub struct MaskTargets<B: Backend> {
 impl<B: RasterBackend> MaskTargets<B> {
     /// A square of each mask, given by its left, its top and its extent in pixels, on `size` × `size` pixels.
     pub fn new<'a>(masks: impl IntoIterator<Item = (&'a Picture, [f64; 3])>, size: usize) -> Self {
-        let mut parts: Vec<Arc<[Vec<f64>; 2]>> = Vec::new();
-        let mut last = None;
-        for (mask, square) in masks {
-            // Instances mostly share one mask, which may be large.
-            let same = |&(other, at): &(&Picture, [f64; 3])| {
-                std::ptr::eq(other.pixels(), mask.pixels()) && at == square
-            };
-            let part = match parts.last().filter(|_| last.as_ref().is_some_and(same)) {
-                Some(part) => part.clone(),
-                None => mask.part(square, size).into(),
-            };
-            parts.push(part);
-            last = Some((mask, square));
-        }
+        let parts = parts(masks, size);
         let images = |k: usize| {
             let numbers = parts.iter().flat_map(|part| part[k].iter().copied()).collect();
             Targets::new(tensor::<B, 3>(numbers, [parts.len(), size, size]))
@@ -48,4 +35,26 @@ impl<B: RasterBackend> MaskTargets<B> {
         };
         iou_loss(image, target)
     }
+}
+
+/// Squares of pictures on `size` × `size` pixels, each with how much of each pixel the picture covers.
+pub(crate) fn parts<'a>(
+    pictures: impl IntoIterator<Item = (&'a Picture, [f64; 3])>,
+    size: usize,
+) -> Vec<Arc<[Vec<f64>; 2]>> {
+    let mut parts: Vec<Arc<[Vec<f64>; 2]>> = Vec::new();
+    let mut last = None;
+    for (picture, square) in pictures {
+        // Instances mostly share one picture, which may be large.
+        let same = |&(other, at): &(&Picture, [f64; 3])| {
+            std::ptr::eq(other.pixels(), picture.pixels()) && at == square
+        };
+        let part = match parts.last().filter(|_| last.as_ref().is_some_and(same)) {
+            Some(part) => part.clone(),
+            None => picture.part(square, size).into(),
+        };
+        parts.push(part);
+        last = Some((picture, square));
+    }
+    parts
 }

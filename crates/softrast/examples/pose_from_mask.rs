@@ -22,7 +22,7 @@ fn main() -> anyhow::Result<()> {
     let found =
         PoseSearch::default()
             .run::<NdArray>(&mesh, &mask, &camera, start, &method, |_, _| Ok(()))?;
-    let FoundPose { camera, iou } = found[0]; // the best; others that fit nearly as well stand behind it
+    let FoundPose { camera, iou, .. } = found[0]; // the best; others that fit nearly as well stand behind it
     println!("R {:.3?}\nt {:.3?}", camera.rotation, camera.translation);
     println!("stood at {:.2?}, found at {:.2?}, IoU {iou:.3}", truth.eye(), camera.eye());
     Ok(())

@@ -7,7 +7,7 @@ use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, MaskFlags, Variant, seen_by};
 use softrast_inverse::{
-    Lens, Picture, camera_json, load_pose,
+    Lens, PaintedView, Picture, View, camera_json, coloured_pixels, load_pose,
     pose::{FoundPose, PoseSearch},
     silhouette_pixels,
 };
@@ -17,12 +17,14 @@ use softrast_lab::{
     overlay, png,
     program::Output,
     report::{Report, Table},
+    rgb_from_planes,
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Pinhole, on_backend};
 
 use crate::{
     Args, Instances,
+    colour::coloured,
     framing::{Framing, mesh},
 };
 
@@ -35,7 +37,7 @@ const SHOWN: usize = 12;
 #[derive(clap::Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Your own pictures")]
 pub struct Pictures {
-    /// Mask whose pose is asked: its transparency, or its luminance where all of it is opaque
+    /// Mask whose pose is asked: its transparency, or its luminance where all of it is opaque. With --colour the picture itself counts too
     #[arg(long, value_name = "PICTURE")]
     pub target: Option<PathBuf>,
 
@@ -98,6 +100,8 @@ impl Pictures {
 struct Solved {
     path: PathBuf,
     mask: Picture,
+    /// Its colours, where they count.
+    painted: Option<PaintedView>,
     poses: Vec<FoundPose>,
     seconds: f64,
 }
@@ -109,6 +113,9 @@ pub(crate) fn solve_pictures(
     let args = given.args;
     refuse_flags_of_seeds(given)?;
     let (mesh, mesh_name, framing) = mesh(args)?;
+    if args.colour {
+        coloured(args, &mesh)?;
+    }
     let (method, backend) = (given.method()?, given.backend()?);
     let mut search = PoseSearch { optimise_fov: args.optimise_fov, ..PoseSearch::default() };
     search.learning_rate = given.learning_rate().unwrap_or(search.learning_rate);
@@ -132,17 +139,23 @@ pub(crate) fn solve_pictures(
         }
         PoseSearch::check(&mesh, &mask, &camera, start.is_some())
             .with_context(|| path.display().to_string())?;
-        tasks.push((path, mask, camera));
+        let view = View { name: path.display().to_string(), picture: path, mask, camera };
+        let painted = args.colour.then(|| PaintedView::load(&view)).transpose()?;
+        tasks.push((view, painted));
     }
     let steps = search.steps(start.is_some());
     let mut progress = given.progress(steps * tasks.len())?;
     let mut solved = Vec::new();
-    for (k, (path, mask, camera)) in tasks.into_iter().enumerate() {
+    for (k, (view, painted)) in tasks.into_iter().enumerate() {
         let clock = std::time::Instant::now();
         let visit = |step: usize, loss: f64| progress.step(k * steps + step, loss);
-        let poses = on_backend!(backend, B => search.run::<B>(&mesh, &mask, &camera, start.is_some(), &method, visit));
-        let poses = poses.with_context(|| path.display().to_string())?;
-        solved.push(Solved { path, mask, poses, seconds: clock.elapsed().as_secs_f64() });
+        let (View { name, picture: path, mask, camera }, started) = (view, start.is_some());
+        let poses = on_backend!(backend, B => match &painted {
+            Some(view) => search.run_by_colour::<B>(&mesh, view, started, &method, visit),
+            None => search.run::<B>(&mesh, &mask, &camera, started, &method, visit),
+        });
+        let poses = poses.context(name)?;
+        solved.push(Solved { path, mask, painted, poses, seconds: clock.elapsed().as_secs_f64() });
     }
     progress.finish();
     let warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
@@ -255,13 +268,24 @@ fn page(
             &png(overlay)?,
             "The mask in grey with the silhouette of the answer over it: orange where only the mask is, blue where only the silhouette is.",
         );
+        if let Some(pair) = beside(mesh, one)? {
+            page.picture(
+                &png(&pair)?,
+                "The colours of the picture that count, over black, and the mesh in its own colours at the answer.",
+            );
+        }
         page.table(&of_camera(&poses[0]));
         if poses.len() > 1 {
             let others = poses[1..].iter().map(|pose| for_page(drawn(mesh, one, pose)));
             let others: Vec<RgbImage> = others.collect();
             page.picture(
                 &png(&contact_sheet(&others, 3.min(others.len())))?,
-                "Other poses that fit nearly as well: a silhouette does not tell them apart.",
+                match one.painted {
+                    Some(_) => "Other poses that fit nearly as well.",
+                    None => {
+                        "Other poses that fit nearly as well: a silhouette does not tell them apart."
+                    }
+                },
             );
         }
         let others: Vec<String> =
@@ -293,6 +317,7 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
             "camera": camera_json(&pose.camera),
             "camera_in_file": camera_json(&framing.of_file(&pose.camera)),
             "iou": pose.iou,
+            "psnr": pose.psnr,
         })
     };
     let mut results: Vec<Value> = Vec::new();
@@ -320,11 +345,24 @@ fn drawn(mesh: &Mesh, one: &Solved, pose: &FoundPose) -> RgbImage {
     overlay(&silhouette, one.mask.pixels(), pose.camera.size.width)
 }
 
+/// The colours of a picture, and those of the mesh at the answer.
+fn beside(mesh: &Mesh, one: &Solved) -> anyhow::Result<Option<RgbImage>> {
+    let Some(view) = &one.painted else { return Ok(None) };
+    let camera = &one.poses[0].camera;
+    let picture = view.over_black.iter().flat_map(|channel| channel.pixels());
+    let [red, green, blue, _] = coloured_pixels(mesh, camera);
+    let planes = [picture.map(|&x| f64::from(x)).collect(), [red, green, blue].concat()];
+    let images = planes.map(|planes: Vec<f64>| {
+        for_page(rgb_from_planes(&planes, camera.size.width, camera.size.height))
+    });
+    Ok(Some(contact_sheet(&images, 2)))
+}
+
 /// The mesh with all poses that were found.
 fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
     let views = solved.iter().flat_map(|Solved { path, mask, poses, .. }| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        poses.iter().enumerate().map(move |(rank, FoundPose { camera, iou })| {
+        poses.iter().enumerate().map(move |(rank, FoundPose { camera, iou, .. })| {
             let name =
                 if rank == 0 { name.to_string() } else { format!("{name}, alternative {rank}") };
             seen_by(name, camera, mask, format!("IoU {iou:.4}"))
@@ -341,18 +379,19 @@ fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
 fn text(mesh_name: &str, solved: &[Solved], single: bool) -> Vec<String> {
     let mut text = vec![format!("pose of {mesh_name} from {}", counted(solved.len(), "picture"))];
     for Solved { path, poses, seconds, .. } in solved {
-        let FoundPose { camera, iou } = &poses[0];
+        let FoundPose { camera, iou, psnr } = &poses[0];
+        let decibels = psnr.map_or_else(String::new, |psnr| format!(", colours {psnr:.1} dB"));
         if !single {
             text.push(line(
                 &path.display().to_string(),
                 &format!(
-                    "IoU {iou:.4}, {}, {seconds:.1} s",
+                    "IoU {iou:.4}{decibels}, {}, {seconds:.1} s",
                     counted(poses.len() - 1, "alternative")
                 ),
             ));
             continue;
         }
-        text.push(line("IoU", &format!("{iou:.4}")));
+        text.push(line("IoU", &format!("{iou:.4}{decibels}")));
         for (k, row) in camera.rotation.iter().enumerate() {
             let numbers = row.map(|x| format!("{x:9.6}")).join(" ");
             text.push(line(if k == 0 { "R" } else { "" }, &numbers));
@@ -376,15 +415,16 @@ fn text(mesh_name: &str, solved: &[Solved], single: bool) -> Vec<String> {
 }
 
 fn csv(solved: &[Solved]) -> String {
-    let head =
-        "picture,rank,iou,r11,r12,r13,r21,r22,r23,r31,r32,r33,t1,t2,t3,fx,fy,cx,cy\n".to_owned();
+    let head = "picture,rank,iou,r11,r12,r13,r21,r22,r23,r31,r32,r33,t1,t2,t3,fx,fy,cx,cy,psnr\n"
+        .to_owned();
     solved.iter().fold(head, |text, Solved { path, poses, .. }| {
         let name = path.display().to_string().replace('"', "\"\"");
-        poses.iter().enumerate().fold(text, |text, (rank, FoundPose { camera, iou })| {
+        poses.iter().enumerate().fold(text, |text, (rank, FoundPose { camera, iou, psnr })| {
             let Pinhole { rotation, translation, focal, centre, .. } = camera;
             let numbers = [&[*iou], rotation.as_flattened(), translation, focal, centre].concat();
             let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
-            format!("{text}\"{name}\",{rank},{}\n", numbers.join(","))
+            let psnr = psnr.map_or_else(String::new, |psnr| psnr.to_string());
+            format!("{text}\"{name}\",{rank},{},{psnr}\n", numbers.join(","))
         })
     })
 }
@@ -394,6 +434,7 @@ fn of_camera(pose: &FoundPose) -> Table {
     let row =
         |values: &[f64]| values.iter().map(|x| format!("{x:.5}")).collect::<Vec<_>>().join(", ");
     let mut pairs = vec![["IoU".to_owned(), format!("{:.4}", pose.iou)]];
+    pairs.extend(pose.psnr.map(|psnr| ["colours, PSNR".to_owned(), format!("{psnr:.1} dB")]));
     for (k, values) in camera.rotation.iter().enumerate() {
         pairs.push([format!("R, row {}", k + 1), row(values)]);
     }

@@ -8,9 +8,10 @@ use std::{
     process::Command,
 };
 
-use image::{GrayImage, Luma};
+use image::{GrayImage, Luma, Rgba, RgbaImage};
 use serde_json::{Value, json};
-use softrast_inverse::silhouette_pixels;
+use softrast_inverse::{camera_json, coloured_pixels, silhouette_pixels};
+use softrast_mesh::icosphere;
 use softrast_raster::Pinhole;
 
 /// Runs `pose solve` with results in `out`: its JSON, or its error line.
@@ -157,6 +158,8 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
     let inside =
         write("in.json", json!({ "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 0.1] }));
     let nowhere = write("no.json", json!({}));
+    let plain = of(folder.path().join("plain.obj"));
+    icosphere(1).save(&plain).unwrap();
     for (words, parts) in [
         (vec!["--target", "missing.png"], vec!["missing.png"]),
         (vec!["--target", &good], vec!["good.json", "no picture"]),
@@ -198,6 +201,10 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         (vec!["--camera", &good], vec!["--target"]),
         (vec!["--targets", "missing"], vec!["missing", "folder"]),
         (vec!["--target", &disc, "--softness", "auto"], vec!["--softness auto"]),
+        (
+            vec!["--target", &disc, "--colour", "--mesh", &plain],
+            vec!["plain.obj", "colours at its vertices"],
+        ),
     ] {
         let out = folder.path().join("out");
         let error = run(&out, &words).unwrap_err();
@@ -286,4 +293,38 @@ fn specks_and_gaps_do_not_lead_astray() {
     let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
     let off = angle_deg(&found["camera"], &truth["views"][4]);
     assert!(off < 5.0, "{off} degrees off, {found}");
+}
+
+/// A ball looks the same from everywhere but for its colours.
+#[test]
+fn a_ball_is_found_by_its_colours() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let ball = icosphere(3);
+    let colours = ball.positions().iter();
+    let colours =
+        colours.map(|&[x, y, z]| [0.5 + 0.4 * (2.0 * x + y).sin(), 0.9 * y.abs(), 0.5 - 0.4 * z]);
+    let ball = ball.clone().with_colours(colours.collect()).unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (mesh, target, lens) = (path("ball.ply"), path("ball.png"), path("camera.json"));
+    ball.save(&mesh).unwrap();
+    let camera =
+        Pinhole::look_at([2.0, 1.5, -2.5], [0.1, 0.0, 0.0], [0.3, 1.0, 0.0], 45.0, [60, 80]);
+    let [red, green, blue, covered] = coloured_pixels(&ball, &camera);
+    let picture = RgbaImage::from_fn(80, 60, |x, y| {
+        let pixel = (80 * y + x) as usize;
+        let level = |channel: &[f64]| (255.0 * channel[pixel] / covered[pixel].max(1e-9)) as u8;
+        Rgba([level(&red), level(&green), level(&blue), (255.0 * covered[pixel]) as u8])
+    });
+    picture.save(&target).unwrap();
+    let truth = camera_json(&camera);
+    fs::write(&lens, json!({ "K": truth["K"], "width": 80, "height": 60 }).to_string()).unwrap();
+    let words = ["--mesh", &mesh, "--target", &target, "--camera", &lens, "--size", "64"];
+    let found = run(out.path(), &[&words[..], &["--colour"]].concat()).unwrap();
+    let off = angle_deg(&found["camera"], &truth);
+    assert!(off < 3.0 && found["psnr"].as_f64().unwrap() > 25.0, "{off} degrees off, {found}");
+    let page = fs::read_to_string(out.path().join("report.html")).unwrap();
+    assert!(page.contains("its own colours at the answer"), "the colours are not shown");
+    // By its silhouette alone it may be anywhere.
+    let found = run(out.path(), &words).unwrap();
+    assert!(angle_deg(&found["camera"], &truth) > 10.0 && found["psnr"].is_null(), "{found}");
 }

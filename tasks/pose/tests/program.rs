@@ -231,7 +231,6 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("learn --resolution 32", 2, "learn draws at --size"),
         ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
         ("--mesh missing.obj", 1, "missing.obj"),
-        ("--colour --target missing.png", 2, "--colour draws its own targets"),
         ("--colour --mesh missing.obj", 1, "missing.obj"),
     ] {
         let failure = run(line).unwrap_err();

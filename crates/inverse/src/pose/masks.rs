@@ -9,7 +9,8 @@ use softrast_raster::{
 };
 use softrast_softness::{numbers, tensor};
 
-use crate::{InverseProblem, MaskTargets, Picture, SoftnessAt, SolveConfig};
+use super::{Coat, ColouredViews, parted};
+use crate::{InverseProblem, MaskTargets, PaintedView, Picture, SoftnessAt, SolveConfig};
 
 /// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
 const CLEARANCE: f64 = 1.05;
@@ -25,13 +26,16 @@ pub struct MaskPose {
     pub square: [f64; 3],
     /// The camera before the first step, for the whole picture.
     pub start: Pinhole,
+    /// The colours of the same picture, if they tell the pose too.
+    pub painted: Option<PaintedView>,
 }
 
 /// Finds the camera of any pose from which a mesh has the silhouette of a mask.
 ///
 /// θ holds for each instance a turn of the camera as a tangent vector in radians, where the middle of the mesh is seen (x and y, in
 /// radii of the mesh), and the logarithm of its depth, all from the start on; with an optimised focal length also its logarithm. The loss
-/// is the soft `IoU` loss over the part of the picture that is looked at; what lies outside of the picture does not count.
+/// is the soft `IoU` loss over the part of the picture that is looked at; what lies outside of the picture does not count. Where the mesh
+/// and all instances have colours, images are those of [`ColouredViews`], and its loss is added.
 ///
 /// Not covered are cameras that stand within 1.05 times the distance of the farthest vertex from the middle of the mesh: depths are held
 /// beyond that, so that no part of the mesh comes behind the camera.
@@ -92,7 +96,12 @@ impl InverseProblem for MaskPoses {
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B>,
     ) -> Tensor<B, 3> {
-        softness.silhouette(scene.project(theta))
+        let seen = scene.project(theta.clone());
+        let coverage = softness.silhouette(seen.clone());
+        match &scene.colours {
+            Some(colours) => colours.image(seen, scene.depth(theta), coverage),
+            None => coverage,
+        }
     }
 
     fn hard_image<B: RasterBackend>(
@@ -100,7 +109,12 @@ impl InverseProblem for MaskPoses {
         scene: &MaskScene<B>,
         theta: Tensor<B, 1>,
     ) -> Tensor<B, 3> {
-        hard_silhouette(scene.project(theta), &scene.faces, scene.cameras.size)
+        let seen = scene.project(theta);
+        let coverage = hard_silhouette(seen.clone(), &scene.faces, scene.cameras.size);
+        match &scene.colours {
+            Some(colours) => colours.hard_image(seen, coverage),
+            None => coverage,
+        }
     }
 
     fn image_loss<B: RasterBackend>(
@@ -108,7 +122,13 @@ impl InverseProblem for MaskPoses {
         scene: &MaskScene<B>,
         image: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        scene.targets.iou_loss(image)
+        match &scene.colours {
+            Some(views) => {
+                let (colours, coverage) = parted(image);
+                scene.targets.iou_loss(coverage) + views.loss(colours)
+            }
+            None => scene.targets.iou_loss(image),
+        }
     }
 
     fn defaults(&self) -> SolveConfig {
@@ -117,7 +137,7 @@ impl InverseProblem for MaskPoses {
 }
 
 /// Instances of [`MaskPoses`] that are solved together, one view each.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct MaskScene<B: RasterBackend> {
     vertices: Tensor<B, 3>,
     faces: Arc<[[u32; 3]]>,
@@ -133,6 +153,7 @@ pub struct MaskScene<B: RasterBackend> {
     nearest: Tensor<B, 2>,
     optimise_fov: bool,
     targets: MaskTargets<B>,
+    colours: Option<ColouredViews<B>>,
 }
 
 impl<B: RasterBackend> MaskScene<B> {
@@ -152,6 +173,12 @@ impl<B: RasterBackend> MaskScene<B> {
         let nearest = |&[_, _, z]: &[f64; 3]| {
             (CLEARANCE * radius / z).ln().clamp(-FARTHEST, FARTHEST).min(0.0)
         };
+        let painted = instances.iter().map(|of| Some((of.painted.as_ref()?, of.square)));
+        let painted: Option<Vec<_>> = painted.collect();
+        let colours = mesh.colours().zip(painted).map(|(colours, painted)| {
+            let coat = Coat::new(colours, mesh.faces().into());
+            ColouredViews::of_pictures(coat, &painted, size)
+        });
         Self {
             vertices: vertices(mesh.positions(), &device),
             faces: mesh.faces().into(),
@@ -163,6 +190,7 @@ impl<B: RasterBackend> MaskScene<B> {
             nearest: column(&nearest),
             optimise_fov: *optimise_fov,
             targets: MaskTargets::new(instances.iter().map(|of| (&of.mask, of.square)), size),
+            colours,
         }
     }
 
@@ -171,14 +199,21 @@ impl<B: RasterBackend> MaskScene<B> {
         [self.depth.dims()[0], if self.optimise_fov { 7 } else { 6 }]
     }
 
+    /// The depth of the middle of the mesh at θ, `[views, 1]`.
+    fn depth(&self, theta: Tensor<B, 1>) -> Tensor<B, 2> {
+        let theta = theta.reshape(self.shape());
+        let farther = theta.clone().narrow(1, 5, 1);
+        // A longer lens is farther away, so that what is seen stays as large.
+        let farther = if self.optimise_fov { farther + theta.narrow(1, 6, 1) } else { farther };
+        self.depth.clone() * farther.exp()
+    }
+
     /// Cameras at θ, for what is looked at.
     fn cameras(&self, theta: Tensor<B, 1>) -> Pinholes<B> {
+        let depth = self.depth(theta.clone());
         let theta = theta.reshape(self.shape());
         let part = |start: usize, length: usize| theta.clone().narrow(1, start, length);
         let zoom = self.optimise_fov.then(|| part(6, 1));
-        // A longer lens is farther away, so that what is seen stays as large.
-        let farther = zoom.iter().fold(part(5, 1), |sum, zoom| sum + zoom.clone());
-        let depth = self.depth.clone() * farther.exp();
         let beside = (self.seen.clone() + part(3, 2) * self.radius.clone()) * depth.clone();
         let Pinholes { rotation, intrinsics, size, .. } = self.cameras.clone();
         let rotation = turned(part(0, 3), rotation);

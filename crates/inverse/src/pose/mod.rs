@@ -4,12 +4,16 @@
 //! is elevation 0, azimuth 0 and the target's distance. Instances in a batch are independent, one view each. Source: Wu et al. 2024,
 //! Sec. 5.1; docs/notes.md, Pose.
 
+mod coat;
+mod coloured;
 mod instance;
 mod masks;
 mod problem;
 mod scene;
 mod search;
 
+pub use coat::Coat;
+pub use coloured::{ColouredViews, parted};
 pub use instance::PoseInstance;
 pub use masks::{MaskPose, MaskPoses, MaskScene};
 pub use problem::PoseProblem;

@@ -1,4 +1,4 @@
-use std::borrow::Cow;
+use std::borrow::{Borrow, Cow};
 
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
@@ -8,8 +8,14 @@ use softrast_raster::{
 };
 use softrast_softness::{numbers, tensor};
 
-use super::masks::{MaskPose, MaskPoses, ball};
-use crate::{Iterate, Method, Picture, SolveConfig, mask_iou, minimize, silhouette_pixels};
+use super::{
+    Coat, ColouredViews,
+    masks::{MaskPose, MaskPoses, ball},
+};
+use crate::{
+    InverseProblem, Iterate, Method, PaintedView, Picture, SolveConfig, coloured_pixels, mask_iou,
+    minimize, silhouette_pixels,
+};
 
 /// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
 const GLANCE: usize = 32;
@@ -68,6 +74,40 @@ pub struct FoundPose {
     /// Overlap over union of its hard silhouette and the mask, both of all pixels of the picture, where a pixel of the mask is in from one
     /// half on.
     pub iou: f64,
+    /// How near its colours come to the picture, in decibels, where they are asked for; see [`PaintedView::psnr`].
+    pub psnr: Option<f64>,
+}
+
+impl Borrow<Pinhole> for FoundPose {
+    fn borrow(&self) -> &Pinhole {
+        &self.camera
+    }
+}
+
+/// What a pose is told by: a mask, its square that is looked at, and colours if they tell it too.
+#[derive(Clone, Copy)]
+struct Target<'a> {
+    mask: &'a Picture,
+    square: [f64; 3],
+    painted: Option<&'a PaintedView>,
+}
+
+impl<'a> Target<'a> {
+    fn new(mask: &'a Picture, painted: Option<&'a PaintedView>) -> anyhow::Result<Self> {
+        Ok(Self { mask, square: mask.looked_at()?, painted })
+    }
+
+    /// Starts of poses, told by silhouettes alone or by colours too.
+    fn poses(&self, starts: impl IntoIterator<Item = Pinhole>, by_colour: bool) -> Vec<MaskPose> {
+        let painted = self.painted.filter(|_| by_colour);
+        let pose = |start| MaskPose {
+            mask: self.mask.clone(),
+            square: self.square,
+            start,
+            painted: painted.cloned(),
+        };
+        starts.into_iter().map(pose).collect()
+    }
 }
 
 impl PoseSearch {
@@ -117,24 +157,60 @@ impl PoseSearch {
         method: &Method,
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
-        Self::check(mesh, mask, camera, started)?;
+        let target = Target::new(mask, None)?;
+        self.found::<B>(mesh, &target, camera, started, method, &mut visit)
+    }
+
+    /// The same by the colours of a picture too, those of the vertices of `mesh` being known: colours tell apart poses that look alike as
+    /// silhouettes. The camera is that of the view. Poses are ranked by the `IoU` loss and the error of colours together; those after the
+    /// first may look like it as silhouettes, and have losses that are larger by 0.03 at most.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`PoseSearch::run`]; if the mesh has no colours, or no pixel of the view has a colour.
+    pub fn run_by_colour<B: RasterBackend>(
+        &self,
+        mesh: &Mesh,
+        view: &PaintedView,
+        started: bool,
+        method: &Method,
+        mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<FoundPose>> {
+        ensure!(mesh.colours().is_some(), "the mesh has no colours at its vertices");
+        let target = Target::new(&view.view.mask, Some(view))?;
+        self.found::<B>(mesh, &target, &view.view.camera, started, method, &mut visit)
+    }
+
+    fn found<B: RasterBackend>(
+        &self,
+        mesh: &Mesh,
+        target: &Target<'_>,
+        camera: &Pinhole,
+        started: bool,
+        method: &Method,
+        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<FoundPose>> {
+        Self::check(mesh, target.mask, camera, started)?;
         let starts = match started {
             true => vec![*camera],
-            false => self.starts::<B>(mesh, mask, camera, method, &mut visit)?,
+            false => self.hopeful::<B>(mesh, target, camera, method, visit)?,
         };
         let begun = self.steps(started) - self.fine_steps;
-        let square = mask.looked_at()?;
-        let poses = starts.into_iter().map(|start| MaskPose { mask: mask.clone(), square, start });
-        let (poses, fine) = (poses.collect(), self.fine());
-        let found = self.improved::<B>(mesh, poses, method, &fine, begun, &mut visit)?;
-        let scored = found
-            .into_iter()
-            .map(|(camera, _)| (camera, 1.0 - mask_iou(&silhouette_pixels(mesh, &camera), mask)));
-        let scored: Vec<(Pinhole, f64)> =
-            apart(scored.collect(), FINE, ANSWERS_APART_DEG, Some(&coarse(mesh)));
+        let (poses, fine) = (target.poses(starts, true), self.fine());
+        let found = self.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+        let scored = found.into_iter().map(|(camera, loss)| {
+            let iou = mask_iou(&silhouette_pixels(mesh, &camera), target.mask);
+            let psnr =
+                target.painted.and_then(|view| view.psnr_of(&coloured_pixels(mesh, &camera)));
+            let loss = if target.painted.is_some() { loss } else { 1.0 - iou };
+            (FoundPose { camera, iou, psnr }, loss)
+        });
+        let few = coarse(mesh);
+        let alike = target.painted.is_none().then_some(&*few);
+        let scored = apart(scored.collect(), FINE, ANSWERS_APART_DEG, alike);
         let best = scored.first().context("no pose was tried")?.1;
-        let nearly = scored.iter().filter(|(_, loss)| *loss <= best + NEARLY);
-        Ok(nearly.map(|&(camera, loss)| FoundPose { camera, iou: 1.0 - loss }).collect())
+        let nearly = scored.into_iter().filter(|(_, loss)| *loss <= best + NEARLY);
+        Ok(nearly.map(|(pose, _)| pose).collect())
     }
 
     /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most hopeful first; at most six.
@@ -151,22 +227,51 @@ impl PoseSearch {
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
         Self::check(mesh, mask, camera, false)?;
-        let square = mask.looked_at()?;
-        let posed = |start: Pinhole| MaskPose { mask: mask.clone(), square, start };
+        self.hopeful::<B>(mesh, &Target::new(mask, None)?, camera, method, &mut visit)
+    }
+
+    fn hopeful<B: RasterBackend>(
+        &self,
+        mesh: &Mesh,
+        target: &Target<'_>,
+        camera: &Pinhole,
+        method: &Method,
+        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<Pinhole>> {
         let few = coarse(mesh);
-        let mut found = apart(glance(&few, mask, square, camera), STARTS.0, APART_DEG, None);
+        let alike = target.painted.is_none().then_some(&*few);
+        let mut found = apart(glance(&few, target, camera), STARTS.0, APART_DEG, None);
         let mut begun = 0;
         // Few steps already tell the hopeless apart: many starts are had for little.
         for ((_, steps), left) in [(STARTS, COARSE.0), (COARSE, FINE)] {
-            let poses = found.into_iter().map(|(start, _)| posed(start)).collect();
+            // Silhouettes bring a pose near for less time than colours; these say then which it is.
+            let poses = target.poses(found.into_iter().map(|(start, _)| start), false);
             let stage = SolveConfig { steps, size: COARSE_SIZE, learning_rate: self.learning_rate };
-            let better = self.improved::<B>(&few, poses, method, &stage, begun, &mut visit)?;
-            found = apart(better, left, APART_DEG, Some(&few));
+            let better = self.improved::<B>(&few, poses, method, &stage, begun, visit)?;
+            found = apart(self.judged(&few, target, better), left, APART_DEG, alike);
             begun += steps;
         }
         let least = found.first().map_or(0.0, |&(_, loss)| loss);
         let found = found.into_iter().filter(|&(_, loss)| loss <= least + HOPEFUL);
         Ok(found.map(|(start, _)| start).collect())
+    }
+
+    /// Poses with the error of their hard image on few pixels: with colours, if they are asked for.
+    fn judged(
+        &self,
+        mesh: &Mesh,
+        target: &Target<'_>,
+        poses: Vec<(Pinhole, f64)>,
+    ) -> Vec<(Pinhole, f64)> {
+        if target.painted.is_none() {
+            return poses;
+        }
+        let instances = target.poses(poses.iter().map(|&(camera, _)| camera), true);
+        let problem = MaskPoses::new(mesh, instances.clone(), self.optimise_fov);
+        let scene = problem.scene::<HostBackend>(&instances, COARSE_SIZE);
+        let image = problem.hard_image(&scene, problem.start(&scene));
+        let losses = numbers(problem.image_loss(&scene, image));
+        poses.into_iter().zip(losses).map(|((camera, _), loss)| (camera, loss)).collect()
     }
 
     /// How poses are improved on many pixels.
@@ -211,7 +316,8 @@ fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
 
 /// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error before
 /// they were moved there for the last time.
-fn glance(mesh: &Mesh, mask: &Picture, square: [f64; 3], camera: &Pinhole) -> Vec<(Pinhole, f64)> {
+fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<(Pinhole, f64)> {
+    let &Target { mask, square, painted } = target;
     let (middle, radius) = ball(mesh);
     let [levels, covered] = mask.part(square, GLANCE);
     let target = moments(&levels);
@@ -231,6 +337,10 @@ fn glance(mesh: &Mesh, mask: &Picture, square: [f64; 3], camera: &Pinhole) -> Ve
         Pinhole { rotation, translation: [0, 1, 2].map(|k| at[k] - seen[k]), ..*camera }
     };
     let all: Vec<_> = directions().map(|local| times(towards, local)).collect();
+    let colours = mesh.colours().zip(painted).map(|(colours, view)| {
+        let coat = Coat::new(colours, mesh.faces().into());
+        ColouredViews::<HostBackend>::of_pictures(coat, &[(view, square); AT_ONCE], GLANCE)
+    });
     let mut found = Vec::with_capacity(all.len());
     for rotations in all.chunks(AT_ONCE) {
         let views = rotations.len();
@@ -244,10 +354,13 @@ fn glance(mesh: &Mesh, mask: &Picture, square: [f64; 3], camera: &Pinhole) -> Ve
                 tensor::<HostBackend, 3>(image.repeat(views), [views, GLANCE, GLANCE])
             };
             // What lies outside of the picture does not count.
-            let drawn =
-                hard_silhouette(project_pinhole(corners.clone(), &cropped), mesh.faces(), GLANCE)
-                    * of_views(&covered);
-            losses = numbers(iou_loss(drawn.clone(), of_views(&levels)));
+            let seen = project_pinhole(corners.clone(), &cropped);
+            let drawn = hard_silhouette(seen.clone(), mesh.faces(), GLANCE) * of_views(&covered);
+            let loss = iou_loss(drawn.clone(), of_views(&levels));
+            losses = numbers(match &colours {
+                Some(colours) => loss + colours.hard_loss(seen, GLANCE),
+                None => loss,
+            });
             let drawn = numbers(drawn);
             for (camera, image) in cameras.iter_mut().zip(drawn.chunks(GLANCE * GLANCE)) {
                 let now = moments(image);
@@ -322,19 +435,20 @@ fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
 
 /// The best so many of these, each at least so many degrees from all that are better; with a mesh, only those at which it looks otherwise,
 /// so that the turns of a vase are one pose.
-fn apart(
-    mut poses: Vec<(Pinhole, f64)>,
+fn apart<P: Copy + Borrow<Pinhole>>(
+    mut poses: Vec<(P, f64)>,
     count: usize,
     degrees: f64,
     mesh: Option<&Mesh>,
-) -> Vec<(Pinhole, f64)> {
+) -> Vec<(P, f64)> {
     poses.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-    let mut kept = Vec::new();
-    for (camera, loss) in poses {
+    let mut kept: Vec<((P, f64), _)> = Vec::new();
+    for (pose, loss) in poses {
         if kept.len() == count {
             break;
         }
-        if kept.iter().any(|((other, _), _): &(_, _)| angle_deg(&camera, other) < degrees) {
+        let camera = pose.borrow();
+        if kept.iter().any(|((other, _), _)| angle_deg(camera, other.borrow()) < degrees) {
             continue;
         }
         let sides = mesh.map(|mesh| from_three_sides(mesh, camera.rotation));
@@ -342,7 +456,7 @@ fn apart(
             sides.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| overlap(a, b) >= ALIKE)
         };
         if !kept.iter().any(|(_, other)| alike(other)) {
-            kept.push(((camera, loss), sides));
+            kept.push(((pose, loss), sides));
         }
     }
     kept.into_iter().map(|(pose, _)| pose).collect()

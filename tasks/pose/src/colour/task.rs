@@ -7,11 +7,11 @@ use softrast_cli::{
     Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, pose::PoseInstance};
-use softrast_lab::{Error, rgb_from_planes};
+use softrast_lab::rgb_from_planes;
 use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 
-use super::Scene;
+use super::{Scene, coloured};
 use crate::{Args, Pictures, Pose, picture::outlined};
 
 /// Larger than that of silhouettes (docs/notes.md, Pose by colour).
@@ -88,24 +88,13 @@ impl Task for Coloured {
     type Args = Args;
     type Pictures = Pictures;
 
-    fn solve_given(
-        _given: &Given<'_, Args>,
-        pictures: &Pictures,
-    ) -> Option<anyhow::Result<Answer>> {
-        let refused = "--colour draws its own targets: leave it out with pictures of your own, whose silhouettes alone are compared";
-        pictures.asked().then(|| Err(Error::usage(refused)))
+    fn solve_given(given: &Given<'_, Args>, pictures: &Pictures) -> Option<anyhow::Result<Answer>> {
+        Pose::solve_given(given, pictures)
     }
 
     fn new(args: &Args, variant: Variant, edges: &EdgeChoice) -> anyhow::Result<Self> {
         let pose = Pose::new(args, variant, edges)?;
-        let colours = pose.problem().mesh.colours().map(<[_]>::to_vec).ok_or_else(|| {
-            let mesh = args.mesh.as_deref().unwrap_or(std::path::Path::new("the mesh"));
-            Error::usage(format!(
-                "--colour needs a mesh with colours at its vertices, and {} has none: give a PLY, GLB or OBJ file that has, as shape3d \
-                 --colour writes them",
-                mesh.display()
-            ))
-        })?;
+        let colours = coloured(args, &pose.problem().mesh)?.to_vec();
         Ok(Self { pose, colours })
     }
 
