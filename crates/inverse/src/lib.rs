@@ -26,6 +26,7 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod baked;
 mod camera_file;
 mod checkpoint;
 mod coloured_pixels;
@@ -53,6 +54,7 @@ mod targets;
 pub mod triangles;
 mod view;
 
+pub use baked::baked;
 pub use checkpoint::Checkpoint;
 pub use coloured_pixels::coloured_pixels;
 pub use distilled_mlp::{distilled_mlp, mlp_like};

@@ -117,6 +117,11 @@ fn a_known_shape_gets_its_colours_back_over_nothing_and_over_white() {
         let page = fs::read_to_string(out.join("report.html")).unwrap();
         assert!(page.contains("PSNR") && page.contains("\"colours\":\""));
         assert!(out.join("colours.png").exists());
+        let textured = Mesh::load_textured(out.join("textured.glb")).unwrap().0;
+        assert_eq!(textured.faces().len(), ball().faces().len());
+        let picture = textured.texture().unwrap().picture().unwrap();
+        let picture = image::load_from_memory(picture).unwrap().into_rgb8();
+        assert!(picture.pixels().any(|texel| texel.0[0].abs_diff(texel.0[2]) > 100));
     }
 }
 

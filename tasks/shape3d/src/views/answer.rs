@@ -50,6 +50,7 @@ struct Summary {
 pub(super) fn answer(
     given: &Given<'_, Args>,
     mesh: &Mesh,
+    textured: Option<&Mesh>,
     scored: &[Scored],
     seconds: f64,
 ) -> anyhow::Result<Answer> {
@@ -96,6 +97,10 @@ pub(super) fn answer(
     if let Some(colours) = colours {
         files.push(("colours.png".to_owned(), colours));
         beside += ", colours.png the same in colour";
+    }
+    if let Some(textured) = textured {
+        files.push(("textured.glb".to_owned(), textured.to_glb()));
+        beside += ", textured.glb the mesh with its colours as a texture";
     }
     let output = Output { text, json, warnings, partial: None };
     Ok(Answer { page, output, files, beside })

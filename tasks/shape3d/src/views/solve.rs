@@ -4,7 +4,8 @@ use anyhow::ensure;
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
-    Method, PaintedView, SolveConfig, View, load_views, mask_iou, minimize, silhouette_pixels,
+    Method, PaintedView, SolveConfig, View, baked, load_views, mask_iou, minimize,
+    silhouette_pixels,
 };
 use softrast_lab::{Error, Progress, format::counted};
 use softrast_mesh::{Mesh, icosphere};
@@ -149,10 +150,13 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
             deformed(given, flags, &stages, start, &train, &mut progress)?
         }
     };
+    let mut textured = None;
     if flags.colour {
-        mesh = painted::painted(given, &mesh, &to_paint, |step, loss| {
+        let painted = painted::painted(given, &mesh, &to_paint, |step, loss| {
             progress.step(steps - of_colours + step, loss)
         })?;
+        textured = Some(baked(&mesh, &painted)?);
+        mesh = painted;
     }
     progress.finish();
     let seconds = clock.elapsed().as_secs_f64();
@@ -165,7 +169,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let train = train.iter().enumerate().map(|view| score(view, &to_paint, false));
     let held_out = held_out.iter().enumerate().map(|view| score(view, &to_compare, true));
     let scored: Vec<Scored> = train.chain(held_out).collect();
-    answer(given, &mesh, &scored, seconds)
+    answer(given, &mesh, textured.as_ref(), &scored, seconds)
 }
 
 /// Parts of the work on the shape, with the steps that were asked for; none if it is known.
