@@ -60,6 +60,8 @@ pub struct ColourRenderer {
     phi: [Vec<f64>; 2],
     tolerance: f64,
     kept: Arc<Mutex<Option<Prepared>>>,
+    #[cfg(feature = "wgpu")]
+    topology: crate::gpu::Topology,
 }
 
 /// What the last image needed and the next one may need again.
@@ -118,7 +120,16 @@ impl ColourRenderer {
         assert!(near < far, "the near plane {near} is not nearer than the far plane {far}");
         check(&weighting, &phi);
         let (tolerance, kept) = (Rasterizer::TOLERANCE, Arc::default());
-        Self { faces, size, weighting, phi, tolerance, kept }
+        Self {
+            faces,
+            size,
+            weighting,
+            phi,
+            tolerance,
+            kept,
+            #[cfg(feature = "wgpu")]
+            topology: Default::default(),
+        }
     }
 
     /// With another largest error of a pixel, as a part of the range of what is shown, in (0, 1).
@@ -183,7 +194,8 @@ impl ColourRenderer {
     /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. They, the
     /// attributes and the background receive gradients, to second order on `Autodiff<Autodiff<B>>`.
     ///
-    /// Where tensors do not lie on the host, on a GPU, this is [`reference::blended`]: every pair of pixel and face in tensor ops.
+    /// On a GPU each image reads one number, the background's weight, and a texture is seen through [`reference::blended`]: every pair of
+    /// pixel and face in tensor ops.
     ///
     /// # Panics
     ///
@@ -195,23 +207,25 @@ impl ColourRenderer {
         background: &Background<B>,
     ) -> Tensor<B, 4> {
         let (device, dtype) = (vertices.device(), vertices.dtype());
-        if !B::ON_HOST {
+        if !B::ON_HOST && attributes.texture.is_some() {
             let phi = self.phi.each_ref().map(|phi| {
                 Tensor::from_data(TensorData::new(phi.clone(), [phi.len()]), (&device, dtype))
             });
             return self.by_reference(vertices, attributes, phi, background);
         }
         let mut prepared = self.prepared(&self.phi, number(background));
+        // A GPU gets what the CPU has computed in f64.
+        let precise = if B::ON_HOST { dtype } else { DType::F64 };
         let data = match prepared.tables.take() {
-            Some((phi, of, data)) if phi == self.phi && of == dtype => data,
+            Some((phi, of, data)) if phi == self.phi && of == precise => data,
             _ => {
                 let phi = self.phi.each_ref().map(|phi| {
                     let data = TensorData::new(phi.clone(), [phi.len()]);
-                    Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), dtype))
+                    Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), precise))
                 });
                 let data = prepared.tables(phi).into_data();
                 if let Some(kept) = self.kept().as_mut() {
-                    kept.tables = Some((self.phi.clone(), dtype, data.clone()));
+                    kept.tables = Some((self.phi.clone(), precise, data.clone()));
                 }
                 data
             }
@@ -220,7 +234,8 @@ impl ColourRenderer {
         self.drawn(&prepared, vertices, attributes, tables, background)
     }
 
-    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too.
+    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too. On a GPU this is
+    /// [`reference::blended`].
     ///
     /// # Panics
     ///
@@ -305,6 +320,8 @@ impl ColourRenderer {
             size: self.size,
             tolerance: 0.5 * self.tolerance,
             kept: None,
+            #[cfg(feature = "wgpu")]
+            topology: self.topology.clone(),
         }
     }
 

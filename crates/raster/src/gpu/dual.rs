@@ -45,6 +45,17 @@ impl Dual {
         Dual { value, tangent: -(value * value * self.tangent) }
     }
 
+    /// `exp(self)`.
+    pub(super) fn exp(self) -> Dual {
+        let value = f32::exp(self.value);
+        Dual { value, tangent: value * self.tangent }
+    }
+
+    /// The natural logarithm.
+    pub(super) fn ln(self) -> Dual {
+        Dual { value: f32::ln(self.value), tangent: self.tangent / self.value }
+    }
+
     /// `yes` where `condition` holds, else `no`.
     pub(super) fn select(condition: bool, yes: Dual, no: Dual) -> Dual {
         Dual {

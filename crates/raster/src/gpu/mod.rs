@@ -9,6 +9,8 @@
 
 #[cfg(not(target_family = "wasm"))]
 mod adapter;
+mod blend;
+mod blend_pass;
 mod cells;
 mod dual;
 mod frame;
@@ -17,6 +19,7 @@ mod image;
 mod pair;
 mod pass;
 mod reach;
+mod shown;
 mod table;
 mod topology;
 
@@ -32,7 +35,8 @@ use burn::{
     },
 };
 
-use crate::{FusedOp, Pass, RasterBackend};
+use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
+use blend_pass::{Blend, Inputs, culling};
 use pass::Pass as Kernels;
 
 /// Width and height in pixels of the tiles that walk together: one cube of units each.
@@ -45,7 +49,11 @@ impl RasterBackend for Wgpu {
     const ON_HOST: bool = false;
 
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
-        let FusedOp::ProfileSum(op) = op else { panic!("on a GPU {op:?} is made of tensor ops") };
+        let op = match op {
+            FusedOp::ProfileSum(op) => op,
+            FusedOp::SoftBlend(op) => return blended(op, pass, tensors),
+            FusedOp::Elementary(_) => panic!("on a GPU {op:?} is made of tensor ops"),
+        };
         let mut tensors = tensors.into_iter();
         let mut next = || tensors.next().expect("all inputs of the pass");
         let (vertices, table) = (next(), next());
@@ -69,6 +77,50 @@ impl RasterBackend for Wgpu {
             }
         }
     }
+}
+
+/// A pass of the op of colours, without a texture. Tables have no gradient.
+fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> FloatTensor<Wgpu> {
+    assert!(op.texture.is_none(), "on a GPU a texture is seen through tensor ops");
+    let mut tensors = tensors.into_iter();
+    let mut next = || tensors.next().expect("all inputs of the pass");
+    let [vertices, attributes, tables, background] = [next(), next(), next(), next()];
+    let inputs = [&vertices, &attributes, &tables, &background];
+    let lengths = inputs.map(length);
+    let shape = [vertices.shape()[0], lengths[3], op.size.height, op.size.width];
+    let mut inputs = Inputs { vertices, attributes, tables, background, along: None };
+    let culling = culling(op);
+    match pass {
+        Pass::Forward => {
+            let image = Blend::new(op, &culling, inputs).image();
+            Wgpu::float_reshape(image, shape.into())
+        }
+        Pass::Vjp { wanted } => {
+            assert!(!wanted[2], "on a GPU a gradient to tables goes through tensor ops");
+            let [vertices, attributes, background, _] =
+                Blend::new(op, &culling, inputs).gradient(next());
+            let parts = [vertices, attributes, background];
+            chosen(parts.into(), &[wanted[0], wanted[1], wanted[3]])
+        }
+        Pass::VjpOfVjp { along, wanted } => {
+            assert!(!wanted[2], "on a GPU a gradient to tables goes through tensor ops");
+            let (upstream, direction) = (next(), next());
+            let direction = whole(direction, &lengths, along);
+            let mut start = 0;
+            inputs.along = Some(lengths.map(|length| {
+                start += length;
+                Wgpu::float_slice(direction.clone(), &[Slice::from(start - length..start)])
+            }));
+            let parts = Blend::new(op, &culling, inputs).gradient(upstream);
+            chosen(parts.into(), &[wanted[0], wanted[1], wanted[3], wanted[4]])
+        }
+    }
+}
+
+/// Those of some flat tensors that are wanted, as one.
+fn chosen(parts: Vec<FloatTensor<Wgpu>>, wanted: &[bool]) -> FloatTensor<Wgpu> {
+    let parts = parts.into_iter().zip(wanted).filter(|&(_, &wanted)| wanted);
+    Wgpu::float_cat(parts.map(|(part, _)| part).collect(), 0)
 }
 
 fn length(tensor: &FloatTensor<Wgpu>) -> usize {

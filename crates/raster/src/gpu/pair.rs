@@ -21,6 +21,10 @@ pub(super) struct Lookup {
     pub(super) start: f32,
     pub(super) octaves: u32,
     pub(super) bits: u32,
+    /// Octaves before the end that are resolved, from `1 - z` to what their cells lie in, and the start of that.
+    pub(super) far: u32,
+    pub(super) shrunk: f32,
+    pub(super) end: f32,
     /// Cells of one side, without its tail.
     pub(super) cells: u32,
     /// Rows from the table of a view to that of the next; 0 where all have one.
@@ -33,40 +37,115 @@ impl Lookup {
     pub(super) fn first_row(self, view: u32) -> u32 {
         view * self.stride
     }
+
+    /// Where a squared distance lies in the table, on its inner side or not. Without `far` no cell is counted from the far end.
+    pub(super) fn place(self, distance2: Dual, inner: bool, #[comptime] far: bool) -> Place {
+        let inverse = select(inner, self.inverse_inner, self.inverse_outer);
+        let y = distance2.scale(inverse);
+        let z = select(y.value < 2.0f32, y.value, 2.0f32) + self.start;
+        let near = Cell::of(z, self.octaves, self.bits);
+        let mut index = select(near.index > self.cells, self.cells, near.index);
+        let mut value = near.place;
+        let mut rate = near.rate;
+        if far {
+            let rest = select(z < 1.0f32, 1.0f32 - z, 0.0f32);
+            let rest = select(rest < 0.5f32, rest, 0.5f32) * self.shrunk + self.end;
+            let cell = Cell::of(rest, self.far + 1u32, self.bits);
+            let is_far = z > 0.5f32;
+            // Counted from its end; one that starts at the middle is not reached.
+            let last = select(z < 1.0f32, self.cells - 1u32 - cell.index, self.cells);
+            index = select(is_far, last, index);
+            value = select(is_far, 1.0f32 - cell.place, value);
+            rate = select(is_far, cell.rate * self.shrunk, rate);
+        }
+        let row = select(inner, index + self.cells + 1u32, index);
+        // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
+        let place = Dual { value, tangent: y.tangent * rate };
+        let place = Dual::select(z < 1.0f32, place, Dual::constant(0.0f32));
+        let slope = rate * inverse;
+        Place { row, place, rate: select(slope < STEEPEST, slope, STEEPEST) }
+    }
+}
+
+/// A cell of some octaves below 1, counted by exponent and leading mantissa bits of a number in it, and the place of that in it.
+#[derive(CubeType, Clone, Copy)]
+struct Cell {
+    index: u32,
+    place: f32,
+    /// Rate at which the place moves with the number.
+    rate: f32,
+}
+
+#[cube]
+impl Cell {
+    fn of(z: f32, octaves: u32, bits: u32) -> Cell {
+        let raw = u32::reinterpret(z);
+        let shift = MANTISSA - bits;
+        let lower = f32::reinterpret((raw >> shift) << shift);
+        let index = (raw >> shift) - ((BIAS - octaves) << bits);
+        let rate = f32::reinterpret((2u32 * BIAS + bits - (raw >> MANTISSA)) << MANTISSA);
+        Cell { index, place: (z - lower) * rate, rate }
+    }
+}
+
+/// Where a squared distance lies in a table.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Place {
+    /// Row of the table.
+    pub(super) row: u32,
+    /// Place within the cell, in [0, 1], and its derivative by the squared distance.
+    pub(super) place: Dual,
+    pub(super) rate: f32,
+}
+
+#[cube]
+impl Place {
+    /// The value of the table there.
+    pub(super) fn value(self, cubic: Cubic) -> Dual {
+        let t = self.place;
+        cubic.a.add(t.mul(cubic.b.add(t.mul(cubic.c.add(t.mul(cubic.d))))))
+    }
+
+    /// Its derivative by the squared distance.
+    pub(super) fn slope(self, cubic: Cubic) -> Dual {
+        let t = self.place;
+        let by_place = cubic.b.add(t.mul(cubic.c.scale(2.0f32).add(t.mul(cubic.d.scale(3.0f32)))));
+        by_place.scale(self.rate)
+    }
 }
 
 /// One edge of a face.
 #[derive(CubeType, Clone, Copy)]
-struct Edge {
+pub(super) struct Edge {
     x: Dual,
     y: Dual,
-    along_x: Dual,
-    along_y: Dual,
+    pub(super) along_x: Dual,
+    pub(super) along_y: Dual,
     /// One over the squared length; 0 for an edge that is a point.
-    inverse: Dual,
+    pub(super) inverse: Dual,
 }
 
 /// A projected triangle prepared for distances; corner k starts edge k.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Face {
-    first: Edge,
-    second: Edge,
-    third: Edge,
+    pub(super) first: Edge,
+    pub(super) second: Edge,
+    pub(super) third: Edge,
     /// Sign of the area; 0 for a triangle without area.
-    orientation: f32,
+    pub(super) orientation: f32,
 }
 
 /// Closest point of an edge, or of the whole boundary, to a pixel.
 #[derive(CubeType, Clone, Copy)]
-struct Closest {
-    distance2: Dual,
-    dx: Dual,
-    dy: Dual,
+pub(super) struct Closest {
+    pub(super) distance2: Dual,
+    pub(super) dx: Dual,
+    pub(super) dy: Dual,
     /// Place on its edge, from 0 to 1.
-    along: Dual,
-    edge: u32,
+    pub(super) along: Dual,
+    pub(super) edge: u32,
     /// At least 0 where the pixel is on the inner side of all edges so far.
-    side: f32,
+    pub(super) side: f32,
 }
 
 /// What the profile makes of one pixel and one face.
@@ -94,6 +173,13 @@ impl Edge {
         let divisor = Dual::select(long, length2, Dual::constant(1.0f32));
         let inverse = Dual::select(long, divisor.recip(), Dual::constant(0.0f32));
         Edge { x, y, along_x, along_y, inverse }
+    }
+
+    /// The doubled area of the pixel at `px`, `py` and the edge, above 0 to its left.
+    pub(super) fn area(self, px: f32, py: f32) -> Dual {
+        let wx = Dual::constant(px).sub(self.x);
+        let wy = Dual::constant(py).sub(self.y);
+        self.along_x.mul(wy).sub(self.along_y.mul(wx))
     }
 
     fn closest(self, px: f32, py: f32, orientation: f32, edge: u32) -> Closest {
@@ -150,35 +236,26 @@ impl Face {
         Face { first: edge_a, second: edge_b, third: edge_c, orientation }
     }
 
-    /// Where the pixel at `px`, `py` (NDC) lies in the table.
-    pub(super) fn pair(self, px: f32, py: f32, lookup: Lookup) -> Pair {
+    /// The point of the boundary that is closest to the pixel at `px`, `py` (NDC).
+    pub(super) fn closest(self, px: f32, py: f32) -> Closest {
         let orientation = self.orientation;
         let first = self.first.closest(px, py, orientation, 0u32);
         let second = self.second.closest(px, py, orientation, 1u32);
         let third = self.third.closest(px, py, orientation, 2u32);
-        let nearest = first.nearer(second).nearer(third);
+        first.nearer(second).nearer(third)
+    }
+
+    /// Where the pixel at `px`, `py` (NDC) lies in the table.
+    pub(super) fn pair(self, px: f32, py: f32, lookup: Lookup) -> Pair {
+        let orientation = self.orientation;
+        let nearest = self.closest(px, py);
         let inside = nearest.side >= 0.0f32 && orientation != 0.0f32;
 
-        let inverse = select(inside, lookup.inverse_inner, lookup.inverse_outer);
-        let y = nearest.distance2.scale(inverse);
-        // Exponent and leading mantissa bits count the cells; what remains is the place in one.
-        let z = select(y.value < 2.0f32, y.value, 2.0f32) + lookup.start;
-        let raw = u32::reinterpret(z);
-        let shift = MANTISSA - lookup.bits;
-        let lower = f32::reinterpret((raw >> shift) << shift);
-        let index = (raw >> shift) - ((BIAS - lookup.octaves) << lookup.bits);
-        let index = select(index > lookup.cells, lookup.cells, index);
-        let row = select(inside, index + lookup.cells + 1u32, index);
-        let exponent = raw >> MANTISSA;
-        let rate = f32::reinterpret((2u32 * BIAS + lookup.bits - exponent) << MANTISSA);
-        // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
-        let place = Dual { value: (z - lower) * rate, tangent: y.tangent * rate };
-        let place = Dual::select(z < 1.0f32, place, Dual::constant(0.0f32));
-        let slope = rate * inverse;
+        let place = lookup.place(nearest.distance2, inside, false);
         Pair {
-            row,
-            place,
-            rate: select(slope < STEEPEST, slope, STEEPEST),
+            row: place.row,
+            place: place.place,
+            rate: place.rate,
             dx: nearest.dx,
             dy: nearest.dy,
             along: nearest.along,
@@ -191,15 +268,12 @@ impl Face {
 impl Pair {
     /// The profile at this pair.
     pub(super) fn value(self, cubic: Cubic) -> Dual {
-        let t = self.place;
-        cubic.a.add(t.mul(cubic.b.add(t.mul(cubic.c.add(t.mul(cubic.d))))))
+        Place { row: self.row, place: self.place, rate: self.rate }.value(cubic)
     }
 
     /// Derivative of the profile by the squared distance.
     pub(super) fn slope(self, cubic: Cubic) -> Dual {
-        let t = self.place;
-        let by_place = cubic.b.add(t.mul(cubic.c.scale(2.0f32).add(t.mul(cubic.d.scale(3.0f32)))));
-        by_place.scale(self.rate)
+        Place { row: self.row, place: self.place, rate: self.rate }.slope(cubic)
     }
 
     /// Barycentric weight of a corner at the closest point.

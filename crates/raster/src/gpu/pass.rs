@@ -21,43 +21,47 @@ use super::{
     table::{sum_cubics, sum_tables},
     topology::OnDevice,
 };
-use crate::{ImageSize, ProfileSum};
+use crate::{ImageSize, ProfileSum, kernel::Grid};
 
-type Buffer = CubeTensor<WgpuRuntime>;
+pub(super) type Buffer = CubeTensor<WgpuRuntime>;
 
 /// Largest buffer of a pass's own, in bytes: half of what every adapter can bind (128 MiB).
 const BUFFER: usize = 64 << 20;
 /// All tables of [`sum_cubics`] together, in bytes.
 const TABLES: usize = 32 << 20;
 /// Units of a cube where they do not share anything.
-const CUBE: u32 = 64;
+pub(super) const CUBE: u32 = 64;
 
 /// Inputs of a pass on the device.
 pub(super) struct Pass<'a> {
-    op: &'a ProfileSum,
-    client: ComputeClient<WgpuRuntime>,
+    pub(super) op: &'a ProfileSum,
+    pub(super) client: ComputeClient<WgpuRuntime>,
     /// `[views, 3, vertices]`.
-    vertices: Buffer,
+    pub(super) vertices: Buffer,
     /// `[rows, 4]`, or `[views, rows, 4]`.
     table: Buffer,
     /// Whether each view has a table of its own.
     by_view: bool,
     /// Derivatives of both, flat and in this order, in a pass of second order.
     direction: Option<Buffer>,
-    topology: OnDevice,
-    views: usize,
-    vertex_count: usize,
+    pub(super) topology: OnDevice,
+    pub(super) views: usize,
+    pub(super) vertex_count: usize,
     /// Width and height of a cell in pixels.
     side: usize,
+    /// Whether what is prepared of faces has their depths.
+    depths: bool,
+    /// Faces beyond this depth are not drawn.
+    far: f32,
 }
 
 /// Some of the views, culled.
-struct Culled {
-    first_view: usize,
-    views: usize,
-    corners: Buffer,
-    reaches: Buffer,
-    cells: Buffer,
+pub(super) struct Culled {
+    pub(super) first_view: usize,
+    pub(super) views: usize,
+    pub(super) corners: Buffer,
+    pub(super) reaches: Buffer,
+    pub(super) cells: Buffer,
 }
 
 /// Tables of the units that add up the gradient to one.
@@ -96,7 +100,14 @@ impl<'a> Pass<'a> {
             views,
             vertex_count,
             side,
+            depths: false,
+            far: f32::INFINITY,
         }
+    }
+
+    /// With the depths of faces, none of which is drawn beyond `far`.
+    pub(super) fn with_depths(self, far: f32) -> Self {
+        Self { depths: true, far, ..self }
     }
 
     /// Sums of the profile, flat: `[views * height * width]`.
@@ -171,7 +182,7 @@ impl<'a> Pass<'a> {
     }
 
     /// The views in parts whose buffers all fit, culled one after the other.
-    fn culled(&self) -> impl Iterator<Item = Culled> {
+    pub(super) fn culled(&self) -> impl Iterator<Item = Culled> {
         let faces = self.op.faces.len();
         let largest = (4 * self.stride() * faces).max(4 * self.cells_per_view() * words(self.op));
         // A launch counts at most 65535 cubes along an axis.
@@ -202,7 +213,9 @@ impl<'a> Pass<'a> {
             faces as u32,
             jobs as u32,
             (self.op.near as f32).to_bits(),
+            self.far.to_bits(),
             self.op.grid.outer as f32,
+            self.depths,
             self.second(),
         );
         count_drawn::launch(
@@ -320,12 +333,17 @@ impl<'a> Pass<'a> {
         );
     }
 
-    fn second(&self) -> bool {
+    /// What stands for tables.
+    pub(super) fn table(&self) -> &Buffer {
+        &self.table
+    }
+
+    pub(super) fn second(&self) -> bool {
         self.direction.is_some()
     }
 
     /// The direction; any buffer where there is none, as nothing then reads it.
-    fn direction(&self) -> Buffer {
+    pub(super) fn direction(&self) -> Buffer {
         self.direction.as_ref().unwrap_or(&self.table).clone()
     }
 
@@ -336,10 +354,11 @@ impl<'a> Pass<'a> {
 
     /// Numbers that describe a face.
     fn stride(&self) -> usize {
-        if self.second() { 12 } else { 6 }
+        let numbers = if self.depths { 9 } else { 6 };
+        if self.second() { 2 * numbers } else { numbers }
     }
 
-    fn pixels(&self) -> usize {
+    pub(super) fn pixels(&self) -> usize {
         self.views * self.op.size.pixels()
     }
 
@@ -361,12 +380,12 @@ impl<'a> Pass<'a> {
         self.per_row() * self.per_column()
     }
 
-    fn frame(&self) -> FrameLaunch<WgpuRuntime> {
+    pub(super) fn frame(&self) -> FrameLaunch<WgpuRuntime> {
         let ImageSize { height, width } = self.op.size;
         FrameLaunch::new(height as u32, width as u32, height.min(width) as u32)
     }
 
-    fn cells(&self, culled: &Culled) -> CellsLaunch<WgpuRuntime> {
+    pub(super) fn cells(&self, culled: &Culled) -> CellsLaunch<WgpuRuntime> {
         CellsLaunch::new(
             self.side as u32,
             self.per_row() as u32,
@@ -378,26 +397,15 @@ impl<'a> Pass<'a> {
     }
 
     fn lookup(&self) -> LookupLaunch<WgpuRuntime> {
-        let grid = &self.op.grid;
-        let start = f64::exp2(-f64::from(grid.octaves));
-        let inverse = |radius: f64| ((1.0 - start) * radius.powi(-2)) as f32;
-        LookupLaunch::new(
-            inverse(grid.outer),
-            inverse(grid.inner),
-            start as f32,
-            grid.octaves,
-            grid.bits,
-            grid.cells() as u32,
-            if self.by_view { grid.rows() as u32 } else { 0 },
-        )
+        lookup(&self.op.grid, if self.by_view { self.rows() as u32 } else { 0 })
     }
 
-    fn cubes(&self, jobs: usize, units: u32) -> CubeCount {
+    pub(super) fn cubes(&self, jobs: usize, units: u32) -> CubeCount {
         calculate_cube_count_elemwise(&self.client, jobs, CubeDim::new_1d(units))
     }
 
     /// A flat buffer that nothing has been written to.
-    fn buffer(&self, length: usize, dtype: DType) -> Buffer {
+    pub(super) fn buffer(&self, length: usize, dtype: DType) -> Buffer {
         let handle = self.client.empty(length * dtype.size());
         let device = self.vertices.device.clone();
         CubeTensor::new_contiguous(self.client.clone(), device, [length].into(), handle, dtype)
@@ -407,6 +415,24 @@ impl<'a> Pass<'a> {
         let device = self.vertices.device.clone();
         zeros_client(self.client.clone(), device, [length].into(), DType::F32)
     }
+}
+
+/// A grid prepared for look-ups, and how many rows the table of a view is from that of the next.
+pub(super) fn lookup(grid: &Grid, stride: u32) -> LookupLaunch<WgpuRuntime> {
+    let [start, end] = [grid.octaves, grid.far + 1].map(|k| f64::exp2(-f64::from(k)));
+    let inverse = |radius: f64| ((1.0 - start) * radius.powi(-2)) as f32;
+    LookupLaunch::new(
+        inverse(grid.outer),
+        inverse(grid.inner),
+        start as f32,
+        grid.octaves,
+        grid.bits,
+        grid.far,
+        (1.0 - 2.0 * end) as f32,
+        end as f32,
+        grid.cells() as u32,
+        stride,
+    )
 }
 
 /// Words that hold a bit for each face.

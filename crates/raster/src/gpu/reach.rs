@@ -7,7 +7,6 @@ use super::frame::Frame;
 /// Projected coordinates beyond 1e6 NDC are not drawn. As bits: floats of one sign are ordered as
 /// their bits are, and a shader may assume that no float is NaN, but not that no integer is.
 const FAR_AWAY_BITS: u32 = 1e6f32.to_bits();
-const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
 /// All bits but the sign.
 const MAGNITUDE: u32 = 0x7fff_ffff;
 /// Makes up for rounding, in pixels.
@@ -50,13 +49,13 @@ impl Reach {
 }
 
 /// Whether a corner may be drawn: `x` and `y` not far away, `z` not nearer than the float with the
-/// bits `near`; false for NaN.
+/// bits `near` and not beyond that with the bits `far`; false for NaN.
 #[cube]
-fn is_drawn(x: f32, y: f32, z: f32, near: u32) -> bool {
+fn is_drawn(x: f32, y: f32, z: f32, near: u32, far: u32) -> bool {
     let x = u32::reinterpret(x) & MAGNITUDE;
     let y = u32::reinterpret(y) & MAGNITUDE;
     let z = u32::reinterpret(z);
-    x <= FAR_AWAY_BITS && y <= FAR_AWAY_BITS && z >= near && z <= INFINITY_BITS
+    x <= FAR_AWAY_BITS && y <= FAR_AWAY_BITS && z >= near && z <= far
 }
 
 /// First pixel of an axis of `side` pixels whose centre lies at or after `low` (NDC).
@@ -94,7 +93,8 @@ fn largest(a: f32, b: f32, c: f32) -> f32 {
 /// Writes corners and reach of every face of every view, one unit each.
 ///
 /// `vertices` is `[views, 3, vertices]`; `direction` starts with its derivatives. `corners` becomes
-/// `[views, faces, 6]`, in a pass of second order `[views, faces, 12]` with the derivatives last.
+/// `[views, faces, 6]`, in a pass of second order `[views, faces, 12]` with the derivatives last; with `depths` those of the three corners
+/// follow, and their derivatives.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn prepare(
@@ -109,7 +109,9 @@ pub(super) fn prepare(
     face_count: u32,
     jobs: u32,
     near: u32,
+    far: u32,
     radius: f32,
+    #[comptime] depths: bool,
     #[comptime] second: bool,
 ) {
     let job = ABSOLUTE_POS;
@@ -124,7 +126,8 @@ pub(super) fn prepare(
     let a = origin + faces[3 * face] as usize;
     let b = origin + faces[3 * face + 1] as usize;
     let c = origin + faces[3 * face + 2] as usize;
-    let stride = comptime!(if second { 12usize } else { 6usize });
+    let flat = comptime!(if second { 12usize } else { 6usize });
+    let stride = comptime!(if depths { flat / 2 * 3 } else { flat });
     let at = stride * job;
     let (ax, ay, az) = (vertices[a], vertices[a + vertex_count], vertices[a + 2 * vertex_count]);
     let (bx, by, bz) = (vertices[b], vertices[b + vertex_count], vertices[b + 2 * vertex_count]);
@@ -143,8 +146,19 @@ pub(super) fn prepare(
         corners[at + 10] = direction[c];
         corners[at + 11] = direction[c + vertex_count];
     }
-    let drawn =
-        is_drawn(ax, ay, az, near) && is_drawn(bx, by, bz, near) && is_drawn(cx, cy, cz, near);
+    if depths {
+        corners[at + flat] = az;
+        corners[at + flat + 1] = bz;
+        corners[at + flat + 2] = cz;
+        if second {
+            corners[at + flat + 3] = direction[a + 2 * vertex_count];
+            corners[at + flat + 4] = direction[b + 2 * vertex_count];
+            corners[at + flat + 5] = direction[c + 2 * vertex_count];
+        }
+    }
+    let drawn = is_drawn(ax, ay, az, near, far)
+        && is_drawn(bx, by, bz, near, far)
+        && is_drawn(cx, cy, cz, near, far);
     let left = first_pixel(least(ax, bx, cx) - radius, frame.width, frame.shorter);
     let right = end_pixel(largest(ax, bx, cx) + radius, frame.width, frame.shorter);
     let top = first_pixel(-largest(ay, by, cy) - radius, frame.height, frame.shorter);

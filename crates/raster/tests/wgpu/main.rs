@@ -3,6 +3,7 @@
 //! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
 //! there is none.
 
+mod colours;
 mod products;
 #[path = "../triangles/mod.rs"]
 mod triangles;

@@ -57,7 +57,7 @@ pub(crate) fn tensor<T: Backend, const D: usize>(
     Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), dtype))
 }
 
-fn numbers<T: Backend, const D: usize>(tensor: Tensor<T, D>) -> Vec<f64> {
+pub(crate) fn numbers<T: Backend, const D: usize>(tensor: Tensor<T, D>) -> Vec<f64> {
     tensor.into_data().iter().collect()
 }
 
@@ -148,7 +148,7 @@ impl Products {
 }
 
 /// Distance of two vectors relative to the length of the second; infinite if it is not a number.
-fn relative(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn relative(a: &[f64], b: &[f64]) -> f64 {
     let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
     let error = norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied());
     if error.is_nan() { f64::INFINITY } else { error }

@@ -1,0 +1,369 @@
+//! The arithmetic of one pixel and one face in colour, as `kernel/blend/{point,depth,walk}.rs` have it.
+
+use cubecl::prelude::*;
+
+use super::{
+    dual::{Dual, load},
+    pair::{Closest, Cubic, Face, Lookup},
+};
+use crate::kernel::blend::AREA;
+
+/// [`AREA`] in the floats of kernels.
+#[allow(clippy::cast_possible_truncation)]
+const LEAST_AREA: f32 = AREA as f32;
+
+/// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, then the background.
+#[derive(CubeType, CubeLaunch, Clone, Copy)]
+pub(super) struct Weights {
+    /// Cells of the edge softness, mirrored: the inner side is outside a face.
+    pub(super) edge: Lookup,
+    pub(super) depth: Lookup,
+    /// Row where the table by depth begins.
+    pub(super) depth_row: u32,
+    /// Where attributes and background begin.
+    pub(super) attributes: u32,
+    pub(super) background: u32,
+    /// Attributes of a view that has its own.
+    pub(super) per_view: u32,
+    /// Where the derivatives of all these numbers begin in the direction.
+    pub(super) along: u32,
+    /// Depth of nearness 1, and one over the distance of the planes.
+    pub(super) near: f32,
+    pub(super) per_range: f32,
+    /// What is taken off the edge softness, and the logarithm from which on it counts.
+    pub(super) floor: f32,
+    pub(super) counts_from: f32,
+    /// Least weight by depth, of a line.
+    pub(super) line_floor: f32,
+}
+
+/// What of the weighting is known when a kernel is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Kind {
+    /// Whether tables have cells that are counted from their far ends.
+    pub(super) far_edge: bool,
+    pub(super) far_depth: bool,
+    /// Whether weights by depth are a line in place of a table.
+    pub(super) is_line: bool,
+    /// Channels of the image, but for the faces' share.
+    pub(super) channels: usize,
+    /// Whether the pass is of second order.
+    pub(super) second: bool,
+}
+
+/// A number for each corner of a face.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Corners {
+    pub(super) a: Dual,
+    pub(super) b: Dual,
+    pub(super) c: Dual,
+}
+
+#[cube]
+impl Corners {
+    pub(super) fn mul(self, other: Corners) -> Corners {
+        Corners { a: self.a.mul(other.a), b: self.b.mul(other.b), c: self.c.mul(other.c) }
+    }
+
+    pub(super) fn times(self, factor: Dual) -> Corners {
+        Corners { a: self.a.mul(factor), b: self.b.mul(factor), c: self.c.mul(factor) }
+    }
+
+    pub(super) fn less(self, number: Dual) -> Corners {
+        Corners { a: self.a.sub(number), b: self.b.sub(number), c: self.c.sub(number) }
+    }
+
+    pub(super) fn sum(self) -> Dual {
+        self.a.add(self.b).add(self.c)
+    }
+
+    fn select(condition: bool, yes: Corners, no: Corners) -> Corners {
+        Corners {
+            a: Dual::select(condition, yes.a, no.a),
+            b: Dual::select(condition, yes.b, no.b),
+            c: Dual::select(condition, yes.c, no.c),
+        }
+    }
+}
+
+/// A face with what its pairs share.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Shown {
+    face: Face,
+    /// One over the doubled area, signed; 0 for a face without an inside that counts.
+    per_area: Dual,
+    /// One over the depth of each corner.
+    pub(super) per_depth: Corners,
+    /// Where the attributes of its corners begin.
+    entry_a: u32,
+    entry_b: u32,
+    entry_c: u32,
+}
+
+/// What a face is to a pixel.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct ColourPair {
+    closest: Closest,
+    /// 1 where the nearest point of the face is the pixel itself, else 0.
+    within: f32,
+    /// Barycentric weights of the closest point of the boundary, and of the nearest point of the face on the screen.
+    boundary: Corners,
+    pub(super) barycentric: Corners,
+    pub(super) depth: Dual,
+    /// Those of the nearest point on the face itself.
+    pub(super) weights: Corners,
+    /// Logarithm of the edge softness, and its derivative by the squared distance.
+    pub(super) log_edge: Dual,
+    pub(super) edge_slope: Dual,
+    /// Logarithm of the weight by depth, and its derivative by the nearness.
+    pub(super) log_depth: Dual,
+    pub(super) depth_slope: Dual,
+}
+
+/// A logarithm of a weight by depth, and its derivative by the nearness.
+#[derive(CubeType, Clone, Copy)]
+struct ByDepth {
+    log: Dual,
+    slope: Dual,
+}
+
+/// What a pair counts relative to a weight: all of it, and the part that the edge softness makes before its floor is taken off.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Share {
+    pub(super) whole: Dual,
+    pub(super) of_edge: Dual,
+}
+
+#[cube]
+impl Shown {
+    /// The face whose prepared numbers start at `first` in `corners`; `entries` `[faces, 3]` names the attributes at its corners.
+    pub(super) fn new(
+        corners: &Array<f32>,
+        first: usize,
+        entries: &Array<u32>,
+        face: usize,
+        first_attribute: u32,
+        #[comptime] kind: Kind,
+    ) -> Shown {
+        let own = Face::new(corners, first, kind.second);
+        let depths = first + comptime!(if kind.second { 12usize } else { 6usize });
+        let per_depth = Corners {
+            a: load(corners, depths, corners, depths + 3, kind.second).recip(),
+            b: load(corners, depths + 1, corners, depths + 4, kind.second).recip(),
+            c: load(corners, depths + 2, corners, depths + 5, kind.second).recip(),
+        };
+        let (one, other) = (own.first, own.second);
+        let area = one.along_x.mul(other.along_y).sub(one.along_y.mul(other.along_x));
+        let size = select(area.value < 0.0f32, -area.value, area.value);
+        let some = size > LEAST_AREA;
+        let divisor = Dual::select(some, area, Dual::constant(1.0f32));
+        let per_area = Dual::select(some, divisor.recip(), Dual::constant(0.0f32));
+        let channels = comptime!(kind.channels as u32);
+        Shown {
+            face: own,
+            per_area,
+            per_depth,
+            entry_a: first_attribute + entries[3 * face] * channels,
+            entry_b: first_attribute + entries[3 * face + 1] * channels,
+            entry_c: first_attribute + entries[3 * face + 2] * channels,
+        }
+    }
+
+    /// A channel at the three corners.
+    pub(super) fn channel(
+        self,
+        numbers: &Array<f32>,
+        direction: &Array<f32>,
+        along: u32,
+        channel: usize,
+        #[comptime] second: bool,
+    ) -> Corners {
+        let a = self.entry_a as usize + channel;
+        let b = self.entry_b as usize + channel;
+        let c = self.entry_c as usize + channel;
+        let along = along as usize;
+        Corners {
+            a: load(numbers, a, direction, along + a, second),
+            b: load(numbers, b, direction, along + b, second),
+            c: load(numbers, c, direction, along + c, second),
+        }
+    }
+
+    /// What it is to the pixel at `px`, `py` (NDC).
+    pub(super) fn pair(
+        self,
+        px: f32,
+        py: f32,
+        weights: Weights,
+        numbers: &Array<f32>,
+        direction: &Array<f32>,
+        #[comptime] kind: Kind,
+    ) -> ColourPair {
+        let closest = self.face.closest(px, py);
+        let inside = closest.side >= 0.0f32 && self.face.orientation != 0.0f32;
+        let within = inside && self.per_area.value != 0.0f32;
+        let (zero, one) = (Dual::constant(0.0f32), Dual::constant(1.0f32));
+        // Corner k starts edge k and ends edge k - 1.
+        let (along, rest) = (closest.along, one.sub(closest.along));
+        let (first, second, third) = (closest.edge == 0, closest.edge == 1, closest.edge == 2);
+        let boundary = Corners {
+            a: Dual::select(first, rest, Dual::select(third, along, zero)),
+            b: Dual::select(second, rest, Dual::select(first, along, zero)),
+            c: Dual::select(third, rest, Dual::select(second, along, zero)),
+        };
+        let own = Corners {
+            a: self.face.second.area(px, py),
+            b: self.face.third.area(px, py),
+            c: self.face.first.area(px, py),
+        };
+        let barycentric = Corners::select(within, own.times(self.per_area), boundary);
+        // 1 / z is what interpolates linearly on the screen.
+        let parts = barycentric.mul(self.per_depth);
+        let depth = parts.sum().recip();
+
+        let place = weights.edge.place(closest.distance2, !inside, kind.far_edge);
+        let cubic = Cubic::new(numbers, place.row, direction, weights.along, kind.second);
+        let x = Dual::constant(weights.near).sub(depth).scale(weights.per_range);
+        let by_depth = ByDepth::at(x, weights, numbers, direction, kind);
+        ColourPair {
+            closest,
+            within: select(within, 1.0f32, 0.0f32),
+            boundary,
+            barycentric,
+            depth,
+            weights: parts.times(depth),
+            log_edge: zero.sub(place.value(cubic)),
+            edge_slope: zero.sub(place.slope(cubic)),
+            log_depth: by_depth.log,
+            depth_slope: by_depth.slope,
+        }
+    }
+
+    /// Gradient to x and y of a corner, of a function with these derivatives by the squared distance and by the barycentric weights; see
+    /// `kernel/blend/point.rs`.
+    pub(super) fn pulled(self, pair: ColourPair, by_distance2: Dual, by_weights: Corners) -> Moved {
+        let zero = Dual::constant(0.0f32);
+        let (w0, w1, w2) = (by_weights.a, by_weights.b, by_weights.c);
+        let (e0, e1, e2) = (self.face.first, self.face.second, self.face.third);
+        let closest = pair.closest;
+        let within = pair.within > 0.5f32;
+        let (first, second) = (closest.edge == 0, closest.edge == 1);
+        // Of the pixel itself.
+        let inner_x = zero
+            .sub(w0.mul(e1.along_y).add(w1.mul(e2.along_y)).add(w2.mul(e0.along_y)))
+            .mul(self.per_area);
+        let inner_y =
+            w0.mul(e1.along_x).add(w1.mul(e2.along_x)).add(w2.mul(e0.along_x)).mul(self.per_area);
+        // Of a point of an edge that is not held at one of its ends.
+        let slide = Dual::select(first, w1.sub(w0), Dual::select(second, w2.sub(w1), w0.sub(w2)));
+        let edge_x = Dual::select(first, e0.along_x, Dual::select(second, e1.along_x, e2.along_x));
+        let edge_y = Dual::select(first, e0.along_y, Dual::select(second, e1.along_y, e2.along_y));
+        let inverse = Dual::select(first, e0.inverse, Dual::select(second, e1.inverse, e2.inverse));
+        let free = closest.along.value > 0.0f32 && closest.along.value < 1.0f32 && !within;
+        let slide = Dual::select(free, slide, zero).mul(inverse);
+        Moved {
+            field_x: Dual::select(within, inner_x, slide.mul(edge_x)),
+            field_y: Dual::select(within, inner_y, slide.mul(edge_y)),
+            across_x: slide.mul(closest.dx),
+            across_y: slide.mul(closest.dy),
+            pull_x: by_distance2.scale(-2.0f32).mul(closest.dx),
+            pull_y: by_distance2.scale(-2.0f32).mul(closest.dy),
+        }
+    }
+}
+
+/// What moves the corners of a face at a pair.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Moved {
+    field_x: Dual,
+    field_y: Dual,
+    across_x: Dual,
+    across_y: Dual,
+    pull_x: Dual,
+    pull_y: Dual,
+}
+
+#[cube]
+impl Moved {
+    /// The gradient to x of the corners.
+    pub(super) fn x(self, pair: ColourPair) -> Corners {
+        corners(pair, self.pull_x, self.field_x, self.across_x)
+    }
+
+    /// The gradient to y of the corners.
+    pub(super) fn y(self, pair: ColourPair) -> Corners {
+        corners(pair, self.pull_y, self.field_y, self.across_y)
+    }
+}
+
+/// The gradient to the corners along an axis. What is across pushes the first corner of the closest edge back and its second one on.
+#[cube]
+fn corners(pair: ColourPair, pull: Dual, field: Dual, across: Dual) -> Corners {
+    let zero = Dual::constant(0.0f32);
+    let edge = pair.closest.edge;
+    let back = zero.sub(across);
+    let turned = Corners {
+        a: Dual::select(edge == 0, back, Dual::select(edge == 2, across, zero)),
+        b: Dual::select(edge == 1, back, Dual::select(edge == 0, across, zero)),
+        c: Dual::select(edge == 2, back, Dual::select(edge == 1, across, zero)),
+    };
+    let (at, own) = (pair.boundary, pair.barycentric);
+    Corners {
+        a: pull.mul(at.a).sub(field.mul(own.a)).add(turned.a),
+        b: pull.mul(at.b).sub(field.mul(own.b)).add(turned.b),
+        c: pull.mul(at.c).sub(field.mul(own.c)).add(turned.c),
+    }
+}
+
+#[cube]
+impl ByDepth {
+    /// What a point at `x`, its nearness less 1, counts.
+    fn at(
+        x: Dual,
+        weights: Weights,
+        numbers: &Array<f32>,
+        direction: &Array<f32>,
+        #[comptime] kind: Kind,
+    ) -> ByDepth {
+        let zero = Dual::constant(0.0f32);
+        if kind.is_line {
+            let at = 4 * weights.depth_row as usize;
+            let along = weights.along as usize + at;
+            let nearness = x.add(Dual::constant(1.0f32));
+            let a = load(numbers, at, direction, along, kind.second);
+            let c = load(numbers, at + 1, direction, along + 1, kind.second);
+            let slope = Dual::select(nearness.value > 0.0f32, a, zero.sub(c));
+            let weight = slope.mul(nearness);
+            let some = weight.value > weights.line_floor;
+            let held = Dual::select(some, weight, Dual::constant(weights.line_floor));
+            let per_weight = Dual::select(some, held.recip(), zero);
+            ByDepth { log: held.ln(), slope: slope.mul(per_weight) }
+        } else {
+            let place = weights.depth.place(x.mul(x), x.value <= 0.0f32, kind.far_depth);
+            let row = weights.depth_row + place.row;
+            let cubic = Cubic::new(numbers, row, direction, weights.along, kind.second);
+            let slope = place.slope(cubic).mul(x.scale(-2.0f32));
+            ByDepth { log: zero.sub(place.value(cubic)), slope }
+        }
+    }
+}
+
+#[cube]
+impl ColourPair {
+    /// Whether it counts at all, and is above the floor by more than rounding leaves.
+    pub(super) fn counts(self, weights: Weights) -> bool {
+        self.log_edge.value > weights.counts_from
+    }
+
+    /// What it counts relative to a weight with this logarithm.
+    pub(super) fn share(self, relative: Dual, weights: Weights) -> Share {
+        let by_depth = self.log_depth.sub(relative);
+        let whole = self.log_edge.add(by_depth).exp();
+        let rest = 1.0f32 / (1.0f32 - weights.floor);
+        // Far from the pixel, a near face without its edge may be beyond the range of floats; it does not count.
+        let floor = by_depth.exp().scale(weights.floor);
+        let has_floor = weights.floor > 0.0f32;
+        let less = Dual::select(has_floor, whole.sub(floor).scale(rest), whole);
+        Share { whole: less, of_edge: whole.scale(rest) }
+    }
+}
