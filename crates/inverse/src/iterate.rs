@@ -82,7 +82,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
     }
 
     /// The numbers of what is seen, with its hard error.
-    pub(crate) fn read(
+    pub(crate) async fn read(
         &self,
         step: usize,
         part: f64,
@@ -95,7 +95,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
         let read = Transaction::default().register(seen.theta).register(seen.loss.inner());
         let read = read.register(seen.soft_loss);
         let read = image.into_iter().fold(read, |read, image| read.register(image));
-        let mut read = read.execute().into_iter();
+        let mut read = read.execute_async().await?.into_iter();
         let mut next = || read.next().context("fewer tensors were read than were asked for");
         let (theta, loss, soft_loss) = (on_host(next()?), next()?, next()?);
         let image = rows.map(|side| {

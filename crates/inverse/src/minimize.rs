@@ -1,7 +1,10 @@
 use std::{borrow::Borrow, time::Duration};
 
 use anyhow::{Context, ensure};
-use burn::{backend::Autodiff, tensor::Tensor};
+use burn::{
+    backend::Autodiff,
+    tensor::{Tensor, read_sync},
+};
 use softrast_meta::{Adam, AdamState, Optimizer};
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::{Follower, Place, ScaleSchedule};
@@ -150,7 +153,17 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
         }
     }
 
-    fn step(&mut self) -> anyhow::Result<Iterate> {
+    /// The next iterate, as [`Iterator::next`] gives it. In a browser this is the only way to what a GPU has computed.
+    pub async fn next_async(&mut self) -> Option<anyhow::Result<Iterate>> {
+        if self.ended {
+            return None;
+        }
+        let iterate = self.step().await;
+        self.ended |= iterate.is_err();
+        Some(iterate)
+    }
+
+    async fn step(&mut self) -> anyhow::Result<Iterate> {
         let clock = Instant::now();
         let hard_loss = self.latest.as_ref().map(|latest| latest.hard_loss);
         let (step, drawn) = self.stepped();
@@ -164,10 +177,12 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
         let seconds = drawn.map(|drawing| (drawing + clock.elapsed()).as_secs_f64());
         let clock = Instant::now();
         let seen = self.run.seen(self.place.part, leaf.clone());
-        // A GPU has only been asked so far, also for the end of the step before.
-        B::sync(&seen.theta.device())?;
+        // A GPU has only been asked so far, also for the end of the step before. A browser does not wait for it.
+        if cfg!(not(target_family = "wasm")) {
+            B::sync(&seen.theta.device())?;
+        }
         let (drawing, loss) = (clock.elapsed(), seen.loss.clone());
-        let read = self.run.read(step, self.place.part, seen, self.pictures)?;
+        let read = self.run.read(step, self.place.part, seen, self.pictures).await?;
         let iterate = Iterate { seconds, begun_again: self.starts - 1, ..read };
         let hard_loss = iterate.hard_loss[0];
         self.latest = Some(Latest { step, leaf, loss, hard_loss, drawing });
@@ -179,12 +194,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Iterator for Minimizatio
     type Item = anyhow::Result<Iterate>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
-        let iterate = self.step();
-        self.ended |= iterate.is_err();
-        Some(iterate)
+        read_sync(self.next_async())
     }
 }
 

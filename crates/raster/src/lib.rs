@@ -43,6 +43,7 @@ mod profile;
 pub mod reference;
 mod shading;
 mod silhouette;
+mod small_product;
 mod soft_blend;
 mod soft_renderer;
 mod sum_op;
@@ -72,6 +73,8 @@ pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
 pub use profile::Profile;
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use silhouette::{Rasterizer, Silhouette};
+#[doc(hidden)]
+pub use small_product::small_product;
 #[doc(hidden)]
 pub use soft_blend::SoftBlend;
 pub use soft_renderer::SoftRenderer;

@@ -4,6 +4,8 @@ use softrast_softness::tensor_on;
 use crate::{
     ImageSize, Orbit, RasterBackend,
     camera::{cross, dot, perspective, unit},
+    small_product,
+    view::sin_cos,
 };
 
 /// How far from a right angle, a unit length or the middle of an image still counts as none at all.
@@ -334,7 +336,7 @@ pub fn project_pinhole<B: RasterBackend>(
 /// # Panics
 ///
 /// If the shapes do not fit.
-pub fn turned<B: Backend>(tangent: Tensor<B, 2>, rotation: Tensor<B, 3>) -> Tensor<B, 3> {
+pub fn turned<B: RasterBackend>(tangent: Tensor<B, 2>, rotation: Tensor<B, 3>) -> Tensor<B, 3> {
     let [views, ..] = rotation.dims();
     assert_eq!(tangent.dims(), [views, 3], "tangents of {views} rotations");
     let square = (tangent.clone() * tangent.clone()).sum_dim(1); // [views, 1]
@@ -345,8 +347,9 @@ pub fn turned<B: Backend>(tangent: Tensor<B, 2>, rotation: Tensor<B, 3>) -> Tens
     };
     let safe = square.clone().mask_fill(near.clone(), 1.0);
     let angle = safe.clone().sqrt();
-    let sinc = angle.clone().sin() / angle.clone();
-    let versine = (angle.cos().neg() + 1.0) / safe;
+    let [sin, cos] = sin_cos(angle.clone());
+    let sinc = sin / angle;
+    let versine = (cos.neg() + 1.0) / safe;
     let sinc = sinc.mask_where(near.clone(), series([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0]));
     let versine = versine.mask_where(near, series([0.5, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40320.0]));
 
@@ -354,8 +357,8 @@ pub fn turned<B: Backend>(tangent: Tensor<B, 2>, rotation: Tensor<B, 3>) -> Tens
     let zero = || w(0) * 0.0;
     let skew = vec![zero(), w(2).neg(), w(1), w(2), zero(), w(0).neg(), w(1).neg(), w(0), zero()];
     let skew = Tensor::cat(skew, 1).reshape([views, 3, 3]);
-    let once = skew.clone().matmul(rotation.clone());
-    let twice = skew.matmul(once.clone());
+    let once = small_product(skew.clone(), rotation.clone());
+    let twice = small_product(skew, once.clone());
     rotation + once * sinc.unsqueeze_dim(2) + twice * versine.unsqueeze_dim(2)
 }
 

@@ -1,6 +1,10 @@
 //! The views of orbiting cameras: their rotations, and how near and how far is drawn.
 
+use std::f64::consts::PI;
+
 use burn::tensor::{Tensor, backend::Backend};
+
+use crate::RasterBackend;
 
 /// Camera depth, in world units, below which a vertex counts as behind the camera. Faces with such
 /// a vertex are not drawn.
@@ -20,9 +24,12 @@ pub(crate) const FARTHEST: f64 = 1e15;
 /// itself, where `look_at` divides by zero, this form keeps the axes that it has just before.
 ///
 /// Source: docs/notes.md, Camera, with the cross products of `look_at` multiplied out.
-pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>) -> Tensor<B, 3> {
-    let [sin_e, cos_e] = sin_cos(elevation);
-    let [sin_a, cos_a] = sin_cos(azimuth);
+pub fn view_rotation<B: RasterBackend>(
+    elevation: Tensor<B, 1>,
+    azimuth: Tensor<B, 1>,
+) -> Tensor<B, 3> {
+    let [sin_e, cos_e] = sin_cos(radians(elevation));
+    let [sin_a, cos_a] = sin_cos(radians(azimuth));
     // Which way is up: constant on either side of the pole, so it has no gradient.
     let sign = cos_e.clone().sign();
     let roll = sign.clone().mask_fill(sign.equal_elem(0.0), 1.0);
@@ -43,14 +50,68 @@ pub fn view_rotation<B: Backend>(elevation: Tensor<B, 1>, azimuth: Tensor<B, 1>)
 }
 
 /// Distance of the image plane in NDC, `[views, 1, 1]`.
-pub(crate) fn focal<B: Backend>(fov_deg: Tensor<B, 1>) -> Tensor<B, 3> {
+pub(crate) fn focal<B: RasterBackend>(fov_deg: Tensor<B, 1>) -> Tensor<B, 3> {
     let [views] = fov_deg.dims();
-    let [sin, cos] = sin_cos(fov_deg * 0.5);
+    let [sin, cos] = sin_cos(radians(fov_deg * 0.5));
     (cos / sin).reshape([views, 1, 1])
 }
 
-fn sin_cos<B: Backend, const D: usize>(degrees: Tensor<B, D>) -> [Tensor<B, D>; 2] {
+fn radians<B: Backend>(degrees: Tensor<B, 1>) -> Tensor<B, 1> {
     // One factor: burn 0.21 differentiates a division by a number in f32.
-    let radians = degrees * (std::f64::consts::PI / 180.0);
-    [radians.clone().sin(), radians.cos()]
+    degrees * (PI / 180.0)
+}
+
+/// Sine and cosine of angles in radians.
+pub(crate) fn sin_cos<B: RasterBackend, const D: usize>(
+    radians: Tensor<B, D>,
+) -> [Tensor<B, D>; 2] {
+    match B::ON_HOST {
+        true => [radians.clone().sin(), radians.cos()],
+        false => by_series(radians),
+    }
+}
+
+/// The same from sums and products alone: a GPU's own sine and cosine may be off by 2^-11 (WebGPU Shading Language, Accuracy of Built-in
+/// Functions), which a loss shows.
+fn by_series<B: Backend, const D: usize>(radians: Tensor<B, D>) -> [Tensor<B, D>; 2] {
+    let turns = radians * (0.5 / PI);
+    // Half the angle that is left, within a right angle, where the next terms are below 1e-8.
+    let half = (turns.clone() - turns.round()) * PI;
+    let square = half.clone() * half.clone();
+    let sum = |last: usize| {
+        let term = |sum: Tensor<B, D>, k: usize| {
+            (sum * square.clone()) * (-1.0 / (k * (k - 1)) as f64) + 1.0
+        };
+        (2..last).rev().step_by(2).fold(square.ones_like(), term)
+    };
+    let (sin, cos) = (half * sum(14), sum(13));
+    let versine = sin.clone() * sin.clone() * 2.0;
+    [sin * cos * 2.0, versine.neg() + 1.0]
+}
+
+#[cfg(all(test, any(feature = "ndarray", feature = "wgpu")))]
+mod tests {
+    use burn::backend::{Autodiff, NdArray};
+    use softrast_softness::{numbers, vector};
+
+    use super::*;
+
+    /// Rounding of the angle, which is at most 10, and of some sums in f32.
+    const ROUNDED: f64 = 2e-6;
+
+    #[test]
+    fn a_series_is_sine_and_cosine_with_their_derivatives() {
+        let angles: Vec<f64> = (-1000..=1000).map(|k| f64::from(k) * 0.01).collect();
+        for k in 0..2 {
+            let radians = vector::<Autodiff<NdArray<f32>>>(&angles).require_grad();
+            let found = by_series(radians.clone())[k].clone();
+            let slope = radians.grad(&found.clone().sum().backward()).expect("a gradient");
+            for ((x, y), slope) in angles.iter().zip(numbers(found)).zip(numbers(slope)) {
+                let (sin, cos) = x.sin_cos();
+                let (value, derivative) = if k == 0 { (sin, cos) } else { (cos, -sin) };
+                assert!((y - value).abs() < ROUNDED, "{y} at {x}, expected {value}");
+                assert!((slope - derivative).abs() < ROUNDED, "slope {slope} at {x}");
+            }
+        }
+    }
 }

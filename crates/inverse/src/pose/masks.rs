@@ -4,8 +4,8 @@ use anyhow::Context;
 use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, turned,
-    vertices,
+    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, small_product,
+    turned, vertices,
 };
 use softrast_softness::{numbers, tensor};
 
@@ -217,7 +217,7 @@ impl<B: RasterBackend> MaskScene<B> {
         let beside = (self.seen.clone() + part(3, 2) * self.radius.clone()) * depth.clone();
         let Pinholes { rotation, intrinsics, size, .. } = self.cameras.clone();
         let rotation = turned(part(0, 3), rotation);
-        let middle = rotation.clone().matmul(self.middle.clone()).squeeze_dim::<2>(2);
+        let middle = small_product(rotation.clone(), self.middle.clone()).squeeze_dim::<2>(2);
         let translation = Tensor::cat(vec![beside, depth], 1) - middle;
         let intrinsics = match zoom {
             None => intrinsics,

@@ -3,8 +3,9 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    Orbit, RasterBackend, hard_silhouette, iou_loss, project, vertices, view_rotation,
+    HostBackend, Orbit, RasterBackend, hard_silhouette, iou_loss, project, vertices, view_rotation,
 };
+use softrast_softness::{numbers, tensor};
 
 use crate::{Targets, pose::PoseInstance};
 
@@ -42,22 +43,20 @@ impl<B: RasterBackend> PoseScene<B> {
     pub fn new(mesh: &Mesh, instances: &[PoseInstance], size: usize, optimise_fov: bool) -> Self {
         let views = instances.len();
         assert!(views > 0, "a scene needs an instance");
-        let device = Default::default();
-        let orbits = |of: fn(&PoseInstance) -> Orbit| {
-            let orbits: Vec<Orbit> = instances.iter().map(of).collect();
-            Orbit::tensors::<B>(&orbits, &device)
+        let orbits = |of: fn(&PoseInstance) -> Orbit| instances.iter().map(of).collect();
+        let (ends, starts): (Vec<Orbit>, Vec<Orbit>) =
+            (orbits(|of| of.target), orbits(|of| of.start));
+        let [turned, target] = match B::ON_HOST {
+            true => seen_by::<B>(mesh, &ends, size),
+            // In a browser nothing that lies on a GPU can be read at once, and a hard silhouette is drawn on the CPU.
+            false => seen_by::<HostBackend>(mesh, &ends, size).map(|seen| {
+                let shape = seen.dims();
+                tensor(numbers(seen), shape)
+            }),
         };
-        let positions = vertices::<B>(mesh.positions(), &device);
-        let count = mesh.positions().len();
-        let faces: Arc<[[u32; 3]]> = mesh.faces().into();
-
-        let targets = orbits(|instance| instance.target);
-        let target = hard_silhouette(project(positions.clone(), targets.clone()), &faces, size);
-        let angle = |k: usize| targets.clone().narrow(1, k, 1).reshape([views]);
-        let rotation = view_rotation(angle(1), angle(2));
-        let turned = positions.expand([views, count, 3]).matmul(rotation.swap_dims(1, 2));
-
-        let starts = orbits(|instance| instance.start);
+        let device = Default::default();
+        let targets = Orbit::tensors::<B>(&ends, &device);
+        let starts = Orbit::tensors::<B>(&starts, &device);
         let [pose, fov] = [(0, 3), (3, 1)].map(|(start, n)| starts.clone().narrow(1, start, n));
         let (start, fov) = match optimise_fov {
             true => (Tensor::cat(vec![pose, fov * 0.5], 1), None),
@@ -65,7 +64,8 @@ impl<B: RasterBackend> PoseScene<B> {
         };
         let given = starts.narrow(1, 0, 1).min_pair(targets.narrow(1, 0, 1));
         let nearest = given.clamp_max(nearest_distance(mesh));
-        Self { turned, fov, start, nearest, faces, targets: Targets::new(target), size }
+        let (faces, targets) = (mesh.faces().into(), Targets::new(target));
+        Self { turned, fov, start, nearest, faces, targets, size }
     }
 
     /// θ before the first step.
@@ -117,6 +117,19 @@ impl<B: RasterBackend> PoseScene<B> {
         }
         Tensor::cat(columns, 1)
     }
+}
+
+/// A mesh along the axes of each camera `[views, vertices, 3]`, and its hard silhouettes there `[views, size, size]`.
+fn seen_by<B: RasterBackend>(mesh: &Mesh, cameras: &[Orbit], size: usize) -> [Tensor<B, 3>; 2] {
+    let (views, count, device) = (cameras.len(), mesh.positions().len(), Default::default());
+    let cameras = Orbit::tensors::<B>(cameras, &device);
+    let positions = vertices::<B>(mesh.positions(), &device);
+    let seen = project(positions.clone(), cameras.clone());
+    let silhouettes = hard_silhouette(seen, mesh.faces(), size);
+    let angle = |k: usize| cameras.clone().narrow(1, k, 1).reshape([views]);
+    let rotation = view_rotation(angle(1), angle(2));
+    let turned = positions.expand([views, count, 3]).matmul(rotation.swap_dims(1, 2));
+    [turned, silhouettes]
 }
 
 /// Distance from the origin beyond which a camera has the whole mesh in front of it.

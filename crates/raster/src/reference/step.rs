@@ -3,14 +3,15 @@
 use burn::tensor::{Tensor, backend::Backend};
 
 use crate::{
-    NEAR,
+    NEAR, RasterBackend,
     loss::EMPTY,
+    small_product,
     view::{FARTHEST, focal, view_rotation},
 };
 
 /// The matrices `[views, 3, 4]` of orbits `[views, 4]` (distance, elevation, azimuth, whole field of view in degrees): two rows give x and
 /// y times the depth, the third gives the depth; see [`project`](crate::project).
-pub fn orbit_matrices<B: Backend>(orbits: Tensor<B, 2>) -> Tensor<B, 3> {
+pub fn orbit_matrices<B: RasterBackend>(orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     let [views, _] = orbits.dims();
     let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([views]);
     let focal = focal(column(3));
@@ -24,9 +25,12 @@ pub fn orbit_matrices<B: Backend>(orbits: Tensor<B, 2>) -> Tensor<B, 3> {
 }
 
 /// x and y in NDC and depth `[views, vertices, 3]` of `vertices` `[views or 1, vertices, 3]`, as cameras with these matrices see them.
-pub fn perspective<B: Backend>(vertices: Tensor<B, 3>, matrices: Tensor<B, 3>) -> Tensor<B, 3> {
+pub fn perspective<B: RasterBackend>(
+    vertices: Tensor<B, 3>,
+    matrices: Tensor<B, 3>,
+) -> Tensor<B, 3> {
     let vertices = vertices.clamp(-FARTHEST, FARTHEST).swap_dims(1, 2);
-    let seen = matrices.clone().narrow(2, 0, 3).matmul(vertices) + matrices.narrow(2, 3, 1);
+    let seen = small_product(matrices.clone().narrow(2, 0, 3), vertices) + matrices.narrow(2, 3, 1);
     let depth = seen.clone().narrow(1, 2, 1);
     let xy = seen.narrow(1, 0, 2) * depth.clone().clamp_min(NEAR).recip();
     Tensor::cat(vec![xy, depth], 1).swap_dims(1, 2)
