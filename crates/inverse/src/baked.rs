@@ -11,7 +11,8 @@ const APART: usize = 3;
 /// The mesh with a texture that shows the colours of `fine`: the same mesh, cut by [`Mesh::subdivided`] some times.
 ///
 /// Each vertex of `fine` has a texel for each face that it lies in or on, and what is read between texels, as all programs do, is what
-/// `fine` has there. Colours are rounded to 8 bits.
+/// `fine` has there. Colours are rounded to 8 bits. Texels beyond the longest side of a face go on as the face does, but are held within
+/// [0, 1]: so half way along that side what is read may be off, by a quarter of what is cut off.
 ///
 /// # Errors
 ///
@@ -127,7 +128,7 @@ mod tests {
             let ball = icosphere(1);
             let fine = (0..cuts).fold(ball.clone(), |mesh, _| mesh.subdivided());
             let channel =
-                |k: usize, vertex: usize| 0.5 + 0.2 * (1.7 * (3 * vertex + k) as f64).sin();
+                |k: usize, vertex: usize| 0.5 + 0.1 * (1.7 * (3 * vertex + k) as f64).sin();
             let colours = (0..fine.positions().len());
             let colours = colours.map(|vertex| [0, 1, 2].map(|k| channel(k, vertex))).collect();
             let fine = fine.with_colours(colours).unwrap();

@@ -1,7 +1,7 @@
 """The figures of docs/guide/pictures.md: poses against their truth, and masks made worse.
 
     python tasks/pose/benches/views.py worse VIEWS OUT specks1|specks5|gap|polygon|all
-    python tasks/pose/benches/views.py poses target/release/pose MESH VIEWS
+    python tasks/pose/benches/views.py poses target/release/pose MESH VIEWS [--colour ..]
 
 VIEWS is a folder with `transforms.json`, `truth.json` (a list `views` of R and t, as OpenCV has them) and the masks in `images`.
 Needs numpy and pillow.
@@ -99,10 +99,10 @@ def off_deg(a, b):
     return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def poses(program, mesh, views):
+def poses(program, mesh, views, *more):
     views = Path(views)
     truth = json.loads((views / "truth.json").read_text())["views"]
-    command = [program, "--mesh", mesh, "--targets", views / "images", "--camera", views / "transforms.json"]
+    command = [program, "--mesh", mesh, "--targets", views / "images", "--camera", views / "transforms.json", *more]
     with tempfile.TemporaryDirectory() as out:
         begun = time.time()
         answer = subprocess.run([*command, "--json", "--quiet", "--out", out], stdout=subprocess.PIPE, check=True).stdout
