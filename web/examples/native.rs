@@ -4,14 +4,14 @@
 
 use std::time::Instant;
 
-use softrast_web::{PoseRun, Run, Settings};
+use softrast_web::{Backend, PoseRun, Run, Settings};
 
 /// Steps whose losses are told. After some 35, runs have gone apart by the rounding of sines and exponentials.
 const TOLD: usize = 30;
 
 fn main() -> anyhow::Result<()> {
     let settings = r#"{"seed":0,"size":64,"steps":300,"softness":{"name":"preset"}}"#;
-    let mut run = PoseRun::new(&softrast_mesh::fox(), &Settings::parse(settings)?)?;
+    let mut run = PoseRun::<Backend>::new(&softrast_mesh::fox(), &Settings::parse(settings)?)?;
     let (mut losses, mut angle_deg) = (vec![], None);
     let clock = Instant::now();
     while let Some(frame) = run.next()? {

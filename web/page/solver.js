@@ -19,7 +19,7 @@ const REDUCED = 500; // milliseconds between pictures with reduced motion
 export class Solver {
   /** `section` is its part of the page, `task` pose or shape, `usual` its settings. `say` shows an error, or nothing. */
   constructor(section, { task, usual, engine, names, say }) {
-    Object.assign(this, { section, task, usual, engine, say });
+    Object.assign(this, { section, task, usual, engine, say, hasGpu: names.gpu });
     this.state = "new"; // new, preparing, ready, running, ended
     this.files = { mesh: null, picture: null };
     this.runs = [];
@@ -50,6 +50,8 @@ export class Solver {
     for (const [name, button] of Object.entries(this.buttons)) button.addEventListener("click", () => this.#do(name));
     this.part.addEventListener("input", () => this.#curve());
     new ResizeObserver(() => this.draw()).observe(find(".results"));
+    this.inputs.gpu.disabled = !names.gpu;
+    find("[data-is=noGpu]").hidden = names.gpu;
   }
 
   /** Settings as the address has them; what it leaves out is as usual. */
@@ -64,6 +66,7 @@ export class Solver {
     const rate = link.number(told.rate, NaN, [1e-4, 100]);
     inputs.rate.value = Number.isNaN(rate) ? "" : rate;
     inputs.invert.checked = told.invert === "true";
+    inputs.gpu.checked = told.gpu === "true" && this.hasGpu;
     inputs.compare.checked = told.with !== undefined;
     this.pickers.forEach((picker, k) => {
       const [name, end] = k ? ["with", "2"] : ["softness", ""];
@@ -86,6 +89,7 @@ export class Solver {
     const own = { tab: this.task, seed: inputs.seed.value, steps: inputs.steps.value, size: inputs.size.value, rate: inputs.rate.value, softness: a.name, ...family(a, "") };
     if (inputs.triangles) own.triangles = inputs.triangles.value;
     if (inputs.invert.checked) own.invert = true;
+    if (inputs.gpu.checked) own.gpu = true;
     if (inputs.mesh?.value === "file") own.mesh = files.mesh.name;
     if (inputs.target.value === "file") own.target = files.picture.name;
     return inputs.compare.checked ? { ...own, with: b.name, ...family(b, "2") } : own;
@@ -298,9 +302,10 @@ export class Solver {
       if (token !== this.token) return;
       const settings = this.#asked;
       const kind = this.#kind;
-      const opened = await this.engine.ask("open", { task: kind, settings, invert: this.inputs.invert.checked });
+      const { invert: { checked: invert }, gpu: { checked: onGpu } } = this.inputs;
+      const opened = await this.engine.ask("open", { task: kind, settings, invert, onGpu });
       if (token !== this.token) return;
-      Object.assign(this, { opened, kind, asked: settings, steps: opened.steps, isPrepared: kind !== "mask" });
+      Object.assign(this, { opened, kind, onGpu, asked: settings, steps: opened.steps, isPrepared: kind !== "mask" });
       this.runs = settings.map(() => ({ frames: [], latest: null }));
       this.state = "ready";
       this.orbit?.show(opened);
@@ -469,12 +474,13 @@ export class Solver {
 
   /** Saves what was found, with all that it takes to find it again. */
   async #save() {
-    const { asked, runs, kind } = this;
+    const { asked, runs, kind, onGpu } = this;
     const task = kind === "shape" ? "shape2d" : kind;
     const softnesses = await Promise.all(asked.map(({ softness }) => this.engine.ask("file", { choice: softness, task })));
     const result = {
       program: "softrast in a browser",
       link: location.href,
+      computed_on: onGpu ? "WebGPU" : "CPU",
       task,
       mesh: this.task === "pose" ? (this.inputs.mesh.value === "file" ? this.files.mesh.name : "fox") : undefined,
       target: this.inputs.target.value === "file" ? this.files.picture.name : undefined,

@@ -10,14 +10,16 @@ const MOST_PIXELS = 120e6; // of a picture that is opened at all
 let mesh = null;
 let picture = null;
 let runs = [];
-let goes = null; // the run that goes on by itself: { token, pause }
+let goes = null; // the run that goes on by itself: { pause }
+let steps = Promise.resolve(); // of the latest step, which a GPU takes its time for
+let gpu = null; // that it has been set up
 const playground = { is: null };
 
 const asks = {
-  /** Names that can be chosen. */
+  /** Names that can be chosen, and whether there is a GPU. */
   async ready() {
-    await init({ module_or_path: new URL("softrast_web_bg.wasm", import.meta.url) });
-    return JSON.parse(softrast.names());
+    const [adapter] = await Promise.all([hasAdapter(), init({ module_or_path: new URL("softrast_web_bg.wasm", import.meta.url) })]);
+    return { ...JSON.parse(softrast.names()), gpu: adapter };
   },
 
   /** A mesh, the fox unless there are bytes. */
@@ -59,12 +61,13 @@ const asks = {
     return JSON.parse(softrast.softness_file(JSON.stringify(choice), task));
   },
 
-  /** Runs side by side on the same start, not begun. */
-  open({ task, settings, invert }) {
-    stop();
+  /** Runs side by side on the same start, not begun; on the GPU if `onGpu`. */
+  async open({ task, settings, invert, onGpu }) {
+    await stop();
     for (const run of runs) run.free();
     runs = [];
-    for (const each of settings) runs.push(opened(task, JSON.stringify(each), invert));
+    if (onGpu) await (gpu ??= softrast.set_up_gpu());
+    for (const each of settings) runs.push(opened(task, JSON.stringify(each), invert, onGpu));
     const about = JSON.parse(runs[0].about());
     const faces = task === "shape" ? null : mesh.faces();
     return { ...about, target: runs[0].target(), positions: runs[0].positions(), faces };
@@ -77,22 +80,22 @@ const asks = {
   },
 
   /** One step of every run. */
-  step() {
-    stop();
+  async step() {
+    await stop();
     return step();
   },
 
   /** Steps until the end or until it is stopped, with so many milliseconds between them. */
-  go({ pause }) {
-    stop();
+  async go({ pause }) {
+    await stop();
     const mine = { pause };
     goes = mine;
     keep(mine);
     return null;
   },
 
-  stop() {
-    stop();
+  async stop() {
+    await stop();
     return null;
   },
 
@@ -104,43 +107,60 @@ const asks = {
   },
 };
 
-function opened(task, settings, invert) {
-  const needed = task === "pose" ? null : picture;
-  if (task !== "pose" && !needed) throw "there is no picture yet";
-  switch (task) {
-    case "pose": return softrast.PageRun.pose(mesh, settings);
-    case "mask": return softrast.PageRun.mask(mesh, needed.rgba, needed.width, invert, settings);
-    default: return softrast.PageRun.shape(needed.rgba, needed.width, invert, settings);
+/** Whether WebGPU has anything to run on. */
+async function hasAdapter() {
+  try {
+    return Boolean(await navigator.gpu?.requestAdapter());
+  } catch {
+    return false;
   }
 }
 
-function stop() {
+function opened(task, settings, invert, onGpu) {
+  const needed = task === "pose" ? null : picture;
+  if (task !== "pose" && !needed) throw "there is no picture yet";
+  switch (task) {
+    case "pose": return softrast.PageRun.pose(mesh, settings, onGpu);
+    case "mask": return softrast.PageRun.mask(mesh, needed.rgba, needed.width, invert, settings, onGpu);
+    default: return softrast.PageRun.shape(needed.rgba, needed.width, invert, settings, onGpu);
+  }
+}
+
+/** Nothing is asked of the runs any more after that. */
+async function stop() {
   goes = null;
+  await steps;
+}
+
+function step() {
+  const taken = stepped();
+  steps = taken.catch(() => {});
+  return taken;
 }
 
 /** Frames of all runs, and whether that was the last. */
-function step() {
-  const frames = runs.map((run) => {
+async function stepped() {
+  const frames = [];
+  for (const run of runs) {
     const clock = performance.now();
-    const numbers = run.next();
-    if (numbers === undefined) return null;
+    const numbers = await run.next();
     const ms = performance.now() - clock;
-    return { ...JSON.parse(numbers), soft: run.soft(), hard: run.hard(), ms };
-  });
+    frames.push(numbers === undefined ? null : { ...JSON.parse(numbers), soft: run.soft(), hard: run.hard(), ms });
+  }
   return { frames, ended: frames.every((frame) => frame === null) };
 }
 
 async function keep(mine) {
   try {
     while (goes === mine) {
-      const { frames, ended } = step();
+      const { frames, ended } = await step();
       postMessage({ frames, ended }, frames.flatMap((frame) => (frame ? [frame.soft.buffer, frame.hard.buffer] : [])));
-      if (ended) goes = null;
+      if (ended && goes === mine) goes = null;
       await (mine.pause ? new Promise((done) => setTimeout(done, mine.pause)) : turn());
     }
   } catch (error) {
     goes = null;
-    postMessage({ error: told(error), fault: isFault(error) });
+    fail(error);
   }
 }
 
@@ -151,6 +171,13 @@ port1.onmessage = () => turned();
 const turn = () => new Promise((done) => {
   turned = done;
   port2.postMessage(null);
+});
+
+const fail = (error) => postMessage({ error: told(error), fault: isFault(error) });
+// What panics while it is waited for answers nobody.
+addEventListener("error", (event) => {
+  event.preventDefault();
+  fail(event.error ?? event);
 });
 
 /** An error of Rust code is text; anything else is a fault of the page. */

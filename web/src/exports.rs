@@ -4,11 +4,12 @@ use std::cell::RefCell;
 
 use serde_json::json;
 use softrast_mesh::{Mesh, fox};
+use softrast_raster::RasterBackend;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 use crate::{
-    Frame, MaskRun, Playground, PoseRun, Run, Scene, Settings, ShapeRun, SoftnessChoice, curves,
-    frame::bytes, loaded, luminance, mask,
+    Backend, Frame, Gpu, MaskRun, Playground, PoseRun, Run, Scene, Settings, ShapeRun,
+    SoftnessChoice, curves, frame::bytes, loaded, luminance, mask,
 };
 
 thread_local! {
@@ -27,6 +28,14 @@ fn start() {
 #[wasm_bindgen]
 pub fn fault() -> String {
     FAULT.with(|fault| fault.borrow().clone())
+}
+
+/// Sets the GPU up, before the first run on it. Where a browser has no adapter it panics.
+#[cfg(target_family = "wasm")]
+#[wasm_bindgen]
+pub async fn set_up_gpu() {
+    use burn::backend::wgpu::{WgpuDevice, graphics::AutoGraphicsApi, init_setup_async};
+    init_setup_async::<AutoGraphicsApi>(&WgpuDevice::default(), Default::default()).await;
 }
 
 /// Names that can be chosen, as JSON: `preset`, `families` and `learned`.
@@ -103,7 +112,7 @@ impl PageMesh {
     }
 }
 
-/// A run of a task.
+/// A run of a task, on a GPU where `gpu` says so.
 #[wasm_bindgen]
 pub struct PageRun {
     run: Box<dyn Run>,
@@ -114,11 +123,15 @@ pub struct PageRun {
 #[wasm_bindgen]
 impl PageRun {
     /// POSE with a target of its own.
-    pub fn pose(mesh: &PageMesh, settings: &str) -> Result<Self, String> {
+    pub fn pose(mesh: &PageMesh, settings: &str, gpu: bool) -> Result<Self, String> {
+        fn run<B: RasterBackend>(mesh: &Mesh, settings: &Settings) -> anyhow::Result<PageRun> {
+            let run = PoseRun::<B>::new(mesh, settings)?;
+            let positions = run.turned(mesh);
+            Ok(PageRun::new(run, positions))
+        }
         let settings = Settings::parse(settings).map_err(line)?;
-        let run = PoseRun::new(&mesh.mesh, &settings).map_err(line)?;
-        let positions = run.turned(&mesh.mesh);
-        Ok(Self { run: Box::new(run), positions, frame: None })
+        if gpu { run::<Gpu>(&mesh.mesh, &settings) } else { run::<Backend>(&mesh.mesh, &settings) }
+            .map_err(line)
     }
 
     /// POSE from a picture of `[height, width, 4]` bytes, whose transparency or luminance is the mask.
@@ -128,21 +141,37 @@ impl PageRun {
         width: usize,
         invert: bool,
         settings: &str,
+        gpu: bool,
     ) -> Result<Self, String> {
         let settings = Settings::parse(settings).map_err(line)?;
         let picture = mask(rgba, width);
         let picture = if invert { picture.inverted() } else { picture };
-        let run = MaskRun::new(&mesh.mesh, picture, &settings).map_err(line)?;
-        Ok(Self { run: Box::new(run), positions: mesh.positions(), frame: None })
+        let (of, positions) = (&mesh.mesh, mesh.positions());
+        Ok(match gpu {
+            true => {
+                Self::new(MaskRun::<Gpu>::new(of, picture, &settings).map_err(line)?, positions)
+            }
+            false => {
+                Self::new(MaskRun::<Backend>::new(of, picture, &settings).map_err(line)?, positions)
+            }
+        })
     }
 
     /// 2D SHAPE on a picture of `[height, width, 4]` bytes.
-    pub fn shape(rgba: &[u8], width: usize, invert: bool, settings: &str) -> Result<Self, String> {
+    pub fn shape(
+        rgba: &[u8],
+        width: usize,
+        invert: bool,
+        settings: &str,
+        gpu: bool,
+    ) -> Result<Self, String> {
         let settings = Settings::parse(settings).map_err(line)?;
         let picture = luminance(rgba, width);
         let picture = if invert { picture.inverted() } else { picture };
-        let run = ShapeRun::new(picture, &settings).map_err(line)?;
-        Ok(Self { run: Box::new(run), positions: Vec::new(), frame: None })
+        Ok(match gpu {
+            true => Self::new(ShapeRun::<Gpu>::new(picture, &settings).map_err(line)?, vec![]),
+            false => Self::new(ShapeRun::<Backend>::new(picture, &settings).map_err(line)?, vec![]),
+        })
     }
 
     /// Finds out what the first step needs; `told` is called with the share that is done, 0 to 1.
@@ -155,8 +184,8 @@ impl PageRun {
     }
 
     /// The next frame as JSON; none after the last. Its pictures are [`PageRun::soft`] and [`PageRun::hard`].
-    pub fn next(&mut self) -> Result<Option<String>, String> {
-        self.frame = self.run.next().map_err(line)?;
+    pub async fn next(&mut self) -> Result<Option<String>, String> {
+        self.frame = self.run.next_async().await.map_err(line)?;
         self.frame
             .as_ref()
             .map(|frame| serde_json::to_string(frame).map_err(|e| e.to_string()))
@@ -187,6 +216,12 @@ impl PageRun {
     pub fn about(&self) -> String {
         json!({ "size": self.run.size(), "steps": self.run.steps(), "truth": self.run.truth() })
             .to_string()
+    }
+}
+
+impl PageRun {
+    fn new(run: impl Run + 'static, positions: Vec<f32>) -> Self {
+        Self { run: Box::new(run), positions, frame: None }
     }
 }
 

@@ -1,7 +1,13 @@
+use std::pin::Pin;
+
+use burn::tensor::read_sync;
 use serde::Serialize;
 use softrast_inverse::Iterate;
 
 use crate::CameraView;
+
+/// A frame that will come; from the CPU it comes at once.
+pub type Coming<'a> = Pin<Box<dyn Future<Output = anyhow::Result<Option<Frame>>> + 'a>>;
 
 /// A run that goes on when it is asked to.
 pub trait Run {
@@ -33,7 +39,16 @@ pub trait Run {
     /// # Errors
     ///
     /// Those of the problem.
-    fn next(&mut self) -> anyhow::Result<Option<Frame>>;
+    fn next_async(&mut self) -> Coming<'_>;
+
+    /// The same where nothing has to be waited for, or this thread may wait.
+    ///
+    /// # Errors
+    ///
+    /// Those of the problem.
+    fn next(&mut self) -> anyhow::Result<Option<Frame>> {
+        read_sync(self.next_async())
+    }
 }
 
 /// What there is to see after a step.

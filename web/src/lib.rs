@@ -16,7 +16,7 @@ mod settings;
 mod shape;
 
 pub use camera::CameraView;
-pub use frame::{Frame, Run};
+pub use frame::{Coming, Frame, Run};
 pub use mask::MaskRun;
 pub use meshes::{Loaded, MOST_FACES, loaded};
 pub use picture::{luminance, mask};
@@ -25,5 +25,11 @@ pub use pose::PoseRun;
 pub use settings::{Settings, SoftnessChoice, curves};
 pub use shape::ShapeRun;
 
-/// What everything is computed on: the CPU, in one thread where there is no other.
+/// What everything is computed on unless a GPU was chosen: the CPU, in one thread where there is no other.
 pub type Backend = burn::backend::NdArray<f32>;
+/// What runs are computed on where a GPU was chosen, through WebGPU. On a computer it stands for the CPU.
+#[cfg(target_family = "wasm")]
+pub type Gpu = softrast_raster::Wgpu;
+/// What runs are computed on where a GPU was chosen. On a computer it stands for the CPU.
+#[cfg(not(target_family = "wasm"))]
+pub type Gpu = Backend;

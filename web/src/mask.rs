@@ -4,18 +4,19 @@ use softrast_inverse::{
     pose::{MaskPose, MaskPoses, PoseSearch},
 };
 use softrast_mesh::Mesh;
-use softrast_raster::Pinhole;
+use softrast_raster::{Pinhole, RasterBackend};
 use softrast_softness::numbers;
 
-use crate::{Backend, CameraView, Frame, Run, Settings};
+use crate::{Backend, CameraView, Coming, Frame, Run, Settings};
 
 /// Field of view along the shorter side of a mask, in degrees: nothing is known of the lens.
 const ASSUMED_FOV_DEG: f64 = 45.0;
 /// Starts that are gone through at most.
 const STARTS: usize = 3;
 
-/// POSE from a mask: first all directions and rolls are looked at, then the most hopeful starts are improved, one after the other.
-pub struct MaskRun {
+/// POSE from a mask: first all directions and rolls are looked at, on the CPU, then the most hopeful starts are improved, one after the
+/// other.
+pub struct MaskRun<B: RasterBackend> {
     mesh: Mesh,
     mask: Picture,
     camera: Pinhole,
@@ -26,13 +27,13 @@ pub struct MaskRun {
     starts: Vec<Pinhole>,
     /// Number of the start that is improved, counted from 0.
     start: usize,
-    run: Option<(Minimization<MaskPoses, Backend>, MaskPose)>,
+    run: Option<(Minimization<MaskPoses, B>, MaskPose)>,
     /// What had the least error so far.
     best: Option<Frame>,
     step: usize,
 }
 
-impl MaskRun {
+impl<B: RasterBackend> MaskRun<B> {
     /// The run for a mask of any size, not begun.
     ///
     /// # Errors
@@ -70,7 +71,7 @@ impl MaskRun {
     }
 }
 
-impl Run for MaskRun {
+impl<B: RasterBackend> Run for MaskRun<B> {
     fn size(&self) -> usize {
         self.config.size
     }
@@ -107,32 +108,34 @@ impl Run for MaskRun {
     }
 
     /// The last frame is the best of all again.
-    fn next(&mut self) -> anyhow::Result<Option<Frame>> {
-        let Some((run, pose)) = &mut self.run else { return Ok(None) };
-        let Some(iterate) = run.next().transpose()? else {
-            self.start += 1;
-            self.run = None;
-            self.begin()?;
-            return match &self.run {
-                Some(_) => self.next(),
-                None => Ok(self.best.take().map(|best| Frame { step: self.step, ..best })),
+    fn next_async(&mut self) -> Coming<'_> {
+        Box::pin(async move {
+            let Some((run, pose)) = &mut self.run else { return Ok(None) };
+            let Some(iterate) = run.next_async().await.transpose()? else {
+                self.start += 1;
+                self.run = None;
+                self.begin()?;
+                return match &self.run {
+                    Some(_) => self.next_async().await,
+                    None => Ok(self.best.take().map(|best| Frame { step: self.step, ..best })),
+                };
             };
-        };
-        let hard = run.problem().hard_image(run.scene(), iterate.theta.clone());
-        let cameras = run.scene().found(iterate.theta.clone(), std::slice::from_ref(pose));
-        let camera = cameras.first().context("a pose has a camera")?;
-        let [down, ahead] = [1, 2].map(|row| camera.rotation[row]);
-        let view = CameraView { eye: camera.eye(), ahead, up: down.map(|x| -x) };
-        let frame = Frame {
-            step: self.step,
-            camera: Some(view),
-            start: [self.start, self.starts.len()],
-            ..Frame::new(&iterate, &numbers(hard), numbers(iterate.theta.clone()))
-        };
-        self.step += 1;
-        if self.best.as_ref().is_none_or(|best| frame.hard_loss < best.hard_loss) {
-            self.best = Some(frame.clone());
-        }
-        Ok(Some(frame))
+            let hard = run.problem().hard_image(run.scene(), iterate.theta.clone());
+            let cameras = run.scene().found(iterate.theta.clone(), std::slice::from_ref(pose));
+            let camera = cameras.first().context("a pose has a camera")?;
+            let [down, ahead] = [1, 2].map(|row| camera.rotation[row]);
+            let view = CameraView { eye: camera.eye(), ahead, up: down.map(|x| -x) };
+            let frame = Frame {
+                step: self.step,
+                camera: Some(view),
+                start: [self.start, self.starts.len()],
+                ..Frame::new(&iterate, &numbers(hard), numbers(iterate.theta.clone()))
+            };
+            self.step += 1;
+            if self.best.as_ref().is_none_or(|best| frame.hard_loss < best.hard_loss) {
+                self.best = Some(frame.clone());
+            }
+            Ok(Some(frame))
+        })
     }
 }

@@ -2,19 +2,19 @@ use softrast_inverse::{
     InverseProblem, Minimization, PoseProblem, SolveConfig, pose::PoseInstance,
 };
 use softrast_mesh::Mesh;
-use softrast_raster::{HostBackend, view_rotation};
+use softrast_raster::{HostBackend, RasterBackend, view_rotation};
 use softrast_softness::{numbers, vector};
 
-use crate::{Backend, CameraView, Frame, Run, Settings};
+use crate::{CameraView, Coming, Frame, Run, Settings};
 
 /// POSE: the camera of a target that was drawn from a pose of its own.
-pub struct PoseRun {
-    run: Minimization<PoseProblem, Backend>,
+pub struct PoseRun<B: RasterBackend> {
+    run: Minimization<PoseProblem, B>,
     instance: PoseInstance,
     config: SolveConfig,
 }
 
-impl PoseRun {
+impl<B: RasterBackend> PoseRun<B> {
     /// The run of a seed, not begun.
     ///
     /// # Errors
@@ -44,7 +44,7 @@ impl PoseRun {
     }
 }
 
-impl Run for PoseRun {
+impl<B: RasterBackend> Run for PoseRun<B> {
     fn size(&self) -> usize {
         self.config.size
     }
@@ -61,16 +61,18 @@ impl Run for PoseRun {
         Some(self.target_camera())
     }
 
-    fn next(&mut self) -> anyhow::Result<Option<Frame>> {
-        let Some(iterate) = self.run.next().transpose()? else { return Ok(None) };
-        let hard = self.run.problem().hard_image(self.run.scene(), iterate.theta.clone());
-        let theta = numbers(iterate.theta.clone());
-        let camera = CameraView::orbiting([theta[0], theta[1], theta[2]]);
-        let angle_deg = Some(camera.angle_deg(&self.target_camera()));
-        Ok(Some(Frame {
-            angle_deg,
-            camera: Some(camera),
-            ..Frame::new(&iterate, &numbers(hard), theta)
-        }))
+    fn next_async(&mut self) -> Coming<'_> {
+        Box::pin(async move {
+            let Some(iterate) = self.run.next_async().await.transpose()? else { return Ok(None) };
+            let hard = self.run.problem().hard_image(self.run.scene(), iterate.theta.clone());
+            let theta = numbers(iterate.theta.clone());
+            let camera = CameraView::orbiting([theta[0], theta[1], theta[2]]);
+            let angle_deg = Some(camera.angle_deg(&self.target_camera()));
+            Ok(Some(Frame {
+                angle_deg,
+                camera: Some(camera),
+                ..Frame::new(&iterate, &numbers(hard), theta)
+            }))
+        })
     }
 }

@@ -8,7 +8,7 @@ use softrast_inverse::{
 use softrast_raster::RasterBackend;
 use softrast_softness::numbers;
 
-use crate::{Backend, Frame, Run, Settings};
+use crate::{Coming, Frame, Run, Settings};
 
 /// Loose triangles that should cover a picture.
 struct Covering {
@@ -67,12 +67,12 @@ impl InverseProblem for Covering {
 }
 
 /// 2D SHAPE: loose triangles move until they cover what is white in a picture.
-pub struct ShapeRun {
-    run: Minimization<Covering, Backend>,
+pub struct ShapeRun<B: RasterBackend> {
+    run: Minimization<Covering, B>,
     config: SolveConfig,
 }
 
-impl ShapeRun {
+impl<B: RasterBackend> ShapeRun<B> {
     /// The run of a seed, which places the triangles; not begun.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl ShapeRun {
     }
 }
 
-impl Run for ShapeRun {
+impl<B: RasterBackend> Run for ShapeRun<B> {
     fn size(&self) -> usize {
         self.config.size
     }
@@ -100,9 +100,11 @@ impl Run for ShapeRun {
         numbers(self.run.scene().target())
     }
 
-    fn next(&mut self) -> anyhow::Result<Option<Frame>> {
-        let Some(iterate) = self.run.next().transpose()? else { return Ok(None) };
-        let hard = self.run.problem().hard_image(self.run.scene(), iterate.theta.clone());
-        Ok(Some(Frame::new(&iterate, &numbers(hard), numbers(iterate.theta.clone()))))
+    fn next_async(&mut self) -> Coming<'_> {
+        Box::pin(async move {
+            let Some(iterate) = self.run.next_async().await.transpose()? else { return Ok(None) };
+            let hard = self.run.problem().hard_image(self.run.scene(), iterate.theta.clone());
+            Ok(Some(Frame::new(&iterate, &numbers(hard), numbers(iterate.theta.clone()))))
+        })
     }
 }

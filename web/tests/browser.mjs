@@ -27,7 +27,10 @@ export async function serve() {
   return { url: `http://127.0.0.1:${server.address().port}${PATH}`, close: () => { server.closeAllConnections(); server.close(); } };
 }
 
-export const launch = () => chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
+export const launch = (...args) => chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox", ...args] });
+
+/** What gives Chromium a WebGPU adapter on any machine: SwiftShader, which computes on the CPU. */
+export const SOFTWARE_GPU = ["--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-webgpu-adapter=swiftshader"];
 
 /** A page at an address; `wrong` gathers what it says on the console, and what it asks of any other host. */
 export async function opened(browser, url, options = {}) {

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
-import { ended, launch, opened, serve, status } from "./browser.mjs";
+import { SOFTWARE_GPU, ended, launch, opened, serve, status } from "./browser.mjs";
 import { disc, large, meshes, png } from "./files.mjs";
 
 const data = (file) => new URL(`../../data/${file}`, import.meta.url);
@@ -228,6 +228,44 @@ onPage("it works without a network once it has been loaded", "#tab=pose&steps=2"
   await ended(page);
   await page.click("nav a[data-tab=shape]");
   await ended(page, "shape");
+});
+
+onPage("without an adapter for WebGPU the switch is off, and a line says so", "#tab=pose&steps=2&gpu=true", async (page) => {
+  await ended(page);
+  for (const tab of ["pose", "shape"]) {
+    assert.ok(await page.isDisabled(`#${tab} [data-set=gpu]`), tab);
+    assert.ok(!(await page.isChecked(`#${tab} [data-set=gpu]`)), tab);
+    assert.equal(await page.locator(`#${tab} [data-is=noGpu]`).getAttribute("hidden"), null);
+  }
+  assert.equal((await saved(page)).computed_on, "CPU");
+});
+
+test("on WebGPU runs are those of the CPU", async () => {
+  const software = await launch(...SOFTWARE_GPU);
+  try {
+    for (const [tab, hash] of [["pose", "#tab=pose&seed=0&steps=8&size=32&softness=gauss"], ["shape", "#tab=shape&steps=4&size=64&triangles=100&softness=gauss"]]) {
+      const runs = [];
+      for (const gpu of ["", "&gpu=true"]) {
+        const { context, page, wrong } = await opened(software, host.url + hash + gpu);
+        await page.waitForSelector("body[data-ready]", { timeout: 60_000 });
+        await ended(page, tab, 240_000);
+        const result = await saved(page, tab);
+        assert.equal(result.computed_on, gpu ? "WebGPU" : "CPU");
+        assert.equal(await error(page), "");
+        assert.deepEqual(wrong, []);
+        runs.push(result.runs[0].losses);
+        await context.close();
+      }
+      const [cpu, gpu] = runs;
+      assert.equal(gpu.length, cpu.length);
+      // Both compute in f32, and round otherwise.
+      const largest = Math.max(...cpu.map((loss, k) => Math.abs(loss - gpu[k])));
+      assert.ok(largest < 1e-4, `losses of ${tab} differ by ${largest}: ${cpu} and ${gpu}`);
+      assert.notEqual(gpu.at(-1), gpu[0], `nothing moves: ${gpu}`);
+    }
+  } finally {
+    await software.close();
+  }
 });
 
 test("neither the page nor its worker can send anything to another host", async () => {
