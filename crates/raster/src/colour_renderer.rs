@@ -206,13 +206,30 @@ impl ColourRenderer {
         attributes: &Attributes<B>,
         background: &Background<B>,
     ) -> Tensor<B, 4> {
-        let (device, dtype) = (vertices.device(), vertices.dtype());
         if !B::ON_HOST && attributes.texture.is_some() {
-            let phi = self.phi.each_ref().map(|phi| {
-                Tensor::from_data(TensorData::new(phi.clone(), [phi.len()]), (&device, dtype))
-            });
+            let options = (&vertices.device(), vertices.dtype());
+            let phi = self
+                .phi
+                .each_ref()
+                .map(|phi| Tensor::from_data(TensorData::new(phi.clone(), [phi.len()]), options));
             return self.by_reference(vertices, attributes, phi, background);
         }
+        self.image_of_attributes(vertices, attributes, background)
+    }
+
+    /// [`image`](Self::image) without a texture on a GPU, for programs that should not hold the reference.
+    ///
+    /// # Panics
+    ///
+    /// Those of [`image`](Self::image), and on a GPU if there is a texture.
+    #[doc(hidden)]
+    pub fn image_of_attributes<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        attributes: &Attributes<B>,
+        background: &Background<B>,
+    ) -> Tensor<B, 4> {
+        let (device, dtype) = (vertices.device(), vertices.dtype());
         let mut prepared = self.prepared(&self.phi, number(background));
         // A GPU gets what the CPU has computed in f64.
         let precise = if B::ON_HOST { dtype } else { DType::F64 };
