@@ -129,7 +129,7 @@ mod tests {
             let fine = (0..cuts).fold(ball.clone(), |mesh, _| mesh.subdivided());
             let channel =
                 |k: usize, vertex: usize| 0.5 + 0.1 * (1.7 * (3 * vertex + k) as f64).sin();
-            let colours = (0..fine.positions().len());
+            let colours = 0..fine.positions().len();
             let colours = colours.map(|vertex| [0, 1, 2].map(|k| channel(k, vertex))).collect();
             let fine = fine.with_colours(colours).unwrap();
             let textured = baked(&ball, &fine).unwrap();
