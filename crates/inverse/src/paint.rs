@@ -33,7 +33,7 @@ const BEYOND: f64 = 1e-3;
 ///
 /// Of each view the square that is looked at of its mask counts, on `config.size` pixels a side. The loss is that of [`PaintTargets`] and a
 /// little smoothness; colours start at the mean of all views and stay within [0, 1]. `visit` is told the steps taken and the mean
-/// squared difference. It runs on the CPU: on a GPU there is no fast op for colours.
+/// squared difference. It runs on the CPU.
 ///
 /// # Errors
 ///

@@ -16,7 +16,7 @@ use super::{
 /// Numbers of a pixel that a gradient needs: the logarithm of all weights, and what the image is to the upstream, with their derivatives.
 pub(super) const OF_PIXEL: usize = 4;
 
-/// Writes each pixel of the image, `[views, channels + 1, height, width]` from `offset` on, or in a pass of second order its derivative.
+/// Writes each pixel of the image, `[views, channels + 1, height, width]`, or in a pass of second order its derivative.
 ///
 /// With `pull` it also writes to `pixels`, for each pixel, [`OF_PIXEL`] numbers and the gradient of the background, `channels + 1` numbers; the
 /// image itself is then only written in a pass of second order.
@@ -36,7 +36,6 @@ pub(super) fn blend_pixels(
     weights: Weights,
     frame: Frame,
     first_view: u32,
-    offset: u32,
     #[comptime] kind: Kind,
     #[comptime] pull: bool,
 ) {
@@ -131,14 +130,13 @@ pub(super) fn blend_pixels(
     let mut whole_tangent = covered.tangent * of_share;
     let mut alone = 0.0f32;
     let mut alone_tangent = 0.0f32;
-    let offset = offset as usize;
     for channel in 0..channels {
         let at = weights.background as usize + channel;
         let colour = load(numbers, at, direction, along as usize + at, second);
         let sum = Dual { value: values[channel], tangent: tangents[channel] };
         let seen = sum.mul(per_total).add(rest.mul(colour));
         if comptime!(!pull || kind.second) {
-            image[offset + first + channel * step] = seen.stored(second);
+            image[first + channel * step] = seen.stored(second);
         }
         if pull {
             let u = upstream[first + channel * step];
@@ -150,7 +148,7 @@ pub(super) fn blend_pixels(
         }
     }
     if comptime!(!pull || kind.second) {
-        image[offset + first + channels * step] = covered.stored(second);
+        image[first + channels * step] = covered.stored(second);
     }
     if pull {
         let whole = Dual { value: whole, tangent: whole_tangent };

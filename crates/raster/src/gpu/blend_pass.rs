@@ -169,7 +169,6 @@ impl<'a> Blend<'a> {
             self.weights(),
             self.pass.frame(),
             culled.first_view as u32,
-            0,
             self.kind(),
             pull,
         );
