@@ -412,6 +412,7 @@ impl Prepared {
             (DepthCurve::Family(curve), DepthSoftness::Family(family)) => {
                 DepthCurve::Family(curve.stretched(stretch(&family, depth, &phi[1])?)?)
             }
+            (DepthCurve::Exponential, _) => DepthCurve::Exponential,
             (curve, _) if *depth == phi[1] => curve,
             _ => return None,
         };

@@ -1,7 +1,7 @@
 use std::iter;
 
 use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Softness, support};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, support};
 
 use crate::{
     Profile, TConorm,
@@ -116,6 +116,8 @@ impl LogCurve {
 pub(crate) enum DepthCurve {
     /// A family, over the distance from the near plane.
     Family(LogCurve),
+    /// The reversed exponential: its logarithm is a straight line, until it is 0.
+    Exponential,
     /// The network: without biases it is a straight line on each side of nearness 0.
     Mlp,
 }
@@ -129,6 +131,7 @@ impl DepthCurve {
         device: &B::Device,
     ) -> Self {
         match softness {
+            DepthSoftness::Family(Family::Exp) => Self::Exponential,
             DepthSoftness::Family(family) => {
                 // The distance from the plane is in units of that between the planes.
                 let softness = EdgeSoftness { family, squared: false };
@@ -141,14 +144,22 @@ impl DepthCurve {
     pub(crate) fn grid(&self) -> DepthGrid {
         match self {
             Self::Family(curve) => DepthGrid::Table(curve.grid),
+            Self::Exponential => DepthGrid::Exponential,
             Self::Mlp => DepthGrid::Line { floor: softrast_softness::OPAQUE },
         }
     }
 
-    /// As [`LogCurve::table`]; of a network one row, with its values at nearness 1 and -1.
+    /// As [`LogCurve::table`]; of an exponential one row, with the slope of its logarithm and its value at nearness 1; of a network one row,
+    /// with its values at nearness 1 and -1.
     pub(crate) fn table<B: Backend>(&self, phi: Tensor<B, 1>) -> Tensor<B, 2> {
         match self {
             Self::Family(curve) => curve.table(phi),
+            Self::Exponential => {
+                let per_scale = phi.clone().narrow(0, 0, 1).neg().exp();
+                let shift = phi.narrow(0, 1, 1).neg();
+                let zero = shift.zeros_like();
+                Tensor::cat(vec![per_scale, shift, zero.clone(), zero], 0).reshape([1, 4])
+            }
             Self::Mlp => {
                 let slopes = DepthSoftness::mlp_at_ends(phi);
                 let zero = slopes.clone() * 0.0;
@@ -194,7 +205,6 @@ fn settled_beyond<B: Backend>(
 #[cfg(all(test, feature = "ndarray"))]
 mod tests {
     use burn::backend::NdArray;
-    use softrast_softness::Family;
 
     use super::*;
     use crate::weighting::floor;

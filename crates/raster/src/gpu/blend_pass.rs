@@ -16,7 +16,10 @@ use super::{
 };
 use crate::{
     ImageSize, ProfileSum, SoftBlend,
-    kernel::{Grid, blend::DepthGrid},
+    kernel::{
+        Grid,
+        blend::{DepthGrid, LEAST},
+    },
     weighting::{FARTHEST_SEEN, counts_from},
 };
 
@@ -244,6 +247,7 @@ impl<'a> Blend<'a> {
             far_edge: self.op.edge.far > 0,
             far_depth,
             is_line: matches!(self.op.depth, DepthGrid::Line { .. }),
+            is_exponential: self.op.depth == DepthGrid::Exponential,
             channels: self.channels,
             second: self.pass.second(),
         }
@@ -251,8 +255,9 @@ impl<'a> Blend<'a> {
 
     fn weights(&self) -> WeightsLaunch<WgpuRuntime> {
         let op = self.op;
-        let (depth, line_floor) = match op.depth {
+        let (depth, least) = match op.depth {
             DepthGrid::Table(grid) => (grid, 0.0),
+            DepthGrid::Exponential => (op.edge, LEAST),
             DepthGrid::Line { floor } => (op.edge, floor),
         };
         let [near, far] = op.planes;
@@ -270,7 +275,7 @@ impl<'a> Blend<'a> {
             (far - near).recip() as f32,
             op.floor as f32,
             (counts_from(op.floor) as f32).max(LOWEST),
-            line_floor as f32,
+            least as f32,
         )
     }
 }

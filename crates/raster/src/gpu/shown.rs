@@ -33,8 +33,8 @@ pub(super) struct Weights {
     /// What is taken off the edge softness, and the logarithm from which on it counts.
     pub(super) floor: f32,
     pub(super) counts_from: f32,
-    /// Least weight by depth, of a line.
-    pub(super) line_floor: f32,
+    /// Least weight by depth, of a line; of an exponential its logarithm.
+    pub(super) least: f32,
 }
 
 /// What of the weighting is known when a kernel is compiled.
@@ -43,8 +43,9 @@ pub(super) struct Kind {
     /// Whether tables have cells that are counted from their far ends.
     pub(super) far_edge: bool,
     pub(super) far_depth: bool,
-    /// Whether weights by depth are a line in place of a table.
+    /// Whether weights by depth are a line or an exponential in place of a table.
     pub(super) is_line: bool,
+    pub(super) is_exponential: bool,
     /// Channels of the image, but for the faces' share.
     pub(super) channels: usize,
     /// Whether the pass is of second order.
@@ -334,10 +335,21 @@ impl ByDepth {
             let c = load(numbers, at + 1, direction, along + 1, kind.second);
             let slope = Dual::select(nearness.value > 0.0f32, a, zero.sub(c));
             let weight = slope.mul(nearness);
-            let some = weight.value > weights.line_floor;
-            let held = Dual::select(some, weight, Dual::constant(weights.line_floor));
+            let some = weight.value > weights.least;
+            let held = Dual::select(some, weight, Dual::constant(weights.least));
             let per_weight = Dual::select(some, held.recip(), zero);
             ByDepth { log: held.ln(), slope: slope.mul(per_weight) }
+        } else if kind.is_exponential {
+            let at = 4 * weights.depth_row as usize;
+            let along = weights.along as usize + at;
+            let slope = load(numbers, at, direction, along, kind.second);
+            let log = slope.mul(x).add(load(numbers, at + 1, direction, along + 1, kind.second));
+            let (above, below) = (log.value > weights.least, log.value < 0.0f32);
+            let log = Dual::select(above, log, Dual::constant(weights.least));
+            ByDepth {
+                log: Dual::select(below, log, zero),
+                slope: Dual::select(above && below, slope, zero),
+            }
         } else {
             let place = weights.depth.place(x.mul(x), x.value <= 0.0f32, kind.far_depth);
             let row = weights.depth_row + place.row;

@@ -132,10 +132,11 @@ fn exp(x: f32) -> f32 {
     let whole = shifted - MAGIC;
     // ln 2 in two parts, the first of which has bits to spare.
     let rest = held - whole * 0.693_359_4 + whole * 2.121_944_4e-4;
-    let series = 1.0 / 720.0 + rest * (1.0 / 5040.0);
-    let series = 1.0 / 120.0 + rest * series;
-    let series = 1.0 / 6.0 + rest * (1.0 / 24.0 + rest * series);
-    let power = 1.0 + rest * (1.0 + rest * (0.5 + rest * series));
+    // In pairs, and pairs of pairs: a chain of products would have each wait for the one before.
+    let square = rest * rest;
+    let low = rest + square * (0.5 + rest * (1.0 / 6.0));
+    let high = (1.0 / 24.0 + rest * (1.0 / 120.0)) + square * (1.0 / 720.0 + rest * (1.0 / 5040.0));
+    let power = 1.0 + (low + square * square * high);
     // 2^whole in two factors, since one alone would leave the range of exponents.
     let exponent = shifted.to_bits().wrapping_sub(MAGIC.to_bits()) as i32;
     let half = exponent >> 1;

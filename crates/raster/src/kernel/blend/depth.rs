@@ -1,5 +1,6 @@
 //! How much a point counts by its depth, and how that changes.
 
+use super::walk::everywhere;
 use crate::kernel::{
     lanes::{Lanes, Places},
     real::{Mask, Real, Table, splat},
@@ -11,6 +12,8 @@ use crate::kernel::{
 pub(crate) enum DepthGrid {
     /// A table of its negative over the squared distance from the near plane; what is nearer than that plane is the outer side.
     Table(Grid),
+    /// One row that holds `a` and `c`: the logarithm of the weight at `x`, the nearness less 1, is `a x + c`, but between [`LEAST`] and 0.
+    Exponential,
     /// One row that holds `a` and `c`: the weight is `a z` of a nearness z above 0, `-c z` of one below it, and never less than `floor`.
     Line {
         /// The least weight.
@@ -18,12 +21,15 @@ pub(crate) enum DepthGrid {
     },
 }
 
+/// The least logarithm of an exponential weight.
+pub(crate) const LEAST: f64 = -1e15;
+
 impl DepthGrid {
     /// Rows of the table.
     pub(crate) fn rows(&self) -> usize {
         match self {
             Self::Table(grid) => grid.rows(),
-            Self::Line { .. } => 1,
+            Self::Exponential | Self::Line { .. } => 1,
         }
     }
 }
@@ -39,6 +45,8 @@ pub(super) struct DepthLookup<'a, T: Real> {
 pub(super) enum DepthAt<T: Real> {
     /// From a table: the logarithm of the weight, its derivative by the place, and the place in the table.
     Table { log: T, slope: T, t: T, row: Places },
+    /// From an exponential: the logarithm, its derivative, the place, and where the logarithm is above and below its bounds.
+    Exponential { log: T, slope: T, x: T, within: [Mask<T>; 2] },
     /// From a line: the logarithm, and what its derivatives need.
     Line { log: T, per_weight: T, nearness: T, slope: T, near: Mask<T> },
 }
@@ -47,7 +55,7 @@ impl<'a, T: Real> DepthLookup<'a, T> {
     pub(super) fn new(grid: DepthGrid, table: Table<'a, T>) -> Self {
         let lookup = match &grid {
             DepthGrid::Table(grid) => Some(Lookup::new(grid, 1.0)),
-            DepthGrid::Line { .. } => None,
+            DepthGrid::Exponential | DepthGrid::Line { .. } => None,
         };
         Self { grid, lookup, table }
     }
@@ -55,6 +63,13 @@ impl<'a, T: Real> DepthLookup<'a, T> {
     /// Rows of the table.
     pub(super) fn rows(&self) -> usize {
         self.grid.rows()
+    }
+
+    /// A number of the one row, in all lanes.
+    #[inline(always)]
+    fn number(&self, column: usize) -> T {
+        let Table { values, tangents } = self.table;
+        everywhere(values.as_flattened(), tangents.as_flattened(), column)
     }
 
     /// What points at `x` count: their nearness less 1.
@@ -65,16 +80,24 @@ impl<'a, T: Real> DepthLookup<'a, T> {
             (Some(lookup), _) => {
                 let behind = x.value().at_most(zero);
                 let Place { row, t, rate } = lookup.place::<T, true>(x * x, behind);
-                let [a, b, c, d] = T::rows(self.table, &row);
-                let log = T::constant(zero) - (a + t * (b + t * (c + t * d)));
-                let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
+                let [value, slope] = cubic(T::rows(self.table, &row), t);
+                let log = T::constant(zero) - value;
                 let slope = slope.scale(rate) * x.scale(splat(-2.0));
                 DepthAt::Table { log, slope, t, row }
+            }
+            (None, DepthGrid::Exponential) => {
+                let least = splat::<T::Lanes>(LEAST);
+                let slope = self.number(0);
+                let log = slope * x + self.number(1);
+                let within = [least.less(log.value()), log.value().less(zero)];
+                let log = T::choose(within[0], log, T::constant(least)).masked(within[1]);
+                let slope = slope.masked(within[0]).masked(within[1]);
+                DepthAt::Exponential { log, slope, x, within }
             }
             (None, DepthGrid::Line { floor }) => {
                 let nearness = x + T::constant(splat(1.0));
                 let near = zero.less(nearness.value());
-                let [a, c, ..] = T::rows(self.table, &Places::FIRST);
+                let [a, c] = [self.number(0), self.number(1)];
                 let slope = T::choose(near, a, T::constant(zero) - c);
                 let weight = slope * nearness;
                 let some = splat::<T::Lanes>(floor).less(weight.value());
@@ -92,7 +115,9 @@ impl<T: Real> DepthAt<T> {
     #[inline(always)]
     pub(super) fn log(&self) -> T {
         match self {
-            Self::Table { log, .. } | Self::Line { log, .. } => *log,
+            Self::Table { log, .. } | Self::Exponential { log, .. } | Self::Line { log, .. } => {
+                *log
+            }
         }
     }
 
@@ -100,7 +125,7 @@ impl<T: Real> DepthAt<T> {
     #[inline(always)]
     pub(super) fn slope(&self) -> T {
         match self {
-            Self::Table { slope, .. } => *slope,
+            Self::Table { slope, .. } | Self::Exponential { slope, .. } => *slope,
             Self::Line { per_weight, slope, .. } => *per_weight * *slope,
         }
     }
@@ -111,6 +136,12 @@ impl<T: Real> DepthAt<T> {
         let zero = T::constant(splat(0.0));
         match self {
             Self::Table { t, row, .. } => pull_row(zero - by_log, *t, row, table),
+            Self::Exponential { x, within, .. } => {
+                let by_constant = by_log.masked(within[0]).masked(within[1]);
+                let by_slope = by_constant * *x;
+                let columns = [by_slope.output(), by_constant.output(), splat(0.0), splat(0.0)];
+                T::Lanes::add_to_rows(table, &Places::FIRST, columns);
+            }
             Self::Line { per_weight, nearness, near, .. } => {
                 let by_slope = by_log * *per_weight * *nearness;
                 let above = by_slope.masked(*near);
@@ -120,6 +151,15 @@ impl<T: Real> DepthAt<T> {
             }
         }
     }
+}
+
+/// A cubic and its derivative at `t`. In pairs: a chain of products would have each wait for the one before.
+#[inline(always)]
+pub(super) fn cubic<T: Real>([a, b, c, d]: [T; 4], t: T) -> [T; 2] {
+    let square = t * t;
+    let value = (a + t * b) + square * (c + t * d);
+    let slope = (b + t * c.scale(splat(2.0))) + square * d.scale(splat(3.0));
+    [value, slope]
 }
 
 /// Adds to the gradient of the rows of a table, of a function with this derivative by the value at the place `t` in them.

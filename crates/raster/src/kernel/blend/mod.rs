@@ -16,6 +16,8 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
+#[cfg(feature = "wgpu")]
+pub(crate) use self::depth::LEAST;
 pub(crate) use self::{depth::DepthGrid, point::AREA, texture::OF_TEXEL};
 use self::{
     depth::DepthLookup,

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{DepthGrid, Inputs};
+use super::{DepthGrid, Inputs, depth::LEAST};
 use crate::kernel::{
     bands::{Bands, View},
     float::Float,
@@ -107,12 +107,16 @@ pub(super) fn bands<F: Float>(inputs: &Inputs<F>) -> Reached {
     let edge = EdgeReach::new(inputs.edge, edge_rows, inputs.floor);
     let depth = match inputs.depth {
         DepthGrid::Table(grid) => Some(Curve { grid, knots: grid.knots(), rows: depth_rows }),
-        DepthGrid::Line { .. } => None,
+        DepthGrid::Exponential | DepthGrid::Line { .. } => None,
     };
     let [near_plane, far_plane] = inputs.planes;
     let per_range = (far_plane - near_plane).recip();
     let log_weight = |z: f64| match (&depth, inputs.depth) {
         (Some(curve), _) => -curve.at((z - near_plane) * per_range),
+        (None, DepthGrid::Exponential) => {
+            let [a, c, ..] = depth_rows[0].map(Float::to_f64);
+            (a * (near_plane - z) * per_range + c).clamp(LEAST, 0.0)
+        }
         (None, DepthGrid::Line { floor }) => {
             let [a, c, ..] = depth_rows[0].map(Float::to_f64);
             let nearness = (far_plane - z) * per_range;

@@ -14,12 +14,10 @@ fn passes<F: float::Float>(
     views: usize,
     log_weight: f64,
     floor: f64,
-    line: bool,
+    depth: DepthGrid,
     texture_size: Option<[usize; 2]>,
 ) -> Vec<F> {
     let edge = Grid { outer: 0.2, inner: 0.3, octaves: 12, far: 5, bits: 2 };
-    let by_depth = Grid { outer: 1e-3, inner: 2.0, octaves: 10, far: 0, bits: 2 };
-    let depth = if line { DepthGrid::Line { floor: 1e-7 } } else { DepthGrid::Table(by_depth) };
     let wave = |k: usize, step: f64| (step * k as f64).sin();
     let numbers = |count: usize, step: f64| -> Vec<F> {
         (0..count).map(|k| F::from_f64(wave(k, step))).collect()
@@ -77,16 +75,19 @@ fn passes<F: float::Float>(
 }
 
 fn assert_same_bits<F: float::Float>() {
+    let table = DepthGrid::Table(Grid { outer: 1e-3, inner: 2.0, octaves: 10, far: 0, bits: 2 });
+    let line = DepthGrid::Line { floor: 1e-7 };
     // A background that weighs little asks for the largest weight of each pixel.
-    for (views, log_weight, floor, line, texture) in [
-        (1, -2.0, 0.0, false, None),
-        (4, -1.0, 1e-7, true, None),
-        (3, -700.0, 1e-7, false, None),
-        (2, -2.0, 0.0, false, Some([9, 13])),
+    for (views, log_weight, floor, depth, texture) in [
+        (1, -2.0, 0.0, table, None),
+        (4, -1.0, 1e-7, line, None),
+        (3, -700.0, 1e-7, table, None),
+        (3, -1.0, 0.0, DepthGrid::Exponential, None),
+        (2, -2.0, 0.0, table, Some([9, 13])),
     ] {
-        let fast = passes::<F>(views, log_weight, floor, line, texture);
+        let fast = passes::<F>(views, log_weight, floor, depth, texture);
         PORTABLE.store(true, Ordering::SeqCst);
-        let portable = passes::<F>(views, log_weight, floor, line, texture);
+        let portable = passes::<F>(views, log_weight, floor, depth, texture);
         PORTABLE.store(false, Ordering::SeqCst);
         assert!(fast.iter().all(|x| x.to_f64().is_finite()), "{views} views");
         assert!(format!("{fast:?}") == format!("{portable:?}"), "{views} views");

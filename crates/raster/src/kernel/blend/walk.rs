@@ -5,7 +5,7 @@
 
 use super::{
     Blend,
-    depth::{DepthAt, pull_row},
+    depth::{DepthAt, cubic, pull_row},
     planes::Planes,
     point::{Barycentric, Point},
     texture::{OF_TEXEL, TexelSums},
@@ -196,9 +196,8 @@ impl<T: Real> Blend<'_, T> {
         let outside = zero.less(pick(point.closest.inside, zero, splat(1.0)));
         let table::Place { row: edge_row, t, rate } =
             self.scene.lookup.place::<T, true>(point.closest.distance2, outside);
-        let [a, b, c, d] = T::rows(place.table, &edge_row);
-        let log_edge = T::constant(zero) - (a + t * (b + t * (c + t * d)));
-        let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
+        let [value, slope] = cubic(T::rows(place.table, &edge_row), t);
+        let log_edge = T::constant(zero) - value;
         let edge_slope = slope.scale(rate.neg());
         let x = (T::constant(T::Lanes::splat(self.near)) - depth)
             .scale(T::Lanes::splat(self.per_range));
