@@ -1,5 +1,6 @@
 //! What is tested, one file for each part of a rasterizer or task.
 
+mod colours;
 mod depths;
 mod gradients;
 pub mod learning;
@@ -36,6 +37,7 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         poses::CASES,
         shapes::CASES,
         depths::CASES,
+        colours::CASES,
         learning::CASES,
     ];
     parts.into_iter().flatten()
