@@ -64,7 +64,7 @@ def test_nan_never_comes_out():
     (lambda: renderer(t_conorm="max"), "unknown T-conorm"),
     (lambda: softrast.Softness("sigmoid", 0.1), "unknown softness"),
     (lambda: softrast.Softness("logistic", -1.0), "the scale of a softness is -1"),
-    (lambda: softrast.Softness.learned("nothing"), "no learned softness is called"),
+    (lambda: softrast.Softness.learned("nothing"), "no softness of that kind is called"),
     (lambda: softrast.load_mesh("missing.obj"), "missing.obj"),
     (lambda: softrast.project(CORNERS, np.zeros((1, 5))), "cameras must be orbits"),
 ])

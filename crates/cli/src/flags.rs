@@ -69,7 +69,7 @@ pub fn usual_args<A: Args>() -> A {
 /// The method: a softness, how its scale moves, and how finely it is drawn. What is `None` is as the task has it.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
 pub struct MethodArgs {
-    /// A family such as logistic, gauss, exp, gamma or mlp, a file, preset, learned[-KIND], or auto
+    /// A family such as logistic, gauss, exp, gamma or mlp, a file, preset, learned[-KIND], searched, or auto
     #[arg(long, value_name = "NAME|FILE.json", help_heading = "Softness")]
     pub softness: Option<SoftnessChoice>,
 
@@ -162,12 +162,17 @@ pub enum SoftnessChoice {
     Preset,
     /// What a learning run found for the task and comes with the program, or that of this kind.
     Learned(Option<String>),
+    /// What a search with more freedom than those of families found for the task and comes with the program.
+    Searched,
     /// What `choose` finds.
     Auto,
 }
 
 /// What the preset of a task is called.
 pub const PRESET: &str = "preset";
+
+/// What a search found for a task is called.
+const SEARCHED: &str = "searched";
 
 /// With what the names of learned softnesses that come with the program begin.
 const LEARNED: &str = "learned";
@@ -180,6 +185,7 @@ impl fmt::Display for SoftnessChoice {
             Self::Preset => f.write_str(PRESET),
             Self::Learned(None) => f.write_str(LEARNED),
             Self::Learned(Some(kind)) => write!(f, "{LEARNED}-{kind}"),
+            Self::Searched => f.write_str(SEARCHED),
             Self::Auto => f.write_str("auto"),
         }
     }
@@ -201,12 +207,13 @@ impl FromStr for SoftnessChoice {
         }
         match text {
             PRESET => return Ok(Self::Preset),
+            SEARCHED => return Ok(Self::Searched),
             "auto" => return Ok(Self::Auto),
             _ => {}
         }
         let families = Family::ALL.map(Family::name).join(", ");
         Err(format!(
-            "expected preset, learned, auto, a file that ends in .json, or one of {families}"
+            "expected preset, learned, searched, auto, a file that ends in .json, or one of {families}"
         ))
     }
 }

@@ -7,6 +7,7 @@ use softrast_lab::{
     Error, Progress, ViewerView, mask_png, parse::share, program::Output, report::Report,
 };
 use softrast_raster::{BackendChoice, Pinhole};
+use softrast_softness::ScheduledSoftness;
 
 use crate::{Common, MethodArgs, Scales, SoftnessChoice, backend, session::Session};
 
@@ -35,8 +36,8 @@ pub struct Answer {
 }
 
 impl<A> Given<'_, A> {
-    /// The softness; without a word the preset of the task, or what was learned on it where the preset has feedback: that goes with one run
-    /// at a time, and pictures are solved from many starts side by side.
+    /// The softness; without a word the preset of the task, or where that has feedback what a search found for it, else what was learned on
+    /// it: feedback goes with one run at a time, and pictures are solved from many starts side by side.
     ///
     /// # Errors
     ///
@@ -52,7 +53,10 @@ impl<A> Given<'_, A> {
         if self.names_softness() || method.softness.feedback.is_none() {
             return Ok(method);
         }
-        let softness = Some(SoftnessChoice::Learned(None));
+        let softness = Some(match ScheduledSoftness::searched(name) {
+            Ok(_) => SoftnessChoice::Searched,
+            Err(_) => SoftnessChoice::Learned(None),
+        });
         MethodArgs { softness, ..self.method.clone() }.method(name, scales, true)
     }
 

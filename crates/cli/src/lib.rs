@@ -31,7 +31,7 @@ pub use backend::backend;
 pub use experiment::{Entry, Purpose, TaskExperiment};
 pub use flags::{Common, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args};
 pub use given::{Answer, Given, MaskFlags, seen_by};
-pub use method::{Scales, is_preset_learned, learned_kind, method_colour};
+pub use method::{Scales, is_preset, is_preset_learned, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};
 pub use program::{execute, main};
 pub use searched::Searched;

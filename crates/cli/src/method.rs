@@ -152,6 +152,7 @@ impl MethodArgs {
 pub fn method_colour(name: &str) -> [u8; 3] {
     match name.split([' ', '.']).next().unwrap_or_default() {
         "preset" => [110, 110, 110],
+        "searched" => [150, 120, 40],
         "learned-mlp" => [170, 20, 60],
         "learned-surrogate" => [110, 80, 190],
         "logistic" => [31, 96, 168],
@@ -193,6 +194,11 @@ impl MethodArgs {
         };
         match &self.softness {
             Some(choice @ SoftnessChoice::Preset) => Some(preset(choice)),
+            Some(choice @ SoftnessChoice::Searched) => Some(Shipped {
+                called: choice.to_string(),
+                name: PRESET.to_owned(),
+                file: ScheduledSoftness::searched(task),
+            }),
             Some(choice @ SoftnessChoice::Learned(kind)) => {
                 let name = kind.as_ref().map_or(task.to_owned(), |kind| learned_kind(task, kind));
                 let file = ScheduledSoftness::learned(&name);
@@ -216,8 +222,12 @@ pub fn learned_kind(task: &str, kind: &str) -> String {
 
 /// Whether the preset of a task is what was learned on it.
 pub fn is_preset_learned(task: &str) -> bool {
-    let learned = ScheduledSoftness::learned(task).ok();
-    learned.is_some() && learned == ScheduledSoftness::preset(task).ok()
+    is_preset(task, ScheduledSoftness::learned(task))
+}
+
+/// Whether this is the preset of a task, if there is such a softness.
+pub fn is_preset(task: &str, softness: Result<ScheduledSoftness, SoftnessFileError>) -> bool {
+    softness.is_ok_and(|softness| ScheduledSoftness::preset(task).ok() == Some(softness))
 }
 
 /// A network, and its weights, in the place of a softness.

@@ -1,7 +1,9 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use softrast_cli::{MethodArgs, SoftnessChoice, Variant, is_preset_learned, learned_kind};
+use softrast_cli::{
+    MethodArgs, SoftnessChoice, Variant, is_preset, is_preset_learned, learned_kind,
+};
 use softrast_inverse::{Method, Resolution};
 use softrast_lab::Shard;
 use softrast_raster::compiled_backends;
@@ -14,7 +16,7 @@ use crate::{
 
 /// Softness families whose settings are searched for, static and decaying, and the MLP. Its random start reaches the whole image, which
 /// takes over twenty times as long as a logistic; the fitted one does not.
-const METHODS: &str = "preset,learned,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
+const METHODS: &str = "preset,learned,searched,learned-mlp,learned-surrogate,logistic --schedule static,gauss --schedule static,exp --schedule static,\
                        gamma --schedule static,mlp --init fitted --schedule static,logistic --schedule decay,gauss --schedule decay,\
                        exp --schedule decay,gamma --schedule decay";
 
@@ -121,6 +123,7 @@ fn crossing(text: &str) -> Result<String, String> {
 fn is_there(task: &'static dyn AnyTask, method: &MethodArgs) -> bool {
     let there = |name: &str| ScheduledSoftness::learned(name).is_ok();
     match &method.softness {
+        Some(SoftnessChoice::Searched) => ScheduledSoftness::searched(task.name()).is_ok(),
         Some(SoftnessChoice::Preset) => ScheduledSoftness::preset(task.name()).is_ok(),
         Some(SoftnessChoice::Learned(None)) => there(task.name()),
         Some(SoftnessChoice::Learned(Some(kind))) => there(&learned_kind(task.name(), kind)),
@@ -174,7 +177,7 @@ impl Args {
 
     /// Methods as they are, and varied.
     ///
-    /// What was learned on a task is left out where it is the preset, if that is compared.
+    /// What was learned or searched for on a task is left out where it is the preset, if that is compared.
     fn compared(
         &self,
         task: &'static dyn AnyTask,
@@ -201,8 +204,14 @@ impl Args {
             let Some(method) = method.as_ref().filter(|method| is_there(task, method)) else {
                 continue;
             };
-            let is_learned = is(method, SoftnessChoice::Learned(None));
-            if is_learned && has_preset && is_preset_learned(task.name()) {
+            let name_of_task = task.name();
+            let shown_twice = match is(method, SoftnessChoice::Searched) {
+                true => is_preset(name_of_task, ScheduledSoftness::searched(name_of_task)),
+                false => {
+                    is(method, SoftnessChoice::Learned(None)) && is_preset_learned(name_of_task)
+                }
+            };
+            if has_preset && shown_twice {
                 continue;
             }
             cells.push(cell(name.clone(), method.clone(), None, Purpose::Compared));
@@ -287,8 +296,8 @@ mod tests {
     fn cells_go_through_tasks_variants_and_methods() {
         let cells = args("--quick --tasks shape2d,shape3d,pose,occlusion").cells().unwrap();
         // Beside eleven of all tasks a surrogate and four that are varied where edges move, and on three tasks what was learned beside the
-        // preset.
-        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + 3 * 2 + 4 * 2 * 3);
+        // preset, on one what was searched for.
+        assert_eq!(cells.len(), 4 * 2 * 11 + 3 * 2 * (1 + 4) + (3 + 1) * 2 + 4 * 2 * 3);
         assert_eq!((cells[0].task.name(), cells[18].variant), ("shape2d", Variant::Transfer));
         assert_eq!((&*cells[0].name, &*cells[12].name), ("preset", "preset resolution 128"));
         assert!(cells[0].is_default() && !cells[12].is_default());
@@ -296,6 +305,10 @@ mod tests {
             |task: &str| cells.iter().any(|c| c.task.name() == task && c.name == "learned");
         assert!(learned("shape3d") && learned("pose") && learned("occlusion"));
         assert!(!learned("shape2d"), "what is the preset is not shown twice");
+        let searched = cells.iter().filter(|cell| cell.name == "searched");
+        assert!(
+            searched.clone().count() == 2 && searched.clone().all(|c| c.task.name() == "shape3d")
+        );
         let alone =
             args("--tasks occlusion --methods learned --varied= --crossed=").cells().unwrap();
         assert_eq!(alone.len(), 2);

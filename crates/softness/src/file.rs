@@ -46,7 +46,7 @@ pub enum SoftnessFileError {
         wrong: String,
     },
     /// No softness of this name comes with the crate.
-    #[error("no learned softness is called {name:?}; there are {known}")]
+    #[error("no softness of that kind is called {name:?}; there are {known}")]
     Unknown {
         /// The name that was asked for.
         name: String,

@@ -64,17 +64,33 @@ pub struct ScheduledSoftness {
 impl ScheduledSoftness {
     /// What the program of a task takes where nobody says otherwise: the best that is known, whoever found it. Its note says how.
     ///
-    /// It is what was learned on the task, for `pose` with feedback, but for `shape3d` and `occlusion`, where a search found a better one.
+    /// It is what was learned on the task, for `pose` and `shape3d` with [feedback](Feedback), but for `occlusion`, where a
+    /// search found a better one.
     ///
     /// # Errors
     ///
     /// If there is none for a task of this name.
     pub fn preset(task: &str) -> Result<Self, SoftnessFileError> {
         match task {
+            "occlusion" => Self::searched(task),
+            "pose" | "shape3d" => Self::learned(&format!("{task}-feedback")),
+            _ => Self::learned(task),
+        }
+    }
+
+    /// What a search found for a task with more freedom than families have by default. Its note says how.
+    ///
+    /// # Errors
+    ///
+    /// If there is none for a task of this name.
+    pub fn searched(task: &str) -> Result<Self, SoftnessFileError> {
+        match task {
             "shape3d" => Self::parse(include_str!("../searched/shape3d.json"), task),
             "occlusion" => Self::parse(include_str!("../searched/occlusion.json"), task),
-            "pose" => Self::learned("pose-feedback"),
-            _ => Self::learned(task),
+            _ => Err(SoftnessFileError::Unknown {
+                name: task.to_owned(),
+                known: "shape3d, occlusion".to_owned(),
+            }),
         }
     }
 
@@ -191,6 +207,7 @@ impl Stored for ScheduledSoftness {
     const LEARNED: &'static [(&'static str, &'static str)] = learned![
         ".json":
         "shape2d", "shape2d-mlp", "shape2d-surrogate", "shape3d", "shape3d-mlp", "shape3d-surrogate",
+        "shape2d-feedback", "shape3d-feedback",
         "pose", "pose-mlp", "pose-surrogate", "pose-feedback", "occlusion", "occlusion-mlp", "networks/pose",
         "networks/pose-15-35", "networks/pose-55-75", "networks/shape3d", "networks/shape3d-0",
         "networks/shape3d-30", "networks/shape3d-60", "networks/shape3d-minus30",
@@ -374,7 +391,8 @@ mod tests {
         }
         let message = ScheduledSoftness::learned("nothing").unwrap_err().to_string();
         assert!(
-            message.starts_with("no learned softness is called \"nothing\"; there are shape2d,")
+            message
+                .starts_with("no softness of that kind is called \"nothing\"; there are shape2d,")
         );
     }
 }
