@@ -266,7 +266,7 @@ fn the_turns_of_a_bottle_are_one_pose() {
     let words = ["--mesh", mesh.to_str().unwrap(), "--target", path.to_str().unwrap()];
     let found = run(out.path(), &words).unwrap();
     assert!(found["iou"].as_f64().unwrap() > 0.97, "{found}");
-    // From the front, or tilted away as far as towards, and one that did not come all the way.
+    // From the front, or tilted away as far as towards. Rounding decides whether one of its turns counts as another pose too.
     assert!(found["alternatives"].as_array().unwrap().len() <= 3, "{found}");
 }
 
