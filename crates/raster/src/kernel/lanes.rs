@@ -31,6 +31,20 @@ pub(crate) const LANES: usize = 8;
 /// Neighbours of a row that always come together: half a vector.
 pub(crate) const GROUP: usize = LANES / 2;
 
+/// An array of what an expression says of each lane. Written out, since a compiler takes ten times as long over so many little loops.
+macro_rules! lanes {
+    ($i:ident => $value:expr) => {
+        lanes!(@ $i => $value, 0 1 2 3 4 5 6 7)
+    };
+    (@ $i:ident => $value:expr, $($lane:literal)*) => {
+        [$({
+            const $i: usize = $lane;
+            $value
+        }),*]
+    };
+}
+pub(crate) use lanes;
+
 /// A vector of [`LANES`] floats.
 pub(crate) trait Lanes:
     Copy
@@ -75,20 +89,14 @@ pub(crate) trait Lanes:
     /// `e` to this power; see [`Float::exp`].
     #[inline(always)]
     fn exp(self) -> Self {
-        let mut numbers = self.array();
-        for i in 0..LANES {
-            numbers[i] = Float::exp(numbers[i]);
-        }
-        Self::of(&numbers)
+        let numbers = self.array();
+        Self::of(&lanes!(I => Float::exp(numbers[I])))
     }
     /// Natural logarithm.
     #[inline(always)]
     fn ln(self) -> Self {
-        let mut numbers = self.array();
-        for i in 0..LANES {
-            numbers[i] = Float::ln(numbers[i]);
-        }
-        Self::of(&numbers)
+        let numbers = self.array();
+        Self::of(&lanes!(I => Float::ln(numbers[I])))
     }
     /// `-self`.
     fn neg(self) -> Self;
@@ -230,11 +238,8 @@ macro_rules! operator {
         impl<F: Float> $trait for Plain<F> {
             type Output = Self;
             #[inline(always)]
-            fn $function(mut self, other: Self) -> Self {
-                for i in 0..LANES {
-                    self.0[i] = self.0[i] $operator other.0[i];
-                }
-                self
+            fn $function(self, other: Self) -> Self {
+                Self(lanes!(I => self.0[I] $operator other.0[I]))
             }
         }
     };
@@ -262,7 +267,7 @@ impl<F: Float> Lanes for Plain<F> {
 
     #[inline(always)]
     fn splat(value: F) -> Self {
-        Self([value; LANES])
+        Self(lanes!(_I => value))
     }
 
     #[inline(always)]
@@ -277,87 +282,56 @@ impl<F: Float> Lanes for Plain<F> {
 
     #[inline(always)]
     fn of_groups(low: &[F; GROUP], high: &[F; GROUP]) -> Self {
-        let mut lanes = [low[0]; LANES];
-        for i in 0..GROUP {
-            (lanes[i], lanes[i + GROUP]) = (low[i], high[i]);
-        }
-        Self(lanes)
+        Self(lanes!(I => if I < GROUP { low[I] } else { high[I - GROUP] }))
     }
 
     #[inline(always)]
     fn add_to_groups(self, numbers: &mut [F], at: [u32; 2]) {
-        for (half, at) in at.into_iter().enumerate() {
-            let group = &mut numbers[at as usize..at as usize + GROUP];
-            for i in 0..GROUP {
-                group[i] += self.0[half * GROUP + i];
-            }
-        }
+        let [a, b, c, d, e, f, g, h] = self.0;
+        let low = &mut numbers[at[0] as usize..at[0] as usize + GROUP];
+        (low[0], low[1], low[2], low[3]) = (low[0] + a, low[1] + b, low[2] + c, low[3] + d);
+        let high = &mut numbers[at[1] as usize..at[1] as usize + GROUP];
+        (high[0], high[1], high[2], high[3]) = (high[0] + e, high[1] + f, high[2] + g, high[3] + h);
     }
 
     #[inline(always)]
-    fn recip(mut self) -> Self {
-        for i in 0..LANES {
-            self.0[i] = F::ONE / self.0[i];
-        }
-        self
+    fn recip(self) -> Self {
+        Self(lanes!(I => F::ONE / self.0[I]))
     }
 
     #[inline(always)]
-    fn sqrt(mut self) -> Self {
-        for i in 0..LANES {
-            self.0[i] = self.0[i].sqrt();
-        }
-        self
+    fn sqrt(self) -> Self {
+        Self(lanes!(I => self.0[I].sqrt()))
     }
 
     #[inline(always)]
-    fn neg(mut self) -> Self {
-        for i in 0..LANES {
-            self.0[i] = -self.0[i];
-        }
-        self
+    fn neg(self) -> Self {
+        Self(lanes!(I => -self.0[I]))
     }
 
     #[inline(always)]
-    fn min(mut self, other: Self) -> Self {
-        for i in 0..LANES {
-            self.0[i] = if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] };
-        }
-        self
+    fn min(self, other: Self) -> Self {
+        Self(lanes!(I => if self.0[I] < other.0[I] { self.0[I] } else { other.0[I] }))
     }
 
     #[inline(always)]
-    fn max(mut self, other: Self) -> Self {
-        for i in 0..LANES {
-            self.0[i] = if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] };
-        }
-        self
+    fn max(self, other: Self) -> Self {
+        Self(lanes!(I => if self.0[I] > other.0[I] { self.0[I] } else { other.0[I] }))
     }
 
     #[inline(always)]
     fn less(self, other: Self) -> [bool; LANES] {
-        let mut mask = [false; LANES];
-        for i in 0..LANES {
-            mask[i] = self.0[i] < other.0[i];
-        }
-        mask
+        lanes!(I => self.0[I] < other.0[I])
     }
 
     #[inline(always)]
     fn at_most(self, other: Self) -> [bool; LANES] {
-        let mut mask = [false; LANES];
-        for i in 0..LANES {
-            mask[i] = self.0[i] <= other.0[i];
-        }
-        mask
+        lanes!(I => self.0[I] <= other.0[I])
     }
 
     #[inline(always)]
-    fn pick(mask: [bool; LANES], yes: Self, mut no: Self) -> Self {
-        for i in 0..LANES {
-            no.0[i] = if mask[i] { yes.0[i] } else { no.0[i] };
-        }
-        no
+    fn pick(mask: [bool; LANES], yes: Self, no: Self) -> Self {
+        Self(lanes!(I => if mask[I] { yes.0[I] } else { no.0[I] }))
     }
 
     #[inline(always)]
@@ -372,12 +346,7 @@ impl<F: Float> Lanes for Plain<F> {
 
     #[inline(always)]
     fn where_each(second: [bool; LANES], third: [bool; LANES]) -> [[bool; LANES]; 3] {
-        let mut masks = [[false; LANES], [false; LANES], third];
-        for i in 0..LANES {
-            masks[0][i] = !second[i] & !third[i];
-            masks[1][i] = second[i] & !third[i];
-        }
-        masks
+        [lanes!(I => !second[I] & !third[I]), lanes!(I => second[I] & !third[I]), third]
     }
 
     #[inline(always)]
@@ -387,48 +356,29 @@ impl<F: Float> Lanes for Plain<F> {
 
     #[inline(always)]
     fn to_rows([a, b, c]: [Self; 3], to: &mut [[F; 4]; LANES]) {
-        for i in 0..LANES {
-            to[i] = [a.0[i], b.0[i], c.0[i], F::ZERO];
-        }
+        *to = lanes!(I => [a.0[I], b.0[I], c.0[I], F::ZERO]);
     }
 
     #[inline(always)]
     fn bits(mask: [bool; LANES]) -> u32 {
-        let mut bits = 0;
-        for i in 0..LANES {
-            bits |= u32::from(mask[i]) << i;
-        }
-        bits
+        let [a, b, c, d, e, f, g, h] = lanes!(I => u32::from(mask[I]) << I);
+        a | b | c | d | e | f | g | h
     }
 
     #[inline(always)]
     fn sum(self) -> F {
-        let mut lanes = self.0;
-        let mut width = LANES / 2;
-        while width > 0 {
-            for i in 0..width {
-                lanes[i] += lanes[i + width];
-            }
-            width /= 2;
-        }
-        lanes[0]
+        let [a, b, c, d, e, f, g, h] = self.0;
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
     }
 
     #[inline(always)]
     fn nearest(self) -> [i32; LANES] {
-        let mut whole = [0; LANES];
-        for i in 0..LANES {
-            whole[i] = self.0[i].nearest();
-        }
-        whole
+        lanes!(I => self.0[I].nearest())
     }
 
     #[inline(always)]
-    fn rounded(mut self) -> Self {
-        for i in 0..LANES {
-            self.0[i] = self.0[i].rounded();
-        }
-        self
+    fn rounded(self) -> Self {
+        Self(lanes!(I => self.0[I].rounded()))
     }
 
     #[inline(always)]
@@ -438,37 +388,31 @@ impl<F: Float> Lanes for Plain<F> {
         [to_a, to_b]: [&mut [u32; LANES]; 2],
     ) -> usize {
         let mut count = 0;
-        for i in 0..LANES {
+        lanes!(I => {
             let free = count % LANES;
-            (to_a[free], to_b[free]) = (a[i] as u32, b[i] as u32);
-            count += usize::from(keep[i]);
-        }
+            (to_a[free], to_b[free]) = (a[I] as u32, b[I] as u32);
+            count += usize::from(keep[I]);
+        });
         count
     }
 
     #[inline(always)]
     fn pixels(places: &[u32; 2]) -> (Self, Self) {
-        let (mut x, mut y) = ([F::ZERO; LANES], [F::ZERO; LANES]);
-        for i in 0..LANES {
-            let place = places[i / GROUP];
-            x[i] = F::of_whole((place & 0x00ff_ffff) as i32 + (i % GROUP) as i32);
-            y[i] = F::of_whole((place >> 24) as i32);
-        }
+        let x =
+            lanes!(I => F::of_whole((places[I / GROUP] & 0x00ff_ffff) as i32 + (I % GROUP) as i32));
+        let y = lanes!(I => F::of_whole((places[I / GROUP] >> 24) as i32));
         (Self(x), Self(y))
     }
 
     #[inline(always)]
     fn cell(self, octaves: u32, bits: u32) -> ([i32; LANES], Self, Self) {
-        let (mut index, mut place, mut inverse) = ([0; LANES], self.0, self.0);
-        for i in 0..LANES {
-            (index[i], place[i], inverse[i]) = self.0[i].cell(octaves, bits);
-        }
-        (index, Self(place), Self(inverse))
+        let cells = lanes!(I => self.0[I].cell(octaves, bits));
+        (lanes!(I => cells[I].0), Self(lanes!(I => cells[I].1)), Self(lanes!(I => cells[I].2)))
     }
 
     #[inline(always)]
     fn index(value: i32) -> [i32; LANES] {
-        [value; LANES]
+        lanes!(_I => value)
     }
 
     #[inline(always)]
@@ -482,36 +426,25 @@ impl<F: Float> Lanes for Plain<F> {
     }
 
     #[inline(always)]
-    fn plus(mut a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
-        for i in 0..LANES {
-            a[i] += b[i];
-        }
-        a
+    fn plus(a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
+        lanes!(I => a[I] + b[I])
     }
 
     #[inline(always)]
-    fn minus(mut a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
-        for i in 0..LANES {
-            a[i] -= b[i];
-        }
-        a
+    fn minus(a: [i32; LANES], b: [i32; LANES]) -> [i32; LANES] {
+        lanes!(I => a[I] - b[I])
     }
 
     #[inline(always)]
-    fn pick_index(mask: [bool; LANES], yes: [i32; LANES], mut no: [i32; LANES]) -> [i32; LANES] {
-        for i in 0..LANES {
-            no[i] = if mask[i] { yes[i] } else { no[i] };
-        }
-        no
+    fn pick_index(mask: [bool; LANES], yes: [i32; LANES], no: [i32; LANES]) -> [i32; LANES] {
+        lanes!(I => if mask[I] { yes[I] } else { no[I] })
     }
 
     #[inline(always)]
     fn places(cell: [i32; LANES], cells: i32, second: [bool; LANES]) -> Places {
-        let mut at = [0; LANES];
-        for i in 0..LANES {
-            let side = if second[i] { cells as u32 + 1 } else { 0 };
-            at[i] = (cell[i] as u32).min(cells as u32) + side;
-        }
+        let other = cells as u32 + 1;
+        let at =
+            lanes!(I => (cell[I] as u32).min(cells as u32) + if second[I] { other } else { 0 });
         Places { at, rows: 2 * (cells as usize + 1) }
     }
 
@@ -522,24 +455,21 @@ impl<F: Float> Lanes for Plain<F> {
 
     #[inline(always)]
     fn rows(table: &[[F; 4]], at: &Places) -> [Self; 4] {
-        let mut columns = [[F::ZERO; LANES]; 4];
-        for i in 0..LANES {
-            let row = table[at.at[i] as usize];
-            for k in 0..4 {
-                columns[k][i] = row[k];
-            }
-        }
-        let [a, b, c, d] = columns;
-        [Self(a), Self(b), Self(c), Self(d)]
+        let rows = lanes!(I => table[at.at[I] as usize]);
+        [
+            Self(lanes!(I => rows[I][0])),
+            Self(lanes!(I => rows[I][1])),
+            Self(lanes!(I => rows[I][2])),
+            Self(lanes!(I => rows[I][3])),
+        ]
     }
 
     #[inline(always)]
     fn add_to_rows(table: &mut [[F; 4]], at: &Places, columns: [Self; 4]) {
-        for i in 0..LANES {
-            let row = &mut table[at.at[i] as usize];
-            for k in 0..4 {
-                row[k] += columns[k].0[i];
-            }
-        }
+        let [Self(a), Self(b), Self(c), Self(d)] = columns;
+        lanes!(I => {
+            let row = &mut table[at.at[I] as usize];
+            *row = [row[0] + a[I], row[1] + b[I], row[2] + c[I], row[3] + d[I]];
+        });
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::kernel::{
     float::Float as _,
-    lanes::{LANES, Lanes, Places},
+    lanes::{LANES, Lanes, Places, lanes},
     real::{Float, Real, Table, splat},
 };
 
@@ -39,14 +39,13 @@ impl<T: Real> Texture<'_, T> {
         let y = (T::constant(splat(1.0)) - v).scale(splat(height as f64)) - half;
         let (left, [lefts, rights]) = around(x.value(), width);
         let (above, [aboves, belows]) = around(y.value(), height);
-        let mut rows = [[0; LANES]; 4];
-        for i in 0..LANES {
-            let [above, below] = [aboves[i] * width as u32, belows[i] * width as u32];
-            rows[0][i] = above + lefts[i];
-            rows[1][i] = above + rights[i];
-            rows[2][i] = below + lefts[i];
-            rows[3][i] = below + rights[i];
-        }
+        let row = width as u32;
+        let rows = [
+            lanes!(I => aboves[I] * row + lefts[I]),
+            lanes!(I => aboves[I] * row + rights[I]),
+            lanes!(I => belows[I] * row + lefts[I]),
+            lanes!(I => belows[I] * row + rights[I]),
+        ];
         let mut texels = [[half; OF_TEXEL]; 4];
         for k in 0..4 {
             let places: Places = T::Lanes::numbered(&rows[k], height * width);
@@ -61,20 +60,14 @@ impl<T: Real> Texture<'_, T> {
 #[inline(always)]
 fn around<L: Lanes>(x: L, count: usize) -> (L, [[u32; LANES]; 2]) {
     let numbers = x.array();
-    let mut floors = [L::Float::ZERO; LANES];
-    let mut places = [[0; LANES]; 2];
-    for i in 0..LANES {
-        let floor = numbers[i].to_f64().floor();
-        floors[i] = L::Float::from_f64(floor);
-        let last = count as i64 - 1;
-        let mut at = floor as i64;
-        if at < 0 || at > last {
-            at = at.rem_euclid(count as i64);
-        }
-        places[0][i] = at as u32;
-        places[1][i] = if at == last { 0 } else { at as u32 + 1 };
-    }
-    (L::of(&floors), places)
+    let floors = lanes!(I => numbers[I].to_f64().floor());
+    let last = count as i64 - 1;
+    let places = lanes!(I => {
+        let at = floors[I] as i64;
+        if at < 0 || at > last { at.rem_euclid(count as i64) } else { at }
+    });
+    let next = lanes!(I => if places[I] == last { 0 } else { places[I] as u32 + 1 });
+    (L::of(&lanes!(I => L::Float::from_f64(floors[I]))), [lanes!(I => places[I] as u32), next])
 }
 
 impl<T: Real> Sample<T> {
