@@ -50,7 +50,7 @@ pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R> {
 /// What is seen at a step, on the device.
 pub(crate) struct Seen<B: RasterBackend> {
     pub(crate) theta: Tensor<B, 1>,
-    image: Tensor<B, 3>,
+    image: Option<Tensor<B, 3>>,
     soft_loss: Tensor<B, 1>,
     /// What is lowered, of each instance, with a tape.
     pub(crate) loss: Tensor<Autodiff<B>, 1>,
@@ -72,13 +72,16 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
         Self { problem: of, instances: instances.len(), size, renderer, scene, host }
     }
 
-    /// What is seen at `theta` `[N]`, under the softness at a part of its path, 0 to 1.
-    pub(crate) fn seen(&self, part: f64, theta: Tensor<Autodiff<B>, 1>) -> Seen<B> {
+    /// What is seen at `theta` `[N]`, under the softness at a part of its path, 0 to 1; with the image if pictures are wanted.
+    pub(crate) fn seen(&self, part: f64, theta: Tensor<Autodiff<B>, 1>, pictures: bool) -> Seen<B> {
         let (problem, Self { scene, renderer, .. }) = (self.problem.borrow(), self);
-        let image = problem.image(scene, theta.clone(), &renderer.at_part(part));
-        let soft = problem.image_loss(scene, image.clone());
+        let softness = renderer.at_part(part);
+        // Beside the loss, which is the same to the last bit with pictures and without.
+        let image = pictures.then(|| problem.image(scene, theta.clone().detach(), &softness));
+        let soft = problem.loss_at(scene, theta.clone(), &softness);
         let loss = lowered(problem, scene, theta.clone(), soft.clone());
-        Seen { theta: theta.inner(), image: image.inner(), soft_loss: soft.inner(), loss }
+        let image = image.map(Tensor::inner);
+        Seen { theta: theta.inner(), image, soft_loss: soft.inner(), loss }
     }
 
     /// The numbers of what is seen, with its hard error.
@@ -87,9 +90,8 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
         step: usize,
         part: f64,
         seen: Seen<B>,
-        picture: bool,
     ) -> anyhow::Result<Iterate> {
-        let image = picture.then(|| of_first(seen.image, self.instances));
+        let image = seen.image.map(|image| of_first(image, self.instances));
         let rows = image.as_ref().map(|image| image.dims()[2]);
         // One round trip to the device for all of it.
         let read = Transaction::default().register(seen.theta).register(seen.loss.inner());

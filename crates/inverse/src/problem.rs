@@ -91,6 +91,16 @@ pub trait InverseProblem: 'static {
         image: Tensor<B, 3>,
     ) -> Tensor<B, 1>;
 
+    /// [`image_loss`](Self::image_loss) of the [`image`](Self::image) at θ, where the image itself is not asked for.
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &Self::Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 1> {
+        self.image_loss(scene, self.image(scene, theta, softness))
+    }
+
     /// What is lowered beside it to keep the scene regular, `[instances]`.
     fn regularizer<B: RasterBackend>(
         &self,

@@ -1,10 +1,10 @@
 use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
 
 use burn::tensor::{Element, Tensor, TensorData};
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer};
+use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer, iou_loss, mse_loss};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, numbers, vector};
 
-use crate::{PhiLayout, Resolution};
+use crate::{PhiLayout, Resolution, Targets};
 
 /// Draws soft silhouettes of one mesh topology at every step of a run.
 ///
@@ -185,6 +185,44 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
         let below = table.clone().narrow(0, own, rows - own);
         let table = table.narrow(0, 0, own);
         seen.coverage_with_surrogate(vertices, table, &surrogate.clone().sized(side), below)
+    }
+
+    /// The [`iou_loss`] `[views]` of the [`silhouette`](Self::silhouette) against its targets: in one op where nothing is differentiated by φ
+    /// and there is no surrogate.
+    ///
+    /// # Panics
+    ///
+    /// If the problem has no faces, or there is no target of this many pixels.
+    pub fn iou_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
+        let target = targets.of_side(self.side());
+        match self.alone(&vertices) {
+            Some((seen, table)) => seen.iou_error_by_table(vertices, table, target),
+            None => iou_loss(self.silhouette(vertices), target),
+        }
+    }
+
+    /// The [`mse_loss`] `[views]`, likewise.
+    ///
+    /// # Panics
+    ///
+    /// If the problem has no faces, or there is no target of this many pixels.
+    pub fn mse_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
+        let target = targets.of_side(self.side());
+        match self.alone(&vertices) {
+            Some((seen, table)) => seen.squared_error_by_table(vertices, table, target),
+            None => mse_loss(self.silhouette(vertices), target),
+        }
+    }
+
+    /// What draws, and its table, if only vertices have a gradient, and the image's own.
+    fn alone(&self, vertices: &Tensor<B, 3>) -> Option<(Silhouette<EdgeSoftness>, Tensor<B, 2>)> {
+        let kept = self.renderer.kept::<B>(self.part);
+        if self.prepared.is_some() || kept.silhouettes.len() > 1 {
+            return None;
+        }
+        let options = (&vertices.device(), <B::FloatElem as Element>::dtype());
+        let table = Tensor::from_data(kept.table.clone(), options);
+        Some((kept.silhouettes[0].clone().sized(self.side()), table))
     }
 
     /// Pixels a side of the image.

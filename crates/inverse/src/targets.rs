@@ -39,7 +39,15 @@ impl<B: Backend> Targets<B> {
     ///
     /// If the image has another size than all of them.
     pub fn of(&self, image: &Tensor<B, 3>) -> Tensor<B, 3> {
-        let [_, side, _] = image.dims();
+        self.of_side(image.dims()[1])
+    }
+
+    /// The target of `side` pixels a side.
+    ///
+    /// # Panics
+    ///
+    /// If there is none.
+    pub fn of_side(&self, side: usize) -> Tensor<B, 3> {
         let level = self.levels.iter().find(|level| level.dims()[1] == side);
         level.cloned().unwrap_or_else(|| panic!("there is no target of {side} pixels a side"))
     }

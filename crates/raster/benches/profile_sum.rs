@@ -34,7 +34,7 @@ use machine::machine;
 use rayon::ThreadPool;
 use record::Record;
 use scalar::Scalar;
-use softrast_raster::{Rasterizer, Silhouette, mse_loss, project};
+use softrast_raster::{Rasterizer, Silhouette, project};
 use softrast_softness::{EdgeSoftness, Family};
 use workload::{Workload, disk, tensor};
 
@@ -328,8 +328,8 @@ impl Step {
     fn gradient(&self, table: Tensor<B, 2>) -> Tensor<B, 3> {
         let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
         let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
-        let image = self.op.silhouette.coverage_by_table(vertices, Tensor::from_inner(table));
-        let loss = mse_loss(image, Tensor::from_inner(self.target.clone())).mean();
+        let (table, target) = (Tensor::from_inner(table), Tensor::from_inner(self.target.clone()));
+        let loss = self.op.silhouette.squared_error_by_table(vertices, table, target).mean();
         backward((loss, world))
     }
 }

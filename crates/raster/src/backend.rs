@@ -16,8 +16,9 @@ use burn::{
 };
 
 use crate::{
-    ProfileSum,
+    ProfileSum, SilhouetteLoss,
     fused::{ElementaryOp, FusedOp, HostFloat, Pass},
+    kernel::PixelLoss,
 };
 
 fn slice<F: Element>(data: &TensorData) -> &[F] {
@@ -141,6 +142,17 @@ pub fn profile_sum<B: RasterBackend, const D: usize>(
     vertices: Tensor<B, 3>,
     table: Tensor<B, D>,
 ) -> Tensor<B, 3> {
+    check(op, &vertices, &table);
+    let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
+    fused(&FusedOp::ProfileSum(op.clone()), inputs)
+}
+
+/// Panics unless vertices and table are for this op.
+fn check<B: RasterBackend, const D: usize>(
+    op: &ProfileSum,
+    vertices: &Tensor<B, 3>,
+    table: &Tensor<B, D>,
+) {
     let [views, count, three] = vertices.dims();
     assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
     let (found, rows) = (table.dims(), op.grid.rows());
@@ -152,8 +164,30 @@ pub fn profile_sum<B: RasterBackend, const D: usize>(
     assert_eq!(vertices.dtype(), table.dtype(), "vertices and table differ in float type");
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
-    let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
-    fused(&FusedOp::ProfileSum(op.clone()), inputs)
+}
+
+/// How silhouettes of the probabilistic sum differ from a target `[1 or views, height, width]`, `[views]`. Only where tensors lie on the host,
+/// and only the vertices may need a gradient.
+///
+/// # Panics
+///
+/// If the shapes do not fit or the float types differ.
+pub(crate) fn silhouette_loss<B: RasterBackend, const D: usize>(
+    op: &ProfileSum,
+    loss: PixelLoss,
+    vertices: Tensor<B, 3>,
+    table: Tensor<B, D>,
+    target: Tensor<B, 3>,
+) -> Tensor<B, 1> {
+    check(op, &vertices, &table);
+    let ([views, _, _], found) = (vertices.dims(), target.dims());
+    let fits =
+        found[1..] == [op.size.height, op.size.width] && (found[0] == 1 || found[0] == views);
+    assert!(fits, "a target of {views} views of {:?} cannot be {found:?}", op.size);
+    assert_eq!(vertices.dtype(), target.dtype(), "vertices and target differ in float type");
+    let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table), primitive(target)];
+    let op = SilhouetteLoss { sum: op.clone(), loss, kept: None };
+    fused(&FusedOp::SilhouetteLoss(op), inputs)
 }
 
 /// The result of an op that is written for any number. Only where tensors lie on the host.

@@ -37,6 +37,7 @@ mod image_size;
 mod kernel;
 mod log_curve;
 mod loss;
+mod loss_op;
 mod picture_loss;
 mod pinhole;
 mod profile;
@@ -68,6 +69,8 @@ pub use gpu::adapter_name;
 pub use hard::{hard_silhouette, nearest_faces};
 pub use image_size::ImageSize;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
+#[doc(hidden)]
+pub use loss_op::SilhouetteLoss;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
 pub use profile::Profile;

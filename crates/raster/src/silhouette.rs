@@ -5,9 +5,11 @@ use softrast_softness::Softness;
 
 use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
-    backend::{elementary, pairs, primitive},
+    backend::{elementary, pairs, primitive, silhouette_loss},
     fused::{ElementaryOp, FusedOp},
-    profile_sum,
+    iou_loss,
+    kernel::PixelLoss,
+    mse_loss, profile_sum,
 };
 
 /// How silhouettes are drawn.
@@ -160,6 +162,54 @@ impl<S: Softness> Silhouette<S> {
         table: Tensor<B, D>,
     ) -> Tensor<B, 3> {
         covered(self.profile.t_conorm(), self.sums(vertices, table))
+    }
+
+    /// The [squared error](mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of
+    /// [`Silhouette::coverage_by_table`], in one op on the CPU under the probabilistic sum. Gradients reach the vertices alone, to second
+    /// order.
+    ///
+    /// # Panics
+    ///
+    /// If shapes or float types do not fit.
+    pub fn squared_error_by_table<B: RasterBackend, const D: usize>(
+        &self,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, D>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        self.loss(PixelLoss::SquaredError, vertices, table, target)
+    }
+
+    /// The [`iou_loss`] of each view, likewise.
+    ///
+    /// # Panics
+    ///
+    /// If shapes or float types do not fit.
+    pub fn iou_error_by_table<B: RasterBackend, const D: usize>(
+        &self,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, D>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        self.loss(PixelLoss::Iou, vertices, table, target)
+    }
+
+    fn loss<B: RasterBackend, const D: usize>(
+        &self,
+        loss: PixelLoss,
+        vertices: Tensor<B, 3>,
+        table: Tensor<B, D>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        let (table, target) = (table.detach(), target.detach());
+        if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
+            let image = self.coverage_by_table(vertices, table);
+            return match loss {
+                PixelLoss::SquaredError => mse_loss(image, target),
+                PixelLoss::Iou => iou_loss(image, target),
+            };
+        }
+        silhouette_loss(&self.op, loss, vertices, table, target)
     }
 
     /// Sums over the faces of each pixel, `[views, height, width]`: what the T-conorm of the profile

@@ -3,7 +3,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
 
-use crate::{HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm};
+use crate::{
+    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, iou_loss, mse_loss,
+};
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
 const SAME: f64 = 1e-12;
@@ -183,6 +185,44 @@ impl<S: Softness> SoftRenderer<S> {
         kept.prepared =
             Some(Prepared { phi: phi.to_vec(), on_host: B::ON_HOST, silhouette: prepared });
         silhouette
+    }
+
+    /// The [squared error](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of the
+    /// [`silhouette`](Self::silhouette). Gradients reach the vertices alone, to second order.
+    ///
+    /// On the CPU, under the probabilistic sum and without a surrogate, it is one op that computes the gradient along with the image, in about
+    /// two thirds of the time.
+    ///
+    /// # Panics
+    ///
+    /// If the target is of another size.
+    pub fn squared_error<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        if self.surrogate.is_some() {
+            return mse_loss(self.silhouette(vertices), target);
+        }
+        let (silhouette, table) = self.own_table(&vertices);
+        silhouette.squared_error_by_table(vertices, table, target)
+    }
+
+    /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
+    ///
+    /// # Panics
+    ///
+    /// If the target is of another size.
+    pub fn iou_error<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        if self.surrogate.is_some() {
+            return iou_loss(self.silhouette(vertices), target);
+        }
+        let (silhouette, table) = self.own_table(&vertices);
+        silhouette.iou_error_by_table(vertices, table, target)
     }
 
     fn drawn<B: RasterBackend>(

@@ -109,6 +109,15 @@ impl InverseProblem for Pose {
         self.problem.image_loss(scene, image)
     }
 
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 1> {
+        self.problem.loss_at(scene, theta, softness)
+    }
+
     fn defaults(&self) -> SolveConfig {
         match self.variant {
             Variant::Original => self.problem.defaults(),

@@ -77,6 +77,15 @@ impl InverseProblem for Shape2d {
         scene.image_loss(image)
     }
 
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 1> {
+        softness.mse_loss(scene.vertices(theta), scene.targets())
+    }
+
     fn regularizer<B: RasterBackend>(
         &self,
         scene: &Scene<B>,

@@ -111,6 +111,11 @@ impl<B: RasterBackend> Scene<B> {
         iou_loss(image, target).mean()
     }
 
+    /// The targets at every size that a run may draw at.
+    pub fn targets(&self) -> &Targets<B> {
+        &self.targets
+    }
+
     /// What keeps the surface of `vertices` `[vertices, 3]` smooth: 0.03 times the Laplacian loss
     /// and 0.0003 times the flatness loss, `[1]`. Second derivatives are finite everywhere.
     pub fn smoothness_loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {

@@ -88,6 +88,15 @@ impl InverseProblem for Shape3d {
         scene.image_loss(image)
     }
 
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 1> {
+        softness.iou_loss(scene.project(scene.vertices(theta)), scene.targets()).mean()
+    }
+
     fn regularizer<B: RasterBackend>(
         &self,
         scene: &Scene<B>,

@@ -11,6 +11,7 @@ mod pinhole;
 mod pytorch3d;
 mod reference;
 mod shading;
+mod silhouette_loss;
 mod soft_blend;
 mod soft_renderer;
 mod threads;

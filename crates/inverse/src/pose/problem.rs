@@ -85,6 +85,15 @@ impl InverseProblem for PoseProblem {
         scene.image_loss(image)
     }
 
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &PoseScene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B>,
+    ) -> Tensor<B, 1> {
+        softness.iou_loss(scene.project(scene.by_view(theta)), scene.targets())
+    }
+
     fn defaults(&self) -> SolveConfig {
         SolveConfig { size: 64, steps: 300, learning_rate: 0.3 }
     }

@@ -101,6 +101,11 @@ impl<B: RasterBackend> PoseScene<B> {
         iou_loss(image, target)
     }
 
+    /// The targets at every size that a run may draw at.
+    pub fn targets(&self) -> &Targets<B> {
+        &self.targets
+    }
+
     /// θ moved to the nearest pose that is allowed.
     ///
     /// The camera stays outside the ball around the origin that holds the mesh, with 5 % to spare,

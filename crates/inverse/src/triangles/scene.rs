@@ -73,6 +73,11 @@ impl<B: RasterBackend> Scene<B> {
         mse_loss(image, target)
     }
 
+    /// The picture at every size that a run may draw at.
+    pub fn targets(&self) -> &Targets<B> {
+        &self.targets
+    }
+
     /// What keeps triangles small: the Laplacian loss of each by itself, weighted, `[1]`.
     ///
     /// `Σ |corner - middle of the other two|²` over all corners, times 0.0065. Source: docs/notes.md, 2D shape.

@@ -16,7 +16,7 @@ pub(crate) use number::Number;
 pub use pass::Pass;
 
 use crate::{
-    ProfileSum, SoftBlend,
+    ProfileSum, SilhouetteLoss, SoftBlend,
     kernel::{self, Dual, Float, Inputs},
 };
 
@@ -28,6 +28,9 @@ pub enum FusedOp {
     /// See [`crate::ColourRenderer`].
     #[doc(hidden)]
     SoftBlend(SoftBlend),
+    /// See [`crate::SoftRenderer::squared_error`].
+    #[doc(hidden)]
+    SilhouetteLoss(SilhouetteLoss),
     /// One that is written for any number.
     #[doc(hidden)]
     Elementary(ElementaryOp),
@@ -49,6 +52,7 @@ impl FusedOp {
         match self {
             Self::ProfileSum(op) => Self::ProfileSum(op.keeping()),
             Self::SoftBlend(op) => Self::SoftBlend(op.keeping()),
+            Self::SilhouetteLoss(op) => Self::SilhouetteLoss(op.keeping()),
             Self::Elementary(op) => Self::Elementary(*op),
         }
     }
@@ -118,7 +122,7 @@ host_float!(f64);
 
 fn run<F>(op: &FusedOp, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
 where
-    F: Element + Float + Number<Float = F>,
+    F: Numbers + Float + Number<Float = F>,
 {
     use ElementaryOp::{
         Coverage as C, Iou as I, OrbitMatrix as O, Perspective as P, SquaredError as E,
@@ -127,12 +131,38 @@ where
     match op {
         FusedOp::ProfileSum(op) => op.run(pass, slices, dims),
         FusedOp::SoftBlend(op) => op.run(pass, slices, dims),
+        FusedOp::SilhouetteLoss(op) => op.run(pass, slices, dims),
         FusedOp::Elementary(O) => elementary(&OrbitMatrix, pass, slices, dims),
         FusedOp::Elementary(P) => elementary(&Perspective, pass, slices, dims),
         FusedOp::Elementary(C) => elementary(&Coverage, pass, slices, dims),
         FusedOp::Elementary(E) => elementary(&SquaredError, pass, slices, dims),
         FusedOp::Elementary(I) => elementary(&Iou, pass, slices, dims),
     }
+}
+
+/// The derivatives of `Σ upstream · loss` by sums of profiles `[views, height, width]`, whose coverages a loss compares with a target, and how
+/// they change as the sums move by `moved`. `dims` are the shapes of both images.
+pub(crate) fn dual_upstream<F>(
+    loss: ElementaryOp,
+    [sums, moved, target, upstream]: [&[F]; 4],
+    dims: &[Vec<usize>],
+) -> [Vec<F>; 2]
+where
+    F: Float + Number<Float = F>,
+{
+    let dual = |(&value, &tangent)| Dual { value, tangent };
+    let sums: Vec<_> = sums.iter().zip(moved).map(dual).collect();
+    let target: Vec<_> = target.iter().map(|&value| Dual::constant(value)).collect();
+    let coverage = Coverage.forward(&[&sums], &dims[..1]);
+    let (inputs, wanted) = ([&coverage[..], &target[..]], [true, false]);
+    let by_coverage = match loss {
+        ElementaryOp::Iou => Iou.vjp(&inputs, dims, upstream, &wanted),
+        _ => SquaredError.vjp(&inputs, dims, upstream, &wanted),
+    };
+    let one = Dual::constant(F::ONE);
+    let by_sums = by_coverage.into_iter().zip(coverage).map(|(by, c)| by * (one - c));
+    let (values, tangents) = by_sums.map(|number| (number.value, number.tangent)).unzip();
+    [values, tangents]
 }
 
 fn elementary<F>(

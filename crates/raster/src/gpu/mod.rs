@@ -52,7 +52,9 @@ impl RasterBackend for Wgpu {
         let op = match op {
             FusedOp::ProfileSum(op) => op,
             FusedOp::SoftBlend(op) => return blended(op, pass, tensors),
-            FusedOp::Elementary(_) => panic!("on a GPU {op:?} is made of tensor ops"),
+            FusedOp::Elementary(_) | FusedOp::SilhouetteLoss(_) => {
+                panic!("on a GPU {op:?} is made of other ops")
+            }
         };
         let mut tensors = tensors.into_iter();
         let mut next = || tensors.next().expect("all inputs of the pass");

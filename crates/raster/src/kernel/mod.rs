@@ -12,6 +12,7 @@ mod face;
 mod float;
 mod lanes;
 mod list;
+mod losses;
 mod pair;
 mod pairs;
 mod reach;
@@ -23,6 +24,7 @@ mod walk;
 
 pub(crate) use bands::Bands;
 pub(crate) use float::Float;
+pub(crate) use losses::{PixelLoss, losses};
 pub(crate) use pairs::pairs;
 pub(crate) use reach::{FAR_AWAY, inside_spans};
 pub(crate) use real::Dual;

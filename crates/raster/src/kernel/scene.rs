@@ -45,6 +45,8 @@ pub(crate) struct Place<'a, T: Real> {
     pub(crate) table: Table<'a, T>,
     pub(crate) view: &'a View,
     pub(crate) band: usize,
+    /// Which list of the faces of the band a walk begins with.
+    pub(crate) first_list: usize,
 }
 
 impl<T: Real> Place<'_, T> {
@@ -175,7 +177,7 @@ impl<'a, T: Real> Scene<'a, T> {
             tangents: of_table(self.tables.tangents),
         };
         let [vertices, tangents] = [self.vertices, self.tangents].map(of_view);
-        Place { vertices, tangents, table, view, band }
+        Place { vertices, tangents, table, view, band, first_list: 0 }
     }
 
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.

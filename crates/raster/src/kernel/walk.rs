@@ -12,10 +12,10 @@ use super::{
 
 /// Room for chunks whose geometry is known: a power of two. Adding up follows [`AHEAD`] chunks behind: while one waits for the table, the
 /// arithmetic of the other goes on.
-const RING: usize = 8;
+pub(crate) const RING: usize = 8;
 
 /// Chunks whose gradients are added up lane by lane: fewer terms in a row keep more digits.
-const TOGETHER: usize = 16;
+pub(crate) const TOGETHER: usize = 16;
 
 /// What one band gives back.
 pub(crate) struct BandGradient<F> {
@@ -43,7 +43,8 @@ fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
         visited: splat(0.0),
         tail: place.tail(&scene.grid),
     };
-    for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
+    let lists = place.view.faces(place.band).chunks(LISTED).enumerate();
+    for (k, numbers) in lists.skip(place.first_list) {
         list.fill(scene, &place, numbers);
         let first = k * LISTED;
         match (scene.lookup.has_far_cells(), list.slivers) {

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use super::*;
-use crate::kernel::lanes::PORTABLE;
+use crate::kernel::{PixelLoss, lanes::PORTABLE, losses};
 
 const VERTICES: usize = 60;
 const FACES: u32 = 90;
@@ -36,6 +36,10 @@ fn passes<F: Float>(size: [usize; 2], views: usize, tables: usize, far: u32) -> 
     all.extend(vjp(&inputs, bands, &upstream, [true, false]));
     all.extend(vjp(&inputs, bands, &upstream, [true; 2]));
     all.extend(vjp_of_vjp(&inputs, bands, &upstream, &direction, [true; 2], [true; 3]));
+    for loss in [PixelLoss::SquaredError, PixelLoss::Iou] {
+        let target: Vec<F> = upstream.iter().map(|&x| x * x).collect();
+        all.extend(losses(&inputs, bands, &target, loss, true).concat());
+    }
     let along = &direction[..vertices.len()];
     all.extend(vjp_of_vjp(&inputs, bands, &upstream, along, [true, false], [true, false, true]));
     all

@@ -1,0 +1,120 @@
+use std::sync::{Arc, OnceLock};
+
+use burn::tensor::{Element, TensorData};
+
+use crate::{
+    ProfileSum,
+    fused::{ElementaryOp, Number, Numbers, dual_upstream, pass::Pass},
+    kernel::{self, Float, PixelLoss},
+};
+
+/// The loss of silhouettes against a target, in one op: its gradient to the vertices is computed along with it.
+#[derive(Clone, Debug)]
+pub struct SilhouetteLoss {
+    pub(crate) sum: ProfileSum,
+    pub(crate) loss: PixelLoss,
+    /// The gradients of the losses, of an op that is recorded; as many numbers as the vertices have.
+    pub(crate) kept: Option<Arc<OnceLock<TensorData>>>,
+}
+
+impl SilhouetteLoss {
+    /// The op of one call whose passes share what they find out.
+    pub(crate) fn keeping(&self) -> Self {
+        let kept = Some(self.kept.clone().unwrap_or_default());
+        Self { sum: self.sum.keeping(), kept, ..self.clone() }
+    }
+
+    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[1 or views, rows, 4]` and a `target` `[1 or views, height, width]`, to losses
+    /// `[views]`. Only the vertices have a gradient.
+    pub(crate) fn run<F: Float + Numbers + Number<Float = F>>(
+        &self,
+        pass: &Pass,
+        slices: &[&[F]],
+        dims: &[Vec<usize>],
+    ) -> TensorData {
+        let [vertices, table, target] = [slices[0], slices[1], slices[2]];
+        let views = dims[0][0];
+        let inputs = self.sum.inputs(views, vertices, table);
+        let own = OnceLock::new();
+        let bands = self.sum.kept.as_deref().unwrap_or(&own).get_or_init(|| inputs.bands());
+        let losses = |gradient| kernel::losses(&inputs, bands, target, self.loss, gradient);
+        let own_gradient = OnceLock::new();
+        let gradient = || {
+            let kept = self.kept.as_deref().unwrap_or(&own_gradient);
+            let kept = kept.get_or_init(|| {
+                let [_, gradient] = losses(true);
+                flat(gradient)
+            });
+            kept.clone()
+        };
+        let of_view = vertices.len() / views.max(1);
+        match pass {
+            Pass::Forward => {
+                let [losses, gradient] = losses(self.kept.is_some());
+                if let Some(kept) = &self.kept {
+                    // Another call may have been as quick; its gradient is the same.
+                    let _ = kept.set(flat(gradient));
+                }
+                flat(losses)
+            }
+            Pass::Vjp { wanted } => {
+                assert!(wanted == &[true, false, false], "only the vertices have a gradient");
+                let mut gradient = gradient();
+                let numbers = gradient.as_mut_slice::<F>().expect("numbers of this type");
+                for (view, &factor) in numbers.chunks_mut(of_view.max(1)).zip(slices[3]) {
+                    view.iter_mut().for_each(|number| *number = *number * factor);
+                }
+                gradient
+            }
+            Pass::VjpOfVjp { wanted, .. } => {
+                let (upstream, direction) = (slices[3], slices[4]);
+                let mut all = Vec::new();
+                if wanted[0] {
+                    all = self.along(&inputs, bands, [target, upstream, direction], dims);
+                }
+                if wanted[3] {
+                    let gradient = gradient();
+                    let numbers = gradient.as_slice::<F>().expect("numbers of this type");
+                    let views =
+                        numbers.chunks(of_view.max(1)).zip(direction.chunks(of_view.max(1)));
+                    all.extend(views.map(|(gradient, direction)| {
+                        let products = gradient.iter().zip(direction);
+                        products.fold(F::ZERO, |sum, (&a, &b)| sum + a * b)
+                    }));
+                }
+                flat(all)
+            }
+        }
+    }
+
+    /// The derivative of the gradient `Σ upstream · loss` along a direction of the vertices.
+    fn along<F: Float + Numbers + Number<Float = F>>(
+        &self,
+        inputs: &kernel::Inputs<F>,
+        bands: &kernel::Bands,
+        [target, upstream, direction]: [&[F]; 3],
+        dims: &[Vec<usize>],
+    ) -> Vec<F> {
+        let sums = kernel::forward(inputs, bands);
+        let image = vec![dims[0][0], self.sum.size.height, self.sum.size.width];
+        let shapes = [image, dims[2].clone()];
+        let loss = match self.loss {
+            PixelLoss::SquaredError => ElementaryOp::SquaredError,
+            PixelLoss::Iou => ElementaryOp::Iou,
+        };
+        // The derivatives by the sums do not depend on how the sums move, but how those move depends on them being known.
+        let still = vec![F::ZERO; sums.len()];
+        let [by_sums, _] = dual_upstream(loss, [&sums, &still, target, upstream], &shapes);
+        let (along, wanted) = ([true, false], [true, false, true]);
+        let pulled = kernel::vjp_of_vjp(inputs, bands, &by_sums, direction, along, wanted);
+        let (curved, moved) = pulled.split_at(inputs.vertices.len());
+        let [_, change] = dual_upstream(loss, [&sums, moved, target, upstream], &shapes);
+        let rest = kernel::vjp(inputs, bands, &change, [true, false]);
+        curved.iter().zip(rest).map(|(&a, b)| a + b).collect()
+    }
+}
+
+fn flat<F: Element>(values: Vec<F>) -> TensorData {
+    let length = values.len();
+    TensorData::new(values, [length])
+}

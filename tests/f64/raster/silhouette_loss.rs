@@ -1,0 +1,121 @@
+//! A loss that is computed along with the silhouette is that of the silhouette, and so are its derivatives.
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::Tensor,
+};
+use proptest::prelude::*;
+use softrast_raster::{SoftRenderer, iou_loss, mse_loss};
+use softrast_softness::{EdgeSoftness, Family};
+use softrast_tests::{numbers, vector};
+
+use super::triangles::triangles;
+
+type B = NdArray<f64>;
+type A = Autodiff<B>;
+type AA = Autodiff<A>;
+
+type Renderer = SoftRenderer<EdgeSoftness>;
+type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>) -> Tensor<AA, 1>;
+
+/// In one op, and in two.
+const LOSSES: [[Loss; 2]; 2] = [
+    [
+        |renderer, vertices, target| renderer.squared_error(vertices, target),
+        |renderer, vertices, target| mse_loss(renderer.silhouette(vertices), target),
+    ],
+    [
+        |renderer, vertices, target| renderer.iou_error(vertices, target),
+        |renderer, vertices, target| iou_loss(renderer.silhouette(vertices), target),
+    ],
+];
+
+/// Losses of views, the gradient of a sum of them to the vertices, and the gradients of a product with that to vertices and to the
+/// factors of the sum.
+fn derivatives(
+    loss: Loss,
+    renderer: &Renderer,
+    [vertices, target]: [Tensor<B, 3>; 2],
+) -> [Vec<f64>; 4] {
+    let views = vertices.dims()[0];
+    let wave = |count: usize, step: f64| -> Vec<f64> {
+        (0..count).map(|k| (step * (k + 1) as f64).sin()).collect()
+    };
+    let dims = vertices.dims();
+    let direction = vector::<A>(&wave(dims.iter().product(), 1.3)).reshape(dims);
+    let inner = Tensor::<A, 3>::from_inner(vertices).require_grad();
+    let factors = vector::<A>(&wave(views, 0.7)).require_grad();
+    let vertices = Tensor::<AA, 3>::from_inner(inner.clone()).require_grad();
+    let target = Tensor::from_inner(Tensor::from_inner(target));
+    let losses = loss(renderer, vertices.clone(), target);
+    let total = (losses.clone() * Tensor::from_inner(factors.clone())).sum();
+    let gradient = vertices.grad(&total.backward()).expect("a gradient");
+    let second = (gradient.clone() * direction).sum().backward();
+    let to_vertices = inner.grad(&second).expect("a second derivative");
+    let to_factors = factors.grad(&second).expect("a gradient to the factors");
+    [numbers(losses), numbers(gradient), numbers(to_vertices), numbers(to_factors)]
+}
+
+/// Asserts that both ways agree, for a renderer, so many views and a target of each or one of all.
+fn assert_same(
+    renderer: &Renderer,
+    seed: u64,
+    [height, width]: [usize; 2],
+    views: usize,
+    own: bool,
+) {
+    let (values, _) = triangles(seed, 20);
+    let view = |k: usize| {
+        let vertices = vector::<B>(&values).reshape([1, values.len() as i64 / 3, 3]);
+        let depth = vertices.clone().narrow(2, 2, 1);
+        Tensor::cat(vec![vertices.narrow(2, 0, 2) * (1.0 - 0.1 * k as f64), depth], 2)
+    };
+    let vertices = Tensor::cat((0..views).map(view).collect(), 0);
+    let targets = if own { views } else { 1 };
+    let pixel = |k: usize| 0.5 + 0.5 * (0.37 * k as f64).sin();
+    let pixels: Vec<f64> = (0..targets * height * width).map(pixel).collect();
+    let target = vector::<B>(&pixels).reshape([targets, height, width]);
+    for [one, two] in LOSSES {
+        let [found, wanted] =
+            [one, two].map(|loss| derivatives(loss, renderer, [vertices.clone(), target.clone()]));
+        for (which, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
+            let largest = wanted.iter().fold(1e-12, |largest: f64, x| largest.max(x.abs()));
+            for (found, wanted) in found.iter().zip(wanted) {
+                let off = (found - wanted).abs() / largest;
+                assert!(off < 1e-9, "{which}: {found:e} for {wanted:e}, {off:e} of {largest:e}");
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn one_op_gives_what_two_give(
+        seed in 0u64..1000,
+        family in proptest::sample::select(Family::ALL.to_vec()),
+        squared: bool,
+        width in -2.0f64..-0.5,
+        size in proptest::sample::select(vec![[9, 9], [70, 13], [13, 70]]),
+        views in 1usize..6,
+        own: bool,
+    ) {
+        let softness = EdgeSoftness { family, squared };
+        let scale = 10f64.powf(if squared { 2.0 * width } else { width });
+        let (_, faces) = triangles(seed, 20);
+        let renderer = SoftRenderer::new(&faces, size, softness, scale).with_tolerance(1e-4);
+        assert_same(&renderer, seed, size, views, own);
+    }
+}
+
+#[test]
+fn more_pairs_than_are_kept_are_walked_again() {
+    // 400 faces that reach most pixels: up to 400 * 32 * 64 / 8 chunks in a band.
+    let size = [64, 64];
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let (_, faces) = triangles(3, 20);
+    let many = faces.repeat(20);
+    let renderer = SoftRenderer::new(&many, size, softness, 0.1);
+    assert_same(&renderer, 3, size, 1, true);
+}
