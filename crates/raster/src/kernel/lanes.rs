@@ -282,7 +282,8 @@ impl<F: Float> Lanes for Plain<F> {
 
     #[inline(always)]
     fn of_groups(low: &[F; GROUP], high: &[F; GROUP]) -> Self {
-        Self(lanes!(I => if I < GROUP { low[I] } else { high[I - GROUP] }))
+        let ([a, b, c, d], [e, f, g, h]) = (*low, *high);
+        Self([a, b, c, d, e, f, g, h])
     }
 
     #[inline(always)]
