@@ -196,7 +196,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     pub fn iou_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
         let target = targets.of_side(self.side());
         match self.alone(&vertices) {
-            Some((seen, table)) => seen.iou_error_by_table(vertices, table, target),
+            Some((seen, table)) => seen.iou_loss_by_table(vertices, table, target),
             None => iou_loss(self.silhouette(vertices), target),
         }
     }
@@ -209,7 +209,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     pub fn mse_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
         let target = targets.of_side(self.side());
         match self.alone(&vertices) {
-            Some((seen, table)) => seen.squared_error_by_table(vertices, table, target),
+            Some((seen, table)) => seen.mse_loss_by_table(vertices, table, target),
             None => mse_loss(self.silhouette(vertices), target),
         }
     }

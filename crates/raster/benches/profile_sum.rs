@@ -329,7 +329,7 @@ impl Step {
         let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
         let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
         let (table, target) = (Tensor::from_inner(table), Tensor::from_inner(self.target.clone()));
-        let loss = self.op.silhouette.squared_error_by_table(vertices, table, target).mean();
+        let loss = self.op.silhouette.mse_loss_by_table(vertices, table, target).mean();
         backward((loss, world))
     }
 }

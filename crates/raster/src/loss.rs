@@ -4,6 +4,7 @@ use crate::{
     RasterBackend,
     backend::{elementary, primitive},
     fused::ElementaryOp,
+    kernel::PixelLoss,
     reference,
 };
 
@@ -41,6 +42,20 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
     match B::ON_HOST {
         true => compared(ElementaryOp::SquaredError, image, target),
         false => reference::mse_loss(image, target),
+    }
+}
+
+impl PixelLoss {
+    /// The loss of each view.
+    pub(crate) fn of_images<B: RasterBackend>(
+        self,
+        image: Tensor<B, 3>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
+        match self {
+            Self::SquaredError => mse_loss(image, target),
+            Self::Iou => iou_loss(image, target),
+        }
     }
 }
 

@@ -1,10 +1,10 @@
 use std::sync::{Arc, OnceLock};
 
-use burn::tensor::{Element, TensorData};
+use burn::tensor::TensorData;
 
 use crate::{
     ProfileSum,
-    fused::{ElementaryOp, Number, Numbers, dual_upstream, pass::Pass},
+    fused::{ElementaryOp, Number, Numbers, dual_upstream, flat, pass::Pass},
     kernel::{self, Float, PixelLoss},
 };
 
@@ -112,9 +112,4 @@ impl SilhouetteLoss {
         let rest = kernel::vjp(inputs, bands, &change, [true, false]);
         curved.iter().zip(rest).map(|(&a, b)| a + b).collect()
     }
-}
-
-fn flat<F: Element>(values: Vec<F>) -> TensorData {
-    let length = values.len();
-    TensorData::new(values, [length])
 }

@@ -7,9 +7,8 @@ use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
     backend::{elementary, pairs, primitive, silhouette_loss},
     fused::{ElementaryOp, FusedOp},
-    iou_loss,
     kernel::PixelLoss,
-    mse_loss, profile_sum,
+    profile_sum,
 };
 
 /// How silhouettes are drawn.
@@ -164,14 +163,14 @@ impl<S: Softness> Silhouette<S> {
         covered(self.profile.t_conorm(), self.sums(vertices, table))
     }
 
-    /// The [squared error](mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of
+    /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of
     /// [`Silhouette::coverage_by_table`], in one op on the CPU under the probabilistic sum. Gradients reach the vertices alone, to second
     /// order.
     ///
     /// # Panics
     ///
     /// If shapes or float types do not fit.
-    pub fn squared_error_by_table<B: RasterBackend, const D: usize>(
+    pub fn mse_loss_by_table<B: RasterBackend, const D: usize>(
         &self,
         vertices: Tensor<B, 3>,
         table: Tensor<B, D>,
@@ -180,12 +179,12 @@ impl<S: Softness> Silhouette<S> {
         self.loss(PixelLoss::SquaredError, vertices, table, target)
     }
 
-    /// The [`iou_loss`] of each view, likewise.
+    /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
     ///
     /// # Panics
     ///
     /// If shapes or float types do not fit.
-    pub fn iou_error_by_table<B: RasterBackend, const D: usize>(
+    pub fn iou_loss_by_table<B: RasterBackend, const D: usize>(
         &self,
         vertices: Tensor<B, 3>,
         table: Tensor<B, D>,
@@ -194,7 +193,7 @@ impl<S: Softness> Silhouette<S> {
         self.loss(PixelLoss::Iou, vertices, table, target)
     }
 
-    fn loss<B: RasterBackend, const D: usize>(
+    pub(crate) fn loss<B: RasterBackend, const D: usize>(
         &self,
         loss: PixelLoss,
         vertices: Tensor<B, 3>,
@@ -203,11 +202,7 @@ impl<S: Softness> Silhouette<S> {
     ) -> Tensor<B, 1> {
         let (table, target) = (table.detach(), target.detach());
         if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
-            let image = self.coverage_by_table(vertices, table);
-            return match loss {
-                PixelLoss::SquaredError => mse_loss(image, target),
-                PixelLoss::Iou => iou_loss(image, target),
-            };
+            return loss.of_images(self.coverage_by_table(vertices, table), target);
         }
         silhouette_loss(&self.op, loss, vertices, table, target)
     }

@@ -4,7 +4,7 @@ use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
 
 use crate::{
-    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, iou_loss, mse_loss,
+    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, kernel::PixelLoss,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -187,7 +187,7 @@ impl<S: Softness> SoftRenderer<S> {
         silhouette
     }
 
-    /// The [squared error](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of the
+    /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of the
     /// [`silhouette`](Self::silhouette). Gradients reach the vertices alone, to second order.
     ///
     /// On the CPU, under the probabilistic sum and without a surrogate, it is one op that computes the gradient along with the image, in about
@@ -196,16 +196,12 @@ impl<S: Softness> SoftRenderer<S> {
     /// # Panics
     ///
     /// If the target is of another size.
-    pub fn squared_error<B: RasterBackend>(
+    pub fn mse_loss<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        if self.surrogate.is_some() {
-            return mse_loss(self.silhouette(vertices), target);
-        }
-        let (silhouette, table) = self.own_table(&vertices);
-        silhouette.squared_error_by_table(vertices, table, target)
+        self.loss(PixelLoss::SquaredError, vertices, target)
     }
 
     /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
@@ -213,16 +209,25 @@ impl<S: Softness> SoftRenderer<S> {
     /// # Panics
     ///
     /// If the target is of another size.
-    pub fn iou_error<B: RasterBackend>(
+    pub fn iou_loss<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
+        self.loss(PixelLoss::Iou, vertices, target)
+    }
+
+    fn loss<B: RasterBackend>(
+        &self,
+        loss: PixelLoss,
+        vertices: Tensor<B, 3>,
+        target: Tensor<B, 3>,
+    ) -> Tensor<B, 1> {
         if self.surrogate.is_some() {
-            return iou_loss(self.silhouette(vertices), target);
+            return loss.of_images(self.silhouette(vertices), target.detach());
         }
         let (silhouette, table) = self.own_table(&vertices);
-        silhouette.iou_error_by_table(vertices, table, target)
+        silhouette.loss(loss, vertices, table, target)
     }
 
     fn drawn<B: RasterBackend>(

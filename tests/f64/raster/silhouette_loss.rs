@@ -21,11 +21,11 @@ type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>) -> Tensor<AA, 1>;
 /// In one op, and in two.
 const LOSSES: [[Loss; 2]; 2] = [
     [
-        |renderer, vertices, target| renderer.squared_error(vertices, target),
+        |renderer, vertices, target| renderer.mse_loss(vertices, target),
         |renderer, vertices, target| mse_loss(renderer.silhouette(vertices), target),
     ],
     [
-        |renderer, vertices, target| renderer.iou_error(vertices, target),
+        |renderer, vertices, target| renderer.iou_loss(vertices, target),
         |renderer, vertices, target| iou_loss(renderer.silhouette(vertices), target),
     ],
 ];

@@ -28,7 +28,7 @@ pub enum FusedOp {
     /// See [`crate::ColourRenderer`].
     #[doc(hidden)]
     SoftBlend(SoftBlend),
-    /// See [`crate::SoftRenderer::squared_error`].
+    /// See [`crate::SoftRenderer::mse_loss`].
     #[doc(hidden)]
     SilhouetteLoss(SilhouetteLoss),
     /// One that is written for any number.
@@ -208,7 +208,7 @@ where
     }
 }
 
-fn flat<F: Element>(values: Vec<F>) -> TensorData {
+pub(crate) fn flat<F: Element>(values: Vec<F>) -> TensorData {
     let length = values.len();
     TensorData::new(values, [length])
 }

@@ -32,6 +32,7 @@ pub(crate) const LANES: usize = 8;
 pub(crate) const GROUP: usize = LANES / 2;
 
 /// An array of what an expression says of each lane. Written out, since a compiler takes ten times as long over so many little loops.
+#[cfg(not(target_family = "wasm"))]
 macro_rules! lanes {
     ($i:ident => $value:expr) => {
         lanes!(@ $i => $value, 0 1 2 3 4 5 6 7)
@@ -42,6 +43,15 @@ macro_rules! lanes {
             $value
         }),*]
     };
+}
+/// The same, in the fewest bytes: a page has to be loaded.
+#[cfg(target_family = "wasm")]
+macro_rules! lanes {
+    ($i:ident => $value:expr) => {{
+        #[allow(non_snake_case)]
+        let lanes: [_; LANES] = std::array::from_fn(|$i| $value);
+        lanes
+    }};
 }
 pub(crate) use lanes;
 

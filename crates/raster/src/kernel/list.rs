@@ -74,6 +74,11 @@ impl<T: Real> List<T> {
         groups.map(|(places, (&at, owners))| Chunk { places, at, owner: owners[0] as usize })
     }
 
+    /// How many chunks it has.
+    pub(crate) fn len(&self) -> usize {
+        self.chunks
+    }
+
     /// Makes room for so many groups.
     #[cold]
     #[inline(never)]
@@ -159,6 +164,12 @@ impl<T: Real> List<T> {
         self.owners[last].fill(numbers.len().saturating_sub(1) as u8);
         self.chunks = listed / 2;
     }
+}
+
+/// A group of pixels.
+#[inline(always)]
+pub(crate) fn group<F>(numbers: &[F], at: u32) -> &[F; GROUP] {
+    numbers[at as usize..at as usize + GROUP].try_into().expect("a group of pixels")
 }
 
 /// Room for [`LANES`] numbers.

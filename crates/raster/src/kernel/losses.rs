@@ -10,50 +10,20 @@ use rayon::prelude::*;
 use super::{
     bands::{Bands, View},
     float::Float,
-    lanes::{GROUP, LANES, Lanes, Places, Plain, Work, has_vectors, run},
-    list::{AHEAD, Chunk, LISTED, List},
+    lanes::{LANES, Lanes, Places, Plain, Work, has_vectors, run},
+    list::{AHEAD, Chunk, LISTED, List, group},
     pair::closest,
+    pixel_loss::{PARTS, PixelLoss, overlap_and_union, squared_error},
     real::{Table, splat},
     scene::{Place, Scene},
     sum::Inputs,
     table::Place as Cell,
     walk::{BandGradient, RING, TOGETHER, walk_gradient, walk_image},
 };
-use crate::loss::EMPTY;
 
-/// What compares a silhouette with its target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PixelLoss {
-    /// See [`crate::mse_loss`].
-    SquaredError,
-    /// See [`crate::iou_loss`].
-    Iou,
-}
-
-/// Chunks of a band that are kept, of 172 bytes in f32, so that a thread keeps 5.6 MB at most; what lies beyond is walked once more.
+/// Chunks of a band that are kept, of 172 bytes in f32 and 332 in f64: a thread keeps 5.6 or 11 MB at most. Lists that do not fit are walked
+/// twice. A power of two, as vectors grow.
 const KEPT: usize = 1 << 15;
-
-/// Sums over pixels that a loss is made of, and derivatives by the sum of profiles at each pixel that its gradient is made of: two at most.
-const PARTS: usize = 2;
-
-impl PixelLoss {
-    /// The loss of a view, and the factors of the parts of its gradient, from its sums over so many pixels.
-    fn of_sums<F: Float>(self, [first, second]: [F; PARTS], pixels: usize) -> (F, [F; PARTS]) {
-        let number = F::from_f64;
-        match self {
-            Self::SquaredError => {
-                let share = F::ONE / number(pixels as f64);
-                (first * share, [number(2.0) * share, F::ZERO])
-            }
-            // d(1 - overlap / union) = -(1 / union) d overlap + (overlap / union²) d union.
-            Self::Iou => {
-                let inverse = F::ONE / (second + number(EMPTY));
-                let ratio = first * inverse;
-                (F::ONE - ratio, [-inverse, ratio * inverse])
-            }
-        }
-    }
-}
 
 /// Losses `[views]`, and the gradient of each to its vertices, `[views, 3, vertices]`, if it is wanted: else it is 0. `target` is
 /// `[1 or views, height, width]`.
@@ -109,7 +79,7 @@ fn of_views<L: Lanes>(
 /// What a band gives back: its sums over pixels, and parts of the gradient to the corners of its faces.
 struct Walked<F> {
     sums: [F; PARTS],
-    /// None where the band is all of its view: then the first part is all of the gradient.
+    /// Whether the band is all of its view: then there is one part, which has its factor already.
     whole: bool,
     parts: Vec<BandGradient<F>>,
 }
@@ -232,10 +202,10 @@ impl<L: Lanes> Band<'_, '_, L> {
         let mut list = List::new();
         let mut listed = 0;
         for numbers in place.view.faces(place.band).chunks(LISTED) {
-            if room.kept.len() >= KEPT {
+            list.fill(scene, place, numbers);
+            if room.kept.len() + list.len() + AHEAD > KEPT {
                 break;
             }
-            list.fill(scene, place, numbers);
             let first = (listed * LISTED) as u32;
             room.corners.extend((0..numbers.len()).map(|owner| list.face(owner).corners()));
             match (scene.lookup.has_far_cells(), list.slivers) {
@@ -371,12 +341,6 @@ impl<L: Lanes> Room<L> {
     }
 }
 
-/// A group of pixels.
-#[inline(always)]
-fn group<F>(numbers: &[F], at: u32) -> &[F; GROUP] {
-    numbers[at as usize..at as usize + GROUP].try_into().expect("a group of pixels")
-}
-
 /// Adds sums over the chunks of a face to its corners. The sums have neither the factor -2 nor the share of the first corner, which is
 /// what the others leave.
 #[inline(always)]
@@ -400,47 +364,4 @@ fn flush<L: Lanes>(
         own[2 * corner] += x.sum() * right;
         own[2 * corner + 1] += y.sum() * down;
     }
-}
-
-/// `Σ (c - t)²` for the coverages `c = 1 - exp(-sum)`, lane by lane; `part` becomes half its derivatives by the sums.
-#[inline(always)]
-fn squared_error<L: Lanes>(
-    sums: &[L::Float],
-    target: &[L::Float],
-    part: &mut [L::Float],
-) -> [L; 2] {
-    let one = splat::<L>(1.0);
-    let mut total = splat::<L>(0.0);
-    let pixels = sums.as_chunks().0.iter().zip(target.as_chunks().0);
-    for (part, (sums, target)) in part.as_chunks_mut().0.iter_mut().zip(pixels) {
-        let rest = L::of(sums).neg().exp();
-        let difference = one - rest - L::of(target);
-        total += difference * difference;
-        *part = (difference * rest).array();
-    }
-    [total, splat(0.0)]
-}
-
-/// `Σ c t` and `Σ (c + t - c t)` for the coverages `c = 1 - exp(-sum)`, lane by lane, and the derivatives of each by the sums.
-#[inline(always)]
-fn overlap_and_union<L: Lanes>(
-    sums: &[L::Float],
-    target: &[L::Float],
-    to_overlap: &mut [L::Float],
-    to_union: &mut [L::Float],
-) -> [L; 2] {
-    let one = splat::<L>(1.0);
-    let (mut overlap, mut union) = (splat::<L>(0.0), splat::<L>(0.0));
-    let pixels = sums.as_chunks().0.iter().zip(target.as_chunks().0);
-    let parts = to_overlap.as_chunks_mut().0.iter_mut().zip(to_union.as_chunks_mut().0);
-    for ((to_overlap, to_union), (sums, target)) in parts.zip(pixels) {
-        let (rest, target) = (L::of(sums).neg().exp(), L::of(target));
-        let coverage = one - rest;
-        let both = coverage * target;
-        overlap += both;
-        union += coverage + target - both;
-        *to_overlap = (target * rest).array();
-        *to_union = ((one - target) * rest).array();
-    }
-    [overlap, union]
 }

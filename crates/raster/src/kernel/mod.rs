@@ -15,6 +15,7 @@ mod list;
 mod losses;
 mod pair;
 mod pairs;
+mod pixel_loss;
 mod reach;
 mod real;
 mod scene;
@@ -24,8 +25,9 @@ mod walk;
 
 pub(crate) use bands::Bands;
 pub(crate) use float::Float;
-pub(crate) use losses::{PixelLoss, losses};
+pub(crate) use losses::losses;
 pub(crate) use pairs::pairs;
+pub(crate) use pixel_loss::PixelLoss;
 pub(crate) use reach::{FAR_AWAY, inside_spans};
 pub(crate) use real::Dual;
 pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};

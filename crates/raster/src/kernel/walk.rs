@@ -2,8 +2,8 @@
 
 use super::{
     float::Float as _,
-    lanes::{GROUP, Lanes, Places},
-    list::{AHEAD, Chunk, LISTED, List},
+    lanes::{Lanes, Places},
+    list::{AHEAD, Chunk, LISTED, List, group},
     pair::closest,
     real::{Float, Real, Table, splat},
     scene::{Place, Scene},
@@ -163,7 +163,7 @@ impl<T: Real> Walker<'_, '_, T> {
         [low, high]: [u32; 2],
         sums: &mut [T::Lanes; 6],
     ) {
-        let upstream = T::Lanes::of_groups(self.group(low), self.group(high));
+        let upstream = T::Lanes::of_groups(group(self.upstream, low), group(self.upstream, high));
         let t = ring.t[slot];
         let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
         let pull = slope.scale(ring.rate[slot] * upstream);
@@ -184,11 +184,6 @@ impl<T: Real> Walker<'_, '_, T> {
             T::Lanes::add_to_rows(&mut self.gradient.table, &ring.row[slot], columns);
             self.visited += one.output();
         }
-    }
-
-    #[inline(always)]
-    fn group(&self, at: u32) -> &[Float<T>; GROUP] {
-        self.upstream[at as usize..at as usize + GROUP].try_into().expect("a group of pixels")
     }
 
     /// Adds to the gradient of a face.
