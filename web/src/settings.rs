@@ -126,6 +126,7 @@ impl SoftnessChoice {
         let suits = softness.task.as_deref().is_none_or(|of| of == learned_on) && task != "mask";
         Ok(ScheduledSoftness {
             learning_rate: softness.learning_rate.filter(|_| suits),
+            rate_end: softness.rate_end.filter(|_| suits),
             ..softness
         })
     }

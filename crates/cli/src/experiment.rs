@@ -106,6 +106,9 @@ impl<T: Task> TaskExperiment<T> {
         let mut settings = self.description.settings.clone();
         let mut set = |name: &str, value: Value| drop(settings.insert(name.into(), value));
         set("learning_rate", self.solve.learning_rate.into());
+        if let Some(end) = softness.rate_end {
+            set("rate_end", end.into());
+        }
         if T::MOVES_EDGES {
             set("resolution", self.method.resolution.to_string().into());
             set("tolerance", self.method.tolerance().into());

@@ -89,6 +89,10 @@ pub struct MethodArgs {
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
     pub learning_rate: Option<f64>,
 
+    /// Share of the learning rate that is left at the last step, to which it falls geometrically
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true, help_heading = RARE)]
+    pub rate_end: Option<f64>,
+
     /// Feed the softness the squared distance; widths are in NDC² then
     #[arg(long, help_heading = RARE)]
     pub squared: bool,
@@ -243,11 +247,12 @@ impl MethodArgs {
     }
 
     /// This method beside a first one: its scales are its own or the task's, never those of the first, whose scale may mean another
-    /// width; its learning rate, resolution and tolerance are its own or those of the first.
+    /// width; its learning rate and its fall, resolution and tolerance are its own or those of the first.
     #[must_use]
     pub fn beside(self, first: &Self) -> Self {
         Self {
             learning_rate: self.learning_rate.or(first.learning_rate),
+            rate_end: self.rate_end.or(first.rate_end),
             resolution: self.resolution.or(first.resolution),
             tolerance: self.tolerance.or(first.tolerance),
             ..self

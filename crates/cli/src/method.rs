@@ -78,8 +78,14 @@ impl MethodArgs {
     /// A softness of a file, with the learning rate if that suits the task.
     fn of_file(&self, file: ScheduledSoftness, task: &str) -> anyhow::Result<ScheduledSoftness> {
         let suits = file.task.as_ref().is_none_or(|learned_on| learned_on == task);
-        let mut softness =
-            ScheduledSoftness { learning_rate: file.learning_rate.filter(|_| suits), ..file };
+        if file.feedback.is_some() && self.rate_end.is_some() {
+            return Err(Error::usage(
+                "a softness with feedback moves its learning rate itself: leave out --rate-end, or name another softness",
+            ));
+        }
+        let learning_rate = file.learning_rate.filter(|_| suits);
+        let rate_end = self.rate_end.or(file.rate_end.filter(|_| suits));
+        let mut softness = ScheduledSoftness { learning_rate, rate_end, ..file };
         if self.init == Some(Init::Fitted) {
             (softness.softness, softness.phi) = network_like(softness.softness, &softness.phi)?;
             if let Some(Surrogate { softness, phi }) = &mut softness.surrogate {
@@ -122,6 +128,7 @@ impl MethodArgs {
             softness.phi = edge.with_scale_values(&weights, factor);
         }
         softness.learning_rate = searched.and_then(|searched| searched.learning_rate);
+        softness.rate_end = self.rate_end.or(searched.and_then(|searched| searched.rate_end));
         let surrogate = searched.and_then(|searched| searched.surrogate_scale);
         let Some(scale) = self.surrogate_scale.or(surrogate) else {
             return Ok((family.name().to_owned(), softness));
@@ -300,6 +307,19 @@ mod tests {
         let learned = MethodArgs::parse("learned-pose").unwrap();
         let rate = |task| learned.method(task, &SCALES, true).unwrap().softness.learning_rate;
         assert!(rate("pose").is_some() && rate("shape3d").is_none());
+    }
+
+    #[test]
+    fn a_rate_falls_unless_feedback_moves_it() {
+        let end = |line: &str, task| {
+            let softness = MethodArgs::parse(line).unwrap().method(task, &SCALES, true)?.softness;
+            anyhow::Ok(softness.rate_end)
+        };
+        assert_eq!(end("gauss", "none").unwrap(), None);
+        assert_eq!(end("gauss --rate-end 0.2", "none").unwrap(), Some(0.2));
+        assert_eq!(end("learned --rate-end 0.2", "pose").unwrap(), Some(0.2));
+        let feedback = end("preset --rate-end 0.2", "pose").unwrap_err();
+        assert!(feedback.to_string().contains("leave out --rate-end"), "{feedback}");
     }
 
     #[test]

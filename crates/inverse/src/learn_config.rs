@@ -140,6 +140,10 @@ impl LearnConfig {
             "a softness with feedback goes by the hard image, which has no gradient: it needs --estimator es and --outer-loss returned"
         );
         ensure!(
+            softness.rate_end.is_none() || outer_loss == OuterLoss::Returned,
+            "a rate that falls is followed where runs are judged by what they return: leave out --rate-end, or add --outer-loss returned"
+        );
+        ensure!(
             !self.learn_rate || differences,
             "--learn-rate needs --estimator es: the others differentiate by the softness alone"
         );

@@ -52,6 +52,8 @@ pub struct Minimization<P: InverseProblem, B: RasterBackend, R: Borrow<P> = P> {
     config: SolveConfig,
     pictures: bool,
     follower: Option<Follower>,
+    /// What the learning rate is multiplied by at the end, without feedback.
+    rate_end: f64,
     optimizer: Adam,
     theta: Tensor<B, 1>,
     state: AdamState<B, 1>,
@@ -88,6 +90,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
     ) -> anyhow::Result<Self> {
         ensure!(!instances.is_empty(), "there is no instance to solve");
         let feedback = method.softness.feedback;
+        let rate_end = method.softness.rate_end.unwrap_or(1.0);
         ensure!(
             instances.len() == 1 || feedback.is_none(),
             "a softness with feedback solves one instance at a time, found {} side by side: name another softness",
@@ -99,7 +102,8 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
         let theta = problem.start(&run.scene).inner();
         Ok(Self {
             state: optimizer.init(&theta),
-            place: by_time(0, config.steps),
+            place: by_time(rate_end, 0, config.steps),
+            rate_end,
             follower: feedback.map(|feedback| feedback.follow(config.steps)),
             config: *config,
             starts: 1,
@@ -142,7 +146,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
     fn placed(&mut self, step: usize, hard_loss: Option<f64>) {
         self.place = match &mut self.follower {
             Some(run) => run.next(hard_loss),
-            None => by_time(step, self.config.steps),
+            None => by_time(self.rate_end, step, self.config.steps),
         };
         if self.place.again {
             let problem = self.run.problem.borrow();
@@ -199,6 +203,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Iterator for Minimizatio
 }
 
 /// Where a step is taken without feedback.
-fn by_time(step: usize, steps: usize) -> Place {
-    Place { part: ScaleSchedule::part(step, steps), rate: 1.0, again: false }
+fn by_time(rate_end: f64, step: usize, steps: usize) -> Place {
+    let part = ScaleSchedule::part(step, steps);
+    Place { part, rate: rate_end.powf(part), again: false }
 }

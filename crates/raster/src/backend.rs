@@ -41,12 +41,14 @@ pub trait RasterBackend: Backend {
         None
     }
 
-    /// Runs a pass of an op. Where tensors do not lie on the host, of [`FusedOp::ProfileSum`] only.
+    /// Runs a pass of an op. Where tensors do not lie on the host, of [`FusedOp::ProfileSum`] only. WebAssembly has f32 alone, so that a page
+    /// is smaller to load.
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
         match tensors[0].dtype() {
             DType::F32 => on_host::<Self, f32>(op, pass, tensors),
+            #[cfg(not(target_family = "wasm"))]
             DType::F64 => on_host::<Self, f64>(op, pass, tensors),
-            other => panic!("fused ops work in f32 and f64, found {other:?}"),
+            other => panic!("fused ops work in f32, and outside browsers in f64; found {other:?}"),
         }
     }
 }
@@ -123,8 +125,9 @@ pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usiz
     let data = vertices.swap_dims(1, 2).into_data();
     match data.dtype {
         DType::F32 => f32::pairs(&op.inputs::<f32>(views, slice(&data), &[])),
+        #[cfg(not(target_family = "wasm"))]
         DType::F64 => f64::pairs(&op.inputs::<f64>(views, slice(&data), &[])),
-        other => panic!("profile_sum works in f32 and f64, found {other:?}"),
+        other => panic!("fused ops work in f32, and outside browsers in f64; found {other:?}"),
     }
 }
 

@@ -5,7 +5,7 @@ use burn::tensor::TensorData;
 use crate::{
     ProfileSum,
     fused::{ElementaryOp, Number, Numbers, dual_upstream, flat, pass::Pass},
-    kernel::{self, Float, PixelLoss},
+    kernel::{self, Float, Inputs, PixelLoss, rows_of_losses},
 };
 
 /// The loss of silhouettes against a target, in one op: its gradient to the vertices is computed along with it.
@@ -34,7 +34,8 @@ impl SilhouetteLoss {
     ) -> TensorData {
         let [vertices, table, target] = [slices[0], slices[1], slices[2]];
         let views = dims[0][0];
-        let inputs = self.sum.inputs(views, vertices, table);
+        let rows = rows_of_losses(views, self.sum.size);
+        let inputs = Inputs { rows, ..self.sum.inputs(views, vertices, table) };
         let own = OnceLock::new();
         let bands = self.sum.kept.as_deref().unwrap_or(&own).get_or_init(|| inputs.bands());
         let losses = |gradient| kernel::losses(&inputs, bands, target, self.loss, gradient);
@@ -90,7 +91,7 @@ impl SilhouetteLoss {
     /// The derivative of the gradient `Σ upstream · loss` along a direction of the vertices.
     fn along<F: Float + Numbers + Number<Float = F>>(
         &self,
-        inputs: &kernel::Inputs<F>,
+        inputs: &Inputs<F>,
         bands: &kernel::Bands,
         [target, upstream, direction]: [&[F]; 3],
         dims: &[Vec<usize>],

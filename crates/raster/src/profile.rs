@@ -5,7 +5,7 @@ use crate::{TConorm, kernel::Grid};
 
 /// Octaves of the squared distance that a table may resolve, and cells in an octave (as a power of
 /// two) that it may use, coarsest first.
-const OCTAVES: [u32; 6] = [16, 24, 36, 56, 80, 120];
+const OCTAVES: [u32; 7] = [12, 16, 24, 36, 56, 80, 120];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
 /// Octaves of the distance to the end of the support that a table may resolve, coarsest first, where
 /// cells that are spaced from the edge of the face are not enough.
@@ -192,35 +192,52 @@ impl Profile {
         let middles = knots[1..].windows(2).map(middle);
         let places = knots.iter().copied().chain(middles).chain([BEYOND * BEYOND]);
         let places: Vec<f64> = places.collect();
-        // Both sides in one tensor: an op costs more than its few hundred numbers.
-        let sides = [-self.grid.outer, self.grid.inner];
         // A distance of 0 has no side; this one has, and is next to nothing also in a wide support.
         let nudged = |r: f64, y: f64| {
             if y == 0.0 { r.clamp(-1.0, 1.0) * 1e-15 } else { r * y.sqrt() }
         };
-        let distances = sides.iter().flat_map(|&r| places.iter().map(move |&y| nudged(r, y)));
         // dy/dd at the knots, to turn slopes by distance into slopes by cell. Where the distance is
         // 0 the slope by its square may be infinite; the innermost cell is linear and needs none.
         let rate = |r: f64, y: f64| if y == 0.0 { 0.0 } else { r / (2.0 * y.sqrt()) };
-        let rates = sides.iter().flat_map(|&r| places.iter().map(move |&y| rate(r, y)));
-        let (distances, rates) = (constant(distances.collect()), constant(rates.collect()));
-        let (value, slope) = self.t_conorm.profile(softness, phi, distances);
-        let slope = slope * rates;
+        let sides = [-self.grid.outer, self.grid.inner];
+        let of_sides = |sides: &[f64]| {
+            let at = |of: &dyn Fn(f64, f64) -> f64| {
+                constant(
+                    sides.iter().flat_map(|&r| places.iter().map(move |&y| of(r, y))).collect(),
+                )
+            };
+            let (value, slope) = self.t_conorm.profile(softness, phi.clone(), at(&nudged));
+            (value, slope * at(&rate))
+        };
+        // An op that is recorded costs more than its few hundred numbers, so both sides are one tensor there. Else each has a thread.
+        let sides = if B::ad_enabled(&device) {
+            let (value, slope) = of_sides(&sides);
+            let side = |k: usize| {
+                let of = |tensor: &Tensor<B, 1>| {
+                    tensor.clone().narrow(0, k * places.len(), places.len())
+                };
+                (of(&value), of(&slope))
+            };
+            [side(0), side(1)]
+        } else {
+            let (outer, inner) = rayon::join(|| of_sides(&sides[..1]), || of_sides(&sides[1..]));
+            [outer, inner]
+        };
 
         let widths = constant(knots[1..].windows(2).map(|pair| pair[1] - pair[0]).collect());
         let mut rows = Vec::with_capacity(6);
-        for start in [0, places.len()] {
-            let at = |k: usize| value.clone().narrow(0, start + k, 1).reshape([1, 1]);
+        for (value, slope) in sides {
+            let at = |k: usize| value.clone().narrow(0, k, 1).reshape([1, 1]);
             let (first, tail) = (at(0), at(places.len() - 1));
             let zero = first.clone() * 0.0;
             let rise = at(1) - first.clone();
             rows.push(Tensor::cat(vec![first, rise, zero.clone(), zero.clone()], 1));
-            let inner = |k: usize| slope.clone().narrow(0, start + k, cells - 1) * widths.clone();
+            let inner = |k: usize| slope.clone().narrow(0, k, cells - 1) * widths.clone();
             let [left, right, middle] = [1, 2, cells + 1].map(inner);
             let (half, whole) = (middle - left.clone(), right - left.clone());
             let square = half.clone() * 2.0 - whole.clone() * 0.5;
             let cube = (whole - half * 2.0) * (2.0 / 3.0);
-            let values = value.clone().narrow(0, start + 1, cells - 1);
+            let values = value.clone().narrow(0, 1, cells - 1);
             rows.push(Tensor::stack(vec![values, left, square, cube], 1));
             rows.push(Tensor::cat(vec![tail, zero.clone(), zero.clone(), zero], 1));
         }

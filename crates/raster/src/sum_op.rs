@@ -5,7 +5,7 @@ use burn::tensor::{Element, TensorData};
 use crate::{
     ImageSize,
     fused::pass::Pass,
-    kernel::{self, Bands, Float, Grid, Inputs},
+    kernel::{self, Bands, Float, Grid, Inputs, rows_of_bands},
 };
 
 /// What stays the same over the calls of the op: faces, image size and the places of the knots.
@@ -42,6 +42,7 @@ impl ProfileSum {
             size: self.size,
             near: self.near,
             views,
+            rows: rows_of_bands(views),
         }
     }
 

@@ -53,6 +53,9 @@ pub struct ScheduledSoftness {
     /// The learning rate of the optimisations that it was learned on, which suits it best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate: Option<f64>,
+    /// What the learning rate is multiplied by at the end of a run, in (0, 1]; it falls geometrically. Feedback has a fall of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_end: Option<f64>,
     /// The task that it was learned on; without one, the rate is for any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
@@ -117,8 +120,9 @@ impl ScheduledSoftness {
 
     fn new(softness: EdgeSoftness, scale: f64, schedule: Option<ScaleSchedule>) -> Self {
         let phi = softness.default_phi(scale);
-        let (feedback, surrogate, learning_rate, task, note) = (None, None, None, None, None);
-        Self { softness, phi, schedule, feedback, surrogate, learning_rate, task, note }
+        let (feedback, surrogate, task, note) = (None, None, None, None);
+        let (learning_rate, rate_end) = (None, None);
+        Self { softness, phi, schedule, feedback, surrogate, learning_rate, rate_end, task, note }
     }
 
     /// With the same softness at `scale`, in NDC (NDC² if squared), as its surrogate.
@@ -223,7 +227,13 @@ impl Stored for ScheduledSoftness {
         if let Some(rate) = self.learning_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
             return Err(format!(": the learning rate is {rate}, expected a positive number"));
         }
+        if let Some(end) = self.rate_end.filter(|end| !(*end > 0.0 && *end <= 1.0)) {
+            return Err(format!(": the rate ends at {end} of itself, expected a share of 1"));
+        }
         match &self.feedback {
+            Some(_) if self.rate_end.is_some() => {
+                return Err(" has a rate_end beside feedback, which has one of its own".into());
+            }
             Some(_) if self.is_constant() => {
                 return Err(" has feedback, which moves along a path, but no path".into());
             }
@@ -254,6 +264,7 @@ mod tests {
             feedback: Some(Feedback::START),
             surrogate: Some(Surrogate { softness, phi: softness.default_phi(1e-2) }),
             learning_rate: Some(0.3),
+            rate_end: None,
             task: Some("pose".into()),
             note: Some("a start".into()),
         }
@@ -354,6 +365,10 @@ mod tests {
                 r#"{{"softness": {{"family": "gauss", "squared": false}}, "phi": [0], "learning_rate": {rate}}}"#
             ));
             assert!(message.contains(&format!("the learning rate is {rate}")), "{message}");
+            let message = error(&format!(
+                r#"{{"softness": {{"family": "gauss", "squared": false}}, "phi": [0], "rate_end": {rate}}}"#
+            ));
+            assert!(message.contains(&format!("the rate ends at {rate}")), "{message}");
         }
     }
 

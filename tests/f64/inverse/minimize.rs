@@ -72,6 +72,25 @@ fn a_step_ends_where_it_is_allowed_to() {
 }
 
 #[test]
+fn a_rate_falls_geometrically_to_its_end() {
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let constant = ScheduledSoftness::constant(softness, 0.1);
+    let method = Method::new("none", ScheduledSoftness { rate_end: Some(0.01), ..constant });
+    let problem = Square { floor: -1e9, seen: true };
+    let mut places = Vec::new();
+    // So far away that all gradients are alike and Adam takes steps as long as its rate.
+    minimize::<_, B>(&problem, &[1e6], &method, &problem.defaults(), false, |now, _| {
+        places.push(numbers(now.theta.clone())[0]);
+        Ok(())
+    })
+    .unwrap();
+    let steps: Vec<f64> = places.windows(2).map(|pair| pair[0] - pair[1]).collect();
+    for (step, expected) in steps.iter().zip([0.25, 0.025, 0.0025]) {
+        assert!((step / expected - 1.0).abs() < 1e-4, "{steps:?}");
+    }
+}
+
+#[test]
 fn parameters_without_a_gradient_stay_and_an_error_ends_the_descent() {
     let mut seen = 0;
     let visit = |now: &Iterate| {

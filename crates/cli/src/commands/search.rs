@@ -29,9 +29,12 @@ const SCALE: usize = 0;
 const END: usize = 1;
 const RATE: usize = 2;
 const SURROGATE: usize = 3;
-const OWN: usize = 4;
+const RATE_END: usize = 4;
+const OWN: usize = 5;
 /// How wide a surrogate may be, as a share of the scale.
 const SURROGATES: [f64; 2] = [0.7, 6.0];
+/// What a learning rate may fall to, as a share of itself.
+const RATE_ENDS: [f64; 2] = [0.05, 0.5];
 
 /// Searches for the best setting, then evaluates it on seeds that the search never saw.
 pub(crate) fn search<T: Task>(
@@ -52,6 +55,7 @@ pub(crate) fn search<T: Task>(
             method.surrogate_scale = setting[SURROGATE].or(method.surrogate_scale);
         }
         method.learning_rate = setting[RATE].or(method.learning_rate);
+        method.rate_end = setting[RATE_END].or(method.rate_end);
         if let (Some(set), Some(Some(value))) = (set_own, setting.get(OWN)) {
             set(&mut args, *value);
         }
@@ -165,11 +169,18 @@ fn space<T: Task>(
         around.iter().flat_map(|scale| SURROGATES.map(|ratio| scale * ratio)).collect();
     let wider = if has_surrogate && method.surrogate_scale.is_none() { &wider } else { none };
     let surrogate = SearchAxis { optional: true, ..SearchAxis::among("surrogate-scale", wider) };
+    // A rate that is given stays unless its end is given too, and feedback moves it itself.
+    let stays = method.learning_rate.is_some() || base.method.softness.feedback.is_some();
+    let falls = if stays { none } else { &RATE_ENDS };
     let mut axes = vec![
         axis("scale", method.scale, &around),
         end,
         axis("learning-rate", method.learning_rate, &rates),
         surrogate,
+        SearchAxis {
+            optional: method.rate_end.is_none(),
+            ..axis("rate-end", method.rate_end, falls)
+        },
     ];
     axes.extend(base.task.own_axis(args).map(|own| SearchAxis::among(own.flag, &own.values)));
     let space = SearchSpace { axes, valid: is_valid };

@@ -11,7 +11,7 @@ use super::{
     bands::{Bands, View},
     float::Float,
     lanes::{LANES, Lanes, Places, Plain, Work, has_vectors, run},
-    list::{AHEAD, Chunk, LISTED, List, group},
+    list::{AHEAD, Chunk, LISTED, List, group, rows_of_bands},
     pair::closest,
     pixel_loss::{PARTS, PixelLoss, overlap_and_union, squared_error},
     real::{Table, splat},
@@ -20,10 +20,22 @@ use super::{
     table::Place as Cell,
     walk::{BandGradient, RING, TOGETHER, walk_gradient, walk_image},
 };
+use crate::ImageSize;
 
-/// Chunks of a band that are kept, of 172 bytes in f32 and 332 in f64: a thread keeps 5.6 or 11 MB at most. Lists that do not fit are walked
+/// Chunks of a band that are kept, of 140 bytes in f32 and 268 in f64: a thread keeps 4.6 or 8.8 MB at most. Lists that do not fit are walked
 /// twice. A power of two, as vectors grow.
 const KEPT: usize = 1 << 15;
+
+/// Pixels of a band from which on it has no more rows than [`LEAST_ROWS`], so that what is kept stays near the processor.
+const PIXELS: usize = 1 << 12;
+/// Fewest rows of a band in images that have more.
+const LEAST_ROWS: usize = 16;
+
+/// Rows of a band.
+pub(crate) fn rows_of_losses(views: usize, size: ImageSize) -> usize {
+    let most = rows_of_bands(views);
+    PIXELS.div_ceil(size.width.max(1)).next_power_of_two().clamp(LEAST_ROWS, most)
+}
 
 /// Losses `[views]`, and the gradient of each to its vertices, `[views, 3, vertices]`, if it is wanted: else it is 0. `target` is
 /// `[1 or views, height, width]`.
@@ -113,11 +125,10 @@ fn gather<L: Lanes>(
     value
 }
 
-/// What is kept of eight pixels and a face: how fast the profile changes with the squared distance, where the closest point lies from
-/// there, and its weights on the second and the third corner.
+/// What is kept of eight pixels and a face: where the closest point lies from there, times the rate at which the profile changes with the
+/// squared distance, and its weights on the second and the third corner.
 #[derive(Clone, Copy)]
 struct Kept<L> {
-    slope: L,
     dx: L,
     dy: L,
     weights: [L; 2],
@@ -180,8 +191,8 @@ impl<L: Lanes> Work for Band<'_, '_, L> {
         let sums = self.compare();
         let parts = match (self.loss, self.whole) {
             _ if !self.with_gradient => Vec::new(),
-            (PixelLoss::Iou, false) => vec![self.pull(0, listed), self.pull(1, listed)],
-            _ => vec![self.pull(0, listed)],
+            (PixelLoss::Iou, false) => self.pull::<PARTS>(listed),
+            _ => self.pull::<1>(listed),
         };
         Walked { sums, whole: self.whole, parts }
     }
@@ -265,36 +276,46 @@ impl<L: Lanes> Band<'_, '_, L> {
         sums
     }
 
-    /// The gradient of the sum of a part times the sums of profiles, to the corners of the faces.
+    /// The gradients of the sums of so many parts times the sums of profiles, to the corners of the faces.
     #[inline(always)]
-    fn pull(&mut self, part: usize, listed: usize) -> BandGradient<L::Float> {
+    fn pull<const COUNT: usize>(&mut self, listed: usize) -> Vec<BandGradient<L::Float>> {
         let Self { scene, place, room, .. } = self;
-        let upstream = &room.parts[part];
         let faces = place.view.faces(place.band).len();
-        let mut gradient =
-            BandGradient { corners: vec![[L::Float::ZERO; 6]; faces], table: Vec::new() };
-        let (mut sums, mut face) = ([splat::<L>(0.0); 6], u32::MAX);
+        let nothing =
+            || BandGradient { corners: vec![[L::Float::ZERO; 6]; faces], table: Vec::new() };
+        let mut gradients: Vec<_> = (0..COUNT).map(|_| nothing()).collect();
+        let (mut sums, mut face) = ([[splat::<L>(0.0); 6]; COUNT], u32::MAX);
         for (k, (kept, &(at, owner))) in room.kept.iter().zip(&room.at).enumerate() {
             if owner != face || k % TOGETHER == 0 {
-                flush(&room.corners, face, &sums, scene.half, &mut gradient);
-                (sums, face) = ([splat(0.0); 6], owner);
+                for part in 0..COUNT {
+                    flush(&room.corners, face, &sums[part], scene.half, &mut gradients[part]);
+                }
+                (sums, face) = ([[splat(0.0); 6]; COUNT], owner);
             }
-            let pull = kept.slope * L::of_groups(group(upstream, at[0]), group(upstream, at[1]));
-            let (x, y) = (pull * kept.dx, pull * kept.dy);
             let [second, third] = kept.weights;
-            sums[0] += x;
-            sums[1] += y;
-            sums[2] += x * second;
-            sums[3] += y * second;
-            sums[4] += x * third;
-            sums[5] += y * third;
+            for part in 0..COUNT {
+                let upstream = &room.parts[part];
+                let pull = L::of_groups(group(upstream, at[0]), group(upstream, at[1]));
+                let (x, y) = (pull * kept.dx, pull * kept.dy);
+                let sums = &mut sums[part];
+                sums[0] += x;
+                sums[1] += y;
+                sums[2] += x * second;
+                sums[3] += y * second;
+                sums[4] += x * third;
+                sums[5] += y * third;
+            }
         }
-        flush(&room.corners, face, &sums, scene.half, &mut gradient);
+        for part in 0..COUNT {
+            flush(&room.corners, face, &sums[part], scene.half, &mut gradients[part]);
+        }
         let place = Place { first_list: listed, ..*place };
         if listed * LISTED < faces {
-            walk_gradient(scene, place, upstream, &mut [], &mut gradient);
+            for (gradient, upstream) in gradients.iter_mut().zip(&room.parts) {
+                walk_gradient(scene, place, upstream, &mut [], gradient);
+            }
         }
-        gradient
+        gradients
     }
 }
 
@@ -311,16 +332,17 @@ impl<L: Lanes> Room<L> {
     ) {
         let zero = splat::<L>(0.0);
         let (mut rows, mut places) = ([Places::FIRST; RING], [zero; RING]);
+        let mut rates = [zero; RING];
         let start = self.kept.len();
         for (ahead, Chunk { places: from_origin, at, owner }) in list.chunks(AHEAD).enumerate() {
             let slot = ahead % RING;
             let (px, py) = L::pixels(from_origin);
             let point = closest::<L, SLIVERS>(list.face(owner), px, py);
             let Cell { row, t, rate } = scene.lookup.place::<L, FAR>(point.distance2, point.inside);
-            (rows[slot], places[slot]) = (row, t);
+            (rows[slot], places[slot], rates[slot]) = (row, t, rate);
             let [_, second, third] = point.weights;
             let weights = [second, third];
-            self.kept.push(Kept { slope: rate, dx: point.dx, dy: point.dy, weights });
+            self.kept.push(Kept { dx: point.dx, dy: point.dy, weights });
             self.at.push((at, first + owner as u32));
             if ahead < AHEAD {
                 continue;
@@ -331,9 +353,9 @@ impl<L: Lanes> Room<L> {
             let before = start + ahead - AHEAD;
             (a + t * (b + t * (c + t * d)) - tail)
                 .add_to_groups(&mut self.image, self.at[before].0);
-            let slope = b + t * (c * splat(2.0) + t * (d * splat(3.0)));
+            let slope = rates[slot] * (b + t * (c * splat(2.0) + t * (d * splat(3.0))));
             let kept = &mut self.kept[before];
-            kept.slope = slope * kept.slope;
+            (kept.dx, kept.dy) = (slope * kept.dx, slope * kept.dy);
         }
         let end = self.kept.len() - AHEAD;
         self.kept.truncate(end);

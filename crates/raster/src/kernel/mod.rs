@@ -25,7 +25,8 @@ mod walk;
 
 pub(crate) use bands::Bands;
 pub(crate) use float::Float;
-pub(crate) use losses::losses;
+pub(crate) use list::rows_of_bands;
+pub(crate) use losses::{losses, rows_of_losses};
 pub(crate) use pairs::pairs;
 pub(crate) use pixel_loss::PixelLoss;
 pub(crate) use reach::{FAR_AWAY, inside_spans};

@@ -56,7 +56,8 @@ mod tests {
     fn pairs_within(radius: f64, vertices: &[f64], views: usize) -> usize {
         let grid = Grid { outer: radius, inner: 1.0, octaves: 4, far: 0, bits: 2 };
         let faces = &[[0, 1, 2]];
-        pairs(&Inputs { vertices, table: &[], faces, grid, size: SIZE.into(), near: 0.1, views })
+        let size = SIZE.into();
+        pairs(&Inputs { vertices, table: &[], faces, grid, size, near: 0.1, views, rows: 16 })
     }
 
     #[test]

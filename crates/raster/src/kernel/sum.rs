@@ -6,7 +6,6 @@ use super::{
     bands::{Bands, View},
     float::Float,
     lanes::{Plain, has_vectors},
-    list::rows_of_bands,
     real::{self, Dual, Real, Table},
     scene::Scene,
     table::Grid,
@@ -29,13 +28,15 @@ pub(crate) struct Inputs<'a, F> {
     pub(crate) size: ImageSize,
     pub(crate) near: f64,
     pub(crate) views: usize,
+    /// Rows of a band.
+    pub(crate) rows: usize,
 }
 
 impl<F: Float> Inputs<'_, F> {
     pub(crate) fn bands(&self) -> Bands {
         let per_view = self.vertices.len() / 3 / self.views.max(1);
-        let rows = rows_of_bands(self.views);
-        Bands::new(self.vertices, per_view, self.faces, self.size, rows, self.near, self.grid.outer)
+        let Self { vertices, faces, size, rows, near, .. } = *self;
+        Bands::new(vertices, per_view, faces, size, rows, near, self.grid.outer)
     }
 
     /// What a walk over these inputs reads; `tangents` are those of vertices and table, or nothing.
@@ -46,8 +47,8 @@ impl<F: Float> Inputs<'_, F> {
     {
         let tables =
             Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
-        let rows = rows_of_bands(self.views);
-        Scene::new([self.vertices, tangents[0]], self.faces, tables, self.grid, self.size, rows)
+        let Self { vertices, faces, grid, size, rows, .. } = *self;
+        Scene::new([vertices, tangents[0]], faces, tables, grid, size, rows)
     }
 }
 

@@ -150,6 +150,7 @@ fn parameters(tested: &Tested) -> Levels {
             feedback: None,
             surrogate: None,
             learning_rate: None,
+            rate_end: None,
             task: None,
             note: None,
         }

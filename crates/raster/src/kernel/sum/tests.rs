@@ -27,8 +27,16 @@ fn passes<F: Float>(size: [usize; 2], views: usize, tables: usize, far: u32) -> 
         _ => [corner(f), corner(7 * f + 3), corner(11 * f + 8)],
     };
     let faces: Vec<_> = (0..FACES).map(face).collect();
-    let inputs =
-        Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, views };
+    let inputs = Inputs {
+        vertices: &vertices,
+        table: &table,
+        faces: &faces,
+        grid,
+        size,
+        near: 0.01,
+        views,
+        rows: 32,
+    };
     let upstream = numbers(views * size.pixels(), 0.3);
     let direction = numbers(vertices.len() + table.len(), 2.3);
     let bands = &inputs.bands();
