@@ -128,7 +128,7 @@ impl MethodArgs {
             softness.phi = edge.with_scale_values(&weights, factor);
         }
         softness.learning_rate = searched.and_then(|searched| searched.learning_rate);
-        softness.rate_end = self.rate_end.or(searched.and_then(|searched| searched.rate_end));
+        softness.rate_end = self.rate_end;
         let surrogate = searched.and_then(|searched| searched.surrogate_scale);
         let Some(scale) = self.surrogate_scale.or(surrogate) else {
             return Ok((family.name().to_owned(), softness));

@@ -21,9 +21,6 @@ pub struct Searched {
     pub surrogate_scale: Option<f64>,
     /// Learning rate in the original variant; none leaves the task's own.
     pub learning_rate: Option<f64>,
-    /// What the learning rate is multiplied by at the last step, where it falls.
-    #[serde(default)]
-    pub rate_end: Option<f64>,
     /// Width of the soft depth, where the task has one.
     pub depth_scale: Option<f64>,
     /// Mean over the training seeds of the error that the search went by.
@@ -88,18 +85,11 @@ mod tests {
             assert!(decay.iter().all(|f| f.scale_end.is_some_and(|end| end < f.scale)), "{task}");
             for found in fixed.iter().chain(decay) {
                 let Searched {
-                    scale,
-                    scale_end,
-                    surrogate_scale,
-                    learning_rate,
-                    rate_end,
-                    depth_scale,
-                    ..
+                    scale, scale_end, surrogate_scale, learning_rate, depth_scale, ..
                 } = found;
-                let rates = [*learning_rate, *rate_end];
-                let numbers = [Some(*scale), *scale_end, *surrogate_scale, *depth_scale];
-                let numbers = numbers.into_iter().chain(rates);
-                assert!(numbers.flatten().all(|x| x > 0.0), "{task} {family}");
+                let numbers =
+                    [Some(*scale), *scale_end, *surrogate_scale, *learning_rate, *depth_scale];
+                assert!(numbers.into_iter().flatten().all(|x| x > 0.0), "{task} {family}");
                 let schedule = found.schedule();
                 for usual in [Schedule::Static, Schedule::Decay] {
                     let asked = Searched::of(task, family, Some(schedule), usual);

@@ -140,6 +140,10 @@ impl LearnConfig {
             "a softness with feedback goes by the hard image, which has no gradient: it needs --estimator es and --outer-loss returned"
         );
         ensure!(
+            softness.rate_end.is_none() || !has_feedback,
+            "feedback moves the learning rate itself: leave out --rate-end"
+        );
+        ensure!(
             softness.rate_end.is_none() || outer_loss == OuterLoss::Returned,
             "a rate that falls is followed where runs are judged by what they return: leave out --rate-end, or add --outer-loss returned"
         );
@@ -211,6 +215,23 @@ mod tests {
         for config in [hard, rate] {
             assert!(resolved(&config, Family::Gauss).is_ok());
             assert!(resolved(&config, Family::Mlp).is_err());
+        }
+    }
+
+    #[test]
+    fn a_rate_that_falls_is_learned_from_by_what_runs_return_and_not_with_feedback() {
+        let decay = EdgeSoftness { family: Family::Gauss, squared: false };
+        let softness = ScheduledSoftness {
+            rate_end: Some(0.2),
+            ..ScheduledSoftness::decay(decay, 0.1, 0.01)
+        };
+        let plain = LearnConfig::default();
+        let returned = LearnConfig { outer_loss: Some(OuterLoss::Returned), ..plain.clone() };
+        let feedback = LearnConfig { feedback: true, ..plain.clone() };
+        assert!(returned.resolved(&softness, 0).is_ok());
+        for wrong in [plain, feedback] {
+            let refused = wrong.resolved(&softness, 0).unwrap_err().to_string();
+            assert!(refused.contains("leave out --rate-end"), "{refused}");
         }
     }
 
