@@ -9,7 +9,6 @@ use crate::{
     fused::FusedOp,
     kernel::blend::OF_TEXEL,
     log_curve::{DepthCurve, LogCurve, Precision},
-    reference::{self, Scene},
     soft_blend::SoftBlend,
     soft_renderer::stretch,
     weighting::floor,
@@ -24,7 +23,7 @@ const BEHIND: f64 = 1e-3;
 ///
 /// At each pixel it takes the mean of what all faces show, and of a background behind them. A face weighs as much as it covers the pixel
 /// (its edge softness), times what its depth counts (its depth softness): `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` with `wⱼ = s(dⱼ) b(zⱼ)`. So
-/// an image changes smoothly as faces move, also where one comes in front of another. [`reference::blended`] has the definition in full.
+/// an image changes smoothly as faces move, also where one comes in front of another. [`reference::blended`](crate::reference::blended) has the definition in full.
 ///
 /// No pixel is off by more than the tolerance times the range of what is shown, in exact arithmetic: tables of both softnesses are made to
 /// measure, and what is left out of a pixel is bounded by the background's weight. In floats of 32 bits, logarithms of weights have an error
@@ -194,36 +193,12 @@ impl ColourRenderer {
     /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. They, the
     /// attributes and the background receive gradients, to second order on `Autodiff<Autodiff<B>>`.
     ///
-    /// On a GPU each image reads one number, the background's weight, and a texture is seen through [`reference::blended`]: every pair of
-    /// pixel and face in tensor ops.
+    /// On a GPU each image reads one number, the background's weight.
     ///
     /// # Panics
     ///
     /// If shapes do not fit, or float types differ.
     pub fn image<B: RasterBackend>(
-        &self,
-        vertices: Tensor<B, 3>,
-        attributes: &Attributes<B>,
-        background: &Background<B>,
-    ) -> Tensor<B, 4> {
-        if !B::ON_HOST && attributes.texture.is_some() {
-            let options = (&vertices.device(), vertices.dtype());
-            let phi = self
-                .phi
-                .each_ref()
-                .map(|phi| Tensor::from_data(TensorData::new(phi.clone(), [phi.len()]), options));
-            return self.by_reference(vertices, attributes, phi, background);
-        }
-        self.image_of_attributes(vertices, attributes, background)
-    }
-
-    /// [`image`](Self::image) without a texture on a GPU, for programs that should not hold the reference.
-    ///
-    /// # Panics
-    ///
-    /// Those of [`image`](Self::image), and on a GPU if there is a texture.
-    #[doc(hidden)]
-    pub fn image_of_attributes<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
         attributes: &Attributes<B>,
@@ -251,8 +226,8 @@ impl ColourRenderer {
         self.drawn(&prepared, vertices, attributes, tables, background)
     }
 
-    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too. On a GPU this is
-    /// [`reference::blended`].
+    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too. A GPU reads
+    /// them for each image.
     ///
     /// # Panics
     ///
@@ -265,9 +240,6 @@ impl ColourRenderer {
         background: &Background<B>,
     ) -> Tensor<B, 4> {
         let phi = [edge.clone(), depth.clone()];
-        if !B::ON_HOST {
-            return self.by_reference(vertices, attributes, phi, background);
-        }
         let values = [edge, depth].map(|phi| phi.to_data().iter().collect::<Vec<f64>>());
         check(&self.weighting, &values);
         let prepared = self.prepared(&values, number(background));
@@ -294,17 +266,6 @@ impl ColourRenderer {
         let prepared = self.prepared(phi, log_weight);
         let op = self.blend_op(&prepared, entries, texture);
         (FusedOp::SoftBlend(op), WeightTables(prepared))
-    }
-
-    fn by_reference<B: RasterBackend>(
-        &self,
-        vertices: Tensor<B, 3>,
-        attributes: &Attributes<B>,
-        phi: [Tensor<B, 1>; 2],
-        background: &Background<B>,
-    ) -> Tensor<B, 4> {
-        let scene = Scene { faces: &self.faces, size: self.size };
-        reference::blended(scene, vertices, attributes, &self.weighting, phi, background)
     }
 
     fn drawn<B: RasterBackend>(

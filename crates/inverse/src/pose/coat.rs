@@ -64,7 +64,7 @@ impl<B: RasterBackend> Coat<B> {
                 .with_tolerance(TOLERANCE)
         });
         let background = renderer.background(&[0.0; 3], &seen.device());
-        renderer.image_of_attributes(seen, &self.attributes, &background).narrow(1, 0, 3)
+        renderer.image(seen, &self.attributes, &background).narrow(1, 0, 3)
     }
 
     /// The same without softness: at the centre of each pixel the colour of the nearest face. It has no gradient.

@@ -10,7 +10,7 @@ use super::{
     frame::Frame,
     gradient::UNITS,
     reach::Reach,
-    shown::{Corners, Kind, Shown, Weights},
+    shown::{Kind, Shown, Weights},
 };
 
 /// Numbers of a pixel that a gradient needs: the logarithm of all weights, and what the image is to the upstream, with their derivatives.
@@ -97,11 +97,21 @@ pub(super) fn blend_pixels(
                     let share = pair.share(Dual::constant(largest), weights).whole;
                     total += share.value;
                     total_tangent += share.tangent;
-                    for channel in 0..channels {
-                        let own = shown.channel(numbers, direction, along, channel, second);
-                        let seen = share.mul(pair.weights.mul(own).sum());
-                        values[channel] = values[channel] + seen.value;
-                        tangents[channel] = tangents[channel] + seen.tangent;
+                    if kind.is_textured {
+                        let sample = shown.sample(pair, weights, numbers, direction, kind);
+                        for channel in 0..channels {
+                            let own = sample.texels(numbers, direction, weights, channel, second);
+                            let seen = share.mul(sample.between(own));
+                            values[channel] = values[channel] + seen.value;
+                            tangents[channel] = tangents[channel] + seen.tangent;
+                        }
+                    } else {
+                        for channel in 0..channels {
+                            let own = shown.attribute(numbers, direction, along, channel, second);
+                            let seen = share.mul(pair.weights.mul(own).sum());
+                            values[channel] = values[channel] + seen.value;
+                            tangents[channel] = tangents[channel] + seen.tangent;
+                        }
                     }
                 }
             }
@@ -163,8 +173,8 @@ pub(super) fn blend_pixels(
     }
 }
 
-/// Writes the gradient of each face, one cube a face, as `[views, faces, 9 + 3 channels]`: x, y and depth of each of its corners, then the
-/// channels of each.
+/// Writes the gradient of each face, one cube a face, as `[views, faces, 9 + 3 numbers]`: x, y and depth of each of its corners, then the
+/// attributes of each.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn blend_faces(
@@ -189,13 +199,12 @@ pub(super) fn blend_faces(
     }
     let channels = comptime!(kind.channels);
     let second = comptime!(kind.second);
-    let count = comptime!(9 + 3 * kind.channels);
+    let count = comptime!(9 + 3 * kind.numbers());
     let units = comptime!(UNITS as usize);
     let view = job as u32 / face_count + first_view;
     let face = job % face_count as usize;
     let stride = comptime!(if second { 18usize } else { 9usize });
     let first_attribute = weights.attributes + view * weights.per_view;
-    let along = weights.along;
     let shown = Shown::new(corners, stride * job, entries, face, first_attribute, kind);
     let reach = Reach::load(reaches, job);
     let mut pixel = UNIT_POS;
@@ -223,40 +232,44 @@ pub(super) fn blend_faces(
             let log = Dual { value: pixels[own], tangent: pixels[own + 1] };
             let draw = Dual { value: pixels[own + 2], tangent: pixels[own + 3] };
             let share = pair.share(log, weights);
-            // How the objective changes with the attributes of the three corners, were the point there.
-            let mut at_corners = Array::<f32>::new(6usize);
-            for k in 0..6usize {
-                at_corners[k] = 0.0f32;
+            let seen = shown.seen(
+                pair,
+                weights,
+                numbers,
+                direction,
+                upstream,
+                first,
+                plane as usize,
+                kind,
+            );
+            if kind.is_textured {
+                let by_u = pair.weights.times(share.whole.mul(seen.by_u));
+                let by_v = pair.weights.times(share.whole.mul(seen.by_v));
+                sums[9] = sums[9] + by_u.a.stored(second);
+                sums[10] = sums[10] + by_v.a.stored(second);
+                sums[11] = sums[11] + by_u.b.stored(second);
+                sums[12] = sums[12] + by_v.b.stored(second);
+                sums[13] = sums[13] + by_u.c.stored(second);
+                sums[14] = sums[14] + by_v.c.stored(second);
+            } else {
+                for channel in 0..channels {
+                    let u = upstream[first + channel * plane as usize];
+                    let by_channel = pair.weights.times(share.whole.scale(u));
+                    let at = 9 + channel;
+                    sums[at] = sums[at] + by_channel.a.stored(second);
+                    sums[at + channels] = sums[at + channels] + by_channel.b.stored(second);
+                    sums[at + 2 * channels] = sums[at + 2 * channels] + by_channel.c.stored(second);
+                }
             }
-            for channel in 0..channels {
-                let u = upstream[first + channel * plane as usize];
-                let values = shown.channel(numbers, direction, along, channel, second);
-                at_corners[0] = at_corners[0] + values.a.value * u;
-                at_corners[1] = at_corners[1] + values.a.tangent * u;
-                at_corners[2] = at_corners[2] + values.b.value * u;
-                at_corners[3] = at_corners[3] + values.b.tangent * u;
-                at_corners[4] = at_corners[4] + values.c.value * u;
-                at_corners[5] = at_corners[5] + values.c.tangent * u;
-                let by_channel = pair.weights.times(share.whole.scale(u));
-                let at = 9 + channel;
-                sums[at] = sums[at] + by_channel.a.stored(second);
-                sums[at + channels] = sums[at + channels] + by_channel.b.stored(second);
-                sums[at + 2 * channels] = sums[at + 2 * channels] + by_channel.c.stored(second);
-            }
-            let at_corners = Corners {
-                a: Dual { value: at_corners[0], tangent: at_corners[1] },
-                b: Dual { value: at_corners[2], tangent: at_corners[3] },
-                c: Dual { value: at_corners[4], tangent: at_corners[5] },
-            };
-            let between = pair.weights.mul(at_corners).sum();
+            let between = pair.weights.mul(seen.at_corners).sum();
             // A share draws the image from what it is towards what the face shows.
-            let drawn = between.sub(draw);
+            let drawn = seen.here.sub(draw);
             let by_edge = share.of_edge.mul(drawn);
             let by_place = share.whole.mul(drawn).mul(pair.depth_slope);
             // The nearness falls as the depth grows.
             let by_z = by_place.scale(-weights.per_range);
             // Both the depth and the weights on the face change by a weight on the screen as by its share of 1 / z.
-            let pulled_back = at_corners.less(between).times(share.whole);
+            let pulled_back = seen.at_corners.less(between).times(share.whole);
             let by_part = pulled_back.less(pair.depth.mul(by_z)).times(pair.depth);
             let by_barycentric = by_part.mul(shown.per_depth);
             let moved = shown.pulled(pair, by_edge.mul(pair.edge_slope), by_barycentric);
@@ -275,7 +288,7 @@ pub(super) fn blend_faces(
         pixel += UNITS;
     }
     // One number after the other: each unit adds up some of them over all units.
-    let mut shares = SharedMemory::<f32>::new(comptime!((9 + 3 * kind.channels) * UNITS as usize));
+    let mut shares = SharedMemory::<f32>::new(comptime!((9 + 3 * kind.numbers()) * UNITS as usize));
     for k in 0..count {
         shares[k * units + UNIT_POS as usize] = sums[k];
     }
@@ -288,6 +301,101 @@ pub(super) fn blend_faces(
         }
         gradient[count * job + number] = sum;
         number += units;
+    }
+}
+
+/// Adds the gradient of both tables, every unit to tables of its own over the pixels that it walks, `[units, rows, 4]`, as
+/// [`sum_cubics`](super::table::sum_cubics) does.
+#[cube(launch)]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn blend_cubics(
+    corners: &Array<f32>,
+    reaches: &Array<u32>,
+    cells: &Array<u32>,
+    numbers: &Array<f32>,
+    direction: &Array<f32>,
+    entries: &Array<u32>,
+    upstream: &Array<f32>,
+    pixels: &Array<f32>,
+    partial: &mut Array<f32>,
+    of_cells: Cells,
+    weights: Weights,
+    frame: Frame,
+    first_view: u32,
+    views: u32,
+    rows: u32,
+    #[comptime] kind: Kind,
+) {
+    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
+    let across = (frame.width + TILE - 1u32) / TILE;
+    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
+    let down = (frame.height + TILE - 1u32) / TILE;
+    let tiles = views * across * down;
+    let table = ABSOLUTE_POS as u32 * rows * 4u32;
+    let stride = comptime!(if kind.second { 18usize } else { 9usize });
+    let plane = frame.height * frame.width;
+    let planes = comptime!(kind.channels as u32 + 1);
+    let mut tile = CUBE_POS as u32;
+    while tile < tiles {
+        let column = tile % across * TILE + UNIT_POS_X;
+        let row = tile / across % down * TILE + UNIT_POS_Y;
+        let view = tile / (across * down);
+        if column < frame.width && row < frame.height {
+            let px = frame.column_centre(column);
+            let py = frame.row_centre(row);
+            let first_attribute = weights.attributes + (first_view + view) * weights.per_view;
+            let first =
+                ((first_view + view) * planes * plane + row * frame.width + column) as usize;
+            let own = frame.pixel(first_view + view, row, column) as usize
+                * comptime!(OF_PIXEL + kind.channels + 1);
+            let log = Dual { value: pixels[own], tangent: pixels[own + 1] };
+            let draw = Dual { value: pixels[own + 2], tangent: pixels[own + 3] };
+            let first_word = of_cells.first_word(view, column, row);
+            for word in 0..of_cells.words {
+                let mut bits = cells[(first_word + word) as usize];
+                while bits != 0 {
+                    let face = 32 * word + bits.trailing_zeros();
+                    bits &= bits - 1u32;
+                    let job = (view * of_cells.face_count + face) as usize;
+                    if Reach::load(reaches, job).holds(column, row) {
+                        let shown = Shown::new(
+                            corners,
+                            stride * job,
+                            entries,
+                            face as usize,
+                            first_attribute,
+                            kind,
+                        );
+                        let pair = shown.pair(px, py, weights, numbers, direction, kind);
+                        if pair.counts(weights) {
+                            let share = pair.share(log, weights);
+                            let seen = shown.seen(
+                                pair,
+                                weights,
+                                numbers,
+                                direction,
+                                upstream,
+                                first,
+                                plane as usize,
+                                kind,
+                            );
+                            let drawn = seen.here.sub(draw);
+                            pair.pull_tables(
+                                share.of_edge.mul(drawn),
+                                share.whole.mul(drawn),
+                                weights,
+                                numbers,
+                                direction,
+                                partial,
+                                table,
+                                kind,
+                            );
+                        }
+                    }
+                }
+            }
+        }
+        tile += CUBE_COUNT as u32;
     }
 }
 

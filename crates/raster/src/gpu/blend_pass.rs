@@ -8,10 +8,11 @@ use burn_cubecl::{cubecl::prelude::*, kernel::into_contiguous};
 
 use super::{
     TILE, Wgpu,
-    blend::{OF_PIXEL, blend_faces, blend_pixels, gather_corners},
+    blend::{OF_PIXEL, blend_cubics, blend_faces, blend_pixels, gather_corners},
     gradient::UNITS,
-    pass::{Buffer, CUBE, Culled, Pass, lookup},
+    pass::{Buffer, CUBE, Culled, Partial, Pass, lookup},
     shown::{Kind, WeightsLaunch},
+    texture::{sum_texels, texel_floats},
     topology::{OnDevice, Topology},
 };
 use crate::{
@@ -26,20 +27,11 @@ use crate::{
 /// Stands for no limit.
 const LOWEST: f32 = -1e30;
 
-/// Inputs of a pass: vertices, attributes, tables and background, and in a pass of second order their derivatives.
-pub(super) struct Inputs {
-    pub(super) vertices: Buffer,
-    pub(super) attributes: Buffer,
-    pub(super) tables: Buffer,
-    pub(super) background: Buffer,
-    pub(super) along: Option<[Buffer; 4]>,
-}
-
 /// Inputs on the device.
 pub(super) struct Blend<'a> {
     op: &'a SoftBlend,
     pass: Pass<'a>,
-    /// Tables, attributes and background.
+    /// Tables, attributes, background and texture.
     numbers: Buffer,
     direction: Option<Buffer>,
     /// Entries of the attributes at the corners of faces, and the corners of each entry.
@@ -48,8 +40,27 @@ pub(super) struct Blend<'a> {
     channels: usize,
     /// Whether all views have the same attributes.
     shared: bool,
-    /// Where attributes and background begin in the numbers.
-    starts: [usize; 2],
+    /// Where attributes, background and texture begin in the numbers.
+    starts: [usize; 3],
+}
+
+/// A gradient of texels in the making.
+struct Texels {
+    /// The largest size of a term, and all terms, two words for each of `count` numbers.
+    largest: Buffer,
+    sums: Buffer,
+    count: usize,
+}
+
+/// What a pass back gives.
+pub(super) struct Gradient {
+    pub(super) vertices: Buffer,
+    pub(super) attributes: Buffer,
+    pub(super) tables: Option<Buffer>,
+    pub(super) background: Buffer,
+    pub(super) texture: Option<Buffer>,
+    /// Of a pass of second order.
+    pub(super) image: Buffer,
 }
 
 /// What of the silhouettes' op culls the faces of this one: an edge softness reaches as far as its table.
@@ -65,22 +76,39 @@ pub(super) fn culling(op: &SoftBlend) -> ProfileSum {
 }
 
 impl<'a> Blend<'a> {
-    pub(super) fn new(op: &'a SoftBlend, culling: &'a ProfileSum, inputs: Inputs) -> Self {
-        let Inputs { vertices, attributes, tables, background, along } = inputs;
-        let (views, entry_count) = (attributes.shape()[0], attributes.shape()[1]);
-        let channels = background.shape().num_elements() - 1;
+    /// `inputs` are vertices, attributes, tables, background and, if there is one, the texture; `direction` their derivatives, flat, in a pass
+    /// of second order.
+    pub(super) fn new(
+        op: &'a SoftBlend,
+        culling: &'a ProfileSum,
+        inputs: Vec<Buffer>,
+        direction: Option<Buffer>,
+    ) -> Self {
+        let lengths: Vec<usize> = inputs.iter().map(|input| input.shape().num_elements()).collect();
+        let (views, entry_count) = (inputs[1].shape()[0], inputs[1].shape()[1]);
+        let channels = lengths[3] - 1;
         let flat = |tensor: Buffer| {
             let length = tensor.shape().num_elements();
             Wgpu::float_reshape(tensor, [length].into())
         };
-        let joined = |parts: Vec<Buffer>| Wgpu::float_cat(parts.into_iter().map(flat).collect(), 0);
-        let starts = [
-            tables.shape().num_elements(),
-            tables.shape().num_elements() + attributes.shape().num_elements(),
-        ];
-        let numbers = joined(vec![tables, attributes, background]);
-        let direction = along.map(|[vertices, attributes, tables, background]| {
-            into_contiguous(joined(vec![vertices, tables, attributes, background]))
+        let starts = [lengths[2], lengths[2] + lengths[1], lengths[2] + lengths[1] + lengths[3]];
+        let mut inputs = inputs.into_iter();
+        let vertices = inputs.next().expect("vertices");
+        // The tables come first.
+        let mut numbers: Vec<Buffer> = inputs.map(flat).collect();
+        numbers.swap(0, 1);
+        let numbers = Wgpu::float_cat(numbers, 0);
+        let direction = direction.map(|direction| {
+            let mut start = 0;
+            let mut parts: Vec<Buffer> = lengths
+                .iter()
+                .map(|length| {
+                    start += length;
+                    Wgpu::float_slice(direction.clone(), &[Slice::from(start - length..start)])
+                })
+                .collect();
+            parts.swap(1, 2);
+            into_contiguous(Wgpu::float_cat(parts, 0))
         });
         let pass = Pass::new(culling, vertices, numbers, direction.clone());
         let pass = pass.with_depths(FARTHEST_SEEN as f32);
@@ -105,31 +133,52 @@ impl<'a> Blend<'a> {
         image
     }
 
-    /// Gradients of `Σ upstream · image` to vertices, attributes and background, flat; in a pass of second order their derivatives, and that
-    /// of the image.
-    pub(super) fn gradient(&self, upstream: Buffer) -> [Buffer; 4] {
+    /// Gradients of `Σ upstream · image` to vertices, attributes, tables, background and texture, flat; in a pass of second order their
+    /// derivatives, and that of the image. Those of tables and texture are there if they are wanted.
+    pub(super) fn gradient(&self, upstream: Buffer, of_tables: bool, of_texels: bool) -> Gradient {
         let upstream = into_contiguous(upstream);
         let (views, channels) = (self.pass.views, self.channels);
+        let numbers = self.kind().numbers();
         let of_pixel = OF_PIXEL + channels + 1;
         let buffer = |length: usize| self.pass.buffer(length, DType::F32);
         let pixels = buffer(self.pass.pixels() * of_pixel);
         let image = buffer(if self.pass.second() { self.image_length() } else { 1 });
         let vertices = buffer(3 * views * self.pass.vertex_count);
-        let attributes = buffer(channels * views * self.entry_count);
+        let attributes = buffer(numbers * views * self.entry_count);
+        let rows = self.op.edge.rows() + self.op.depth.rows();
+        let partial = of_tables.then(|| self.pass.partial(views, rows));
+        let texels = of_texels.then(|| self.no_texels());
         for culled in self.pass.culled() {
             self.write_pixels(&culled, &upstream, &pixels, &image, true);
             let of_faces = self.write_faces(&culled, &upstream, &pixels);
             let corners = &self.pass.topology.corners;
             let counts = [self.pass.vertex_count, 0, 3];
             self.gather(&culled, &of_faces, corners, &vertices, counts, false);
-            let counts = [self.entry_count, 9, channels];
+            let counts = [self.entry_count, 9, numbers];
             self.gather(&culled, &of_faces, &self.entries.corners, &attributes, counts, true);
+            if let Some(partial) = &partial {
+                self.add_cubics(&culled, &upstream, &pixels, partial, rows);
+            }
+            if let Some(texels) = &texels {
+                self.add_texels(&culled, &upstream, &pixels, texels, true);
+            }
         }
+        if let Some(texels) = &texels {
+            for culled in self.pass.culled() {
+                self.add_texels(&culled, &upstream, &pixels, texels, false);
+            }
+        }
+        let tables = partial.map(|partial| {
+            let tables = buffer(4 * rows);
+            self.pass.add_up(partial, &tables, 0);
+            tables
+        });
+        let texture = texels.map(|texels| self.floats(texels));
         let behind = Wgpu::float_reshape(pixels, [self.pass.pixels(), of_pixel].into());
         let all = Slice::from(0..self.pass.pixels());
         let behind = Wgpu::float_slice(behind, &[all, Slice::from(OF_PIXEL..of_pixel)]);
-        let behind = Wgpu::float_reshape(Wgpu::float_sum_dim(behind, 0), [channels + 1].into());
-        let entries = channels * self.entry_count;
+        let background = Wgpu::float_reshape(Wgpu::float_sum_dim(behind, 0), [channels + 1].into());
+        let entries = numbers * self.entry_count;
         let attributes = match self.shared {
             true => {
                 let by_view = Wgpu::float_reshape(attributes, [views, entries].into());
@@ -137,7 +186,7 @@ impl<'a> Blend<'a> {
             }
             false => attributes,
         };
-        [vertices, attributes, behind, image]
+        Gradient { vertices, attributes, tables, background, texture, image }
     }
 
     /// Numbers of the image of all views.
@@ -153,11 +202,9 @@ impl<'a> Blend<'a> {
         image: &Buffer,
         pull: bool,
     ) {
-        let ImageSize { height, width } = self.op.size;
-        let [across, down] = [width, height].map(|side| side.div_ceil(TILE as usize) as u32);
         blend_pixels::launch(
             &self.pass.client,
-            CubeCount::Static(across, down, culled.views as u32),
+            self.tiles(culled),
             CubeDim::new_2d(TILE, TILE),
             culled.corners.clone().into_array_arg(),
             culled.reaches.clone().into_array_arg(),
@@ -202,6 +249,99 @@ impl<'a> Blend<'a> {
         of_faces
     }
 
+    /// Adds the gradient of both tables, of so many `rows` together, to `partial`.
+    fn add_cubics(
+        &self,
+        culled: &Culled,
+        upstream: &Buffer,
+        pixels: &Buffer,
+        partial: &Partial,
+        rows: usize,
+    ) {
+        blend_cubics::launch(
+            &self.pass.client,
+            CubeCount::Static(partial.cubes as u32, 1, 1),
+            CubeDim::new_2d(TILE, TILE),
+            culled.corners.clone().into_array_arg(),
+            culled.reaches.clone().into_array_arg(),
+            culled.cells.clone().into_array_arg(),
+            self.numbers.clone().into_array_arg(),
+            self.direction().into_array_arg(),
+            self.entries.faces.clone().into_array_arg(),
+            upstream.clone().into_array_arg(),
+            pixels.clone().into_array_arg(),
+            partial.tables.clone().into_array_arg(),
+            self.pass.cells(culled),
+            self.weights(),
+            self.pass.frame(),
+            culled.first_view as u32,
+            culled.views as u32,
+            rows as u32,
+            self.kind(),
+        );
+    }
+
+    /// A gradient to all numbers of the texture, of no terms.
+    fn no_texels(&self) -> Texels {
+        let count = self.numbers.shape().num_elements() - self.starts[2];
+        let zeros = |length: usize| self.pass.zeros(length, DType::U32);
+        Texels { largest: zeros(1), sums: zeros(2 * count), count }
+    }
+
+    /// Finds the largest size of a term with `measure`, else adds up all.
+    fn add_texels(
+        &self,
+        culled: &Culled,
+        upstream: &Buffer,
+        pixels: &Buffer,
+        texels: &Texels,
+        measure: bool,
+    ) {
+        sum_texels::launch(
+            &self.pass.client,
+            self.tiles(culled),
+            CubeDim::new_2d(TILE, TILE),
+            culled.corners.clone().into_array_arg(),
+            culled.reaches.clone().into_array_arg(),
+            culled.cells.clone().into_array_arg(),
+            self.numbers.clone().into_array_arg(),
+            self.direction().into_array_arg(),
+            self.entries.faces.clone().into_array_arg(),
+            upstream.clone().into_array_arg(),
+            pixels.clone().into_array_arg(),
+            texels.largest.clone().into_array_arg(),
+            texels.sums.clone().into_array_arg(),
+            self.pass.cells(culled),
+            self.weights(),
+            self.pass.frame(),
+            culled.first_view as u32,
+            self.kind(),
+            measure,
+        );
+    }
+
+    /// The terms added up, as floats.
+    fn floats(&self, texels: Texels) -> Buffer {
+        let gradient = self.pass.buffer(texels.count, DType::F32);
+        texel_floats::launch(
+            &self.pass.client,
+            self.pass.cubes(texels.count, CUBE),
+            CubeDim::new_1d(CUBE),
+            texels.sums.into_array_arg(),
+            texels.largest.into_array_arg(),
+            gradient.clone().into_array_arg(),
+            texels.count as u32,
+        );
+        gradient
+    }
+
+    /// A cube for each tile of the image.
+    fn tiles(&self, culled: &Culled) -> CubeCount {
+        let ImageSize { height, width } = self.op.size;
+        let [across, down] = [width, height].map(|side| side.div_ceil(TILE as usize) as u32);
+        CubeCount::Static(across, down, culled.views as u32)
+    }
+
     /// Adds up the corners of each of `count` vertices or entries: `of_each` numbers, which stand from `first` on in those of a face.
     fn gather(
         &self,
@@ -233,7 +373,7 @@ impl<'a> Blend<'a> {
 
     /// Numbers of a face in a gradient.
     fn of_face(&self) -> usize {
-        9 + 3 * self.channels
+        9 + 3 * self.kind().numbers()
     }
 
     /// The direction; any buffer where there is none, as nothing then reads it.
@@ -248,6 +388,7 @@ impl<'a> Blend<'a> {
             far_depth,
             is_line: matches!(self.op.depth, DepthGrid::Line { .. }),
             is_exponential: self.op.depth == DepthGrid::Exponential,
+            is_textured: self.op.texture.is_some(),
             channels: self.channels,
             second: self.pass.second(),
         }
@@ -261,6 +402,7 @@ impl<'a> Blend<'a> {
             DepthGrid::Line { floor } => (op.edge, floor),
         };
         let [near, far] = op.planes;
+        let [rows, columns] = op.texture.unwrap_or([1, 1]);
         let along =
             if self.pass.second() { 3 * self.pass.views * self.pass.vertex_count } else { 0 };
         WeightsLaunch::new(
@@ -269,7 +411,10 @@ impl<'a> Blend<'a> {
             op.edge.rows() as u32,
             self.starts[0] as u32,
             self.starts[1] as u32,
-            if self.shared { 0 } else { (self.channels * self.entry_count) as u32 },
+            self.starts[2] as u32,
+            rows as u32,
+            columns as u32,
+            if self.shared { 0 } else { (self.kind().numbers() * self.entry_count) as u32 },
             along as u32,
             near as f32,
             (far - near).recip() as f32,

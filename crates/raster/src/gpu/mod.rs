@@ -3,9 +3,9 @@
 //! The same sums as in `kernel`, in another order of loops. Culling gives every cell of the image a
 //! bit for each face; the image is a walk of one unit a pixel over the faces of its cell, and so is
 //! the gradient of the table; the gradient to the vertices is gathered, first per face over its
-//! pixels and then per vertex over its faces. There are no atomic operations and nothing is read
-//! back: every sum has one order, and a step of an optimisation never waits for the GPU. The second
-//! order is the same kernels over dual numbers.
+//! pixels and then per vertex over its faces. Nothing is read back, so that a step of an optimisation never
+//! waits for the GPU. Every sum of floats has one order; texels are added up as whole numbers by atomic
+//! operations, where the order does not matter. The second order is the same kernels over dual numbers.
 
 #[cfg(not(target_family = "wasm"))]
 mod adapter;
@@ -21,6 +21,7 @@ mod pass;
 mod reach;
 mod shown;
 mod table;
+mod texture;
 mod topology;
 
 #[cfg(not(target_family = "wasm"))]
@@ -36,7 +37,7 @@ use burn::{
 };
 
 use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
-use blend_pass::{Blend, Inputs, culling};
+use blend_pass::{Blend, culling};
 use pass::Pass as Kernels;
 
 /// Width and height in pixels of the tiles that walk together: one cube of units each.
@@ -81,48 +82,41 @@ impl RasterBackend for Wgpu {
     }
 }
 
-/// A pass of the op of colours, without a texture. Tables have no gradient.
+/// A pass of the op of colours.
 fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> FloatTensor<Wgpu> {
-    assert!(op.texture.is_none(), "on a GPU a texture is seen through tensor ops");
-    let mut tensors = tensors.into_iter();
-    let mut next = || tensors.next().expect("all inputs of the pass");
-    let [vertices, attributes, tables, background] = [next(), next(), next(), next()];
-    let inputs = [&vertices, &attributes, &tables, &background];
-    let lengths = inputs.map(length);
-    let shape = [vertices.shape()[0], lengths[3], op.size.height, op.size.width];
-    let mut inputs = Inputs { vertices, attributes, tables, background, along: None };
+    let count = 4 + usize::from(op.texture.is_some());
+    let mut inputs = tensors;
+    let mut rest = inputs.split_off(count).into_iter();
+    let mut next = || rest.next().expect("all inputs of the pass");
+    let lengths: Vec<usize> = inputs.iter().map(length).collect();
+    let shape = [inputs[0].shape()[0], lengths[3], op.size.height, op.size.width];
     let culling = culling(op);
-    match pass {
+    let (direction, wanted, upstream) = match pass {
         Pass::Forward => {
-            let image = Blend::new(op, &culling, inputs).image();
-            Wgpu::float_reshape(image, shape.into())
+            let image = Blend::new(op, &culling, inputs, None).image();
+            return Wgpu::float_reshape(image, shape.into());
         }
-        Pass::Vjp { wanted } => {
-            assert!(!wanted[2], "on a GPU a gradient to tables goes through tensor ops");
-            let [vertices, attributes, background, _] =
-                Blend::new(op, &culling, inputs).gradient(next());
-            let parts = [vertices, attributes, background];
-            chosen(parts.into(), &[wanted[0], wanted[1], wanted[3]])
-        }
+        Pass::Vjp { wanted } => (None, wanted, next()),
         Pass::VjpOfVjp { along, wanted } => {
-            assert!(!wanted[2], "on a GPU a gradient to tables goes through tensor ops");
-            let (upstream, direction) = (next(), next());
-            let direction = whole(direction, &lengths, along);
-            let mut start = 0;
-            inputs.along = Some(lengths.map(|length| {
-                start += length;
-                Wgpu::float_slice(direction.clone(), &[Slice::from(start - length..start)])
-            }));
-            let parts = Blend::new(op, &culling, inputs).gradient(upstream);
-            chosen(parts.into(), &[wanted[0], wanted[1], wanted[3], wanted[4]])
+            let upstream = next();
+            (Some(whole(next(), &lengths, along)), wanted, upstream)
         }
+    };
+    let of_texels = op.texture.is_some() && wanted[4];
+    let blend = Blend::new(op, &culling, inputs, direction);
+    let found = blend.gradient(upstream, wanted[2], of_texels);
+    let mut parts = vec![
+        Some(found.vertices),
+        Some(found.attributes),
+        found.tables,
+        Some(found.background),
+    ];
+    if op.texture.is_some() {
+        parts.push(found.texture);
     }
-}
-
-/// Those of some flat tensors that are wanted, as one.
-fn chosen(parts: Vec<FloatTensor<Wgpu>>, wanted: &[bool]) -> FloatTensor<Wgpu> {
+    parts.push(Some(found.image));
     let parts = parts.into_iter().zip(wanted).filter(|&(_, &wanted)| wanted);
-    Wgpu::float_cat(parts.map(|(part, _)| part).collect(), 0)
+    Wgpu::float_cat(parts.filter_map(|(part, _)| part).collect(), 0)
 }
 
 fn length(tensor: &FloatTensor<Wgpu>) -> usize {

@@ -65,11 +65,13 @@ pub(super) struct Culled {
 }
 
 /// Tables of the units that add up the gradient to one.
-struct Partial {
-    cubes: usize,
+pub(super) struct Partial {
+    pub(super) cubes: usize,
     units: usize,
+    /// Numbers of a table.
+    coefficients: usize,
     /// `[units, rows, 4]`.
-    tables: Buffer,
+    pub(super) tables: Buffer,
 }
 
 impl<'a> Pass<'a> {
@@ -132,16 +134,16 @@ impl<'a> Pass<'a> {
         let gradient = if wrt_table && self.vertex_count > 0 {
             self.buffer(length, DType::F32)
         } else {
-            self.zeros(length)
+            self.zeros(length, DType::F32)
         };
-        let shared = (wrt_table && !self.by_view).then(|| self.partial(self.views));
+        let shared = (wrt_table && !self.by_view).then(|| self.partial(self.views, self.rows()));
         for culled in self.culled() {
             self.write_corners(&culled, &upstream, &gradient);
             if let Some(partial) = &shared {
                 self.add_cubics(&culled, &upstream, partial, 0..culled.views);
             } else if wrt_table {
                 for view in 0..culled.views {
-                    let partial = self.partial(1);
+                    let partial = self.partial(1, self.rows());
                     self.add_cubics(&culled, &upstream, &partial, view..view + 1);
                     let rows = (culled.first_view + view) * self.rows();
                     self.add_up(partial, &gradient, coordinates + 4 * rows);
@@ -157,25 +159,27 @@ impl<'a> Pass<'a> {
         gradient
     }
 
-    /// Tables for the units of [`sum_cubics`] over some views.
-    fn partial(&self, views: usize) -> Partial {
+    /// Tables of so many rows for units that walk over some views.
+    pub(super) fn partial(&self, views: usize, rows: usize) -> Partial {
         let ImageSize { height, width } = self.op.size;
         let tiles = views * height.div_ceil(TILE as usize) * width.div_ceil(TILE as usize);
-        let (cube, coefficients) = ((TILE * TILE) as usize, 4 * self.rows());
+        let (cube, coefficients) = ((TILE * TILE) as usize, 4 * rows);
         let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, tiles.max(1));
-        Partial { cubes, units: cubes * cube, tables: self.zeros(cubes * cube * coefficients) }
+        let units = cubes * cube;
+        let tables = self.zeros(units * coefficients, DType::F32);
+        Partial { cubes, units, coefficients, tables }
     }
 
     /// Adds up the tables of all units into `gradient`, from `offset` on.
-    fn add_up(&self, partial: Partial, gradient: &Buffer, offset: usize) {
-        let coefficients = 4 * self.rows();
+    pub(super) fn add_up(&self, partial: Partial, gradient: &Buffer, offset: usize) {
+        let Partial { units, coefficients, tables, .. } = partial;
         sum_tables::launch(
             &self.client,
             self.cubes(coefficients, CUBE),
             CubeDim::new_1d(CUBE),
-            partial.tables.into_array_arg(),
+            tables.into_array_arg(),
             gradient.clone().into_array_arg(),
-            partial.units as u32,
+            units as u32,
             coefficients as u32,
             offset as u32,
         );
@@ -411,9 +415,9 @@ impl<'a> Pass<'a> {
         CubeTensor::new_contiguous(self.client.clone(), device, [length].into(), handle, dtype)
     }
 
-    fn zeros(&self, length: usize) -> Buffer {
+    pub(super) fn zeros(&self, length: usize, dtype: DType) -> Buffer {
         let device = self.vertices.device.clone();
-        zeros_client(self.client.clone(), device, [length].into(), DType::F32)
+        zeros_client(self.client.clone(), device, [length].into(), dtype)
     }
 }
 

@@ -4,7 +4,9 @@ use cubecl::prelude::*;
 
 use super::{
     dual::{Dual, load},
-    pair::{Closest, Cubic, Face, Lookup},
+    pair::{Closest, Cubic, Face, Lookup, Place},
+    table::add_powers,
+    texture::{Four, Sample},
 };
 use crate::kernel::blend::AREA;
 
@@ -12,7 +14,7 @@ use crate::kernel::blend::AREA;
 #[allow(clippy::cast_possible_truncation)]
 const LEAST_AREA: f32 = AREA as f32;
 
-/// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, then the background.
+/// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, background and texture.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
 pub(super) struct Weights {
     /// Cells of the edge softness, mirrored: the inner side is outside a face.
@@ -20,9 +22,13 @@ pub(super) struct Weights {
     pub(super) depth: Lookup,
     /// Row where the table by depth begins.
     pub(super) depth_row: u32,
-    /// Where attributes and background begin.
+    /// Where attributes, background and texture begin.
     pub(super) attributes: u32,
     pub(super) background: u32,
+    pub(super) texture: u32,
+    /// Those of the texture.
+    pub(super) rows: u32,
+    pub(super) columns: u32,
     /// Attributes of a view that has its own.
     pub(super) per_view: u32,
     /// Where the derivatives of all these numbers begin in the direction.
@@ -46,10 +52,19 @@ pub(super) struct Kind {
     /// Whether weights by depth are a line or an exponential in place of a table.
     pub(super) is_line: bool,
     pub(super) is_exponential: bool,
+    /// Whether attributes are places on a texture.
+    pub(super) is_textured: bool,
     /// Channels of the image, but for the faces' share.
     pub(super) channels: usize,
     /// Whether the pass is of second order.
     pub(super) second: bool,
+}
+
+impl Kind {
+    /// Numbers of an attribute.
+    pub(super) fn numbers(self) -> usize {
+        if self.is_textured { 2 } else { self.channels }
+    }
 }
 
 /// A number for each corner of a face.
@@ -64,6 +79,10 @@ pub(super) struct Corners {
 impl Corners {
     pub(super) fn mul(self, other: Corners) -> Corners {
         Corners { a: self.a.mul(other.a), b: self.b.mul(other.b), c: self.c.mul(other.c) }
+    }
+
+    pub(super) fn add(self, other: Corners) -> Corners {
+        Corners { a: self.a.add(other.a), b: self.b.add(other.b), c: self.c.add(other.c) }
     }
 
     pub(super) fn times(self, factor: Dual) -> Corners {
@@ -113,10 +132,12 @@ pub(super) struct ColourPair {
     pub(super) depth: Dual,
     /// Those of the nearest point on the face itself.
     pub(super) weights: Corners,
-    /// Logarithm of the edge softness, and its derivative by the squared distance.
+    /// Where the table by edges is read, the logarithm of the edge softness and its derivative by the squared distance.
+    edge: Place,
     pub(super) log_edge: Dual,
     pub(super) edge_slope: Dual,
-    /// Logarithm of the weight by depth, and its derivative by the nearness.
+    /// The nearness less 1, the logarithm of the weight by depth and its derivative by the nearness.
+    x: Dual,
     pub(super) log_depth: Dual,
     pub(super) depth_slope: Dual,
 }
@@ -126,6 +147,17 @@ pub(super) struct ColourPair {
 struct ByDepth {
     log: Dual,
     slope: Dual,
+}
+
+/// What a pair shows of the objective: what it is at the point, and how it changes with the attributes of the three corners, were the point
+/// there.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Seen {
+    pub(super) here: Dual,
+    pub(super) at_corners: Corners,
+    /// Derivatives by the place on a texture, if there is one.
+    pub(super) by_u: Dual,
+    pub(super) by_v: Dual,
 }
 
 /// What a pair counts relative to a weight: all of it, and the part that the edge softness makes before its floor is taken off.
@@ -159,34 +191,106 @@ impl Shown {
         let some = size > LEAST_AREA;
         let divisor = Dual::select(some, area, Dual::constant(1.0f32));
         let per_area = Dual::select(some, divisor.recip(), Dual::constant(0.0f32));
-        let channels = comptime!(kind.channels as u32);
+        let numbers = comptime!(kind.numbers() as u32);
         Shown {
             face: own,
             per_area,
             per_depth,
-            entry_a: first_attribute + entries[3 * face] * channels,
-            entry_b: first_attribute + entries[3 * face + 1] * channels,
-            entry_c: first_attribute + entries[3 * face + 2] * channels,
+            entry_a: first_attribute + entries[3 * face] * numbers,
+            entry_b: first_attribute + entries[3 * face + 1] * numbers,
+            entry_c: first_attribute + entries[3 * face + 2] * numbers,
         }
     }
 
-    /// A channel at the three corners.
-    pub(super) fn channel(
+    /// A number of the attributes at the three corners.
+    pub(super) fn attribute(
         self,
         numbers: &Array<f32>,
         direction: &Array<f32>,
         along: u32,
-        channel: usize,
+        number: usize,
         #[comptime] second: bool,
     ) -> Corners {
-        let a = self.entry_a as usize + channel;
-        let b = self.entry_b as usize + channel;
-        let c = self.entry_c as usize + channel;
+        let a = self.entry_a as usize + number;
+        let b = self.entry_b as usize + number;
+        let c = self.entry_c as usize + number;
         let along = along as usize;
         Corners {
             a: load(numbers, a, direction, along + a, second),
             b: load(numbers, b, direction, along + b, second),
             c: load(numbers, c, direction, along + c, second),
+        }
+    }
+
+    /// Where a pair sees the texture.
+    pub(super) fn sample(
+        self,
+        pair: ColourPair,
+        weights: Weights,
+        numbers: &Array<f32>,
+        direction: &Array<f32>,
+        #[comptime] kind: Kind,
+    ) -> Sample {
+        let u = self.attribute(numbers, direction, weights.along, 0usize, kind.second);
+        let v = self.attribute(numbers, direction, weights.along, 1usize, kind.second);
+        Sample::at(pair.weights.mul(u).sum(), pair.weights.mul(v).sum(), weights)
+    }
+
+    /// What a pair shows under an upstream, the first channel of which stands at `first`.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn seen(
+        self,
+        pair: ColourPair,
+        weights: Weights,
+        numbers: &Array<f32>,
+        direction: &Array<f32>,
+        upstream: &Array<f32>,
+        first: usize,
+        plane: usize,
+        #[comptime] kind: Kind,
+    ) -> Seen {
+        let zero = Dual::constant(0.0f32);
+        if kind.is_textured {
+            let sample = self.sample(pair, weights, numbers, direction, kind);
+            // Kept in an array, as a loop changes no struct.
+            let mut sums = Array::<f32>::new(8usize);
+            for k in 0..8usize {
+                sums[k] = 0.0f32;
+            }
+            for channel in 0..comptime!(kind.channels) {
+                let u = upstream[first + channel * plane];
+                let texels = sample.texels(numbers, direction, weights, channel, kind.second);
+                Four::load(&sums).plus(u, texels).store(&mut sums);
+            }
+            let sums = Four::load(&sums);
+            let (by_u, by_v) = (sample.by_u(sums, weights), sample.by_v(sums, weights));
+            let u = self.attribute(numbers, direction, weights.along, 0usize, kind.second);
+            let v = self.attribute(numbers, direction, weights.along, 1usize, kind.second);
+            let at_corners = u.times(by_u).add(v.times(by_v));
+            Seen { here: sample.between(sums), at_corners, by_u, by_v }
+        } else {
+            let mut sums = Array::<f32>::new(6usize);
+            for k in 0..6usize {
+                sums[k] = 0.0f32;
+            }
+            for channel in 0..comptime!(kind.channels) {
+                let u = upstream[first + channel * plane];
+                let values =
+                    self.attribute(numbers, direction, weights.along, channel, kind.second);
+                sums[0] = sums[0] + values.a.value * u;
+                sums[1] = sums[1] + values.a.tangent * u;
+                sums[2] = sums[2] + values.b.value * u;
+                sums[3] = sums[3] + values.b.tangent * u;
+                sums[4] = sums[4] + values.c.value * u;
+                sums[5] = sums[5] + values.c.tangent * u;
+            }
+            let at_corners = Corners {
+                a: Dual { value: sums[0], tangent: sums[1] },
+                b: Dual { value: sums[2], tangent: sums[3] },
+                c: Dual { value: sums[4], tangent: sums[5] },
+            };
+            let here = pair.weights.mul(at_corners).sum();
+            Seen { here, at_corners, by_u: zero, by_v: zero }
         }
     }
 
@@ -233,8 +337,10 @@ impl Shown {
             barycentric,
             depth,
             weights: parts.times(depth),
+            edge: place,
             log_edge: zero.sub(place.value(cubic)),
             edge_slope: zero.sub(place.slope(cubic)),
+            x,
             log_depth: by_depth.log,
             depth_slope: by_depth.slope,
         }
@@ -362,6 +468,51 @@ impl ByDepth {
 
 #[cube]
 impl ColourPair {
+    /// Adds to the gradient of both tables, which begins at `own`, of a function with these derivatives by the logarithms of the weights.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn pull_tables(
+        self,
+        by_edge: Dual,
+        by_depth: Dual,
+        weights: Weights,
+        numbers: &Array<f32>,
+        direction: &Array<f32>,
+        partial: &mut Array<f32>,
+        own: u32,
+        #[comptime] kind: Kind,
+    ) {
+        let zero = Dual::constant(0.0f32);
+        let edge = self.edge;
+        add_powers(partial, own + 4u32 * edge.row, edge.place, zero.sub(by_edge), kind.second);
+        let first = own + 4u32 * weights.depth_row;
+        if kind.is_line || kind.is_exponential {
+            let at = 4 * weights.depth_row as usize;
+            let along = weights.along as usize + at;
+            let a = load(numbers, at, direction, along, kind.second);
+            let c = load(numbers, at + 1, direction, along + 1, kind.second);
+            let (by_a, by_c) = if kind.is_line {
+                let nearness = self.x.add(Dual::constant(1.0f32));
+                let near = nearness.value > 0.0f32;
+                let weight = Dual::select(near, a, zero.sub(c)).mul(nearness);
+                let some = weight.value > weights.least;
+                let held = Dual::select(some, weight, Dual::constant(1.0f32));
+                let by_slope = Dual::select(some, by_depth.mul(nearness).mul(held.recip()), zero);
+                (Dual::select(near, by_slope, zero), Dual::select(near, zero, zero.sub(by_slope)))
+            } else {
+                let log = a.mul(self.x).add(c).value;
+                let by_log = Dual::select(log > weights.least && log < 0.0f32, by_depth, zero);
+                (by_log.mul(self.x), by_log)
+            };
+            let first = first as usize;
+            partial[first] = partial[first] + by_a.stored(kind.second);
+            partial[first + 1] = partial[first + 1] + by_c.stored(kind.second);
+        } else {
+            let x = self.x;
+            let place = weights.depth.place(x.mul(x), x.value <= 0.0f32, kind.far_depth);
+            add_powers(partial, first + 4u32 * place.row, place.place, zero.sub(by_depth), kind.second);
+        }
+    }
+
     /// Whether it counts at all, and is above the floor by more than rounding leaves.
     pub(super) fn counts(self, weights: Weights) -> bool {
         self.log_edge.value > weights.counts_from

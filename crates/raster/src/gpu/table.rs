@@ -59,6 +59,7 @@ pub(super) fn sum_cubics(
                         let pair = Face::new(corners, stride * face, second).pair(px, py, lookup);
                         if pair.row != lookup.cells {
                             in_tail -= 1u32;
+                            let g = Dual::constant(g);
                             add_powers(partial, own + 4u32 * pair.row, pair.place, g, second);
                         }
                     }
@@ -75,13 +76,17 @@ pub(super) fn sum_cubics(
 
 /// Adds `g`, `g t`, `g t²` and `g t³` to four numbers from `at` on.
 #[cube]
-fn add_powers(partial: &mut Array<f32>, at: u32, place: Dual, g: f32, #[comptime] second: bool) {
+pub(super) fn add_powers(
+    partial: &mut Array<f32>,
+    at: u32,
+    place: Dual,
+    g: Dual,
+    #[comptime] second: bool,
+) {
     let at = at as usize;
-    let first = place.scale(g);
+    let first = place.mul(g);
     let square = first.mul(place);
-    if !second {
-        partial[at] = partial[at] + g;
-    }
+    partial[at] = partial[at] + g.stored(second);
     partial[at + 1] = partial[at + 1] + first.stored(second);
     partial[at + 2] = partial[at + 2] + square.stored(second);
     partial[at + 3] = partial[at + 3] + square.mul(place).stored(second);

@@ -31,56 +31,90 @@ struct Scene {
     entries: (Arc<[[u32; 3]]>, usize),
     /// Views that have attributes of their own.
     own: usize,
+    /// Of the image; attributes are places on a texture where there is one.
     channels: usize,
+    /// Its rows and columns.
+    texture: Option<[usize; 2]>,
     renderer: ColourRenderer,
 }
 
-/// The image, then gradients to vertices, attributes and background, then derivatives of a sum of these to the same.
-fn products<T: RasterBackend>(scene: &Scene, dtype: DType) -> Vec<Vec<f64>> {
-    let Scene { views, channels, own, .. } = *scene;
+/// Which inputs get gradients: vertices, attributes, background and texture, or the parameters of the softnesses too.
+#[derive(Clone, Copy, PartialEq)]
+enum Wanted {
+    Scene,
+    Softness,
+}
+
+/// The image, then gradients to what is wanted, then derivatives of a sum of these to the same.
+fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Vec<Vec<f64>> {
+    let Scene { views, channels, own, texture, .. } = *scene;
     let flat =
         |values: &[f64]| tensor::<Autodiff<T>, 1>(values, [values.len()], dtype).require_grad();
     let wave = |count: usize, rate: f64| -> Vec<f64> {
         (0..count).map(|i| 0.5 + 0.4 * (rate * i as f64).sin()).collect()
     };
-    let count = own * scene.entries.1 * channels;
+    let numbers_of_entry = if texture.is_some() { 2 } else { channels };
+    let [height, width] = texture.unwrap_or([1, 1]);
     let background =
         scene.renderer.background::<NdArray<f64>>(&vec![0.3; channels], &Default::default());
     let log_weight = numbers(background.log_weight);
-    let inner = [
-        flat(&scene.vertices),
-        flat(&wave(count, 0.71)),
-        flat(&[wave(channels, 1.3), log_weight].concat()),
-    ];
-    let outer =
-        inner.clone().map(|input| Tensor::<Autodiff<_>, 1>::from_inner(input).require_grad());
-    let [vertices, attributes, behind] = outer.clone();
-    let shaped = vertices.reshape([views, scene.vertices.len() / 3 / views, 3]);
-    let attributes = attributes.reshape([own, scene.entries.1, channels]);
-    let attributes = Attributes::new(attributes, scene.entries.0.clone());
+    let inner: Vec<_> = [
+        scene.vertices.clone(),
+        // Some places lie beyond the texture, which repeats.
+        wave(own * scene.entries.1 * numbers_of_entry, 0.71).iter().map(|x| 2.0 * x - 0.4).collect(),
+        [wave(channels, 1.3), log_weight].concat(),
+        wave(height * width * channels, 0.83),
+        scene.renderer.phi()[0].clone(),
+        scene.renderer.phi()[1].clone(),
+    ]
+    .iter()
+    .map(|values| flat(values))
+    .collect();
+    let outer: Vec<_> =
+        inner.iter().map(|input| Tensor::<Autodiff<_>, 1>::from_inner(input.clone()).require_grad()).collect();
+    let [vertices, attributes, behind, texels, edge, depth] = &outer[..] else { unreachable!() };
+    let shaped = vertices.clone().reshape([views, scene.vertices.len() / 3 / views, 3]);
+    let attributes = attributes.clone().reshape([own, scene.entries.1, numbers_of_entry]);
+    let mut attributes = Attributes::new(attributes, scene.entries.0.clone());
+    if texture.is_some() {
+        attributes = attributes.with_texture(texels.clone().reshape([height, width, channels]));
+    }
     let background = Background {
         colour: behind.clone().narrow(0, 0, channels),
-        log_weight: behind.narrow(0, channels, 1),
+        log_weight: behind.clone().narrow(0, channels, 1),
     };
-    let image = scene.renderer.image(shaped, &attributes, &background);
+    let image = match wanted {
+        Wanted::Scene => scene.renderer.image(shaped, &attributes, &background),
+        Wanted::Softness => {
+            scene.renderer.image_with(shaped, &attributes, [edge, depth], &background)
+        }
+    };
     let shape = image.dims();
     let weights: Vec<f64> =
         (0..shape.iter().product()).map(|i: usize| (0.37 * i as f64).sin()).collect();
     let grads = (image.clone() * image.clone() * tensor(&weights, shape, dtype)).sum().backward();
-    let first = outer.each_ref().map(|input| input.grad(&grads).expect("a gradient"));
-    let sum = first.clone().map(|gradient| {
+    let with_gradient: Vec<usize> = (0..6)
+        .filter(|&k| match k {
+            3 => texture.is_some(),
+            4 | 5 => wanted == Wanted::Softness,
+            _ => true,
+        })
+        .collect();
+    let first: Vec<_> =
+        with_gradient.iter().map(|&k| outer[k].grad(&grads).expect("a gradient")).collect();
+    let sum = first.clone().into_iter().map(|gradient| {
         let length = gradient.dims()[0];
         let ramp: Vec<f64> = (0..length).map(|i| (0.11 * i as f64).cos()).collect();
         (gradient * tensor(&ramp, [length], dtype)).sum()
     });
-    let again = sum.into_iter().reduce(Tensor::add).expect("three sums").backward();
-    let second = inner.each_ref().map(|input| numbers(input.grad(&again).expect("second order")));
-    [vec![numbers(image)], first.map(numbers).into(), second.into()].concat()
+    let again = sum.reduce(Tensor::add).expect("sums").backward();
+    let second = with_gradient.iter().map(|&k| numbers(inner[k].grad(&again).expect("second order")));
+    [vec![numbers(image)], first.into_iter().map(numbers).collect(), second.collect()].concat()
 }
 
-fn assert_close(scene: &Scene, name: &str) {
-    let expected = products::<NdArray<f64>>(scene, DType::F64);
-    let found = products::<Wgpu>(scene, DType::F32);
+fn assert_close(scene: &Scene, wanted: Wanted, name: &str) {
+    let expected = products::<NdArray<f64>>(scene, wanted, DType::F64);
+    let found = products::<Wgpu>(scene, wanted, DType::F32);
     let image = found[0].iter().zip(&expected[0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let errors: Vec<f64> =
         found[1..].iter().zip(&expected[1..]).map(|(a, b)| relative(a, b)).collect();
@@ -116,6 +150,7 @@ fn ball(family: Family, depth: DepthSoftness) -> Scene {
         entries: (faces.clone(), positions.len()),
         own: 1,
         channels: 3,
+        texture: None,
         renderer: renderer(&faces, family, depth, [1.7, 3.8]),
     }
 }
@@ -141,6 +176,7 @@ fn random() -> Scene {
         entries: (entries, count),
         own: 2,
         channels: 5,
+        texture: None,
         renderer: renderer(&faces, Family::Logistic, depth, [1.0, 3.0]),
     }
 }
@@ -151,8 +187,45 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
         return;
     }
     let exp = DepthSoftness::Family(Family::Exp);
-    assert_close(&ball(Family::Logistic, exp), "a ball");
-    assert_close(&ball(Family::Uniform, exp), "a ball with edges that end");
-    assert_close(&ball(Family::Gauss, DepthSoftness::Mlp), "a ball by the network of depths");
-    assert_close(&random(), "random triangles");
+    let scenes = [
+        ("a ball", ball(Family::Logistic, exp)),
+        ("a ball with edges that end", ball(Family::Uniform, exp)),
+        ("a ball by the network of depths", ball(Family::Gauss, DepthSoftness::Mlp)),
+        ("random triangles", random()),
+        ("a ball in a picture", Scene { texture: Some([5, 7]), ..ball(Family::Logistic, exp) }),
+        (
+            "random triangles in pictures",
+            Scene { texture: Some([3, 4]), channels: 4, ..random() },
+        ),
+    ];
+    for (name, scene) in scenes {
+        assert_close(&scene, Wanted::Scene, name);
+    }
+}
+
+#[test]
+fn gradients_to_the_softnesses_agree_with_the_kernel_in_f64() {
+    if !adapter() {
+        return;
+    }
+    let scenes = [
+        ("an exponential", ball(Family::Logistic, DepthSoftness::Family(Family::Exp))),
+        ("a line", ball(Family::Logistic, DepthSoftness::Mlp)),
+        ("a table", ball(Family::Gauss, DepthSoftness::Family(Family::Logistic))),
+        ("random triangles in pictures", Scene { texture: Some([3, 4]), channels: 3, ..random() }),
+    ];
+    for (name, scene) in scenes {
+        assert_close(&scene, Wanted::Softness, name);
+    }
+}
+
+#[test]
+fn a_texture_gets_the_same_gradient_every_time() {
+    if !adapter() {
+        return;
+    }
+    let exp = DepthSoftness::Family(Family::Exp);
+    let scene = Scene { texture: Some([2, 2]), ..ball(Family::Logistic, exp) };
+    let [first, second] = [(); 2].map(|()| products::<Wgpu>(&scene, Wanted::Scene, DType::F32));
+    assert_eq!(first, second);
 }

@@ -1,0 +1,320 @@
+//! What the network has that a curve of one parameter has not: the shapes it has learned, in how many ways they can move, and what the loss
+//! does when they do.
+//!
+//! ```text
+//! cargo run --release -p compare --features studies --example network              # about 20 minutes
+//! cargo run --release -p compare --features studies --example network -- --quick   # tiny instances, to out/
+//! ```
+//!
+//! Writes `docs/studies/network-*.svg`, their points as CSV and a part of `docs/studies/network.md`.
+
+#[allow(dead_code, reason = "not every study uses all of it")]
+mod common;
+
+use clap::Parser;
+use common::{Study, setup};
+use pose::Pose;
+use shape2d::Shape2d;
+use softrast_cli::{Common, MethodArgs, Task, usual_args};
+use softrast_inverse::{Instances, LearnConfig, OuterLoss};
+use softrast_lab::{
+    machine, mean, mean_interval,
+    plot::{Axis, Plot, Series},
+    report::Table,
+};
+use softrast_meta::TaskDistribution;
+use softrast_raster::HostBackend as B;
+use softrast_softness::{
+    EdgeSoftness, Family, ScheduledSoftness, Softness, numbers, tensor_on, vector,
+};
+
+/// The learned networks, by their names and tasks.
+const NETWORKS: [&str; 4] = ["shape2d-mlp", "shape3d-mlp", "pose-mlp", "occlusion-mlp"];
+/// Curves that a network is compared with.
+const CURVES: [Family; 2] = [Family::Gauss, Family::Logistic];
+/// Signed distances at which functions are compared, in widths of the function: so many to either side of 0, up to so far.
+const POINTS: usize = 200;
+const REACH: f64 = 8.0;
+/// Change of a weight for its slope, and directions that are looked at.
+const STEP: f64 = 1e-4;
+const MOST: usize = 12;
+/// Largest changes of coverage along each direction.
+const CHANGES: [f64; 9] = [-0.2, -0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1, 0.2];
+/// Directions of the weights in which the function moves most, beside its width, and random ones.
+const LEADING: usize = 3;
+const RANDOM: usize = 2;
+/// What colours lines.
+const COLOURS: [[u8; 3]; 6] = [
+    [20, 20, 20],
+    [0, 114, 178],
+    [86, 180, 233],
+    [0, 158, 115],
+    [213, 94, 0],
+    [230, 159, 0],
+];
+
+fn main() -> anyhow::Result<()> {
+    let study = Study::parse();
+    let mut page = format!("On {}.\n\n", machine());
+    page += &shapes()?.markdown();
+    page += "\n";
+    page += &landscape::<Shape2d>(&study, "shape2d", usual_args(), 20)?;
+    page += &landscape::<Pose>(&study, "pose", usual_args(), 100)?;
+    study.page("network.md", &page)
+}
+
+/// A learned network; its functions are compared by the distance over its own width.
+struct Network {
+    softness: EdgeSoftness,
+    phi: Vec<f64>,
+    width: f64,
+}
+
+impl Network {
+    fn new(softness: EdgeSoftness, phi: &[f64]) -> Self {
+        Self { softness, phi: phi.to_vec(), width: half_width(softness, phi) }
+    }
+
+    /// Coverage at all points under other weights.
+    fn values(&self, phi: &[f64]) -> Vec<f64> {
+        values(self.softness, &self.softness.with_scale_values(phi, 1.0 / self.width))
+    }
+
+    /// How its function changes with each of the weights: a row for each point.
+    fn slopes(&self) -> Vec<Vec<f64>> {
+        let moved = |k: usize, by: f64| {
+            let mut phi = self.phi.clone();
+            phi[k] += by;
+            self.values(&phi)
+        };
+        let slope = |k: usize| -> Vec<f64> {
+            let (up, down) = (moved(k, STEP), moved(k, -STEP));
+            up.iter().zip(&down).map(|(up, down)| (up - down) / (2.0 * STEP)).collect()
+        };
+        let columns: Vec<Vec<f64>> = (0..self.phi.len()).map(slope).collect();
+        (0..=2 * POINTS).map(|row| columns.iter().map(|column| column[row]).collect()).collect()
+    }
+}
+
+/// Coverage of a softness at all points.
+fn values(softness: EdgeSoftness, phi: &[f64]) -> Vec<f64> {
+    let points = (0..=2 * POINTS).map(|k| REACH * (k as f64 / POINTS as f64 - 1.0));
+    covered(softness, phi, points.collect())
+}
+
+fn covered(softness: EdgeSoftness, phi: &[f64], points: Vec<f64>) -> Vec<f64> {
+    let device = Default::default();
+    let shape = [points.len()];
+    let x = tensor_on::<B, 1>(points, shape, &device);
+    numbers(softness.value(vector::<B>(phi), x))
+}
+
+/// Half of the distance from a coverage of a quarter to one of three quarters.
+fn half_width(softness: EdgeSoftness, phi: &[f64]) -> f64 {
+    let at = |wanted: f64| {
+        let (mut low, mut high) = (-20.0, 20.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            let below = covered(softness, phi, vec![middle])[0] < wanted;
+            (low, high) = if below { (middle, high) } else { (low, middle) };
+        }
+        0.5 * (low + high)
+    };
+    0.5 * (at(0.75) - at(0.25))
+}
+
+/// The largest difference of two functions.
+fn difference(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// How far the curve of a family is from a function at best, over its scale.
+fn distance(family: Family, function: &[f64]) -> f64 {
+    let softness = EdgeSoftness { family, squared: false };
+    let at = |log: f64| difference(&values(softness, &softness.default_phi(log.exp())), function);
+    let (mut low, mut high) = (-3.0, 3.0);
+    for _ in 0..60 {
+        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        (low, high) = if at(a) < at(b) { (low, b) } else { (a, high) };
+    }
+    at(0.5 * (low + high))
+}
+
+/// Directions of the weights in which the function moves most, each at right angles to those before, and how much it moves along each: by the
+/// power method on the product of the slopes with themselves.
+fn directions(slopes: &[Vec<f64>], count: usize) -> Vec<(Vec<f64>, f64)> {
+    let weights = slopes[0].len();
+    let mut found: Vec<(Vec<f64>, f64)> = Vec::new();
+    for k in 0..count {
+        let mut direction: Vec<f64> =
+            (0..weights).map(|i| 1.0 + (1.7 * (i + 31 * k) as f64).sin()).collect();
+        let mut moves = 0.0;
+        for _ in 0..500 {
+            for (other, _) in &found {
+                let along = dot(&direction, other);
+                direction.iter_mut().zip(other).for_each(|(x, o)| *x -= along * o);
+            }
+            unit(&mut direction);
+            let seen: Vec<f64> = slopes.iter().map(|row| dot(row, &direction)).collect();
+            moves = dot(&seen, &seen).sqrt();
+            direction = (0..weights)
+                .map(|i| slopes.iter().zip(&seen).map(|(row, s)| row[i] * s).sum())
+                .collect();
+        }
+        unit(&mut direction);
+        found.push((direction, moves));
+    }
+    found
+}
+
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(a, b)| a * b).sum()
+}
+
+fn unit(direction: &mut [f64]) {
+    let length = dot(direction, direction).sqrt().max(f64::MIN_POSITIVE);
+    direction.iter_mut().for_each(|x| *x /= length);
+}
+
+/// What the learned networks look like.
+fn shapes() -> anyhow::Result<Table> {
+    let mut table = Table::new([
+        "network",
+        "nearest Gauss curve",
+        "nearest logistic",
+        "directions for 90, 99 and 99.9 % of its movement",
+    ]);
+    for name in NETWORKS {
+        let learned = ScheduledSoftness::learned(name)?;
+        let network = Network::new(learned.softness, &learned.phi);
+        let function = network.values(&network.phi);
+        let slopes = network.slopes();
+        let found = directions(&slopes, MOST);
+        let all: f64 = slopes.iter().map(|row| dot(row, row)).sum();
+        let enough = |share: f64| {
+            let mut sum = 0.0;
+            let reached = found.iter().position(|(_, moves)| {
+                sum += moves * moves;
+                sum >= share * all
+            });
+            reached.map_or(format!("more than {MOST}"), |k| (k + 1).to_string())
+        };
+        let [gauss, logistic] =
+            CURVES.map(|family| format!("{:.3}", distance(family, &function)));
+        let enough = [0.9, 0.99, 0.999].map(enough).join(", ");
+        table.push([name.to_owned(), gauss, logistic, enough]);
+    }
+    Ok(table)
+}
+
+/// What a run returns when the learned network of a task is moved.
+fn landscape<T: Task>(
+    study: &Study,
+    task: &str,
+    args: T::Args,
+    runs: usize,
+) -> anyhow::Result<String> {
+    let runs = if study.quick { 2 } else { runs };
+    let (size, steps) = (study.quick.then_some(16), study.quick.then_some(20));
+    let common = Common { size, steps, ..Common::default() };
+    let method = MethodArgs::parse("learned-mlp").map_err(anyhow::Error::msg)?;
+    let (problem, method, solve) = setup::<T>(&args, &common, &method)?;
+    let config =
+        LearnConfig { outer_loss: Some(OuterLoss::Returned), ..LearnConfig::default() };
+    let instances = Instances::<_, B>::new(problem, &method, &solve, &config)?;
+    let start = instances.start();
+    let knots = method.softness.schedule.as_ref().map_or(0, |schedule| schedule.knots.len());
+    let weights = method.softness.phi.len();
+    let network = Network::new(method.softness.softness, &start[knots..knots + weights]);
+    let own = network.values(&network.phi);
+    let mut lines: Vec<(String, Option<Vec<f64>>)> = vec![("width".to_owned(), None)];
+    for (k, (direction, _)) in directions(&network.slopes(), LEADING).into_iter().enumerate() {
+        lines.push((format!("direction {}", k + 1), Some(direction)));
+    }
+    for k in 0..RANDOM {
+        let mut direction: Vec<f64> =
+            (0..weights).map(|i| (12.9898 * (i + 97 * k + 1) as f64).sin() * 43758.5453 % 1.0).collect();
+        unit(&mut direction);
+        lines.push((format!("random {}", k + 1), Some(direction)));
+    }
+    let returned = |phi: &[f64]| -> Vec<f64> {
+        (0..runs as u64)
+            .map(|seed| {
+                let seed = config.validation_seed + seed;
+                instances.validation_loss(seed, &vector::<B>(phi)).powi(2)
+            })
+            .collect()
+    };
+    let here = returned(&start);
+    let mut table = Table::new(
+        std::iter::once("largest change of coverage".to_owned())
+            .chain(CHANGES.iter().filter(|&&change| change != 0.0).map(|change| format!("{change:+}"))),
+    );
+    let mut series = Vec::new();
+    for ((name, direction), colour) in lines.iter().zip(COLOURS) {
+        let mut row = vec![name.clone()];
+        let mut points = Vec::new();
+        for change in CHANGES {
+            let losses = if change == 0.0 {
+                here.clone()
+            } else {
+                let moved = |by: f64| {
+                    let mut phi = start.clone();
+                    match direction {
+                        None => phi[..knots].iter_mut().for_each(|knot| *knot += by),
+                        Some(direction) => phi[knots..knots + weights]
+                            .iter_mut()
+                            .zip(direction)
+                            .for_each(|(x, d)| *x += by * d),
+                    }
+                    phi
+                };
+                let changed = |by: f64| {
+                    let phi = match direction {
+                        None => network.softness.with_scale_values(&network.phi, by.exp()),
+                        Some(_) => moved(by)[knots..knots + weights].to_vec(),
+                    };
+                    difference(&network.values(&phi), &own)
+                };
+                let sign = f64::signum(change);
+                let (mut low, mut high) = (0.0, 1e-3);
+                while changed(sign * high) < change.abs() && high < 100.0 {
+                    high *= 2.0;
+                }
+                for _ in 0..40 {
+                    let middle = 0.5 * (low + high);
+                    let little = changed(sign * middle) < change.abs();
+                    (low, high) = if little { (middle, high) } else { (low, middle) };
+                }
+                returned(&moved(sign * high))
+            };
+            let less: Vec<f64> = losses.iter().zip(&here).map(|(a, b)| a - b).collect();
+            if change != 0.0 {
+                row.push(told(&less, mean(&here)));
+            }
+            points.push([change, mean(&losses)]);
+            println!("{task}, {name}, {change}: {:.5}", mean(&losses));
+        }
+        series.push(Series { name: name.clone(), colour, points, ..Series::default() });
+        table.push(row);
+    }
+    let axes = Plot::new(
+        Axis::linear("largest change of coverage along a direction"),
+        Axis::logarithmic("hard error returned, mean"),
+    );
+    let plot = Plot { series, ..axes };
+    study.file(&format!("network-{task}.svg"), plot.svg()?.as_bytes())?;
+    study.file(&format!("network-{task}.csv"), plot.csv().as_bytes())?;
+    Ok(format!(
+        "\n{task}, {runs} runs, {:.5} returned as learned:\n\n![{task}](network-{task}.svg)\n\n{}",
+        mean(&here),
+        table.markdown()
+    ))
+}
+
+/// A mean difference as a part of what it is a difference to, in bold where its interval leaves out 0.
+fn told(less: &[f64], of: f64) -> String {
+    let [low, high] = mean_interval(less);
+    let text = format!("{:+.0} %", 100.0 * mean(less) / of);
+    if low > 0.0 || high < 0.0 { format!("**{text}**") } else { text }
+}
