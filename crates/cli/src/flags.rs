@@ -247,12 +247,14 @@ impl MethodArgs {
     }
 
     /// This method beside a first one: its scales are its own or the task's, never those of the first, whose scale may mean another
-    /// width; its learning rate and its fall, resolution and tolerance are its own or those of the first.
+    /// width; its resolution and tolerance are its own or those of the first. So are the learning rate and its fall of a family; what a
+    /// file holds was found at a rate of its own.
     #[must_use]
     pub fn beside(self, first: &Self) -> Self {
+        let is_family = matches!(self.softness, None | Some(SoftnessChoice::Family(_)));
         Self {
-            learning_rate: self.learning_rate.or(first.learning_rate),
-            rate_end: self.rate_end.or(first.rate_end),
+            learning_rate: self.learning_rate.or(first.learning_rate.filter(|_| is_family)),
+            rate_end: self.rate_end.or(first.rate_end.filter(|_| is_family)),
             resolution: self.resolution.or(first.resolution),
             tolerance: self.tolerance.or(first.tolerance),
             ..self
@@ -302,6 +304,9 @@ mod tests {
         assert_eq!(second.softness, Some(SoftnessChoice::Family(Family::Gauss)));
         assert_eq!((second.scale, second.surrogate_scale), (None, None));
         assert_eq!(second.learning_rate, Some(0.3));
+        // What comes along keeps the rate that it was found at.
+        let preset = MethodArgs::parse("preset").unwrap().beside(&first);
+        assert_eq!(preset.learning_rate, None);
         let second = MethodArgs::parse("mlp --scale-end 1e-3 --learning-rate 2").unwrap();
         let second = second.beside(&first);
         assert_eq!((second.scale_end, second.learning_rate), (Some(1e-3), Some(2.0)));

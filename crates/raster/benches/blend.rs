@@ -42,7 +42,12 @@ fn main() {
     println!("{}", machine::machine());
     println!("| scene | threads | silhouette, ms | image, ms | colour, ms | ratio | default, ms |");
     println!("|---|---|---|---|---|---|---|");
-    for workload in [Workload::w1(), Workload::w2()] {
+    let narrow = Workload {
+        name: "W2, edges half a pixel wide".into(),
+        width: 1.0 / 256.0,
+        ..Workload::w2()
+    };
+    for workload in [Workload::w1(), Workload::w2(), narrow] {
         let silhouettes = Silhouettes::new(&workload);
         let flat = Coloured::<B>::new(&workload, FLAT, DType::F32);
         let default = Coloured::<B>::new(&workload, ColourRenderer::DEPTH_SCALE, DType::F32);
