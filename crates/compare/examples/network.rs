@@ -48,9 +48,8 @@ const COLOURS: [[u8; 3]; 6] =
 
 fn main() -> anyhow::Result<()> {
     let study = Study::parse();
-    let mut page = format!("On {}.\n\n", machine());
+    let mut page = format!("On {}.\n", machine());
     page += &shapes()?.markdown();
-    page += "\n";
     page += &landscape(&study)?;
     study.page("network.md", &page)
 }
@@ -293,7 +292,7 @@ fn landscape(study: &Study) -> anyhow::Result<String> {
     study.file("network-loss.svg", plot.svg()?.as_bytes())?;
     study.file("network-loss.csv", plot.csv().as_bytes())?;
     Ok(format!(
-        "\n{runs} runs of {triangles} triangles on {size} x {size} pixels in {steps} steps; {:.5} returned as learned.\n\n![loss](network-loss.svg)\n\n{}",
+        "\n{runs} runs of {triangles} triangles on {size} x {size} pixels in {steps} steps; {:.5} returned as learned.\n\n![loss](network-loss.svg)\n{}",
         mean(&here),
         table.markdown()
     ))
