@@ -247,8 +247,8 @@ impl MethodArgs {
     }
 
     /// This method beside a first one: its scales are its own or the task's, never those of the first, whose scale may mean another
-    /// width; its resolution and tolerance are its own or those of the first. So are the learning rate and its fall of a family; what a
-    /// file holds was found at a rate of its own.
+    /// width; its resolution and tolerance are its own or those of the first. A family also takes the learning rate and its fall of the first;
+    /// what a file holds was found at a rate of its own.
     #[must_use]
     pub fn beside(self, first: &Self) -> Self {
         let is_family = matches!(self.softness, None | Some(SoftnessChoice::Family(_)));
@@ -298,15 +298,19 @@ mod tests {
 
     #[test]
     fn a_second_method_has_its_own_scales_and_shares_the_rest() {
-        let first = MethodArgs::parse("exp --scale 0.1 --surrogate-scale 1 --learning-rate 0.3");
+        let first = MethodArgs::parse(
+            "exp --scale 0.1 --surrogate-scale 1 --learning-rate 0.3 --rate-end 0.1",
+        );
         let first = first.unwrap();
         let second = MethodArgs::parse("gauss").unwrap().beside(&first);
         assert_eq!(second.softness, Some(SoftnessChoice::Family(Family::Gauss)));
         assert_eq!((second.scale, second.surrogate_scale), (None, None));
         assert_eq!(second.learning_rate, Some(0.3));
         // What comes along keeps the rate that it was found at.
-        let preset = MethodArgs::parse("preset").unwrap().beside(&first);
-        assert_eq!(preset.learning_rate, None);
+        for name in ["preset", "learned.json"] {
+            let own = MethodArgs::parse(name).unwrap().beside(&first);
+            assert_eq!((own.learning_rate, own.rate_end), (None, None), "{name}");
+        }
         let second = MethodArgs::parse("mlp --scale-end 1e-3 --learning-rate 2").unwrap();
         let second = second.beside(&first);
         assert_eq!((second.scale_end, second.learning_rate), (Some(1e-3), Some(2.0)));

@@ -1,5 +1,5 @@
-//! What the network has that a curve of one parameter has not: the shapes it has learned, in how many ways they can move, and what the loss
-//! does when they do.
+//! What the network has that a curve of one parameter has not: the shapes that come along, in how many ways they can move, and what the
+//! loss does when they do.
 //!
 //! ```text
 //! cargo run --release -p compare --features studies --example network              # about 10 minutes
@@ -27,7 +27,7 @@ use softrast_softness::{
     EdgeSoftness, Family, ScheduledSoftness, Softness, numbers, tensor_on, vector,
 };
 
-/// The learned networks, by their names and tasks.
+/// The networks that come along, by their names and tasks.
 const NETWORKS: [&str; 4] = ["shape2d-mlp", "shape3d-mlp", "pose-mlp", "occlusion-mlp"];
 /// Curves that a network is compared with.
 const CURVES: [Family; 2] = [Family::Gauss, Family::Logistic];
@@ -54,7 +54,7 @@ fn main() -> anyhow::Result<()> {
     study.page("network.md", &page)
 }
 
-/// A learned network; its functions are compared by the distance over its own width.
+/// A network; its functions are compared by the distance over its own width.
 struct Network {
     softness: EdgeSoftness,
     phi: Vec<f64>,
@@ -167,13 +167,13 @@ fn unit(direction: &mut [f64]) {
     direction.iter_mut().for_each(|x| *x /= length);
 }
 
-/// What the learned networks look like.
+/// What the networks look like.
 fn shapes() -> anyhow::Result<Table> {
     let mut table = Table::new([
         "network",
         "nearest Gauss curve",
         "nearest logistic",
-        "directions for 90, 99 and 99.9 % of its movement",
+        "directions for 90, 99 and 99.9 % of its squared movement",
     ]);
     for name in NETWORKS {
         let learned = ScheduledSoftness::learned(name)?;
@@ -197,7 +197,7 @@ fn shapes() -> anyhow::Result<Table> {
     Ok(table)
 }
 
-/// What a run of 2D SHAPE returns when its learned network is moved, on small instances: where coverage far from a face does not vanish, every
+/// What a run of 2D SHAPE returns when its network is moved, on small instances: where coverage far from a face does not vanish, every
 /// pixel sees every face.
 fn landscape(study: &Study) -> anyhow::Result<String> {
     let (runs, size, triangles, steps) =
@@ -267,6 +267,10 @@ fn landscape(study: &Study) -> anyhow::Result<String> {
                 while changed(sign * high) < change.abs() && high < 100.0 {
                     high *= 2.0;
                 }
+                anyhow::ensure!(
+                    changed(sign * high) >= change.abs(),
+                    "{name} does not change the coverage by {change}"
+                );
                 for _ in 0..40 {
                     let middle = 0.5 * (low + high);
                     let little = changed(sign * middle) < change.abs();
@@ -292,7 +296,7 @@ fn landscape(study: &Study) -> anyhow::Result<String> {
     study.file("network-loss.svg", plot.svg()?.as_bytes())?;
     study.file("network-loss.csv", plot.csv().as_bytes())?;
     Ok(format!(
-        "\n{runs} runs of {triangles} triangles on {size} x {size} pixels in {steps} steps; {:.5} returned as learned.\n\n![loss](network-loss.svg)\n{}",
+        "\n{runs} runs of {triangles} triangles on {size} x {size} pixels in {steps} steps; {:.5} returned under the fit.\n\n![loss](network-loss.svg)\n{}",
         mean(&here),
         table.markdown()
     ))

@@ -141,7 +141,7 @@ impl LearnConfig {
         );
         ensure!(
             softness.rate_end.is_none() || !has_feedback,
-            "feedback moves the learning rate itself: leave out --rate-end"
+            "feedback moves the learning rate itself: leave out --rate-end, or begin with a softness without one"
         );
         ensure!(
             softness.rate_end.is_none() || outer_loss == OuterLoss::Returned,
@@ -221,10 +221,8 @@ mod tests {
     #[test]
     fn a_rate_that_falls_is_learned_from_by_what_runs_return_and_not_with_feedback() {
         let decay = EdgeSoftness { family: Family::Gauss, squared: false };
-        let softness = ScheduledSoftness {
-            rate_end: Some(0.2),
-            ..ScheduledSoftness::decay(decay, 0.1, 0.01)
-        };
+        let softness =
+            ScheduledSoftness { rate_end: Some(0.2), ..ScheduledSoftness::decay(decay, 0.1, 0.01) };
         let plain = LearnConfig::default();
         let returned = LearnConfig { outer_loss: Some(OuterLoss::Returned), ..plain.clone() };
         let feedback = LearnConfig { feedback: true, ..plain.clone() };

@@ -226,8 +226,8 @@ impl ColourRenderer {
         self.drawn(&prepared, vertices, attributes, tables, background)
     }
 
-    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too. A GPU reads
-    /// them for each image.
+    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too. On a GPU each
+    /// image waits to read them back, which a browser cannot.
     ///
     /// # Panics
     ///

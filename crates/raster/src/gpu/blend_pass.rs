@@ -12,7 +12,7 @@ use super::{
     gradient::UNITS,
     pass::{Buffer, CUBE, Culled, Partial, Pass, lookup},
     shown::{Kind, WeightsLaunch},
-    texture::{sum_texels, texel_floats},
+    texture::{MEASURED, sum_texels, texel_floats},
     topology::{OnDevice, Topology},
 };
 use crate::{
@@ -46,8 +46,7 @@ pub(super) struct Blend<'a> {
 
 /// A gradient of texels in the making.
 struct Texels {
-    /// The largest size of a term, and all terms, two words for each of `count` numbers.
-    largest: Buffer,
+    /// What is measured, then two words for each of `count` numbers.
     sums: Buffer,
     count: usize,
 }
@@ -284,8 +283,7 @@ impl<'a> Blend<'a> {
     /// A gradient to all numbers of the texture, of no terms.
     fn no_texels(&self) -> Texels {
         let count = self.numbers.shape().num_elements() - self.starts[2];
-        let zeros = |length: usize| self.pass.zeros(length, DType::U32);
-        Texels { largest: zeros(1), sums: zeros(2 * count), count }
+        Texels { sums: self.pass.zeros(MEASURED + 2 * count, DType::U32), count }
     }
 
     /// Finds the largest size of a term with `measure`, else adds up all.
@@ -309,7 +307,6 @@ impl<'a> Blend<'a> {
             self.entries.faces.clone().into_array_arg(),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
-            texels.largest.clone().into_array_arg(),
             texels.sums.clone().into_array_arg(),
             self.pass.cells(culled),
             self.weights(),
@@ -328,7 +325,6 @@ impl<'a> Blend<'a> {
             self.pass.cubes(texels.count, CUBE),
             CubeDim::new_1d(CUBE),
             texels.sums.into_array_arg(),
-            texels.largest.into_array_arg(),
             gradient.clone().into_array_arg(),
             texels.count as u32,
         );

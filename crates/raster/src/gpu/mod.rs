@@ -3,9 +3,8 @@
 //! The same sums as in `kernel`, in another order of loops. Culling gives every cell of the image a
 //! bit for each face; the image is a walk of one unit a pixel over the faces of its cell, and so is
 //! the gradient of the table; the gradient to the vertices is gathered, first per face over its
-//! pixels and then per vertex over its faces. Nothing is read back, so that a step of an optimisation never
-//! waits for the GPU. Every sum of floats has one order; texels are added up as whole numbers by atomic
-//! operations, where the order does not matter. The second order is the same kernels over dual numbers.
+//! pixels and then per vertex over its faces. They read nothing back. Every sum of floats has
+//! one order; the gradient of a texture is added up in whole numbers by atomic operations, where the order does not matter. The second order is the same kernels over dual numbers.
 
 #[cfg(not(target_family = "wasm"))]
 mod adapter;
@@ -105,12 +104,8 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
     let of_texels = op.texture.is_some() && wanted[4];
     let blend = Blend::new(op, &culling, inputs, direction);
     let found = blend.gradient(upstream, wanted[2], of_texels);
-    let mut parts = vec![
-        Some(found.vertices),
-        Some(found.attributes),
-        found.tables,
-        Some(found.background),
-    ];
+    let mut parts =
+        vec![Some(found.vertices), Some(found.attributes), found.tables, Some(found.background)];
     if op.texture.is_some() {
         parts.push(found.texture);
     }

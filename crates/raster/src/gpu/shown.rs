@@ -509,7 +509,13 @@ impl ColourPair {
         } else {
             let x = self.x;
             let place = weights.depth.place(x.mul(x), x.value <= 0.0f32, kind.far_depth);
-            add_powers(partial, first + 4u32 * place.row, place.place, zero.sub(by_depth), kind.second);
+            add_powers(
+                partial,
+                first + 4u32 * place.row,
+                place.place,
+                zero.sub(by_depth),
+                kind.second,
+            );
         }
     }
 

@@ -1,7 +1,7 @@
 //! A texture, sampled between its texels at the points of faces, as `kernel/blend/texture.rs` has it; and its gradient.
 //!
 //! A texel is seen by pairs all over the image, so its gradient is added up by atomic operations: on whole numbers, whose sums do not depend
-//! on their order. Each term is taken relative to the largest of all, in 64 bits.
+//! on their order. They have 64 bits, and a first walk finds how large terms are and how many, so that no sum leaves these.
 
 use cubecl::prelude::*;
 
@@ -18,11 +18,16 @@ use crate::kernel::blend::OF_TEXEL;
 
 /// Numbers of a texel.
 const NUMBERS: u32 = OF_TEXEL as u32;
-/// The largest term of a gradient as a whole number, and 2³². Eight million such terms have room.
-const LARGEST: f32 = 1_099_511_627_776.0;
+/// What all terms may add up to as whole numbers, a quarter of what has room, and 2³².
+const MOST: f32 = 2_305_843_009_213_693_952.0;
 const WORD: f32 = 4_294_967_296.0;
 /// Terms are taken as if the largest were not less than this, so that floats can hold their scale.
-const LEAST: f32 = 1e-25;
+const LEAST: f32 = 1e-19;
+/// Bits of a float without its sign, and of the least that is not finite.
+const SIZE: u32 = 0x7fff_ffff;
+const INFINITE: u32 = 0x7f80_0000;
+/// Words before the sums: the bits of the largest size of a term, and how many pairs there are.
+pub(super) const MEASURED: usize = 2;
 
 /// A place on a texture, between four texels.
 #[derive(CubeType, Clone, Copy)]
@@ -60,9 +65,10 @@ impl Between {
         let floor = f32::floor(x.value);
         let size = f32::cast_from(count);
         let place = floor - size * f32::floor(floor / size);
-        // Rounding, or a place that is not a number, must not leave the texture.
         let place = select(place > 0.0f32, place, 0.0f32);
         let first = u32::cast_from(select(place < size, place, 0.0f32));
+        // Neither rounding nor a place that is not a number leaves the texture; of floats a shader may assume that there is no such number.
+        let first = select(first < count, first, 0u32);
         let second = select(first + 1 == count, 0u32, first + 1);
         Between { first, second, part: x.sub(Dual::constant(floor)) }
     }
@@ -190,8 +196,8 @@ impl Four {
     }
 }
 
-/// Adds up the gradient of the texels, one unit a pixel: with `measure` only the largest size of a term, as the bits of a float, to
-/// `largest`; else all terms to `sums`, two words for each number of the texels.
+/// Adds up the gradient of the texels, one unit a pixel: with `measure` only finds the first [`MEASURED`] words of `sums`, else adds all terms to
+/// those behind them, two for each number of the texels.
 ///
 /// `pixels` is what [`blend_pixels`](super::blend::blend_pixels) has written.
 #[cube(launch)]
@@ -205,7 +211,6 @@ pub(super) fn sum_texels(
     entries: &Array<u32>,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
-    largest: &mut Array<Atomic<u32>>,
     sums: &mut Array<Atomic<u32>>,
     of_cells: Cells,
     weights: Weights,
@@ -228,14 +233,15 @@ pub(super) fn sum_texels(
     let plane = frame.height * frame.width;
     let planes = comptime!(kind.channels as u32 + 1);
     let first = ((first_view + view) * planes * plane + row * frame.width + column) as usize;
-    let own =
-        frame.pixel(first_view + view, row, column) as usize * comptime!(OF_PIXEL + kind.channels + 1);
+    let own = frame.pixel(first_view + view, row, column) as usize
+        * comptime!(OF_PIXEL + kind.channels + 1);
     let log = Dual { value: pixels[own], tangent: pixels[own + 1] };
     let mut scale = 0.0f32;
     if !measure {
-        scale = LARGEST / larger(f32::reinterpret(largest[0].load()), LEAST);
+        scale = scale_of(sums[0].load(), sums[1].load());
     }
-    let mut size = 0.0f32;
+    let mut largest = 0u32;
+    let mut pairs = 0u32;
     let first_word = of_cells.first_word(view, column, row);
     for word in 0..of_cells.words {
         let mut bits = cells[(first_word + word) as usize];
@@ -257,6 +263,7 @@ pub(super) fn sum_texels(
                     let share = pair.share(log, weights).whole;
                     let sample = shown.sample(pair, weights, numbers, direction, kind);
                     let shares = sample.shares().times(share);
+                    pairs += 1u32;
                     for channel in 0..channels {
                         let u = upstream[first + channel * plane as usize];
                         let a = shares.a.scale(u).stored(kind.second);
@@ -264,7 +271,10 @@ pub(super) fn sum_texels(
                         let c = shares.c.scale(u).stored(kind.second);
                         let d = shares.d.scale(u).stored(kind.second);
                         if measure {
-                            size = larger(larger(size, a), larger(b, larger(c, d)));
+                            largest = larger(largest, a);
+                            largest = larger(largest, b);
+                            largest = larger(largest, c);
+                            largest = larger(largest, d);
                         } else {
                             let channel = channel as u32;
                             add(sums, NUMBERS * sample.above_left + channel, a * scale);
@@ -278,31 +288,39 @@ pub(super) fn sum_texels(
         }
     }
     if measure {
-        // Of floats that are not negative the larger one has the larger bits.
-        largest[0].fetch_max(u32::reinterpret(size));
+        sums[0].fetch_max(largest);
+        sums[1].fetch_add(pairs);
     }
 }
 
-/// The larger size of two numbers.
+/// The larger of these bits and those of the size of a number: larger sizes have larger bits, and what is no number has the largest.
 #[cube]
-fn larger(one: f32, other: f32) -> f32 {
-    let one = f32::abs(one);
-    let other = f32::abs(other);
-    select(one > other, one, other)
+fn larger(bits: u32, number: f32) -> u32 {
+    let other = u32::reinterpret(number) & SIZE;
+    select(bits > other, bits, other)
 }
 
-/// Adds a number to the one at `at`, rounded to a whole one: to its lower word, and with what that carries to its upper one.
+/// What a term is multiplied by to become a whole number, from the bits of the largest and the number of pairs. A pair has at most four terms
+/// in a number.
+#[cube]
+fn scale_of(largest: u32, pairs: u32) -> f32 {
+    let size = f32::reinterpret(largest);
+    let size = select(size > LEAST, size, LEAST);
+    MOST / (4.0f32 * f32::cast_from(pairs) + 1.0f32) / size
+}
+
+/// Adds a number to number `at`, cut to a whole one: to its lower word, and with what that carries to its upper one.
 #[cube]
 fn add(sums: &mut Array<Atomic<u32>>, at: u32, number: f32) {
     let size = f32::abs(number);
-    let upper = f32::floor(size / WORD);
+    let upper = f32::floor(size * (1.0f32 / WORD));
     let mut low = u32::cast_from(size - upper * WORD);
     let mut high = u32::cast_from(upper);
     if number < 0.0f32 {
         high = select(low == 0u32, 0u32 - high, u32::MAX - high);
         low = 0u32 - low;
     }
-    let place = (2u32 * at) as usize;
+    let place = MEASURED + (2u32 * at) as usize;
     if low != 0u32 {
         let before = sums[place].fetch_add(low);
         high += select(before > u32::MAX - low, 1u32, 0u32);
@@ -312,19 +330,14 @@ fn add(sums: &mut Array<Atomic<u32>>, at: u32, number: f32) {
     }
 }
 
-/// Turns sums into floats, one unit a number.
+/// Turns the sums of [`sum_texels`] into floats, one unit a number.
 #[cube(launch)]
-pub(super) fn texel_floats(
-    sums: &Array<u32>,
-    largest: &Array<f32>,
-    gradient: &mut Array<f32>,
-    count: u32,
-) {
+pub(super) fn texel_floats(sums: &Array<u32>, gradient: &mut Array<f32>, count: u32) {
     let number = ABSOLUTE_POS as u32;
     if number >= count {
         terminate!();
     }
-    let at = (2u32 * number) as usize;
+    let at = MEASURED + (2u32 * number) as usize;
     let mut low = sums[at];
     let mut high = sums[at + 1];
     let negative = high > u32::MAX / 2u32;
@@ -333,6 +346,8 @@ pub(super) fn texel_floats(
         low = 0u32 - low;
     }
     let size = f32::cast_from(high) * WORD + f32::cast_from(low);
-    let sum = size * (larger(largest[0], LEAST) / LARGEST);
-    gradient[number as usize] = select(negative, -sum, sum);
+    let sum = size / scale_of(sums[0], sums[1]);
+    let sum = select(negative, -sum, sum);
+    // One term that is no number makes all of them none.
+    gradient[number as usize] = select(sums[0] < INFINITE, sum, f32::reinterpret(SIZE));
 }

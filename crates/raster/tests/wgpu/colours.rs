@@ -61,7 +61,10 @@ fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Ve
     let inner: Vec<_> = [
         scene.vertices.clone(),
         // Some places lie beyond the texture, which repeats.
-        wave(own * scene.entries.1 * numbers_of_entry, 0.71).iter().map(|x| 2.0 * x - 0.4).collect(),
+        wave(own * scene.entries.1 * numbers_of_entry, 0.71)
+            .iter()
+            .map(|x| 2.0 * x - 0.4)
+            .collect(),
         [wave(channels, 1.3), log_weight].concat(),
         wave(height * width * channels, 0.83),
         scene.renderer.phi()[0].clone(),
@@ -70,8 +73,10 @@ fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Ve
     .iter()
     .map(|values| flat(values))
     .collect();
-    let outer: Vec<_> =
-        inner.iter().map(|input| Tensor::<Autodiff<_>, 1>::from_inner(input.clone()).require_grad()).collect();
+    let outer: Vec<_> = inner
+        .iter()
+        .map(|input| Tensor::<Autodiff<_>, 1>::from_inner(input.clone()).require_grad())
+        .collect();
     let [vertices, attributes, behind, texels, edge, depth] = &outer[..] else { unreachable!() };
     let shaped = vertices.clone().reshape([views, scene.vertices.len() / 3 / views, 3]);
     let attributes = attributes.clone().reshape([own, scene.entries.1, numbers_of_entry]);
@@ -108,7 +113,8 @@ fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Ve
         (gradient * tensor(&ramp, [length], dtype)).sum()
     });
     let again = sum.reduce(Tensor::add).expect("sums").backward();
-    let second = with_gradient.iter().map(|&k| numbers(inner[k].grad(&again).expect("second order")));
+    let second =
+        with_gradient.iter().map(|&k| numbers(inner[k].grad(&again).expect("second order")));
     [vec![numbers(image)], first.into_iter().map(numbers).collect(), second.collect()].concat()
 }
 
@@ -193,10 +199,7 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
         ("a ball by the network of depths", ball(Family::Gauss, DepthSoftness::Mlp)),
         ("random triangles", random()),
         ("a ball in a picture", Scene { texture: Some([5, 7]), ..ball(Family::Logistic, exp) }),
-        (
-            "random triangles in pictures",
-            Scene { texture: Some([3, 4]), channels: 4, ..random() },
-        ),
+        ("random triangles in pictures", Scene { texture: Some([3, 4]), channels: 4, ..random() }),
     ];
     for (name, scene) in scenes {
         assert_close(&scene, Wanted::Scene, name);
@@ -210,6 +213,7 @@ fn gradients_to_the_softnesses_agree_with_the_kernel_in_f64() {
     }
     let scenes = [
         ("an exponential", ball(Family::Logistic, DepthSoftness::Family(Family::Exp))),
+        ("edges that end", ball(Family::Uniform, DepthSoftness::Family(Family::Exp))),
         ("a line", ball(Family::Logistic, DepthSoftness::Mlp)),
         ("a table", ball(Family::Gauss, DepthSoftness::Family(Family::Logistic))),
         ("random triangles in pictures", Scene { texture: Some([3, 4]), channels: 3, ..random() }),
