@@ -18,9 +18,10 @@ use crate::{
     triangles::triangles,
 };
 
-/// Largest error of a pixel, and of derivatives relative to their length.
+/// Largest error of a pixel, and of derivatives relative to their length: more where tables are made in f32.
 const IMAGE: f64 = 1e-4;
 const PRODUCTS: f64 = 2e-3;
+const PRODUCTS_OF_TABLES: f64 = 5e-3;
 
 /// What is drawn.
 struct Scene {
@@ -127,7 +128,8 @@ fn assert_close(scene: &Scene, wanted: Wanted, name: &str) {
     let shown: Vec<String> = errors.iter().map(|error| format!("{error:.1e}")).collect();
     println!("{name}: pixels {image:.1e}, products {}", shown.join(", "));
     assert!(image <= IMAGE, "{name}: a pixel is off by {image:e}");
-    assert!(errors.iter().all(|&e| e <= PRODUCTS), "{name}: relative errors {shown:?}");
+    let most = if wanted == Wanted::Scene { PRODUCTS } else { PRODUCTS_OF_TABLES };
+    assert!(errors.iter().all(|&e| e <= most), "{name}: relative errors {shown:?}");
 }
 
 fn renderer(
@@ -213,7 +215,7 @@ fn gradients_to_the_softnesses_agree_with_the_kernel_in_f64() {
     }
     let scenes = [
         ("an exponential", ball(Family::Logistic, DepthSoftness::Family(Family::Exp))),
-        ("edges that end", ball(Family::Uniform, DepthSoftness::Family(Family::Exp))),
+        ("edges that end", ball(Family::CubicHermite, DepthSoftness::Family(Family::Exp))),
         ("a line", ball(Family::Logistic, DepthSoftness::Mlp)),
         ("a table", ball(Family::Gauss, DepthSoftness::Family(Family::Logistic))),
         ("random triangles in pictures", Scene { texture: Some([3, 4]), channels: 3, ..random() }),
