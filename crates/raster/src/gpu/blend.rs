@@ -3,45 +3,63 @@
 
 use cubecl::prelude::*;
 
-use super::TILE;
 use super::{
-    cells::Cells,
-    dual::{Dual, load},
-    frame::Frame,
+    TILE,
+    drawn::{Drawn, Kind},
+    dual::Dual,
     gradient::UNITS,
     reach::Reach,
-    shown::{Kind, Shown, Weights},
 };
 
 /// Numbers of a pixel that a gradient needs: the logarithm of all weights, and what the image is to the upstream, with their derivatives.
 pub(super) const OF_PIXEL: usize = 4;
+
+/// The numbers of a pixel.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct OfPixel {
+    pub(super) log: Dual,
+    draw: Dual,
+}
+
+#[cube]
+impl OfPixel {
+    /// Where those of a pixel of a view of the launch begin, and behind them the gradient of the background.
+    pub(super) fn at(
+        drawn: &Drawn,
+        view: u32,
+        row: u32,
+        column: u32,
+        #[comptime] kind: Kind,
+    ) -> usize {
+        drawn.frame.pixel(drawn.first_view + view, row, column) as usize
+            * comptime!(OF_PIXEL + kind.channels + 1)
+    }
+
+    pub(super) fn load(pixels: &Array<f32>, at: usize) -> OfPixel {
+        OfPixel {
+            log: Dual { value: pixels[at], tangent: pixels[at + 1] },
+            draw: Dual { value: pixels[at + 2], tangent: pixels[at + 3] },
+        }
+    }
+}
 
 /// Writes each pixel of the image, `[views, channels + 1, height, width]`, or in a pass of second order its derivative.
 ///
 /// With `pull` it also writes to `pixels`, for each pixel, [`OF_PIXEL`] numbers and the gradient of the background, `channels + 1` numbers; the
 /// image itself is then only written in a pass of second order.
 #[cube(launch)]
-#[allow(clippy::too_many_arguments)]
 pub(super) fn blend_pixels(
-    corners: &Array<f32>,
-    reaches: &Array<u32>,
-    cells: &Array<u32>,
-    numbers: &Array<f32>,
-    direction: &Array<f32>,
-    entries: &Array<u32>,
+    drawn: &Drawn,
     upstream: &Array<f32>,
     pixels: &mut Array<f32>,
     image: &mut Array<f32>,
-    of_cells: Cells,
-    weights: Weights,
-    frame: Frame,
-    first_view: u32,
     #[comptime] kind: Kind,
     #[comptime] pull: bool,
 ) {
     let column = CUBE_POS_X * TILE + UNIT_POS_X;
     let row = CUBE_POS_Y * TILE + UNIT_POS_Y;
     let view = CUBE_POS_Z;
+    let (frame, weights, of_cells) = (drawn.frame, drawn.weights, drawn.of_cells);
     if column >= frame.width || row >= frame.height {
         terminate!();
     }
@@ -49,11 +67,8 @@ pub(super) fn blend_pixels(
     let second = comptime!(kind.second);
     let px = frame.column_centre(column);
     let py = frame.row_centre(row);
-    let along = weights.along;
-    let stride = comptime!(if second { 18usize } else { 9usize });
-    let first_attribute = weights.attributes + (first_view + view) * weights.per_view;
-    let last = weights.background as usize + channels;
-    let log_behind = load(numbers, last, direction, along as usize + last, second);
+    let background = weights.background as usize;
+    let log_behind = drawn.number(background + channels, kind);
 
     // Sums of weights relative to the largest so far, and of weights times channels.
     let mut largest = log_behind.value;
@@ -67,21 +82,13 @@ pub(super) fn blend_pixels(
     }
     let first_word = of_cells.first_word(view, column, row);
     for word in 0..of_cells.words {
-        let mut bits = cells[(first_word + word) as usize];
+        let mut bits = drawn.cells[(first_word + word) as usize];
         while bits != 0 {
             let face = 32 * word + bits.trailing_zeros();
             bits &= bits - 1u32;
-            let job = (view * of_cells.face_count + face) as usize;
-            if Reach::load(reaches, job).holds(column, row) {
-                let shown = Shown::new(
-                    corners,
-                    stride * job,
-                    entries,
-                    face as usize,
-                    first_attribute,
-                    kind,
-                );
-                let pair = shown.pair(px, py, weights, numbers, direction, kind);
+            if drawn.reaches(view, face, column, row) {
+                let shown = drawn.face(view, face, kind);
+                let pair = shown.pair(px, py, drawn, kind);
                 if pair.counts(weights) {
                     let log = pair.log_edge.value + pair.log_depth.value;
                     if log > largest {
@@ -98,16 +105,16 @@ pub(super) fn blend_pixels(
                     total += share.value;
                     total_tangent += share.tangent;
                     if kind.is_textured {
-                        let sample = shown.sample(pair, weights, numbers, direction, kind);
+                        let sample = shown.sample(pair, drawn, kind);
                         for channel in 0..channels {
-                            let own = sample.texels(numbers, direction, weights, channel, second);
+                            let own = sample.texels(drawn, channel, kind);
                             let seen = share.mul(sample.between(own));
                             values[channel] = values[channel] + seen.value;
                             tangents[channel] = tangents[channel] + seen.tangent;
                         }
                     } else {
                         for channel in 0..channels {
-                            let own = shown.attribute(numbers, direction, along, channel, second);
+                            let own = shown.attribute(drawn, channel, kind);
                             let seen = share.mul(pair.weights.mul(own).sum());
                             values[channel] = values[channel] + seen.value;
                             tangents[channel] = tangents[channel] + seen.tangent;
@@ -124,13 +131,9 @@ pub(super) fn blend_pixels(
     let per_total = whole_weight.recip();
     let covered = total.mul(per_total);
     let rest = behind.mul(per_total);
-    let plane = frame.height * frame.width;
-    let in_plane = row * frame.width + column;
-    let planes = comptime!(kind.channels as u32 + 1);
-    let first = ((first_view + view) * planes * plane + in_plane) as usize;
-    let step = plane as usize;
-    let own = frame.pixel(first_view + view, row, column) as usize
-        * comptime!(OF_PIXEL + kind.channels + 1);
+    let first = drawn.in_image(view, row, column, kind);
+    let step = drawn.plane();
+    let own = OfPixel::at(drawn, view, row, column, kind);
     let mut of_share = 0.0f32;
     if pull {
         of_share = upstream[first + channels * step];
@@ -141,8 +144,7 @@ pub(super) fn blend_pixels(
     let mut alone = 0.0f32;
     let mut alone_tangent = 0.0f32;
     for channel in 0..channels {
-        let at = weights.background as usize + channel;
-        let colour = load(numbers, at, direction, along as usize + at, second);
+        let colour = drawn.number(background + channel, kind);
         let sum = Dual { value: values[channel], tangent: tangents[channel] };
         let seen = sum.mul(per_total).add(rest.mul(colour));
         if comptime!(!pull || kind.second) {
@@ -176,21 +178,12 @@ pub(super) fn blend_pixels(
 /// Writes the gradient of each face, one cube a face, as `[views, faces, 9 + 3 numbers]`: x, y and depth of each of its corners, then the
 /// attributes of each.
 #[cube(launch)]
-#[allow(clippy::too_many_arguments)]
 pub(super) fn blend_faces(
-    corners: &Array<f32>,
-    reaches: &Array<u32>,
-    numbers: &Array<f32>,
-    direction: &Array<f32>,
-    entries: &Array<u32>,
+    drawn: &Drawn,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     gradient: &mut Array<f32>,
-    weights: Weights,
-    frame: Frame,
-    face_count: u32,
     jobs: u32,
-    first_view: u32,
     #[comptime] kind: Kind,
 ) {
     let job = CUBE_POS;
@@ -201,12 +194,11 @@ pub(super) fn blend_faces(
     let second = comptime!(kind.second);
     let count = comptime!(9 + 3 * kind.numbers());
     let units = comptime!(UNITS as usize);
-    let view = job as u32 / face_count + first_view;
-    let face = job % face_count as usize;
-    let stride = comptime!(if second { 18usize } else { 9usize });
-    let first_attribute = weights.attributes + view * weights.per_view;
-    let shown = Shown::new(corners, stride * job, entries, face, first_attribute, kind);
-    let reach = Reach::load(reaches, job);
+    let (frame, weights) = (drawn.frame, drawn.weights);
+    let face_count = drawn.of_cells.face_count;
+    let (view, face) = (job as u32 / face_count, job as u32 % face_count);
+    let shown = drawn.face(view, face, kind);
+    let reach = Reach::load(&drawn.reaches, job);
     let mut pixel = UNIT_POS;
     let mut end = 0u32;
     let mut width = 1u32;
@@ -218,30 +210,17 @@ pub(super) fn blend_faces(
     for k in 0..count {
         sums[k] = 0.0f32;
     }
-    let plane = frame.height * frame.width;
-    let planes = comptime!(kind.channels as u32 + 1);
     while pixel < end {
         let column = reach.left + pixel % width;
         let row = reach.top + pixel / width;
-        let first = (view * planes * plane + row * frame.width + column) as usize;
-        let own = frame.pixel(view, row, column) as usize * comptime!(OF_PIXEL + kind.channels + 1);
+        let first = drawn.in_image(view, row, column, kind);
         let px = frame.column_centre(column);
         let py = frame.row_centre(row);
-        let pair = shown.pair(px, py, weights, numbers, direction, kind);
+        let pair = shown.pair(px, py, drawn, kind);
         if pair.counts(weights) {
-            let log = Dual { value: pixels[own], tangent: pixels[own + 1] };
-            let draw = Dual { value: pixels[own + 2], tangent: pixels[own + 3] };
-            let share = pair.share(log, weights);
-            let seen = shown.seen(
-                pair,
-                weights,
-                numbers,
-                direction,
-                upstream,
-                first,
-                plane as usize,
-                kind,
-            );
+            let of_pixel = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind));
+            let share = pair.share(of_pixel.log, weights);
+            let seen = shown.seen(pair, drawn, upstream, first, kind);
             if kind.is_textured {
                 let by_u = pair.weights.times(share.whole.mul(seen.by_u));
                 let by_v = pair.weights.times(share.whole.mul(seen.by_v));
@@ -253,7 +232,7 @@ pub(super) fn blend_faces(
                 sums[14] = sums[14] + by_v.c.stored(second);
             } else {
                 for channel in 0..channels {
-                    let u = upstream[first + channel * plane as usize];
+                    let u = upstream[first + channel * drawn.plane()];
                     let by_channel = pair.weights.times(share.whole.scale(u));
                     let at = 9 + channel;
                     sums[at] = sums[at] + by_channel.a.stored(second);
@@ -263,9 +242,9 @@ pub(super) fn blend_faces(
             }
             let between = pair.weights.mul(seen.at_corners).sum();
             // A share draws the image from what it is towards what the face shows.
-            let drawn = seen.here.sub(draw);
-            let by_edge = share.of_edge.mul(drawn);
-            let by_place = share.whole.mul(drawn).mul(pair.depth_slope);
+            let pulled = seen.here.sub(of_pixel.draw);
+            let by_edge = share.of_edge.mul(pulled);
+            let by_place = share.whole.mul(pulled).mul(pair.depth_slope);
             // The nearness falls as the depth grows.
             let by_z = by_place.scale(-weights.per_range);
             // Both the depth and the weights on the face change by a weight on the screen as by its share of 1 / z.
@@ -307,34 +286,21 @@ pub(super) fn blend_faces(
 /// Adds the gradient of both tables, every unit to tables of its own over the pixels that it walks, `[units, rows, 4]`, as
 /// [`sum_cubics`](super::table::sum_cubics) does.
 #[cube(launch)]
-#[allow(clippy::too_many_arguments)]
 pub(super) fn blend_cubics(
-    corners: &Array<f32>,
-    reaches: &Array<u32>,
-    cells: &Array<u32>,
-    numbers: &Array<f32>,
-    direction: &Array<f32>,
-    entries: &Array<u32>,
+    drawn: &Drawn,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     partial: &mut Array<f32>,
-    of_cells: Cells,
-    weights: Weights,
-    frame: Frame,
-    first_view: u32,
-    views: u32,
     rows: u32,
     #[comptime] kind: Kind,
 ) {
+    let (frame, of_cells) = (drawn.frame, drawn.of_cells);
     #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
     let across = (frame.width + TILE - 1u32) / TILE;
     #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
     let down = (frame.height + TILE - 1u32) / TILE;
-    let tiles = views * across * down;
+    let tiles = of_cells.views * across * down;
     let table = ABSOLUTE_POS as u32 * rows * 4u32;
-    let stride = comptime!(if kind.second { 18usize } else { 9usize });
-    let plane = frame.height * frame.width;
-    let planes = comptime!(kind.channels as u32 + 1);
     let mut tile = CUBE_POS as u32;
     while tile < tiles {
         let column = tile % across * TILE + UNIT_POS_X;
@@ -343,53 +309,24 @@ pub(super) fn blend_cubics(
         if column < frame.width && row < frame.height {
             let px = frame.column_centre(column);
             let py = frame.row_centre(row);
-            let first_attribute = weights.attributes + (first_view + view) * weights.per_view;
-            let first =
-                ((first_view + view) * planes * plane + row * frame.width + column) as usize;
-            let own = frame.pixel(first_view + view, row, column) as usize
-                * comptime!(OF_PIXEL + kind.channels + 1);
-            let log = Dual { value: pixels[own], tangent: pixels[own + 1] };
-            let draw = Dual { value: pixels[own + 2], tangent: pixels[own + 3] };
+            let first = drawn.in_image(view, row, column, kind);
+            let of_pixel = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind));
             let first_word = of_cells.first_word(view, column, row);
             for word in 0..of_cells.words {
-                let mut bits = cells[(first_word + word) as usize];
+                let mut bits = drawn.cells[(first_word + word) as usize];
                 while bits != 0 {
                     let face = 32 * word + bits.trailing_zeros();
                     bits &= bits - 1u32;
-                    let job = (view * of_cells.face_count + face) as usize;
-                    if Reach::load(reaches, job).holds(column, row) {
-                        let shown = Shown::new(
-                            corners,
-                            stride * job,
-                            entries,
-                            face as usize,
-                            first_attribute,
-                            kind,
-                        );
-                        let pair = shown.pair(px, py, weights, numbers, direction, kind);
-                        if pair.counts(weights) {
-                            let share = pair.share(log, weights);
-                            let seen = shown.seen(
-                                pair,
-                                weights,
-                                numbers,
-                                direction,
-                                upstream,
-                                first,
-                                plane as usize,
-                                kind,
-                            );
-                            let drawn = seen.here.sub(draw);
-                            pair.pull_tables(
-                                share.of_edge.mul(drawn),
-                                share.whole.mul(drawn),
-                                weights,
-                                numbers,
-                                direction,
-                                partial,
-                                table,
-                                kind,
-                            );
+                    if drawn.reaches(view, face, column, row) {
+                        let shown = drawn.face(view, face, kind);
+                        let pair = shown.pair(px, py, drawn, kind);
+                        if pair.counts(drawn.weights) {
+                            let share = pair.share(of_pixel.log, drawn.weights);
+                            let seen = shown.seen(pair, drawn, upstream, first, kind);
+                            let pulled = seen.here.sub(of_pixel.draw);
+                            let (by_edge, by_depth) =
+                                (share.of_edge.mul(pulled), share.whole.mul(pulled));
+                            pair.pull_tables(by_edge, by_depth, drawn, partial, table, kind);
                         }
                     }
                 }

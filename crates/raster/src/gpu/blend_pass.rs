@@ -9,9 +9,9 @@ use burn_cubecl::{cubecl::prelude::*, kernel::into_contiguous};
 use super::{
     TILE, Wgpu,
     blend::{OF_PIXEL, blend_cubics, blend_faces, blend_pixels, gather_corners},
+    drawn::{DrawnLaunch, Kind, WeightsLaunch},
     gradient::UNITS,
     pass::{Buffer, CUBE, Culled, Partial, Pass, lookup},
-    shown::{Kind, WeightsLaunch},
     texture::{MEASURED, sum_texels, texel_floats},
     topology::{OnDevice, Topology},
 };
@@ -205,19 +205,10 @@ impl<'a> Blend<'a> {
             &self.pass.client,
             self.tiles(culled),
             CubeDim::new_2d(TILE, TILE),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            culled.cells.clone().into_array_arg(),
-            self.numbers.clone().into_array_arg(),
-            self.direction().into_array_arg(),
-            self.entries.faces.clone().into_array_arg(),
+            self.drawn(culled),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             image.clone().into_array_arg(),
-            self.pass.cells(culled),
-            self.weights(),
-            self.pass.frame(),
-            culled.first_view as u32,
             self.kind(),
             pull,
         );
@@ -230,19 +221,11 @@ impl<'a> Blend<'a> {
             &self.pass.client,
             self.pass.cubes(jobs * UNITS as usize, UNITS),
             CubeDim::new_1d(UNITS),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            self.numbers.clone().into_array_arg(),
-            self.direction().into_array_arg(),
-            self.entries.faces.clone().into_array_arg(),
+            self.drawn(culled),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             of_faces.clone().into_array_arg(),
-            self.weights(),
-            self.pass.frame(),
-            self.op.faces.len() as u32,
             jobs as u32,
-            culled.first_view as u32,
             self.kind(),
         );
         of_faces
@@ -261,20 +244,10 @@ impl<'a> Blend<'a> {
             &self.pass.client,
             CubeCount::Static(partial.cubes as u32, 1, 1),
             CubeDim::new_2d(TILE, TILE),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            culled.cells.clone().into_array_arg(),
-            self.numbers.clone().into_array_arg(),
-            self.direction().into_array_arg(),
-            self.entries.faces.clone().into_array_arg(),
+            self.drawn(culled),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             partial.tables.clone().into_array_arg(),
-            self.pass.cells(culled),
-            self.weights(),
-            self.pass.frame(),
-            culled.first_view as u32,
-            culled.views as u32,
             rows as u32,
             self.kind(),
         );
@@ -299,19 +272,10 @@ impl<'a> Blend<'a> {
             &self.pass.client,
             self.tiles(culled),
             CubeDim::new_2d(TILE, TILE),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            culled.cells.clone().into_array_arg(),
-            self.numbers.clone().into_array_arg(),
-            self.direction().into_array_arg(),
-            self.entries.faces.clone().into_array_arg(),
+            self.drawn(culled),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             texels.sums.clone().into_array_arg(),
-            self.pass.cells(culled),
-            self.weights(),
-            self.pass.frame(),
-            culled.first_view as u32,
             self.kind(),
             measure,
         );
@@ -329,6 +293,22 @@ impl<'a> Blend<'a> {
             texels.count as u32,
         );
         gradient
+    }
+
+    /// What the kernels read.
+    fn drawn(&self, culled: &Culled) -> DrawnLaunch<WgpuRuntime> {
+        DrawnLaunch::new(
+            culled.corners.clone().into_array_arg(),
+            culled.reaches.clone().into_array_arg(),
+            culled.cells.clone().into_array_arg(),
+            self.numbers.clone().into_array_arg(),
+            self.direction().into_array_arg(),
+            self.entries.faces.clone().into_array_arg(),
+            self.pass.cells(culled),
+            self.weights(),
+            self.pass.frame(),
+            culled.first_view as u32,
+        )
     }
 
     /// A cube for each tile of the image.

@@ -11,6 +11,8 @@ mod adapter;
 mod blend;
 mod blend_pass;
 mod cells;
+mod depth;
+mod drawn;
 mod dual;
 mod frame;
 mod gradient;

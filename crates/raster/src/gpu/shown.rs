@@ -1,10 +1,12 @@
-//! The arithmetic of one pixel and one face in colour, as `kernel/blend/{point,depth,walk}.rs` have it.
+//! The arithmetic of one pixel and one face in colour, as `kernel/blend/{point,walk}.rs` have it.
 
 use cubecl::prelude::*;
 
 use super::{
+    depth::{ByDepth, pull_depth},
+    drawn::{Drawn, Kind, Weights},
     dual::{Dual, load},
-    pair::{Closest, Cubic, Face, Lookup, Place},
+    pair::{Closest, Face, Place},
     table::add_powers,
     texture::{Four, Sample},
 };
@@ -13,59 +15,6 @@ use crate::kernel::blend::AREA;
 /// [`AREA`] in the floats of kernels.
 #[allow(clippy::cast_possible_truncation)]
 const LEAST_AREA: f32 = AREA as f32;
-
-/// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, background and texture.
-#[derive(CubeType, CubeLaunch, Clone, Copy)]
-pub(super) struct Weights {
-    /// Cells of the edge softness, mirrored: the inner side is outside a face.
-    pub(super) edge: Lookup,
-    pub(super) depth: Lookup,
-    /// Row where the table by depth begins.
-    pub(super) depth_row: u32,
-    /// Where attributes, background and texture begin.
-    pub(super) attributes: u32,
-    pub(super) background: u32,
-    pub(super) texture: u32,
-    /// Those of the texture.
-    pub(super) rows: u32,
-    pub(super) columns: u32,
-    /// Attributes of a view that has its own.
-    pub(super) per_view: u32,
-    /// Where the derivatives of all these numbers begin in the direction.
-    pub(super) along: u32,
-    /// Depth of nearness 1, and one over the distance of the planes.
-    pub(super) near: f32,
-    pub(super) per_range: f32,
-    /// What is taken off the edge softness, and the logarithm from which on it counts.
-    pub(super) floor: f32,
-    pub(super) counts_from: f32,
-    /// Least weight by depth, of a line; of an exponential its logarithm.
-    pub(super) least: f32,
-}
-
-/// What of the weighting is known when a kernel is compiled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Kind {
-    /// Whether tables have cells that are counted from their far ends.
-    pub(super) far_edge: bool,
-    pub(super) far_depth: bool,
-    /// Whether weights by depth are a line or an exponential in place of a table.
-    pub(super) is_line: bool,
-    pub(super) is_exponential: bool,
-    /// Whether attributes are places on a texture.
-    pub(super) is_textured: bool,
-    /// Channels of the image, but for the faces' share.
-    pub(super) channels: usize,
-    /// Whether the pass is of second order.
-    pub(super) second: bool,
-}
-
-impl Kind {
-    /// Numbers of an attribute.
-    pub(super) fn numbers(self) -> usize {
-        if self.is_textured { 2 } else { self.channels }
-    }
-}
 
 /// A number for each corner of a face.
 #[derive(CubeType, Clone, Copy)]
@@ -142,13 +91,6 @@ pub(super) struct ColourPair {
     pub(super) depth_slope: Dual,
 }
 
-/// A logarithm of a weight by depth, and its derivative by the nearness.
-#[derive(CubeType, Clone, Copy)]
-struct ByDepth {
-    log: Dual,
-    slope: Dual,
-}
-
 /// What a pair shows of the objective: what it is at the point, and how it changes with the attributes of the three corners, were the point
 /// there.
 #[derive(CubeType, Clone, Copy)]
@@ -203,55 +145,34 @@ impl Shown {
     }
 
     /// A number of the attributes at the three corners.
-    pub(super) fn attribute(
-        self,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
-        along: u32,
-        number: usize,
-        #[comptime] second: bool,
-    ) -> Corners {
-        let a = self.entry_a as usize + number;
-        let b = self.entry_b as usize + number;
-        let c = self.entry_c as usize + number;
-        let along = along as usize;
+    pub(super) fn attribute(self, drawn: &Drawn, number: usize, #[comptime] kind: Kind) -> Corners {
         Corners {
-            a: load(numbers, a, direction, along + a, second),
-            b: load(numbers, b, direction, along + b, second),
-            c: load(numbers, c, direction, along + c, second),
+            a: drawn.number(self.entry_a as usize + number, kind),
+            b: drawn.number(self.entry_b as usize + number, kind),
+            c: drawn.number(self.entry_c as usize + number, kind),
         }
     }
 
     /// Where a pair sees the texture.
-    pub(super) fn sample(
-        self,
-        pair: ColourPair,
-        weights: Weights,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
-        #[comptime] kind: Kind,
-    ) -> Sample {
-        let u = self.attribute(numbers, direction, weights.along, 0usize, kind.second);
-        let v = self.attribute(numbers, direction, weights.along, 1usize, kind.second);
-        Sample::at(pair.weights.mul(u).sum(), pair.weights.mul(v).sum(), weights)
+    pub(super) fn sample(self, pair: ColourPair, drawn: &Drawn, #[comptime] kind: Kind) -> Sample {
+        let u = pair.weights.mul(self.attribute(drawn, 0usize, kind)).sum();
+        let v = pair.weights.mul(self.attribute(drawn, 1usize, kind)).sum();
+        Sample::at(u, v, drawn.weights)
     }
 
     /// What a pair shows under an upstream, the first channel of which stands at `first`.
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn seen(
         self,
         pair: ColourPair,
-        weights: Weights,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
+        drawn: &Drawn,
         upstream: &Array<f32>,
         first: usize,
-        plane: usize,
         #[comptime] kind: Kind,
     ) -> Seen {
+        let plane = drawn.plane();
         let zero = Dual::constant(0.0f32);
         if kind.is_textured {
-            let sample = self.sample(pair, weights, numbers, direction, kind);
+            let sample = self.sample(pair, drawn, kind);
             // Kept in an array, as a loop changes no struct.
             let mut sums = Array::<f32>::new(8usize);
             for k in 0..8usize {
@@ -259,13 +180,14 @@ impl Shown {
             }
             for channel in 0..comptime!(kind.channels) {
                 let u = upstream[first + channel * plane];
-                let texels = sample.texels(numbers, direction, weights, channel, kind.second);
+                let texels = sample.texels(drawn, channel, kind);
                 Four::load(&sums).plus(u, texels).store(&mut sums);
             }
             let sums = Four::load(&sums);
-            let (by_u, by_v) = (sample.by_u(sums, weights), sample.by_v(sums, weights));
-            let u = self.attribute(numbers, direction, weights.along, 0usize, kind.second);
-            let v = self.attribute(numbers, direction, weights.along, 1usize, kind.second);
+            let by_u = sample.by_u(sums, drawn.weights);
+            let by_v = sample.by_v(sums, drawn.weights);
+            let u = self.attribute(drawn, 0usize, kind);
+            let v = self.attribute(drawn, 1usize, kind);
             let at_corners = u.times(by_u).add(v.times(by_v));
             Seen { here: sample.between(sums), at_corners, by_u, by_v }
         } else {
@@ -275,8 +197,7 @@ impl Shown {
             }
             for channel in 0..comptime!(kind.channels) {
                 let u = upstream[first + channel * plane];
-                let values =
-                    self.attribute(numbers, direction, weights.along, channel, kind.second);
+                let values = self.attribute(drawn, channel, kind);
                 sums[0] = sums[0] + values.a.value * u;
                 sums[1] = sums[1] + values.a.tangent * u;
                 sums[2] = sums[2] + values.b.value * u;
@@ -299,11 +220,10 @@ impl Shown {
         self,
         px: f32,
         py: f32,
-        weights: Weights,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
+        drawn: &Drawn,
         #[comptime] kind: Kind,
     ) -> ColourPair {
+        let weights = drawn.weights;
         let closest = self.face.closest(px, py);
         let inside = closest.side >= 0.0f32 && self.face.orientation != 0.0f32;
         let within = inside && self.per_area.value != 0.0f32;
@@ -327,9 +247,9 @@ impl Shown {
         let depth = parts.sum().recip();
 
         let place = weights.edge.place(closest.distance2, !inside, kind.far_edge);
-        let cubic = Cubic::new(numbers, place.row, direction, weights.along, kind.second);
+        let cubic = drawn.cubic(place.row, kind);
         let x = Dual::constant(weights.near).sub(depth).scale(weights.per_range);
-        let by_depth = ByDepth::at(x, weights, numbers, direction, kind);
+        let by_depth = ByDepth::at(x, drawn, kind);
         ColourPair {
             closest,
             within: select(within, 1.0f32, 0.0f32),
@@ -423,100 +343,22 @@ fn corners(pair: ColourPair, pull: Dual, field: Dual, across: Dual) -> Corners {
 }
 
 #[cube]
-impl ByDepth {
-    /// What a point at `x`, its nearness less 1, counts.
-    fn at(
-        x: Dual,
-        weights: Weights,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
-        #[comptime] kind: Kind,
-    ) -> ByDepth {
-        let zero = Dual::constant(0.0f32);
-        if kind.is_line {
-            let at = 4 * weights.depth_row as usize;
-            let along = weights.along as usize + at;
-            let nearness = x.add(Dual::constant(1.0f32));
-            let a = load(numbers, at, direction, along, kind.second);
-            let c = load(numbers, at + 1, direction, along + 1, kind.second);
-            let slope = Dual::select(nearness.value > 0.0f32, a, zero.sub(c));
-            let weight = slope.mul(nearness);
-            let some = weight.value > weights.least;
-            let held = Dual::select(some, weight, Dual::constant(weights.least));
-            let per_weight = Dual::select(some, held.recip(), zero);
-            ByDepth { log: held.ln(), slope: slope.mul(per_weight) }
-        } else if kind.is_exponential {
-            let at = 4 * weights.depth_row as usize;
-            let along = weights.along as usize + at;
-            let slope = load(numbers, at, direction, along, kind.second);
-            let log = slope.mul(x).add(load(numbers, at + 1, direction, along + 1, kind.second));
-            let (above, below) = (log.value > weights.least, log.value < 0.0f32);
-            let log = Dual::select(above, log, Dual::constant(weights.least));
-            ByDepth {
-                log: Dual::select(below, log, zero),
-                slope: Dual::select(above && below, slope, zero),
-            }
-        } else {
-            let place = weights.depth.place(x.mul(x), x.value <= 0.0f32, kind.far_depth);
-            let row = weights.depth_row + place.row;
-            let cubic = Cubic::new(numbers, row, direction, weights.along, kind.second);
-            let slope = place.slope(cubic).mul(x.scale(-2.0f32));
-            ByDepth { log: zero.sub(place.value(cubic)), slope }
-        }
-    }
-}
-
-#[cube]
 impl ColourPair {
     /// Adds to the gradient of both tables, which begins at `own`, of a function with these derivatives by the logarithms of the weights.
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn pull_tables(
         self,
         by_edge: Dual,
         by_depth: Dual,
-        weights: Weights,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
+        drawn: &Drawn,
         partial: &mut Array<f32>,
         own: u32,
         #[comptime] kind: Kind,
     ) {
-        let zero = Dual::constant(0.0f32);
         let edge = self.edge;
-        add_powers(partial, own + 4u32 * edge.row, edge.place, zero.sub(by_edge), kind.second);
-        let first = own + 4u32 * weights.depth_row;
-        if kind.is_line || kind.is_exponential {
-            let at = 4 * weights.depth_row as usize;
-            let along = weights.along as usize + at;
-            let a = load(numbers, at, direction, along, kind.second);
-            let c = load(numbers, at + 1, direction, along + 1, kind.second);
-            let (by_a, by_c) = if kind.is_line {
-                let nearness = self.x.add(Dual::constant(1.0f32));
-                let near = nearness.value > 0.0f32;
-                let weight = Dual::select(near, a, zero.sub(c)).mul(nearness);
-                let some = weight.value > weights.least;
-                let held = Dual::select(some, weight, Dual::constant(1.0f32));
-                let by_slope = Dual::select(some, by_depth.mul(nearness).mul(held.recip()), zero);
-                (Dual::select(near, by_slope, zero), Dual::select(near, zero, zero.sub(by_slope)))
-            } else {
-                let log = a.mul(self.x).add(c).value;
-                let by_log = Dual::select(log > weights.least && log < 0.0f32, by_depth, zero);
-                (by_log.mul(self.x), by_log)
-            };
-            let first = first as usize;
-            partial[first] = partial[first] + by_a.stored(kind.second);
-            partial[first + 1] = partial[first + 1] + by_c.stored(kind.second);
-        } else {
-            let x = self.x;
-            let place = weights.depth.place(x.mul(x), x.value <= 0.0f32, kind.far_depth);
-            add_powers(
-                partial,
-                first + 4u32 * place.row,
-                place.place,
-                zero.sub(by_depth),
-                kind.second,
-            );
-        }
+        let by_value = Dual::constant(0.0f32).sub(by_edge);
+        add_powers(partial, own + 4u32 * edge.row, edge.place, by_value, kind.second);
+        let first = own + 4u32 * drawn.weights.depth_row;
+        pull_depth(self.x, by_depth, drawn, partial, first, kind);
     }
 
     /// Whether it counts at all, and is above the floor by more than rounding leaves.

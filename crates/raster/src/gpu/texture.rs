@@ -7,12 +7,9 @@ use cubecl::prelude::*;
 
 use super::{
     TILE,
-    blend::OF_PIXEL,
-    cells::Cells,
-    dual::{Dual, load},
-    frame::Frame,
-    reach::Reach,
-    shown::{Kind, Shown, Weights},
+    blend::OfPixel,
+    drawn::{Drawn, Kind, Weights},
+    dual::Dual,
 };
 use crate::kernel::blend::OF_TEXEL;
 
@@ -95,25 +92,13 @@ impl Sample {
     }
 
     /// A channel of the four texels.
-    pub(super) fn texels(
-        self,
-        numbers: &Array<f32>,
-        direction: &Array<f32>,
-        weights: Weights,
-        channel: usize,
-        #[comptime] second: bool,
-    ) -> Four {
-        let first = weights.texture + channel as u32;
-        let along = weights.along as usize;
-        let a = (first + NUMBERS * self.above_left) as usize;
-        let b = (first + NUMBERS * self.above_right) as usize;
-        let c = (first + NUMBERS * self.below_left) as usize;
-        let d = (first + NUMBERS * self.below_right) as usize;
+    pub(super) fn texels(self, drawn: &Drawn, channel: usize, #[comptime] kind: Kind) -> Four {
+        let first = drawn.weights.texture + channel as u32;
         Four {
-            a: load(numbers, a, direction, along + a, second),
-            b: load(numbers, b, direction, along + b, second),
-            c: load(numbers, c, direction, along + c, second),
-            d: load(numbers, d, direction, along + d, second),
+            a: drawn.number((first + NUMBERS * self.above_left) as usize, kind),
+            b: drawn.number((first + NUMBERS * self.above_right) as usize, kind),
+            c: drawn.number((first + NUMBERS * self.below_left) as usize, kind),
+            d: drawn.number((first + NUMBERS * self.below_right) as usize, kind),
         }
     }
 
@@ -201,41 +186,27 @@ impl Four {
 ///
 /// `pixels` is what [`blend_pixels`](super::blend::blend_pixels) has written.
 #[cube(launch)]
-#[allow(clippy::too_many_arguments)]
 pub(super) fn sum_texels(
-    corners: &Array<f32>,
-    reaches: &Array<u32>,
-    cells: &Array<u32>,
-    numbers: &Array<f32>,
-    direction: &Array<f32>,
-    entries: &Array<u32>,
+    drawn: &Drawn,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     sums: &mut Array<Atomic<u32>>,
-    of_cells: Cells,
-    weights: Weights,
-    frame: Frame,
-    first_view: u32,
     #[comptime] kind: Kind,
     #[comptime] measure: bool,
 ) {
     let column = CUBE_POS_X * TILE + UNIT_POS_X;
     let row = CUBE_POS_Y * TILE + UNIT_POS_Y;
     let view = CUBE_POS_Z;
+    let (frame, of_cells) = (drawn.frame, drawn.of_cells);
     if column >= frame.width || row >= frame.height {
         terminate!();
     }
     let channels = comptime!(kind.channels);
     let px = frame.column_centre(column);
     let py = frame.row_centre(row);
-    let stride = comptime!(if kind.second { 18usize } else { 9usize });
-    let first_attribute = weights.attributes + (first_view + view) * weights.per_view;
-    let plane = frame.height * frame.width;
-    let planes = comptime!(kind.channels as u32 + 1);
-    let first = ((first_view + view) * planes * plane + row * frame.width + column) as usize;
-    let own = frame.pixel(first_view + view, row, column) as usize
-        * comptime!(OF_PIXEL + kind.channels + 1);
-    let log = Dual { value: pixels[own], tangent: pixels[own + 1] };
+    let first = drawn.in_image(view, row, column, kind);
+    let own = OfPixel::at(drawn, view, row, column, kind);
+    let log = OfPixel::load(pixels, own).log;
     let mut scale = 0.0f32;
     if !measure {
         scale = scale_of(sums[0].load(), sums[1].load());
@@ -244,28 +215,20 @@ pub(super) fn sum_texels(
     let mut pairs = 0u32;
     let first_word = of_cells.first_word(view, column, row);
     for word in 0..of_cells.words {
-        let mut bits = cells[(first_word + word) as usize];
+        let mut bits = drawn.cells[(first_word + word) as usize];
         while bits != 0 {
             let face = 32 * word + bits.trailing_zeros();
             bits &= bits - 1u32;
-            let job = (view * of_cells.face_count + face) as usize;
-            if Reach::load(reaches, job).holds(column, row) {
-                let shown = Shown::new(
-                    corners,
-                    stride * job,
-                    entries,
-                    face as usize,
-                    first_attribute,
-                    kind,
-                );
-                let pair = shown.pair(px, py, weights, numbers, direction, kind);
-                if pair.counts(weights) {
-                    let share = pair.share(log, weights).whole;
-                    let sample = shown.sample(pair, weights, numbers, direction, kind);
+            if drawn.reaches(view, face, column, row) {
+                let shown = drawn.face(view, face, kind);
+                let pair = shown.pair(px, py, drawn, kind);
+                if pair.counts(drawn.weights) {
+                    let share = pair.share(log, drawn.weights).whole;
+                    let sample = shown.sample(pair, drawn, kind);
                     let shares = sample.shares().times(share);
                     pairs += 1u32;
                     for channel in 0..channels {
-                        let u = upstream[first + channel * plane as usize];
+                        let u = upstream[first + channel * drawn.plane()];
                         let a = shares.a.scale(u).stored(kind.second);
                         let b = shares.b.scale(u).stored(kind.second);
                         let c = shares.c.scale(u).stored(kind.second);
