@@ -26,7 +26,8 @@ const BEHIND: f64 = 1e-3;
 /// an image changes smoothly as faces move, also where one comes in front of another. [`reference::blended`](crate::reference::blended) has the definition in full.
 ///
 /// No pixel is off by more than the tolerance times the range of what is shown, in exact arithmetic: tables of both softnesses are made to
-/// measure, and what is left out of a pixel is bounded by the background's weight. In floats of 32 bits, logarithms of weights have an error
+/// measure, and what is left out of a pixel is bounded by the background's weight. Where no table can meet the tolerance,
+/// [`error_bound`](Self::error_bound) is larger and states the error that is left. In floats of 32 bits, logarithms of weights have an error
 /// of 1e-7 of themselves. An edge softness that is 0 from some distance on is known to 1e-11, so its background should weigh no less than
 /// 1e-6 of the nearest faces. One that never comes to be negligible, as the network, has every face drawn at every pixel.
 ///
@@ -173,6 +174,15 @@ impl ColourRenderer {
     pub fn set_phi(&mut self, phi: [Vec<f64>; 2]) {
         check(&self.weighting, &phi);
         self.phi = phi;
+    }
+
+    /// The largest error of a pixel beside this background under the renderer's own parameters, as a part of the range of what is shown:
+    /// the tolerance, or more where a softness has a jump or a corner that no table can follow to it. In exact arithmetic.
+    pub fn error_bound<B: Backend>(&self, background: &Background<B>) -> f64 {
+        let prepared = self.prepared(&self.phi, number(background));
+        // As many parts for each table as it is off; half of the tolerance is for what is left out.
+        let tables = [prepared.edge.error, prepared.depth.error()].map(|error| error.max(1.0));
+        self.tolerance * (0.5 + 0.25 * (tables[0] + tables[1]))
     }
 
     /// A background of this colour that weighs a thousandth of a face at the far plane: where a face covers a pixel it takes at most that

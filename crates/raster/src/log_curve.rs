@@ -1,12 +1,12 @@
 use std::iter;
 
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, support};
+use burn::tensor::{Tensor, backend::Backend};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers, support};
 
 use crate::{
     Profile, TConorm,
     kernel::{Grid, blend::DepthGrid},
-    profile::{FAR, Reached, Sample, refined, samples},
+    profile::{FAR, PLACES, Reached, Sample, dense, precise, refined, samples, settled_until},
     weighting::NOTHING,
 };
 
@@ -31,6 +31,8 @@ const ROUNDING: f64 = 1e-12;
 pub(crate) struct LogCurve {
     softness: EdgeSoftness,
     pub(crate) grid: Grid,
+    /// How far it is off, in multiples of what was asked for.
+    pub(crate) error: f64,
 }
 
 /// What a table is asked for.
@@ -67,16 +69,6 @@ impl LogCurve {
         precision: Precision,
         device: &B::Device,
     ) -> Self {
-        Self::measured::<B>(softness, phi, precision, device).0
-    }
-
-    /// The same, and by how much it is off, in multiples of what is asked for.
-    fn measured<B: Backend>(
-        softness: EdgeSoftness,
-        phi: &[f64],
-        precision: Precision,
-        device: &B::Device,
-    ) -> (Self, f64) {
         let softness = EdgeSoftness { family: softness.family.mirrored(), ..softness };
         let Precision { accuracy, least, floor } = precision;
         let outer = support::<B>(&softness, phi, accuracy / 2.0, device).outer;
@@ -84,9 +76,12 @@ impl LogCurve {
         let close = if floor > 0.0 { least.exp() / floor } else { accuracy };
         let close = close.min(accuracy).max(ROUNDING) / 2.0;
         let inner = settled_beyond::<B>(&softness, phi, -least, close, device);
-        let (grid, reached) = refined([outer, inner], &FAR, |grid| {
-            let (samples, rounding) =
-                samples::<B>(&softness, TConorm::Probabilistic, phi, grid, device);
+        let from = || {
+            let settled = |edge: f64, q: f64| (q - edge).abs() <= accuracy.max(ROUNDING) / 2.0;
+            settled_until::<B>(&softness, phi, [outer, inner], settled, device)
+        };
+        let missed = |grid: Grid, places: &[f64]| {
+            let (samples, rounding) = samples::<B>(&softness, depths(grid), phi, places, device);
             let mut reached = Reached::NOTHING;
             for Sample { exact, interpolated, innermost } in samples {
                 let error = precision.error(exact, interpolated, rounding);
@@ -94,21 +89,29 @@ impl LogCurve {
                 *place = place.max(error);
             }
             reached
-        });
-        (Self { softness, grid }, reached.innermost.max(reached.rest))
+        };
+        let (grid, reached) = refined([outer, inner], from, &FAR, |grid| missed(grid, &PLACES));
+        let mut error = reached.most();
+        if error > 1.0 {
+            error = missed(grid, &dense()).most();
+        }
+        Self { softness, grid, error }
     }
 
     /// The same softness stretched by `factor` along its argument, to the same precision; None where it has to be chosen anew.
     pub(crate) fn stretched(self, factor: f64) -> Option<Self> {
-        let profile = Profile { grid: self.grid, t_conorm: TConorm::Probabilistic, error: 0.0 };
-        Some(Self { grid: profile.stretched(factor)?.grid, ..self })
+        Some(Self { grid: depths(self.grid).stretched(factor)?.grid, ..self })
     }
 
     /// Coefficients of the cubics, `[rows, 4]`, in the float type of `phi` `[parameters]`.
     pub(crate) fn table<B: Backend>(&self, phi: Tensor<B, 1>) -> Tensor<B, 2> {
-        let profile = Profile { grid: self.grid, t_conorm: TConorm::Probabilistic, error: 0.0 };
-        profile.table(&self.softness, phi)
+        depths(self.grid).table(&self.softness, phi)
     }
+}
+
+/// A profile of optical depths with these cells.
+fn depths(grid: Grid) -> Profile {
+    Profile { grid, t_conorm: TConorm::Probabilistic, error: 0.0, rough: false }
 }
 
 /// Logarithms of weights by depth, for a kernel.
@@ -138,6 +141,14 @@ impl DepthCurve {
                 Self::Family(LogCurve::new::<B>(softness, phi, precision, device))
             }
             DepthSoftness::Mlp => Self::Mlp,
+        }
+    }
+
+    /// How far it is off, in multiples of what was asked for.
+    pub(crate) fn error(&self) -> f64 {
+        match self {
+            Self::Family(curve) => curve.error,
+            Self::Exponential | Self::Mlp => 0.0,
         }
     }
 
@@ -179,13 +190,8 @@ fn settled_beyond<B: Backend>(
     close: f64,
     device: &B::Device,
 ) -> f64 {
-    let dtype = if B::supports_dtype(device, DType::F64) { DType::F64 } else { DType::F32 };
-    let tensor = |values: &[f64]| {
-        let data = TensorData::new(values.to_vec(), [values.len()]);
-        Tensor::<B, 1>::from_data(data, (device, dtype))
-    };
-    let depths = |x: &[f64]| -> Vec<f64> {
-        softness.optical_depth(tensor(phi), tensor(x)).into_data().iter().collect()
+    let depths = |x: &[f64]| {
+        numbers(softness.optical_depth(precise::<B>(phi, device), precise::<B>(x, device)))
     };
     let limit = depths(&[LIMIT])[0];
     let unsettled = |&q: &f64| q < depth && (q - limit).abs() > close;
@@ -218,8 +224,8 @@ mod tests {
                 let floor = floor(&softness);
                 let precision = Precision { accuracy: 5e-6, least: -27.0, floor };
                 let device = Default::default();
-                let (curve, error) =
-                    LogCurve::measured::<NdArray<f64>>(softness, &phi, precision, &device);
+                let curve = LogCurve::new::<NdArray<f64>>(softness, &phi, precision, &device);
+                let error = curve.error;
                 // Where the law of this one begins, it rises faster than knots follow.
                 let most = if family == Family::GammaForward { 200.0 } else { 1.0 };
                 assert!(

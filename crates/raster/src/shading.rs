@@ -105,7 +105,12 @@ pub fn phong<B: Backend>(
         let across = dot(&normals, &towards);
         let mirrored = normals.clone() * across.clone() * 2.0 - towards;
         let seen = positive(dot(&mirrored, &view)).mask_fill(across.lower_equal_elem(0.0), 0.0);
-        seen.powf_scalar(shininess) * colour
+        #[allow(
+            clippy::disallowed_methods,
+            reason = "a shininess need not be known to more than an f32"
+        )]
+        let lobe = seen.powf_scalar(shininess);
+        lobe * colour
     };
     lights.iter().map(of_light).reduce(Tensor::add).expect("a light")
 }

@@ -13,7 +13,8 @@ const SAME: f64 = 1e-12;
 /// Draws soft silhouettes of one mesh topology.
 ///
 /// It holds what an image depends on beside the vertices: faces, size, softness, T-conorm and tolerance. Support and knots follow the
-/// parameters φ by themselves, so no pixel is ever off by more than the tolerance. Where only the scale of the softness has changed they
+/// parameters φ by themselves, so no pixel is off by more than the tolerance in exact arithmetic, wherever the parameters go. Where no
+/// table can meet the tolerance, [`error_bound`](Self::error_bound) is larger and states the error that is left. Where only the scale of the softness has changed they
 /// are stretched, which costs nothing; where its shape has, they are chosen anew, which takes milliseconds.
 ///
 /// ```
@@ -127,6 +128,21 @@ impl<S: Softness> SoftRenderer<S> {
     pub fn phi_tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 1> {
         let data = TensorData::new(self.phi.clone(), [self.phi.len()]);
         Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+    }
+
+    /// The largest error of a pixel under the renderer's own parameters, in coverage: the tolerance, or more where the softness has a
+    /// jump or a corner that no table can follow to it. In exact arithmetic; rounding in `f32` adds some 1e-6.
+    ///
+    /// ```
+    /// use burn::backend::NdArray;
+    /// use softrast_raster::SoftRenderer;
+    /// use softrast_softness::Family;
+    ///
+    /// let renderer = SoftRenderer::new(&[[0, 1, 2]], 32, Family::Logistic, 0.01).with_tolerance(1e-6);
+    /// assert_eq!(renderer.error_bound::<NdArray>(), 1e-6);
+    /// ```
+    pub fn error_bound<B: RasterBackend>(&self) -> f64 {
+        self.prepared::<B>(&self.phi).profile().error()
     }
 
     /// Draws with these parameters from now on.

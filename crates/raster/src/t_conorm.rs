@@ -1,11 +1,14 @@
 use std::{fmt, str::FromStr};
 
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::{DType, Tensor, backend::Backend};
 use softrast_softness::Softness;
 
 /// Optical depth beyond which `exp(q)` is held: a face that lets less than e^-40 = 4e-18 of the
 /// light through counts as that.
 const DEEPEST: f64 = 40.0;
+/// Powers of `exp(q)` are held below `exp` of this, so that sums of them, and their slopes, fit a float. In f32 a face then covers no
+/// more than `1 - exp(-64 / p)` under Dombi and Schweizer-Sklar with this p: all but 1e-7 up to p = 4.
+const LARGEST: [f64; 2] = [64.0, 600.0];
 /// Smallest number that enters a power or a logarithm.
 const SMALLEST: f64 = 1e-30;
 
@@ -135,24 +138,28 @@ impl TConorm {
             }
             Self::Yager(p) => {
                 let s = s().clamp_min(SMALLEST);
-                let slope = s.clone().powf_scalar(p - 1.0) * density() * p;
-                (s.powf_scalar(p), slope)
+                let slope = power(s.clone(), p - 1.0) * density() * p;
+                (power(s, p), slope)
             }
             Self::AczelAlsina(p) => {
                 let q = q().clamp_min(SMALLEST);
-                let slope = q.clone().powf_scalar(p - 1.0) * hazard() * p;
-                (q.powf_scalar(p), slope)
+                let slope = power(q.clone(), p - 1.0) * hazard() * p;
+                (power(q, p), slope)
             }
             Self::Dombi(p) => {
                 // d ln(e^q - 1) / dq = 1 / s.
-                let q = q().clamp_max(DEEPEST);
+                let q = q();
+                let deepest = deepest(p, q.dtype());
+                let q = q.clamp_max(deepest);
                 let odds = expm1(q).clamp_min(SMALLEST);
-                let value = odds.powf_scalar(p);
+                let value = power(odds, p);
                 let slope = value.clone() * hazard() * p / s().clamp_min(SMALLEST);
                 (value, slope)
             }
             Self::SchweizerSklar(p) => {
-                let power = expm1(q().clamp_max(DEEPEST / -p) * -p);
+                let q = q();
+                let deepest = deepest(-p, q.dtype());
+                let power = expm1(q.clamp_max(deepest) * -p);
                 (power.clone(), (power + 1.0) * hazard() * -p)
             }
         }
@@ -160,7 +167,7 @@ impl TConorm {
 
     /// Coverage `A = g⁻¹(S)` in [0, 1] of the sum `S >= 0`, same shape.
     pub fn coverage<B: Backend, const D: usize>(self, sum: Tensor<B, D>) -> Tensor<B, D> {
-        let root = |sum: Tensor<B, D>, p: f64| sum.clamp_min(SMALLEST).powf_scalar(1.0 / p);
+        let root = |sum: Tensor<B, D>, p: f64| power(sum.clamp_min(SMALLEST), 1.0 / p);
         match self {
             Self::Probabilistic => covered(sum),
             Self::Einstein => sum.tanh(),
@@ -179,7 +186,7 @@ impl TConorm {
                 let odds = root(sum, p);
                 odds.clone() / (odds + 1.0)
             }
-            Self::SchweizerSklar(p) => (sum + 1.0).powf_scalar(1.0 / p).neg() + 1.0,
+            Self::SchweizerSklar(p) => power(sum + 1.0, 1.0 / p).neg() + 1.0,
         }
     }
 
@@ -204,6 +211,15 @@ impl TConorm {
             }
             _ => self.generator(-(-tolerance).ln_1p()),
         }
+    }
+
+    /// The largest `S dA/dS`: how far the coverage moves, at most, with a relative error of the sum.
+    pub(crate) fn sensitivity(self) -> f64 {
+        let moved = |k: i32| {
+            let sum = f64::exp2(0.25 * f64::from(k));
+            (self.coverage_of(1.001 * sum) - self.coverage_of(sum)) / 0.001
+        };
+        (-120..80).map(moved).fold(0.0, f64::max)
     }
 
     /// [`TConorm::coverage`] in plain numbers.
@@ -239,8 +255,8 @@ impl TConorm {
             }
             Self::Yager(p) => s.powf(p),
             Self::AczelAlsina(p) => q.powf(p),
-            Self::Dombi(p) => q.min(DEEPEST).exp_m1().powf(p),
-            Self::SchweizerSklar(p) => (q.min(DEEPEST / -p) * -p).exp_m1(),
+            Self::Dombi(p) => q.min(deepest(p, DType::F64)).exp_m1().powf(p),
+            Self::SchweizerSklar(p) => (q.min(deepest(-p, DType::F64)) * -p).exp_m1(),
         }
     }
 }
@@ -249,6 +265,19 @@ impl TConorm {
 /// which steer the pixels that are nearly covered.
 fn covered<B: Backend, const D: usize>(sum: Tensor<B, D>) -> Tensor<B, D> {
     sum.neg().exp().neg() + 1.0
+}
+
+/// The optical depth up to which `exp(p q)` is told from what is deeper.
+fn deepest(p: f64, dtype: DType) -> f64 {
+    DEEPEST.min(LARGEST[usize::from(dtype == DType::F64)] / p)
+}
+
+/// `x^p` of positive numbers.
+///
+/// burn 0.21 rounds exponents to f32, whatever the float type.
+#[allow(clippy::disallowed_methods, reason = "the one place that knows of it")]
+fn power<B: Backend, const D: usize>(x: Tensor<B, D>, p: f64) -> Tensor<B, D> {
+    if x.dtype() == DType::F64 { (x.log() * p).exp() } else { x.powf_scalar(p) }
 }
 
 /// `exp(x) - 1` without cancellation: `tanh(x/2) (exp(x) + 1)`.

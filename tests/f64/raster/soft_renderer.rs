@@ -4,7 +4,6 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::Tensor,
 };
-use proptest::prelude::*;
 use softrast_raster::{Rasterizer, SoftRenderer, TConorm, reference};
 use softrast_softness::{
     EdgeSoftness, Family, ScaleSchedule, ScheduledSoftness, Softness, Surrogate,
@@ -22,7 +21,7 @@ fn shaped(vertices: &[f64]) -> Tensor<B, 3> {
     vector::<B>(vertices).reshape([1, vertices.len() as i64 / 3, 3])
 }
 
-/// By how much the renderer's image differs from that of every pixel-face pair, and the bound.
+/// By how much the renderer's image differs from that of every pixel-face pair, and the error that it states.
 fn off(
     renderer: &SoftRenderer<EdgeSoftness>,
     (vertices, faces): (&[f64], &[[u32; 3]]),
@@ -36,37 +35,30 @@ fn off(
     let exact = numbers(t_conorm.coverage(sums));
     let largest = drawn.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let error = renderer.prepared::<B>(phi).profile().error();
-    [largest, TOLERANCE / 2.0 + error.max(TOLERANCE / 2.0)]
+    [largest, error]
 }
 
 fn renderer(softness: EdgeSoftness, faces: &[[u32; 3]], scale: f64) -> SoftRenderer<EdgeSoftness> {
     SoftRenderer::new(faces, SIZE, softness, scale).with_tolerance(TOLERANCE)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn no_pixel_is_off_by_more_than_the_tolerance_wherever_the_parameters_go(
-        seed in 0u64..1000,
-        family in proptest::sample::select(Family::ALL.to_vec()),
-        squared: bool,
-        width in -3.0f64..0.0,
-        moves in proptest::collection::vec((-3.0f64..3.0, 0usize..3, -0.5f64..0.5), 1..5),
-    ) {
-        let softness = EdgeSoftness { family, squared };
-        let (vertices, faces) = triangles(seed, 20);
-        let scale = |width: f64| 10f64.powf(if squared { 2.0 * width } else { width });
-        let renderer = renderer(softness, &faces, scale(width));
-        let mut phi = renderer.phi().to_vec();
-        for (wider, which, by) in moves {
-            phi = softness.with_scale_values(&phi, scale(wider.clamp(-3.0 - width, 0.5 - width)));
-            if let Some(entry) = phi.iter_mut().skip(1).nth(which) {
-                *entry += by;
-            }
-            let [largest, bound] = off(&renderer, (&vertices, &faces), softness, &phi);
-            prop_assert!(largest <= bound, "{phi:?}: off by {largest:e}, not {bound:e}");
-        }
+#[test]
+fn no_pixel_is_off_by_more_than_the_tolerance_where_a_face_covers_before_its_edge() {
+    // The law begins outside, so that the optical depth has a pole there, away from the edge and from the end of the support.
+    let softness = EdgeSoftness { family: Family::Exp, squared: true };
+    let (vertices, faces) = triangles(553, 20);
+    let scale = |width: f64| 10f64.powf(2.0 * width);
+    let width = -2.128_356_450_252_82;
+    let renderer = renderer(softness, &faces, scale(width));
+    let mut phi = renderer.phi().to_vec();
+    for (wider, shift) in
+        [(-0.768_596_027_845_630_1, 0.0), (2.127_549_584_422_48, -0.209_657_546_645_118_85)]
+    {
+        phi = softness.with_scale_values(&phi, scale(wider));
+        phi[1] += shift;
+        let [largest, stated] = off(&renderer, (&vertices, &faces), softness, &phi);
+        assert_eq!(stated, TOLERANCE);
+        assert!(largest <= TOLERANCE, "{phi:?}: off by {largest:e}");
     }
 }
 

@@ -66,7 +66,7 @@ pub(super) struct Gradient {
 pub(super) fn culling(op: &SoftBlend) -> ProfileSum {
     ProfileSum {
         faces: op.faces.clone(),
-        grid: Grid { outer: op.edge.inner, ..op.edge },
+        grid: Grid { outer: op.edge.inner, from: [op.edge.from[1]; 2], ..op.edge },
         size: op.size,
         near: crate::NEAR,
         kept: None,

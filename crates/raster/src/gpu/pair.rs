@@ -18,6 +18,9 @@ pub(super) struct Lookup {
     /// From squared distances to what places are read from, without its start.
     pub(super) inverse_outer: f32,
     pub(super) inverse_inner: f32,
+    /// What these are where the cells begin; 0 without `far`.
+    pub(super) before_outer: f32,
+    pub(super) before_inner: f32,
     pub(super) start: f32,
     pub(super) octaves: u32,
     pub(super) bits: u32,
@@ -42,7 +45,12 @@ impl Lookup {
     pub(super) fn place(self, distance2: Dual, inner: bool, #[comptime] far: bool) -> Place {
         let inverse = select(inner, self.inverse_inner, self.inverse_outer);
         let y = distance2.scale(inverse);
-        let z = select(y.value < 2.0f32, y.value, 2.0f32) + self.start;
+        let mut position = y.value;
+        if far {
+            let before = select(inner, self.before_inner, self.before_outer);
+            position = select(y.value < before, 0.0f32, y.value - before);
+        }
+        let z = select(position < 2.0f32, position, 2.0f32) + self.start;
         let near = Cell::of(z, self.octaves, self.bits);
         let mut index = select(near.index > self.cells, self.cells, near.index);
         let mut value = near.place;
@@ -57,6 +65,8 @@ impl Lookup {
             index = select(is_far, last, index);
             value = select(is_far, 1.0f32 - cell.place, value);
             rate = select(is_far, cell.rate * self.shrunk, rate);
+            let before = select(inner, self.before_inner, self.before_outer);
+            rate = select(y.value < before, 0.0f32, rate);
         }
         let row = select(inner, index + self.cells + 1u32, index);
         // In the tail the cubic is constant; a place of 0 keeps overflow out of it.

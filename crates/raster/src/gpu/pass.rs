@@ -424,10 +424,12 @@ impl<'a> Pass<'a> {
 /// A grid prepared for look-ups, and how many rows the table of a view is from that of the next.
 pub(super) fn lookup(grid: &Grid, stride: u32) -> LookupLaunch<WgpuRuntime> {
     let [start, end] = [grid.octaves, grid.far + 1].map(|k| f64::exp2(-f64::from(k)));
-    let inverse = |radius: f64| ((1.0 - start) * radius.powi(-2)) as f32;
+    let [outer, inner] = grid.lookups(1.0).map(|side| side.map(|number| number as f32));
     LookupLaunch::new(
-        inverse(grid.outer),
-        inverse(grid.inner),
+        outer[0],
+        inner[0],
+        outer[1],
+        inner[1],
         start as f32,
         grid.octaves,
         grid.bits,

@@ -13,7 +13,8 @@ const STEEPEST: f64 = 1e30;
 /// Places of the cells of a profile table: two one-sided tables over the squared distance that
 /// meet at the edge of the face.
 ///
-/// With `y = d² / radius²` of the side and `c = 2^-octaves`, places are read off the bits of the float `z = y (1 - c) + c`: each of
+/// A side has cells from one distance to another, `y` being the part of the way between their squares; it is constant before and beyond.
+/// With `y` and `c = 2^-octaves`, places are read off the bits of the float `z = y (1 - c) + c`: each of
 /// the octaves of z from c to 1 holds `2^bits` cells, and the last cell is the constant tail `y >= 1`. So the look-up needs no
 /// transcendental function, no square root, and no case for the first cell, at the edge.
 ///
@@ -26,6 +27,8 @@ pub(crate) struct Grid {
     pub(crate) outer: f64,
     /// Distance inside the face beyond which the profile is constant, in NDC.
     pub(crate) inner: f64,
+    /// Distances outside and inside the face up to which the profile is what it is at the edge, in NDC; only with `far`.
+    pub(crate) from: [f64; 2],
     /// Octaves that are resolved.
     pub(crate) octaves: u32,
     /// Octaves before the end that are resolved; 0 for none.
@@ -44,6 +47,44 @@ impl Grid {
     /// Where the places start: `2^-octaves`, and with `far` the same of the other end.
     fn starts(&self) -> [f64; 2] {
         [self.octaves, self.far + 1].map(|octaves| f64::exp2(-f64::from(octaves)))
+    }
+
+    /// The distance on a side, outer or inner, at the part `y` of the way between the squares of its ends.
+    pub(crate) fn distance(&self, side: usize, y: f64) -> f64 {
+        let [from, to] = self.ends(side);
+        // Without rounding where a side starts at the edge.
+        if from == 0.0 { to * y.sqrt() } else { (from * from + y * (to * to - from * from)).sqrt() }
+    }
+
+    /// The derivative of [`Grid::distance`] by `y`.
+    pub(crate) fn rate(&self, side: usize, y: f64) -> f64 {
+        let [from, to] = self.ends(side);
+        (to - from) * (to + from) / (2.0 * self.distance(side, y))
+    }
+
+    /// The inverse of [`Grid::distance`]; below 0 before the cells.
+    pub(crate) fn position(&self, side: usize, distance: f64) -> f64 {
+        let [from, to] = self.ends(side);
+        if from == 0.0 {
+            return (distance / to).powi(2);
+        }
+        (distance - from) * (distance + from) / ((to - from) * (to + from))
+    }
+
+    /// Where the cells of a side begin and end.
+    fn ends(&self, side: usize) -> [f64; 2] {
+        [self.from[side], [self.outer, self.inner][side]]
+    }
+
+    /// For each side the factor from squared distances, of which `unit` squared are one of the grid's, to places without their start; and
+    /// what that makes of the distance where the cells begin.
+    pub(crate) fn lookups(&self, unit: f64) -> [[f64; 2]; 2] {
+        let [start, _] = self.starts();
+        [0, 1].map(|side| {
+            let [from, to] = self.ends(side).map(|end| end * unit);
+            let factor = (1.0 - start) / ((to - from) * (to + from));
+            [factor, factor * from * from]
+        })
     }
 
     /// Rows of the coefficient table: both sides with their tails, outside first.
@@ -86,6 +127,9 @@ pub(crate) struct Lookup<F> {
     /// From squared distances to z, without its start.
     inverse_outer: F,
     inverse_inner: F,
+    /// What they are where the cells begin.
+    before_outer: F,
+    before_inner: F,
     start: F,
     /// From `1 - z` to what the cells before the end lie in, and the start of that.
     shrunk: F,
@@ -109,10 +153,12 @@ impl<F: Float> Lookup<F> {
     /// For distances of which `unit` are one unit of the grid's.
     pub(crate) fn new(grid: &Grid, unit: f64) -> Self {
         let [start, end] = grid.starts();
-        let inverse = |radius: f64| F::from_f64((1.0 - start) * (radius * unit).powi(-2));
+        let [outer, inner] = grid.lookups(unit).map(|side| side.map(F::from_f64));
         Self {
-            inverse_outer: inverse(grid.outer),
-            inverse_inner: inverse(grid.inner),
+            inverse_outer: outer[0],
+            inverse_inner: inner[0],
+            before_outer: outer[1],
+            before_inner: inner[1],
             start: F::from_f64(start),
             shrunk: F::from_f64(1.0 - 2.0 * end),
             end: F::from_f64(end),
@@ -143,7 +189,20 @@ impl<F: Float> Lookup<F> {
         let inverse =
             pick(inside, T::Lanes::splat(self.inverse_inner), T::Lanes::splat(self.inverse_outer));
         let scaled = distance2.scale(inverse);
-        let z = scaled.value() + T::Lanes::splat(self.start);
+        let mut z = scaled.value() + T::Lanes::splat(self.start);
+        let mut begun = None;
+        if FAR {
+            let before = pick(
+                inside,
+                T::Lanes::splat(self.before_inner),
+                T::Lanes::splat(self.before_outer),
+            );
+            let start = T::Lanes::splat(self.start);
+            let place = scaled.value() - before;
+            begun = Some(splat::<T::Lanes>(0.0).at_most(place));
+            // NaN stays NaN.
+            z = splat::<T::Lanes>(0.0).max(place) + start;
+        }
         let (cell, mut t, mut rate) = z.cell(self.octaves, self.bits);
         let mut row = cell;
         if FAR && self.far > 0 {
@@ -162,8 +221,11 @@ impl<F: Float> Lookup<F> {
         }
         let row = T::Lanes::places(row, self.cells, inside);
         // In the tail the cubic is constant. A place that does not change keeps overflow out of it.
-        let moves = (scaled.output() * rate).only(z.less(one));
-        let rate = (rate * inverse).min(splat(STEEPEST));
+        let mut moves = (scaled.output() * rate).only(z.less(one));
+        let mut rate = (rate * inverse).min(splat(STEEPEST));
+        if let Some(begun) = begun {
+            (moves, rate) = (moves.only(begun), rate.only(begun));
+        }
         Place { row, t: T::new(t, moves), rate }
     }
 }
@@ -186,8 +248,8 @@ mod tests {
 
     #[test]
     fn every_place_lies_between_the_knots_of_its_cell() {
-        let near = Grid { outer: 1.0, inner: 1.0, octaves: 12, far: 0, bits: 3 };
-        let both = Grid { outer: 1.0, inner: 1.0, octaves: 7, far: 9, bits: 2 };
+        let near = Grid { outer: 1.0, inner: 1.0, from: [0.0; 2], octaves: 12, far: 0, bits: 3 };
+        let both = Grid { outer: 1.0, inner: 1.0, from: [0.0; 2], octaves: 7, far: 9, bits: 2 };
         for grid in [near, both] {
             let knots = grid.knots();
             assert_eq!(knots.len(), grid.cells() + 1);
@@ -213,7 +275,7 @@ mod tests {
 
     #[test]
     fn the_inner_side_has_rows_of_its_own() {
-        let grid = Grid { outer: 1.0, inner: 0.5, octaves: 4, far: 0, bits: 2 };
+        let grid = Grid { outer: 1.0, inner: 0.5, from: [0.0; 2], octaves: 4, far: 0, bits: 2 };
         let y = Plain::splat(0.3f64);
         let inside =
             Lookup::new(&grid, 1.0).place::<_, false>(y.scale(Plain::splat(0.25)), [true; LANES]);
@@ -226,7 +288,7 @@ mod tests {
     #[test]
     fn infinity_and_nan_fall_into_the_tail() {
         for far in [0, 5] {
-            let grid = Grid { outer: 1.0, inner: 1.0, octaves: 4, far, bits: 2 };
+            let grid = Grid { outer: 1.0, inner: 1.0, from: [0.0; 2], octaves: 4, far, bits: 2 };
             for y in [f64::INFINITY, f64::NAN, 1.0, 1e300] {
                 assert_eq!(place(&grid, y).0, grid.tail());
             }

@@ -14,10 +14,10 @@ const TERMS: usize = 48;
 /// The power series serves up to `p + SWITCH`, the continued fraction from there.
 const SWITCH: f64 = 2.0;
 
-/// Below this distance, in scales, the distribution function is a straight line from 0.
+/// Below this distance, in scales, the distribution function is a parabola from 0 that joins the law with its slope.
 ///
-/// For `p < 1` the density grows without bound towards 0; it stops at that line's slope,
-/// `F(FLOOR) / FLOOR`: 1.1e4 per scale for p = 0.5.
+/// For `p < 1` the density grows without bound towards 0; here it ends at `(2 - p) F(FLOOR) / FLOOR`: 1.7e4 per scale for p = 0.5. For
+/// `p >= 1` the parabola is a straight line.
 const FLOOR: f64 = 1e-8;
 
 /// The Gamma law, `F(y) = P(p, y)`, the regularised incomplete gamma function; φ `[3]` is the
@@ -25,7 +25,7 @@ const FLOOR: f64 = 1e-8;
 /// Use it as [`Reversed`](super::Reversed) or [`Forward`](super::Forward).
 ///
 /// Reversed with p = 0.5, `s = erfc(sqrt(-x / scale))` outside. Shapes lie in [0.02, 20]; closer
-/// than 1e-8 scales to the edge, s runs straight, so that the density stays finite for p < 1.
+/// than 1e-8 scales to the edge, s is a parabola, so that the density stays finite for p < 1.
 ///
 /// Source: Wu et al. 2024, Sec. 4.2 (Gamma, p = 0.5); Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,6 +69,18 @@ impl<B: Backend, const D: usize> Pieces<B, D> {
     }
 }
 
+/// The part of `F(FLOOR)` that the law has come to at `y`, 1 from [`FLOOR`] on, and below it the rate at which it grows, per scale.
+fn begun<B: Backend, const D: usize>(
+    p: &Tensor<B, D>,
+    y: Tensor<B, D>,
+) -> (Tensor<B, D>, Tensor<B, D>) {
+    let line = y.clamp_max(FLOOR) / FLOOR;
+    let bend = (p.clone().neg() + 1.0).clamp_min(0.0);
+    let part = line.clone() * ((line.clone().neg() + 1.0) * bend.clone() + 1.0);
+    let rate = ((line * -2.0 + 1.0) * bend + 1.0) / FLOOR;
+    (part, rate)
+}
+
 /// `Σ yⁿ / ((p + 1) … (p + n))`.
 fn series<B: Backend, const D: usize>(p: Tensor<B, D>, y: Tensor<B, D>) -> Tensor<B, D> {
     (1..=TERMS)
@@ -94,34 +106,35 @@ impl HalfLine for Gamma {
         phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
     ) -> (Tensor<B, D>, Tensor<B, D>) {
-        let line = y.clone().clamp_max(FLOOR) / FLOOR;
-        let Pieces { far, below, far_depth, .. } = Pieces::new(phi, y);
+        let start = y.clone();
+        let Pieces { p, far, below, far_depth, .. } = Pieces::new(phi, y);
         let above = far_depth.neg().exp();
-        let below = below * line;
+        let below = below * begun(&p, start).0;
         let (near_rest, far_rest) = (below.clone().neg() + 1.0, above.clone().neg() + 1.0);
         (below.mask_where(far.clone(), far_rest), near_rest.mask_where(far, above))
     }
 
     fn slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
         let close = y.clone().lower_elem(FLOOR);
+        let start = y.clone();
         let Pieces { p, y, below, .. } = Pieces::new(phi, y);
+        let (_, rate) = begun(&p, start);
         let curve = ((p.clone() - 1.0) * y.clone().log() - y - ln_gamma(p)).exp();
-        curve.mask_where(close, below / FLOOR)
+        curve.mask_where(close, below * rate)
     }
 
     fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        let line = y.clone().clamp_max(FLOOR) / FLOOR;
-        let Pieces { far, below, far_depth, .. } = Pieces::new(phi, y);
-        (below * line).neg().log1p().neg().mask_where(far, far_depth)
+        let start = y.clone();
+        let Pieces { p, far, below, far_depth, .. } = Pieces::new(phi, y);
+        (below * begun(&p, start).0).neg().log1p().neg().mask_where(far, far_depth)
     }
 
     fn depth_slope<B: Backend, const D: usize>(
         phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
     ) -> Tensor<B, D> {
-        let line = y.clone().clamp_max(FLOOR) / FLOOR;
-        let slope = Self::slope(phi, y.clone());
-        let Pieces { y, far, below, fraction, .. } = Pieces::new(phi, y);
-        (slope / ((below * line).neg() + 1.0)).mask_where(far, fraction / y)
+        let (start, slope) = (y.clone(), Self::slope(phi, y.clone()));
+        let Pieces { p, y, far, below, fraction, .. } = Pieces::new(phi, y);
+        (slope / ((below * begun(&p, start).0).neg() + 1.0)).mask_where(far, fraction / y)
     }
 }

@@ -34,11 +34,9 @@ impl<F: Float> Curve<'_, F> {
 
     /// The value at a distance on one side, the outer one if it is below 0.
     fn at(&self, x: f64) -> f64 {
-        let (first, radius) = match x < 0.0 {
-            true => (0, self.grid.outer),
-            false => (self.grid.cells() + 1, self.grid.inner),
-        };
-        let y = (x / radius).powi(2);
+        let side = usize::from(x >= 0.0);
+        let first = side * (self.grid.cells() + 1);
+        let y = self.grid.position(side, x.abs()).max(0.0);
         let above = self.knots.partition_point(|&knot| knot <= y);
         if above >= self.knots.len() {
             return self.value(first + self.grid.cells(), 0.0);
@@ -83,7 +81,7 @@ impl<'a, F: Float> EdgeReach<'a, F> {
             return None;
         }
         let first = self.most.partition_point(|&most| most > least);
-        let radius = |&y: &f64| self.curve.grid.inner * y.sqrt();
+        let radius = |&y: &f64| self.curve.grid.distance(1, y);
         Some(self.curve.knots.get(first).map_or(EVERYWHERE, radius).min(EVERYWHERE))
     }
 }

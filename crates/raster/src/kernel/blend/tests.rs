@@ -17,7 +17,7 @@ fn passes<F: float::Float>(
     depth: DepthGrid,
     texture_size: Option<[usize; 2]>,
 ) -> Vec<F> {
-    let edge = Grid { outer: 0.2, inner: 0.3, octaves: 12, far: 5, bits: 2 };
+    let edge = Grid { outer: 0.2, inner: 0.3, from: [0.0; 2], octaves: 12, far: 5, bits: 2 };
     let wave = |k: usize, step: f64| (step * k as f64).sin();
     let numbers = |count: usize, step: f64| -> Vec<F> {
         (0..count).map(|k| F::from_f64(wave(k, step))).collect()
@@ -75,7 +75,14 @@ fn passes<F: float::Float>(
 }
 
 fn assert_same_bits<F: float::Float>() {
-    let table = DepthGrid::Table(Grid { outer: 1e-3, inner: 2.0, octaves: 10, far: 0, bits: 2 });
+    let table = DepthGrid::Table(Grid {
+        outer: 1e-3,
+        inner: 2.0,
+        from: [0.0; 2],
+        octaves: 10,
+        far: 0,
+        bits: 2,
+    });
     let line = DepthGrid::Line { floor: 1e-7 };
     // A background that weighs little asks for the largest weight of each pixel.
     for (views, log_weight, floor, depth, texture) in [

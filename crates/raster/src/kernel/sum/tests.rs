@@ -10,7 +10,7 @@ const FACES: u32 = 90;
 
 /// All that the three passes give, over random triangles of all kinds, some of them slivers, points or without area.
 fn passes<F: Float>(size: [usize; 2], views: usize, tables: usize, far: u32) -> Vec<F> {
-    let grid = Grid { outer: 0.3, inner: 0.2, octaves: 12, far, bits: 2 };
+    let grid = Grid { outer: 0.3, inner: 0.2, from: [0.0; 2], octaves: 12, far, bits: 2 };
     let wave = |k: usize, step: f64| (step * k as f64).sin();
     let numbers = |count: usize, step: f64| -> Vec<F> {
         (0..count).map(|k| F::from_f64(wave(k, step))).collect()
