@@ -44,7 +44,7 @@ fn renderer(softness: EdgeSoftness, faces: &[[u32; 3]], scale: f64) -> SoftRende
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(100))]
 
     #[test]
     fn no_pixel_is_off_by_more_than_the_tolerance_wherever_the_parameters_go(

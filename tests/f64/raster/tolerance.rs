@@ -55,7 +55,7 @@ const ROUGH: [Family; 2] = [Family::Gamma, Family::GammaForward];
 const FINEST: f64 = 1e-5;
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(300))]
 
     #[test]
     fn no_pixel_is_off_by_more_than_the_tolerance(
