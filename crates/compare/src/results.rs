@@ -9,7 +9,7 @@ use crate::{
     Measured, Record,
     charts::{Chart, Charts, by_variant},
     documents::block,
-    tables,
+    groups, tables,
 };
 
 const HEAD: &str = include_str!("text/head.md");
@@ -76,7 +76,7 @@ pub(crate) fn html(
     READING.split("\n\n").for_each(|text| report.paragraph(&text.replace("**", "")));
     report.heading("Tasks");
     report.table(&tables::tasks(records));
-    let errors = tables::by_variant(records);
+    let errors = groups::by_variant(records);
     let groups = by_variant(measured);
     for ((group, charts), errors) in groups.iter().zip(&charts.of_variants).zip(&errors) {
         let cell = &group[0].cell;

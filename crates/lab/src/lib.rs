@@ -19,6 +19,7 @@ pub mod format;
 pub mod halving;
 mod machine;
 mod metric;
+mod outcome;
 pub mod parse;
 mod picture;
 pub mod plot;
@@ -43,6 +44,7 @@ pub use files::{OutputFolder, write_atomically};
 pub use halving::check_held_out;
 pub use machine::{machine, peak_rss_mib};
 pub use metric::{Metric, Role, place};
+pub use outcome::Outcome;
 pub use picture::{
     Encoded, contact_sheet, difference, for_page, mask_png, overlay, png, rgb_from_gray,
     rgb_from_planes,
