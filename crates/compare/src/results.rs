@@ -109,3 +109,19 @@ pub(crate) fn html(
                   and their points as CSV";
     Ok(report.finish(command, beside))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_document_has_the_texts_that_another_call_would_print() {
+        let document = include_str!("../../../docs/results.md");
+        for text in [HEAD, READING, SECONDS, CROSSED] {
+            assert!(
+                document.contains(text.trim()),
+                "docs/results.md has another text than: {text}"
+            );
+        }
+    }
+}

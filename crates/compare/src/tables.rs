@@ -124,7 +124,11 @@ pub(crate) fn summary(records: &[Record]) -> Table {
         let variant = if preset.original { "" } else { ", transfer" };
         let named = |one: Option<&&Record>| {
             one.map_or(String::new(), |one| {
-                format!("{} ({})", short(mean(&one.returned)), one.family)
+                let seeds = match one.returned.len() {
+                    count if count == preset.returned.len() => String::new(),
+                    count => format!(", {count} seeds"),
+                };
+                format!("{} ({}{seeds})", short(mean(&one.returned)), one.family)
             })
         };
         let [fixed, decay] = others.map(named);
