@@ -5,7 +5,8 @@
 //! for a setting, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
 //! [`report::Report`] writes pages, on which a [`Viewer`] turns a mesh.
 //!
-//! Nothing here knows of rendering: it sees seeds, numbers, RGB images, and meshes as plain numbers.
+//! Nothing here draws or differentiates: it sees seeds, numbers, RGB images, and meshes and cameras as plain numbers. A page shows them
+//! ([`Viewer`], [`overlay`]), and advice names flags of the programs.
 
 mod axis;
 mod comparison;
