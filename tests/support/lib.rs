@@ -6,6 +6,7 @@ mod outputs;
 mod paper_mesh;
 mod shape2d;
 mod tensors;
+mod threads;
 mod waves;
 mod workload;
 
@@ -16,6 +17,7 @@ pub use paper_mesh::paper_mesh;
 pub use shape2d::{Shape2d, shape2d_start};
 pub use softrast_softness::{numbers, vector};
 pub use tensors::tensor;
+pub use threads::assert_same_on_threads;
 pub use waves::{WAVES, Waves};
 pub use workload::{Row, Workload};
 
