@@ -107,12 +107,7 @@ fn links(text: &str) -> Vec<String> {
         line.strip_prefix('[').filter(|line| !line.starts_with('^'))?.split_once("]: ").map(|x| x.1)
     }));
     // A title may stand behind the target.
-    found
-        .iter()
-        .map(|link| {
-            link.split_whitespace().collect::<Vec<_>>().first().map_or("", |x| *x).to_owned()
-        })
-        .collect()
+    found.iter().map(|link| link.split_whitespace().next().unwrap_or_default().to_owned()).collect()
 }
 
 /// The titles of the headings of a page, as they read.

@@ -114,12 +114,12 @@ impl Crate {
     }
 
     /// What a path in a module leads to, if it is of this crate.
-    fn find(&self, module: &Module, path: &[String]) -> Option<Found> {
+    fn find(&self, module: &[String], path: &[String]) -> Option<Found> {
         self.found(module, path, 0)
     }
 
-    fn found(&self, module: &Module, path: &[String], depth: usize) -> Option<Found> {
-        let mut at = module.clone();
+    fn found(&self, module: &[String], path: &[String], depth: usize) -> Option<Found> {
+        let mut at = module.to_vec();
         let mut rest = path;
         let mut is_own = false;
         while let [first, more @ ..] = rest {
@@ -151,10 +151,8 @@ impl Crate {
                     (at, rest) = (child, more);
                 }
                 _ => {
-                    return self
-                        .item(&at, first, depth)
-                        .map(|found| self.inside(found, more, depth))
-                        .flatten();
+                    let found = self.item(&at, first, depth)?;
+                    return self.inside(found, more, depth);
                 }
             }
         }
@@ -173,19 +171,19 @@ impl Crate {
     }
 
     /// What a name in a module stands for; if nothing there says so, it is taken for its own.
-    fn item(&self, module: &Module, name: &str, depth: usize) -> Option<Found> {
+    fn item(&self, module: &[String], name: &str, depth: usize) -> Option<Found> {
         let contents = self.modules.get(module)?;
         if depth > 20 {
             return None;
         }
         if contents.items.contains(name) {
-            return Some(Found::Item(module.clone(), name.to_owned()));
+            return Some(Found::Item(module.to_vec(), name.to_owned()));
         }
         if let Some(import) = contents.imports.get(name) {
             return self.found(module, &import.path, depth + 1);
         }
         contents.globs.iter().find_map(|glob| match self.found(module, &glob.path, depth + 1)? {
-            Found::Module(of) if of != *module => self.item(&of, name, depth + 1),
+            Found::Module(of) if of != module => self.item(&of, name, depth + 1),
             _ => None,
         })
     }
@@ -205,7 +203,7 @@ impl Reader<'_> {
     }
 
     /// Reads a module up to its closing brace or the end of the file.
-    fn read(&mut self, module: &Module) {
+    fn read(&mut self, module: &[String]) {
         const DEFINE: [&str; 9] =
             ["fn", "struct", "enum", "union", "trait", "type", "const", "static", "mod"];
         let mut own = Contents { file: self.file.to_owned(), ..Contents::default() };
@@ -274,7 +272,7 @@ impl Reader<'_> {
         }
         let there = self.found.modules.remove(module).unwrap_or_default();
         own.imports.extend(there.imports);
-        self.found.modules.insert(module.clone(), own);
+        self.found.modules.insert(module.to_vec(), own);
     }
 
     /// Reads a tree of imports, up to what ends it.
