@@ -10,6 +10,7 @@ use crate::kernel::blend::OF_TEXEL;
 
 /// Numbers of a texel.
 pub(super) const NUMBERS: u32 = OF_TEXEL as u32;
+
 /// A place on a texture, between four texels.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Sample {
