@@ -121,7 +121,7 @@ fn values_are_those_of_f64_to_the_digits_of_f32() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(softrast_test_kit::cases(64))]
 
     #[test]
     fn any_distance_and_scale_gives_a_value_between_zero_and_one(

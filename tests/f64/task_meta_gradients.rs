@@ -23,12 +23,10 @@ type Single = NdArray<f32>;
 
 /// Relative to central differences.
 const BOUND: f64 = 1e-5;
-/// The same gradient in floats of 32 bits, relative to it: Adam's first steps turn on the sign of coordinates whose
-/// gradient is nearly rounding, and the order of additions decides these. At this seed the most is 5.6e-2, on 3D SHAPE; over
-/// 12 seeds there, the median is 7e-4, but a tenth is above 4e-2 and one is off by 13.
-const SINGLE_BOUND: f64 = 0.1;
-/// Half the distance of a difference, as a share of the parameter's size; see the tests of the 2-D problem.
-const SHARES: [f64; 6] = [1e-6, 3e-6, 3e-7, 1e-5, 1e-7, 1e-4];
+/// Half the distance of a difference, as a share of the parameter's size. The differences choose among them without the gradient that they
+/// check: the first that agrees with the one before is taken, whose error by curvature is then a hundredth of what they differ by.
+const SHARES: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
+const AGREE: f64 = 1e-4;
 const SEED: u64 = 5;
 
 /// A problem at the size of its images, with a softness and how the result is judged.
@@ -65,11 +63,11 @@ impl<P: InverseProblem> Case<'_, P> {
         let what = format!("{}, {:?}, {:?}", self.name, self.softness.softness, self.outer_loss);
         let (phi, exact, loss) = self.gradient::<B>();
         assert!(exact.iter().any(|&g| g != 0.0), "{what}: no gradient");
+        // Printed, since no bound holds at every seed: Adam's first steps turn on the sign of coordinates whose gradient is nearly rounding,
+        // and the order of additions decides these. Over 12 seeds of 3D SHAPE the median is 7e-4 and the largest 13.
         let (_, single, _) = self.gradient::<Single>();
-        let off = relative_error(&single, &exact);
-        println!("{what}, in single precision: {off:.1e}");
-        assert!(off <= SINGLE_BOUND, "{what}: {off:e}");
-        let error = |share: f64| {
+        println!("{what}, in single precision: {:.1e}", relative_error(&single, &exact));
+        let differences = |share: f64| -> Vec<f64> {
             let slope = |k: usize| {
                 let h = share * phi[k].abs().max(1e-2);
                 let [low, high] = [-h, h].map(|h| {
@@ -79,12 +77,18 @@ impl<P: InverseProblem> Case<'_, P> {
                 });
                 (high - low) / (2.0 * h)
             };
-            let found: Vec<f64> = (0..phi.len()).map(slope).collect();
-            let error = relative_error(&found, &exact);
-            println!("{what}, h = {share:e}: {error:.1e}");
-            error
+            (0..phi.len()).map(slope).collect()
         };
-        assert!(SHARES.into_iter().any(|share| error(share) <= BOUND), "{what}");
+        let mut before: Option<Vec<f64>> = None;
+        let settled = SHARES.into_iter().find_map(|share| {
+            let found = differences(share);
+            println!("{what}, h = {share:e}: {:.1e}", relative_error(&found, &exact));
+            let last = before.replace(found.clone());
+            last.filter(|last| relative_error(last, &found) <= AGREE).map(|_| found)
+        });
+        let settled = settled.unwrap_or_else(|| panic!("{what}: the differences do not settle"));
+        let error = relative_error(&settled, &exact);
+        assert!(error <= BOUND, "{what}: {error:e}");
     }
 }
 

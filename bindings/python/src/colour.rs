@@ -1,15 +1,15 @@
 //! Soft colours of one mesh topology.
 
-use burn::{backend::NdArray, tensor::Tensor};
+use burn::backend::NdArray;
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use softrast_raster::{ImageSize, Weighting};
 use softrast_softness::{DepthSoftness, Softness as _};
 
 use crate::{
+    checks::{check_phi, check_size, check_tolerance, corners, least},
     guard::{guarded, refused},
     op::Op,
-    renderer::{check_phi, check_size, check_tolerance, corners, least},
     softness::Softness,
 };
 
@@ -172,13 +172,4 @@ impl PreparedColour {
     fn tables(&self) -> Op {
         self.tables.clone()
     }
-}
-
-/// Both φ of a vector that has one behind the other.
-pub(crate) fn both<B: burn::tensor::backend::Backend>(
-    phi: Tensor<B, 1>,
-    split: usize,
-) -> [Tensor<B, 1>; 2] {
-    let [count] = phi.dims();
-    [phi.clone().narrow(0, 0, split), phi.narrow(0, split, count - split)]
 }

@@ -3,6 +3,7 @@
 //! The Python side (`python/softrast`) checks shapes in the user's terms; here only what would be wrong or unsafe to run is refused. Every
 //! error and panic arrives there as a `ValueError` of one line.
 
+mod checks;
 mod colour;
 mod guard;
 mod meshes;

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness as _};
 
 use crate::{
+    checks::check_phi,
     guard::{guarded, refused},
-    renderer::check_phi,
 };
 
 /// A soft step with its parameters φ: how much a face covers a pixel at a signed distance (NDC, positive inside).

@@ -7,8 +7,6 @@ use burn::{
 use softrast_raster::{Silhouette, TConorm, WeightTables};
 use softrast_softness::EdgeSoftness;
 
-use crate::colour::both;
-
 type Plain = NdArray<f64>;
 type Once = Autodiff<Plain>;
 type Twice = Autodiff<Once>;
@@ -73,4 +71,10 @@ fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
 
 fn numbers(tensor: Tensor<Plain, 1>) -> Vec<f64> {
     tensor.into_data().iter().collect()
+}
+
+/// Both φ of a vector that has one behind the other.
+pub(crate) fn both<B: Backend>(phi: Tensor<B, 1>, split: usize) -> [Tensor<B, 1>; 2] {
+    let [count] = phi.dims();
+    [phi.clone().narrow(0, 0, split), phi.narrow(0, split, count - split)]
 }

@@ -7,7 +7,7 @@ use softrast_raster::{BackendChoice, HostBackend, RasterBackend, on_backend};
 use softrast_softness::{Softness, Surrogate};
 
 use crate::{
-    Common, Description, EdgeChoice, MethodArgs, SoftnessChoice, Task, Variant, backend,
+    Common, Description, EdgeChoice, Entry, MethodArgs, SoftnessChoice, Task, Variant, backend,
     task::{Ended, HARD, PARAMETER, theta_of},
 };
 
@@ -260,20 +260,6 @@ pub enum Purpose {
     Finding,
     /// The same by learning: a family has a surrogate only where one is asked for, whatever a search found.
     Learning,
-}
-
-/// A task with a method, ready to be evaluated, whichever task it is.
-pub struct Entry {
-    /// What is run.
-    pub experiment: Box<dyn Experiment>,
-    /// The method.
-    pub method: Method,
-    /// Size, steps and learning rate.
-    pub solve: SolveConfig,
-    /// Every choice behind the numbers.
-    pub settings: Map<String, Value>,
-    /// Faces of the scene.
-    pub faces: usize,
 }
 
 impl Entry {

@@ -10,6 +10,7 @@ mod backend;
 mod command_line;
 mod commands;
 mod diagnostics;
+mod entry;
 mod experiment;
 mod flags;
 mod given;
@@ -28,7 +29,8 @@ mod task;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 pub use backend::backend;
-pub use experiment::{Entry, Purpose, TaskExperiment};
+pub use entry::Entry;
+pub use experiment::{Purpose, TaskExperiment};
 pub use flags::{Common, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args};
 pub use given::{Answer, Given, MaskFlags, seen_by};
 pub use method::{Scales, is_preset, is_preset_learned, learned_kind, method_colour};

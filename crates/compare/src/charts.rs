@@ -10,7 +10,7 @@ use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
 use softrast_softness::Softness;
 
-use crate::{Measured, Purpose, Variation, measured::short, tables::grouped};
+use crate::{Measured, Purpose, Variation, groups::grouped, measured::short};
 
 /// A run is solved where its hard error has fallen to this share of what it began with. Fixed before anything was measured.
 const TARGET: f64 = 0.1;

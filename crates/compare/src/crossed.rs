@@ -1,11 +1,10 @@
 //! Table 6 of the paper: what was learned on one task, used on another.
 
-use softrast_cli::{SoftnessChoice, is_preset_learned};
 use softrast_lab::{mean, report::Table};
 
 use crate::{
-    Cell, Purpose, Record, TASKS,
-    tables::{by_variant, with_interval},
+    Record, TASKS,
+    groups::{by_variant, with_interval},
 };
 
 /// What was learned on each task, on all of them; the lowest of a column in bold. None where nothing is crossed.
@@ -42,22 +41,4 @@ pub(crate) fn crossed(records: &[Record]) -> Option<Table> {
         table.push([called].into_iter().chain(cells));
     }
     (!rows.is_empty()).then_some(table)
-}
-
-/// The kind of what comes with the programs, and the task that it was learned on.
-pub(crate) fn learned_on(cell: &Cell) -> Option<[String; 2]> {
-    let task = cell.task.name();
-    let kind = match &cell.method.softness {
-        Some(SoftnessChoice::Preset) if is_preset_learned(task) => String::new(),
-        Some(SoftnessChoice::Learned(kind)) => kind.clone().unwrap_or_default(),
-        _ => return None,
-    };
-    match cell.purpose {
-        Purpose::Crossed(from) => {
-            let own = kind.strip_prefix(from).map(|kind| kind.trim_start_matches('-').to_owned());
-            Some([own.unwrap_or(kind), from.to_owned()])
-        }
-        Purpose::Compared => Some([kind, task.to_owned()]),
-        Purpose::Varied(_) => None,
-    }
 }

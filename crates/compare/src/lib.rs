@@ -8,6 +8,7 @@ mod cell;
 mod charts;
 mod crossed;
 mod documents;
+mod groups;
 mod measured;
 mod program;
 mod records;

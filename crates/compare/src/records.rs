@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
-use softrast_cli::{Schedule, Searched, SoftnessChoice, Variant};
+use softrast_cli::{Schedule, Searched, SoftnessChoice, Variant, is_preset_learned};
 use softrast_lab::{mean, mean_interval};
 
-use crate::{Cell, Measured, Purpose, TASKS, crossed::learned_on, tasks::AnyTask};
+use crate::{Cell, Measured, Purpose, TASKS, tasks::AnyTask};
 
 /// Digits of a number that is kept.
 const DIGITS: usize = 5;
@@ -108,6 +108,24 @@ impl Record {
     /// Share of runs that succeed.
     pub fn success_rate(&self) -> f64 {
         self.successes as f64 / self.last.len() as f64
+    }
+}
+
+/// The kind of what comes with the programs, and the task that it was learned on.
+fn learned_on(cell: &Cell) -> Option<[String; 2]> {
+    let task = cell.task.name();
+    let kind = match &cell.method.softness {
+        Some(SoftnessChoice::Preset) if is_preset_learned(task) => String::new(),
+        Some(SoftnessChoice::Learned(kind)) => kind.clone().unwrap_or_default(),
+        _ => return None,
+    };
+    match cell.purpose {
+        Purpose::Crossed(from) => {
+            let own = kind.strip_prefix(from).map(|kind| kind.trim_start_matches('-').to_owned());
+            Some([own.unwrap_or(kind), from.to_owned()])
+        }
+        Purpose::Compared => Some([kind, task.to_owned()]),
+        Purpose::Varied(_) => None,
     }
 }
 

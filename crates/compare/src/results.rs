@@ -9,7 +9,7 @@ use crate::{
     Measured, Record,
     charts::{Chart, Charts, by_variant},
     documents::block,
-    tables,
+    groups, tables,
 };
 
 const HEAD: &str = include_str!("text/head.md");
@@ -76,7 +76,7 @@ pub(crate) fn html(
     READING.split("\n\n").for_each(|text| report.paragraph(&text.replace("**", "")));
     report.heading("Tasks");
     report.table(&tables::tasks(records));
-    let errors = tables::by_variant(records);
+    let errors = groups::by_variant(records);
     let groups = by_variant(measured);
     for ((group, charts), errors) in groups.iter().zip(&charts.of_variants).zip(&errors) {
         let cell = &group[0].cell;
@@ -108,4 +108,20 @@ pub(crate) fn html(
     let beside = "runs.jsonl with every run, cells.csv with the numbers behind the tables, results with those of all runs, the charts as SVG \
                   and their points as CSV";
     Ok(report.finish(command, beside))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_document_has_the_texts_that_another_call_would_print() {
+        let document = include_str!("../../../docs/results.md");
+        for text in [HEAD, READING, SECONDS, CROSSED] {
+            assert!(
+                document.contains(text.trim()),
+                "docs/results.md has another text than: {text}"
+            );
+        }
+    }
 }

@@ -1,28 +1,16 @@
 //! The tables of the paper with our figures.
 
 use softrast_cli::Variant;
-use softrast_lab::{mean, mean_interval, median, paired_among, report::Table, wilson_interval};
+use softrast_lab::{mean, median, paired_among, report::Table, wilson_interval};
 
-use crate::{Record, TASKS, measured::short};
+use crate::{
+    Record,
+    groups::{by_variant, with_interval},
+    measured::short,
+};
 
 /// Hard error of what is returned above which a run has not found its pose.
 const FAILS: f64 = 0.05;
-
-/// The records of each task in each variant, in the order of the tables, without those of Table 6 alone.
-pub(crate) fn by_variant(records: &[Record]) -> Vec<Vec<&Record>> {
-    grouped(records, |one| one.compared.then_some((one.task.as_str(), one.original)))
-}
-
-/// What has a task, and whether it is the original, in the order of the tables; what has none is left out.
-pub(crate) fn grouped<'a, T>(
-    all: &'a [T],
-    key: impl Fn(&'a T) -> Option<(&'a str, bool)>,
-) -> Vec<Vec<&'a T>> {
-    let places =
-        TASKS.iter().flat_map(|task| [true, false].map(|original| (task.name(), original)));
-    let group = |place| all.iter().filter(|one| key(one) == Some(place)).collect::<Vec<_>>();
-    places.map(group).filter(|group| !group.is_empty()).collect()
-}
 
 /// Table 2: what each task is.
 pub(crate) fn tasks(records: &[Record]) -> Table {
@@ -136,7 +124,11 @@ pub(crate) fn summary(records: &[Record]) -> Table {
         let variant = if preset.original { "" } else { ", transfer" };
         let named = |one: Option<&&Record>| {
             one.map_or(String::new(), |one| {
-                format!("{} ({})", short(mean(&one.returned)), one.family)
+                let seeds = match one.returned.len() {
+                    count if count == preset.returned.len() => String::new(),
+                    count => format!(", {count} seeds"),
+                };
+                format!("{} ({}{seeds})", short(mean(&one.returned)), one.family)
             })
         };
         let [fixed, decay] = others.map(named);
@@ -186,12 +178,6 @@ fn poses(records: &[Record]) -> Table {
         }
     }
     table
-}
-
-/// Mean and interval, where there are several runs.
-pub(crate) fn with_interval(errors: &[f64]) -> String {
-    let (mean, [low, high]) = (short(mean(errors)), mean_interval(errors).map(short));
-    if errors.len() == 1 { mean } else { format!("{mean} ({low} to {high})") }
 }
 
 /// Mean and interval of the differences on the seeds that both have; in bold where one is clear among so many comparisons.

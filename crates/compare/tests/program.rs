@@ -4,6 +4,8 @@
 
 use std::{fs, process::Command};
 
+use softrast_test_kit::{Program, ended};
+
 #[test]
 fn a_comparison_is_not_done_twice() {
     let out = tempfile::tempdir().unwrap();
@@ -23,4 +25,13 @@ fn a_comparison_is_not_done_twice() {
     let first = compare();
     assert!(first.0.matches("\n| exp |").count() == 2, "{}", first.0);
     assert_eq!(compare(), first);
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    let out = tempfile::tempdir().unwrap();
+    let mut command = Program::new(env!("CARGO_BIN_EXE_compare")).on_one_thread().command();
+    let line = "--tasks occlusion --methods exp --runs 1 --quiet --out";
+    let output = ended(command.args(line.split_whitespace()).arg(out.path()));
+    assert!(output.status.success(), "{output:?}");
 }

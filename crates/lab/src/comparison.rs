@@ -2,7 +2,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Evaluation, Experiment, Metric, Run, Summary,
+    Evaluation, Experiment, Metric, Outcome, Run,
     error_summary::{errors_of, nested},
     format::short,
     mean, mean_interval,
@@ -16,7 +16,9 @@ pub struct Comparison {
     titles: [String; 2],
     about: Map<String, Value>,
     /// On the seeds that both have solved.
-    second: Summary,
+    second: Outcome,
+    /// Wall time of its runs.
+    seconds: f64,
     differences: Vec<Difference>,
 }
 
@@ -62,16 +64,17 @@ impl Comparison {
     ) -> anyhow::Result<Self> {
         let runs = first.runs.len().min(second.runs.len());
         let (first, others) = (&first.runs[..runs], &second.runs[..runs]);
-        let second = Summary::new(experiment, others, second.seconds, true)?;
+        let seconds = second.seconds;
+        let second = Outcome::new(experiment, others, true)?;
         let errors = errors_of(experiment.metrics());
         let differences = errors.map(|(k, metric)| Difference::new(metric, k, first, others));
-        Ok(Self { titles, about, second, differences: differences.collect() })
+        Ok(Self { titles, about, second, seconds, differences: differences.collect() })
     }
 
     pub(crate) fn json(&self) -> Value {
         let mut json = self.about.clone();
-        json.extend(self.second.outcome());
-        json.insert("seconds".into(), self.second.seconds.into());
+        json.extend(self.second.json());
+        json.insert("seconds".into(), self.seconds.into());
         let differences = self.differences.iter().map(|one| (&one.metric, json!(one)));
         json.insert("difference".into(), nested(differences).into());
         json.into()

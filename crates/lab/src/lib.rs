@@ -5,7 +5,8 @@
 //! for a setting, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
 //! [`report::Report`] writes pages, on which a [`Viewer`] turns a mesh.
 //!
-//! Nothing here knows of rendering: it sees seeds, numbers, RGB images, and meshes as plain numbers.
+//! Nothing here draws or differentiates: it sees seeds, numbers, RGB images, and meshes and cameras as plain numbers. A page shows them
+//! ([`Viewer`], [`overlay`]), and advice names flags of the programs.
 
 mod axis;
 mod comparison;
@@ -19,6 +20,7 @@ pub mod format;
 pub mod halving;
 mod machine;
 mod metric;
+mod outcome;
 pub mod parse;
 mod picture;
 pub mod plot;
@@ -43,6 +45,7 @@ pub use files::{OutputFolder, write_atomically};
 pub use halving::check_held_out;
 pub use machine::{machine, peak_rss_mib};
 pub use metric::{Metric, Role, place};
+pub use outcome::Outcome;
 pub use picture::{
     Encoded, contact_sheet, difference, for_page, mask_png, overlay, png, rgb_from_gray,
     rgb_from_planes,

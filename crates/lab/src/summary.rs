@@ -2,25 +2,20 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Comparison, Experiment, Role, Run,
-    error_summary::{ErrorSummary, errors_of, nested},
+    Comparison, Experiment, Outcome, Role, Run,
     format::{counted, line, short},
     mean, median, peak_rss_mib, place,
     report::{Report, Table},
-    wilson_interval,
 };
 
 /// What the runs of one experiment came to.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    pub(crate) errors: Vec<ErrorSummary>,
+    /// Their errors, and how many succeeded.
+    pub outcome: Outcome,
     returned: Returned,
-    /// How many runs succeeded, of how many.
-    pub successes: [usize; 2],
     /// First of the seeds.
     pub seed: u64,
-    /// Whether there are intervals and values of each run.
-    pub many: bool,
     /// Wall time of all runs, with errors and pictures.
     pub(crate) seconds: f64,
     /// Wall time of a step of a run, median, and of all steps of a run, mean.
@@ -74,14 +69,6 @@ impl Summary {
         seconds: f64,
         many: bool,
     ) -> anyhow::Result<Self> {
-        if let Some(run) = runs.iter().find(|run| run.curve.is_empty()) {
-            anyhow::bail!(
-                "seed {}: the errors are not finite numbers before the first step: check that the target is in view and that the \
-                 scale is not extreme",
-                run.seed
-            );
-        }
-        let errors = errors_of(experiment.metrics());
         let steps: Vec<f64> = runs.iter().flat_map(|run| run.step_seconds.clone()).collect();
         let per_run: Vec<f64> = runs.iter().map(Run::seconds).collect();
         let mut warnings: Vec<String> = Vec::new();
@@ -91,11 +78,9 @@ impl Summary {
             }
         }
         Ok(Self {
-            errors: errors.map(|(k, metric)| ErrorSummary::new(metric, k, runs, many)).collect(),
             returned: Returned::new(experiment, runs),
-            successes: [runs.iter().filter(|run| run.success).count(), runs.len()],
+            outcome: Outcome::new(experiment, runs, many)?,
             seed: runs.first().map_or(0, |run| run.seed),
-            many,
             seconds,
             step_seconds: [median(&steps), mean(&per_run)],
             warnings,
@@ -104,22 +89,10 @@ impl Summary {
         })
     }
 
-    /// What stands in the results of any runs: how many they are, their errors, how often they succeeded.
-    pub(crate) fn outcome(&self) -> Map<String, Value> {
-        let [successes, runs] = self.successes;
-        let mut json = nested(self.errors.iter().map(|error| (&error.metric, json!(error))));
-        json.insert("runs".into(), runs.into());
-        json.insert("success_rate".into(), (successes as f64 / runs.max(1) as f64).into());
-        if self.many {
-            json.insert("success_ci95".into(), json!(wilson_interval(successes, runs)));
-        }
-        json
-    }
-
     /// As it stands in `result.json`, behind what `about` says of what was run.
     pub fn json(&self, about: &Map<String, Value>, success_means: &str) -> Map<String, Value> {
         let mut json = about.clone();
-        json.extend(self.outcome());
+        json.extend(self.outcome.json());
         json.insert("seed".into(), self.seed.into());
         json.insert("returned".into(), json!(self.returned));
         json.insert("success_means".into(), success_means.into());
@@ -134,17 +107,9 @@ impl Summary {
         json
     }
 
-    /// How many of the runs succeeded.
-    pub(crate) fn success_share(&self) -> String {
-        let [successes, runs] = self.successes;
-        let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
-        let rate = successes as f64 / runs.max(1) as f64 * 100.0;
-        format!("{rate:.1} % of runs, 95 % interval {low:.1} to {high:.1} %")
-    }
-
     fn success(&self, means: &str) -> String {
-        let succeeded = match self.successes[0] {
-            _ if self.many => self.success_share(),
+        let succeeded = match self.outcome.successes[0] {
+            _ if self.outcome.many => self.outcome.success_share(),
             0 => "no".to_owned(),
             _ => "yes".to_owned(),
         };
@@ -153,7 +118,7 @@ impl Summary {
 
     /// Which seeds were run.
     pub fn seeds(&self) -> String {
-        match self.successes[1] {
+        match self.outcome.successes[1] {
             1 => format!("seed {}", self.seed),
             n => {
                 let last = self.seed.wrapping_add(n as u64 - 1);
@@ -167,7 +132,7 @@ impl Summary {
         let mut lines: Vec<String> =
             self.partial.iter().map(|partial| line("stopped", &partial.of("runs"))).collect();
         lines.extend(self.table().lines());
-        lines.push(line("returned", &self.returned.in_words(self.successes[1])));
+        lines.push(line("returned", &self.returned.in_words(self.outcome.successes[1])));
         lines.push(line("success", &self.success(success_means)));
         lines.push(line("time", &self.time()));
         lines.extend(self.against.iter().flat_map(|against| against.text()));
@@ -181,10 +146,10 @@ impl Summary {
     }
 
     fn table(&self) -> Table {
-        let interval = self.many.then_some("95 % interval of the end");
+        let interval = self.outcome.many.then_some("95 % interval of the end");
         let head = ["Error", "Start", "End", "Best"].into_iter().chain(interval);
         let mut table = Table::new(head);
-        for error in &self.errors {
+        for error in &self.outcome.errors {
             let numbers = [error.initial, error.last, error.best].map(short);
             let interval =
                 error.ci95.map(|[low, high]| format!("{} to {}", short(low), short(high)));
@@ -197,13 +162,14 @@ impl Summary {
     pub fn section(&self, report: &mut Report, runs: &[Run], success_means: &str) {
         report.heading("Results");
         report.table(&self.table());
-        report.labelled("Returned", &self.returned.in_words(self.successes[1]));
+        report.labelled("Returned", &self.returned.in_words(self.outcome.successes[1]));
         report.labelled("Success", &self.success(success_means));
-        let gains = match self.errors.iter().any(|error| error.metric.is_gain()) {
+        let gains = match self.outcome.errors.iter().any(|error| error.metric.is_gain()) {
             false => "",
             true => ", of dB the higher",
         };
-        let means = if self.successes[1] > 1 { " All are means over the runs." } else { "" };
+        let means =
+            if self.outcome.successes[1] > 1 { " All are means over the runs." } else { "" };
         report.note(&format!(
             "The lower the better{gains}; \"best\" is over all steps, for each by itself.{means} {}.",
             self.time()
@@ -211,17 +177,17 @@ impl Summary {
         if let Some(against) = &self.against {
             against.section(report);
         }
-        if self.many {
+        if self.outcome.many {
             report.details("Every run at its end", &self.each_run(runs));
         }
     }
 
     fn each_run(&self, runs: &[Run]) -> Table {
-        let titles = self.errors.iter().map(|error| error.metric.title());
+        let titles = self.outcome.errors.iter().map(|error| error.metric.title());
         let mut table =
             Table::new(["Seed".to_owned()].into_iter().chain(titles).chain(["Success".into()]));
         for (k, run) in runs.iter().enumerate() {
-            let last = self.errors.iter().filter_map(|error| error.per_run.as_ref());
+            let last = self.outcome.errors.iter().filter_map(|error| error.per_run.as_ref());
             let success = if run.success { "yes" } else { "no" };
             let cells = last.map(|values| short(values[k]));
             table.push([run.seed.to_string()].into_iter().chain(cells).chain([success.into()]));

@@ -138,7 +138,7 @@ fn the_ending_names_the_format() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(softrast_test_kit::cases(2000))]
 
     #[test]
     fn random_bytes_never_break_the_reader(bytes in vec(any::<u8>(), 0..400)) {

@@ -29,7 +29,6 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{DType, Tensor},
 };
-use criterion::{BenchmarkGroup, Criterion, Throughput, measurement::WallTime};
 use machine::machine;
 use rayon::ThreadPool;
 use record::Record;
@@ -51,25 +50,26 @@ type AA = Autodiff<A>;
 const MOST_PAIRS: usize = 60_000_000;
 const MOST_PLAIN_PAIRS: usize = 4_000_000;
 
+/// Each measurement runs unrecorded for `WARM_UP`, then as `SAMPLES` samples that take `MEASUREMENT` together.
+const WARM_UP: Duration = Duration::from_millis(150);
+const MEASUREMENT: Duration = Duration::from_millis(500);
+const SAMPLES: usize = 10;
+
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut criterion = Criterion::default()
-        .sample_size(10)
-        .warm_up_time(Duration::from_millis(150))
-        .measurement_time(Duration::from_millis(500))
-        .configure_from_args();
+    // Cargo adds a flag of its own.
+    let filter = std::env::args().skip(1).find(|word| word != "--bench");
     let machine = machine();
-    let bench = Bench { record: Record::default(), pools: [1, 2].map(pool) };
+    let bench = Bench { record: Record::default(), pools: [1, 2].map(pool), filter };
     for (name, workload) in [("W1", Workload::w1()), ("W2", Workload::w2())] {
         println!("{name} is {}", workload.name);
-        let mut group = criterion.benchmark_group(name);
-        bench.passes(&mut group, &workload.name, &workload);
+        bench.passes(name, &workload.name, &workload);
         let mlp = under_mlp(&workload);
-        bench.step(&mut group, &format!("{name}, logistic"), &workload);
-        bench.step(&mut group, &format!("{name}, MLP"), &mlp);
+        bench.step(name, &format!("{name}, logistic"), &workload);
+        bench.step(name, &format!("{name}, MLP"), &mlp);
     }
     let sphere = softrast_mesh::icosphere(5);
     for size in [256, 1024] {
-        let mut group = criterion.benchmark_group(format!("20k faces, {size} px"));
+        let group = format!("20k faces, {size} px");
         for width in [1e-5, 1e-4, 1e-3, 1e-2, 1e-1] {
             let workload = Workload { width, ..Workload::new("", &sphere, &[30.0], size) };
             let pairs = Op::new(&workload).pairs();
@@ -78,13 +78,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                 println!("left out: {name}: {pairs} pairs");
                 continue;
             }
-            bench.passes(&mut group, &name, &workload);
+            bench.passes(&group, &name, &workload);
         }
     }
-    criterion.final_summary();
-    // Without arguments, or with a filter, some rows are missing.
-    let words: Vec<_> = std::env::args().skip(1).collect();
-    if words == ["--bench"] {
+    // With a filter, some rows are missing.
+    if bench.filter.is_none() {
         let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies/speed.md");
         record::write(&page, &bench.tables(&machine)?)?;
     }
@@ -175,6 +173,8 @@ fn pool(threads: usize) -> ThreadPool {
 struct Bench {
     record: Record,
     pools: [ThreadPool; 2],
+    /// A part of the names of the measurements to make; all without it.
+    filter: Option<String>,
 }
 
 /// Where a time goes on the page.
@@ -195,33 +195,40 @@ const PLAIN: [&str; 2] = ["scalar forward, 1 thread", "scalar vjp, 1 thread"];
 
 impl Bench {
     /// Times `run` on what `prepare` makes, which is not timed.
-    fn time<I, O>(
-        &self,
-        group: &mut BenchmarkGroup<WallTime>,
-        cell: Cell,
-        prepare: impl Fn() -> I,
-        run: impl Fn(I) -> O,
-    ) {
+    fn time<I, O>(&self, group: &str, cell: Cell, prepare: impl Fn() -> I, run: impl Fn(I) -> O) {
         let Cell { row, pairs, column } = cell;
-        group.throughput(Throughput::Elements(pairs as u64));
-        group.bench_function(format!("{row}, {column}"), |bencher| {
-            bencher.iter_custom(|iterations| {
-                let mut total = Duration::ZERO;
-                for _ in 0..iterations {
-                    let input = prepare();
-                    let start = Instant::now();
-                    let output = black_box(run(input));
-                    total += start.elapsed();
-                    drop(output);
-                }
-                self.record.note(row, pairs, column, total, iterations);
-                total
-            });
-        });
+        let name = format!("{group}/{row}, {column}");
+        if self.filter.as_ref().is_some_and(|filter| !name.contains(filter)) {
+            return;
+        }
+        let timed = || {
+            let input = prepare();
+            let start = Instant::now();
+            let output = black_box(run(input));
+            let time = start.elapsed();
+            drop(output);
+            time
+        };
+        let (start, mut warm) = (Instant::now(), 0);
+        while warm == 0 || start.elapsed() < WARM_UP {
+            timed();
+            warm += 1;
+        }
+        let per_sample = MEASUREMENT.as_secs_f64() / SAMPLES as f64;
+        let iterations = (per_sample * warm as f64 / start.elapsed().as_secs_f64()) as u64;
+        for _ in 0..SAMPLES {
+            let total = (0..iterations.max(1)).map(|_| timed()).sum();
+            self.record.note(row, pairs, column, total, iterations.max(1));
+        }
+        let median = self.record.median(row, column).unwrap_or(f64::NAN);
+        println!(
+            "{name}: {median:.3} ms, {:.0} million pairs per second",
+            pairs as f64 / median / 1e3
+        );
     }
 
     /// All three passes, and the plain version with the same support.
-    fn passes(&self, group: &mut BenchmarkGroup<WallTime>, row: &str, workload: &Workload) {
+    fn passes(&self, group: &str, row: &str, workload: &Workload) {
         let op = Op::new(workload);
         let pairs = op.pairs();
         let cell = |column| Cell { row, pairs, column };
@@ -240,7 +247,7 @@ impl Bench {
     }
 
     /// Whole steps: with a table that is there, and with one that every step makes anew.
-    fn step(&self, group: &mut BenchmarkGroup<WallTime>, row: &str, workload: &Workload) {
+    fn step(&self, group: &str, row: &str, workload: &Workload) {
         let step = Step::new(workload);
         let pairs = step.op.pairs();
         for (k, pool) in self.pools.iter().enumerate() {

@@ -41,7 +41,7 @@ pub trait RasterBackend: Backend {
         None
     }
 
-    /// Runs a pass of an op. Where tensors do not lie on the host, of [`FusedOp::ProfileSum`] only. WebAssembly has f32 alone, so that a page
+    /// Runs a pass of an op. Backends whose tensors do not lie on the host run [`FusedOp::ProfileSum`] and [`FusedOp::SoftBlend`] only. WebAssembly has f32 alone, so that a page
     /// is smaller to load.
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
         match tensors[0].dtype() {

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::NoAdapter;
+
 /// Where little things are computed whatever backend draws: parameters, supports, figures. On the
 /// CPU, in floats of 32 bits; with `ndarray` or `wgpu` it also has floats of 64 bits.
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]
@@ -112,14 +114,6 @@ pub enum NoBackend {
 fn names(choices: &[BackendChoice]) -> String {
     choices.iter().map(|choice| choice.name()).collect::<Vec<_>>().join(" and ")
 }
-
-/// There is nothing that wgpu could run on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "no adapter for wgpu found: install the Vulkan driver of your graphics card, or Mesa's software \
-     Vulkan (Debian, Ubuntu: apt install mesa-vulkan-drivers libvulkan1)"
-)]
-pub struct NoAdapter;
 
 /// The backends whose features (`ndarray`, `flex`, `wgpu`) are on in the crate that asks, as
 /// `&'static [BackendChoice]`.

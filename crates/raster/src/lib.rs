@@ -35,9 +35,11 @@ mod gpu;
 mod hard;
 mod image_size;
 mod kernel;
+mod limits;
 mod log_curve;
 mod loss;
 mod loss_op;
+mod no_adapter;
 mod picture_loss;
 mod pinhole;
 mod profile;
@@ -54,7 +56,7 @@ mod weighting;
 
 pub use attributes::Attributes;
 pub use backend::{RasterBackend, profile_sum};
-pub use backend_choice::{BackendChoice, HostBackend, NoAdapter, NoBackend};
+pub use backend_choice::{BackendChoice, HostBackend, NoBackend};
 pub use camera::{Orbit, project, vertices};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
@@ -68,9 +70,11 @@ pub use gpu::Wgpu;
 pub use gpu::adapter_name;
 pub use hard::{hard_silhouette, nearest_faces};
 pub use image_size::ImageSize;
+pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 #[doc(hidden)]
 pub use loss_op::SilhouetteLoss;
+pub use no_adapter::NoAdapter;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
 pub use profile::Profile;
@@ -83,7 +87,7 @@ pub use soft_blend::SoftBlend;
 pub use soft_renderer::SoftRenderer;
 pub use sum_op::ProfileSum;
 pub use t_conorm::{TConorm, UnknownTConorm};
-pub use view::{NEAR, view_rotation};
+pub use view::view_rotation;
 pub use weighting::Weighting;
 
 /// Compiles and runs the README's example.

@@ -8,9 +8,6 @@ use crate::{
     reference,
 };
 
-/// Keeps the ratio of two empty images defined.
-pub(crate) const EMPTY: f64 = 1e-6;
-
 /// `1 - |p ∩ t| / |p ∪ t|` of each view, soft: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
 ///
 /// `image` and `target` are `[views, height, width]` in [0, 1]; the result is `[views]`. Two empty

@@ -1,10 +1,10 @@
 use std::sync::{Arc, OnceLock};
 
-use burn::tensor::TensorData;
+use burn::tensor::{Element, TensorData};
 
 use crate::{
     ProfileSum,
-    fused::{ElementaryOp, Number, Numbers, dual_upstream, flat, pass::Pass},
+    fused::{ElementaryOp, Number, dual_upstream, flat, pass::Pass},
     kernel::{self, Float, Inputs, PixelLoss, rows_of_losses},
 };
 
@@ -26,7 +26,7 @@ impl SilhouetteLoss {
 
     /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[1 or views, rows, 4]` and a `target` `[1 or views, height, width]`, to losses
     /// `[views]`. Only the vertices have a gradient.
-    pub(crate) fn run<F: Float + Numbers + Number<Float = F>>(
+    pub(crate) fn run<F: Float + Element + Number<Float = F>>(
         &self,
         pass: &Pass,
         slices: &[&[F]],
@@ -89,7 +89,7 @@ impl SilhouetteLoss {
     }
 
     /// The derivative of the gradient `Σ upstream · loss` along a direction of the vertices.
-    fn along<F: Float + Numbers + Number<Float = F>>(
+    fn along<F: Float + Element + Number<Float = F>>(
         &self,
         inputs: &Inputs<F>,
         bands: &kernel::Bands,

@@ -1,18 +1,10 @@
-//! The views of orbiting cameras: their rotations, and how near and how far is drawn.
+//! The views of orbiting cameras: their rotations.
 
 use std::f64::consts::PI;
 
 use burn::tensor::{Tensor, backend::Backend};
 
 use crate::RasterBackend;
-
-/// Camera depth, in world units, below which a vertex counts as behind the camera. Faces with such
-/// a vertex are not drawn.
-pub const NEAR: f64 = 1e-2;
-
-/// Vertices farther than this from the origin along an axis, in world units, are moved there: their
-/// squares would leave the range of f32, and their gradients with them.
-pub(crate) const FARTHEST: f64 = 1e15;
 
 /// Rotation from world to camera axes for cameras that look at the origin with y up.
 ///

@@ -54,9 +54,6 @@ struct Measured {
 fn draw(args: &Args) -> anyhow::Result<Output> {
     let backend = BackendChoice::among(compiled_backends!(), args.backend.as_deref());
     let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
-    if args.colour && backend == BackendChoice::Wgpu {
-        return Err(Error::usage("--colour draws on the CPU: choose --backend ndarray or flex"));
-    }
     if !args.reference {
         backend.set_up()?;
     }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use softrast_lab::Failure;
 use softrast_mesh::{Mesh, icosphere};
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_test_kit::{Program, ended};
 
 fn mesh(folder: &Path) -> String {
     let path = folder.join("sphere.obj");
@@ -332,5 +333,17 @@ fn meshes_without_size_or_behind_the_camera_leave_the_picture_white() {
         assert!((0.0..=1.0).contains(&covered), "{name}: {covered}");
         let picture = image::open(&out).unwrap().into_rgb8();
         assert_eq!(picture.get_pixel(31, 31).0, WHITE, "{name}");
+    }
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, out) = (mesh(folder.path()), folder.path().join("sphere.png"));
+    let program = Program::new(env!("CARGO_BIN_EXE_render")).on_one_thread();
+    for more in [&[][..], &["--reference"], &["--colour"], &["--threads", "2"]] {
+        let mut command = program.command();
+        let output = ended(command.args([&mesh, "--size", "16", "--out"]).arg(&out).args(more));
+        assert!(output.status.success(), "{more:?}: {output:?}");
     }
 }

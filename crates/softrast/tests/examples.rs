@@ -1,6 +1,12 @@
-//! Every example runs to its end and says something. `cargo test` builds them beside this test.
+//! Every example runs to its end, with the right result. `cargo test` builds them beside this test.
 
-use std::{env, path::PathBuf, process::Command};
+use std::{env, fs, path::PathBuf, process::Command};
+
+use burn::{
+    backend::{Autodiff, NdArray},
+    tensor::{DType, Tensor, TensorData},
+};
+use softrast::{mesh::fox, prelude::*};
 
 fn folder() -> PathBuf {
     let test = env::current_exe().expect("a test has a path");
@@ -24,9 +30,56 @@ fn number_after(text: &str, words: &str) -> f64 {
     rest[..end].parse().unwrap_or_else(|_| panic!("no number behind {words:?} in {text}"))
 }
 
+/// The mean coverage of the example's silhouette, by camera, scale and vertices that are moved, in f64.
+fn mean_coverage(camera: Orbit, scale: f64, moved: f64) -> f64 {
+    type Exact = NdArray<f64>;
+    let mesh = fox();
+    let positions: Vec<[f64; 3]> = mesh.positions().iter().map(|p| p.map(|x| x * moved)).collect();
+    let positions: Vec<f64> = positions.into_iter().flatten().collect();
+    let data = TensorData::new(positions, [1, mesh.positions().len(), 3]);
+    let corners = Tensor::<Exact, 3>::from_data(data, (&Default::default(), DType::F64));
+    let Orbit { distance, elevation_deg, azimuth_deg, fov_deg } = camera;
+    let camera = TensorData::new(vec![distance, elevation_deg, azimuth_deg, fov_deg], [1, 4]);
+    let camera = Tensor::<Exact, 2>::from_data(camera, (&Default::default(), DType::F64));
+    let renderer =
+        SoftRenderer::new(mesh.faces(), 64, Family::Logistic, scale).with_tolerance(1e-8);
+    renderer.silhouette(project(corners, camera)).mean().into_scalar()
+}
+
+/// The number behind a name in a line of debug output.
+fn field(text: &str, name: &str) -> f64 {
+    let rest = text.rsplit(name).next().unwrap_or_default();
+    let end = rest.find([',', ')', ' ', '}']).unwrap_or(rest.len());
+    rest[..end].parse().unwrap_or_else(|_| panic!("no number behind {name:?} in {text}"))
+}
+
 #[test]
-fn a_silhouette_has_gradients() {
-    assert!(number_after(&runs("silhouette"), "mean coverage") > 0.1);
+fn a_silhouette_has_the_gradients_of_differences() {
+    let said = runs("silhouette");
+    let at = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
+    assert!((number_after(&said, "mean coverage") - mean_coverage(at, 0.01, 1.0)).abs() < 2e-3);
+    let slope = |of: &dyn Fn(f64) -> f64, h: f64| (of(h) - of(-h)) / (2.0 * h);
+    let by = |change: &dyn Fn(f64) -> Orbit| slope(&|h| mean_coverage(change(h), 0.01, 1.0), 1e-4);
+    for (found, expected) in [
+        (field(&said, "distance: "), by(&|h| Orbit { distance: at.distance + h, ..at })),
+        (
+            field(&said, "elevation_deg: "),
+            by(&|h| Orbit { elevation_deg: at.elevation_deg + h, ..at }),
+        ),
+        (field(&said, "azimuth_deg: "), by(&|h| Orbit { azimuth_deg: at.azimuth_deg + h, ..at })),
+        (field(&said, "fov_deg: "), by(&|h| Orbit { fov_deg: at.fov_deg + h, ..at })),
+        (
+            field(&said, "ln of the scale   Some("),
+            slope(&|h| mean_coverage(at, 0.01 * h.exp(), 1.0), 1e-2),
+        ),
+    ] {
+        assert!((found - expected).abs() < 2e-2 * expected.abs() + 1e-5, "{found} not {expected}");
+    }
+    // The norm of the gradient is at least its part along a direction: that in which the mesh grows.
+    let norm = field(&said, "norm    Some(");
+    let grown = slope(&|h| mean_coverage(at, 0.01, 1.0 + h), 1e-4);
+    let length = fox().positions().iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
+    assert!(norm >= 0.99 * grown / length && norm < 1.0, "{norm} {grown} {length}");
 }
 
 #[test]
@@ -62,8 +115,58 @@ fn learning_lowers_the_validation_loss() {
     assert!(best < 0.8 * losses[0], "{said}");
 }
 
+/// What the example's ten steps leave of the pose, with a logarithm of the scale that is moved by `h`.
+fn after_ten_steps(renderer: &SoftRenderer<Family>, h: f64) -> f64 {
+    type Exact = NdArray<f64>;
+    let (mesh, device) = (fox(), Default::default());
+    let camera = Orbit { distance: 2.7, elevation_deg: 10.0, azimuth_deg: 0.0, fov_deg: 60.0 };
+    let seen = project(vertices::<Exact>(mesh.positions(), &device), camera.tensor(&device));
+    let target = hard_silhouette(seen, mesh.faces(), 32);
+    let phi = renderer.phi_tensor::<Exact>(&device) + h;
+    let start = Orbit { elevation_deg: 22.0, azimuth_deg: 15.0, ..camera };
+    let rates = Orbit { distance: 0.0, elevation_deg: 300.0, azimuth_deg: 300.0, fov_deg: 0.0 };
+    let (mut pose, rates) = (start.tensor::<Exact>(&device), rates.tensor::<Exact>(&device));
+    for _ in 0..10 {
+        let leaf = Tensor::<Autodiff<Exact>, 2>::from_inner(pose.clone()).require_grad();
+        let corners = project(vertices(mesh.positions(), &device), leaf.clone());
+        let image = renderer.silhouette_with(corners, &Tensor::from_inner(phi.clone()));
+        let loss = iou_loss(image, Tensor::from_inner(target.clone())).mean();
+        let gradient = leaf.grad(&loss.backward()).expect("the image depends on the pose");
+        pose = pose - gradient * rates.clone();
+    }
+    (pose - camera.tensor(&device)).powi_scalar(2).sum().into_scalar()
+}
+
 #[test]
-fn a_meta_gradient_is_a_number() {
-    let by_scale = number_after(&runs("meta_gradient"), "of the scale:");
-    assert!(by_scale.is_finite() && by_scale != 0.0, "{by_scale}");
+fn a_meta_gradient_is_that_of_differences() {
+    let said = runs("meta_gradient");
+    let renderer = SoftRenderer::new(fox().faces(), 32, Family::Logistic, 0.02);
+    let off = number_after(&said, "squared error of the pose:");
+    assert!((off - after_ten_steps(&renderer, 0.0)).abs() < 1e-2, "{said}");
+    let h = 1e-4;
+    let slope = (after_ten_steps(&renderer, h) - after_ten_steps(&renderer, -h)) / (2.0 * h);
+    let found = number_after(&said, "of the scale:");
+    assert!((found - slope).abs() < 1e-2 * slope.abs() + 1e-3, "{found} not {slope}");
+}
+
+#[test]
+fn a_texture_is_found_from_pictures() {
+    let said = runs("texture");
+    let losses: Vec<f64> = said
+        .split("mean squared error ")
+        .skip(1)
+        .map(|rest| rest.split_whitespace().next().unwrap_or_default().parse().unwrap_or(f64::NAN))
+        .collect();
+    assert!(losses.len() > 1 && losses[losses.len() - 1] < 0.1 * losses[0], "{said}");
+}
+
+#[test]
+fn every_example_is_run_here() {
+    let folder = env!("CARGO_MANIFEST_DIR");
+    let this = fs::read_to_string(format!("{folder}/tests/examples.rs")).expect("this file");
+    for entry in fs::read_dir(format!("{folder}/examples")).expect("a folder of examples") {
+        let path = entry.expect("an example").path();
+        let name = path.file_stem().expect("a name").to_string_lossy();
+        assert!(this.contains(&format!("runs(\"{name}\")")), "{name} is not run");
+    }
 }

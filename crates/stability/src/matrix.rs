@@ -8,6 +8,7 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::ThreadPoolBuilder;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use softrast_lab::{Store, key, median, wilson_interval};
@@ -83,12 +84,13 @@ pub struct LevelOutcome {
 
 /// Runs every case with every method, on so many threads, but for what is in the store; a shard every one that is its.
 ///
-/// The threads are plain ones, outside of the pool in which images are drawn: a thread of that pool that waits for an image may begin
-/// another case meanwhile, while it holds what the first needs.
+/// Each thread draws in a pool of its own, which has its share of the cores. The threads of one pool cannot run cases: one that waits for an
+/// image may begin another case meanwhile, while it holds what the first needs. And a caller that is a thread of the common pool waits here
+/// without working for it, so that no case may need that pool: it may have no other thread.
 ///
 /// # Errors
 ///
-/// If the store cannot be written.
+/// If the store cannot be written, or a thread cannot be started.
 pub fn run(
     cases: &[&'static Case],
     methods: &[Tested],
@@ -106,6 +108,8 @@ pub fn run(
     }
     let (next, done) = (AtomicUsize::new(0), Mutex::new((store, Vec::with_capacity(cells.len()))));
     let failed = Mutex::new(None);
+    let threads = threads.max(1);
+    let share = (rayon::current_num_threads() / threads).max(1);
     let work = || {
         while let Some((case, method)) = cells.get(next.fetch_add(1, Ordering::Relaxed)) {
             bar.set_message(format!("{} {}: {}", case.id, case.name, method.name));
@@ -123,7 +127,13 @@ pub fn run(
             lock().1.push((case.id, outcome));
         }
     };
-    std::thread::scope(|scope| (0..threads.max(1)).for_each(|_| drop(scope.spawn(work))));
+    let in_own_pool = || match ThreadPoolBuilder::new().num_threads(share).build() {
+        Ok(pool) => pool.install(work),
+        Err(error) => {
+            failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error.into());
+        }
+    };
+    std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(in_own_pool))));
     bar.finish_and_clear();
     if let Some(failed) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(failed);

@@ -84,7 +84,6 @@ fn work(args: &Args, again: &str) -> anyhow::Result<Matrix> {
     let chosen = chosen(&args.cases)?;
     let methods = methods(args)?;
     let mut folder = OutputFolder::open(&args.out)?;
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let path = folder.file("stability.jsonl");
     let store = match args.shard {
         Some(shard) => Store::of_shard(&path, shard)?,
@@ -98,7 +97,13 @@ fn work(args: &Args, again: &str) -> anyhow::Result<Matrix> {
     // A panic in a case is part of its outcome.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
-    let matrix = run(&chosen, &methods, store, args.threads.unwrap_or(cores), args.quiet);
+    let matrix = run(
+        &chosen,
+        &methods,
+        store,
+        args.threads.unwrap_or_else(rayon::current_num_threads),
+        args.quiet,
+    );
     std::panic::set_hook(hook);
     let matrix = matrix?;
     if args.shard.is_some() {

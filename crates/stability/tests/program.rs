@@ -5,6 +5,7 @@
 use std::{collections::HashSet, ffi::OsString};
 
 use serde_json::Value;
+use softrast_test_kit::Program;
 use stability::{cases, execute};
 
 #[test]
@@ -71,4 +72,23 @@ fn a_case_that_does_not_exist_is_answered_with_those_that_do() {
     let failure = execute(words, &mut Vec::new()).unwrap_err();
     assert_eq!(failure.code, 2);
     assert!(failure.message.contains("\"X99\"; known are F16, G01"), "{failure}");
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    let program = Program::new(env!("CARGO_BIN_EXE_stability")).on_one_thread();
+    for threads in ["", " --threads 3"] {
+        let out = tempfile::tempdir().unwrap();
+        let line = format!("--cases F16,G01,O06 --methods logistic,decay{threads}");
+        let json = program.run_in(out.path(), &line).unwrap();
+        assert_eq!(json["rows"].as_array().unwrap().len(), 3);
+    }
+}
+
+#[test]
+fn cases_run_where_the_caller_is_the_only_thread_of_its_pool() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let json = pool.install(|| run("stability --cases F16 --methods logistic", out.path()));
+    assert_eq!(json["rows"].as_array().unwrap().len(), 1);
 }

@@ -2,43 +2,21 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path};
 
 use serde_json::Value;
-use softrast_lab::Failure;
 use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
+use softrast_test_kit::{Failure, Program, assert_finite, warnings};
+
+const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_occlusion"));
 
 /// Runs a command line with results in `out`; its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
-    let output = Command::new(env!("CARGO_BIN_EXE_occlusion"))
-        .args(line.split_whitespace())
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.code() {
-        Some(0) => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        code => Err(Failure {
-            code: code.unwrap().try_into().unwrap(),
-            message: String::from_utf8(output.stderr).unwrap(),
-        }),
-    }
+    PROGRAM.run_in(out, line)
 }
 
 fn run(line: &str) -> Result<Value, Failure> {
     run_in(tempfile::tempdir().unwrap().path(), line)
-}
-
-fn warnings(json: &Value) -> String {
-    json["warnings"].to_string()
-}
-
-fn assert_finite(json: &Value) {
-    for error in ["image_error", "parameter_error"] {
-        for key in ["initial", "final", "best"] {
-            assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
-        }
-    }
 }
 
 #[test]
@@ -277,5 +255,13 @@ fn flags_of_learning_that_make_no_sense_are_refused() {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, 2, "{line}: {failure}");
         assert!(failure.message.contains(part), "{line}: {failure}");
+    }
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    for line in ["--size 16 --steps 2", "evaluate --runs 3 --size 16 --steps 2"] {
+        let out = tempfile::tempdir().unwrap();
+        PROGRAM.on_one_thread().run_in(out.path(), line).unwrap();
     }
 }

@@ -12,6 +12,7 @@ use std::{
 };
 
 use serde_json::Value;
+use softrast_test_kit::mpirun;
 
 const EXACT: &str = "learn --estimator unrolled --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness logistic --quiet --json";
 const ES: &str = "learn --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness gauss --estimator es:0.2 --quiet --json";
@@ -25,17 +26,7 @@ fn start(out: &Path, processes: Option<usize>, line: &str) -> Child {
     let pose = env!("CARGO_BIN_EXE_pose");
     let mut command = match processes {
         None => Command::new(pose),
-        Some(count) => {
-            let mut command = Command::new("mpirun");
-            command.args([
-                "--allow-run-as-root",
-                "--oversubscribe",
-                "-n",
-                &count.to_string(),
-                pose,
-            ]);
-            command
-        }
+        Some(count) => mpirun(pose, count),
     };
     let mesh = out.join("mesh.obj");
     // Where that is not possible the program says so.

@@ -5,7 +5,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
@@ -13,20 +12,13 @@ use serde_json::{Value, json};
 use softrast_inverse::{camera_json, coloured_pixels, silhouette_pixels};
 use softrast_mesh::icosphere;
 use softrast_raster::Pinhole;
+use softrast_test_kit::Program;
 
 /// Runs `pose solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
-    let output = Command::new(env!("CARGO_BIN_EXE_pose"))
-        .arg("solve")
-        .args(words)
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.success() {
-        true => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        false => Err(String::from_utf8(output.stderr).unwrap().trim_end().to_owned()),
-    }
+    let program = Program::new(env!("CARGO_BIN_EXE_pose"));
+    let found = program.run_words(out, &[&["solve"], words].concat());
+    found.map_err(|failure| failure.message.trim_end().to_owned())
 }
 
 fn fox(name: &str) -> String {
@@ -327,4 +319,12 @@ fn a_ball_is_found_by_its_colours() {
     // By its silhouette alone it may be anywhere.
     let found = run(out.path(), &words).unwrap();
     assert!(angle_deg(&found["camera"], &truth) > 10.0 && found["psnr"].is_null(), "{found}");
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    let program = Program::new(env!("CARGO_BIN_EXE_pose")).on_one_thread();
+    let (out, target) = (tempfile::tempdir().unwrap(), fox("images/03.png"));
+    let line = format!("--target {target} --camera {}", fox("transforms.json"));
+    program.run_in(out.path(), &line).unwrap();
 }

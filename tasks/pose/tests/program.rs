@@ -2,35 +2,21 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path};
 
 use serde_json::Value;
-use softrast_lab::Failure;
 use softrast_mesh::{Mesh, icosphere};
+use softrast_test_kit::{Failure, Program, assert_finite, warnings};
+
+const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_pose"));
 
 /// Runs a command line with results in `out`; its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
-    let output = Command::new(env!("CARGO_BIN_EXE_pose"))
-        .args(line.split_whitespace())
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.code() {
-        Some(0) => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        code => Err(Failure {
-            code: code.unwrap().try_into().unwrap(),
-            message: String::from_utf8(output.stderr).unwrap(),
-        }),
-    }
+    PROGRAM.run_in(out, line)
 }
 
 fn run(line: &str) -> Result<Value, Failure> {
     run_in(tempfile::tempdir().unwrap().path(), line)
-}
-
-fn warnings(json: &Value) -> String {
-    json["warnings"].to_string()
 }
 
 /// A mesh file of one triangle, or of whatever the text says.
@@ -39,14 +25,6 @@ fn with_mesh(text: &str, line: &str) -> Result<Value, Failure> {
     let mesh = folder.path().join("mesh.obj");
     fs::write(&mesh, text).unwrap();
     run(&format!("{line} --mesh {}", mesh.display()))
-}
-
-fn assert_finite(json: &Value) {
-    for error in ["image_error", "parameter_error"] {
-        for key in ["initial", "final", "best"] {
-            assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
-        }
-    }
 }
 
 #[test]
@@ -292,4 +270,16 @@ fn the_first_step_with_a_gamma_moves_as_the_released_one() {
     let json = run(&format!("{line} {}", spot.display())).unwrap();
     let released = 24.0 * json["parameter_error"]["released"]["final"].as_f64().unwrap();
     assert!((released / 1.63487 - 1.0).abs() < 1e-4, "parameter error after a step: {released}");
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    for line in [
+        "--size 16 --steps 2",
+        "evaluate --runs 3 --size 16 --steps 2",
+        "learn --size 16 --steps 2 --batch 2 --outer 1 --validation-runs 2 --softness logistic",
+    ] {
+        let out = tempfile::tempdir().unwrap();
+        PROGRAM.on_one_thread().run_in(out.path(), line).unwrap();
+    }
 }

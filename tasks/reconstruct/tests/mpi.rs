@@ -6,6 +6,7 @@
 use std::{fs, path::Path, process::Command};
 
 use serde_json::Value;
+use softrast_test_kit::mpirun;
 
 const LINE: &str =
     "train --shapes 3 --pairs 4 --parts 4 --steps 2 --val 1 --softness gauss --quiet --json";
@@ -15,17 +16,7 @@ fn trained(out: &Path, processes: Option<usize>, more: &str) -> [Value; 2] {
     let program = env!("CARGO_BIN_EXE_reconstruct");
     let mut command = match processes {
         None => Command::new(program),
-        Some(count) => {
-            let mut command = Command::new("mpirun");
-            command.args([
-                "--allow-run-as-root",
-                "--oversubscribe",
-                "-n",
-                &count.to_string(),
-                program,
-            ]);
-            command
-        }
+        Some(count) => mpirun(program, count),
     };
     command.args(LINE.split_whitespace()).args(more.split_whitespace()).arg("--out").arg(out);
     let output = command.output().unwrap();
@@ -59,14 +50,7 @@ fn any_number_of_processes_trains_the_same_to_the_last_bit() {
 #[test]
 fn more_processes_than_parts_are_refused() {
     let out = tempfile::tempdir().unwrap();
-    let output = Command::new("mpirun")
-        .args([
-            "--allow-run-as-root",
-            "--oversubscribe",
-            "-n",
-            "3",
-            env!("CARGO_BIN_EXE_reconstruct"),
-        ])
+    let output = mpirun(env!("CARGO_BIN_EXE_reconstruct"), 3)
         .args(["train", "--parts", "2", "--quiet", "--out"])
         .arg(out.path())
         .output()

@@ -9,7 +9,7 @@ use std::fs;
 use image::{GrayImage, Luma};
 use serde_json::Value;
 
-use runs::{assert_finite, run, run_in, warnings};
+use runs::{PROGRAM, assert_finite, run, run_in, warnings};
 
 /// Runs on a picture of 8 × 8 pixels with these levels.
 fn with_target(level: impl Fn(u32, u32) -> u8, line: &str) -> Value {
@@ -106,5 +106,16 @@ fn contradictions_are_usage_errors_and_bad_files_are_not() {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");
         assert!(failure.message.contains(part), "{line}: {failure}");
+    }
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    for line in [
+        "--size 16 --triangles 20 --steps 2",
+        "evaluate --runs 3 --size 16 --triangles 20 --steps 2",
+    ] {
+        let out = tempfile::tempdir().unwrap();
+        PROGRAM.on_one_thread().run_in(out.path(), line).unwrap();
     }
 }

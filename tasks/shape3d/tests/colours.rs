@@ -2,27 +2,20 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path};
 
 use image::{Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::{Value, json};
 use softrast_inverse::coloured_pixels;
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{Orbit, Pinhole};
+use softrast_test_kit::Program;
 
 /// Runs `shape3d solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
-    let output = Command::new(env!("CARGO_BIN_EXE_shape3d"))
-        .arg("solve")
-        .args(words)
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.success() {
-        true => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        false => Err(String::from_utf8(output.stderr).unwrap().trim_end().to_owned()),
-    }
+    let program = Program::new(env!("CARGO_BIN_EXE_shape3d"));
+    let found = program.run_words(out, &[&["solve"], words].concat());
+    found.map_err(|failure| failure.message.trim_end().to_owned())
 }
 
 /// A ball, wider than high, with colours that follow its shape.

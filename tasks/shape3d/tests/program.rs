@@ -2,26 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path};
 
 use serde_json::Value;
-use softrast_lab::Failure;
+use softrast_test_kit::{Failure, Program, assert_finite, warnings};
+
+const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_shape3d"));
 
 /// Runs a command line with results in `out`; its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
-    let output = Command::new(env!("CARGO_BIN_EXE_shape3d"))
-        .args(line.split_whitespace())
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.code() {
-        Some(0) => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        code => Err(Failure {
-            code: code.unwrap().try_into().unwrap(),
-            message: String::from_utf8(output.stderr).unwrap(),
-        }),
-    }
+    PROGRAM.run_in(out, line)
 }
 
 fn run(line: &str) -> Result<Value, Failure> {
@@ -39,18 +29,6 @@ fn with_file(flag: &str, text: &str, line: &str) -> Result<Value, Failure> {
 /// A template of few faces, for tests of other things.
 const OCTAHEDRON: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n\
                           f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
-
-fn warnings(json: &Value) -> String {
-    json["warnings"].to_string()
-}
-
-fn assert_finite(json: &Value) {
-    for error in ["image_error", "parameter_error"] {
-        for key in ["initial", "final", "best"] {
-            assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
-        }
-    }
-}
 
 #[test]
 fn a_few_steps_lower_all_errors_and_write_every_file() {
@@ -160,5 +138,13 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");
         assert!(failure.message.contains(part), "{line}: {failure}");
+    }
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    for line in ["--size 16 --steps 2", "evaluate --runs 3 --size 16 --steps 2"] {
+        let out = tempfile::tempdir().unwrap();
+        PROGRAM.on_one_thread().run_in(out.path(), line).unwrap();
     }
 }

@@ -2,24 +2,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{fs, path::Path, process::Command};
+use std::{fs, path::Path};
 
 use serde_json::{Value, json};
 use softrast_mesh::Mesh;
+use softrast_test_kit::Program;
 
 /// Runs `shape3d solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
-    let output = Command::new(env!("CARGO_BIN_EXE_shape3d"))
-        .arg("solve")
-        .args(words)
-        .args(["--quiet", "--json", "--out"])
-        .arg(out)
-        .output()
-        .unwrap();
-    match output.status.success() {
-        true => Ok(serde_json::from_slice(&output.stdout).unwrap()),
-        false => Err(String::from_utf8(output.stderr).unwrap().trim_end().to_owned()),
-    }
+    let program = Program::new(env!("CARGO_BIN_EXE_shape3d"));
+    let found = program.run_words(out, &[&["solve"], words].concat());
+    found.map_err(|failure| failure.message.trim_end().to_owned())
 }
 
 fn fox() -> String {
@@ -197,4 +190,12 @@ fn a_template_is_deformed_and_pictures_may_cut_the_object_off() {
 fn two_views_are_enough_for_a_mesh_that_has_both_masks() {
     let two = |cameras: &mut Value| cameras["frames"].as_array_mut().unwrap().truncate(2);
     assert!(with(two, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    let program = Program::new(env!("CARGO_BIN_EXE_shape3d")).on_one_thread();
+    let out = tempfile::tempdir().unwrap();
+    let line = format!("--views {} --colour --steps 2", fox());
+    program.run_in(out.path(), &line).unwrap();
 }

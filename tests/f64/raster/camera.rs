@@ -47,7 +47,7 @@ fn a_camera_without_angles_looks_along_z() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(256))]
 
     #[test]
     fn projection_is_that_of_a_camera_that_looks_at_the_origin(

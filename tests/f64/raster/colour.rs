@@ -134,7 +134,7 @@ fn gradients_and_hessian_products_match_central_differences() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(256))]
 
     #[test]
     fn permuting_the_faces_changes_nothing_above_rounding(

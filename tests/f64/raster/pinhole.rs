@@ -168,7 +168,7 @@ fn gradients_to_pose_intrinsics_and_vertices_are_differences_to_second_order() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(256))]
 
     #[test]
     fn conventions_lead_there_and_back(

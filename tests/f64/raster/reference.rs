@@ -61,7 +61,7 @@ fn a_triangle_without_area_has_no_inside() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(256))]
 
     #[test]
     fn the_distance_is_that_to_the_nearest_point_of_the_boundary(

@@ -89,7 +89,7 @@ fn assert_same(
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(softrast_test_kit::cases(40))]
 
     #[test]
     fn one_op_gives_what_two_give(

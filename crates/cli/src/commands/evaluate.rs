@@ -118,7 +118,7 @@ fn run<T: Task>(
     let is_begun = |(_, evaluation): &(_, &Evaluation)| !evaluation.runs.is_empty();
     let other = second.zip(evaluations.get(1)).filter(is_begun);
     let mut summary = finished.summary(many)?;
-    let partial = Partial { finished: summary.successes[1], asked: seeds.len() };
+    let partial = Partial { finished: summary.outcome.successes[1], asked: seeds.len() };
     summary.partial = stopped.then_some(partial);
     if let Some((second, evaluation)) = other {
         let titles = [title(first, second), title(second, first)];

@@ -58,7 +58,7 @@ pub(super) fn write<T: Task>(
         }
     }
     folder.stage("curve.csv", csv(metrics, &evaluation.runs).as_bytes())?;
-    if summary.many {
+    if summary.outcome.many {
         let named: Vec<_> = ["method", "against"].into_iter().zip(&convergences).collect();
         folder.stage("convergence.csv", convergence_csv(metrics, &named).as_bytes())?;
     }
@@ -110,7 +110,7 @@ fn page<T: Task>(
     let again = begun_again(&evaluation.runs);
     report.note(&format!(
         "All errors should fall to 0.{}{again}",
-        if summary.many { means } else { "" }
+        if summary.outcome.many { means } else { "" }
     ));
     let mut about = experiment.about();
     about.retain(|_, value| !value.is_object());
@@ -141,7 +141,7 @@ fn begun_again(runs: &[Run]) -> String {
 
 fn pictures(report: &mut Report, summary: &Summary, evaluation: &Evaluation) {
     let Some(pictures) = &evaluation.pictures else { return };
-    let which = match summary.many {
+    let which = match summary.outcome.many {
         false => String::new(),
         true => format!(" Shown is seed {}, the first.", summary.seed),
     };

@@ -83,7 +83,7 @@ fn a_finished_run_is_gone_on_from_without_a_step() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(softrast_test_kit::cases(60))]
 
     #[test]
     fn a_damaged_checkpoint_is_one_line(changes in changes()) {

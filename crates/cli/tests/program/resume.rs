@@ -79,7 +79,7 @@ fn runs_of_another_job_are_neither_used_nor_lost() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(softrast_test_kit::cases(40))]
 
     /// Bytes changed, lines doubled, dropped and swapped, the file cut: the results are those of an undamaged one.
     #[test]

@@ -104,7 +104,7 @@ fn what_shards_cannot_share_is_refused() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(softrast_test_kit::cases(24))]
 
     /// Shards of any number, in any order, some never run, some twice, and each killed anywhere.
     #[test]

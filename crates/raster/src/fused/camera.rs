@@ -2,11 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::{Elementary, Views, number::Number};
+use super::{
+    elementary::{Elementary, Views},
+    number::Number,
+};
 use crate::{
     NEAR,
     kernel::{Dual, Float},
-    view::FARTHEST,
+    limits::FARTHEST,
 };
 
 /// Orbits `[views, 4]` to matrices `[views, 3, 4]`; see [`crate::project`].

@@ -2,8 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{Elementary, Views, number::Number};
-use crate::{kernel::Float, loss::EMPTY};
+use super::{
+    elementary::{Elementary, Views},
+    number::Number,
+};
+use crate::kernel::{EMPTY, Float};
 
 /// Pixels that one task takes; sums of them are added in order, whatever the number of threads.
 const PIXELS: usize = 8192;

@@ -4,44 +4,14 @@
 use cubecl::prelude::*;
 
 use super::{
-    TILE,
     drawn::{Drawn, Kind},
     dual::Dual,
     gradient::UNITS,
+    of_pixel::{OF_PIXEL, OfPixel},
     reach::Reach,
+    shown::Shown,
+    tile::TILE,
 };
-
-/// Numbers of a pixel that a gradient needs: the logarithm of all weights, and what the image is to the upstream, with their derivatives.
-pub(super) const OF_PIXEL: usize = 4;
-
-/// The numbers of a pixel.
-#[derive(CubeType, Clone, Copy)]
-pub(super) struct OfPixel {
-    pub(super) log: Dual,
-    draw: Dual,
-}
-
-#[cube]
-impl OfPixel {
-    /// Where those of a pixel of a view of the launch begin, and behind them the gradient of the background.
-    pub(super) fn at(
-        drawn: &Drawn,
-        view: u32,
-        row: u32,
-        column: u32,
-        #[comptime] kind: Kind,
-    ) -> usize {
-        drawn.frame.pixel(drawn.first_view + view, row, column) as usize
-            * comptime!(OF_PIXEL + kind.channels + 1)
-    }
-
-    pub(super) fn load(pixels: &Array<f32>, at: usize) -> OfPixel {
-        OfPixel {
-            log: Dual { value: pixels[at], tangent: pixels[at + 1] },
-            draw: Dual { value: pixels[at + 2], tangent: pixels[at + 3] },
-        }
-    }
-}
 
 /// Writes each pixel of the image, `[views, channels + 1, height, width]`, or in a pass of second order its derivative.
 ///
@@ -87,7 +57,7 @@ pub(super) fn blend_pixels(
             let face = 32 * word + bits.trailing_zeros();
             bits &= bits - 1u32;
             if drawn.reaches(view, face, column, row) {
-                let shown = drawn.face(view, face, kind);
+                let shown = Shown::of(drawn, view, face, kind);
                 let pair = shown.pair(px, py, drawn, kind);
                 if pair.counts(weights) {
                     let log = pair.log_edge.value + pair.log_depth.value;
@@ -197,7 +167,7 @@ pub(super) fn blend_faces(
     let (frame, weights) = (drawn.frame, drawn.weights);
     let face_count = drawn.of_cells.face_count;
     let (view, face) = (job as u32 / face_count, job as u32 % face_count);
-    let shown = drawn.face(view, face, kind);
+    let shown = Shown::of(drawn, view, face, kind);
     let reach = Reach::load(&drawn.reaches, job);
     let mut pixel = UNIT_POS;
     let mut end = 0u32;
@@ -318,7 +288,7 @@ pub(super) fn blend_cubics(
                     let face = 32 * word + bits.trailing_zeros();
                     bits &= bits - 1u32;
                     if drawn.reaches(view, face, column, row) {
-                        let shown = drawn.face(view, face, kind);
+                        let shown = Shown::of(drawn, view, face, kind);
                         let pair = shown.pair(px, py, drawn, kind);
                         if pair.counts(drawn.weights) {
                             let share = pair.share(of_pixel.log, drawn.weights);

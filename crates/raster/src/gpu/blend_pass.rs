@@ -7,12 +7,14 @@ use burn::{
 use burn_cubecl::{cubecl::prelude::*, kernel::into_contiguous};
 
 use super::{
-    TILE, Wgpu,
-    blend::{OF_PIXEL, blend_cubics, blend_faces, blend_pixels, gather_corners},
+    backend::Wgpu,
+    blend::{blend_cubics, blend_faces, blend_pixels, gather_corners},
     drawn::{DrawnLaunch, Kind, WeightsLaunch},
     gradient::UNITS,
+    of_pixel::OF_PIXEL,
     pass::{Buffer, CUBE, Culled, Partial, Pass, lookup},
-    texture::{MEASURED, sum_texels, texel_floats},
+    texels::{MEASURED, sum_texels, texel_floats},
+    tile::TILE,
     topology::{OnDevice, Topology},
 };
 use crate::{

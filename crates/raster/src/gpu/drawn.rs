@@ -8,7 +8,6 @@ use super::{
     frame::Frame,
     pair::{Cubic, Lookup},
     reach::Reach,
-    shown::Shown,
 };
 
 /// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, background and texture.
@@ -74,7 +73,7 @@ pub(super) struct Drawn {
     numbers: Array<f32>,
     direction: Array<f32>,
     /// `[faces, 3]`: the attributes at the corners.
-    entries: Array<u32>,
+    pub(super) entries: Array<u32>,
     pub(super) of_cells: Cells,
     pub(super) weights: Weights,
     pub(super) frame: Frame,
@@ -99,14 +98,6 @@ impl Drawn {
     pub(super) fn reaches(&self, view: u32, face: u32, column: u32, row: u32) -> bool {
         let job = (view * self.of_cells.face_count + face) as usize;
         Reach::load(&self.reaches, job).holds(column, row)
-    }
-
-    /// A face of a view of the launch.
-    pub(super) fn face(&self, view: u32, face: u32, #[comptime] kind: Kind) -> Shown {
-        let job = (view * self.of_cells.face_count + face) as usize;
-        let stride = comptime!(if kind.second { 18usize } else { 9usize });
-        let first = self.weights.attributes + (self.first_view + view) * self.weights.per_view;
-        Shown::new(&self.corners, stride * job, &self.entries, face as usize, first, kind)
     }
 
     /// Where the first channel of a pixel of a view of the launch stands in an image of all views.

@@ -3,11 +3,11 @@
 use cubecl::prelude::*;
 
 use super::{
-    TILE,
     cells::Cells,
     frame::Frame,
     pair::{Cubic, Face, Lookup},
     reach::Reach,
+    tile::TILE,
 };
 
 /// Writes the sum of each pixel to `sums`, all views being at `offset`.

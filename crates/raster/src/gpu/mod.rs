@@ -8,6 +8,7 @@
 
 #[cfg(not(target_family = "wasm"))]
 mod adapter;
+mod backend;
 mod blend;
 mod blend_pass;
 mod cells;
@@ -17,35 +18,30 @@ mod dual;
 mod frame;
 mod gradient;
 mod image;
+mod of_pixel;
 mod pair;
 mod pass;
 mod reach;
 mod shown;
 mod table;
+mod texels;
 mod texture;
+mod tile;
 mod topology;
 
 #[cfg(not(target_family = "wasm"))]
 pub use adapter::adapter_name;
+pub use backend::Wgpu;
 pub(crate) use topology::Topology;
 
-use burn::{
-    backend::wgpu::{CubeBackend, WgpuRuntime},
-    tensor::{
-        FloatDType, Slice, TensorMetadata,
-        ops::{FloatTensor, FloatTensorOps},
-    },
+use burn::tensor::{
+    FloatDType, Slice, TensorMetadata,
+    ops::{FloatTensor, FloatTensorOps},
 };
 
 use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
 use blend_pass::{Blend, culling};
 use pass::Pass as Kernels;
-
-/// Width and height in pixels of the tiles that walk together: one cube of units each.
-const TILE: u32 = 8;
-
-/// The wgpu backend in floats of 32 bits: Vulkan, Metal or `WebGPU`, whichever the system has.
-pub type Wgpu = CubeBackend<WgpuRuntime, f32, i32, u32>;
 
 impl RasterBackend for Wgpu {
     const ON_HOST: bool = false;

@@ -1,4 +1,4 @@
-//! The arithmetic of one pixel and one face, as `kernel/{face,pair,table,batch}.rs` have it.
+//! The arithmetic of one pixel and one face, as `kernel/{face,pair,table}.rs` have it.
 
 use cubecl::prelude::*;
 

@@ -11,7 +11,6 @@ use burn_cubecl::{
 };
 
 use super::{
-    TILE,
     cells::{CellsLaunch, fill_cells},
     frame::FrameLaunch,
     gradient::{UNITS, sum_faces, sum_vertices},
@@ -19,6 +18,7 @@ use super::{
     pair::LookupLaunch,
     reach::{count_drawn, prepare},
     table::{sum_cubics, sum_tables},
+    tile::TILE,
     topology::OnDevice,
 };
 use crate::{ImageSize, ProfileSum, kernel::Grid};

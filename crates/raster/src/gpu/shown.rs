@@ -111,8 +111,16 @@ pub(super) struct Share {
 
 #[cube]
 impl Shown {
+    /// A face of a view of the launch.
+    pub(super) fn of(drawn: &Drawn, view: u32, face: u32, #[comptime] kind: Kind) -> Shown {
+        let job = (view * drawn.of_cells.face_count + face) as usize;
+        let stride = comptime!(if kind.second { 18usize } else { 9usize });
+        let first = drawn.weights.attributes + (drawn.first_view + view) * drawn.weights.per_view;
+        Shown::new(&drawn.corners, stride * job, &drawn.entries, face as usize, first, kind)
+    }
+
     /// The face whose prepared numbers start at `first` in `corners`; `entries` `[faces, 3]` names the attributes at its corners.
-    pub(super) fn new(
+    fn new(
         corners: &Array<f32>,
         first: usize,
         entries: &Array<u32>,

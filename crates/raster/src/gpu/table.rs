@@ -3,12 +3,12 @@
 use cubecl::prelude::*;
 
 use super::{
-    TILE,
     cells::Cells,
     dual::Dual,
     frame::Frame,
     pair::{Face, Lookup},
     reach::Reach,
+    tile::TILE,
 };
 
 /// Adds the gradient of the table of some `views` from `start` on, every unit to a table of its own over the pixels that it walks:

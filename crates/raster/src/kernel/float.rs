@@ -1,55 +1,15 @@
 //! The floats that kernels run on.
 
-use std::{
-    fmt::Debug,
-    ops::{Add, AddAssign, Div, Mul, Neg, Sub},
-};
+pub(crate) use super::lanes::Float;
+use super::lanes::plain::Plain;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use super::lanes::wasm::F32x8;
+#[cfg(target_arch = "x86_64")]
+use super::lanes::x86::F32x8;
 
-use super::lanes::{Lanes, Plain};
-
-/// `f32` or `f64`, with the view of their bits that the profile table is indexed by.
-pub(crate) trait Float:
-    Copy
-    + Send
-    + Sync
-    + 'static
-    + PartialOrd
-    + Default
-    + Debug
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
-{
-    /// The best vectors of a machine that has them; see [`has_vectors`](super::lanes::has_vectors).
-    type Best: Lanes<Float = Self>;
-    const ZERO: Self;
-    const ONE: Self;
-    /// Nearest float.
-    fn from_f64(value: f64) -> Self;
-    /// A whole number.
-    fn of_whole(value: i32) -> Self;
-    /// To double precision.
-    fn to_f64(self) -> f64;
-    /// Where `self`, at least `2^-octaves`, lies among cells of which each octave holds `2^bits`, from there on:
-    /// the cell's index, the place in it from 0 to 1, and the inverse of its width. Infinity and NaN lie in one of more than
-    /// `octaves << bits`.
-    fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self);
-    /// Square root.
-    fn sqrt(self) -> Self;
-    /// Nearest integer, for numbers in [0, 2^22].
-    fn nearest(self) -> i32;
-    /// Nearest integer as a float, for numbers in [0, 2^22].
-    fn rounded(self) -> Self;
-    /// `e` to this power, to 2 units in the last place.
-    fn exp(self) -> Self;
-    /// Natural logarithm.
-    fn ln(self) -> Self;
-    /// Sine and cosine of an angle in radians.
-    fn sin_cos(self) -> (Self, Self);
-}
+/// The best vectors of `f32`, for machines that [have them](super::lanes::has_vectors).
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128"))))]
+type F32x8 = Plain<f32>;
 
 macro_rules! float {
     ($float:ty, $bits:ty, $mantissa:expr, $bias:expr, $best:ty, $exp:path) => {
@@ -116,7 +76,7 @@ macro_rules! float {
     };
 }
 
-float!(f32, u32, 23, 127, super::lanes::F32x8, exp);
+float!(f32, u32, 23, 127, F32x8, exp);
 float!(f64, u64, 52, 1023, Plain<f64>, f64::exp);
 
 /// `e^x` without a branch or a call, so that loops over it become vectors; to 2 units in the last

@@ -1,13 +1,11 @@
 //! The pixels that faces may reach, as a list of chunks that a walk takes one after the other.
 #![allow(clippy::needless_range_loop)]
 
-use std::ops::Range;
-
 use super::{
     face::{Face, Faces},
     float::Float as _,
     lanes::{GROUP, LANES, Lanes},
-    reach::Reach,
+    reach::within,
     real::{Float, Real, splat},
     scene::{Place, Scene},
 };
@@ -188,10 +186,4 @@ pub(crate) fn rows_from_origin<L: Lanes>() -> L {
         lanes[lane] = number(rows[lane]);
     }
     L::of(&lanes)
-}
-
-/// Rows of a band that a face may reach.
-#[inline(always)]
-pub(crate) fn within(band: Range<usize>, reach: Reach) -> Range<usize> {
-    band.start.max(reach.top as usize)..band.end.min(reach.bottom as usize)
 }

@@ -28,7 +28,7 @@ pub(crate) use float::Float;
 pub(crate) use list::rows_of_bands;
 pub(crate) use losses::{losses, rows_of_losses};
 pub(crate) use pairs::pairs;
-pub(crate) use pixel_loss::PixelLoss;
+pub(crate) use pixel_loss::{EMPTY, PixelLoss};
 pub(crate) use reach::{FAR_AWAY, inside_spans};
 pub(crate) use real::Dual;
 pub(crate) use sum::{Inputs, forward, vjp, vjp_of_vjp};

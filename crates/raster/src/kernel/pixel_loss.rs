@@ -1,7 +1,9 @@
 //! Losses of silhouettes pixel by pixel, and what the gradient to the sums of profiles is made of.
 
 use super::{float::Float, lanes::Lanes, real::splat};
-use crate::loss::EMPTY;
+
+/// Keeps the ratio of two empty images defined.
+pub(crate) const EMPTY: f64 = 1e-6;
 
 /// What compares a silhouette with its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,7 @@
 //! Where faces lie in the image: decided face by face, on plain floats.
 
+use std::ops::Range;
+
 use super::float::Float;
 use crate::ImageSize;
 
@@ -70,6 +72,12 @@ impl Reach {
         let some = left < right && top < bottom;
         Some(if some { Self { top, bottom, left, right } } else { Self::NOTHING })
     }
+}
+
+/// Rows of a band that a face may reach.
+#[inline(always)]
+pub(crate) fn within(band: Range<usize>, reach: Reach) -> Range<usize> {
+    band.start.max(reach.top as usize)..band.end.min(reach.bottom as usize)
 }
 
 /// Calls `fill(row, start, end)` for the pixels whose centre a face over `vertices`

@@ -2,7 +2,10 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::lanes::{LANES, Lanes, Places};
+use super::{
+    float::Float as _,
+    lanes::{LANES, Lanes, Places},
+};
 
 /// Arithmetic shared by vectors and dual numbers over them. Kernels compare [`Real::value`] only.
 pub(crate) trait Real:
@@ -57,6 +60,13 @@ pub(crate) type Which<T> = <<T as Real>::Lanes as Lanes>::Which;
 pub(crate) struct Table<'a, T: Real> {
     pub(crate) values: &'a [[Float<T>; 4]],
     pub(crate) tangents: &'a [[Float<T>; 4]],
+}
+
+/// A number and its tangent in all lanes.
+#[inline(always)]
+pub(crate) fn everywhere<T: Real>(values: &[Float<T>], tangents: &[Float<T>], at: usize) -> T {
+    let tangent = if T::DUAL { tangents[at] } else { Float::<T>::ZERO };
+    T::new(T::Lanes::splat(values[at]), T::Lanes::splat(tangent))
 }
 
 impl<T: Real> Clone for Table<'_, T> {

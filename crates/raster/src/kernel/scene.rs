@@ -7,7 +7,7 @@ use super::{
     face::{Faces, Spans, prepare},
     float::Float as _,
     lanes::{GROUP, LANES, Lanes},
-    list::within,
+    reach::within,
     real::{Float, Real, Table, splat},
     table::{Grid, Lookup},
 };

@@ -4,9 +4,10 @@ use burn::tensor::{Tensor, backend::Backend};
 
 use crate::{
     NEAR, RasterBackend,
-    loss::EMPTY,
+    kernel::EMPTY,
+    limits::FARTHEST,
     small_product,
-    view::{FARTHEST, focal, view_rotation},
+    view::{focal, view_rotation},
 };
 
 /// The matrices `[views, 3, 4]` of orbits `[views, 4]` (distance, elevation, azimuth, whole field of view in degrees): two rows give x and

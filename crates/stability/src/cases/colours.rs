@@ -7,7 +7,7 @@ use softrast_meta::{numbers, tensor};
 use softrast_raster::{Attributes, ColourRenderer, Weighting, mse_loss};
 use softrast_softness::{DepthSoftness, Family};
 
-use super::{ORIGINAL, PARAMETER, SCALE, levels, trials};
+use super::common::{ORIGINAL, PARAMETER, SCALE, levels, trials};
 use crate::{
     Case, Config, Level, Tested, Trial,
     drawing::{Single, largest},

@@ -3,7 +3,7 @@
 use occlusion::{Args, Occlusion};
 use softrast_cli::Variant;
 
-use super::{ORIGINAL, PARAMETER, levels, trials};
+use super::common::{ORIGINAL, PARAMETER, levels, trials};
 use crate::{Case, Config, Level, Tested};
 
 pub(super) const CASES: &[Case] = &[

@@ -1,6 +1,6 @@
 //! Gradients over the pixel grid, and an outline that depends on how faces are split.
 
-use super::levels;
+use super::common::levels;
 use crate::{
     Case, Level, Tested, Trial,
     drawing::{Exact, RenderRequest, Single, largest},

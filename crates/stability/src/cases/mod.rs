@@ -1,6 +1,7 @@
 //! What is tested, one file for each part of a rasterizer or task.
 
 mod colours;
+mod common;
 mod depths;
 mod gradients;
 pub mod learning;
@@ -8,26 +9,9 @@ pub mod poses;
 mod shapes;
 pub mod triangle;
 
-use softrast_cli::{Task, Variant};
+pub use common::SCALE;
 
-use crate::{Case, Config, Level, Tested, Trial};
-
-/// Softness, in NDC, of cases that do not vary it.
-pub const SCALE: f64 = 0.03;
-
-/// A task as it is, on its original variant.
-const ORIGINAL: Config = Config {
-    variant: Variant::Original,
-    size: 24,
-    steps: None,
-    learning_rate: None,
-    scale: None,
-    runs: 1,
-};
-
-/// Places of the metrics of a task: error of the parameters, and of the hard image.
-const PARAMETER: usize = 2;
-const HARD: usize = 4;
+use crate::Case;
 
 /// All cases, in the order of the report.
 pub fn cases() -> impl Iterator<Item = &'static Case> {
@@ -41,35 +25,4 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         learning::CASES,
     ];
     parts.into_iter().flatten()
-}
-
-/// The level that each strength of a perturbation makes.
-fn levels<T>(
-    strengths: impl IntoIterator<Item = T>,
-    level: impl FnMut(T) -> anyhow::Result<Level>,
-) -> anyhow::Result<Vec<Level>> {
-    strengths.into_iter().map(level).collect()
-}
-
-/// Solves seeds of a task, one trial each: the metric at `measured` where the hard image is best. It reaches its target if the run is a
-/// success.
-fn trials<T: Task>(
-    tested: &Tested,
-    args: T::Args,
-    config: &Config,
-    measured: usize,
-) -> anyhow::Result<Vec<Trial>> {
-    let runs = tested.solve::<T>(args, config)?;
-    let trial = |run: &softrast_lab::Run| {
-        let value = run.returned(HARD).map_or(f64::NAN, |point| point.values[measured]);
-        let finite = run.curve.iter().flat_map(|point| &point.values).all(|x| x.is_finite());
-        Trial { value, reached: finite && run.success, finite }
-    };
-    Ok(runs.iter().map(trial).collect())
-}
-
-/// The same trials with another target: at most `limit`.
-fn with_limit(mut trials: Vec<Trial>, limit: f64) -> Vec<Trial> {
-    trials.iter_mut().for_each(|trial| trial.reached = trial.finite && trial.value <= limit);
-    trials
 }

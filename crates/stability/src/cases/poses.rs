@@ -7,7 +7,7 @@ use softrast_inverse::pose::PoseInstance;
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::Orbit;
 
-use super::{ORIGINAL, levels, trials};
+use super::common::{ORIGINAL, PARAMETER, levels, trials, with_limit};
 use crate::{Case, Config, Descended, Level, Tested, Trial, descend};
 
 pub(super) const CASES: &[Case] = &[
@@ -95,7 +95,7 @@ fn with_body<R>(mesh: &Mesh, work: impl FnOnce(Args) -> anyhow::Result<R>) -> an
 /// Degrees that seeds of the lopsided body end off; a success is 5.
 fn degrees(tested: &Tested, range: Range, config: Config) -> anyhow::Result<Vec<Trial>> {
     with_body(&lopsided()?, |args| {
-        trials::<Pose>(tested, Args { range: Some(range), ..args }, &config, super::PARAMETER)
+        trials::<Pose>(tested, Args { range: Some(range), ..args }, &config, PARAMETER)
     })
 }
 
@@ -133,7 +133,7 @@ fn ranges(tested: &Tested) -> anyhow::Result<Vec<Level>> {
 fn softness(tested: &Tested) -> anyhow::Result<Vec<Level>> {
     levels([1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3], |scale: f64| {
         let config = Config { scale: Some(scale), steps: Some(60), runs: 2, ..SOLVED };
-        Ok(Level::new(scale, super::with_limit(degrees(tested, Range::Near, config)?, 10.0)))
+        Ok(Level::new(scale, with_limit(degrees(tested, Range::Near, config)?, 10.0)))
     })
 }
 

@@ -7,7 +7,7 @@ use softrast_cli::{EdgeChoice, Task, Variant};
 use softrast_inverse::SolveConfig;
 use softrast_mesh::icosphere;
 
-use super::{HARD, ORIGINAL, levels, trials, with_limit};
+use super::common::{HARD, ORIGINAL, levels, trials, with_limit};
 use crate::{
     Case, Config, Level, Tested, Trial, descend,
     drawing::{RenderRequest, Single},

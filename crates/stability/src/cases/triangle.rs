@@ -7,7 +7,7 @@ use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Targets};
 use softrast_meta::{numbers, tensor};
 use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, mse_loss};
 
-use super::{SCALE, levels};
+use super::common::{SCALE, levels};
 use crate::{
     Case, Descended, Level, Tested, Trial, descend,
     drawing::{Single, largest},

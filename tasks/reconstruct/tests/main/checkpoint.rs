@@ -36,7 +36,7 @@ fn evaluate(bytes: &[u8]) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(softrast_test_kit::cases(48))]
 
     #[test]
     fn a_damaged_file_ends_in_one_line(at in any::<prop::sample::Index>(), byte: u8, cut: bool) {

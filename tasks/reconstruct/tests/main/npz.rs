@@ -97,7 +97,7 @@ fn whole() -> &'static [[Vec<u8>; 2]; 2] {
 const WHAT: [&str; 2] = ["images", "voxels"];
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(softrast_test_kit::cases(200))]
 
     /// Heads stand at both ends of a file, so most of the damage is done there.
     #[test]

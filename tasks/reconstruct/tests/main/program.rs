@@ -5,6 +5,7 @@ use std::{
 
 use reconstruct::{Checkpoint, execute};
 use serde_json::Value;
+use softrast_test_kit::Program;
 
 /// Runs the program; what it prints, or its error line.
 pub(crate) fn run(line: &str) -> Result<String, String> {
@@ -162,4 +163,12 @@ fn methods_are_compared_in_one_table() {
     assert!(run(&line).unwrap_err().contains("is there already"));
     // What is done is not done again: the times are the same.
     assert_eq!(run(&format!("{line} --resume")).unwrap(), table);
+}
+
+#[test]
+fn it_ends_on_a_machine_of_one_core() {
+    let program = Program::new(env!("CARGO_BIN_EXE_reconstruct")).on_one_thread();
+    let out = tempfile::tempdir().unwrap();
+    let line = "train --quick --pairs 2 --steps 2 --shapes 4 --val 1 --epochs 1";
+    program.run_in(out.path(), line).unwrap();
 }

@@ -82,7 +82,9 @@ pub(super) fn answer(
         .map(for_page)
         .collect();
     let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
-    let colours = painted::sheet(&shown(scored).collect::<Vec<_>>()).map(|sheet| png(&sheet));
+    let coloured =
+        shown(scored).filter_map(|one| Some((one.colours.as_ref()?, one.view.camera.size)));
+    let colours = painted::sheet(coloured).map(|sheet| png(&sheet));
     let colours = colours.transpose()?;
     let text = text(mesh, scored, &summary);
     let page = page(mesh, scored, &warnings, &text[1..], &picture, colours.as_deref())?;

@@ -5,8 +5,8 @@ use softrast_cli::Given;
 use softrast_inverse::{PaintedView, SolveConfig, coloured_pixels, paint};
 use softrast_lab::{contact_sheet, for_page, rgb_from_planes};
 use softrast_mesh::Mesh;
+use softrast_raster::ImageSize;
 
-use super::answer::Scored;
 use crate::Args;
 
 /// On spot with its shape known, 30 steps at 0.1 end at 31.4 dB on views kept aside, 40 at 0.05 at 32.6, 60 at 34.3.
@@ -59,14 +59,11 @@ pub(super) fn painted(
 }
 
 /// Pictures and results side by side, two pairs in a row; none without colours.
-pub(super) fn sheet(scored: &[&Scored]) -> Option<RgbImage> {
-    let pair = |one: &&Scored| {
-        let size = one.view.camera.size;
-        let planes = one.colours.iter().flat_map(|colours| &colours.planes);
-        let images =
-            planes.map(|planes| for_page(rgb_from_planes(planes, size.width, size.height)));
-        images.collect::<Vec<_>>()
+pub(super) fn sheet<'a>(views: impl Iterator<Item = (&'a Colours, ImageSize)>) -> Option<RgbImage> {
+    let pair = |(colours, size): (&'a Colours, ImageSize)| {
+        let image = |planes| for_page(rgb_from_planes(planes, size.width, size.height));
+        colours.planes.each_ref().map(|planes| image(planes))
     };
-    let images: Vec<RgbImage> = scored.iter().flat_map(pair).collect();
+    let images: Vec<RgbImage> = views.flat_map(pair).collect();
     (!images.is_empty()).then(|| contact_sheet(&images, 4))
 }

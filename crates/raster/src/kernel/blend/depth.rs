@@ -1,9 +1,8 @@
 //! How much a point counts by its depth, and how that changes.
 
-use super::walk::everywhere;
 use crate::kernel::{
     lanes::{Lanes, Places},
-    real::{Mask, Real, Table, splat},
+    real::{Float, Mask, Real, Table, everywhere, splat},
     table::{Grid, Lookup, Place},
 };
 
@@ -37,7 +36,7 @@ impl DepthGrid {
 /// A [`DepthGrid`] prepared for look-ups, with its table.
 pub(super) struct DepthLookup<'a, T: Real> {
     grid: DepthGrid,
-    lookup: Option<Lookup<super::Float<T>>>,
+    lookup: Option<Lookup<Float<T>>>,
     table: Table<'a, T>,
 }
 
@@ -132,7 +131,7 @@ impl<T: Real> DepthAt<T> {
 
     /// Adds to the gradient of the table, of a function with this derivative by the logarithm.
     #[inline(always)]
-    pub(super) fn pull(&self, by_log: T, table: &mut [[super::Float<T>; 4]]) {
+    pub(super) fn pull(&self, by_log: T, table: &mut [[Float<T>; 4]]) {
         let zero = T::constant(splat(0.0));
         match self {
             Self::Table { t, row, .. } => pull_row(zero - by_log, *t, row, table),
@@ -164,12 +163,7 @@ pub(super) fn cubic<T: Real>([a, b, c, d]: [T; 4], t: T) -> [T; 2] {
 
 /// Adds to the gradient of the rows of a table, of a function with this derivative by the value at the place `t` in them.
 #[inline(always)]
-pub(super) fn pull_row<T: Real>(
-    by_value: T,
-    t: T,
-    row: &Places,
-    table: &mut [[super::Float<T>; 4]],
-) {
+pub(super) fn pull_row<T: Real>(by_value: T, t: T, row: &Places, table: &mut [[Float<T>; 4]]) {
     let first = by_value * t;
     let second = first * t;
     let third = second * t;

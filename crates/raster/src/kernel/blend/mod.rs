@@ -9,6 +9,7 @@ mod depth;
 mod planes;
 mod point;
 mod reach;
+mod scene;
 mod texture;
 mod walk;
 
@@ -18,172 +19,23 @@ use rayon::prelude::*;
 
 #[cfg(feature = "wgpu")]
 pub(crate) use self::depth::LEAST;
-pub(crate) use self::{depth::DepthGrid, point::AREA, texture::OF_TEXEL};
+pub(crate) use self::{depth::DepthGrid, point::AREA, scene::Inputs, texture::OF_TEXEL};
 use self::{
-    depth::DepthLookup,
     planes::Planes,
     reach::Reached,
-    texture::{TexelSums, Texture},
-    walk::{Largest, OF_CORNERS, Pull, Sums, Visitor, Walk, everywhere},
+    scene::{Blend, of_type},
+    texture::TexelSums,
+    walk::{Largest, OF_CORNERS, Pull, Sums, Visitor, Walk},
 };
 use super::{
     bands::View,
     float,
     lanes::{Lanes, Plain, Work, has_vectors, run},
-    list::rows_of_bands,
-    real::{self, Dual, Real, Table, splat},
-    scene::Scene,
-    table::Grid,
+    real::{Dual, Float, Real, splat},
 };
-use crate::{ImageSize, weighting::counts_from};
-
-type Float<T> = real::Float<T>;
 
 /// Logarithm of the largest ratio of two weights that floats of 32 and of 64 bits add up without losing the sum.
 const RANGE: [f64; 2] = [60.0, 600.0];
-/// Weights below these, relative to what weights of a pixel are relative to, are 0: far less than the range leaves of a sum.
-const VANISHING: [f64; 2] = [1e-36, 1e-300];
-
-/// The inputs of the op in one float type.
-#[derive(Clone, Copy)]
-pub(crate) struct Inputs<'a, F> {
-    /// `[views, 3, vertices]`: x and y in NDC, depth.
-    pub(crate) vertices: &'a [F],
-    /// `[1 or views, entries, channels]`, or with a texture places on it, `[1 or views, entries, 2]`.
-    pub(crate) attributes: &'a [F],
-    /// `[rows, 4]`: minus the logarithms of the weights by edge, then of those by depth.
-    pub(crate) tables: &'a [F],
-    /// `[channels + 1]`: the colour, then the logarithm of the weight.
-    pub(crate) background: &'a [F],
-    /// `[rows, columns, 4]`, or nothing.
-    pub(crate) texture: &'a [F],
-    /// Rows and columns of the texture, if there is one.
-    pub(crate) texture_size: Option<[usize; 2]>,
-    pub(crate) faces: &'a [[u32; 3]],
-    /// Entries of the attributes at the corners of each face.
-    pub(crate) entries: &'a [[u32; 3]],
-    /// Cells of the edge softness, mirrored: the inner side is outside a face.
-    pub(crate) edge: Grid,
-    pub(crate) depth: DepthGrid,
-    /// What is taken off the edge softness.
-    pub(crate) floor: f64,
-    /// Depths of nearness 1 and 0.
-    pub(crate) planes: [f64; 2],
-    pub(crate) size: ImageSize,
-    /// Depths between which all corners of a face that is drawn lie.
-    pub(crate) near: f64,
-    pub(crate) far: f64,
-    /// What all that is left out of a pixel may add up to, in weights of the background.
-    pub(crate) tolerance: f64,
-    pub(crate) views: usize,
-    /// Whether all views have the same attributes.
-    pub(crate) shared: bool,
-}
-
-impl<'a, F: float::Float> Inputs<'a, F> {
-    /// Channels of the image, but for the faces' share.
-    pub(crate) fn channels(&self) -> usize {
-        self.background.len() - 1
-    }
-
-    /// Numbers of an entry of the attributes.
-    fn numbers(&self) -> usize {
-        if self.texture_size.is_some() { 2 } else { self.channels() }
-    }
-
-    /// Rows of both tables, or of their tangents.
-    fn split_tables<'b>(&self, tables: &'b [F]) -> (&'b [[F; 4]], &'b [[F; 4]]) {
-        let rows: &[[F; 4]] = tables.as_chunks().0;
-        rows.split_at(self.edge.rows().min(rows.len()))
-    }
-
-    /// What a walk reads; `tangents` are those of vertices, attributes, tables, background and texture, or nothing.
-    fn blend<'s, T>(&'s self, tangents: [&'s [F]; 5]) -> Blend<'s, T>
-    where
-        T: Real,
-        T::Lanes: Lanes<Float = F>,
-    {
-        let values = self.split_tables(self.tables);
-        let along = self.split_tables(tangents[2]);
-        let edge = Table { values: values.0, tangents: along.0 };
-        let depth = Table { values: values.1, tangents: along.1 };
-        let rows = rows_of_bands(self.views);
-        let vertices = [self.vertices, tangents[0]];
-        let half = 0.5 * self.size.shorter() as f64;
-        Blend {
-            least_area: F::from_f64(AREA * half * half),
-            vanishing: F::from_f64(of_type::<F>(VANISHING)),
-            scene: Scene::new(vertices, self.faces, edge, self.edge, self.size, rows),
-            attributes: [self.attributes, tangents[1]],
-            entries: self.entries,
-            channels: self.channels(),
-            numbers: self.numbers(),
-            texture: self.texture_size.map(|size| Texture {
-                size,
-                texels: Table {
-                    values: self.texture.as_chunks().0,
-                    tangents: tangents[4].as_chunks().0,
-                },
-            }),
-            per_view: if self.shared { 0 } else { self.attributes.len() / self.views.max(1) },
-            depth: DepthLookup::new(self.depth, depth),
-            near: F::from_f64(self.planes[0]),
-            per_range: F::from_f64((self.planes[1] - self.planes[0]).recip()),
-            floor: F::from_f64(self.floor),
-            counts_from: F::from_f64(counts_from(self.floor)),
-            background: [self.background, tangents[3]],
-        }
-    }
-}
-
-/// What is meant for this float type, of 32 or of 64 bits.
-fn of_type<F>([single, double]: [f64; 2]) -> f64 {
-    if size_of::<F>() == size_of::<f64>() { double } else { single }
-}
-
-/// Everything a walk reads, in one number type.
-struct Blend<'a, T: Real> {
-    scene: Scene<'a, T>,
-    attributes: [&'a [Float<T>]; 2],
-    entries: &'a [[u32; 3]],
-    /// Of the image, but for the faces' share.
-    channels: usize,
-    /// Of an entry of the attributes.
-    numbers: usize,
-    texture: Option<Texture<'a, T>>,
-    /// Attributes of a view that has its own.
-    per_view: usize,
-    depth: DepthLookup<'a, T>,
-    near: Float<T>,
-    per_range: Float<T>,
-    floor: Float<T>,
-    /// [`AREA`] in pixels.
-    least_area: Float<T>,
-    /// [`VANISHING`] of the float type.
-    vanishing: Float<T>,
-    /// Logarithm of an edge softness from which on it counts.
-    counts_from: Float<T>,
-    background: [&'a [Float<T>]; 2],
-}
-
-impl<T: Real> Blend<'_, T> {
-    /// A gradient to the texels of the texture, if it is wanted, else to none.
-    fn no_texels(&self, wanted: bool) -> TexelSums<Float<T>> {
-        let texels = self.texture.as_ref().filter(|_| wanted).map(|texture| texture.size);
-        TexelSums::new(texels.map_or(0, |[height, width]| height * width))
-    }
-
-    /// Where the attributes of a view begin.
-    fn first_attribute(&self, view: usize) -> usize {
-        view * self.per_view
-    }
-
-    /// A number of the background: a channel, or behind them the logarithm of the weight.
-    #[inline(always)]
-    fn behind(&self, channel: usize) -> T {
-        everywhere(self.background[0], self.background[1], channel)
-    }
-}
 
 /// What passes over the same inputs share.
 pub(crate) struct Kept<F> {

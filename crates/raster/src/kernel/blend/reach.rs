@@ -2,7 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::{DepthGrid, Inputs, depth::LEAST};
+use super::{
+    depth::{DepthGrid, LEAST},
+    scene::Inputs,
+};
 use crate::kernel::{
     bands::{Bands, View},
     float::Float,

@@ -3,7 +3,10 @@
 use std::sync::atomic::Ordering;
 
 use super::*;
-use crate::kernel::lanes::PORTABLE;
+use crate::{
+    ImageSize,
+    kernel::{lanes::PORTABLE, table::Grid},
+};
 
 const VERTICES: usize = 40;
 const FACES: u32 = 50;

@@ -4,10 +4,10 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::{
-    Blend,
     depth::{DepthAt, cubic, pull_row},
     planes::Planes,
     point::{Barycentric, Point},
+    scene::Blend,
     texture::{OF_TEXEL, TexelSums},
 };
 use crate::kernel::{
@@ -15,7 +15,7 @@ use crate::kernel::{
     float::Float as _,
     lanes::{Lanes, Places, Work},
     list::{Chunk, LISTED, List},
-    real::{Float, Real, splat},
+    real::{Float, Real, everywhere, splat},
     scene::{Place, Scene},
     table,
 };
@@ -162,13 +162,6 @@ impl<T: Real> Shown<T> {
         }
         self.planes = Barycentric::new(face, blend.least_area);
     }
-}
-
-/// A number and its tangent in all lanes.
-#[inline(always)]
-pub(super) fn everywhere<T: Real>(values: &[Float<T>], tangents: &[Float<T>], at: usize) -> T {
-    let tangent = if T::DUAL { tangents[at] } else { Float::<T>::ZERO };
-    T::new(T::Lanes::splat(values[at]), T::Lanes::splat(tangent))
 }
 
 impl<T: Real> Blend<'_, T> {

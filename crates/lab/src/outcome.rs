@@ -1,0 +1,64 @@
+use serde_json::{Map, Value, json};
+
+use crate::{
+    Experiment, Run,
+    error_summary::{ErrorSummary, errors_of, nested},
+    wilson_interval,
+};
+
+/// The errors of some runs, and how many succeeded.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    pub(crate) errors: Vec<ErrorSummary>,
+    /// How many runs succeeded, of how many.
+    pub successes: [usize; 2],
+    /// Whether there are intervals and values of each run.
+    pub many: bool,
+}
+
+impl Outcome {
+    /// Of finished runs; `many` asks for intervals.
+    ///
+    /// # Errors
+    ///
+    /// If a run has no finite number even before its first step.
+    pub(crate) fn new(
+        experiment: &dyn Experiment,
+        runs: &[Run],
+        many: bool,
+    ) -> anyhow::Result<Self> {
+        if let Some(run) = runs.iter().find(|run| run.curve.is_empty()) {
+            anyhow::bail!(
+                "seed {}: the errors are not finite numbers before the first step: check that the target is in view and that the \
+                 scale is not extreme",
+                run.seed
+            );
+        }
+        let errors = errors_of(experiment.metrics());
+        Ok(Self {
+            errors: errors.map(|(k, metric)| ErrorSummary::new(metric, k, runs, many)).collect(),
+            successes: [runs.iter().filter(|run| run.success).count(), runs.len()],
+            many,
+        })
+    }
+
+    /// What stands in the results of any runs: how many they are, their errors, how often they succeeded.
+    pub(crate) fn json(&self) -> Map<String, Value> {
+        let [successes, runs] = self.successes;
+        let mut json = nested(self.errors.iter().map(|error| (&error.metric, json!(error))));
+        json.insert("runs".into(), runs.into());
+        json.insert("success_rate".into(), (successes as f64 / runs.max(1) as f64).into());
+        if self.many {
+            json.insert("success_ci95".into(), json!(wilson_interval(successes, runs)));
+        }
+        json
+    }
+
+    /// How many of the runs succeeded.
+    pub(crate) fn success_share(&self) -> String {
+        let [successes, runs] = self.successes;
+        let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);
+        let rate = successes as f64 / runs.max(1) as f64 * 100.0;
+        format!("{rate:.1} % of runs, 95 % interval {low:.1} to {high:.1} %")
+    }
+}

@@ -1,0 +1,100 @@
+//! What an op is that is written once for any number, and how its passes run.
+
+use burn::tensor::{Element, TensorData};
+
+use super::{number::Number, pass::Pass};
+use crate::kernel::{Dual, Float};
+
+/// An op that is written for any number. `dims` are the shapes of the inputs.
+pub(super) trait Elementary: Sync {
+    fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize>;
+
+    fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N>;
+
+    /// The gradients that are wanted, one after the other.
+    fn vjp<N: Number>(
+        &self,
+        inputs: &[&[N]],
+        dims: &[Vec<usize>],
+        upstream: &[N::Float],
+        wanted: &[bool],
+    ) -> Vec<N>;
+}
+
+/// Runs a pass of an op.
+pub(super) fn run<F>(
+    op: &impl Elementary,
+    pass: &Pass,
+    slices: &[&[F]],
+    dims: &[Vec<usize>],
+) -> TensorData
+where
+    F: Element + Float + Number<Float = F>,
+{
+    match pass {
+        Pass::Forward => TensorData::new(op.forward(slices, dims), op.shape(dims)),
+        Pass::Vjp { wanted } => {
+            let (upstream, inputs) = slices.split_last().expect("an upstream");
+            flat(op.vjp(inputs, dims, upstream, wanted))
+        }
+        Pass::VjpOfVjp { along, wanted } => {
+            let [inputs @ .., upstream, direction] = slices else { panic!("a direction") };
+            let mut direction = *direction;
+            let dual = |(input, &along): (&&[F], &bool)| -> Vec<Dual<F>> {
+                if !along {
+                    return input.iter().map(|&value| Dual::constant(value)).collect();
+                }
+                let (own, rest) = direction.split_at(input.len());
+                direction = rest;
+                let number = |(&value, &tangent)| Dual { value, tangent };
+                input.iter().zip(own).map(number).collect()
+            };
+            let duals: Vec<_> = inputs.iter().zip(along).map(dual).collect();
+            let duals: Vec<_> = duals.iter().map(Vec::as_slice).collect();
+            let (to_upstream, wanted) = wanted.split_last().expect("one for the upstream");
+            // The Hessian is symmetric: to the inputs, it is the derivative of the gradient along the direction.
+            let mut gradient = Vec::new();
+            if wanted.contains(&true) {
+                gradient = op.vjp(&duals, dims, upstream, wanted);
+            }
+            if *to_upstream {
+                gradient.extend(op.forward(&duals, dims));
+            }
+            flat(gradient.into_iter().map(|number| number.tangent).collect())
+        }
+    }
+}
+
+/// Numbers as a flat tensor.
+pub(crate) fn flat<F: Element>(values: Vec<F>) -> TensorData {
+    let length = values.len();
+    TensorData::new(values, [length])
+}
+
+/// Parts of a tensor `[1 or views, ..]`, one for each view.
+#[derive(Clone, Copy)]
+pub(super) struct Views<'a, N> {
+    pub(super) numbers: &'a [N],
+    pub(super) length: usize,
+    pub(super) shared: bool,
+}
+
+impl<'a, N> Views<'a, N> {
+    pub(super) fn new(numbers: &'a [N], dims: &[usize]) -> Self {
+        let length = dims[1..].iter().product();
+        Self { numbers, length, shared: dims[0] == 1 }
+    }
+
+    pub(super) fn range(&self, view: usize) -> std::ops::Range<usize> {
+        let start = if self.shared { 0 } else { view * self.length };
+        start..start + self.length
+    }
+
+    pub(super) fn of(&self, view: usize) -> &'a [N] {
+        &self.numbers[self.range(view)]
+    }
+
+    pub(super) fn of_mut<'b>(&self, numbers: &'b mut [N], view: usize) -> &'b mut [N] {
+        &mut numbers[self.range(view)]
+    }
+}

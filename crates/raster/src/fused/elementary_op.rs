@@ -1,0 +1,68 @@
+//! The ops that are written for any number.
+
+use burn::tensor::{Element, TensorData};
+
+use super::{
+    camera::{OrbitMatrix, Perspective},
+    elementary::{self, Elementary},
+    image::{Coverage, Iou, SquaredError},
+    number::Number,
+    pass::Pass,
+};
+use crate::kernel::{Dual, Float};
+
+/// An op that is written for any number.
+#[derive(Clone, Copy, Debug)]
+pub enum ElementaryOp {
+    /// Orbits to matrices.
+    OrbitMatrix,
+    /// Points to what cameras see.
+    Perspective,
+    /// Sums to coverage.
+    Coverage,
+    /// Mean squared difference.
+    SquaredError,
+    /// One less the overlap over the union.
+    Iou,
+}
+
+impl ElementaryOp {
+    /// Runs a pass over `slices` with the shapes `dims`.
+    pub(super) fn run<F>(self, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
+    where
+        F: Element + Float + Number<Float = F>,
+    {
+        match self {
+            Self::OrbitMatrix => elementary::run(&OrbitMatrix, pass, slices, dims),
+            Self::Perspective => elementary::run(&Perspective, pass, slices, dims),
+            Self::Coverage => elementary::run(&Coverage, pass, slices, dims),
+            Self::SquaredError => elementary::run(&SquaredError, pass, slices, dims),
+            Self::Iou => elementary::run(&Iou, pass, slices, dims),
+        }
+    }
+}
+
+/// The derivatives of `Σ upstream · loss` by sums of profiles `[views, height, width]`, whose coverages a loss compares with a target, and how
+/// they change as the sums move by `moved`. `dims` are the shapes of both images.
+pub(crate) fn dual_upstream<F>(
+    loss: ElementaryOp,
+    [sums, moved, target, upstream]: [&[F]; 4],
+    dims: &[Vec<usize>],
+) -> [Vec<F>; 2]
+where
+    F: Float + Number<Float = F>,
+{
+    let dual = |(&value, &tangent)| Dual { value, tangent };
+    let sums: Vec<_> = sums.iter().zip(moved).map(dual).collect();
+    let target: Vec<_> = target.iter().map(|&value| Dual::constant(value)).collect();
+    let coverage = Coverage.forward(&[&sums], &dims[..1]);
+    let (inputs, wanted) = ([&coverage[..], &target[..]], [true, false]);
+    let by_coverage = match loss {
+        ElementaryOp::Iou => Iou.vjp(&inputs, dims, upstream, &wanted),
+        _ => SquaredError.vjp(&inputs, dims, upstream, &wanted),
+    };
+    let one = Dual::constant(F::ONE);
+    let by_sums = by_coverage.into_iter().zip(coverage).map(|(by, c)| by * (one - c));
+    let (values, tangents) = by_sums.map(|number| (number.value, number.tangent)).unzip();
+    [values, tangents]
+}

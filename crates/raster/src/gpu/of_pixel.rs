@@ -1,0 +1,40 @@
+//! What the kernels of a gradient read of each pixel.
+
+use cubecl::prelude::*;
+
+use super::{
+    drawn::{Drawn, Kind},
+    dual::Dual,
+};
+
+/// Numbers of a pixel that a gradient needs: the logarithm of all weights, and what the image is to the upstream, with their derivatives.
+pub(super) const OF_PIXEL: usize = 4;
+
+/// The numbers of a pixel.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct OfPixel {
+    pub(super) log: Dual,
+    pub(super) draw: Dual,
+}
+
+#[cube]
+impl OfPixel {
+    /// Where those of a pixel of a view of the launch begin, and behind them the gradient of the background.
+    pub(super) fn at(
+        drawn: &Drawn,
+        view: u32,
+        row: u32,
+        column: u32,
+        #[comptime] kind: Kind,
+    ) -> usize {
+        drawn.frame.pixel(drawn.first_view + view, row, column) as usize
+            * comptime!(OF_PIXEL + kind.channels + 1)
+    }
+
+    pub(super) fn load(pixels: &Array<f32>, at: usize) -> OfPixel {
+        OfPixel {
+            log: Dual { value: pixels[at], tangent: pixels[at + 1] },
+            draw: Dual { value: pixels[at + 2], tangent: pixels[at + 3] },
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Links of the documents lead somewhere, and sections that code cites exist.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod repository;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use repository::{files, root, shown};
+
+/// Where files of the repository are read on the web.
+const ON_THE_WEB: [&str; 2] = [
+    "https://github.com/softrast/softrast/blob/main/",
+    "https://github.com/softrast/softrast/tree/main/",
+];
+
+#[test]
+fn every_link_of_a_document_leads_to_a_file_and_a_heading() {
+    let (mut dead, mut count) = (Vec::new(), 0);
+    for page in files(root(), "md") {
+        let text = fs::read_to_string(&page).unwrap();
+        for link in links(&text) {
+            count += 1;
+            if let Some(reason) = fault(&page, &link) {
+                dead.push(format!("  {}: {link}: {reason}", shown(&page)));
+            }
+        }
+    }
+    assert!(count > 100, "the links of the documents are found, not {count} alone");
+    assert!(dead.is_empty(), "{} dead links:\n{}", dead.len(), dead.join("\n"));
+}
+
+#[test]
+fn every_section_of_the_notes_that_is_cited_exists() {
+    let notes = fs::read_to_string(root().join("docs/notes.md")).unwrap();
+    let sections: BTreeSet<String> = headings(&notes).into_iter().collect();
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for extension in ["rs", "py", "md", "toml", "js"] {
+        for path in files(root(), extension) {
+            if path.starts_with(env!("CARGO_MANIFEST_DIR")) {
+                continue;
+            }
+            let text = fs::read_to_string(&path).unwrap();
+            for cited in citations(&text) {
+                count += 1;
+                if !sections.iter().any(|section| begins_with_name(&cited, section)) {
+                    wrong.push(format!("  {}: {cited}", shown(&path)));
+                }
+            }
+        }
+    }
+    assert!(count > 30, "citations are found, not {count} alone");
+    assert!(wrong.is_empty(), "no such section of docs/notes.md:\n{}", wrong.join("\n"));
+}
+
+/// Why a link on a page leads nowhere, if it does not.
+fn fault(page: &Path, link: &str) -> Option<String> {
+    let on_the_web = ON_THE_WEB.iter().find_map(|start| link.strip_prefix(start));
+    let is_elsewhere = ["http:", "https:", "mailto:", "data:"].iter().any(|x| link.starts_with(x));
+    if on_the_web.is_none() && is_elsewhere {
+        return None;
+    }
+    let (path, anchor) =
+        on_the_web.unwrap_or(link).split_once('#').unwrap_or((on_the_web.unwrap_or(link), ""));
+    let folder = if on_the_web.is_some() { root() } else { page.parent().unwrap() };
+    let target = if path.is_empty() { page.to_owned() } else { folder.join(path) };
+    if !target.exists() {
+        return Some("there is no such file".to_owned());
+    }
+    let is_page = target.extension().is_some_and(|extension| extension == "md");
+    if anchor.is_empty() || !is_page {
+        return None;
+    }
+    let text = fs::read_to_string(&target).unwrap();
+    (!anchors(&text).contains(anchor)).then(|| "there is no such heading".to_owned())
+}
+
+/// The lines of a page outside of blocks of code, and in them only what is outside of pieces of code.
+fn prose(text: &str) -> String {
+    let mut fenced = false;
+    let mut prose = String::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            prose.extend(line.split('`').step_by(2));
+        }
+        prose.push('\n');
+    }
+    prose
+}
+
+/// The targets of the links and pictures of a page.
+fn links(text: &str) -> Vec<String> {
+    let prose = prose(text);
+    let mut found = Vec::new();
+    for (start, end) in [("](", ")"), ("src=\"", "\""), ("href=\"", "\"")] {
+        let rests = prose.match_indices(start).map(|(at, _)| &prose[at + start.len()..]);
+        found.extend(rests.filter_map(|rest| rest.find(end).map(|end| &rest[..end])));
+    }
+    // `[name]: target`
+    found.extend(prose.lines().filter_map(|line| {
+        line.strip_prefix('[').filter(|line| !line.starts_with('^'))?.split_once("]: ").map(|x| x.1)
+    }));
+    // A title may stand behind the target.
+    found.iter().map(|link| link.split_whitespace().next().unwrap_or_default().to_owned()).collect()
+}
+
+/// The titles of the headings of a page, as they read.
+fn headings(text: &str) -> Vec<String> {
+    let mut fenced = false;
+    let mut found = Vec::new();
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced && line.starts_with('#') {
+            let title = line.trim_start_matches('#');
+            if title.starts_with(' ') {
+                found.push(as_read(title.trim()));
+            }
+        }
+    }
+    found
+}
+
+/// A title without the marks of links, code and emphasis.
+fn as_read(title: &str) -> String {
+    let mut read = String::new();
+    let mut rest = title;
+    while let Some((before, after)) = rest.split_once('[') {
+        let Some((words, behind)) = after.split_once("](") else { break };
+        read += before;
+        read += words;
+        rest = behind.split_once(')').map_or("", |x| x.1);
+    }
+    read += rest;
+    read.replace(['`', '*'], "")
+}
+
+/// What GitHub names the headings of a page, and the anchors that it sets by itself.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    for title in headings(text) {
+        let kept = |c: &char| c.is_alphanumeric() || [' ', '-', '_'].contains(c);
+        let name: String = title.to_lowercase().chars().filter(kept).collect();
+        let name = name.replace(' ', "-");
+        let times = seen.entry(name.clone()).or_default();
+        found.insert(if *times == 0 { name } else { format!("{name}-{times}") });
+        *times += 1;
+    }
+    for mark in ["id=\"", "name=\""] {
+        let rests = text.match_indices(mark).map(|(at, _)| &text[at + mark.len()..]);
+        found.extend(rests.filter_map(|rest| rest.split_once('"').map(|x| x.0.to_owned())));
+    }
+    found
+}
+
+/// What stands behind each `docs/notes.md, `, in one line.
+fn citations(text: &str) -> Vec<String> {
+    let lines = text.lines().map(|line| line.trim().trim_start_matches(['/', '!', '#']).trim());
+    let text = lines.collect::<Vec<_>>().join(" ");
+    let mark = "docs/notes.md, ";
+    let found = text.match_indices(mark).map(|(at, _)| &text[at + mark.len()..]);
+    found.map(|rest| rest.chars().take(60).collect()).collect()
+}
+
+/// Whether a text begins with a name, and with all of its last word.
+fn begins_with_name(text: &str, name: &str) -> bool {
+    text.strip_prefix(name).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric))
+}
+
+#[test]
+fn headings_have_the_anchors_of_github() {
+    let text = "# `a_b` and *C*: 2D\n## Same\n## Same\n```\n# no heading\n```\n### [Link](x.md), ü\n<a id=\"own\"></a>\n";
+    let expected = ["a_b-and-c-2d", "same", "same-1", "link-ü", "own"].map(str::to_owned);
+    assert_eq!(anchors(text), BTreeSet::from(expected));
+}
+
+#[test]
+fn links_are_found_outside_of_code() {
+    let text = "[a](b.md#c \"title\") ![p](q.png) `[x](y)`\n```\n[z](w)\n```\n<img src=\"i.png\">\n[r]: s.md\n";
+    assert_eq!(links(text), ["b.md#c", "q.png", "i.png", "s.md"]);
+}
+
+#[test]
+fn a_dead_file_and_a_dead_heading_are_faults() {
+    let folder = tempfile::tempdir().unwrap();
+    let page: PathBuf = folder.path().join("page.md");
+    fs::write(&page, "# Here\n").unwrap();
+    for (link, dead) in [
+        ("#here", false),
+        ("page.md#here", false),
+        ("https://example.org/#x", false),
+        ("#there", true),
+        ("page.md#there", true),
+        ("none.md", true),
+        ("https://github.com/softrast/softrast/blob/main/README.md", false),
+        ("https://github.com/softrast/softrast/blob/main/NONE.md", true),
+    ] {
+        assert_eq!(fault(&page, link).is_some(), dead, "{link}");
+    }
+}
