@@ -56,7 +56,7 @@ struct Distortion {
 
 /// Models of cameras without distortion, or whose distortion is told by coefficients.
 const MODELS: [&str; 4] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL"];
-/// Focal lengths against the longer side of a picture: from a field of view of 179 degrees down to a thousandth of one.
+/// Focal lengths against the shorter and the longer side of a picture: from a field of view of 179 degrees down to a thousandth of one.
 const FOCAL_LENGTHS: [f64; 2] = [0.01, 1e5];
 /// How far off the principal point may be, in longer sides: a picture may be a small part of a large one.
 const FARTHEST_CENTRE: f64 = 1e5;
@@ -241,13 +241,12 @@ impl Lens {
 /// An error if a camera's numbers, though positive, are those of no camera: floats of 32 bits would not tell pixels apart.
 fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
     let ImageSize { width, height } = camera.size;
-    let longer = width.max(height) as f64;
-    let (shortest, longest) = (FOCAL_LENGTHS[0] * longer, FOCAL_LENGTHS[1] * longer);
+    let (shorter, longer) = (camera.size.shorter() as f64, width.max(height) as f64);
+    let (shortest, longest) = (FOCAL_LENGTHS[0] * shorter, FOCAL_LENGTHS[1] * longer);
     for (name, focal) in ["fx", "fy"].into_iter().zip(camera.focal) {
         ensure!(
             (shortest..=longest).contains(&focal),
-            "the focal length {name} is {focal:e} pixels, for a picture of {width} x {height} it must be from {shortest} to {longest:e}: it is \
-             not in millimetres, nor in widths of the picture"
+            "the focal length {name} is {focal:e} pixels, for a picture of {width} x {height} it must be from {shortest} to {longest:e}"
         );
     }
     for (name, centre) in ["cx", "cy"].into_iter().zip(camera.centre) {

@@ -13,8 +13,8 @@ use softrast_softness::tensor;
 
 use crate::args::Args;
 
-/// Texels that are drawn at most, 4096 × 4096, at 12 bytes each: as many as the largest image has samples. Larger pictures are reduced.
-const MOST_TEXELS: usize = 1 << 24;
+/// Texels that are drawn at most, about 3500 × 3500: the op takes some 60 bytes for each. Larger pictures are reduced.
+const MOST_TEXELS: usize = 12 << 20;
 /// Red, green and blue of a mesh that has no colours.
 const GREY: [f64; 3] = [0.7; 3];
 
