@@ -201,7 +201,7 @@ fn faces_that_reach_behind_a_camera_are_said() {
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stderr).unwrap()
     };
-    let said = run(&["--raw", "--distance", "3"]);
+    let said = run(&["--raw", "--distance", "1"]);
     assert!(said.contains("2 of 2 faces reach behind the camera of azimuth 30"), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
     assert_eq!(run(&[]), "");
