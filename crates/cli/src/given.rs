@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use softrast_inverse::{Method, Picture};
+use softrast_inverse::{MaskRules, Method, Picture};
 use softrast_lab::{
     Error, Progress, ViewerView, mask_png, parse::share, program::Output, report::Report,
 };
@@ -119,14 +119,10 @@ impl MaskFlags {
     ///
     /// # Errors
     ///
-    /// If it is missing or no picture.
+    /// If it is missing, no picture, or has nothing that is half white.
     pub fn load(&self, path: &Path) -> anyhow::Result<Picture> {
-        let mask = Picture::load_mask(path)?;
-        let mask = if self.invert { mask.inverted() } else { mask };
-        Ok(match self.threshold {
-            Some(level) => mask.thresholded(level),
-            None => mask,
-        })
+        let rules = MaskRules { invert: self.invert, threshold: self.threshold };
+        Picture::load_mask_by(&rules, path)
     }
 }
 

@@ -1,10 +1,11 @@
 //! JSON files of cameras: what is wrong in them is said with its place.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, ensure};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use softrast_mesh::read_bounded;
 
 /// Fields that hold one number.
 const NUMBERS: [&str; 20] = [
@@ -30,19 +31,56 @@ const NUMBERS: [&str; 20] = [
     "p2",
 ];
 
-/// A file as JSON.
-pub(crate) fn json(path: &Path) -> anyhow::Result<Value> {
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("cannot read the camera file {}", path.display()))?;
-    serde_json::from_str(&text).map_err(|error| match not_finite(&text) {
+/// Bytes of a camera file at most: 100,000 frames have fewer.
+const LARGEST_FILE: u64 = 1 << 25;
+/// Positions in world units beyond this do not fit the floats that draw.
+const FARTHEST: f64 = 1e15;
+
+/// The content of a camera file, with its path as its name.
+pub(crate) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
+    let name = path.display().to_string();
+    let bytes = read_bounded(path, LARGEST_FILE)
+        .with_context(|| format!("cannot read the camera file {name}"))?;
+    Ok((bytes, name))
+}
+
+/// The content of the camera file `name` as JSON.
+pub(crate) fn json(bytes: &[u8], name: &str) -> anyhow::Result<Value> {
+    let text = text(bytes).with_context(|| name.to_owned())?;
+    let file: Value = serde_json::from_str(&text).map_err(|error| match not_finite(&text) {
         Some(place) => {
-            anyhow!(
-                "{}: {place} is NaN or infinite: calibrate anew, or leave its frame out",
-                path.display()
-            )
+            anyhow!("{name}: {place} is NaN or infinite: calibrate anew, or leave its frame out")
         }
-        None => anyhow!("{}: {error}", path.display()),
-    })
+        None => anyhow!("{name}: {error}"),
+    })?;
+    ensure!(file.is_object(), "{name}: it has no fields of a camera: a JSON object is expected");
+    Ok(file)
+}
+
+/// A text in UTF-8, with or without a byte order mark, or in UTF-16 with one, as shells of Windows write it.
+fn text(bytes: &[u8]) -> anyhow::Result<Cow<'_, str>> {
+    let of_16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
+        let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+        let text: Option<String> = char::decode_utf16(units).map(Result::ok).collect();
+        text.filter(|_| bytes.len().is_multiple_of(2)).map(Cow::Owned)
+    };
+    let text = match bytes {
+        [0xff, 0xfe, rest @ ..] => of_16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => of_16(rest, u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, rest @ ..] => str::from_utf8(rest).ok().map(Cow::Borrowed),
+        all => str::from_utf8(all).ok().map(Cow::Borrowed),
+    };
+    text.context("the file is no text in UTF-8: save it as that")
+}
+
+/// An error if t is no place that can be drawn from.
+pub(crate) fn check_place(translation: [f64; 3]) -> anyhow::Result<()> {
+    let near = translation.iter().all(|x| x.abs() <= FARTHEST);
+    ensure!(
+        near,
+        "the camera is at t = {translation:?}, farther than {FARTHEST:e} world units: take other units"
+    );
+    Ok(())
 }
 
 /// The fields of an object as a type, or the first that has another one.
@@ -126,6 +164,24 @@ fn dotted(rest: String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_text_and_utf_16_is_read_with_one() {
+        let plain = "{\"file_path\": \"füchse/01.png\"}";
+        let utf_16 = |mark: char| format!("{mark}{plain}").encode_utf16().collect::<Vec<u16>>();
+        let little: Vec<u8> =
+            utf_16('\u{feff}').iter().flat_map(|unit| unit.to_le_bytes()).collect();
+        let big: Vec<u8> = utf_16('\u{feff}').iter().flat_map(|unit| unit.to_be_bytes()).collect();
+        let marked = format!("\u{feff}{plain}").into_bytes();
+        for bytes in [plain.as_bytes(), &marked, &little, &big] {
+            assert_eq!(json(bytes, "a.json").unwrap()["file_path"], "füchse/01.png");
+        }
+        // Cut within a sign, half of a pair, or another encoding.
+        for bytes in [&little[..5], &[0xff, 0xfe, 0x00, 0xd8], b"{\"a\": \"f\xfcchse\"}"] {
+            let error = format!("{:#}", json(bytes, "a.json").unwrap_err());
+            assert_eq!(error, "a.json: the file is no text in UTF-8: save it as that");
+        }
+    }
 
     #[test]
     fn a_number_that_is_none_is_named_by_its_place() {

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use softrast_raster::{ImageSize, Pinhole};
 
-use crate::camera_file::{json, typed};
+use crate::camera_file::{json, read, typed};
 
 /// Intrinsics of a camera as files have them.
 ///
@@ -56,6 +56,10 @@ struct Distortion {
 
 /// Models of cameras without distortion, or whose distortion is told by coefficients.
 const MODELS: [&str; 4] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL"];
+/// Focal lengths against the shorter and the longer side of a picture: from a field of view of 179 degrees down to a thousandth of one.
+const FOCAL_LENGTHS: [f64; 2] = [0.01, 1e5];
+/// How far off the principal point may be, in longer sides: a picture may be a small part of a large one.
+const FARTHEST_CENTRE: f64 = 1e5;
 /// How much `fx` and that of `K` may differ, as a fraction: files hold few digits.
 const ROUNDED: f64 = 1e-6;
 
@@ -66,12 +70,21 @@ impl Lens {
     ///
     /// If the file is missing, is no JSON, has a field of another type, or tells no focal length.
     pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
-        let path = path.as_ref();
-        let file = json(path)?;
+        let (bytes, name) = read(path.as_ref())?;
+        Self::parse(&bytes, &name)
+    }
+
+    /// What the content of a camera file called `name` says of it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Lens::load`], but for reading.
+    pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
+        let file = json(bytes, name)?;
         // A result of ours holds its camera one level down.
         let camera = if file["camera"].is_object() { &file["camera"] } else { &file };
         let lens = Self::of(camera).and_then(|lens| lens.angle_or_length().map(|()| lens));
-        lens.with_context(|| path.display().to_string())
+        lens.with_context(|| name.to_owned())
     }
 
     /// What the fields of an object say.
@@ -91,7 +104,8 @@ impl Lens {
     ///
     /// # Errors
     ///
-    /// If it is for pictures of another size, contradicts itself, or has a skew, a distortion or no focal length.
+    /// If it is for pictures of another size, contradicts itself, has a skew, a distortion or no focal length, or one that no picture of this
+    /// size is taken with.
     pub fn pinhole(&self, size: ImageSize) -> anyhow::Result<Pinhole> {
         self.check_size(size)?;
         self.check_distortion()?;
@@ -105,6 +119,7 @@ impl Lens {
             size,
         };
         pinhole.check()?;
+        check_sense(&pinhole)?;
         Ok(pinhole)
     }
 
@@ -223,6 +238,26 @@ impl Lens {
     }
 }
 
+/// An error if a camera's numbers, though positive, are those of no camera: floats of 32 bits would not tell pixels apart.
+fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
+    let ImageSize { width, height } = camera.size;
+    let (shorter, longer) = (camera.size.shorter() as f64, width.max(height) as f64);
+    let (shortest, longest) = (FOCAL_LENGTHS[0] * shorter, FOCAL_LENGTHS[1] * longer);
+    for (name, focal) in ["fx", "fy"].into_iter().zip(camera.focal) {
+        ensure!(
+            (shortest..=longest).contains(&focal),
+            "the focal length {name} is {focal:e} pixels, for a picture of {width} x {height} it must be from {shortest} to {longest:e}"
+        );
+    }
+    for (name, centre) in ["cx", "cy"].into_iter().zip(camera.centre) {
+        ensure!(
+            centre.abs() <= FARTHEST_CENTRE * longer,
+            "{name} is {centre:e} pixels, too far from a picture of {width} x {height}"
+        );
+    }
+    Ok(())
+}
+
 impl Distortion {
     fn or(&self, other: &Self) -> Self {
         Self {
@@ -311,6 +346,11 @@ mod tests {
             (json!({ "fx": 500.0, "is_fisheye": true }), "is_fisheye"),
             (json!({ "fx": 500.0, "k6": 1.0 }), "k6 = 1"),
             (json!({ "K": [[1.0]] }), "K"),
+            (json!({ "fx": 5e-324 }), "fx is 5e-324 pixels"),
+            (json!({ "fx": 1e300 }), "fx is 1e300 pixels"),
+            (json!({ "fx": 500.0, "fy": 1e-3 }), "fy is 1e-3 pixels"),
+            (json!({ "fx": 500.0, "cx": 1e40 }), "cx is 1e40 pixels"),
+            (json!({ "camera_angle_x": 1e-300 }), "pixels, for a picture of 640 x 480"),
             (json!({}), "no focal length"),
         ] {
             let error = pinhole(lens.clone()).unwrap_err();

@@ -37,6 +37,7 @@ mod layout;
 mod learn;
 mod learn_config;
 mod lens;
+mod mask_rules;
 mod mask_targets;
 mod method;
 mod minimize;
@@ -45,12 +46,16 @@ mod paint;
 mod paint_targets;
 mod painted_view;
 mod picture;
+mod picture_file;
 pub mod pose;
+mod pose_file;
 mod problem;
 mod renderer;
 mod resolution;
+mod rotation;
 mod surface;
 mod targets;
+mod transforms;
 pub mod triangles;
 mod view;
 
@@ -64,6 +69,7 @@ pub use layout::PhiLayout;
 pub use learn::{Learning, learn};
 pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
 pub use lens::Lens;
+pub use mask_rules::MaskRules;
 pub use mask_targets::MaskTargets;
 pub use method::Method;
 pub use minimize::{Minimization, minimize};
@@ -72,13 +78,18 @@ pub use paint::paint;
 pub use paint_targets::PaintTargets;
 pub use painted_view::PaintedView;
 pub use picture::{Picture, save_picture};
+pub use picture_file::PictureFile;
 pub use pose::PoseProblem;
+pub use pose_file::PoseFile;
 pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
 pub use surface::Surface;
 pub use targets::Targets;
-pub use view::{View, camera_json, load_pose, load_views, mask_iou, silhouette_pixels};
+pub use transforms::{Transforms, load_views};
+pub use view::{
+    View, camera_json, faces_across, faces_across_note, mask_iou, reading_notes, silhouette_pixels,
+};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

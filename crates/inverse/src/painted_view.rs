@@ -34,7 +34,7 @@ impl PaintedView {
     pub fn load(view: &View) -> anyhow::Result<Self> {
         let of = || {
             let [red, green, blue, opacity] = Picture::load_with_opacity(&view.picture)?;
-            let (found, mask) = (opacity.size(), view.mask.size());
+            let (found, mask) = (opacity.whole_size(), view.mask.whole_size());
             ensure!(
                 found == mask,
                 "the picture has {} x {} pixels, but its mask {} x {}",
@@ -144,7 +144,8 @@ mod tests {
         let size = [mask.len() / width, width].into();
         let camera =
             Pinhole { rotation, translation: [0.0; 3], focal: [1.0; 2], centre: [0.0; 2], size };
-        View { name: "a".into(), picture: "a.png".into(), mask: Picture::new(mask, width), camera }
+        let (name, picture) = ("a".into(), "a.png".into());
+        View { name, picture, mask: Picture::new(mask, width), camera, off: 0.0 }
     }
 
     #[test]

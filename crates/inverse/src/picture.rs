@@ -1,68 +1,116 @@
 use std::{path::Path, sync::Arc};
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, anyhow, ensure};
 use burn::tensor::{Tensor, backend::Backend};
-use image::{DynamicImage, GrayImage, Luma, LumaA, Rgba};
-use softrast_raster::ImageSize;
+use image::{GrayImage, Luma};
+use softrast_raster::{ImageSize, Pinhole};
 use softrast_softness::{numbers, tensor_on};
+
+use crate::{
+    MaskRules, PictureFile,
+    mask_rules::Levels,
+    picture_file::{Pixel, luminance},
+};
 
 /// What is looked at of a mask is this much larger than what is white.
 const MARGIN: f64 = 1.5;
+/// Pixels of a picture at most, 2048 × 2048: of larger ones in files the means over equal rectangles are kept.
+const MOST_PIXELS: usize = 1 << 22;
 
 /// A gray picture of any size: a target for silhouettes. Copies share their pixels.
+///
+/// A picture of more than 4,194,304 pixels in a file, as 2048 × 2048, is reduced to that many or a few less when it is read. [`Picture::size`] is the
+/// size of its pixels then, [`Picture::whole_size`] that of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// From 0 to 1, row by row from the top.
     levels: Arc<[f32]>,
     width: usize,
+    /// Of the picture in the file, before it was reduced.
+    whole: ImageSize,
+    /// The level of the file that was taken for white, where it had just one above 0.
+    only_level: Option<f32>,
 }
 
 impl Picture {
-    /// The mask in a picture file: its transparency, or where all of it is opaque its luminance.
+    /// The mask in a picture file: its transparency, or where all of it is opaque its luminance; see [`Picture::mask_of`].
     ///
     /// # Errors
     ///
-    /// If the file is missing or no picture.
+    /// If the path is no regular file or no picture, or those of [`Picture::mask_of`].
     pub fn load_mask(path: impl AsRef<Path>) -> anyhow::Result<Self> {
-        let picture = open(path.as_ref())?;
-        let opaque = !picture.color().has_alpha()
-            || picture.to_luma_alpha16().pixels().all(|p| p.0[1] == u16::MAX);
-        Ok(Self::of(&picture, |p| f32::from(p.0[usize::from(!opaque)]) / FULL))
+        Self::load_mask_by(&MaskRules::default(), path)
+    }
+
+    /// The mask in a picture file by rules.
+    ///
+    /// # Errors
+    ///
+    /// If the path is no regular file or no picture, or those of [`Picture::mask_of`].
+    pub fn load_mask_by(rules: &MaskRules, path: impl AsRef<Path>) -> anyhow::Result<Self> {
+        let (path, file) = (path.as_ref(), PictureFile::load(path.as_ref())?);
+        Self::mask_of(&file, rules).with_context(|| path.display().to_string())
+    }
+
+    /// The mask that a picture is: its transparency, or where all of it is opaque its luminance.
+    ///
+    /// Where one level is above 0 and nothing else, as in masks of 0 and 1, that is the mask: it becomes white, and
+    /// [`Picture::only_level`] has it. A threshold takes levels as they are.
+    ///
+    /// # Errors
+    ///
+    /// If no pixel would be half white: with the brightest level, and the threshold that takes it.
+    pub fn mask_of(file: &PictureFile, rules: &MaskRules) -> anyhow::Result<Self> {
+        let opaque = file.is_opaque();
+        let level = |pixel: Pixel| if opaque { luminance(pixel) } else { pixel[3] };
+        let mut levels = Levels::default();
+        file.each(|pixel| levels.see(level(pixel)));
+        let (change, only_level) = rules.change(&levels).map_err(|wrong| match opaque {
+            false if levels.brightest() == 0.0 => {
+                anyhow!("{wrong}: all of it is transparent, so save it without an alpha channel if its colours are the mask")
+            }
+            _ => wrong,
+        })?;
+        Ok(Self { only_level, ..Self::of(file, |pixel| change(level(pixel))) })
     }
 
     /// The luminance of a picture file; what is transparent is black.
     ///
     /// # Errors
     ///
-    /// If the file is missing or no picture.
+    /// If the path is no regular file or no picture.
     pub fn load_luminance(path: impl AsRef<Path>) -> anyhow::Result<Self> {
-        let level = |p: &LumaA<u16>| f32::from(p.0[0]) / FULL * (f32::from(p.0[1]) / FULL);
-        Ok(Self::of(&open(path.as_ref())?, level))
+        Ok(Self::of(&PictureFile::load(path)?, |pixel| luminance(pixel) * pixel[3]))
     }
 
     /// Red, green and blue of a picture file, as its numbers are; what is transparent is black.
     ///
     /// # Errors
     ///
-    /// If the file is missing or no picture.
+    /// If the path is no regular file or no picture.
     pub fn load_colours(path: impl AsRef<Path>) -> anyhow::Result<[Self; 3]> {
-        let picture = open(path.as_ref())?;
-        let (width, pixels) = (picture.width() as usize, picture.to_rgba16());
-        let level = |p: &Rgba<u16>, k: usize| f32::from(p.0[k]) / FULL * (f32::from(p.0[3]) / FULL);
-        let of = |k| pixels.pixels().map(|p| level(p, k)).collect();
-        Ok([0, 1, 2].map(|k| Self { levels: of(k), width }))
+        Ok(Self::channels(&PictureFile::load(path)?, |[r, g, b, a]| [r * a, g * a, b * a]))
     }
 
-    /// Red, green and blue of a picture file, as its numbers are whatever the transparency, and how opaque it is.
+    /// Red, green and blue of a picture file, as its numbers are whatever the transparency, and how opaque it is. In a picture that is reduced
+    /// colours count as much as they are opaque.
     ///
     /// # Errors
     ///
-    /// If the file is missing or no picture.
+    /// If the path is no regular file or no picture.
     pub fn load_with_opacity(path: impl AsRef<Path>) -> anyhow::Result<[Self; 4]> {
-        let picture = open(path.as_ref())?;
-        let (width, pixels) = (picture.width() as usize, picture.to_rgba16());
-        let of = |k: usize| pixels.pixels().map(|p| f32::from(p.0[k]) / FULL).collect();
-        Ok([0, 1, 2, 3].map(|k| Self { levels: of(k), width }))
+        let file = PictureFile::load(path)?;
+        if file.size().pixels() <= MOST_PIXELS {
+            return Ok(Self::channels(&file, |pixel| pixel));
+        }
+        let [mut colours @ .., opacity] =
+            Self::channels(&file, |[r, g, b, a]| [r * a, g * a, b * a, a]);
+        for colour in &mut colours {
+            let of = |(&x, &a): (&f32, &f32)| if a > 0.0 { x / a } else { 0.0 };
+            colour.levels = colour.levels.iter().zip(opacity.pixels()).map(of).collect();
+        }
+        let [red, green, blue] = colours;
+        Ok([red, green, blue, opacity])
     }
 
     /// A picture of these levels from 0 to 1, row by row from the top.
@@ -76,12 +124,33 @@ impl Picture {
             count > 0 && width > 0 && count.is_multiple_of(width),
             "{count} levels, {width} a row"
         );
-        Self { levels: levels.into(), width }
+        let whole = [count / width, width].into();
+        Self { levels: levels.into(), width, whole, only_level: None }
     }
 
     /// Height and width in pixels.
     pub fn size(&self) -> ImageSize {
         [self.levels.len() / self.width, self.width].into()
+    }
+
+    /// Height and width of the picture in its file, turned as the file asks for: those that a camera of the picture has.
+    pub fn whole_size(&self) -> ImageSize {
+        self.whole
+    }
+
+    /// The level from 0 to 1 that stood for white in the file of a mask, where it was the only one above 0 and less than 1.
+    pub fn only_level(&self) -> Option<f64> {
+        self.only_level.map(f64::from)
+    }
+
+    /// A camera of the picture in the file as one of these pixels.
+    pub fn camera(&self, of_whole: &Pinhole) -> Pinhole {
+        resized(of_whole, self.whole, self.size())
+    }
+
+    /// A camera of these pixels as one of the picture in the file.
+    pub fn whole_camera(&self, camera: &Pinhole) -> Pinhole {
+        resized(camera, self.size(), self.whole)
     }
 
     /// All pixels, row by row from the top.
@@ -116,7 +185,7 @@ impl Picture {
             let most = sum >= 0.5 * count;
             if (self.levels[k] >= 0.5) == most { self.levels[k] } else { f32::from(u8::from(most)) }
         };
-        Self { levels: (0..self.levels.len()).map(majority).collect(), width }
+        Self { levels: (0..self.levels.len()).map(majority).collect(), ..self.clone() }
     }
 
     /// The least square around all that is at least half white, in the middle of it: its left, its top and its extent in pixels. None if
@@ -150,9 +219,8 @@ impl Picture {
     ///
     /// If nothing or all of the mask is white.
     pub fn looked_at(&self) -> anyhow::Result<[f64; 3]> {
-        let [left, top, extent] = self.square().context(
-            "the mask is empty: no pixel is half white or more (--invert takes what is black)",
-        )?;
+        let [left, top, extent] =
+            self.square().context("the mask is empty: no pixel is half white or more")?;
         ensure!(
             self.levels.iter().any(|&level| level < 0.5),
             "the mask is full: all pixels are white, and there is no outline to fit"
@@ -171,9 +239,14 @@ impl Picture {
         [mean(&|at| f64::from(self.levels[at])), mean(&|_| 1.0)]
     }
 
-    fn of(picture: &DynamicImage, level: impl Fn(&LumaA<u16>) -> f32) -> Self {
-        let levels = picture.to_luma_alpha16().pixels().map(level).collect();
-        Self { levels, width: picture.width() as usize }
+    fn of(file: &PictureFile, level: impl Fn(Pixel) -> f32) -> Self {
+        let [picture] = Self::channels(file, |pixel| [level(pixel)]);
+        picture
+    }
+
+    fn channels<const N: usize>(file: &PictureFile, of: impl Fn(Pixel) -> [f32; N]) -> [Self; N] {
+        let (planes, size) = file.planes(MOST_PIXELS, of);
+        planes.map(|levels| Self { whole: file.size(), ..Self::new(levels, size.width) })
     }
 
     /// The image `[size * size]`, top row first, 0 black to 1 white.
@@ -212,15 +285,9 @@ pub fn save_picture<B: Backend>(image: Tensor<B, 3>, path: impl AsRef<Path>) -> 
     picture.save(path).with_context(|| format!("cannot write the picture {}", path.display()))
 }
 
-const FULL: f32 = u16::MAX as f32;
-
-fn open(path: &Path) -> anyhow::Result<DynamicImage> {
-    image::ImageReader::open(path)
-        .with_context(|| format!("cannot open the picture {}", path.display()))?
-        .with_guessed_format()
-        .with_context(|| format!("cannot read the picture {}", path.display()))?
-        .decode()
-        .with_context(|| format!("{} is no picture that can be read", path.display()))
+/// The camera of a picture that is enlarged or reduced.
+fn resized(camera: &Pinhole, from: ImageSize, to: ImageSize) -> Pinhole {
+    camera.cropped([0.0; 2], [from.width as f64, from.height as f64], to)
 }
 
 /// Least and largest of places, along each axis.
@@ -265,6 +332,7 @@ fn shares(count: usize, from: f64, cell: f64, cells: usize) -> Vec<Shares> {
 #[cfg(test)]
 mod tests {
     use burn::backend::NdArray;
+    use image::{DynamicImage, LumaA, Rgba};
 
     use super::*;
 
@@ -300,16 +368,16 @@ mod tests {
 
     #[test]
     fn a_part_is_black_where_it_leaves_the_picture_and_says_how_much_of_it_does() {
-        let levels = [0.0, 0.0, 0.0, 1.0, 1.0, 0.0].into();
-        let picture = Picture { levels, width: 3 };
+        let picture = Picture::new(vec![0.0, 0.0, 0.0, 1.0, 1.0, 0.0], 3);
         assert_eq!(picture.square(), Some([0.0, 0.5, 2.0]));
         let [levels, covered] = picture.part([0.0, 0.5, 2.0], 2);
         assert_close(&levels, &[0.5, 0.5, 0.5, 0.5]);
         assert_close(&covered, &[1.0, 1.0, 0.5, 0.5]);
-        let speckled =
-            |x, y| Luma([if x * y == 36 || (x > 1 && x < 5 && y < 5) { 255 } else { 0 }]);
-        let speckled =
-            Picture::of(&GrayImage::from_fn(9, 9, speckled).into(), |p| f32::from(p.0[0]));
+        let speckled = |k: usize| {
+            let (x, y) = (k % 9, k / 9);
+            f32::from(u8::from(x * y == 36 || (x > 1 && x < 5 && y < 5)))
+        };
+        let speckled = Picture::new((0..81).map(speckled).collect(), 9);
         assert_eq!(speckled.square(), Some([1.0, 0.0, 5.0]));
         assert_eq!(picture.clone().thresholded(2.0).square(), None);
         assert!(

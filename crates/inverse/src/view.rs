@@ -1,73 +1,11 @@
-use std::path::{Path, PathBuf};
+use std::{fmt::Display, path::PathBuf};
 
-use anyhow::{Context, bail, ensure};
-use serde::Deserialize;
 use serde_json::{Value, json};
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
 use softrast_softness::numbers;
 
-use crate::{
-    Lens, Picture,
-    camera_file::{json, typed},
-};
-
-/// R and t of a camera in a file: `{"R": .., "t": ..}` as OpenCV has them, `{"transform_matrix": ..}` as OpenGL has it, or either of them
-/// under `camera`, as a result of ours.
-///
-/// # Errors
-///
-/// If the file is missing, is no JSON, has neither, or what it has is no rotation.
-pub fn load_pose(path: impl AsRef<Path>) -> anyhow::Result<([[f64; 3]; 3], [f64; 3])> {
-    #[derive(Deserialize)]
-    struct Pose {
-        #[serde(rename = "R")]
-        rotation: Option<[[f64; 3]; 3]>,
-        t: Option<[f64; 3]>,
-        transform_matrix: Option<Vec<Vec<f64>>>,
-    }
-    let path = path.as_ref();
-    let file = json(path)?;
-    let object = if file["camera"].is_object() { &file["camera"] } else { &file };
-    let camera = || {
-        let pose: Pose = typed(object)?;
-        let unit = |rotation, translation| Pinhole {
-            rotation,
-            translation,
-            focal: [1.0; 2],
-            centre: [0.0; 2],
-            size: 1.into(),
-        };
-        let camera = match (pose.rotation, pose.t, pose.transform_matrix) {
-            (Some(rotation), Some(translation), _) => unit(rotation, translation),
-            (.., Some(rows)) => {
-                Pinhole::from_opengl(&camera_to_world(&rows)?, [1.0; 2], [0.0; 2], 1)
-            }
-            _ => bail!("there is no pose: name R and t, or transform_matrix"),
-        };
-        camera.check()?;
-        anyhow::Ok(camera)
-    };
-    let camera = camera().with_context(|| path.display().to_string())?;
-    Ok((camera.rotation, camera.translation))
-}
-
-/// A `transform_matrix` of 3 or 4 rows.
-fn camera_to_world(rows: &[Vec<f64>]) -> anyhow::Result<[[f64; 4]; 4]> {
-    let complete: Option<Vec<[f64; 4]>> =
-        rows.iter().map(|row| row.as_slice().try_into().ok()).collect();
-    let last = [0.0, 0.0, 0.0, 1.0];
-    let [x, y, z, last] = match complete.as_deref() {
-        Some(&[x, y, z]) => [x, y, z, last],
-        Some(&[x, y, z, last]) => [x, y, z, last],
-        _ => bail!("transform_matrix is not 4 x 4"),
-    };
-    ensure!(
-        last == [0.0, 0.0, 0.0, 1.0],
-        "the last row of transform_matrix is {last:?}, not [0, 0, 0, 1]: is it transposed?"
-    );
-    Ok([x, y, z, last])
-}
+use crate::{Picture, rotation::SAID};
 
 /// A camera as JSON: R, t, K, width and height, and the orbit if there is one that sees the same.
 pub fn camera_json(camera: &Pinhole) -> Value {
@@ -120,63 +58,112 @@ pub struct View {
     pub picture: PathBuf,
     /// Its mask.
     pub mask: Picture,
-    /// Who took it.
+    /// Who took it: for the pixels of the mask.
     pub camera: Pinhole,
+    /// How far R Rᵀ was from the identity in the file, before it became the nearest rotation.
+    pub off: f64,
 }
 
-/// The views of a folder with a `transforms.json`, as instant-ngp and nerfstudio write it; `load` reads a mask.
-///
-/// It names `fl_x, fl_y, cx, cy, w, h` or `camera_angle_x` for all frames or for each, and `frames` with `file_path` and `transform_matrix`
-/// (camera to world; x right, y up, z behind). A frame with a `mask_path` has its mask there. A path without an ending is that of a PNG.
-///
-/// # Errors
-///
-/// If a file is missing or cannot be read, there is no frame, or a camera is none: one line that names the file and the frame.
-pub fn load_views(
-    folder: impl AsRef<Path>,
-    load: impl Fn(&Path) -> anyhow::Result<Picture>,
-) -> anyhow::Result<Vec<View>> {
-    #[derive(Deserialize)]
-    struct Frame {
-        file_path: String,
-        mask_path: Option<String>,
-        transform_matrix: Vec<Vec<f64>>,
-    }
-    let folder = folder.as_ref();
-    let path = folder.join("transforms.json");
-    let file = json(&path)?;
-    let here = || path.display().to_string();
-    let lens = Lens::of(&file).with_context(here)?;
-    let frames = file["frames"].as_array();
-    let frames = frames.with_context(|| format!("{}: frames is no list", path.display()))?;
-    ensure!(!frames.is_empty(), "{}: there is no frame", path.display());
-    let view = |(k, object): (usize, &Value)| {
-        let name = object["file_path"].as_str().unwrap_or("without file_path").to_owned();
-        let view = || {
-            let frame: Frame = typed(object)?;
-            let matrix = camera_to_world(&frame.transform_matrix)?;
-            let picture = picture_path(folder, &frame.file_path);
-            let mask = match frame.mask_path {
-                Some(name) => load(&picture_path(folder, &name))?,
-                None => load(&picture)?,
-            };
-            let lens = lens.with(&Lens::of(object)?);
-            let Pinhole { focal, centre, size, .. } = lens.pinhole(mask.size())?;
-            let camera = Pinhole::from_opengl(&matrix, focal, centre, size);
-            camera.check()?;
-            anyhow::Ok((picture, mask, camera))
+/// What should be said of views that were read, a line for each kind: masks whose only level was taken for white, and rotations that were
+/// rounded.
+pub fn reading_notes(views: &[View]) -> Vec<String> {
+    let masks = views.iter().filter_map(|view| Some((view.mask.only_level()?, &view.name)));
+    let masks: Vec<(f64, &String)> = masks.collect();
+    let mut notes = Vec::new();
+    if let [(level, name), more @ ..] = &masks[..] {
+        let of = match more.len() {
+            0 => name.to_string(),
+            more => format!("{name} and {more} more"),
         };
-        let (picture, mask, camera) =
-            view().with_context(|| format!("{}: frame {k} ({name})", path.display()))?;
-        Ok(View { name, picture, mask, camera })
-    };
-    frames.iter().enumerate().map(view).collect()
+        notes.push(format!(
+            "{of}: one level is above black and nothing else, {level:.4} where white is 1: it is taken for the mask"
+        ));
+    }
+    let rounded = || views.iter().filter(|view| view.off >= SAID);
+    let worst = rounded().max_by(|a, b| a.off.total_cmp(&b.off));
+    notes.extend(worst.map(|view| rounded_note(&view.name, view.off, rounded().count())));
+    notes
 }
 
-fn picture_path(folder: &Path, name: &str) -> PathBuf {
-    let path = folder.join(name);
-    match path.extension() {
-        Some(_) => path,
-        None => path.with_extension("png"),
+/// That a rotation was rounded, and as many in all.
+pub(crate) fn rounded_note(name: &str, off: f64, count: usize) -> String {
+    let of = match count {
+        1 => "its rotation is".to_owned(),
+        count => format!("its rotation, as those of {} more, is", count - 1),
+    };
+    format!(
+        "{name}: {of} rounded (R Rᵀ is off the identity by {off:.1e}): the nearest rotation is taken"
+    )
+}
+
+/// How many faces of a mesh cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those across
+/// [`NEAR`](softrast_raster::NEAR) are not drawn.
+pub fn faces_across(mesh: &Mesh, camera: &Pinhole, depth: f64) -> usize {
+    let ahead: Vec<bool> = mesh.positions().iter().map(|&p| camera.seen(p)[2] >= depth).collect();
+    let crosses = |face: &&[u32; 3]| {
+        let before = face.iter().filter(|&&v| ahead[v as usize]).count();
+        before > 0 && before < face.len()
+    };
+    mesh.faces().iter().filter(crosses).count()
+}
+
+/// What should be said where [`faces_across`] finds some at cameras, each with its name.
+pub fn faces_across_note<N: Display>(
+    mesh: &Mesh,
+    cameras: impl IntoIterator<Item = (N, Pinhole)>,
+    depth: f64,
+) -> Option<String> {
+    let cameras = cameras.into_iter();
+    let counts = cameras.map(|(name, camera)| (faces_across(mesh, &camera, depth), name));
+    let crossed: Vec<(usize, N)> = counts.filter(|(count, _)| *count > 0).collect();
+    let (most, name) = crossed.iter().max_by_key(|(count, _)| *count)?;
+    let more = match crossed.len() {
+        1 => String::new(),
+        all => format!(", and some in {} more", all - 1),
+    };
+    Some(format!(
+        "{most} of {} faces reach behind the camera of {name}{more}: they are not drawn, so what they cover is missing; cut the mesh, or move \
+         the camera away from it",
+        mesh.faces().len()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Pinhole {
+        Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, [3, 4])
+    }
+
+    fn view(name: &str, mask: Picture, off: f64) -> View {
+        View { name: name.to_owned(), picture: name.into(), mask, camera: camera(), off }
+    }
+
+    #[test]
+    fn rounded_rotations_are_one_line_that_names_the_worst() {
+        let mask = || Picture::new(vec![1.0; 12], 4);
+        let views = [view("a", mask(), 1e-9), view("b", mask(), 1e-3), view("c", mask(), 2e-3)];
+        let notes = reading_notes(&views);
+        assert_eq!(notes.len(), 1, "{notes:?}");
+        assert!(
+            notes[0].starts_with("c: its rotation, as those of 1 more, is rounded"),
+            "{notes:?}"
+        );
+        assert!(reading_notes(&views[..1]).is_empty());
+    }
+
+    #[test]
+    fn faces_on_both_sides_of_a_camera_are_counted() {
+        let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 9.0], [1.0, 1.0, 9.0]];
+        let all = vec![[0, 1, 2], [1, 3, 2], [0, 1, 0], [2, 3, 2]];
+        let mesh = Mesh::new(positions, all).unwrap();
+        assert_eq!(faces_across(&mesh, &camera(), 0.0), 2);
+        let note = faces_across_note(&mesh, [("a.png", camera())], 0.0).unwrap();
+        assert!(note.starts_with("2 of 4 faces reach behind the camera of a.png: "), "{note}");
+        let two = faces_across_note(&mesh, [("a", camera()), ("b", camera())], 0.0).unwrap();
+        assert!(two.contains("some in 1 more"), "{two}");
+        let before = Mesh::new(mesh.positions()[..2].to_vec(), vec![[0, 1, 0]]).unwrap();
+        assert_eq!(faces_across_note(&before, [("a", camera())], 0.0), None);
     }
 }

@@ -168,9 +168,9 @@ pub fn mask_png(mask: &[f32], width: usize) -> anyhow::Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
-/// A picture for a page: small ones are enlarged so that their pixels show, large ones made smaller.
+/// A picture for a page: small ones are enlarged so that their pixels show, large ones made smaller, whichever side is the longer one.
 pub fn for_page(image: RgbImage) -> RgbImage {
-    match image.width() < ON_PAGE[0] {
+    match image.width().max(image.height()) < ON_PAGE[1] {
         true => enlarged(&image, ON_PAGE[0]),
         false => reduced(DynamicImage::from(image)).into_rgb8(),
     }
@@ -202,9 +202,11 @@ fn row(images: &[&RgbImage], width_at_least: u32) -> RgbImage {
     contact_sheet(&cells, cells.len())
 }
 
-/// Repeats pixels, by the smallest whole factor that reaches the width.
+/// Repeats pixels, by the smallest whole factor that reaches the width and leaves both sides within twice that.
 fn enlarged(image: &RgbImage, width_at_least: u32) -> RgbImage {
-    let factor = width_at_least.div_ceil(image.width().max(1)).max(1);
+    let longest = image.width().max(image.height()).max(1);
+    let room = 2 * width_at_least / longest;
+    let factor = width_at_least.div_ceil(image.width().max(1)).min(room).max(1);
     let size = (image.width() * factor, image.height() * factor);
     imageops::resize(image, size.0, size.1, imageops::FilterType::Nearest)
 }
@@ -269,6 +271,10 @@ mod tests {
         assert_eq!(for_page(plain(1280, 320, 7)).dimensions(), (640, 160));
         assert_eq!(for_page(plain(400, 2, 7)), plain(400, 2, 7));
         assert_eq!(for_page(plain(120, 90, 7)).dimensions(), (360, 270));
+        assert_eq!(for_page(plain(2, 90, 7)).dimensions(), (14, 630));
+        assert_eq!(for_page(plain(1, 20_000, 7)).dimensions(), (1, 640));
+        assert_eq!(for_page(plain(9, 40_000, 7)).dimensions(), (1, 640));
+        assert_eq!(for_page(plain(40_000, 9, 7)).dimensions(), (640, 1));
     }
 
     fn plain(width: u32, height: u32, level: u8) -> RgbImage {

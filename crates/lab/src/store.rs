@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
@@ -146,6 +146,8 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
     /// Takes in the lines of a file from a byte on. Of two of the same key the last stays.
     fn read(&mut self, path: &Path, from: u64) -> anyhow::Result<Lines> {
         let named = || format!("cannot read {path:?}");
+        // A pipe could be waited for for ever.
+        ensure!(fs::metadata(path).with_context(named)?.is_file(), "{path:?} is no regular file");
         let mut file = File::open(path).with_context(named)?;
         let mut bytes = Vec::new();
         file.seek(SeekFrom::Start(from))

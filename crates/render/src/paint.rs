@@ -1,10 +1,11 @@
 //! What the faces of a mesh show: a texture, colours of its vertices, or grey.
 
-use std::{fmt, fs, io::Cursor, path::Path, sync::Arc};
+use std::{fmt, sync::Arc};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
-use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage};
+use image::RgbImage;
+use softrast_inverse::PictureFile;
 use softrast_lab::Error;
 use softrast_mesh::{Mesh, MeshError, Texture};
 use softrast_raster::Attributes;
@@ -12,8 +13,8 @@ use softrast_softness::tensor;
 
 use crate::args::Args;
 
-/// Texels that the op draws at most.
-const MOST_TEXELS: u64 = 1 << 26;
+/// Texels that are drawn at most, about 3500 × 3500: the op takes some 60 bytes for each. Larger pictures are reduced.
+const MOST_TEXELS: usize = 12 << 20;
 /// Red, green and blue of a mesh that has no colours.
 const GREY: [f64; 3] = [0.7; 3];
 
@@ -92,7 +93,8 @@ impl Paint {
         if let Some(path) = &args.texture {
             return match (mesh.texture(), left_out) {
                 (Some(texture), _) => {
-                    Ok((Self::textured(texture, read(path).context("--texture")?), None))
+                    let picture = PictureFile::load(path).context("--texture")?;
+                    Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), None))
                 }
                 (None, Some(reason)) => bail!("--texture has no place on the mesh: {reason}"),
                 (None, None) => bail!("--texture: {name} has no texture coordinates"),
@@ -100,8 +102,10 @@ impl Paint {
         }
         let mut warning = left_out.map(|reason| reason.to_string());
         if let Some((texture, picture)) = mesh.texture().and_then(|it| Some((it, it.picture()?))) {
-            match decoded(picture) {
-                Ok(picture) => return Ok((Self::textured(texture, picture), None)),
+            match PictureFile::decode(picture) {
+                Ok(picture) => {
+                    return Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), None));
+                }
                 Err(reason) => warning = Some(format!("{name}: its picture: {reason:#}")),
             }
         }
@@ -152,22 +156,4 @@ impl fmt::Display for Paint {
             Self::Grey => f.write_str("grey: the mesh has no texture and no colours"),
         }
     }
-}
-
-/// The picture in a file.
-fn read(path: &Path) -> anyhow::Result<RgbImage> {
-    let read = || decoded(&fs::read(path)?);
-    read().with_context(|| format!("cannot read {}", path.display()))
-}
-
-/// The picture that is the content of a file, without its transparency.
-fn decoded(content: &[u8]) -> anyhow::Result<RgbImage> {
-    let decoder = ImageReader::new(Cursor::new(content)).with_guessed_format()?.into_decoder()?;
-    let (width, height) = decoder.dimensions();
-    let texels = u64::from(width) * u64::from(height);
-    ensure!(
-        (1..=MOST_TEXELS).contains(&texels),
-        "{width} x {height} texels: a texture has 1 to {MOST_TEXELS} of them"
-    );
-    Ok(DynamicImage::from_decoder(decoder)?.into_rgb8())
 }

@@ -2,10 +2,11 @@ use std::{path::Path, sync::Arc};
 
 use anyhow::Context;
 use burn::tensor::{Tensor, backend::Backend};
-use image::{ImageReader, imageops};
+use image::{GrayImage, imageops};
+use softrast_inverse::{Picture, faces_across_note};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
-use softrast_raster::TConorm;
+use softrast_raster::{ImageSize, NEAR, Orbit, Pinhole, TConorm};
 use softrast_softness::{
     EdgeSoftness, Family, NameOrFile, ScheduledSoftness, Softness, tensor, vector,
 };
@@ -32,7 +33,7 @@ pub(crate) struct Scene {
     /// How it is drawn in colour; none for silhouettes.
     pub(crate) colour: Option<Colour>,
     /// What the user should know.
-    pub(crate) warning: Option<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// What one pass gave and took. Times are in milliseconds.
@@ -77,6 +78,12 @@ impl Scene {
         let (colour, warning) = coloured.map_or((None, None), |(c, warning)| (Some(c), warning));
         let target = args.target.as_ref().map(|target| pixels(target, args.size)).transpose()?;
         let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov];
+        let camera = |&azimuth_deg: &f64| {
+            let (distance, elevation_deg, fov_deg) = (args.distance, args.elevation, args.fov);
+            let orbit = Orbit { distance, elevation_deg, azimuth_deg, fov_deg };
+            (format!("azimuth {azimuth_deg}"), Pinhole::of_orbit(&orbit, args.size))
+        };
+        let across = faces_across_note(&mesh, args.azimuths.iter().map(camera), NEAR);
         Ok(Self {
             faces: mesh.faces().into(),
             vertices: mesh.positions().as_flattened().to_vec(),
@@ -88,7 +95,7 @@ impl Scene {
             tolerance: args.tolerance,
             target,
             colour,
-            warning,
+            warnings: warning.into_iter().chain(across).collect(),
         })
     }
 
@@ -158,13 +165,18 @@ fn disk(x: f64, y: f64, radius: f64, size: usize) -> Vec<f64> {
 }
 
 fn picture(path: &Path, size: usize) -> anyhow::Result<Vec<f64>> {
-    let read = || -> anyhow::Result<_> {
-        Ok(ImageReader::open(path)?.with_guessed_format()?.decode()?.into_luma8())
-    };
-    let mut image = read().with_context(|| format!("cannot read the target {}", path.display()))?;
-    let (width, height) = image.dimensions();
-    if (width, height) != (size as u32, size as u32) {
-        eprintln!("the target is {width} x {height} pixels: resized to {size} x {size}");
+    let picture = Picture::load_luminance(path).context("cannot read the target")?;
+    let (whole, found) = (picture.whole_size(), picture.size());
+    let levels = picture.pixels().iter().map(|level| (255.0 * level).round() as u8).collect();
+    let image = GrayImage::from_raw(found.width as u32, found.height as u32, levels);
+    let mut image = image.context("a picture of whole rows")?;
+    if whole != ImageSize::from(size) {
+        eprintln!(
+            "the target is {} x {} pixels: resized to {size} x {size}",
+            whole.width, whole.height
+        );
+    }
+    if found != ImageSize::from(size) {
         image = imageops::resize(&image, size as u32, size as u32, imageops::FilterType::Triangle);
     }
     Ok(image.pixels().map(|pixel| f64::from(pixel.0[0]) / 255.0).collect())

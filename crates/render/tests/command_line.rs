@@ -190,6 +190,54 @@ fn front(mesh: &str, words: &[&str]) -> (RgbImage, Value) {
 }
 
 #[test]
+fn faces_that_reach_behind_a_camera_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (floor, out) = (path("floor.obj"), path("floor.png"));
+    let text = "v -9 -1 -9\nv 9 -1 -9\nv 9 -1 9\nv -9 -1 9\nf 1 3 2\nf 1 4 3\n";
+    fs::write(&floor, text).unwrap();
+    let run = |more: &[&str]| {
+        let words = [&[&*floor, "--size", "16", "--out", &out, "--quiet"], more].concat();
+        let output = Command::new(env!("CARGO_BIN_EXE_render")).args(words).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let said = run(&["--raw", "--distance", "1"]);
+    assert!(said.contains("2 of 2 faces reach behind the camera of azimuth 30"), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert_eq!(run(&[]), "");
+}
+
+/// A mask of 20,000 x 20,000 and a texture of 8192 x 8192 are drawn within a gibibyte.
+#[test]
+fn large_pictures_take_less_than_a_gibibyte() {
+    use image::{ExtendedColorType, ImageEncoder, codecs::png};
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let written = |name: &str, side: u32, colour: ExtendedColorType, channels: usize| {
+        let pixels = vec![200; side as usize * side as usize * channels];
+        let file = std::io::BufWriter::new(fs::File::create(path(name)).unwrap());
+        let (fast, plain) = (png::CompressionType::Fast, png::FilterType::NoFilter);
+        let encoder = png::PngEncoder::new_with_quality(file, fast, plain);
+        encoder.write_image(&pixels, side, side, colour).unwrap();
+        path(name)
+    };
+    let target = written("mask.png", 20_000, ExtendedColorType::L8, 1);
+    let texture = written("texture.png", 8192, ExtendedColorType::Rgb8, 3);
+    let square = path("square.obj");
+    let text = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n";
+    fs::write(&square, text).unwrap();
+    let out = path("out.png");
+    let most = |words: &[&str]| {
+        let words = [&[&*square, "--size", "32", "--repeat", "1", "--out", &out, "--json"], words];
+        json(&words.concat())["peak_rss_mib"].as_f64().unwrap()
+    };
+    let [of_mask, of_texture] =
+        [most(&["--target", &target]), most(&["--colour", "--texture", &texture])];
+    assert!(of_mask < 1024.0 && of_texture < 1024.0, "{of_mask} and {of_texture} MiB");
+}
+
+#[test]
 fn a_texture_is_seen_where_its_coordinates_place_it() {
     let folder = tempfile::tempdir().unwrap();
     let [obj, glb] = pictured(folder.path());
@@ -291,11 +339,11 @@ fn what_cannot_be_drawn_in_colour_is_one_line() {
         (
             &[&obj, "--colour", "--texture", "none.png"],
             1,
-            "--texture: cannot read none.png: No such",
+            "--texture: cannot read the picture none.png: No such",
         ),
         (&[&obj, "--colour", "--texture", &cut], 1, "cut.png: "),
         (&[&obj, "--colour", "--texture", &text], 1, "text.png: "),
-        (&[&obj, "--colour", "--texture", &huge], 1, "60000 x 60000 texels: a texture has 1 to"),
+        (&[&obj, "--colour", "--texture", &huge], 1, "huge.png: it has 60000 x 60000 pixels"),
         (&[&obj, "--texture", &cut], 2, "--colour"),
         (&[&obj, "--shade"], 2, "--colour"),
         (&[&obj, "--colour", "--target", "disk:0,0,1"], 2, "cannot be used with"),

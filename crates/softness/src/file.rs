@@ -1,7 +1,8 @@
 //! Values that are kept in JSON files, and those that come with the crate.
 
 use std::{
-    fs, io,
+    fs,
+    io::{self, Read},
     path::{Path, PathBuf},
 };
 
@@ -9,6 +10,9 @@ use serde::{Serialize, de::DeserializeOwned};
 
 /// The largest size of a parameter that is a logarithm: its exponential must fit an f32.
 pub(crate) const LARGEST_LOGARITHM: f64 = 80.0;
+
+/// Bytes of a softness file at most.
+const LARGEST_FILE: u64 = 1 << 24;
 
 /// A softness file could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -134,12 +138,25 @@ macro_rules! stored {
 }
 pub(crate) use stored;
 
+/// The text of a regular file: a pipe could be waited for, and a device read, for ever.
 pub(crate) fn read(path: &Path) -> Result<String, SoftnessFileError> {
-    fs::read_to_string(path)
-        .map_err(|reason| SoftnessFileError::Read { path: path.to_owned(), reason })
+    let read = || {
+        if !fs::metadata(path)?.is_file() {
+            return Err(io::Error::other("it is a folder, a device or a pipe, not a file"));
+        }
+        let mut text = String::new();
+        fs::File::open(path)?.take(LARGEST_FILE + 1).read_to_string(&mut text)?;
+        match text.len() as u64 > LARGEST_FILE {
+            true => Err(io::Error::other(format!("it is larger than {} MiB", LARGEST_FILE >> 20))),
+            false => Ok(text),
+        }
+    };
+    read().map_err(|reason| SoftnessFileError::Read { path: path.to_owned(), reason })
 }
 
 pub(crate) fn parse<T: Stored>(text: &str, path: &Path) -> Result<T, SoftnessFileError> {
+    // Editors of Windows write a byte order mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let stored: T = serde_json::from_str(text)
         .map_err(|reason| SoftnessFileError::Parse { path: path.to_owned(), reason })?;
     checked(&stored, path)?;

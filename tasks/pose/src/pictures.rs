@@ -7,9 +7,9 @@ use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, MaskFlags, Variant, seen_by};
 use softrast_inverse::{
-    Lens, PaintedView, Picture, View, camera_json, coloured_pixels, load_pose,
+    Lens, PaintedView, Picture, PoseFile, View, camera_json, coloured_pixels, faces_across_note,
     pose::{FoundPose, PoseSearch},
-    silhouette_pixels,
+    reading_notes, silhouette_pixels,
 };
 use softrast_lab::{
     Error, Viewer, contact_sheet, for_page,
@@ -20,7 +20,7 @@ use softrast_lab::{
     rgb_from_planes,
 };
 use softrast_mesh::Mesh;
-use softrast_raster::{Pinhole, on_backend};
+use softrast_raster::{NEAR, Pinhole, on_backend};
 
 use crate::{
     Args, Instances,
@@ -106,6 +106,13 @@ struct Solved {
     seconds: f64,
 }
 
+impl Solved {
+    /// A pose with the camera of the picture in its file, which may have more pixels than the mask.
+    fn of_file(&self, pose: &FoundPose) -> FoundPose {
+        FoundPose { camera: self.mask.whole_camera(&pose.camera), ..*pose }
+    }
+}
+
 pub(crate) fn solve_pictures(
     given: &Given<'_, Args>,
     pictures: &Pictures,
@@ -122,34 +129,38 @@ pub(crate) fn solve_pictures(
     search.fine_size = given.common.size.unwrap_or(search.fine_size);
     search.fine_steps = given.common.steps.unwrap_or(search.fine_steps);
     let lens = pictures.camera.as_ref().map(Lens::load).transpose()?;
-    let start = pictures.start.as_ref().map(load_pose).transpose()?;
+    let start = pictures.start.as_ref().map(PoseFile::load).transpose()?;
     let paths = pictures.paths()?;
     // What would fail in the middle fails at once.
     let mut tasks = Vec::new();
     for path in paths {
         let mask = pictures.masks.load(&path)?;
-        let size = mask.size();
+        let size = mask.whole_size();
         let lens = lens.clone().unwrap_or_else(|| Lens::of_fov(ASSUMED_FOV_DEG, size));
         let mut camera = lens.pinhole(size).with_context(|| {
             let camera = pictures.camera.as_deref().unwrap_or(Path::new("the camera"));
             format!("{} with {}", camera.display(), path.display())
         })?;
-        if let Some((rotation, translation)) = start {
-            (camera.rotation, camera.translation) = (rotation, translation);
+        if let Some(start) = &start {
+            (camera.rotation, camera.translation) = (start.rotation, start.translation);
         }
+        let camera = mask.camera(&camera);
         PoseSearch::check(&mesh, &mask, &camera, start.is_some())
             .with_context(|| path.display().to_string())?;
-        let view = View { name: path.display().to_string(), picture: path, mask, camera };
+        let view = View { name: path.display().to_string(), picture: path, mask, camera, off: 0.0 };
         let painted = args.colour.then(|| PaintedView::load(&view)).transpose()?;
         tasks.push((view, painted));
     }
+    let views: Vec<View> = tasks.iter().map(|(view, _)| view.clone()).collect();
+    let notes = start.iter().filter_map(|start| start.note.clone()).chain(reading_notes(&views));
+    let notes: Vec<String> = notes.collect();
     let steps = search.steps(start.is_some());
     let mut progress = given.progress(steps * tasks.len())?;
     let mut solved = Vec::new();
     for (k, (view, painted)) in tasks.into_iter().enumerate() {
         let clock = std::time::Instant::now();
         let visit = |step: usize, loss: f64| progress.step(k * steps + step, loss);
-        let (View { name, picture: path, mask, camera }, started) = (view, start.is_some());
+        let (View { name, picture: path, mask, camera, .. }, started) = (view, start.is_some());
         let poses = on_backend!(backend, B => match &painted {
             Some(view) => search.run_by_colour::<B>(&mesh, view, started, &method, visit),
             None => search.run::<B>(&mesh, &mask, &camera, started, &method, visit),
@@ -158,7 +169,10 @@ pub(crate) fn solve_pictures(
         solved.push(Solved { path, mask, painted, poses, seconds: clock.elapsed().as_secs_f64() });
     }
     progress.finish();
-    let warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
+    let best = solved.iter().map(|one| (one.path.display(), one.poses[0].camera));
+    let across = faces_across_note(&mesh, best, NEAR);
+    let mut warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
+    warnings.extend(notes.into_iter().chain(across));
     let mesh = Framed { mesh, name: mesh_name, framing };
     answer(&mesh, &solved, warnings, pictures.target.is_some())
 }
@@ -274,7 +288,7 @@ fn page(
                 "The colours of the picture that count, over black, and the mesh in its own colours at the answer.",
             );
         }
-        page.table(&of_camera(&poses[0]));
+        page.table(&of_camera(&one.of_file(&poses[0])));
         if poses.len() > 1 {
             let others = poses[1..].iter().map(|pose| for_page(drawn(mesh, one, pose)));
             let others: Vec<RgbImage> = others.collect();
@@ -321,10 +335,11 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
         })
     };
     let mut results: Vec<Value> = Vec::new();
-    for Solved { path, poses, seconds, .. } in solved {
-        let mut result = posed(&poses[0]);
+    for one in solved {
+        let Solved { path, poses, seconds, .. } = one;
+        let mut result = posed(&one.of_file(&poses[0]));
         result["target"] = json!(path);
-        result["alternatives"] = poses[1..].iter().map(posed).collect();
+        result["alternatives"] = poses[1..].iter().map(|pose| posed(&one.of_file(pose))).collect();
         result["seconds"] = json!(seconds);
         results.push(result);
     }
@@ -378,8 +393,9 @@ fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
 
 fn text(mesh_name: &str, solved: &[Solved], single: bool) -> Vec<String> {
     let mut text = vec![format!("pose of {mesh_name} from {}", counted(solved.len(), "picture"))];
-    for Solved { path, poses, seconds, .. } in solved {
-        let FoundPose { camera, iou, psnr } = &poses[0];
+    for one in solved {
+        let Solved { path, poses, seconds, .. } = one;
+        let FoundPose { camera, iou, psnr } = &one.of_file(&poses[0]);
         let decibels = psnr.map_or_else(String::new, |psnr| format!(", colours {psnr:.1} dB"));
         if !single {
             text.push(line(
@@ -417,9 +433,10 @@ fn text(mesh_name: &str, solved: &[Solved], single: bool) -> Vec<String> {
 fn csv(solved: &[Solved]) -> String {
     let head = "picture,rank,iou,r11,r12,r13,r21,r22,r23,r31,r32,r33,t1,t2,t3,fx,fy,cx,cy,psnr\n"
         .to_owned();
-    solved.iter().fold(head, |text, Solved { path, poses, .. }| {
-        let name = path.display().to_string().replace('"', "\"\"");
-        poses.iter().enumerate().fold(text, |text, (rank, FoundPose { camera, iou, psnr })| {
+    solved.iter().fold(head, |text, one| {
+        let name = one.path.display().to_string().replace('"', "\"\"");
+        one.poses.iter().enumerate().fold(text, |text, (rank, pose)| {
+            let FoundPose { camera, iou, psnr } = &one.of_file(pose);
             let Pinhole { rotation, translation, focal, centre, .. } = camera;
             let numbers = [&[*iou], rotation.as_flattened(), translation, focal, centre].concat();
             let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();

@@ -149,13 +149,18 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         write("m.json", json!({ "R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]], "t": [0, 0, 4] }));
     let inside =
         write("in.json", json!({ "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 0.1] }));
+    let scaled = write("s.json", json!({ "R": [[2, 0, 0], [0, 2, 0], [0, 0, 2]], "t": [0, 0, 4] }));
     let nowhere = write("no.json", json!({}));
+    let no_length = write("fx.json", json!({ "fx": 5e-324, "width": 40, "height": 30 }));
+    let far =
+        write("far.json", json!({ "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 1e300] }));
+    let classes = of(picture(folder.path(), "zz.png", |x, y| ((x + y) % 4) as u8));
     let plain = of(folder.path().join("plain.obj"));
     icosphere(1).save(&plain).unwrap();
     for (words, parts) in [
         (vec!["--target", "missing.png"], vec!["missing.png"]),
         (vec!["--target", &good], vec!["good.json", "no picture"]),
-        (vec!["--target", &empty], vec!["empty.png", "the mask is empty", "--invert"]),
+        (vec!["--target", &empty], vec!["empty.png", "the mask is empty", "all are black"]),
         (vec!["--target", &full], vec!["full.png", "the mask is full"]),
         (
             vec!["--target", &disc, "--camera", &wrong_size],
@@ -190,6 +195,15 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
             vec!["disc.png", "inside the mesh", "units of the mesh"],
         ),
         (vec!["--target", &disc, "--start", &nowhere], vec!["no.json", "R and t"]),
+        (vec!["--target", &disc, "--start", &scaled], vec!["s.json", "a rotation times 2.0"]),
+        (vec!["--target", &disc, "--start", &far], vec!["far.json", "other units"]),
+        (vec!["--target", &disc, "--camera", &no_length], vec!["fx.json", "fx is 5e-324 pixels"]),
+        (
+            vec!["--target", &classes],
+            vec!["zz.png", "brightest level is 0.0118", "--threshold 0.011"],
+        ),
+        (vec!["--target", "/dev/zero"], vec!["/dev/zero", "not a file"]),
+        (vec!["--target", &disc, "--camera", "/dev/zero"], vec!["/dev/zero", "not a file"]),
         (vec!["--camera", &good], vec!["--target"]),
         (vec!["--targets", "missing"], vec!["missing", "folder"]),
         (vec!["--target", &disc, "--softness", "auto"], vec!["--softness auto"]),
@@ -226,6 +240,60 @@ fn a_mask_may_be_black_and_a_field_of_view_unknown() {
     let again = run(out.path(), &[&target[..], &["--size", "32", "--steps", "1"]].concat());
     assert!(again.is_ok());
     assert!(!out.path().join("overlay-a.png").exists() && out.path().join("mine.png").exists());
+}
+
+/// A mask of 0 and 1 that is turned in its file, from a start whose rotation has three decimals: as the mask itself, and both are said.
+#[test]
+fn masks_as_tools_write_them_give_the_pose_of_the_plain_mask() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut mask = image::open(fox("images/04.png")).unwrap().to_luma8();
+    mask.pixels_mut().for_each(|pixel| pixel.0[0] = u8::from(pixel.0[0] >= 128));
+    let upside_down = image::imageops::rotate180(&mask);
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (target, start) = (path("classes.png"), path("start.json"));
+    let mut encoder = png_of(&upside_down);
+    // Exif data that ask for half a turn, in a chunk after the head.
+    let exif = b"\0\0\0\x1aeXIfII*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x03\0\0\0\0\0\0\0";
+    let sum = exif[4..].iter().fold(u32::MAX, |sum, &byte| {
+        (0..8).fold(sum ^ u32::from(byte), |sum, _| {
+            (sum >> 1) ^ if sum & 1 == 1 { 0xedb8_8320 } else { 0 }
+        })
+    });
+    encoder.splice(33..33, [&exif[..], &(!sum).to_be_bytes()].concat());
+    fs::write(&target, encoder).unwrap();
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    let rounded =
+        |k: usize| (1e3 * truth["views"][4]["R"][k / 3][k % 3].as_f64().unwrap()).round() / 1e3;
+    let r = [0, 3, 6].map(|row| [rounded(row), rounded(row + 1), rounded(row + 2)]);
+    fs::write(&start, json!({ "R": r, "t": truth["views"][4]["t"] }).to_string()).unwrap();
+    let camera = fox("transforms.json");
+    let words = ["--target", &target, "--camera", &camera, "--start", &start, "--steps", "5"];
+    let found = run(out.path(), &words).unwrap();
+    let off = angle_deg(&found["camera"], &truth["views"][4]);
+    assert!(off < 2.0 && found["iou"].as_f64().unwrap() > 0.97, "{off} degrees off, {found}");
+    let said = found["warnings"].to_string();
+    assert!(said.contains("one level is above black and nothing else, 0.0039"), "{said}");
+    assert!(said.contains("its rotation is rounded"), "{said}");
+}
+
+fn png_of(image: &GrayImage) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn a_tall_picture_takes_no_more_memory_than_its_pixels_ask_for() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("tall.png");
+    let white = |_: u32, y: u32| Luma([if (4000..9000).contains(&y) { 255 } else { 0 }]);
+    GrayImage::from_fn(2, 20_000, white).save(&path).unwrap();
+    let camera = folder.path().join("camera.json");
+    fs::write(&camera, r#"{"fx": 20000}"#).unwrap();
+    let words = ["--target", path.to_str().unwrap(), "--camera", camera.to_str().unwrap()];
+    run(out.path(), &[&words[..], &["--size", "16", "--steps", "1"]].concat()).unwrap();
+    let page = fs::metadata(out.path().join("report.html")).unwrap().len();
+    assert!(page < 2_000_000, "{page} bytes");
 }
 
 /// A bottle looks the same however it is turned around itself: that is one answer, not six.

@@ -2,11 +2,15 @@ use std::{fs, path::Path};
 
 use anyhow::{Context, bail, ensure};
 use softrast_lab::write_atomically;
+use softrast_mesh::read_bounded;
 
 use crate::Header;
 
 /// What a file of a training begins with; the number counts changes of the format or the network.
 const MAGIC: &[u8] = b"softrast reconstruct 2\n";
+
+/// Bytes of a file at most.
+const LARGEST_FILE: u64 = 1 << 32;
 
 /// A training as it stood after an epoch.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +29,8 @@ impl Checkpoint {
     /// If it cannot be read, is no checkpoint, is of another version, or is damaged.
     pub fn load(path: &Path) -> anyhow::Result<Self> {
         let name = path.display();
-        let bytes = fs::read(path).with_context(|| format!("cannot read the checkpoint {name}"))?;
+        let bytes = read_bounded(path, LARGEST_FILE)
+            .with_context(|| format!("cannot read the checkpoint {name}"))?;
         if !bytes.starts_with(MAGIC) {
             let family = &MAGIC[..MAGIC.len() - 3];
             if bytes.starts_with(family) {

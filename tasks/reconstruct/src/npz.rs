@@ -8,6 +8,7 @@ use std::{
 };
 
 use anyhow::{Context, anyhow, bail, ensure};
+use softrast_mesh::open_regular;
 use zip::{CompressionMethod, ZipArchive};
 
 /// The only array of an NPZ file, whose rows are read when they are asked for.
@@ -37,7 +38,7 @@ impl NpzArray {
     }
 
     fn opened(path: &Path, shape: &[usize]) -> anyhow::Result<Self> {
-        let file = File::open(path)?;
+        let file = open_regular(path)?;
         let mut archive = ZipArchive::new(&file)
             .map_err(|error| anyhow!("it is no NPZ file, or is damaged or cut off ({error})"))?;
         let entry = (0..archive.len())

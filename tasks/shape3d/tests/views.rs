@@ -101,6 +101,42 @@ fn cameras_come_in_many_ways() {
     assert!(with(masks, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
 }
 
+/// Rotations of three decimals, names as Windows writes them, and names with a dot and no ending.
+#[test]
+fn cameras_as_tools_write_them_are_taken_and_what_was_rounded_is_said() {
+    let change = |cameras: &mut Value| {
+        for (k, frame) in cameras["frames"].as_array_mut().unwrap().iter_mut().enumerate() {
+            for at in 0..9 {
+                let number = &mut frame["transform_matrix"][at / 3][at % 3];
+                *number = json!((1e3 * number.as_f64().unwrap()).round() / 1e3);
+            }
+            frame["file_path"] = json!(format!(".\\images\\{k:02}"));
+        }
+    };
+    let found = with(change, &["--hold-out", "2"]).unwrap();
+    assert!(found["train_iou"].as_f64().unwrap() > 0.9, "{found}");
+    let said = found["warnings"].as_array().unwrap();
+    let rounded = |line: &&Value| line.as_str().unwrap().contains("rounded");
+    assert_eq!(said.iter().filter(rounded).count(), 1, "{said:?}");
+    // From a hundredth on nothing is taken.
+    let scaled = |cameras: &mut Value| {
+        for at in 0..9 {
+            let number = &mut cameras["frames"][5]["transform_matrix"][at / 3][at % 3];
+            *number = json!(1.01 * number.as_f64().unwrap());
+        }
+    };
+    let error = with(scaled, &[]).unwrap_err();
+    assert!(error.contains("frame 5") && error.contains("a rotation times 1.01000"), "{error}");
+    let mirrored = |cameras: &mut Value| {
+        for row in 0..3 {
+            let number = &mut cameras["frames"][5]["transform_matrix"][row][0];
+            *number = json!(-number.as_f64().unwrap());
+        }
+    };
+    let error = with(mirrored, &[]).unwrap_err();
+    assert!(error.contains("frame 5") && error.contains("mirrors"), "{error}");
+}
+
 #[test]
 fn bad_views_are_one_line_that_names_file_and_frame() {
     let frame = |of: fn(&mut Value)| move |cameras: &mut Value| of(&mut cameras["frames"][3]);

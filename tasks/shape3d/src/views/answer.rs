@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, seen_by};
-use softrast_inverse::View;
+use softrast_inverse::{View, faces_across_note};
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
     format::{counted, line},
@@ -52,6 +52,7 @@ pub(super) fn answer(
     mesh: &Mesh,
     textured: Option<&Mesh>,
     scored: &[Scored],
+    notes: Vec<String>,
     seconds: f64,
 ) -> anyhow::Result<Answer> {
     let psnr = |one: &Scored| one.colours.as_ref()?.psnr;
@@ -63,7 +64,9 @@ pub(super) fn answer(
         path: given.folder().join("mesh.obj"),
         seconds,
     };
-    let mut warnings = Vec::new();
+    let mut warnings = notes;
+    let cameras = scored.iter().map(|one| (&one.view.name, one.view.camera));
+    warnings.extend(faces_across_note(mesh, cameras, 0.0));
     if summary.train < 0.9 && given.args.mesh.is_some() {
         warnings.push(format!(
             "the mean IoU is {:.3} only: the mesh is taken as it stands, in the world units of the cameras; check that it lies where the \

@@ -4,7 +4,7 @@ use anyhow::ensure;
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
-    Method, PaintedView, SolveConfig, View, baked, load_views, mask_iou, minimize,
+    Method, PaintedView, SolveConfig, View, baked, load_views, mask_iou, minimize, reading_notes,
     silhouette_pixels,
 };
 use softrast_lab::{Error, Progress, format::counted};
@@ -130,6 +130,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         ));
     }
     let all = load_views(folder, |path| flags.masks.load(path))?;
+    let notes = reading_notes(&all);
     // What is wrong with a picture is said before the work.
     let paint = |views: &[View]| {
         let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
@@ -169,7 +170,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let train = train.iter().enumerate().map(|view| score(view, &to_paint, false));
     let held_out = held_out.iter().enumerate().map(|view| score(view, &to_compare, true));
     let scored: Vec<Scored> = train.chain(held_out).collect();
-    answer(given, &mesh, textured.as_ref(), &scored, seconds)
+    answer(given, &mesh, textured.as_ref(), &scored, notes, seconds)
 }
 
 /// Parts of the work on the shape, with the steps that were asked for; none if it is known.

@@ -1,0 +1,191 @@
+use anyhow::{anyhow, ensure};
+
+/// How the levels of a picture become a mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MaskRules {
+    /// What is black is the mask.
+    pub invert: bool,
+    /// What is at least so bright, from 0 to 1, is the mask; after it is inverted. None keeps soft edges.
+    pub threshold: Option<f64>,
+}
+
+/// The levels that a picture has, as far as a mask is told by them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Levels {
+    darkest: f32,
+    brightest: f32,
+    /// The largest below the brightest, and the least above the darkest, if there are any.
+    next: [Option<f32>; 2],
+}
+
+impl Default for Levels {
+    fn default() -> Self {
+        Self { darkest: f32::INFINITY, brightest: f32::NEG_INFINITY, next: [None; 2] }
+    }
+}
+
+impl Levels {
+    /// Takes note of the level of a pixel.
+    pub(crate) fn see(&mut self, level: f32) {
+        if level == self.darkest || level == self.brightest {
+            return;
+        }
+        let [below, above] = &mut self.next;
+        let before = (self.darkest.is_finite()).then_some([self.darkest, self.brightest]);
+        let Some([darkest, brightest]) = before else {
+            (self.darkest, self.brightest) = (level, level);
+            return;
+        };
+        *below = match level > brightest {
+            true => Some(brightest),
+            false => Some(below.map_or(level, |next| next.max(level))),
+        };
+        *above = match level < darkest {
+            true => Some(darkest),
+            false => Some(above.map_or(level, |next| next.min(level))),
+        };
+        self.darkest = darkest.min(level);
+        self.brightest = brightest.max(level);
+    }
+
+    pub(crate) fn brightest(&self) -> f32 {
+        self.brightest
+    }
+
+    /// The levels as they are where black and white are exchanged.
+    fn inverted(self) -> Self {
+        let [below, above] = self.next.map(|next| next.map(|level| 1.0 - level));
+        Self { darkest: 1.0 - self.brightest, brightest: 1.0 - self.darkest, next: [above, below] }
+    }
+
+    /// The one level that is not 0, where there are no others and it is not 1.
+    fn only(&self) -> Option<f32> {
+        let two = self.darkest == 0.0 && self.next[0] == Some(0.0);
+        (two && self.brightest < 1.0).then_some(self.brightest)
+    }
+}
+
+/// From a level of the file to one of the mask.
+type Change = Box<dyn Fn(f32) -> f32>;
+
+impl MaskRules {
+    /// How levels of the file are changed, and the level that is taken for white where there is just one.
+    ///
+    /// # Errors
+    ///
+    /// If no pixel would be half white.
+    pub(crate) fn change(&self, levels: &Levels) -> anyhow::Result<(Change, Option<f32>)> {
+        let invert = self.invert;
+        let told = move |level: f32| if invert { 1.0 - level } else { level };
+        let of_mask = if invert { levels.inverted() } else { *levels };
+        if let Some(threshold) = self.threshold {
+            let taken = move |level: f32| f64::from(told(level)) >= threshold;
+            ensure!(
+                f64::from(of_mask.brightest) >= threshold,
+                "the mask is empty: no level reaches the threshold {threshold}{}",
+                advice(&of_mask)
+            );
+            return Ok((Box::new(move |level| f32::from(u8::from(taken(level)))), None));
+        }
+        // A mask of 0 and 1 is one before black and white are exchanged.
+        if let Some(only) = levels.only() {
+            let white = move |level: f32| f32::from(u8::from((level > 0.0) != invert));
+            return Ok((Box::new(white), Some(only)));
+        }
+        if let Some(only) = of_mask.only() {
+            let white = move |level: f32| f32::from(u8::from(told(level) > 0.0));
+            return Ok((Box::new(white), Some(only)));
+        }
+        if of_mask.brightest < 0.5 {
+            return Err(anyhow!(
+                "the mask is empty: no pixel is half white or more{}",
+                advice(&of_mask)
+            ));
+        }
+        Ok((Box::new(told), None))
+    }
+}
+
+/// What the brightest level is, and how it is taken.
+fn advice(levels: &Levels) -> String {
+    let Levels { brightest, next: [below, _], .. } = *levels;
+    match below {
+        None if brightest == 0.0 => ", all are black".to_owned(),
+        None => format!(", all have the level {brightest:.4} (1 is white)"),
+        Some(below) => format!(
+            ", and the brightest level is {brightest:.4} (1 is white): --threshold {} takes it alone",
+            between(below, brightest)
+        ),
+    }
+}
+
+/// The number with the fewest digits above `low` and up to `high`.
+fn between(low: f32, high: f32) -> f64 {
+    let [low, high] = [low, high].map(f64::from);
+    let rounded = |digits: i32| (high * 10f64.powi(digits)).floor() / 10f64.powi(digits);
+    // Digits that a person would write, where the levels are that far apart.
+    (3..=9).map(rounded).find(|&x| x > low && x > 0.0).unwrap_or(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn levels(all: &[f32]) -> Levels {
+        let mut levels = Levels::default();
+        all.iter().for_each(|&level| levels.see(level));
+        levels
+    }
+
+    fn mask(rules: MaskRules, all: &[f32]) -> Result<(Vec<f32>, Option<f32>), String> {
+        let (change, only) = rules.change(&levels(all)).map_err(|error| error.to_string())?;
+        Ok((all.iter().map(|&level| change(level)).collect(), only))
+    }
+
+    const PLAIN: MaskRules = MaskRules { invert: false, threshold: None };
+    const INVERTED: MaskRules = MaskRules { invert: true, threshold: None };
+
+    #[test]
+    fn one_level_above_black_and_nothing_else_is_the_mask() {
+        for only in [1.0 / 255.0, 255.0 / 65535.0, 0.3, 0.502, 0.996] {
+            let expected = Ok((vec![0.0, 1.0, 0.0], Some(only)));
+            assert_eq!(mask(PLAIN, &[0.0, only, 0.0]), expected);
+            assert_eq!(mask(PLAIN, &[only, 0.0]).unwrap().0, [1.0, 0.0]);
+            // What is black in it, and a picture whose object is a little darker than white.
+            assert_eq!(mask(INVERTED, &[0.0, only]).unwrap().0, [1.0, 0.0]);
+            assert_eq!(mask(INVERTED, &[1.0, only]).unwrap().0, [0.0, 1.0]);
+        }
+        assert_eq!(mask(PLAIN, &[0.0, 1.0, 0.0]), Ok((vec![0.0, 1.0, 0.0], None)));
+        assert_eq!(mask(PLAIN, &[0.0, 0.3, 0.9]), Ok((vec![0.0, 0.3, 0.9], None)));
+    }
+
+    #[test]
+    fn a_threshold_takes_levels_as_they_are() {
+        let rules = MaskRules { threshold: Some(0.2), ..PLAIN };
+        assert_eq!(mask(rules, &[0.0, 0.1, 0.2]), Ok((vec![0.0, 0.0, 1.0], None)));
+        let rules = MaskRules { invert: true, ..rules };
+        assert_eq!(mask(rules, &[0.0, 0.9]), Ok((vec![1.0, 0.0], None)));
+    }
+
+    #[test]
+    fn an_empty_mask_names_its_brightest_level_and_the_threshold_that_takes_it() {
+        let of_bytes = |all: &[u8]| all.iter().map(|&x| f32::from(x) / 255.0).collect::<Vec<_>>();
+        for all in [vec![0, 1, 2, 3], vec![0, 3, 2, 60], vec![100, 101], vec![9, 8, 7, 0]] {
+            let all = of_bytes(&all);
+            let error = mask(PLAIN, &all).unwrap_err();
+            let brightest = all.iter().copied().fold(0.0, f32::max);
+            assert!(error.contains(&format!("{brightest:.4}")), "{error}");
+            let (_, rest) = error.split_once("--threshold ").unwrap();
+            let threshold = rest.split(' ').next().unwrap().parse().unwrap();
+            let rules = MaskRules { threshold: Some(threshold), ..PLAIN };
+            let (found, _) = mask(rules, &all).unwrap();
+            let expected: Vec<f32> =
+                all.iter().map(|&x| f32::from(u8::from(x == brightest))).collect();
+            assert_eq!(found, expected, "{error}");
+        }
+        assert!(mask(PLAIN, &[0.0, 0.0]).unwrap_err().contains("all are black"));
+        assert!(mask(PLAIN, &[0.2, 0.2]).unwrap_err().contains("all have the level 0.2000"));
+        let high = MaskRules { threshold: Some(0.5), ..PLAIN };
+        assert!(mask(high, &[0.0, 0.4]).unwrap_err().contains("--threshold 0.4 takes it"));
+    }
+}

@@ -1,0 +1,45 @@
+//! The chunks of a PNG file.
+
+use anyhow::ensure;
+
+/// Bytes of the signature.
+const SIGNATURE: usize = 8;
+/// Place of the colour type in the first chunk, and the type whose pixels are entries of a palette.
+const COLOUR_TYPE: usize = 9;
+const PALETTED: u8 = 3;
+/// Bytes of an entry of a palette, and its most entries.
+const ENTRY: usize = 3;
+const MOST_ENTRIES: usize = 256;
+
+/// The content of the first chunk of a kind, if it is whole.
+pub(super) fn find(png: &[u8], kind: [u8; 4]) -> Option<&[u8]> {
+    all(png).find(|(found, _)| *found == kind).map(|(_, content)| content)
+}
+
+/// An error if the palette that pixels refer to is none: the decoder counts on one.
+pub(super) fn check_palette(png: &[u8]) -> anyhow::Result<()> {
+    let head = find(png, *b"IHDR");
+    let paletted = head.and_then(|head| head.get(COLOUR_TYPE)) == Some(&PALETTED);
+    for (_, palette) in all(png).filter(|(kind, _)| paletted && kind == b"PLTE") {
+        let entries = palette.len() / ENTRY;
+        ensure!(
+            palette.len().is_multiple_of(ENTRY) && (1..=MOST_ENTRIES).contains(&entries),
+            "its palette has {} bytes: a palette has 3 for each of 1 to {MOST_ENTRIES} colours",
+            palette.len()
+        );
+    }
+    Ok(())
+}
+
+/// Kinds and contents of all chunks up to the first that is cut off.
+fn all(png: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
+    let mut rest = png.get(SIGNATURE..).unwrap_or_default();
+    std::iter::from_fn(move || {
+        let (length, after) = rest.split_first_chunk::<4>()?;
+        let (kind, after) = after.split_first_chunk::<4>()?;
+        let (content, after) = after.split_at_checked(u32::from_be_bytes(*length) as usize)?;
+        // A sum of four bytes follows.
+        rest = after.get(4..).unwrap_or_default();
+        Some((*kind, content))
+    })
+}
