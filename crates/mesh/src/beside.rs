@@ -1,11 +1,11 @@
 //! Files that lie beside a mesh: materials and pictures.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
-use crate::{MeshError, texture::media_type};
+use crate::{MeshError, bounded::read_bounded, texture::media_type};
 
 /// Where the file lies that another one in `folder` calls `name`.
 ///
@@ -18,10 +18,12 @@ pub(crate) fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(kept.iter().filter(|part| inside(part)).collect::<PathBuf>())
 }
 
+/// Largest file that is read, in bytes: the longest that a GLB file can say.
+const MOST_BYTES: u64 = u32::MAX as u64;
+
 /// The content of a regular file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
-    regular(path)?;
-    fs::read(path).map_err(|reason| MeshError::Read { path: path.into(), reason })
+    read_bounded(path, MOST_BYTES).map_err(|reason| MeshError::Read { path: path.into(), reason })
 }
 
 /// The content of the picture that a file in `folder` calls `name`.
@@ -33,16 +35,6 @@ pub(crate) fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, MeshError> {
         return Err(MeshError::Read { path, reason });
     }
     Ok(content)
-}
-
-/// An error unless `path` is a regular file: reading a device could take for ever.
-pub(crate) fn regular(path: &Path) -> Result<(), MeshError> {
-    let reason = match fs::metadata(path) {
-        Ok(found) if found.is_file() => return Ok(()),
-        Ok(_) => io::Error::other("it is a folder or a device, not a file"),
-        Err(reason) => reason,
-    };
-    Err(MeshError::Read { path: path.into(), reason })
 }
 
 #[cfg(test)]

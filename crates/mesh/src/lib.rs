@@ -16,6 +16,7 @@
 
 mod airplane;
 mod beside;
+mod bounded;
 mod chair;
 mod clean;
 mod cluster;
@@ -45,6 +46,7 @@ mod texture;
 mod write;
 
 pub use airplane::airplane;
+pub use bounded::{open_regular, read_bounded};
 pub use chair::chair;
 pub use edges::Edges;
 pub use error::{Fault, MeshError};

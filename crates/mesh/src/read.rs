@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use crate::{Mesh, MeshError, Texture, beside, error::Trouble, format::Format, glb, obj, ply, stl};
+use crate::{
+    Mesh, MeshError, Texture, beside, bounded::open_regular, error::Trouble, format::Format, glb,
+    obj, ply, stl,
+};
 
 /// What a file has, before it is known to be a mesh.
 #[derive(Default)]
@@ -122,7 +125,7 @@ impl Format {
 /// The content of the file at `path`, its name and its format.
 fn opened(path: &Path) -> Result<(Vec<u8>, String, Format), MeshError> {
     let name = path.display().to_string();
-    beside::regular(path)?;
+    open_regular(path).map_err(|reason| MeshError::Read { path: path.into(), reason })?;
     // The ending comes before the bytes: a film may be large.
     let format = format_of(path, &name)?;
     Ok((beside::read(path)?, name, format))
