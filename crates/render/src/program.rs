@@ -125,7 +125,7 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
         )
     });
     let text = lines(&json);
-    let warnings = culled.into_iter().chain(scene.warning).collect();
+    let warnings = culled.into_iter().chain(scene.warnings).collect();
     Ok(Output { json, text, warnings, partial: None })
 }
 

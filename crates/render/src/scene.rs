@@ -32,7 +32,7 @@ pub(crate) struct Scene {
     /// How it is drawn in colour; none for silhouettes.
     pub(crate) colour: Option<Colour>,
     /// What the user should know.
-    pub(crate) warning: Option<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// What one pass gave and took. Times are in milliseconds.
@@ -68,13 +68,13 @@ impl Scene {
     /// Reads the files that `args` names.
     pub(crate) fn load(args: &Args) -> anyhow::Result<Self> {
         let (softness, phi) = softness(args)?;
-        let (mesh, left_out) = match args.colour {
+        let (mesh, reasons) = match args.colour {
             true => Mesh::load_textured(&args.mesh)?,
-            false => (Mesh::load(&args.mesh)?, None),
+            false => (Mesh::load(&args.mesh)?, vec![]),
         };
         let mesh = if args.raw { mesh } else { mesh.normalized() };
-        let coloured = args.colour.then(|| Colour::of(&mesh, args, left_out)).transpose()?;
-        let (colour, warning) = coloured.map_or((None, None), |(c, warning)| (Some(c), warning));
+        let coloured = args.colour.then(|| Colour::of(&mesh, args, &reasons)).transpose()?;
+        let (colour, warnings) = coloured.map_or((None, vec![]), |(c, warned)| (Some(c), warned));
         let target = args.target.as_ref().map(|target| pixels(target, args.size)).transpose()?;
         let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov];
         Ok(Self {
@@ -88,7 +88,7 @@ impl Scene {
             tolerance: args.tolerance,
             target,
             colour,
-            warning,
+            warnings,
         })
     }
 
