@@ -4,7 +4,7 @@ use std::{
     any::Any,
     fs,
     panic::{self, AssertUnwindSafe},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{self, ExitCode},
     sync::{
         Mutex,
@@ -244,11 +244,11 @@ struct Watch {
 const ENDED: u64 = u64::MAX;
 
 impl Watch {
-    fn begin(&self, running: &PathBuf) {
+    fn begin(&self, running: &Path) {
         if let Ok(mut path) = self.running.lock()
-            && *path != *running
+            && *path != running
         {
-            path.clone_from(running);
+            *path = running.to_path_buf();
         }
         self.seconds.store(1, Relaxed);
     }

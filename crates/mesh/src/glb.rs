@@ -64,7 +64,7 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
     parts.positions.reserve_exact(positions);
     parts.faces.reserve_exact(faces);
 
-    let unwrapped = folder.map(|_| Ok(Unwrapped::default()));
+    let unwrapped = folder.map(|_| Ok(Unwrapped::new(bytes.len())));
     let most = [positions, faces];
     let mut surface = Surface { gltf: &gltf, parts, most, colours: Ok(()), unwrapped };
     walk(&gltf, |mesh, placement| surface.add(mesh, placement))?;

@@ -15,9 +15,12 @@ use crate::{
     texture::{is_near, media_type},
 };
 
+/// Coordinates of a file that is not longer, in bytes. Many small accessors may lie over the same bytes.
+const MOST_COORDINATES: usize = 10_000_000;
+
 /// The texture of the parts placed so far.
-#[derive(Default)]
 pub(crate) struct Unwrapped {
+    most: usize,
     coordinates: Vec<[f64; 2]>,
     corners: Vec<[u32; 3]>,
     /// Where the coordinates of an accessor begin.
@@ -27,6 +30,17 @@ pub(crate) struct Unwrapped {
 }
 
 impl Unwrapped {
+    /// None yet, for a file of `length` bytes.
+    pub(crate) fn new(length: usize) -> Self {
+        Self {
+            most: MOST_COORDINATES.max(length).min(u32::MAX as usize),
+            coordinates: Vec::new(),
+            corners: Vec::new(),
+            firsts: HashMap::new(),
+            of_all: None,
+        }
+    }
+
     /// Adds the coordinates of the `triangles` of a part of `vertices` vertices, one of `faces` faces in all.
     pub(crate) fn add(
         &mut self,
@@ -77,6 +91,10 @@ impl Unwrapped {
                 if count != vertices {
                     return wrong(format!("{count} texture coordinates for {vertices} vertices"));
                 }
+                let most = self.most;
+                if count > most - first {
+                    return wrong(format!("with it there are more than {most} coordinates"));
+                }
                 for (vertex, [u, v]) in gltf.coordinates(accessor)?.into_iter().enumerate() {
                     let upward = [u, 1.0 - v];
                     if !upward.iter().all(is_near) {
@@ -90,10 +108,7 @@ impl Unwrapped {
                 *entry.insert(first)
             }
         };
-        if u32::try_from(self.coordinates.len()).is_err() {
-            return wrong("with it there are more coordinates than 32 bits can number");
-        }
-        self.corners.reserve_exact(faces - self.corners.len());
+        self.corners.reserve_exact(faces.saturating_sub(self.corners.len()));
         let placed = triangles.iter().map(|triangle| triangle.map(|k| first as u32 + k));
         self.corners.extend(placed);
         Ok(())

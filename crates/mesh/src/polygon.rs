@@ -103,12 +103,9 @@ impl Outline {
         let mut waiting: VecDeque<u32> = (1..n).chain([0]).collect();
         let (mut here, mut searches) = (1, SEARCHES);
         for left in (4..=n).rev() {
-            let mut found = None;
-            while let (None, Some(k)) = (found, waiting.pop_front()) {
-                if self.next[k as usize] != k && self.is_ear(k, looks) {
-                    found = Some(k);
-                }
-            }
+            let next = std::iter::from_fn(|| waiting.pop_front());
+            let mut next = next.filter(|&k| self.next[k as usize] != k);
+            let found = next.find(|&k| self.is_ear(k, looks));
             if *looks == 0 {
                 return false;
             }

@@ -68,6 +68,27 @@ fn empty_parts_that_are_placed_often_are_one_line() {
 }
 
 #[test]
+fn coordinates_that_many_accessors_repeat_leave_the_texture_out() {
+    let (vertices, parts) = (30_000, 2000);
+    let file = copied(vertices, 10, 1, false);
+    let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+    let mut json: Value = serde_json::from_slice(&file[20..20 + length]).unwrap();
+    let part = |k: usize| json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 3 + k}, "indices": 1});
+    json["meshes"][0]["primitives"] = (0..parts).map(part).collect();
+    let coordinates =
+        json!({"bufferView": 0, "componentType": 5121, "count": vertices, "type": "VEC2"});
+    json["accessors"].as_array_mut().unwrap().extend(vec![coordinates; parts]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    fs::write(&path, glb(&json, &file[28 + length..])).unwrap();
+    let (mesh, warnings) = Mesh::load_textured(&path).unwrap();
+    assert_eq!((mesh.positions().len(), mesh.faces().len()), (vertices, 10 * parts));
+    let warning = warnings[0].to_string();
+    assert!(warning.ends_with("with it there are more than 10000000 coordinates"), "{warning}");
+    assert!(mesh.texture().is_none() && warnings.len() == 1);
+}
+
+#[test]
 fn counts_that_the_file_cannot_hold_are_one_line() {
     let huge = 1u64 << 40;
     for (accessor, count) in [(0, huge), (1, huge), (0, u64::MAX), (1, 3 << 30)] {
