@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{format::ending, texture::FARTHEST};
+use crate::format::ending;
+
+/// Largest coordinate of a texture, in either direction. Much farther out floats of 32 bits would not tell the texels of a picture apart.
+pub(crate) const FARTHEST: f64 = 1e4;
 
 /// Why a mesh could not be made, read or written.
 ///
@@ -13,7 +16,7 @@ use crate::{format::ending, texture::FARTHEST};
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
     /// The file is missing, is not a regular file, or could not be read.
-    #[error("{}: cannot be read: {reason}", path.display())]
+    #[error("{}: cannot be read: {reason}", file(path))]
     Read {
         /// The file asked for.
         path: PathBuf,
@@ -21,7 +24,7 @@ pub enum MeshError {
         reason: io::Error,
     },
     /// The file could not be written; what was there before is untouched.
-    #[error("{}: cannot be written: {reason}", path.display())]
+    #[error("{}: cannot be written: {reason}", file(path))]
     Write {
         /// The file asked for.
         path: PathBuf,
@@ -30,7 +33,8 @@ pub enum MeshError {
     },
     /// The file's name has no ending of a format that is read.
     #[error(
-        "{name}: {}meshes are read from files that end in .obj, .ply, .stl or .glb",
+        "{}: {}meshes are read from files that end in .obj, .ply, .stl or .glb",
+        file(name),
         advice(name)
     )]
     UnknownFormat {
@@ -38,13 +42,13 @@ pub enum MeshError {
         name: String,
     },
     /// The path has no ending of a format that is written; what was there before is untouched.
-    #[error("{}: meshes are written to files that end in .obj, .ply or .glb", path.display())]
+    #[error("{}: meshes are written to files that end in .obj, .ply or .glb", file(path))]
     NotWritten {
         /// The file asked for.
         path: PathBuf,
     },
     /// A line of a text file, or of the header of a PLY file, cannot be used.
-    #[error("{name}:{line}: {reason}")]
+    #[error("{}:{line}: {reason}", file(name))]
     Line {
         /// Name of the file.
         name: String,
@@ -54,7 +58,7 @@ pub enum MeshError {
         reason: Fault,
     },
     /// A part of a file that has no lines cannot be used.
-    #[error("{name}: {part}: {reason}")]
+    #[error("{}: {part}: {reason}", file(name))]
     Part {
         /// Name of the file.
         name: String,
@@ -64,20 +68,12 @@ pub enum MeshError {
         reason: Fault,
     },
     /// A file without faces: empty, a point cloud, or not of its format at all.
-    #[error("{name}: no faces: {expected}")]
+    #[error("{}: no faces: {expected}", file(name))]
     NoFaces {
         /// Name of the file.
         name: String,
         /// Where a file of this format has its faces.
         expected: &'static str,
-    },
-    /// The parser refused text that was cleaned for it.
-    #[error("{name}: {reason}")]
-    Parser {
-        /// Name of the file.
-        name: String,
-        /// What the parser said.
-        reason: String,
     },
     /// A list of faces is empty.
     #[error("a mesh needs at least one face, found none")]
@@ -161,14 +157,6 @@ pub enum Fault {
     /// A coordinate that is NaN, infinite, or infinite once rounded to 32 bits.
     #[error("coordinate {0:?} is not finite in 32-bit floats")]
     NotFinite(String),
-    /// A channel of a colour that is NaN, below 0, or above what the file's type of number has for full.
-    #[error("colour {value:?} is not from 0 to {full}")]
-    Colour {
-        /// The channel as the file has it.
-        value: String,
-        /// What stands for full.
-        full: u16,
-    },
     /// A face with fewer than three corners.
     #[error("fewer than three corners: found {0}")]
     Corners(usize),
@@ -200,19 +188,26 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Words from a file or a library may break the line; the message stays on one.
-    pub(crate) fn format(reason: impl Into<String>) -> Self {
-        Self::Format(reason.into().replace(char::is_control, " "))
+    /// Words from a file or a library may break the line or be long; the message stays on one line that can be read.
+    pub(crate) fn format(reason: impl AsRef<str>) -> Self {
+        Self::Format(on_one_line(reason.as_ref(), " "))
     }
 }
 
-/// A channel of a colour, as a share of `full`.
-pub(crate) fn channel(value: f64, full: u16) -> Result<f64, Fault> {
-    let share = value / f64::from(full);
-    if (0.0..=1.0).contains(&share) {
-        return Ok(share);
+/// A place in a file whose name the reader does not know.
+pub(crate) enum Place {
+    /// Counted from 1.
+    Line(usize),
+    Part(String),
+}
+
+impl Place {
+    pub(crate) fn trouble(self, fault: Fault) -> Trouble {
+        match self {
+            Self::Line(line) => Trouble::Line(line, fault),
+            Self::Part(part) => Trouble::Part(part, fault),
+        }
     }
-    Err(Fault::Colour { value: value.to_string(), full })
 }
 
 /// What is wrong with the content of a file whose name the reader does not know.
@@ -226,7 +221,7 @@ pub(crate) enum Trouble {
 
 impl Trouble {
     /// A part and what is wrong there, in plain words.
-    pub(crate) fn part(part: impl Into<String>, reason: impl Into<String>) -> Self {
+    pub(crate) fn part(part: impl Into<String>, reason: impl AsRef<str>) -> Self {
         Self::Part(part.into(), Fault::format(reason))
     }
 
@@ -239,6 +234,20 @@ impl Trouble {
             Self::OtherFile(error) => error,
         }
     }
+}
+
+/// The name of a file as an error message shows it: signs in it must not break the line, colour it, or move the cursor.
+fn file(name: impl AsRef<Path>) -> String {
+    on_one_line(&name.as_ref().display().to_string(), "\u{fffd}")
+}
+
+fn on_one_line(text: &str, for_signs: &str) -> String {
+    const LONGEST: usize = 500;
+    let mut line = text.chars().take(LONGEST).collect::<String>();
+    if text.chars().nth(LONGEST).is_some() {
+        line += "...";
+    }
+    line.replace(char::is_control, for_signs)
 }
 
 /// A word of a file as an error message shows it: not longer than a line can bear, and without signs that would break or colour it.

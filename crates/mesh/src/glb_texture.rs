@@ -5,20 +5,22 @@ use std::{
     path::Path,
 };
 
-use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::Value;
 
 use crate::{
     Texture,
     beside::picture,
-    error::{Trouble, shown},
-    gltf::{Gltf, Primitive},
-    texture::{FARTHEST, is_near, media_type},
+    error::{FARTHEST, Trouble, shown},
+    gltf::{Gltf, Primitive, data, number},
+    texture::{is_near, media_type},
 };
 
-/// What the parts placed so far have of a texture.
-#[derive(Default)]
+/// Coordinates of a file that is not longer, in bytes. Many small accessors may lie over the same bytes.
+const MOST_COORDINATES: usize = 10_000_000;
+
+/// The texture of the parts placed so far.
 pub(crate) struct Unwrapped {
+    most: usize,
     coordinates: Vec<[f64; 2]>,
     corners: Vec<[u32; 3]>,
     /// Where the coordinates of an accessor begin.
@@ -28,16 +30,27 @@ pub(crate) struct Unwrapped {
 }
 
 impl Unwrapped {
-    /// Adds what belongs to the `triangles` of a part; at most `most` coordinates in all.
+    /// None yet, for a file of `length` bytes.
+    pub(crate) fn new(length: usize) -> Self {
+        Self {
+            most: MOST_COORDINATES.max(length).min(u32::MAX as usize),
+            coordinates: Vec::new(),
+            corners: Vec::new(),
+            firsts: HashMap::new(),
+            of_all: None,
+        }
+    }
+
+    /// Adds the coordinates of the `triangles` of a part of `vertices` vertices, one of `faces` faces in all.
     pub(crate) fn add(
         &mut self,
         gltf: &Gltf,
-        bin: Option<&[u8]>,
         primitive: &Primitive,
         triangles: &[[u32; 3]],
-        most: usize,
+        vertices: usize,
+        faces: usize,
     ) -> Result<(), Trouble> {
-        fn wrong(reason: impl Into<String>) -> Result<(), Trouble> {
+        fn wrong(reason: impl AsRef<str>) -> Result<(), Trouble> {
             Err(Trouble::part("", reason))
         }
         if triangles.is_empty() {
@@ -46,8 +59,8 @@ impl Unwrapped {
         let (image, set) = base_colour(gltf, primitive).map_err(|why| Trouble::part("", why))?;
         let attributes = &primitive.attributes;
         let accessor = match set {
-            0 => attributes.coordinates.as_u64(),
-            1 => attributes.more_coordinates.as_u64(),
+            0 => number(&attributes.coordinates),
+            1 => number(&attributes.more_coordinates),
             _ => return wrong(format!("its texture needs TEXCOORD_{set}: 0 and 1 are read")),
         };
         let own = (accessor.is_some(), image);
@@ -70,16 +83,19 @@ impl Unwrapped {
             ));
         }
         let Some(accessor) = accessor else { return Ok(()) };
-        let accessor = accessor as usize;
         let first = match self.firsts.entry(accessor) {
             Entry::Occupied(first) => *first.get(),
             Entry::Vacant(entry) => {
                 let first = self.coordinates.len();
                 let count = gltf.count(accessor)?;
-                if count > most.min(u32::MAX as usize) - first {
+                if count != vertices {
+                    return wrong(format!("{count} texture coordinates for {vertices} vertices"));
+                }
+                let most = self.most;
+                if count > most - first {
                     return wrong(format!("with it there are more than {most} coordinates"));
                 }
-                for (vertex, [u, v]) in gltf.coordinates(accessor, bin)?.into_iter().enumerate() {
+                for (vertex, [u, v]) in gltf.coordinates(accessor)?.into_iter().enumerate() {
                     let upward = [u, 1.0 - v];
                     if !upward.iter().all(is_near) {
                         let reason = format!(
@@ -92,28 +108,27 @@ impl Unwrapped {
                 *entry.insert(first)
             }
         };
-        let count = gltf.count(accessor)?;
-        if let Some(index) = triangles.as_flattened().iter().find(|&&k| k as usize >= count) {
-            return wrong(format!("index {index} is beyond its {count} texture coordinates"));
-        }
-        // No more than 2³² coordinates have been let in.
+        self.corners.reserve_exact(faces.saturating_sub(self.corners.len()));
         let placed = triangles.iter().map(|triangle| triangle.map(|k| first as u32 + k));
         self.corners.extend(placed);
         Ok(())
     }
 
-    /// The texture, if there are coordinates, and why its picture was left out.
+    /// The texture, if there are coordinates; `warnings` gets why its picture was left out.
     pub(crate) fn texture(
         self,
         gltf: &Gltf,
-        bin: Option<&[u8]>,
         folder: &Path,
-    ) -> (Option<Texture>, Option<Trouble>) {
-        let Some((true, image)) = self.of_all else { return (None, None) };
-        let picture = image.map(|image| content(gltf, bin, folder, image)).transpose();
+        warnings: &mut Vec<Trouble>,
+    ) -> Option<Texture> {
+        let Some((true, image)) = self.of_all else { return None };
+        let picture = image.map(|image| content(gltf, folder, image)).transpose();
         match Texture::new(self.coordinates, self.corners) {
-            Ok(texture) => texture.pictured(picture),
-            Err(error) => (None, Some(Trouble::OtherFile(error))),
+            Ok(texture) => Some(texture.pictured(picture, warnings)),
+            Err(error) => {
+                warnings.push(Trouble::OtherFile(error));
+                None
+            }
         }
     }
 }
@@ -123,47 +138,37 @@ impl Unwrapped {
 /// Read leniently: what is wrong with materials does not keep a mesh from being read.
 fn base_colour(gltf: &Gltf, primitive: &Primitive) -> Result<(Option<usize>, u64), String> {
     let material = entry(&gltf.materials, &primitive.material);
-    let shown = &material["pbrMetallicRoughness"]["baseColorTexture"];
-    if shown.is_null() {
+    // Programs that know the extension show its picture, whatever stands beside it for others.
+    let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"]["diffuseTexture"];
+    let rough = &material["pbrMetallicRoughness"]["baseColorTexture"];
+    let Some(shown) = [glossy, rough].into_iter().find(|shown| !shown.is_null()) else {
         return Ok((None, 0));
-    }
+    };
     if !shown["extensions"]["KHR_texture_transform"].is_null() {
         return Err("KHR_texture_transform is not read: apply it to the coordinates".to_owned());
     }
     let texture = entry(&gltf.textures, &shown["index"]);
-    let image = texture["source"].as_u64();
-    let image = image.ok_or("its texture has no image of PNG or JPEG")?;
-    Ok((Some(image as usize), shown["texCoord"].as_u64().unwrap_or(0)))
+    let image = number(&texture["source"]).ok_or("its texture has no image of PNG or JPEG")?;
+    Ok((Some(image), shown["texCoord"].as_u64().unwrap_or(0)))
 }
 
-fn entry<'a>(list: &'a Value, number: &Value) -> &'a Value {
-    let number = number.as_u64().and_then(|number| usize::try_from(number).ok());
-    number.and_then(|number| list.get(number)).unwrap_or(&Value::Null)
+fn entry<'a>(list: &'a Value, of: &Value) -> &'a Value {
+    number(of).and_then(|number| list.get(number)).unwrap_or(&Value::Null)
 }
 
 /// The content of the file that an image is.
-fn content(
-    gltf: &Gltf,
-    bin: Option<&[u8]>,
-    folder: &Path,
-    number: usize,
-) -> Result<Vec<u8>, Trouble> {
-    let wrong = |reason: &str| Err(Trouble::part(format!("image {number}"), reason));
-    let image = &gltf.images[number];
-    let content = match (&image["uri"], image["bufferView"].as_u64()) {
-        (Value::String(uri), _) => match uri.strip_prefix("data:") {
+fn content(gltf: &Gltf, folder: &Path, image: usize) -> Result<Vec<u8>, Trouble> {
+    let wrong = |reason: &str| Err(Trouble::part(format!("image {image}"), reason));
+    let found = &gltf.images[image];
+    let content = match (&found["uri"], number(&found["bufferView"])) {
+        (Value::String(uri), _) => match data(uri) {
+            Some(Some(content)) => content,
+            Some(None) => return wrong(&format!("its data URI is not base64: {}", shown(uri))),
             None => return picture(folder, uri).map_err(Trouble::OtherFile),
-            Some(data) => {
-                let coded = data.split_once(";base64,").map(|(_, coded)| coded);
-                match coded.map(|coded| STANDARD.decode(coded)) {
-                    Some(Ok(content)) => content,
-                    _ => return wrong(&format!("its data URI is not base64: {}", shown(uri))),
-                }
-            }
         },
-        (_, Some(view)) => match gltf.view(view as usize, bin) {
+        (_, Some(view)) => match gltf.view(view) {
             Ok((_, Some(bytes))) => bytes.to_vec(),
-            Ok((_, None)) => return wrong("it reaches beyond the binary chunk"),
+            Ok((_, None)) => return wrong("it reaches beyond its buffer"),
             Err(reason) => return wrong(&reason),
         },
         _ => return wrong("it has no content"),

@@ -3,6 +3,12 @@
 //! Read by code of our own: the crate for it panics on some lengths and strides that the format
 //! forbids, and refuses whole files for materials that it does not know.
 
+use std::borrow::Cow;
+
+use base64::{
+    Engine, alphabet,
+    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
+};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -11,7 +17,10 @@ use crate::error::Trouble;
 /// Everything else in the JSON is skipped.
 #[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(crate) struct Gltf {
+pub(crate) struct Gltf<'a> {
+    /// Of each buffer, or why there is none.
+    #[serde(skip)]
+    contents: Vec<Result<Cow<'a, [u8]>, &'static str>>,
     pub(crate) scene: Option<usize>,
     pub(crate) scenes: Vec<Scene>,
     pub(crate) nodes: Vec<Node>,
@@ -37,12 +46,13 @@ pub(crate) struct Node {
     pub(crate) mesh: Option<usize>,
     #[serde(default)]
     pub(crate) children: Vec<usize>,
+    // Boxed, since the shortest text of a node is `{}`.
     /// Column by column.
-    pub(crate) matrix: Option<[f64; 16]>,
-    pub(crate) translation: Option<[f64; 3]>,
+    pub(crate) matrix: Option<Box<[f64; 16]>>,
+    pub(crate) translation: Option<Box<[f64; 3]>>,
     /// x, y, z, w.
-    pub(crate) rotation: Option<[f64; 4]>,
-    pub(crate) scale: Option<[f64; 3]>,
+    pub(crate) rotation: Option<Box<[f64; 4]>>,
+    pub(crate) scale: Option<Box<[f64; 3]>>,
 }
 
 #[derive(Deserialize)]
@@ -68,8 +78,8 @@ fn triangles() -> u64 {
 pub(crate) struct Attributes {
     #[serde(rename = "POSITION")]
     pub(crate) position: Option<usize>,
-    #[serde(rename = "COLOR_0")]
-    pub(crate) colour: Option<usize>,
+    #[serde(rename = "COLOR_0", default)]
+    pub(crate) colour: Value,
     #[serde(rename = "TEXCOORD_0", default)]
     pub(crate) coordinates: Value,
     #[serde(rename = "TEXCOORD_1", default)]
@@ -120,7 +130,27 @@ pub(crate) struct View {
 
 #[derive(Deserialize)]
 struct Buffer {
-    uri: Option<serde::de::IgnoredAny>,
+    uri: Option<String>,
+}
+
+/// The number of an entry in a list.
+pub(crate) fn number(value: &Value) -> Option<usize> {
+    value.as_u64().and_then(|number| usize::try_from(number).ok())
+}
+
+/// The bytes in a data URI, `None` if it is not coded in base 64; `None` for other URIs.
+pub(crate) fn data(uri: &str) -> Option<Option<Vec<u8>>> {
+    const LENIENT: GeneralPurpose = GeneralPurpose::new(
+        &alphabet::STANDARD,
+        GeneralPurposeConfig::new()
+            .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+            .with_decode_allow_trailing_bits(true),
+    );
+    let (_, coded) = match uri.strip_prefix("data:")?.split_once(";base64,") {
+        Some(parts) => parts,
+        None => return Some(None),
+    };
+    Some(LENIENT.decode(coded).ok())
 }
 
 /// The types that glTF numbers from 5120.
@@ -176,64 +206,76 @@ impl Component {
     }
 }
 
-impl Gltf {
+impl<'a> Gltf<'a> {
+    /// The content of a JSON chunk; `bin` is the binary chunk.
+    pub(crate) fn read(json: &[u8], bin: Option<&'a [u8]>) -> Result<Self, Trouble> {
+        let mut gltf: Self = serde_json::from_slice(json)
+            .map_err(|reason| Trouble::part("JSON chunk", reason.to_string()))?;
+        let content = |(number, buffer): (usize, Buffer)| match (buffer.uri, bin) {
+            (Some(uri), _) => match data(&uri) {
+                Some(Some(bytes)) => Ok(Cow::Owned(bytes)),
+                Some(None) => Err("is a data URI that is not base64"),
+                None => Err("lies outside of the binary chunk: export it as one .glb file"),
+            },
+            (None, Some(bin)) if number == 0 => Ok(Cow::Borrowed(bin)),
+            (None, _) => Err("has no binary chunk: export it without compression"),
+        };
+        let buffers = std::mem::take(&mut gltf.buffers);
+        gltf.contents = buffers.into_iter().enumerate().map(content).collect();
+        Ok(gltf)
+    }
+
     /// How many entries the accessor claims.
     pub(crate) fn count(&self, accessor: usize) -> Result<usize, Trouble> {
         let missing = || Trouble::part(format!("accessor {accessor}"), "there is none");
         Ok(self.accessors.get(accessor).ok_or_else(missing)?.count)
     }
 
-    /// The entries of an accessor of 3-vectors; `bin` is the binary chunk.
-    pub(crate) fn positions(
-        &self,
-        accessor: usize,
-        bin: Option<&[u8]>,
-    ) -> Result<Vec<[f64; 3]>, Trouble> {
+    /// The entries of an accessor of 3-vectors.
+    pub(crate) fn positions(&self, accessor: usize) -> Result<Vec<[f64; 3]>, Trouble> {
         let count = self.count(accessor)?;
         let it = &self.accessors[accessor];
-        let values = if it.shape == "VEC3" {
-            self.values(it, count, bin)
-        } else {
-            Err(format!("positions are of type VEC3, not {:?}", it.shape))
-        };
+        let values = Self::are_positions(it).and_then(|()| self.values(it, count, it.normalized));
         values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
     }
 
-    /// The entries of an accessor of linear colours, without transparency; `bin` is the binary chunk.
-    pub(crate) fn colours(
-        &self,
-        accessor: usize,
-        bin: Option<&[u8]>,
-    ) -> Result<Vec<[f64; 3]>, Trouble> {
-        let count = self.count(accessor)?;
-        let it = &self.accessors[accessor];
-        let share = match Component::of(it.component_type) {
-            Some(Component::F32) => true,
-            Some(Component::U8 | Component::U16) => it.normalized,
-            _ => false,
-        };
-        let values =
-            match (share, it.shape.as_str()) {
-                (true, "VEC3") => self.values(it, count, bin),
-                (true, "VEC4") => self
-                    .values(it, count, bin)
-                    .map(|all| all.into_iter().map(|[r, g, b, _]| [r, g, b]).collect()),
-                _ => Err("colours are VEC3 or VEC4 of floats or of normalized bytes or shorts"
-                    .to_owned()),
-            };
-        values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+    fn are_positions(accessor: &Accessor) -> Result<(), String> {
+        match accessor.shape.as_str() {
+            "VEC3" => Ok(()),
+            shape => Err(format!("positions are of type VEC3, not {shape:?}")),
+        }
     }
 
-    /// The entries of an accessor of texture coordinates, v down; `bin` is the binary chunk.
-    pub(crate) fn coordinates(
-        &self,
-        accessor: usize,
-        bin: Option<&[u8]>,
-    ) -> Result<Vec<[f64; 2]>, Trouble> {
+    /// The entries of an accessor of linear colours, without transparency; the value that stands for full; and whether the accessor says so.
+    pub(crate) fn colours(&self, accessor: usize) -> Result<(Vec<[f64; 3]>, f64, bool), Trouble> {
+        let count = self.count(accessor)?;
+        let it = &self.accessors[accessor];
+        let at = |why: String| Trouble::part(format!("accessor {accessor}"), why);
+        let (full, said) = match Component::of(it.component_type) {
+            Some(Component::U8) => (f64::from(u8::MAX), it.normalized),
+            Some(Component::U16) => (f64::from(u16::MAX), it.normalized),
+            Some(Component::F32) => (1.0, true),
+            _ => {
+                return Err(at("colours are floats, or bytes or shorts without a sign".to_owned()));
+            }
+        };
+        let values = match it.shape.as_str() {
+            "VEC3" => self.values(it, count, false),
+            "VEC4" => {
+                let values = self.values(it, count, false);
+                values.map(|all| all.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
+            }
+            shape => Err(format!("colours are of type VEC3 or VEC4, not {shape:?}")),
+        };
+        Ok((values.map_err(at)?, full, said))
+    }
+
+    /// The entries of an accessor of texture coordinates, v down.
+    pub(crate) fn coordinates(&self, accessor: usize) -> Result<Vec<[f64; 2]>, Trouble> {
         let count = self.count(accessor)?;
         let it = &self.accessors[accessor];
         let values = if it.shape == "VEC2" {
-            self.values(it, count, bin)
+            self.values(it, count, it.normalized)
         } else {
             Err(format!("texture coordinates are of type VEC2, not {:?}", it.shape))
         };
@@ -241,76 +283,107 @@ impl Gltf {
     }
 
     /// A buffer view, and its bytes if they are there.
-    pub(crate) fn view<'a>(
-        &self,
-        number: usize,
-        bin: Option<&'a [u8]>,
-    ) -> Result<(&View, Option<&'a [u8]>), String> {
+    pub(crate) fn view(&self, number: usize) -> Result<(&View, Option<&[u8]>), String> {
         let view = self.buffer_views.get(number);
         let view = view.ok_or_else(|| format!("there is no buffer view {number}"))?;
-        let buffer = self.buffers.get(view.buffer);
-        let buffer = buffer.ok_or_else(|| format!("there is no buffer {}", view.buffer))?;
-        if buffer.uri.is_some() {
-            let reason = "lies outside of the binary chunk: export it as one .glb file";
-            return Err(format!("buffer {} {reason}", view.buffer));
-        }
-        let bin = bin.filter(|_| view.buffer == 0);
-        let bin = bin.ok_or_else(|| {
-            let reason = "has no binary chunk: export it without compression";
-            format!("buffer {} {reason}", view.buffer)
-        })?;
+        let content = self.contents.get(view.buffer);
+        let content = content.ok_or_else(|| format!("there is no buffer {}", view.buffer))?;
+        let content =
+            content.as_ref().map_err(|reason| format!("buffer {} {reason}", view.buffer))?;
         let end = view.byte_offset.checked_add(view.byte_length);
-        Ok((view, end.and_then(|end| bin.get(view.byte_offset..end))))
+        Ok((view, end.and_then(|end| content.get(view.byte_offset..end))))
     }
 
-    /// The entries of an accessor of vertex indices; `bin` is the binary chunk.
-    pub(crate) fn indices(&self, accessor: usize, bin: Option<&[u8]>) -> Result<Vec<u32>, Trouble> {
+    /// The number of positions of an accessor, once it is sure that their bytes are there.
+    pub(crate) fn sure_positions(&self, accessor: usize) -> Result<usize, Trouble> {
+        self.sure::<3>(accessor, Self::are_positions)
+    }
+
+    /// The number of vertex indices of an accessor, once it is sure that their bytes are there.
+    pub(crate) fn sure_indices(&self, accessor: usize) -> Result<usize, Trouble> {
+        self.sure::<1>(accessor, Self::are_indices)
+    }
+
+    fn sure<const N: usize>(
+        &self,
+        accessor: usize,
+        check: impl Fn(&Accessor) -> Result<(), String>,
+    ) -> Result<usize, Trouble> {
         let count = self.count(accessor)?;
         let it = &self.accessors[accessor];
-        let whole = Component::of(it.component_type).is_some_and(Component::can_index);
-        let values = if it.shape == "SCALAR" && whole && !it.normalized {
-            self.values(it, count, bin)
-        } else {
-            Err("indices are single whole numbers of 8, 16 or 32 bits without a sign".to_owned())
-        };
+        let found = check(it).and_then(|()| match self.source(it, count)? {
+            Some(source) => source.entries::<N>(self, count).map(|_| count),
+            None => Ok(count),
+        });
+        found.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+    }
+
+    /// Where the entries of an accessor lie; none if they are zero, but for sparse ones.
+    fn source(&self, accessor: &Accessor, count: usize) -> Result<Option<Source>, String> {
+        let component = component(accessor.component_type)?;
+        match accessor.buffer_view {
+            Some(view) => Ok(Some(Source { view, offset: accessor.byte_offset, component })),
+            // Such entries take no bytes, so their number could be anything.
+            None if accessor.sparse.is_some() && count <= self.length() => Ok(None),
+            None => {
+                let reason = "no bytes for them: export it without compression";
+                Err(format!("{count} entries, but {reason}"))
+            }
+        }
+    }
+
+    /// Bytes in all buffers.
+    fn length(&self) -> usize {
+        self.contents.iter().flatten().map(|content| content.len()).sum()
+    }
+
+    /// The entries of an accessor of vertex indices.
+    pub(crate) fn indices(&self, accessor: usize) -> Result<Vec<u32>, Trouble> {
+        let count = self.count(accessor)?;
+        let it = &self.accessors[accessor];
+        let values = Self::are_indices(it).and_then(|()| self.values(it, count, false));
         let values = values.map_err(|why| Trouble::part(format!("accessor {accessor}"), why))?;
         Ok(values.into_iter().map(|[index]| index as u32).collect())
+    }
+
+    fn are_indices(accessor: &Accessor) -> Result<(), String> {
+        let whole = Component::of(accessor.component_type).is_some_and(Component::can_index);
+        if accessor.shape == "SCALAR" && whole && !accessor.normalized {
+            return Ok(());
+        }
+        Err("indices are single whole numbers of 8, 16 or 32 bits without a sign".to_owned())
     }
 
     fn values<const N: usize>(
         &self,
         accessor: &Accessor,
         count: usize,
-        bin: Option<&[u8]>,
+        normalized: bool,
     ) -> Result<Vec<[f64; N]>, String> {
-        let part = |view, offset, component| Source { view, offset, component, bin };
         let component = component(accessor.component_type)?;
-        if accessor.normalized && matches!(component, Component::F32 | Component::U32) {
+        if normalized && matches!(component, Component::F32 | Component::U32) {
             return Err("floats and 32-bit integers cannot be normalized".to_owned());
         }
-        let read = |bytes: [&[u8]; N]| bytes.map(|b| component.value(b, accessor.normalized));
-        let mut values = match accessor.buffer_view {
-            Some(view) => {
-                let source = part(view, accessor.byte_offset, component);
-                source.entries(self, count)?.map(read).collect()
-            }
-            // Such entries are zero. They take no bytes, so their number could be anything.
-            None if accessor.sparse.is_some() && count <= bin.map_or(0, <[u8]>::len) => {
-                vec![[0.0; N]; count]
-            }
-            None => {
-                let reason = "no bytes for them: export it without compression";
-                return Err(format!("{count} entries, but {reason}"));
-            }
+        let read = |bytes: [&[u8]; N]| bytes.map(|b| component.value(b, normalized));
+        let mut values = match self.source(accessor, count)? {
+            Some(source) => source.entries(self, count)?.map(read).collect(),
+            None => vec![[0.0; N]; count],
         };
         if let Some(Sparse { count: changed, indices, values: new }) = &accessor.sparse {
+            if *changed > count {
+                return Err(format!("{changed} sparse entries of {count}"));
+            }
             let code = indices.component_type.unwrap_or_default();
             let whole = self::component(code)?;
             if !whole.can_index() {
                 return Err(format!("component type {code} cannot be an index"));
             }
-            let places = part(indices.buffer_view, indices.byte_offset, whole);
-            let entries = part(new.buffer_view, new.byte_offset, component);
+            let part = |part: &Part, component| Source {
+                view: part.buffer_view,
+                offset: part.byte_offset,
+                component,
+            };
+            let (places, entries) = (part(indices, whole), part(new, component));
             let places = places.entries::<1>(self, *changed)?;
             for ([place], entry) in places.zip(entries.entries(self, *changed)?) {
                 let place = whole.value(place, false) as usize;
@@ -328,22 +401,21 @@ fn component(code: u64) -> Result<Component, String> {
 }
 
 /// Where entries of equal size lie one after the other.
-struct Source<'a> {
+struct Source {
     view: usize,
     offset: usize,
     component: Component,
-    bin: Option<&'a [u8]>,
 }
 
-impl<'a> Source<'a> {
+impl Source {
     /// The bytes of `count` entries of `N` components each, once it is sure that they are there.
-    fn entries<const N: usize>(
+    fn entries<'a, const N: usize>(
         &self,
-        gltf: &Gltf,
+        gltf: &'a Gltf,
         count: usize,
     ) -> Result<impl Iterator<Item = [&'a [u8]; N]> + use<'a, N>, String> {
-        let Self { view: number, offset, component, bin } = *self;
-        let (view, bytes) = gltf.view(number, bin)?;
+        let Self { view: number, offset, component } = *self;
+        let (view, bytes) = gltf.view(number)?;
         let size = component.size();
         let stride = view.byte_stride.unwrap_or(N * size);
         if stride < N * size {
@@ -354,7 +426,7 @@ impl<'a> Source<'a> {
             count.checked_sub(1).map_or(Some(0), |n| n.checked_mul(stride)?.checked_add(N * size));
         let bytes = bytes.and_then(|bytes| bytes.get(offset..)?.get(..length?));
         let bytes = bytes.ok_or_else(|| {
-            format!("{count} entries reach beyond the binary chunk or buffer view {number}")
+            format!("{count} entries reach beyond buffer {} or buffer view {number}", view.buffer)
         })?;
         Ok(bytes
             .chunks(stride)

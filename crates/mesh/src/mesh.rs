@@ -1,8 +1,10 @@
 //! A triangle mesh that is valid by construction.
 
-use std::collections::BTreeMap;
-
-use crate::{MeshError, Texture};
+use crate::{
+    Fault, MeshError, Texture,
+    error::shown,
+    subdivision::{between, quartered},
+};
 
 /// Vertices and the triangles between them.
 ///
@@ -161,26 +163,8 @@ impl Mesh {
     }
 }
 
-/// Each triangle cut into four, at the middles of its edges; `add` is called once for the ends of each edge, and gives the number of its middle.
-pub(crate) fn quartered(faces: &[[u32; 3]], mut add: impl FnMut([u32; 2]) -> u32) -> Vec<[u32; 3]> {
-    let mut middles = BTreeMap::new();
-    let mut middle =
-        |a: u32, b: u32| *middles.entry([a.min(b), a.max(b)]).or_insert_with_key(|&ends| add(ends));
-    let cut = |&[a, b, c]: &[u32; 3]| {
-        let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
-        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-    };
-    faces.iter().flat_map(cut).collect()
-}
-
-/// The mean of two entries, without overflow.
-pub(crate) fn between<const N: usize>(of: &[[f64; N]], ends: [u32; 2]) -> [f64; N] {
-    let [p, q] = ends.map(|end| of[end as usize]);
-    std::array::from_fn(|k| p[k] / 2.0 + q[k] / 2.0)
-}
-
 /// Whether a channel of a colour is one.
-pub(crate) fn is_share(x: &f64) -> bool {
+fn is_share(x: &f64) -> bool {
     (0.0..=1.0).contains(x)
 }
 
@@ -194,6 +178,14 @@ fn all_finite(positions: &[[f64; 3]]) -> Result<(), MeshError> {
 /// Whether `x` stays finite when a 32-bit backend takes it.
 pub(crate) fn fits_f32(x: f64) -> bool {
     (x as f32).is_finite()
+}
+
+/// An error unless all of `position` is finite in 32 bits.
+pub(crate) fn finite(position: [f64; 3]) -> Result<(), Fault> {
+    match position.iter().find(|&&x| !fits_f32(x)) {
+        Some(x) => Err(Fault::NotFinite(shown(&format!("{x:?}")))),
+        None => Ok(()),
+    }
 }
 
 /// `a - b`.

@@ -2,44 +2,53 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use crate::{
     Fault, Texture,
     beside::{beside, picture, read},
-    clean::absolute,
-    error::{Trouble, shown},
+    corner::absolute,
+    error::{FARTHEST, Trouble, shown},
     statements::{Statement, statements},
-    texture::{FARTHEST, is_near},
+    texture::is_near,
 };
 
-/// What the statements of a file say of its texture.
+/// Libraries of materials that a file may name, and words of their names.
+const MOST_LIBRARIES: usize = 100;
+
+/// The texture of a file, as its statements have it.
 #[derive(Default)]
 struct Found {
     coordinates: Vec<[f64; 2]>,
     /// Of each corner of each face, in the order of the file.
     corners: Vec<u32>,
+    /// The texts after `mtllib`, each once.
     libraries: Vec<String>,
     /// The materials of faces; that of faces without one is "".
     materials: BTreeSet<String>,
 }
 
-/// The texture in `bytes`, a file in `folder` whose vertices and faces are sound, and why it or its picture was left out. `cut` says which
-/// corners of the file the triangles have, all numbered in order.
+/// The texture in `bytes`, a file in `folder` whose vertices and faces are sound; `warnings` gets why it, its picture or a library was left
+/// out. `cut` has the corners of the triangles, all corners of the file being numbered in order.
 pub(crate) fn parse(
     bytes: &[u8],
     folder: &Path,
-    cut: &[[usize; 3]],
-) -> (Option<Texture>, Option<Trouble>) {
-    let of = || {
-        let Some(found) = found(bytes)? else { return Ok((None, None)) };
-        let corners = cut.iter().map(|triangle| triangle.map(|k| found.corners[k])).collect();
-        let shown = of_materials(&found, folder);
+    cut: &[[u32; 3]],
+    warnings: &mut Vec<Trouble>,
+) -> Option<Texture> {
+    let mut of = || {
+        let Some(found) = found(bytes)? else { return Ok(None) };
+        let corners = cut.iter().map(|triangle| triangle.map(|k| found.corners[k as usize]));
+        let corners = corners.collect();
+        let shown = of_materials(&found, folder, warnings);
         let texture = Texture::new(found.coordinates, corners).map_err(Trouble::OtherFile)?;
-        Ok(texture.pictured(shown))
+        Ok(Some(texture.pictured(shown, warnings)))
     };
-    of().unwrap_or_else(|trouble| (None, Some(trouble)))
+    of().unwrap_or_else(|trouble| {
+        warnings.push(trouble);
+        None
+    })
 }
 
 /// Coordinates and materials; none if no corner of a face has a coordinate.
@@ -48,7 +57,8 @@ fn found(bytes: &[u8]) -> Result<Option<Found>, Trouble> {
     let mut found = Found::default();
     // Lines of the first corner that has a coordinate, and of the first that has none.
     let (mut with, mut without) = (None, None);
-    let mut material = String::new();
+    // The material of the next faces, until one has it.
+    let mut material = Some(String::new());
     for statement in statements(bytes) {
         let line = statement.line;
         let at = |reason| Trouble::Line(line, reason);
@@ -56,7 +66,7 @@ fn found(bytes: &[u8]) -> Result<Option<Found>, Trouble> {
         match words.next() {
             Some("vt") => found.coordinates.push(coordinate(words).map_err(at)?),
             Some("f") => {
-                found.materials.insert(material.clone());
+                found.materials.extend(material.take());
                 for corner in words {
                     let field = corner.split('/').nth(1).filter(|field| !field.is_empty());
                     let first = if field.is_some() { &mut with } else { &mut without };
@@ -67,8 +77,10 @@ fn found(bytes: &[u8]) -> Result<Option<Found>, Trouble> {
                     }
                 }
             }
-            Some("mtllib") => found.libraries.push(rest(&statement)),
-            Some("usemtl") => material = rest(&statement),
+            Some("mtllib") if found.libraries.len() <= MOST_LIBRARIES => {
+                add(&mut found.libraries, rest(&statement));
+            }
+            Some("usemtl") => material = Some(rest(&statement)),
             _ => {}
         }
     }
@@ -84,7 +96,7 @@ fn found(bytes: &[u8]) -> Result<Option<Found>, Trouble> {
     }
 }
 
-/// What follows the keyword: names of files and materials may hold spaces.
+/// The text after the keyword: names of files and materials may hold spaces.
 fn rest(statement: &Statement) -> String {
     statement.words().skip(1).collect::<Vec<_>>().join(" ")
 }
@@ -116,42 +128,99 @@ fn index(field: &str, before: usize, all: usize) -> Result<u32, Fault> {
     })
 }
 
-/// The picture that all faces show by their materials, if they show one.
-fn of_materials(found: &Found, folder: &Path) -> Result<Option<Vec<u8>>, Trouble> {
+/// Adds what is not there yet.
+fn add<T: PartialEq>(list: &mut Vec<T>, entry: T) {
+    if !list.contains(&entry) {
+        list.push(entry);
+    }
+}
+
+/// The names of the libraries in the text after `mtllib`: one name, or several that end in `.mtl`, all of which may hold spaces.
+fn names(folder: &Path, text: &str) -> Vec<String> {
+    let exists = |name: &str| beside(folder, name).is_file();
+    let words: Vec<&str> = text.split(' ').take(MOST_LIBRARIES + 1).collect();
+    if words.len() == 1 || exists(text) {
+        return vec![text.to_owned()];
+    }
+    let is_last = |word: &&str| word.to_ascii_lowercase().ends_with(".mtl");
+    let mut names = Vec::new();
+    for group in words.split_inclusive(is_last) {
+        let name = group.join(" ");
+        if !exists(&name) && group.iter().any(|word| exists(word)) {
+            names.extend(group.iter().map(|&word| word.to_owned()));
+        } else {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// The picture that all faces show by their materials, if they show one; `warnings` gets the libraries that cannot be read.
+fn of_materials(
+    found: &Found,
+    folder: &Path,
+    warnings: &mut Vec<Trouble>,
+) -> Result<Option<Vec<u8>>, Trouble> {
+    let mut paths = Vec::new();
+    for name in found.libraries.iter().flat_map(|text| names(folder, text)) {
+        if paths.len() <= MOST_LIBRARIES {
+            add(&mut paths, beside(folder, &name));
+        }
+    }
+    if paths.len() > MOST_LIBRARIES {
+        let reason = format!("more than {MOST_LIBRARIES} libraries: the others are not read");
+        warnings.push(Trouble::part("materials", reason));
+    }
+    // Folder and name of the picture of each material that has one; the first library that has a material counts.
     let mut pictures = BTreeMap::new();
-    for library in &found.libraries {
-        let path = beside(folder, library);
-        let content = read(&path).map_err(Trouble::OtherFile)?;
-        let mut material = String::new();
+    for path in paths.iter().take(MOST_LIBRARIES) {
+        let content = match read(path) {
+            Ok(content) => content,
+            Err(error) => {
+                warnings.push(Trouble::OtherFile(error));
+                continue;
+            }
+        };
+        let folder = path.parent().unwrap_or(folder);
+        let mut keep = |material: &mut String, picture: &mut Option<String>| {
+            let material = std::mem::take(material);
+            if let Some(picture) = picture.take() {
+                pictures.entry(material).or_insert((folder, picture));
+            }
+        };
+        let (mut material, mut picture) = (String::new(), None);
         for statement in statements(&content) {
             match statement.words().next() {
-                Some("newmtl") => material = rest(&statement),
+                Some("newmtl") => {
+                    keep(&mut material, &mut picture);
+                    material = rest(&statement);
+                }
                 Some(word) if word.eq_ignore_ascii_case("map_Kd") => {
-                    pictures.insert(material.clone(), (path.clone(), rest(&statement)));
+                    picture = Some(rest(&statement));
                 }
                 _ => {}
             }
         }
+        keep(&mut material, &mut picture);
     }
-    let mut shown: BTreeMap<Option<&(PathBuf, String)>, &String> = BTreeMap::new();
+    let mut of_faces = BTreeMap::new();
     for material in &found.materials {
-        shown.entry(pictures.get(material)).or_insert(material);
+        of_faces.entry(pictures.get(material)).or_insert(material);
     }
     let wrong = |reason: String| Err(Trouble::part("materials", reason));
-    match shown.iter().collect::<Vec<_>>()[..] {
+    match of_faces.iter().collect::<Vec<_>>()[..] {
         [] | [(None, _)] => Ok(None),
         [(Some((_, name)), material)] if name.starts_with('-') => {
+            let (name, material) = (shown(name), shown(material));
             wrong(format!("map_Kd of {material:?} has options, which are not read: {name}"))
         }
-        [(Some((library, name)), _)] => {
-            let folder = library.parent().unwrap_or(folder);
-            picture(folder, name).map(Some).map_err(Trouble::OtherFile)
-        }
+        [(Some((folder, name)), _)] => picture(folder, name).map(Some).map_err(Trouble::OtherFile),
         [(a, one), (b, other), ..] => {
             let [a, b] = [a, b].map(|picture| match picture {
-                Some((_, name)) => name.as_str(),
-                None => "no picture",
+                Some((_, name)) => shown(name),
+                None => "no picture".to_owned(),
             });
+            let [one, other] = [one, other].map(|material| shown(material));
             wrong(format!(
                 "faces of {other:?} show {b}, but those of {one:?} {a}: a mesh has one picture, so join them into one"
             ))

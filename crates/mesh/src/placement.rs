@@ -22,14 +22,14 @@ impl Placement {
     /// Source: glTF 2.0 specification, Sec. 3.5.3: scaled, then turned, then moved; or a matrix.
     pub(crate) fn of(node: &Node) -> Self {
         let each = [0, 1, 2];
-        if let Some(m) = node.matrix {
+        if let Some(m) = &node.matrix {
             return Self {
                 linear: each.map(|i| each.map(|j| m[4 * j + i])),
                 offset: each.map(|i| m[12 + i]),
             };
         }
-        let [x, y, z, w] = node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]);
-        let scale = node.scale.unwrap_or([1.0; 3]);
+        let [x, y, z, w] = node.rotation.as_deref().copied().unwrap_or([0.0, 0.0, 0.0, 1.0]);
+        let scale = node.scale.as_deref().copied().unwrap_or([1.0; 3]);
         let turned = [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
             [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
@@ -37,7 +37,7 @@ impl Placement {
         ];
         Self {
             linear: turned.map(|row| each.map(|j| row[j] * scale[j])),
-            offset: node.translation.unwrap_or_default(),
+            offset: node.translation.as_deref().copied().unwrap_or_default(),
         }
     }
 
@@ -71,13 +71,13 @@ mod tests {
             mesh: None,
             children: vec![],
             matrix: None,
-            translation: Some([0.0, 1.0, 0.0]),
-            rotation: Some([0.0, 0.0, half, half]),
-            scale: Some([2.0, 1.0, 1.0]),
+            translation: Some(Box::new([0.0, 1.0, 0.0])),
+            rotation: Some(Box::new([0.0, 0.0, half, half])),
+            scale: Some(Box::new([2.0, 1.0, 1.0])),
         };
         let matrix = [0., 2., 0., 0., -1., 0., 0., 0., 0., 0., 1., 0., 0., 1., 0., 1.];
         let whole = Node {
-            matrix: Some(matrix),
+            matrix: Some(Box::new(matrix)),
             translation: None,
             rotation: None,
             scale: None,

@@ -8,11 +8,12 @@ use std::slice::ChunksExact;
 
 use crate::{
     Fault, Mesh,
-    error::{Trouble, channel, shown},
-    mesh::fits_f32,
+    colours::{Beyond, Colours},
+    error::{Place, Trouble, shown},
+    mesh::finite,
+    parts::Parts,
     ply_header::{Element, Encoding, Header, Number, Property},
-    polygon::triangles,
-    read::Parts,
+    polygon::Polygons,
     statements::next_line,
 };
 
@@ -36,7 +37,7 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
     }
 
     let mut body = Body { rest: bytes, encoding, line: lines };
-    let (mut positions, mut corners, mut polygons) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut positions, mut polygons, mut polygon) = (Vec::new(), Polygons::default(), Vec::new());
     let mut colours = None;
     for element in &elements {
         match element.name.as_str() {
@@ -51,58 +52,48 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
                 let [x, y, z] = columns(element, AXES, is_one, "number")?;
                 // Without all three there is no colour.
                 match columns(element, CHANNELS, is_one, "number") {
-                    Ok([red, green, blue]) => {
-                        let full =
-                            [red, green, blue].map(|column| full(&element.properties[column]));
+                    Ok(channels) => {
+                        let full = channels.map(|column| full(&element.properties[column]));
+                        let colours = colours.insert(Colours::new(full, Beyond::LeftOut));
+                        let [red, green, blue] = channels;
                         let columns = [x, y, z, red, green, blue];
-                        let colours = colours.insert(Vec::new());
-                        body.rows(element, &columns, |[x, y, z, red, green, blue]| {
-                            let [r, g, b] = full;
-                            colours.push([
-                                channel(red[0], r)?,
-                                channel(green[0], g)?,
-                                channel(blue[0], b)?,
-                            ]);
+                        body.rows(element, &columns, 3, |place, [x, y, z, red, green, blue]| {
+                            colours.push([red[0], green[0], blue[0]], place);
                             take([x, y, z])
                         })?;
                     }
-                    Err(_) => body.rows(element, &[x, y, z], take)?,
+                    Err(_) => body.rows(element, &[x, y, z], 3, |_, axes| take(axes))?,
                 }
             }
             "face" => {
                 let wanted = [["vertex_indices", "vertex_index"]];
                 let whole = |p: &Property| p.list.is_some() && p.number.is_whole();
                 let columns = columns(element, wanted, whole, "list of whole numbers")?;
-                body.rows(element, &columns, |[indices]| {
+                body.rows(element, &columns, 1, |_, [indices]| {
                     if indices.len() < 3 {
                         return Err(Fault::Corners(indices.len()));
                     }
+                    polygon.clear();
                     for &index in indices {
-                        corners.push(vertex(index, vertices)?);
+                        polygon.push(vertex(index, vertices)?);
                     }
-                    polygons.push(indices.len());
-                    Ok(())
+                    polygons.add(&polygon)
                 })?;
             }
-            _ => body.rows(element, &[], |[]| Ok(()))?,
+            _ => body.rows(element, &[], 0, |_, []| Ok(()))?,
         }
     }
 
-    let mut faces = Vec::new();
-    let mut rest = corners.as_slice();
-    for corners in polygons {
-        let (polygon, after) = rest.split_at(corners);
-        faces.extend(triangles(&positions, polygon).iter().map(|face| face.map(|k| polygon[k])));
-        rest = after;
-    }
-    Ok(Parts { positions, faces, colours, ..Parts::default() })
+    let faces = polygons.faces(&polygons.cut(&positions)?);
+    let (colours, warning) = colours.map_or((None, None), Colours::settled);
+    Ok(Parts { positions, faces, colours, warnings: Vec::from_iter(warning), ..Parts::default() })
 }
 
-/// What stands for full in a channel of a colour.
-fn full(channel: &Property) -> u16 {
+/// The value of a channel of a colour that stands for full.
+fn full(channel: &Property) -> f64 {
     match channel.number {
-        Number::F32 | Number::F64 => 1,
-        Number::U16 => u16::MAX,
+        Number::F32 | Number::F64 => 1.0,
+        Number::U16 => u16::MAX.into(),
         _ => u8::MAX.into(),
     }
 }
@@ -138,14 +129,6 @@ fn columns<const N: usize>(
     Ok(columns)
 }
 
-/// An error unless all of `position` is finite in 32 bits.
-pub(crate) fn finite(position: [f64; 3]) -> Result<(), Fault> {
-    match position.iter().find(|&&x| !fits_f32(x)) {
-        Some(x) => Err(Fault::NotFinite(shown(&format!("{x:?}")))),
-        None => Ok(()),
-    }
-}
-
 /// A corner's vertex; `index` is a whole number of at most 32 bits, or was text.
 fn vertex(index: f64, vertices: u64) -> Result<u32, Fault> {
     if index >= 0.0 && index < vertices as f64 && index <= f64::from(u32::MAX) {
@@ -163,12 +146,14 @@ struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// Gives the values of the properties `columns` of each row of `element` to `take`.
+    /// Gives the values of the properties `columns` of each row of `element` to `take`, and the place of the row. Text that is no number is
+    /// an error in the first `strict` columns, and NaN in the others.
     fn rows<const N: usize>(
         &mut self,
         element: &Element,
         columns: &[usize; N],
-        mut take: impl FnMut([&[f64]; N]) -> Result<(), Fault>,
+        strict: usize,
+        mut take: impl FnMut(&dyn Fn() -> Place, [&[f64]; N]) -> Result<(), Fault>,
     ) -> Result<(), Trouble> {
         let ascii = self.encoding == Encoding::Ascii;
         let least: usize =
@@ -190,23 +175,26 @@ impl<'a> Body<'a> {
         for row in 0..element.count {
             values.iter_mut().for_each(Vec::clear);
             let read = match self.encoding {
-                Encoding::Ascii => self.text_row(element, columns, &mut values),
+                Encoding::Ascii => self.text_row(element, columns, strict, &mut values),
                 _ => self.binary_row(element, columns, &mut values),
             };
-            let taken = read.and_then(|()| take(values.each_ref().map(Vec::as_slice)));
-            taken.map_err(|fault| match fault {
-                fault if ascii && fault != Fault::Truncated => Trouble::Line(self.line, fault),
-                fault => Trouble::Part(format!("{} {row}", element.name), fault),
+            let part = || Place::Part(format!("{} {row}", element.name));
+            let place = || if ascii { Place::Line(self.line) } else { part() };
+            let taken = read.and_then(|()| take(&place, values.each_ref().map(Vec::as_slice)));
+            taken.map_err(|fault| {
+                let place = if fault == Fault::Truncated { part() } else { place() };
+                place.trouble(fault)
             })?;
         }
         Ok(())
     }
 
-    /// The next line that is not blank.
+    /// The next line that is not blank. Values after those of the header are skipped: some programs write colours there.
     fn text_row(
         &mut self,
         element: &Element,
         columns: &[usize],
+        strict: usize,
         values: &mut [Vec<f64>],
     ) -> Result<(), Fault> {
         let line = loop {
@@ -229,14 +217,15 @@ impl<'a> Body<'a> {
             for _ in 0..count {
                 let word = word()?;
                 if let Some(column) = column {
-                    values[column].push(parsed(word, list.is_some() && number.is_whole())?);
+                    let whole = list.is_some() && number.is_whole();
+                    values[column].push(match parsed(word, whole) {
+                        Err(_) if column >= strict => f64::NAN,
+                        value => value?,
+                    });
                 }
             }
         }
-        match words.next() {
-            Some(word) => Err(Fault::format(format!("{:?} is one value too many", shown(word)))),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     fn binary_row(

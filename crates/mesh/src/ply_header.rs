@@ -115,29 +115,32 @@ fn statement(
     elements: &mut Vec<Element>,
 ) -> Result<(), Fault> {
     match *words {
-        [] | ["comment" | "obj_info", ..] => {}
-        ["format", "ascii", "1.0"] => *encoding = Some(Encoding::Ascii),
-        ["format", "binary_little_endian", "1.0"] => *encoding = Some(Encoding::LittleEndian),
-        ["format", "binary_big_endian", "1.0"] => *encoding = Some(Encoding::BigEndian),
-        ["element", name, count] => {
+        ["format", "ascii", "1.0", ..] => *encoding = Some(Encoding::Ascii),
+        ["format", "binary_little_endian", "1.0", ..] => *encoding = Some(Encoding::LittleEndian),
+        ["format", "binary_big_endian", "1.0", ..] => *encoding = Some(Encoding::BigEndian),
+        ["element", name, count, ..] => {
             let not_whole = |_| Fault::format(format!("{:?} is not a count", shown(count)));
             let count = count.parse().map_err(not_whole)?;
             elements.push(Element { name: shown(name), count, properties: Vec::new(), line });
         }
-        ["property", "list", count, number, name] => {
+        ["property", "list", count, number, name, ..] => {
             let list = Number::of(count)?;
             if !list.is_whole() {
                 return Err(Fault::format("the length of a list must be of a whole type"));
             }
             add(elements, name, Some(list), Number::of(number)?)?;
         }
-        ["property", number, name] => add(elements, name, None, Number::of(number)?)?,
-        _ => {
+        ["property", number, name, ..] if number != "list" => {
+            add(elements, name, None, Number::of(number)?)?
+        }
+        ["format" | "element" | "property", ..] => {
             let text = shown(&words.join(" "));
             return Err(Fault::format(format!(
                 "{text:?} does not belong in the header of PLY 1.0"
             )));
         }
+        // Comments, `obj_info`, and lines that programs write without either.
+        _ => {}
     }
     Ok(())
 }

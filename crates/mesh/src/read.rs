@@ -3,20 +3,9 @@
 use std::path::Path;
 
 use crate::{
-    Mesh, MeshError, Texture, beside, bounded::open_regular, error::Trouble, format::Format, glb,
-    obj, ply, stl,
+    Mesh, MeshError, beside, bounded::open_regular, format::Format, glb, obj, parts::Parts, ply,
+    stl,
 };
-
-/// What a file has, before it is known to be a mesh.
-#[derive(Default)]
-pub(crate) struct Parts {
-    pub(crate) positions: Vec<[f64; 3]>,
-    pub(crate) faces: Vec<[u32; 3]>,
-    pub(crate) colours: Option<Vec<[f64; 3]>>,
-    pub(crate) texture: Option<Texture>,
-    /// Why the texture or its picture was left out.
-    pub(crate) left_out: Option<Trouble>,
-}
 
 impl Mesh {
     /// The mesh in the file at `path`: OBJ, PLY, STL or GLB by its ending; see [`Mesh::parse`].
@@ -29,24 +18,30 @@ impl Mesh {
         format.parse(&bytes, &name, None).map(|(mesh, _)| mesh)
     }
 
-    /// The mesh in the file at `path` with its [`Texture`], if it has one; otherwise as [`Mesh::load`]. And why a texture that the file
-    /// speaks of, or its picture alone, was left out: this never keeps the mesh from being read.
+    /// The mesh in the file at `path` with its [`Texture`](crate::Texture), if it has one, otherwise as [`Mesh::load`]; and warnings.
+    ///
+    /// Colours, textures, pictures and materials never keep a mesh from being read. Each warning is one line about something that the file
+    /// has and the mesh has not, or has otherwise: colours that are left out, scaled or clamped (see [`Mesh::parse`]), a texture or its
+    /// picture that is left out, a library of materials that cannot be read, an extension of glTF that the file requires and that is not read.
+    /// `Mesh::load` gives the same mesh but for the texture, without warnings.
     ///
     /// A mesh has one texture on all of its faces, with one picture. So it is left out where only some corners have coordinates, and
     /// the picture is left out where materials show several, or some show one and others none. Coordinates stay where the picture alone
     /// is missing. Colours and other properties of materials are ignored, beyond 0 to 1 pictures always repeat.
     ///
-    /// - OBJ: `vt` at the corners of faces, and `map_Kd` of the materials of `mtllib`. Options of `map_Kd` are not read.
-    /// - GLB: `TEXCOORD_0` or `TEXCOORD_1`, whichever the base colour texture names, turned so that v is up. Its picture lies in the
-    ///   file, in a data URI, or in a file of its own.
+    /// - OBJ: `vt` at the corners of faces, and `map_Kd` of the materials of `mtllib`. Options of `map_Kd` are not read. A line `mtllib` names
+    ///   one library, or several that end in `.mtl`; names may hold spaces.
+    /// - GLB: `TEXCOORD_0` or `TEXCOORD_1`, whichever the base colour texture names, or the diffuse texture of
+    ///   `KHR_materials_pbrSpecularGlossiness`; turned so that v is up. Its picture lies in the file, in a data URI, or in a file of its own.
     ///
-    /// Pictures are PNG or JPEG. Other files are looked for in the folder of the mesh and below it, and nowhere else: of a path that leads
-    /// out of it the last part counts.
+    /// Pictures are PNG or JPEG. Libraries of materials lie in the folder of the mesh or below it, pictures in the folder of the mesh (GLB)
+    /// or of the library (OBJ) or below it, and nothing else is opened: of a path that leads out of the folder the last part counts. Links in
+    /// the folder are followed.
     ///
     /// # Errors
     ///
     /// Those of [`Mesh::load`].
-    pub fn load_textured(path: impl AsRef<Path>) -> Result<(Mesh, Option<MeshError>), MeshError> {
+    pub fn load_textured(path: impl AsRef<Path>) -> Result<(Mesh, Vec<MeshError>), MeshError> {
         let path = path.as_ref();
         let (bytes, name, format) = opened(path)?;
         format.parse(&bytes, &name, Some(path.parent().unwrap_or(Path::new(""))))
@@ -73,43 +68,51 @@ impl Mesh {
     /// where a node mirrors, the winding is turned. Each node brings a copy of its mesh's vertices.
     /// Skins, morph targets and animations are ignored: the mesh is as it is modelled.
     ///
+    /// Of a GLB file the buffers lie in its binary chunk or in data URIs. Since a small file can place a mesh many times, it may have
+    /// up to 20 million vertices and 20 million faces in the end, half as many with colours and with a texture; longer files as many as their
+    /// length holds.
+    ///
     /// Colours are read as pictures and screens have them, from 0 to 1 (sRGB):
     ///
     /// - OBJ: `v x y z r g b`, from 0 to 1. A file where only some vertices have six numbers has no
     ///   colours.
     /// - PLY: the properties `red`, `green` and `blue` of the vertices, all three: whole numbers up to
     ///   255 (to 65535 as `ushort`), or floats from 0 to 1.
-    /// - GLB: `COLOR_0`. Its numbers are linear, so they are converted; they are held to 0 to 1, as the
-    ///   format asks, and transparency is ignored. Where only some parts have colours, the others are
-    ///   white, which is what leaving them out means there.
+    /// - GLB: `COLOR_0`. Its numbers are linear, so they are converted; transparency is ignored. Where only some parts have colours, the
+    ///   others are white, which is what leaving them out means there.
+    ///
+    /// Files have other colours too, and a mesh is worth having without. Roundings, less than 0.004 beyond 0 and 1, are clamped. Numbers from
+    /// 0 to 255 where 1 should be full are scaled if all are whole, or one is above 16. Whatever else is not from 0 to 1 leaves
+    /// all colours out, except that finite ones of a GLB file are clamped, as the format asks. [`Mesh::load_textured`] warns of it.
     ///
     /// # Errors
     ///
     /// If the name has another ending, if there are no faces, or at the first part of the file
     /// that is not as its format says, such as a coordinate which is missing, not a number or not
-    /// finite in 32 bits, a colour out of its range, an index which is out of range, a face with fewer
-    /// than three corners, or an end that comes too early. Compressed GLB files, and those that need other files, are
-    /// refused.
+    /// finite in 32 bits, an index which is out of range, a face with fewer
+    /// than three corners, or an end that comes too early. Compressed GLB files, those that need other files, and those that require an
+    /// extension which may move, hide or copy triangles are refused; so are polygons that cross themselves so often that cutting them would
+    /// take long.
     pub fn parse(bytes: &[u8], name: &str) -> Result<Mesh, MeshError> {
         format_of(Path::new(name), name)?.parse(bytes, name, None).map(|(mesh, _)| mesh)
     }
 }
 
 impl Format {
-    /// With the `folder` of the file the mesh has its texture too, and why that was left out comes along.
+    /// With the `folder` of the file the mesh has its texture too. And warnings.
     fn parse(
         self,
         bytes: &[u8],
         name: &str,
         folder: Option<&Path>,
-    ) -> Result<(Mesh, Option<MeshError>), MeshError> {
+    ) -> Result<(Mesh, Vec<MeshError>), MeshError> {
         let parsed = match self {
-            Self::Obj => return obj::parse(bytes, name, folder),
+            Self::Obj => obj::parse(bytes, folder),
             Self::Ply => ply::parse(bytes),
             Self::Stl => stl::parse(bytes),
             Self::Glb => glb::parse(bytes, folder),
         };
-        let Parts { positions, faces, colours, texture, left_out } =
+        let Parts { positions, faces, colours, texture, warnings } =
             parsed.map_err(|trouble| trouble.of_file(name))?;
         let mut mesh = Mesh::new(positions, faces)?;
         if let Some(colours) = colours {
@@ -118,7 +121,7 @@ impl Format {
         if let Some(texture) = texture {
             mesh = mesh.with_texture(texture)?;
         }
-        Ok((mesh, left_out.map(|trouble| trouble.of_file(name))))
+        Ok((mesh, warnings.into_iter().map(|trouble| trouble.of_file(name)).collect()))
     }
 }
 

@@ -8,8 +8,8 @@ use std::collections::HashMap;
 use crate::{
     Fault,
     error::{Trouble, shown},
-    ply::finite,
-    read::Parts,
+    mesh::finite,
+    parts::Parts,
     statements::next_line,
 };
 
@@ -23,6 +23,7 @@ const NO_FACES: Trouble = Trouble::NoFaces("an STL file is a list of triangles, 
 
 /// The mesh in `bytes`; see [`Mesh::parse`](crate::Mesh::parse).
 pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut surface = Surface::default();
     let starts_like_text = bytes.trim_ascii_start().get(..5).is_some_and(|word| {
         // A binary file may start with this word as well, but text has no zeros.
@@ -74,46 +75,58 @@ fn binary(bytes: &[u8], surface: &mut Surface) -> Result<(), Trouble> {
 }
 
 fn text(mut bytes: &[u8], surface: &mut Surface) -> Result<(), Trouble> {
-    let (mut line, mut corners, mut solids) = (0, None, 0);
+    let (mut line, mut state) = (0, State::Closed);
     while let Some(words) = next_line(&mut bytes) {
         line += 1;
-        statement(&String::from_utf8_lossy(words), &mut solids, &mut corners, surface)
+        statement(&String::from_utf8_lossy(words), &mut state, surface)
             .map_err(|fault| Trouble::Line(line, fault))?;
     }
-    let open = match (&corners, solids) {
-        (None, 0) => return Ok(()),
-        (Some(_), _) => "facet",
-        (None, _) => "solid",
+    let open = match state {
+        State::Closed => return Ok(()),
+        State::Named | State::Open => "solid",
+        State::Facet(_) => "facet",
     };
     let reason = format!("the file ends before end{open}");
     Err(Trouble::Line(line, Fault::format(reason)))
 }
 
-/// One line: `solids` counts those that are open, `corners` are those of a facet that is.
-fn statement(
-    line: &str,
-    solids: &mut usize,
-    corners: &mut Option<Vec<[f64; 3]>>,
-    surface: &mut Surface,
-) -> Result<(), Fault> {
+/// How far a text has been read.
+enum State {
+    /// Before and between solids.
+    Closed,
+    /// In a solid, before its first facet: its name may take several lines, and some programs write all of it twice.
+    Named,
+    /// In a solid, after a facet.
+    Open,
+    /// In a facet with these corners.
+    Facet(Vec<[f64; 3]>),
+}
+
+/// One line.
+fn statement(line: &str, state: &mut State, surface: &mut Surface) -> Result<(), Fault> {
     let mut words = line.split_ascii_whitespace();
-    let Some(word) = words.next() else { return Ok(()) };
-    let misplaced = || Err(Fault::format(format!("{:?} does not belong here", shown(word))));
-    match (word.to_ascii_lowercase().as_str(), &mut *corners) {
-        ("solid", None) if *solids == 0 => *solids = 1,
-        ("endsolid", None) if *solids == 1 => *solids = 0,
-        ("facet", None) if *solids == 1 => *corners = Some(Vec::new()),
-        ("outer" | "endloop", Some(_)) => {}
-        ("vertex", Some(corners)) => corners.push(position(words)?),
-        ("endfacet", Some(found)) => {
-            let &[a, b, c] = found.as_slice() else {
-                let reason = format!("a facet has three corners: found {}", found.len());
+    let Some(first) = words.next() else { return Ok(()) };
+    let mut word = first.to_ascii_lowercase();
+    // Some programs write the words that end a part as two.
+    if word == "end" {
+        word += &words.next().unwrap_or_default().to_ascii_lowercase();
+    }
+    match (word.as_str(), &mut *state) {
+        ("solid", State::Closed | State::Open) => *state = State::Named,
+        ("endsolid", State::Closed | State::Named | State::Open) => *state = State::Closed,
+        ("facet", State::Named | State::Open) => *state = State::Facet(Vec::new()),
+        (_, State::Named) => {}
+        ("outer" | "endloop", State::Facet(_)) => {}
+        ("vertex", State::Facet(corners)) => corners.push(position(words)?),
+        ("endfacet", State::Facet(corners)) => {
+            let &[a, b, c] = corners.as_slice() else {
+                let reason = format!("a facet has three corners: found {}", corners.len());
                 return Err(Fault::format(reason));
             };
             surface.add([a, b, c])?;
-            *corners = None;
+            *state = State::Open;
         }
-        _ => return misplaced(),
+        _ => return Err(Fault::format(format!("{:?} does not belong here", shown(first)))),
     }
     Ok(())
 }

@@ -4,12 +4,9 @@ use std::sync::Arc;
 
 use crate::{
     MeshError,
-    error::Trouble,
-    mesh::{between, quartered},
+    error::{FARTHEST, Trouble},
+    subdivision::{between, quartered},
 };
-
-/// Coordinates of textures reach so far in either direction. Floats of 32 bits would not tell the texels of a picture apart much farther out.
-pub(crate) const FARTHEST: f64 = 1e4;
 
 /// Where the corners of faces lie on a picture, and the picture if it is there.
 ///
@@ -81,14 +78,18 @@ impl Texture {
         self.picture.as_deref()
     }
 
-    /// With a picture of a kind that is known, if there is one; or without, and why.
+    /// With a picture of a kind that is known, if there is one; without it and with one more warning if it cannot be had.
     pub(crate) fn pictured(
         self,
         picture: Result<Option<Vec<u8>>, Trouble>,
-    ) -> (Option<Self>, Option<Trouble>) {
+        warnings: &mut Vec<Trouble>,
+    ) -> Self {
         match picture {
-            Ok(picture) => (Some(Self { picture: picture.map(Arc::from), ..self }), None),
-            Err(trouble) => (Some(self), Some(trouble)),
+            Ok(picture) => Self { picture: picture.map(Arc::from), ..self },
+            Err(trouble) => {
+                warnings.push(trouble);
+                self
+            }
         }
     }
 

@@ -178,31 +178,123 @@ fn parts_without_colours_are_white_beside_others() {
     assert_eq!(colours(&(json, bin)), None);
 }
 
+/// The colours of a file and its warnings.
+fn warned((json, bin): &(Value, Vec<u8>)) -> (Option<Vec<[f64; 3]>>, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, glb(json, bin)).expect("a file");
+    let (mesh, warnings) = Mesh::load_textured(&path).expect("a sound file");
+    let name = path.display().to_string();
+    let short = |warning: &softrast_mesh::MeshError| warning.to_string().replace(&name, "a.glb");
+    (mesh.colours().map(<[_]>::to_vec), warnings.iter().map(short).collect())
+}
+
 #[test]
-fn bad_colours_are_one_line_that_names_the_place() {
-    let place = "a.glb: node 0, mesh 0, primitive 0";
-    let kinds = "accessor 2: colours are VEC3 or VEC4 of floats or of normalized bytes or shorts";
+fn colours_that_cannot_be_used_are_left_out_with_one_warning() {
+    let place = "a.glb: mesh 0, primitive 0";
     let sound = || coloured(5121, "VEC3", &[0; 12]);
-    let (mut whole, mut few) = (sound(), sound());
-    whole.0["accessors"][2]["normalized"] = json!(false);
+    let (mut few, mut none, mut twice) =
+        (sound(), sound(), coloured(5126, "VEC3", &floats(&[f32::NAN; 12])));
     few.0["accessors"][2]["count"] = json!(3);
+    none.0["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!("red");
+    twice.0["nodes"] = json!([{"mesh": 0}, {"mesh": 0}]);
+    twice.0["scenes"][0]["nodes"] = json!([0, 1]);
+    let nan = ", vertex 0: colour NaN is not from 0 to 1: the colours are left out";
+    let beyond =
+        ", accessor 2: 4 entries reach beyond buffer 0 or buffer view 2: the colours are left out";
     let cases = [
+        (coloured(5126, "VEC3", &floats(&[f32::NAN; 12])), nan),
+        (twice, nan),
         (
-            coloured(5126, "VEC3", &floats(&[f32::NAN; 12])),
-            ", vertex 0: colour \"NaN\" is not from 0 to 1",
+            coloured(5121, "VEC2", &[0; 12]),
+            ", accessor 2: colours are of type VEC3 or VEC4, not \"VEC2\": the colours are left out",
         ),
-        (coloured(5121, "VEC2", &[0; 12]), &format!(", {kinds}")),
-        (whole, &format!(", {kinds}")),
-        (few, ": 3 colours for 4 vertices"),
         (
-            coloured(5126, "VEC3", &[0; 12]),
-            ", accessor 2: 4 entries reach beyond the binary chunk or buffer view 2",
+            coloured(5122, "VEC3", &[0; 24]),
+            ", accessor 2: colours are floats, or bytes or shorts without a sign: the colours are left out",
         ),
+        (few, ": 3 colours for 4 vertices: the colours are left out"),
+        (none, ": COLOR_0 is no accessor: \"red\": the colours are left out"),
+        (coloured(5126, "VEC3", &[0; 12]), beyond),
     ];
-    for ((json, bin), message) in cases {
-        let error = Mesh::parse(&glb(&json, &bin), "a.glb").expect_err(message).to_string();
-        assert_eq!(error, format!("{place}{message}"));
+    for (file, message) in cases {
+        assert_eq!(warned(&file), (None, vec![format!("{place}{message}")]));
     }
+}
+
+#[test]
+fn colours_of_other_scales_are_scaled_or_clamped_with_one_warning() {
+    let fifth = 0.484_529_204_481_713;
+    let close = |file: &(Value, Vec<u8>), expected: [f64; 3], message: &str| {
+        let (colours, warnings) = warned(file);
+        let colours = colours.expect(message);
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-6;
+        assert!(colours.iter().all(|colour| colour.iter().zip(&expected).all(near)), "{colours:?}");
+        assert_eq!(warnings, [format!("a.glb: mesh 0, primitive 0, {message}")]);
+    };
+    let unsaid = |(mut json, bin): (Value, Vec<u8>)| {
+        json["accessors"][2]["normalized"] = json!(false);
+        (json, bin)
+    };
+    let bytes = unsaid(coloured(5121, "VEC4", &[0, 255, 51, 255].repeat(4)));
+    let message = "accessor 2: colours are not normalized: they are taken as 0 to 255";
+    close(&bytes, [0.0, 1.0, fifth], message);
+    let shorts: Vec<u8> = [0u16, 65535, 13107].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let shorts = unsaid(coloured(5123, "VEC3", &shorts.repeat(4)));
+    let message = "accessor 2: colours are not normalized: they are taken as 0 to 65535";
+    close(&shorts, [0.0, 1.0, fifth], message);
+    let levels = coloured(5126, "VEC3", &floats(&[0.0, 255.0, 51.0]).repeat(4));
+    let message =
+        "vertex 0: colour 255 is not from 0 to 1: all colours are taken as levels from 0 to 255";
+    close(&levels, [0.0, 1.0, fifth], message);
+    let bright = coloured(5126, "VEC3", &floats(&[-1.0, 9.0, 0.2]).repeat(4));
+    let message = "vertex 0: colour -1 is not from 0 to 1: it is clamped, and so are others";
+    close(&bright, [0.0, 1.0, fifth], message);
+}
+
+#[test]
+fn buffers_may_be_data_uris_with_or_without_a_binary_chunk() {
+    use base64::{
+        Engine,
+        engine::general_purpose::{STANDARD, STANDARD_NO_PAD},
+    };
+    let expected = [[0, 1, 2], [0, 2, 3]];
+    let (json, bin) = bytes();
+    for coded in [STANDARD.encode(&bin), STANDARD_NO_PAD.encode(&bin)] {
+        for head in ["data:application/octet-stream", "data:application/gltf-buffer", "data:"] {
+            let mut json = json.clone();
+            json["buffers"][0]["uri"] = json!(format!("{head};base64,{coded}"));
+            assert_eq!(faces((json.clone(), vec![])), expected);
+            // Without the head of an empty binary chunk.
+            let whole = glb(&json, &[]);
+            let mut file = whole[..whole.len() - 8].to_vec();
+            let length = (file.len() as u32).to_le_bytes();
+            file[8..12].copy_from_slice(&length);
+            assert_eq!(Mesh::parse(&file, "a.glb").expect("a sound file").faces(), expected);
+            // A second buffer beside the binary chunk.
+            json["buffers"] = json!([{"byteLength": 6}, json["buffers"][0]]);
+            json["bufferViews"][0]["buffer"] = json!(1);
+            json["bufferViews"][1] = json!({"buffer": 0, "byteLength": 6});
+            assert_eq!(faces((json, bin[48..].to_vec())), expected);
+        }
+    }
+    let mut broken = json;
+    broken["buffers"][0]["uri"] = json!("data:;base64,?");
+    let error = Mesh::parse(&glb(&broken, &bin), "a.glb").expect_err("not base64").to_string();
+    let place = "a.glb: node 0, mesh 0, primitive 0, accessor 0";
+    assert_eq!(error, format!("{place}: buffer 0 is a data URI that is not base64"));
+}
+
+#[test]
+fn more_sparse_entries_than_entries_are_one_line() {
+    let (mut json, bin) = bytes();
+    json["accessors"][0]["sparse"] = json!({
+        "count": 5,
+        "indices": {"bufferView": 1, "componentType": 5121},
+        "values": {"bufferView": 0},
+    });
+    let error = Mesh::parse(&glb(&json, &bin), "a.glb").expect_err("five of four").to_string();
+    assert!(error.ends_with("accessor 0: 5 sparse entries of 4"), "{error}");
 }
 
 #[test]
@@ -242,7 +334,7 @@ fn bad_files_are_one_line_that_names_the_place() {
         (with(|j| j["scene"] = json!(3)), "scene 3: there is none"),
         (
             with(|j| j["accessors"][1]["count"] = json!(9)),
-            "node 0, mesh 0, primitive 0, accessor 1: 9 entries reach beyond the binary chunk or buffer view 1",
+            "node 0, mesh 0, primitive 0, accessor 1: 9 entries reach beyond buffer 0 or buffer view 1",
         ),
         (
             with(|j| j["accessors"][1]["count"] = json!(5)),

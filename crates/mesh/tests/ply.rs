@@ -52,13 +52,17 @@ fn faces_may_come_first_and_other_elements_and_lists_are_skipped() {
 
 /// Three vertices with these properties after x, y and z, and these words after their coordinates.
 fn coloured(properties: &[&str], words: [&str; 3]) -> Result<Mesh, String> {
+    let file = text_of(properties, words);
+    Mesh::parse(file.as_bytes(), "a.ply").map_err(|error| error.to_string())
+}
+
+fn text_of(properties: &[&str], words: [&str; 3]) -> String {
     let properties: String = properties.iter().map(|p| format!("property {p}\n")).collect();
     let [a, b, c] = words;
-    let file = format!(
+    format!(
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
         element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n3 0 1 2\n"
-    );
-    Mesh::parse(file.as_bytes(), "a.ply").map_err(|error| error.to_string())
+    )
 }
 
 #[test]
@@ -78,15 +82,61 @@ fn colours_are_bytes_shorts_or_floats() {
     assert_eq!(coloured(&["uchar red"], ["7"; 3]).unwrap().colours(), None);
 }
 
+/// The red of the second vertex, and the warnings, of floats or whole numbers.
+fn second_red(kind: &str, words: [&str; 3]) -> (Option<f64>, Vec<String>) {
+    let properties = ["red", "green", "blue"].map(|channel| format!("{kind} {channel}"));
+    let properties: Vec<&str> = properties.iter().map(String::as_str).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    std::fs::write(&path, text_of(&properties, words)).unwrap();
+    let (mesh, warnings) = Mesh::load_textured(&path).unwrap();
+    let name = path.display().to_string();
+    let warnings = warnings.iter().map(|warning| warning.to_string().replace(&name, "a.ply"));
+    (mesh.colours().map(|colours| colours[1][0]), warnings.collect())
+}
+
 #[test]
-fn colours_out_of_range_name_their_line() {
-    let floats = ["float red", "float green", "float blue"];
-    for (word, message) in [("1.5", "1.5"), ("-0.1", "-0.1"), ("nan", "NaN"), ("inf", "inf")] {
-        let error = coloured(&floats, ["0 0 0", &format!("0 0 {word}"), "0 0 0"]).unwrap_err();
-        assert_eq!(error, format!("a.ply:14: colour \"{message}\" is not from 0 to 1"));
+fn colours_out_of_range_are_left_out_scaled_or_clamped_with_one_warning() {
+    let left_out = |kind, word: &str, shown, full| {
+        let words = ["0 0 0", &format!("{word} 0 0"), "0 0 0"];
+        let message =
+            format!("a.ply:14: colour {shown} is not from 0 to {full}: the colours are left out");
+        assert_eq!(second_red(kind, words), (None, vec![message]));
+    };
+    for (word, shown) in [("1.5", "1.5"), ("-0.1", "-0.1"), ("nan", "NaN"), ("inf", "inf")] {
+        left_out("float", word, shown, 1);
     }
-    let error = coloured(&["int red", "int green", "int blue"], ["0 0 256"; 3]).unwrap_err();
-    assert_eq!(error, "a.ply:13: colour \"256\" is not from 0 to 255");
+    for word in ["-nan(ind)", "1.#QNAN", "red"] {
+        left_out("double", word, "NaN", 1);
+    }
+    left_out("int", "300", "300", 255);
+    left_out("int", "-2", "-2", 255);
+    let (red, warnings) = second_red("float", ["0 0 0", "255 0 0", "0 128 0"]);
+    let message = "colour 255 is not from 0 to 1: all colours are taken as levels from 0 to 255";
+    assert_eq!((red, warnings), (Some(1.0), vec![format!("a.ply:14: {message}")]));
+    let (red, warnings) = second_red("float", ["0 0 0", "1.0000001 0 0", "0 0 0"]);
+    assert_eq!((red, warnings.len()), (Some(1.0), 1));
+    assert_eq!(second_red("int", ["0 0 0", "256 0 0", "0 0 0"]).0, Some(1.0));
+}
+
+#[test]
+fn values_after_those_of_the_header_are_skipped() {
+    let file = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 2\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0 255 255\n1 0 0\n0 1 0 .5 a word\n3 0 1 2 255 0 0\n3 2 1 0 3\n7 7 7\n";
+    let mesh = Mesh::parse(file.as_bytes(), "a.ply").unwrap();
+    assert_eq!(mesh.positions(), [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    assert_eq!(mesh.faces(), [[0, 1, 2], [2, 1, 0]]);
+}
+
+#[test]
+fn lines_of_the_header_that_are_not_of_the_format_are_skipped() {
+    let file = "ply\nformat ascii 1.0 \nMade by hand, see vertex and face\ncomment a\nobj_info num_cols 3\n\
+        elements follow\nelement vertex 3\nproperty float x\nproperty float y\n\nproperty float z in metres\n\
+        element face 1\nproperty list uchar int vertex_indices\nAuthor\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    for file in [file.to_owned(), file.replace('\n', "\r\n")] {
+        assert_eq!(Mesh::parse(file.as_bytes(), "a.ply").unwrap().faces(), [[0, 1, 2]]);
+    }
 }
 
 #[test]
@@ -109,7 +159,7 @@ fn bad_files_are_one_line_that_names_the_place() {
             "8: the header has no line that starts with format",
         ),
         (with("vertex 3", "vertex x").into(), "3: \"x\" is not a count"),
-        (with("end_header\n", "").into(), "9: \"0 0 0\" does not belong in the header of PLY 1.0"),
+        (with("end_header\n", "").into(), "13: the file ends before end_header"),
         (with("property float z\n", "").into(), "3: element vertex has no number z"),
         (with("face 1", "face 0").into(), " no faces: a PLY file lists them in its element face"),
         (

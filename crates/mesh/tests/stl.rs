@@ -51,6 +51,36 @@ fn solids_of_one_file_are_one_mesh() {
 }
 
 #[test]
+fn words_that_end_a_part_may_be_two() {
+    let whole = text(" a thing");
+    for (from, to) in [
+        ("endloop", "end loop"),
+        ("endfacet", "End\tFacet"),
+        ("endsolid", "END   SOLID"),
+        ("end", "end "),
+    ] {
+        let file = whole.replace(from, to);
+        let mesh = Mesh::parse(file.as_bytes(), "a.stl").unwrap();
+        assert_eq!((mesh.positions().len(), mesh.faces().len()), (4, 4), "{file}");
+    }
+}
+
+#[test]
+fn the_name_of_a_solid_may_have_any_words_and_stand_twice() {
+    let once = text(" a facet vertex endsolid solid thing");
+    let twice = format!("solid a\n{}endsolid a\n", text(" a"));
+    let lines = once.replacen('\n', "\nof several lines\n\nwith words\n", 1);
+    let unclosed = text(" a").replace("endsolid a\n", "") + &text(" b");
+    for (file, faces) in [(once, 4), (twice.clone(), 4), (lines, 4), (unclosed, 8)] {
+        let mesh = Mesh::parse(file.as_bytes(), "a.stl").unwrap();
+        assert_eq!((mesh.positions().len(), mesh.faces().len()), (4, faces), "{file}");
+    }
+    let marked = [b"\xef\xbb\xbf", twice.repeat(3).as_bytes()].concat();
+    let mesh = Mesh::parse(&marked, "a.stl").unwrap();
+    assert_eq!((mesh.positions().len(), mesh.faces().len()), (4, 12));
+}
+
+#[test]
 fn bad_files_are_one_line_that_names_the_place() {
     let whole = text("");
     let with = |from: &str, to: &str| whole.replacen(from, to, 1).into_bytes();

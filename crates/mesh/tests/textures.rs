@@ -24,17 +24,23 @@ fn folder(files: &[(&str, &[u8])]) -> TempDir {
     folder
 }
 
-/// The mesh of a file, and why its texture was left out, without the name of the folder.
+/// The mesh of a file, and its one warning, if any, without the name of the folder.
 fn load(folder: &Path, name: &str) -> (Mesh, Option<String>) {
+    let (mesh, mut warnings) = load_all(folder, name);
+    assert!(warnings.len() <= 1, "{warnings:?}");
+    (mesh, warnings.pop())
+}
+
+fn load_all(folder: &Path, name: &str) -> (Mesh, Vec<String>) {
     let path = folder.join(name);
-    let (mesh, left_out) = Mesh::load_textured(&path).unwrap();
+    let (mesh, warnings) = Mesh::load_textured(&path).unwrap();
     let plain = Mesh::load(&path).unwrap();
     assert_eq!(plain.texture(), None);
     assert_eq!((plain.positions(), plain.faces()), (mesh.positions(), mesh.faces()));
-    let left_out = left_out.map(|error| error.to_string());
+    let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     let prefix = format!("{}/", folder.display());
-    assert!(left_out.iter().all(|text| !text.contains(char::is_control)), "{left_out:?}");
-    (mesh, left_out.map(|text| text.replace(&prefix, "")))
+    assert!(warnings.iter().all(|text| !text.contains(char::is_control)), "{warnings:?}");
+    (mesh, warnings.iter().map(|text| text.replace(&prefix, "")).collect())
 }
 
 /// The coordinates of the corners of each face.
@@ -156,6 +162,113 @@ fn a_picture_that_cannot_be_had_leaves_coordinates_and_says_why() {
     );
     // Materials without pictures are as good as none.
     assert_eq!(mtl(&[], "newmtl a\nKd 1 0 0"), None);
+}
+
+const FACES: &str = "usemtl picture\nf 1/1 2/2 3/3 4/4\n";
+
+#[test]
+fn a_line_may_name_several_libraries_and_names_may_hold_spaces() {
+    let picture: (&str, &[u8]) = ("a.png", PNG);
+    let plain: (&str, &[u8]) = ("plain.mtl", b"newmtl plain\nKd 1 1 1\n");
+    let shown = b"newmtl picture\nmap_Kd a.png\n";
+    for (line, library) in [
+        ("plain.mtl b.mtl", "b.mtl"),
+        ("b.mtl plain.mtl", "b.mtl"),
+        ("plain.mtl my second.MTL", "my second.MTL"),
+        ("my first.mtl plain.mtl", "my first.mtl"),
+        ("old.mtl copy.mtl", "old.mtl copy.mtl"),
+        ("materials", "materials"),
+        ("my materials", "my materials"),
+        ("plain.mtl materials", "materials"),
+        ("plain.mtl\nmtllib b.mtl\nmtllib b.mtl", "b.mtl"),
+    ] {
+        let obj = format!("mtllib {line}\n{SQUARE}{FACES}");
+        let folder = folder(&[("a.obj", obj.as_bytes()), plain, (library, shown), picture]);
+        let (mesh, warning) = load(folder.path(), "a.obj");
+        assert_eq!(warning, None, "{line}");
+        assert_eq!(mesh.texture().unwrap().picture(), Some(PNG), "{line}");
+    }
+    // Words that are files count where the whole is none.
+    let obj = format!("mtllib gone b\n{SQUARE}{FACES}");
+    let folder = folder(&[("a.obj", obj.as_bytes()), ("b", shown), picture]);
+    let (mesh, warning) = load(folder.path(), "a.obj");
+    assert!(warning.unwrap().starts_with("gone: cannot be read: "));
+    assert_eq!(mesh.texture().unwrap().picture(), Some(PNG));
+}
+
+#[test]
+fn a_library_that_is_missing_is_one_warning_and_the_others_are_read() {
+    for head in ["mtllib gone.mtl\nmtllib b.mtl\n", "mtllib b.mtl gone.mtl\n"] {
+        let obj = format!("{head}{SQUARE}{FACES}");
+        let files: [(&str, &[u8]); 3] = [
+            ("a.obj", obj.as_bytes()),
+            ("b.mtl", b"newmtl picture\nmap_Kd a.png\n"),
+            ("a.png", PNG),
+        ];
+        let (mesh, warning) = load(folder(&files).path(), "a.obj");
+        let warning = warning.unwrap();
+        assert!(warning.starts_with("gone.mtl: cannot be read: "), "{warning}");
+        assert_eq!(mesh.texture().unwrap().picture(), Some(PNG));
+    }
+}
+
+#[test]
+fn the_first_library_that_shows_a_picture_of_a_material_counts() {
+    let obj = format!("mtllib z.mtl a.mtl\n{SQUARE}{FACES}");
+    let files: [(&str, &[u8]); 5] = [
+        ("a.obj", obj.as_bytes()),
+        ("z.mtl", b"newmtl picture\nmap_Kd a.png\n"),
+        ("a.mtl", b"newmtl picture\nmap_Kd a.jpg\n"),
+        ("a.png", PNG),
+        ("a.jpg", JPEG),
+    ];
+    let (mesh, warning) = load(folder(&files).path(), "a.obj");
+    assert_eq!((mesh.texture().unwrap().picture(), warning), (Some(PNG), None));
+}
+
+#[test]
+fn libraries_and_pictures_outside_of_the_folder_are_not_opened() {
+    let obj = |library: &str| format!("mtllib {library}\n{SQUARE}{FACES}");
+    let outside = "in/a.obj";
+    let files = |text: &str| {
+        folder(&[
+            (outside, text.as_bytes()),
+            ("b.mtl", b"newmtl picture\nmap_Kd a.png\n"),
+            ("a.png", PNG),
+        ])
+    };
+    let found = files(&obj("../b.mtl"));
+    let (mesh, warning) = load(&found.path().join("in"), "a.obj");
+    assert!(warning.unwrap().starts_with("b.mtl: cannot be read: "));
+    assert_eq!(mesh.texture().unwrap().picture(), None);
+    let absolute = format!("mtllib {}\n", found.path().join("b.mtl").display());
+    let found = files(&format!("{absolute}{SQUARE}{FACES}"));
+    assert!(load(&found.path().join("in"), "a.obj").1.unwrap().starts_with("b.mtl: "));
+    let inside: (&str, &[u8]) = ("in/b.mtl", b"newmtl picture\nmap_Kd ../a.png\n");
+    let found = folder(&[(outside, obj("b.mtl").as_bytes()), inside, ("a.png", PNG)]);
+    assert!(load(&found.path().join("in"), "a.obj").1.unwrap().starts_with("a.png: cannot be"));
+}
+
+#[test]
+fn libraries_without_end_are_read_up_to_a_hundred() {
+    let names: String = (0..300).map(|k| format!(" {k}.mtl")).collect();
+    let lines: String = (0..300).map(|k| format!("mtllib {k}.mtl\n")).collect();
+    for head in [format!("mtllib{names}\n"), lines] {
+        let obj = format!("{head}{SQUARE}{FACES}");
+        let (mesh, warnings) = load_all(folder(&[("a.obj", obj.as_bytes())]).path(), "a.obj");
+        assert_eq!(mesh.faces().len(), 2);
+        let expected = "a.obj: materials: more than 100 libraries: the others are not read";
+        assert_eq!((warnings.len(), warnings[0].as_str()), (101, expected));
+    }
+}
+
+#[test]
+fn signs_in_the_names_of_files_stay_out_of_warnings() {
+    let obj = format!("mtllib a.mtl\n{SQUARE}{FACES}");
+    let name = format!("newmtl picture\nmap_Kd \u{1b}[31m{}.png\n", "x".repeat(5000));
+    let files: [(&str, &[u8]); 2] = [("a.obj", obj.as_bytes()), ("a.mtl", name.as_bytes())];
+    let warning = load(folder(&files).path(), "a.obj").1.unwrap();
+    assert!(warning.starts_with("\u{fffd}[31mx") && warning.len() < 1000, "{warning}");
 }
 
 type Change<'a> = &'a dyn Fn(&mut Value, &mut Vec<u8>);
@@ -284,12 +397,12 @@ fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
         ),
         (
             &|j, _| j["accessors"][1]["count"] = json!(9),
-            " 0, accessor 1: 9 entries reach beyond the binary chunk or buffer view 1",
+            " 0: 9 texture coordinates for 4 vertices",
             false,
         ),
         (
             &|j, _| j["accessors"][1]["count"] = json!(2),
-            " 0: index 2 is beyond its 2 texture coordinates",
+            " 0: 2 texture coordinates for 4 vertices",
             false,
         ),
         (
@@ -328,7 +441,7 @@ fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
         ),
         (
             &|j, _| j["bufferViews"][3]["byteLength"] = json!(1u64 << 40),
-            "image 0: it reaches beyond the binary chunk",
+            "image 0: it reaches beyond its buffer",
             true,
         ),
         (
@@ -349,6 +462,50 @@ fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
     let file = glb(|json, _| json["images"] = json!([{"uri": "../none.png"}]));
     let (_, left_out) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
     assert!(left_out.unwrap().starts_with("none.png: cannot be read: "));
+}
+
+#[test]
+fn the_diffuse_picture_of_specular_and_glossy_materials_is_the_texture() {
+    for required in [false, true] {
+        for beside in [json!(null), json!({"baseColorTexture": {"index": 7}})] {
+            let file = glb(|json, _| {
+                let name = "KHR_materials_pbrSpecularGlossiness";
+                json["materials"] = json!([{
+                    "extensions": {name: {"diffuseTexture": {"index": 0}}},
+                    "pbrMetallicRoughness": beside,
+                }]);
+                if required {
+                    json["extensionsRequired"] = json!([name]);
+                }
+            });
+            let (mesh, warning) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
+            assert_eq!((mesh.texture().unwrap().picture(), warning), (Some(PNG), None));
+        }
+    }
+}
+
+#[test]
+fn a_required_extension_that_is_not_read_is_a_warning_or_an_error() {
+    let requiring = |names: &[&str]| glb(|json, _| json["extensionsRequired"] = json!(names));
+    for name in ["KHR_materials_transmission", "KHR_texture_transform", "EXT_texture_webp"] {
+        let file = requiring(&["KHR_mesh_quantization", name]);
+        let (mesh, warning) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
+        assert_eq!(mesh.texture().unwrap().picture(), Some(PNG));
+        let expected = format!(
+            "a.glb: JSON chunk: needs the extension {name}, which is not read: the mesh may look different"
+        );
+        assert_eq!(warning, Some(expected));
+    }
+    for name in [
+        "KHR_draco_mesh_compression",
+        "EXT_meshopt_compression",
+        "EXT_mesh_gpu_instancing",
+        "ACME_holes",
+    ] {
+        let error = Mesh::parse(&requiring(&["KHR_materials_unlit", name]), "a.glb").unwrap_err();
+        let message = error.to_string();
+        assert!(message.starts_with("a.glb: JSON chunk: ") && message.contains(name), "{message}");
+    }
 }
 
 /// A ball with a seam: faces of its right half have coordinates of their own.

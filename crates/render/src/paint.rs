@@ -55,8 +55,8 @@ impl Colour {
     pub(crate) fn of(
         mesh: &Mesh,
         args: &Args,
-        left_out: Option<MeshError>,
-    ) -> anyhow::Result<(Self, Option<String>)> {
+        reasons: &[MeshError],
+    ) -> anyhow::Result<(Self, Vec<String>)> {
         if args.size * samples(args) > MOST_SAMPLES {
             return Err(Error::usage(format!(
                 "--samples {} times --size {} is above {MOST_SAMPLES}: take fewer",
@@ -64,12 +64,12 @@ impl Colour {
                 args.size
             )));
         }
-        let (paint, warning) = Paint::of(mesh, args, left_out)?;
+        let (paint, warnings) = Paint::of(mesh, args, reasons)?;
         let [low, high] = mesh.bounds();
         let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         // Under a softness without end so narrow a one would draw near faces all over the image: docs/notes.md, Colour.
         let depth_scale = args.softness.is_none().then_some(DEPTH * longest);
-        Ok((Self { paint, shade: args.shade, samples: samples(args), depth_scale }, warning))
+        Ok((Self { paint, shade: args.shade, samples: samples(args), depth_scale }, warnings))
     }
 }
 
@@ -83,37 +83,36 @@ pub(crate) fn samples(args: &Args) -> usize {
 }
 
 impl Paint {
-    /// What `args` ask for of a mesh; `left_out` says why its own texture is not there. And a warning, if that matters.
-    fn of(
-        mesh: &Mesh,
-        args: &Args,
-        left_out: Option<MeshError>,
-    ) -> anyhow::Result<(Self, Option<String>)> {
+    /// The paint that `args` ask for, and warnings; `reasons` say why colours or the texture are not there or not as the file has them.
+    fn of(mesh: &Mesh, args: &Args, reasons: &[MeshError]) -> anyhow::Result<(Self, Vec<String>)> {
         let name = args.mesh.display();
+        let mut warnings: Vec<String> = reasons.iter().map(ToString::to_string).collect();
         if let Some(path) = &args.texture {
-            return match (mesh.texture(), left_out) {
-                (Some(texture), _) => {
+            return match mesh.texture() {
+                Some(texture) => {
                     let picture = PictureFile::load(path).context("--texture")?;
-                    Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), None))
+                    Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), vec![]))
                 }
-                (None, Some(reason)) => bail!("--texture has no place on the mesh: {reason}"),
-                (None, None) => bail!("--texture: {name} has no texture coordinates"),
+                None if warnings.is_empty() => {
+                    bail!("--texture: {name} has no texture coordinates")
+                }
+                None => bail!("--texture has no place on the mesh: {}", warnings.join("; ")),
             };
         }
-        let mut warning = left_out.map(|reason| reason.to_string());
         if let Some((texture, picture)) = mesh.texture().and_then(|it| Some((it, it.picture()?))) {
             match PictureFile::decode(picture) {
                 Ok(picture) => {
-                    return Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), None));
+                    return Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), warnings));
                 }
-                Err(reason) => warning = Some(format!("{name}: its picture: {reason:#}")),
+                Err(reason) => warnings
+                    .push(format!("drawn without its texture: {name}: its picture: {reason:#}")),
             }
         }
         let paint = match mesh.colours() {
             Some(colours) => Self::Vertices(colours.as_flattened().to_vec()),
             None => Self::Grey,
         };
-        Ok((paint, warning.map(|reason| format!("drawn without its texture: {reason}"))))
+        Ok((paint, warnings))
     }
 
     fn textured(texture: &Texture, picture: RgbImage) -> Self {

@@ -69,13 +69,13 @@ impl Scene {
     /// Reads the files that `args` names.
     pub(crate) fn load(args: &Args) -> anyhow::Result<Self> {
         let (softness, phi) = softness(args)?;
-        let (mesh, left_out) = match args.colour {
+        let (mesh, reasons) = match args.colour {
             true => Mesh::load_textured(&args.mesh)?,
-            false => (Mesh::load(&args.mesh)?, None),
+            false => (Mesh::load(&args.mesh)?, vec![]),
         };
         let mesh = if args.raw { mesh } else { mesh.normalized() };
-        let coloured = args.colour.then(|| Colour::of(&mesh, args, left_out)).transpose()?;
-        let (colour, warning) = coloured.map_or((None, None), |(c, warning)| (Some(c), warning));
+        let coloured = args.colour.then(|| Colour::of(&mesh, args, &reasons)).transpose()?;
+        let (colour, warnings) = coloured.map_or((None, vec![]), |(c, warned)| (Some(c), warned));
         let target = args.target.as_ref().map(|target| pixels(target, args.size)).transpose()?;
         let orbit = |&azimuth: &f64| [args.distance, args.elevation, azimuth, args.fov];
         let camera = |&azimuth_deg: &f64| {
@@ -95,7 +95,7 @@ impl Scene {
             tolerance: args.tolerance,
             target,
             colour,
-            warnings: warning.into_iter().chain(across).collect(),
+            warnings: warnings.into_iter().chain(across).collect(),
         })
     }
 

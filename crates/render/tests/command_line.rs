@@ -175,8 +175,8 @@ fn pictured(folder: &Path) -> [String; 2] {
     fs::write(folder.join("square.mtl"), "newmtl a\nmap_Kd square.png\n").unwrap();
     fs::write(folder.join("square.obj"), format!("mtllib square.mtl\nusemtl a\n{SQUARE}")).unwrap();
     let [obj, glb] = ["square.obj", "square.glb"].map(|name| folder.join(name));
-    let (mesh, left_out) = Mesh::load_textured(&obj).unwrap();
-    assert!(left_out.is_none());
+    let (mesh, warnings) = Mesh::load_textured(&obj).unwrap();
+    assert!(warnings.is_empty());
     mesh.save(&glb).unwrap();
     [obj, glb].map(|path| path.to_str().expect("a path in ASCII").to_owned())
 }
