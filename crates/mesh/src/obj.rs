@@ -1,8 +1,9 @@
-//! An OBJ file: its vertices and faces, and the text of one.
-//!
-//! Read by code of our own: the crate for it numbers vertices as faces first use them, and knows no negative indices that reach too far.
+//! An OBJ file: its statements checked, then parsed by `tobj`; and the text of one.
 
-use std::{fmt, path::Path};
+use std::{
+    fmt::{self, Write as _},
+    path::Path,
+};
 
 use crate::{
     Fault, Mesh, Texture,
@@ -23,24 +24,29 @@ use crate::{
 pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Trouble> {
     // A face may come before its vertices, so their number must be known first.
     let vertices = statements(bytes).filter(|s| s.words().next() == Some("v")).count();
-    let (mut positions, mut polygons, mut polygon) = (Vec::new(), Polygons::default(), Vec::new());
     let mut colours = Colours::new([1.0; 3], Beyond::LeftOut);
+    // The parser numbers vertices as faces first use them. A first polygon that lists them all keeps the order of the file, and those which
+    // no face uses.
+    let all: String = (1..=vertices).map(|vertex| format!(" {vertex}")).collect();
+    let (mut text, mut vertices_read) = (format!("f{all}\n"), 0);
     for statement in statements(bytes) {
         let line = statement.line;
         let mut words = statement.words();
         let read = match words.next() {
-            Some("v") => position(&mut words).map(|position| {
-                positions.push(position);
-                if let Some(channels) = colour(words) {
-                    colours.push(channels, || Place::Line(line));
-                }
-            }),
-            Some("f") => face(words, positions.len(), vertices, &mut polygon)
-                .and_then(|()| polygons.add(&polygon)),
+            Some("v") => {
+                vertices_read += 1;
+                position(&mut words, &mut text).map(|()| {
+                    if let Some(channels) = colour(words) {
+                        colours.push(channels, || Place::Line(line));
+                    }
+                })
+            }
+            Some("f") => face(words, vertices_read, vertices, &mut text),
             _ => Ok(()),
         };
         read.map_err(|reason| Trouble::Line(line, reason))?;
     }
+    let (positions, polygons) = parsed(&text)?;
     let cut = polygons.cut(&positions)?;
     if cut.is_empty() {
         return Err(Trouble::NoFaces("an OBJ file lists them on lines that start with f"));
@@ -55,17 +61,48 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
     Ok(Parts { positions, faces, colours, texture, warnings })
 }
 
-fn position<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], Fault> {
-    let mut position = [0.0; 3];
+/// Vertices and polygons of checked statements, less the first polygon.
+fn parsed(text: &str) -> Result<(Vec<[f64; 3]>, Polygons), Trouble> {
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let fault = |reason| Trouble::part("statements", reason);
+    let (models, _) =
+        tobj::load_obj_buf(&mut text.as_bytes(), &tobj::LoadOptions::default(), no_materials)
+            .map_err(|reason| fault(reason.to_string()))?;
+    let (mut positions, mut polygons) = (Vec::new(), Polygons::default());
+    for tobj::Model { mesh, .. } in models {
+        positions.extend(mesh.positions.as_chunks().0);
+        for polygon in split(&mesh.indices, &mesh.face_arities).skip(1) {
+            polygons.add(polygon).map_err(|reason| fault(reason.to_string()))?;
+        }
+    }
+    Ok((positions, polygons))
+}
+
+/// The polygons of a parsed model; no `arities` means that all are triangles.
+fn split<'a>(mut indices: &'a [u32], arities: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
+    let mut arities = arities.iter();
+    std::iter::from_fn(move || {
+        let corners = arities.next().map_or(3, |&n| n as usize);
+        let (polygon, rest) = indices.split_at_checked(corners)?;
+        indices = rest;
+        Some(polygon)
+    })
+}
+
+/// Copies three coordinates to `text`.
+fn position<'a>(words: impl Iterator<Item = &'a str>, text: &mut String) -> Result<(), Fault> {
+    text.push('v');
     let mut found = 0;
-    for (x, word) in position.iter_mut().zip(words) {
-        *x = word.parse().map_err(|_| Fault::Number(shown(word)))?;
-        if !fits_f32(*x) {
+    for word in words.take(3) {
+        let x: f64 = word.parse().map_err(|_| Fault::Number(shown(word)))?;
+        if !fits_f32(x) {
             return Err(Fault::NotFinite(shown(word)));
         }
+        text.extend([" ", word]);
         found += 1;
     }
-    if found < 3 { Err(Fault::Coordinates(found)) } else { Ok(position) }
+    text.push('\n');
+    if found < 3 { Err(Fault::Coordinates(found)) } else { Ok(()) }
 }
 
 /// The colour after the coordinates of a vertex. One further number is a weight, and other lists are not of the format.
@@ -75,20 +112,24 @@ fn colour<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 3]> {
     words.next().is_none().then_some(channels)
 }
 
-/// The vertices of one face, from 0.
+/// Writes the absolute indices of one polygon, from 1, to `text`.
 fn face<'a>(
     words: impl Iterator<Item = &'a str>,
     vertices_read: usize,
     vertices: usize,
-    polygon: &mut Vec<u32>,
+    text: &mut String,
 ) -> Result<(), Fault> {
-    polygon.clear();
+    text.push('f');
+    let mut found = 0;
     for word in words {
         let number = absolute(word, vertices_read, vertices)?;
-        let vertex = u32::try_from(number - 1);
-        polygon.push(vertex.map_err(|_| Fault::format("more vertices than 32 bits can number"))?);
+        u32::try_from(number - 1)
+            .map_err(|_| Fault::format("more vertices than 32 bits can number"))?;
+        write!(text, " {number}").expect("a string can be written to");
+        found += 1;
     }
-    if polygon.len() >= 3 { Ok(()) } else { Err(Fault::Corners(polygon.len())) }
+    text.push('\n');
+    if found >= 3 { Ok(()) } else { Err(Fault::Corners(found)) }
 }
 
 /// A mesh as the text of an OBJ file.
