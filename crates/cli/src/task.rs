@@ -110,6 +110,9 @@ pub trait Task: InverseProblem + Sized {
         rgb_from_gray(image, size, size)
     }
 
+    /// Whether it has a [`drawing`](Task::drawing).
+    const DRAWS: bool = false;
+
     /// What is found as a drawing, a file of SVG; none unless the task has one. `theta` is that of the instance.
     fn drawing(&self, _scene: &Self::Scene<HostBackend>, _theta: &[f64]) -> Option<String> {
         None
