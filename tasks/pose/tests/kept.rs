@@ -21,12 +21,9 @@ const POSE: Program =
 fn inputs(folder: &Path) {
     let path = |name: &str| folder.join(name);
     let camera = r#"{ "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 5], "fx": 20, "fy": 20, "cx": 8, "cy": 8, "width": 16, "height": 16 }"#;
-    for (name, text) in [
-        ("mesh.obj", OCTAHEDRON),
-        ("work-mesh.obj", OCTAHEDRON),
-        ("softness.json", SOFTNESS),
-        ("camera.json", camera),
-    ] {
+    for (name, text) in
+        [("mesh.obj", OCTAHEDRON), ("softness.json", SOFTNESS), ("camera.json", camera)]
+    {
         fs::write(path(name), text).unwrap();
     }
     let coloured = |line: &str| {
@@ -34,13 +31,13 @@ fn inputs(folder: &Path) {
     };
     let coloured: String = OCTAHEDRON.lines().map(coloured).collect();
     fs::write(path("coloured.obj"), coloured).unwrap();
-    for folder in ["masks", "given", "work"] {
+    for folder in ["masks", "given", "work", "found"] {
         fs::create_dir(path(folder)).unwrap();
     }
     let near = |x: u32, y: u32| (i64::from(x) - 8).abs() + (i64::from(y) - 8).abs() < 5;
     let mask = GrayImage::from_fn(16, 16, |x, y| Luma([if near(x, y) { 255 } else { 0 }]));
     for name in [
-        "overlay.png",
+        "work/overlay.png",
         "overlay-mask.png",
         "mask.png",
         "masks/a.png",
@@ -52,38 +49,39 @@ fn inputs(folder: &Path) {
         mask.save(path(name)).unwrap();
     }
     fs::write(path("work/result.json"), camera).unwrap();
+    fs::write(path("found/result.json"), camera).unwrap();
     fs::write(path("work/mesh.obj"), OCTAHEDRON).unwrap();
 }
 
 const LINES: &[(&str, &str)] = &[
     ("--mesh mesh.obj --out .", ""),
     ("--mesh mesh.obj --target overlay-mask.png --out .", ""),
-    ("--mesh mesh.obj --target overlay.png --out .", "overlay.png is an input of this run"),
+    ("--mesh mesh.obj --target work/overlay.png --out work", "overlay.png is an input of this run"),
     (
-        "--mesh ./masks/../mesh.obj --target ./work/../overlay.png --out masks/..",
+        "--mesh ./masks/../mesh.obj --target ./work/overlay.png --out masks/../work",
         "is an input of this run",
     ),
     ("--mesh mesh.obj --targets masks --out .", ""),
     ("--mesh mesh.obj --targets given --out given", "overlay-a.png is an input of this run"),
     ("--mesh mesh.obj --target mask.png --camera camera.json --start camera.json --out .", ""),
     (
-        "--mesh mesh.obj --target mask.png --camera work/result.json --out work",
+        "--mesh mesh.obj --target mask.png --camera found/result.json --out found",
         "result.json is an input of this run",
     ),
     (
-        "--mesh mesh.obj --target mask.png --start work/result.json --out work",
+        "--mesh mesh.obj --target mask.png --start found/result.json --out found",
         "result.json is an input of this run",
     ),
     ("--mesh work/mesh.obj --out work", "result.json is not a recorded result"),
     ("--colour --mesh coloured.obj --out .", ""),
     ("--softness softness.json --out .", ""),
-    ("--softness=work/result.json --out work", "result.json is an input of this run"),
+    ("--softness=found/result.json --out found", "result.json is an input of this run"),
     (
         "evaluate --runs 1 --mesh mesh.obj --softness softness.json --against softness.json --out .",
         "",
     ),
     (
-        "evaluate --runs 1 --against 'work/result.json_--learning-rate_0.1' --out work",
+        "evaluate --runs 1 --against 'found/result.json_--learning-rate_0.1' --out found",
         "result.json",
     ),
     (
