@@ -41,7 +41,7 @@ pub trait Task: InverseProblem + Sized {
     /// Flags of `solve` for pictures that the user gives; [`NoArgs`] where it takes none.
     type Pictures: clap::Args + Clone;
 
-    /// What comes of the pictures that the flags name; nothing if they name none.
+    /// What comes of the pictures that the flags name; nothing if they name none. [`Given::will_write`] is called before the work.
     fn solve_given(
         _given: &Given<'_, Self::Args>,
         _pictures: &Self::Pictures,
