@@ -33,7 +33,7 @@ pub struct Common {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
     pub seed: u64,
 
-    /// Folder for the results; made if missing
+    /// Folder for the results; made if missing [default: out/TASK, or out/TASK-COMMAND]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 

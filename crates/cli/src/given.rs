@@ -1,6 +1,6 @@
 //! `solve` for pictures that the user gives.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use softrast_inverse::{MaskRules, Method, Picture};
 use softrast_lab::{
@@ -9,7 +9,10 @@ use softrast_lab::{
 use softrast_raster::{BackendChoice, Pinhole};
 use softrast_softness::ScheduledSoftness;
 
-use crate::{Common, MethodArgs, Scales, SoftnessChoice, backend, session::Session};
+use crate::{
+    Common, MethodArgs, Scales, SoftnessChoice, backend,
+    session::{RESULT, Session},
+};
 
 /// The flags that every `solve` has, for pictures that the user gives.
 pub struct Given<'a, A> {
@@ -68,6 +71,21 @@ impl<A> Given<'_, A> {
     /// The learning rate of the command line.
     pub fn learning_rate(&self) -> Option<f64> {
         self.method.learning_rate
+    }
+
+    /// Makes sure, before the work, that files of these names may be written beside the results. `reads` are files that the work reads
+    /// without a flag that names them, which no result replaces.
+    ///
+    /// # Errors
+    ///
+    /// If a name is that of a file which is no earlier result, or the folder cannot be written.
+    pub fn will_write<'n>(
+        &self,
+        names: impl IntoIterator<Item = &'n str>,
+        reads: impl IntoIterator<Item = PathBuf>,
+    ) -> anyhow::Result<()> {
+        reads.into_iter().for_each(|path| self.session.inputs.borrow_mut().add(&path));
+        self.session.claim(names.into_iter().chain([RESULT]))
     }
 
     /// Where results go.

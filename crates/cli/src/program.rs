@@ -1,8 +1,8 @@
-use std::{ffi::OsString, io::Write, path::PathBuf, process::ExitCode};
+use std::{cell::RefCell, ffi::OsString, io::Write, path::Path, process::ExitCode};
 
 use clap::CommandFactory;
 use softrast_lab::{
-    Failure,
+    Failure, Inputs,
     program::{parse, repeated, run_main},
 };
 
@@ -39,9 +39,17 @@ pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<
     };
     let (command, shared) = line.command.shared();
     let Common { json, quiet, ref out, .. } = shared.common;
-    let out = out.clone().unwrap_or_else(|| PathBuf::from("out").join(T::NAME));
-    let session =
-        Session { again: repeated(T::PROGRAM, &words), command, task: T::NAME, out, quiet };
+    // Results of different commands do not mix.
+    let folder = if command == "solve" { T::NAME.into() } else { format!("{}-{command}", T::NAME) };
+    let session = Session {
+        again: repeated(T::PROGRAM, &words),
+        command,
+        task: T::NAME,
+        program: T::PROGRAM,
+        inputs: RefCell::new(Inputs::of_words(&words, &["--out"])),
+        out: out.clone().unwrap_or_else(|| Path::new("out").join(folder)),
+        quiet,
+    };
     let output = match line.command {
         Command::Solve(flags) => commands::evaluate::solve::<T>(&session, *flags)?,
         Command::Evaluate(flags) => commands::evaluate::evaluate::<T>(&session, flags)?,

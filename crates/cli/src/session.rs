@@ -1,8 +1,12 @@
-use std::path::PathBuf;
+use std::{cell::RefCell, path::PathBuf};
 
 use serde_json::json;
 use softrast_lab::{
-    OutputFolder, Progress, Runner, Store, Work, format::line, program::Output, report::Report,
+    Inputs, OutputFolder, Progress, Runner, Store, Work,
+    format::line,
+    program::{Output, say},
+    report::Report,
+    shown,
 };
 
 use crate::{command_line::Kept, commands::ended};
@@ -13,8 +17,11 @@ pub(crate) struct Session {
     pub(crate) again: String,
     /// Name of the command.
     pub(crate) command: &'static str,
-    /// Name of the task.
+    /// Name of the task, and of its program.
     pub(crate) task: &'static str,
+    pub(crate) program: &'static str,
+    /// What it reads, and therefore never replaces.
+    pub(crate) inputs: RefCell<Inputs>,
     /// Where results go.
     pub(crate) out: PathBuf,
     pub(crate) quiet: bool,
@@ -23,23 +30,24 @@ pub(crate) struct Session {
 impl Session {
     /// The folder for the results.
     pub(crate) fn folder(&self) -> anyhow::Result<OutputFolder> {
-        Ok(OutputFolder::open(&self.out)?)
+        let command = format!("{} {}", self.program, self.command);
+        Ok(OutputFolder::open(&self.out, &command, &self.inputs.borrow())?)
+    }
+
+    /// Makes sure, before the work, that files of these names may be written to the folder, and the page.
+    pub(crate) fn claim<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> anyhow::Result<()> {
+        Ok(self.folder()?.claim(names.into_iter().chain([PAGE]))?)
     }
 
     /// Somebody to run experiments, who keeps what is finished on file unless the command is `solve`.
-    pub(crate) fn runner(&self, folder: &OutputFolder, kept: Kept) -> anyhow::Result<Runner> {
+    pub(crate) fn runner(&self, folder: &mut OutputFolder, kept: Kept) -> anyhow::Result<Runner> {
         let progress = Progress::of_program(self.quiet);
-        let path = folder.file(&format!("{}.jsonl", self.command));
-        let store = match kept {
-            _ if self.command == "solve" => Store::in_memory(),
-            Kept { shard: Some(shard), .. } => Store::of_shard(&path, shard)?,
-            Kept { resume: false, .. } => Store::fresh(&path),
-            Kept { resume: true, .. } => {
-                let (store, note) = Store::open(&path)?;
-                note.iter().for_each(|note| eprintln!("{note}"));
-                store
-            }
-        };
+        if self.command == "solve" {
+            return Ok(Runner { progress, store: Store::in_memory() });
+        }
+        let name = format!("{}.jsonl", self.command);
+        let (store, note) = Store::of_command(folder, &name, kept.shard, kept.resume)?;
+        note.iter().for_each(|note| say(note));
         Ok(Runner { progress, store })
     }
 
@@ -49,7 +57,7 @@ impl Session {
         let part = runner.part(job);
         let part = part.map_err(|error| ended(error, runner.store.kept()))?;
         let json = json!({
-            "task": self.task, "command": self.command, "out": self.out, "shard": shard, "finished": part.finished,
+            "task": self.task, "command": self.command, "out": shown(&self.out), "shard": shard, "finished": part.finished,
         });
         let text = vec![
             format!("{}: shard {shard} has finished its {} runs", self.task, part.finished),
@@ -75,13 +83,13 @@ impl Session {
         for (key, value) in [("task", self.task), ("command", self.command)] {
             output.json[key] = value.into();
         }
-        output.json["out"] = json!(self.out);
+        output.json["out"] = shown(&self.out).into();
         output.text.push(line("report", &self.out.join(PAGE).display().to_string()));
         folder.stage(PAGE, page.finish(&self.again, beside).as_bytes())?;
         if let Some(file) = file {
             folder.stage(file, &serde_json::to_vec_pretty(&output.json)?)?;
         }
-        folder.commit(if file == Some(RESULT) { &OF_RUNS } else { &[] })?;
+        folder.commit()?;
         Ok(output)
     }
 }
@@ -89,21 +97,8 @@ impl Session {
 const PAGE: &str = "report.html";
 /// The results of runs, as JSON.
 pub(crate) const RESULT: &str = "result.json";
-/// Files that tell of the last runs; those that a command does not write again would tell of others.
-const OF_RUNS: [&str; 15] = [
-    "curve.csv",
-    "convergence.csv",
-    "against_curve.csv",
-    "before_after.png",
-    "animation.gif",
-    "result.svg",
-    "overlay.png",
-    "overlay-*",
-    "poses.csv",
-    "views.png",
-    "mesh.obj",
-    "mesh.ply",
-    "mesh.glb",
-    PAGE,
-    RESULT,
-];
+/// Files that tell of runs: of one, of several, of several with two methods, and of those of a task with drawings.
+pub(crate) const OF_RUN: [&str; 4] = ["before_after.png", "animation.gif", "curve.csv", RESULT];
+pub(crate) const OF_RUNS: &str = "convergence.csv";
+pub(crate) const OF_OTHERS: &str = "against_curve.csv";
+pub(crate) const DRAWING: &str = "result.svg";

@@ -41,7 +41,7 @@ pub trait Task: InverseProblem + Sized {
     /// Flags of `solve` for pictures that the user gives; [`NoArgs`] where it takes none.
     type Pictures: clap::Args + Clone;
 
-    /// What comes of the pictures that the flags name; nothing if they name none.
+    /// What comes of the pictures that the flags name; nothing if they name none. [`Given::will_write`] is called before the work.
     fn solve_given(
         _given: &Given<'_, Self::Args>,
         _pictures: &Self::Pictures,
@@ -109,6 +109,9 @@ pub trait Task: InverseProblem + Sized {
     fn picture(&self, image: &[f64], size: usize) -> RgbImage {
         rgb_from_gray(image, size, size)
     }
+
+    /// Whether it has a [`drawing`](Task::drawing).
+    const DRAWS: bool = false;
 
     /// What is found as a drawing, a file of SVG; none unless the task has one. `theta` is that of the instance.
     fn drawing(&self, _scene: &Self::Scene<HostBackend>, _theta: &[f64]) -> Option<String> {

@@ -1,12 +1,17 @@
-use std::{ffi::OsString, fs, io::Write, process::ExitCode};
+use std::{
+    ffi::OsString,
+    io::Write,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 use anyhow::{Context, ensure};
 use clap::CommandFactory;
 use serde_json::json;
 use softrast_lab::{
-    Error, Failure, Progress, Runner, Store, Work,
-    program::{Output, parse, repeated, run_main},
-    write_atomically,
+    Error, Failure, Inputs, OutputFolder, Progress, Runner, Store, Work,
+    program::{Output, parse, repeated, run_main, say},
+    shown, write_atomically,
 };
 
 use crate::{
@@ -25,8 +30,11 @@ pub fn main() -> ExitCode {
 fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     let again = repeated("compare", &words);
-    let output =
-        if args.recompute.is_empty() { compare(&args, &again)? } else { recompute(&args)? };
+    let inputs = Inputs::of_words(&words, &["--out", "--tables"]);
+    let output = match args.recompute.is_empty() {
+        true => compare(&args, &again, &inputs)?,
+        false => recompute(&args)?,
+    };
     output.print(args.json, &again, stdout)
 }
 
@@ -50,48 +58,43 @@ fn recompute(args: &Args) -> anyhow::Result<Output> {
         "other tables than its records give had {}: written anew",
         others.join(", ")
     );
+    let documents: Vec<String> = args.recompute.iter().map(|path| shown(path)).collect();
     let text =
         vec![format!("{} documents have the tables that their records give", args.recompute.len())];
-    Ok(Output { json: json!({ "documents": args.recompute }), text, ..Output::default() })
+    Ok(Output { json: json!({ "documents": documents }), text, ..Output::default() })
 }
 
-/// Evaluates all cells, writes tables, report and charts after each, and says where. `command` is what they name as what made them.
+/// Evaluates all cells, writes tables, report and charts after each, and says where. `command` is what they name as what made them, `inputs`
+/// what it reads.
 ///
 /// # Errors
 ///
 /// If a cell cannot be evaluated or a file cannot be written.
-pub fn compare(args: &Args, command: &str) -> anyhow::Result<Output> {
+pub fn compare(args: &Args, command: &str, inputs: &Inputs) -> anyhow::Result<Output> {
     let cells = args.cells()?;
-    fs::create_dir_all(&args.out)
-        .with_context(|| format!("cannot make the folder {:?}", args.out))?;
-    let runs = args.out.join("runs.jsonl");
-    let progress = Progress::of_program(args.quiet);
-    if let Some(shard) = args.shard {
-        return part(args, &cells, Runner { progress, store: Store::of_shard(&runs, shard)? });
+    let mut folders = Folders::open(args, inputs)?;
+    let goes_on = folders.out.file(RUNS).exists();
+    let (store, note) = Store::of_command(&mut folders.out, RUNS, args.shard, true)?;
+    let mut runner = Runner { progress: Progress::of_program(args.quiet), store };
+    if args.shard.is_some() {
+        return part(args, &cells, runner);
     }
-    let (store, note) = Store::open(&runs)?;
-    note.filter(|_| runs.exists()).iter().for_each(|note| eprintln!("{note}"));
-    let mut runner = Runner { progress, store };
+    note.filter(|_| goes_on).iter().for_each(|note| say(note));
     let mut measured = Vec::with_capacity(cells.len());
     for (k, cell) in cells.iter().enumerate() {
         let (task, variant) = (cell.task.name(), cell.variant.name());
         if !args.quiet {
-            eprintln!("cell {} of {}: {task}, {variant}, {}", k + 1, cells.len(), cell.name);
+            let place = format!("cell {} of {}", k + 1, cells.len());
+            say(&format!("{place}: {task}, {variant}, {}", cell.name));
         }
         let one = Measured::of(cell, &mut runner, args.backend.as_deref());
         runner.progress = Progress::of_program(args.quiet);
         measured.push(one.with_context(|| format!("{task} {variant} with {}", cell.name))?);
         // After every cell: whoever stops a long comparison has tables of what is finished.
-        write(args, &measured, command)?;
+        folders.write(&measured, command)?;
     }
-    let tables = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
-    let report = args.out.join("report.html");
-    let text = format!(
-        "{} cells, tables in {}, charts in {}",
-        measured.len(),
-        tables.display(),
-        report.display()
-    );
+    let [tables, report] = [tables(args), args.out.join(PAGE)].map(|path| shown(&path));
+    let text = format!("{} cells, tables in {tables}, charts in {report}", measured.len());
     let records: Vec<Record> = measured.iter().map(Record::of).collect();
     let json = json!({ "cells": records, "tables": tables, "report": report });
     Ok(Output { json, text: vec![text], ..Output::default() })
@@ -111,7 +114,7 @@ fn part(args: &Args, cells: &[Cell], mut runner: Runner) -> anyhow::Result<Outpu
         format!("{} runs of this shard are finished", part.finished),
         "then: the same command without --shard, for the tables of all shards".to_owned(),
     ];
-    let json = json!({ "finished": part.finished, "out": args.out });
+    let json = json!({ "finished": part.finished, "out": shown(&args.out) });
     if part.finished < part.asked {
         let kept = part.of("runs of this shard");
         let stopped = anyhow::Error::from(Error::Interrupted);
@@ -120,23 +123,69 @@ fn part(args: &Args, cells: &[Cell], mut runner: Runner) -> anyhow::Result<Outpu
     Ok(Output { json, text, ..Output::default() })
 }
 
-/// Tables, report, charts and numbers; each file is the old one or the new one, whole.
-fn write(args: &Args, measured: &[Measured], command: &str) -> anyhow::Result<()> {
-    let replace = |path: &std::path::Path, text: &str| {
-        write_atomically(path, text.as_bytes()).with_context(|| format!("cannot write {path:?}"))
-    };
-    let tables = args.tables.clone().unwrap_or_else(|| args.out.join("results.md"));
-    let folder = tables.with_extension("");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {folder:?}"))?;
-    let charts = Charts::new(&by_variant(measured));
-    for chart in charts.iter() {
-        replace(&folder.join(format!("{}.svg", chart.name)), &chart.plot.svg()?)?;
-        replace(&folder.join(format!("{}.csv", chart.name)), &chart.plot.csv())?;
+const PAGE: &str = "report.html";
+const CELLS: &str = "cells.csv";
+const RECORDS: &str = "cells.jsonl";
+const RUNS: &str = "runs.jsonl";
+
+/// The document with the tables.
+fn tables(args: &Args) -> PathBuf {
+    args.tables.clone().unwrap_or_else(|| args.out.join("results.md"))
+}
+
+/// The folders of the results: of the page, of the document with the tables, and of the charts beside that.
+struct Folders {
+    /// First, so that it is removed first where nothing is written.
+    charts: OutputFolder,
+    /// Its name, seen from the document.
+    shown: String,
+    tables: OutputFolder,
+    document: String,
+    out: OutputFolder,
+}
+
+impl Folders {
+    fn open(args: &Args, inputs: &Inputs) -> anyhow::Result<Self> {
+        let tables = tables(args);
+        let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let parent = tables.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let charts = tables.with_extension("");
+        let named = name(&tables).zip(name(&charts)).filter(|_| charts != tables);
+        let (document, shown) = named.ok_or_else(|| {
+            let message = format!("--tables {}: expected a name such as a.md", tables.display());
+            Error::usage(message)
+        })?;
+        // Each has results of its own, also where two are one folder.
+        let open = |path: &Path, command| OutputFolder::open(path, command, inputs);
+        let folders = Self {
+            out: open(&args.out, "compare")?,
+            tables: open(parent.unwrap_or(Path::new(".")), "compare --tables")?,
+            charts: open(&charts, "compare, charts")?,
+            document,
+            shown,
+        };
+        folders.out.claim([PAGE, CELLS])?;
+        folders.tables.claim([&folders.document])?;
+        folders.charts.claim([RECORDS])?;
+        Ok(folders)
     }
-    let shown = folder.file_name().and_then(|name| name.to_str());
-    let records: Vec<Record> = measured.iter().map(Record::of).collect();
-    replace(&folder.join("cells.jsonl"), &records::text(&records)?)?;
-    replace(&tables, &markdown(measured, &records, &charts, command, shown)?)?;
-    replace(&args.out.join("cells.csv"), &records::csv(&records))?;
-    replace(&args.out.join("report.html"), &html(measured, &records, &charts, command)?)
+
+    /// Writes tables, report, charts and numbers.
+    fn write(&mut self, measured: &[Measured], command: &str) -> anyhow::Result<()> {
+        let charts = Charts::new(&by_variant(measured));
+        for chart in charts.iter() {
+            self.charts.stage(&format!("{}.svg", chart.name), chart.plot.svg()?.as_bytes())?;
+            self.charts.stage(&format!("{}.csv", chart.name), chart.plot.csv().as_bytes())?;
+        }
+        let records: Vec<Record> = measured.iter().map(Record::of).collect();
+        self.charts.stage(RECORDS, records::text(&records)?.as_bytes())?;
+        let tables = markdown(measured, &records, &charts, command, Some(&self.shown))?;
+        self.tables.stage(&self.document, tables.as_bytes())?;
+        self.out.stage(CELLS, records::csv(&records).as_bytes())?;
+        self.out.stage(PAGE, html(measured, &records, &charts, command)?.as_bytes())?;
+        self.charts.commit()?;
+        // Documents of other names are those of other comparisons.
+        self.tables.commit_beside(|_| true)?;
+        Ok(self.out.commit()?)
+    }
 }

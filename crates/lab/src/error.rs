@@ -1,5 +1,7 @@
 use std::{fmt, path::PathBuf};
 
+use crate::printable;
+
 /// An error that programs treat apart from all others.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -13,6 +15,14 @@ pub enum Error {
         path: PathBuf,
         /// What the system says.
         reason: std::io::Error,
+    },
+    /// A file that a result would replace is not the program's to replace.
+    #[error("{} {why}", path.display())]
+    Taken {
+        /// The file.
+        path: PathBuf,
+        /// Whose it is, and what to do: how the sentence goes on.
+        why: String,
     },
     /// The user asked the program to stop. Exit code 130.
     #[error("stopped before it was finished")]
@@ -34,7 +44,7 @@ pub struct Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let kind = if self.code == INTERRUPTED { "interrupted" } else { "error" };
-        write!(f, "{kind}: {}", self.message)
+        write!(f, "{kind}: {}", printable(&self.message))
     }
 }
 

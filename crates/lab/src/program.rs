@@ -10,7 +10,9 @@ use anyhow::Context;
 use clap::Parser;
 use serde_json::Value;
 
-use crate::{Failure, error::INTERRUPTED, progress::stop_on_ctrl_c};
+use crate::{
+    Failure, error::INTERRUPTED, printable, progress::stop_on_ctrl_c, shown::printable_json,
+};
 
 /// What a command has to say once its files are written.
 #[derive(Clone, Debug, Default)]
@@ -78,12 +80,13 @@ impl Output {
         /// More of them are in the results.
         const SHOWN: usize = 3;
         for warning in self.warnings.iter().take(SHOWN) {
-            eprintln!("warning: {warning}");
+            eprintln!("warning: {}", printable(warning));
         }
         if self.warnings.len() > SHOWN {
             eprintln!("warning: and {} more, listed in the results", self.warnings.len() - SHOWN);
         }
-        let shown = if as_json { self.json.to_string() } else { self.text.join("\n") };
+        let (json, text) = (self.json.to_string(), self.text.join("\n"));
+        let shown = if as_json { printable_json(&json) } else { printable(&text) };
         writeln!(stdout, "{shown}").context(STDOUT)?;
         match &self.partial {
             None => Ok(()),
@@ -93,6 +96,11 @@ impl Output {
             }
         }
     }
+}
+
+/// Prints a line to stderr beside the progress of a program.
+pub fn say(line: &str) {
+    eprintln!("{}", printable(line));
 }
 
 const STDOUT: &str = "cannot write to the standard output";

@@ -7,7 +7,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::{Error, error::INTERRUPTED};
+use crate::{Error, error::INTERRUPTED, printable};
 
 /// Shows on stderr how far the work is, and stops it when the user asks for that.
 ///
@@ -84,6 +84,7 @@ impl Progress {
             return Err(Error::Interrupted);
         }
         (self.runs, self.steps) = (runs, steps);
+        let prefix = printable(&prefix).into_owned();
         self.bar.set_prefix(prefix.clone());
         self.prefix = prefix;
         Ok(())

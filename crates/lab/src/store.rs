@@ -10,7 +10,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use crate::{Shard, write_atomically};
+use crate::{OutputFolder, Shard, write_atomically};
 
 /// Finished work by key, in a file that outlives the program.
 ///
@@ -76,6 +76,25 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
             )),
         };
         Ok((store, note))
+    }
+
+    /// The one of a command in its folder: of its shard, else what there is if it resumes, else a fresh one; and a word on what is damaged.
+    ///
+    /// # Errors
+    ///
+    /// As [`Store::open`] and [`Store::of_shard`]; if the file is not the command's.
+    pub fn of_command(
+        folder: &mut OutputFolder,
+        name: &str,
+        shard: Option<Shard>,
+        resumes: bool,
+    ) -> anyhow::Result<(Self, Option<String>)> {
+        let path = folder.file(name);
+        if let Some(shard) = shard {
+            return Ok((Self::of_shard(&path, shard)?, None));
+        }
+        let path = folder.journal(name, HEAD, resumes)?;
+        if resumes { Self::open(&path) } else { Ok((Self::fresh(&path), None)) }
     }
 
     /// What stands in all files of the job, to go on from with a shard, which writes a new file.
@@ -170,13 +189,13 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
     }
 
     fn append(&mut self, path: &Path, line: &str) -> io::Result<()> {
-        let mut options = OpenOptions::new();
-        match self.appends {
-            true => options.append(true),
-            false => options.write(true).truncate(true),
-        };
-        let mut file = options.create(true).open(path)?;
-        self.appends = true;
+        if !self.appends {
+            // A new file under the old name: another name that the old one may have still leads to it.
+            write_atomically(path, line.as_bytes())?;
+            self.appends = true;
+            return Ok(());
+        }
+        let mut file = OpenOptions::new().append(true).create(true).open(path)?;
         file.write_all(line.as_bytes())?;
         file.sync_data()
     }
@@ -246,7 +265,8 @@ pub(crate) fn checksum(bytes: &[u8]) -> String {
     format!("{:016x}", bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix))
 }
 
-const HEAD: &str = "{\"checksum\":\"";
+/// How every file begins.
+pub(crate) const HEAD: &str = "{\"checksum\":\"";
 const MIDDLE: &str = "\",\"finished\":";
 
 /// What a line holds, if it is as it was written.

@@ -1,14 +1,19 @@
-use std::{ffi::OsString, io::Write, path::Path};
+use std::{
+    ffi::OsString,
+    fs::File,
+    io::{Read, Write},
+    path::Path,
+};
 
 use anyhow::anyhow;
 use clap::CommandFactory;
 use serde_json::{Value, json};
 use softrast_lab::{
-    Error, Failure, OutputFolder, contact_sheet,
+    Error, Failure, Inputs, OutputFile, contact_sheet,
     format::counted,
     median, peak_rss_mib, png,
     program::{Output, parse, repeated},
-    rgb_from_gray, rgb_from_planes,
+    rgb_from_gray, rgb_from_planes, shown,
 };
 use softrast_raster::{BackendChoice, RasterBackend, Rasterizer, compiled_backends, on_backend};
 
@@ -31,12 +36,13 @@ const REPEAT: usize = 5;
 /// Everything that should end the program with an error line. Unless only `stdout` failed, no picture was written then.
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
+    let inputs = Inputs::of_words(&words, &["--out"]);
     let output = match args.threads {
-        None => draw(&args),
+        None => draw(&args, &inputs),
         Some(threads) => {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| anyhow!("--threads {threads}: {error}"))?;
-            pool.install(|| draw(&args))
+            pool.install(|| draw(&args, &inputs))
         }
     };
     output?.print(args.json, &repeated("render", &words), stdout)
@@ -51,19 +57,18 @@ struct Measured {
     profile: Option<(usize, [f64; 2])>,
 }
 
-fn draw(args: &Args) -> anyhow::Result<Output> {
+fn draw(args: &Args, inputs: &Inputs) -> anyhow::Result<Output> {
     let backend = BackendChoice::among(compiled_backends!(), args.backend.as_deref());
     let backend = backend.map_err(|error| Error::usage(error.to_string()))?;
     if !args.reference {
         backend.set_up()?;
     }
     let scene = Scene::load(args)?;
-    let name = args.out.file_name().and_then(|name| name.to_str());
-    let name = name.filter(|_| !args.out.is_dir()).ok_or_else(|| {
-        Error::usage(format!("--out {}: expected the name of a picture", args.out.display()))
-    })?;
-    let parent = args.out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut folder = OutputFolder::open(parent.unwrap_or(Path::new(".")))?;
+    if args.out.file_name().is_none() || args.out.is_dir() {
+        let message = format!("--out {}: expected the name of a picture", args.out.display());
+        return Err(Error::usage(message));
+    }
+    let out = OutputFile::open(&args.out, "PNG picture", is_png, inputs)?;
 
     let repeat = args.repeat.unwrap_or(if args.reference { 1 } else { REPEAT });
     let base_rss_mib = peak_rss_mib();
@@ -73,16 +78,14 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
         Some(colour) => on_backend!(backend, B => in_colour::<B>(&scene, colour, repeat)),
     };
     let last = &measured.steps[repeat - 1];
-    folder
-        .stage(name, &png(&picture(&last.image, scene.size, if args.colour { 3 } else { 1 }))?)?;
-    folder.commit(&[])?;
+    out.write(&png(&picture(&last.image, scene.size, if args.colour { 3 } else { 1 }))?)?;
 
     let title = if args.reference { reference::BACKEND } else { backend.title() };
     let times =
         |of: &dyn Fn(&Step) -> f64| median(&measured.steps.iter().map(of).collect::<Vec<_>>());
     let backward = |step: &Step| step.backward_ms.unwrap_or(0.0);
     let json = json!({
-        "mesh": args.mesh,
+        "mesh": shown(&args.mesh),
         "faces": scene.faces.len(),
         "views": scene.views(),
         "size": scene.size,
@@ -110,7 +113,7 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
         "peak_rss_mib": peak_rss_mib(),
         "profile_knots": measured.profile.map(|(knots, _)| knots),
         "support_ndc": measured.profile.map(|(_, support)| support),
-        "out": args.out,
+        "out": shown(&args.out),
     });
     let culled = measured.culled.filter(|&culled| culled > 0.5).map(|culled| {
         format!(
@@ -124,6 +127,13 @@ fn draw(args: &Args) -> anyhow::Result<Output> {
     let text = lines(&json);
     let warnings = culled.into_iter().chain(scene.warnings).collect();
     Ok(Output { json, text, warnings, partial: None })
+}
+
+/// Whether a file begins as a PNG picture does.
+fn is_png(path: &Path) -> bool {
+    let mut head = [0; 8];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut head));
+    read.is_ok() && head == *b"\x89PNG\r\n\x1a\n"
 }
 
 fn by_reference(scene: &Scene, repeat: usize, quiet: bool) -> Measured {

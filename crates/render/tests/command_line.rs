@@ -63,10 +63,10 @@ fn the_fused_op_gives_the_numbers_of_the_reference() {
 fn a_picture_is_its_own_target() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = mesh(folder.path());
-    let out = folder.path().join("sphere.png");
-    let out = out.to_str().unwrap();
-    run(&[&mesh, "--size", "40", "--out", out]).unwrap();
-    let report = json(&[&mesh, "--size", "40", "--out", out, "--target", out, "--json"]);
+    let [first, second] = ["first.png", "second.png"].map(|name| folder.path().join(name));
+    let [first, second] = [&first, &second].map(|path| path.to_str().unwrap());
+    run(&[&mesh, "--size", "40", "--out", first]).unwrap();
+    let report = json(&[&mesh, "--size", "40", "--out", second, "--target", first, "--json"]);
     // The picture has 8 bits.
     assert!(report["loss"].as_f64().unwrap() < 1e-5, "{report}");
 }

@@ -21,7 +21,9 @@ fn main() -> anyhow::Result<()> {
         Ok(())
     })?;
     println!("scale from {:.3} to {:.4}", learned.scale_at(0.0, 32), learned.scale_at(1.0, 32));
-    learned.save("learned.json")?;
+    let file = std::env::temp_dir().join(format!("softrast-learned-{}.json", std::process::id()));
+    learned.save(&file)?;
+    println!("{}", file.display());
 
     let method = Method::new("learned", learned);
     let instances = [problem.instance(0)?];

@@ -12,8 +12,9 @@ fn main() -> anyhow::Result<()> {
     let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, [90, 120]);
     let corners = vertices::<NdArray>(mesh.positions(), &device);
     let seen = project_pinhole(corners, &Pinholes::new(&[truth], &device));
-    save_picture(hard_silhouette(seen, mesh.faces(), [90, 120]), "mask.png")?;
-    let mask = Picture::load_mask("mask.png")?;
+    let file = std::env::temp_dir().join(format!("softrast-mask-{}.png", std::process::id()));
+    save_picture(hard_silhouette(seen, mesh.faces(), [90, 120]), &file)?;
+    let mask = Picture::load_mask(&file)?;
 
     // The lens is known, the pose is not. Of your own: Lens::load("camera.json")?.pinhole(mask.size())?
     let camera = Lens::of_fov(45.0, mask.size()).pinhole(mask.size())?;

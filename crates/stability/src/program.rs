@@ -4,12 +4,17 @@ use anyhow::anyhow;
 use clap::{CommandFactory, Parser};
 use serde_json::json;
 use softrast_lab::{
-    Error, Failure, OutputFolder, Shard, Store,
+    Error, Failure, Inputs, OutputFolder, Shard, Store,
     parse::count,
-    program::{Output, parse, repeated},
+    program::{Output, parse, repeated, say},
+    shown,
 };
 
 use crate::{Case, Matrix, Tested, cases, report, run};
+
+/// The results, for people and programs.
+const PAGE: &str = "report.html";
+const MATRIX: &str = "stability.json";
 
 /// Tests every softness on scenes where rasterizers and optimisers fail.
 #[derive(Debug, Parser)]
@@ -62,17 +67,17 @@ struct Args {
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(args) = parse::<Args>(Args::command(), &words, stdout)? else { return Ok(()) };
     let again = repeated("stability", &words);
-    let matrix = work(&args, &again)?;
+    let matrix = work(&args, &again, &Inputs::of_words(&words, &["--out"]))?;
     if args.shard.is_some() {
         let count: usize = matrix.rows.iter().map(|row| row.outcomes.len()).sum();
         let then = "then: the same command with --resume instead of --shard, for the results of all shards";
         let text = vec![format!("{count} pairs of case and method are finished"), then.to_owned()];
-        let json = json!({ "finished": count, "out": args.out });
+        let json = json!({ "finished": count, "out": shown(&args.out) });
         return Output { json, text, ..Output::default() }.print(args.json, &again, stdout);
     }
     let json = serde_json::to_value(&matrix).map_err(anyhow::Error::from)?;
     let mut text = report::lines(&matrix);
-    text.push(format!("report: {}", args.out.join("report.html").display()));
+    text.push(format!("report: {}", args.out.join(PAGE).display()));
     Output { json, text, ..Output::default() }.print(args.json, &again, stdout)?;
     match matrix.faults().len() {
         0 => Ok(()),
@@ -80,20 +85,13 @@ pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failu
     }
 }
 
-fn work(args: &Args, again: &str) -> anyhow::Result<Matrix> {
+fn work(args: &Args, again: &str, inputs: &Inputs) -> anyhow::Result<Matrix> {
     let chosen = chosen(&args.cases)?;
     let methods = methods(args)?;
-    let mut folder = OutputFolder::open(&args.out)?;
-    let path = folder.file("stability.jsonl");
-    let store = match args.shard {
-        Some(shard) => Store::of_shard(&path, shard)?,
-        None if args.resume => {
-            let (store, note) = Store::open(&path)?;
-            note.iter().for_each(|note| eprintln!("{note}"));
-            store
-        }
-        None => Store::fresh(&path),
-    };
+    let mut folder = OutputFolder::open(&args.out, "stability", inputs)?;
+    folder.claim([PAGE, MATRIX])?;
+    let (store, note) = Store::of_command(&mut folder, "stability.jsonl", args.shard, args.resume)?;
+    note.iter().for_each(|note| say(note));
     // A panic in a case is part of its outcome.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| {}));
@@ -109,9 +107,9 @@ fn work(args: &Args, again: &str) -> anyhow::Result<Matrix> {
     if args.shard.is_some() {
         return Ok(matrix);
     }
-    folder.stage("report.html", report::html(&matrix, again)?.as_bytes())?;
-    folder.stage("stability.json", &serde_json::to_vec_pretty(&matrix)?)?;
-    folder.commit(&[])?;
+    folder.stage(PAGE, report::html(&matrix, again)?.as_bytes())?;
+    folder.stage(MATRIX, &serde_json::to_vec_pretty(&matrix)?)?;
+    folder.commit()?;
     Ok(matrix)
 }
 

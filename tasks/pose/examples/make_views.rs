@@ -17,7 +17,7 @@ const WIDTH: usize = 120;
 const SAMPLES: usize = 4;
 
 fn main() -> anyhow::Result<()> {
-    let folder = Path::new("data/views/fox");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");
     fs::create_dir_all(folder.join("images"))?;
     let mesh = fox();
     let (mut frames, mut truth) = (Vec::new(), Vec::new());

@@ -1,6 +1,9 @@
 //! Poses from pictures that the user gives.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, ensure};
 use image::RgbImage;
@@ -17,7 +20,7 @@ use softrast_lab::{
     overlay, png,
     program::Output,
     report::{Report, Table},
-    rgb_from_planes,
+    rgb_from_planes, shown,
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{NEAR, Pinhole, on_backend};
@@ -154,6 +157,11 @@ pub(crate) fn solve_pictures(
     let views: Vec<View> = tasks.iter().map(|(view, _)| view.clone()).collect();
     let notes = start.iter().filter_map(|start| start.note.clone()).chain(reading_notes(&views));
     let notes: Vec<String> = notes.collect();
+    let single = pictures.target.is_some();
+    let paths: Vec<PathBuf> = tasks.iter().map(|(view, _)| view.picture.clone()).collect();
+    let overlays = overlay_names(&paths, single);
+    let poses = (!single).then_some(POSES);
+    given.will_write(overlays.iter().map(String::as_str).chain(poses), paths)?;
     let steps = search.steps(start.is_some());
     let mut progress = given.progress(steps * tasks.len())?;
     let mut solved = Vec::new();
@@ -174,7 +182,7 @@ pub(crate) fn solve_pictures(
     let mut warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
     warnings.extend(notes.into_iter().chain(across));
     let mesh = Framed { mesh, name: mesh_name, framing };
-    answer(&mesh, &solved, warnings, pictures.target.is_some())
+    answer(&mesh, &solved, &overlays, warnings, single)
 }
 
 /// The mesh that is looked for, and where it was.
@@ -226,6 +234,7 @@ fn warnings(calibrated: bool, optimised: bool, solved: &[Solved]) -> Vec<String>
 fn answer(
     mesh: &Framed,
     solved: &[Solved],
+    names: &[String],
     warnings: Vec<String>,
     single: bool,
 ) -> anyhow::Result<Answer> {
@@ -233,11 +242,11 @@ fn answer(
         solved.iter().map(|one| drawn(&mesh.mesh, one, &one.poses[0])).collect();
     let page = page(&mesh.mesh, solved, &overlays, &warnings, single)?;
     let mut files = Vec::new();
-    for (one, overlay) in solved.iter().zip(&overlays) {
-        files.push((overlay_name(one, single), png(overlay)?));
+    for (name, overlay) in names.iter().zip(&overlays) {
+        files.push((name.clone(), png(overlay)?));
     }
     if !single {
-        files.push(("poses.csv".to_owned(), csv(solved).into_bytes()));
+        files.push((POSES.to_owned(), csv(solved).into_bytes()));
     }
     let json = json(mesh, solved, &warnings, single);
     let output = Output { text: text(&mesh.name, solved, single), json, warnings, partial: None };
@@ -249,13 +258,24 @@ fn answer(
     Ok(Answer { page, output, files, beside: beside.to_owned() })
 }
 
-/// The file with the mask and the silhouette of an answer.
-fn overlay_name(one: &Solved, single: bool) -> String {
-    let name = one.path.file_name().unwrap_or_default().to_string_lossy();
-    match single {
-        true => "overlay.png".to_owned(),
-        false => format!("overlay-{}.png", name.trim_end_matches(".png")),
+/// A line for each pose of many pictures.
+const POSES: &str = "poses.csv";
+
+/// The files with mask and silhouette of the answers, one for each picture: `overlay-NAME.png`, and `overlay-NAME.png-2.png` where a
+/// picture before has that, also where upper and lower case are one.
+fn overlay_names(pictures: &[PathBuf], single: bool) -> Vec<String> {
+    if single {
+        return vec!["overlay.png".to_owned()];
     }
+    let mut taken = HashSet::new();
+    let mut free = |name: &String| taken.insert(name.to_lowercase());
+    let named = |path: &PathBuf| {
+        let whole = path.file_name().unwrap_or_default().to_string_lossy();
+        let name = format!("overlay-{}.png", whole.strip_suffix(".png").unwrap_or(&whole));
+        let more = (2..).map(|k| format!("overlay-{whole}-{k}.png"));
+        [name].into_iter().chain(more).find(&mut free).unwrap_or_default()
+    };
+    pictures.iter().map(named).collect()
 }
 
 fn page(
@@ -338,7 +358,7 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
     for one in solved {
         let Solved { path, poses, seconds, .. } = one;
         let mut result = posed(&one.of_file(&poses[0]));
-        result["target"] = json!(path);
+        result["target"] = shown(path).into();
         result["alternatives"] = poses[1..].iter().map(|pose| posed(&one.of_file(pose))).collect();
         result["seconds"] = json!(seconds);
         results.push(result);
@@ -458,4 +478,18 @@ fn of_camera(pose: &FoundPose) -> Table {
     pairs.push(["t".to_owned(), row(&camera.translation)]);
     pairs.push(["fx, fy, cx, cy".to_owned(), row(&[camera.focal, camera.centre].concat())]);
     Table::pairs(pairs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_picture_has_an_overlay_of_its_own() {
+        let names = ["a.jpg", "a.png", "a.jpg.png", "a.png.png", "A.png", "a.png-2.png"];
+        let overlays = overlay_names(&names.map(PathBuf::from), false);
+        assert_eq!(overlays[..2], ["overlay-a.jpg.png", "overlay-a.png"]);
+        let apart: HashSet<String> = overlays.iter().map(|name| name.to_lowercase()).collect();
+        assert_eq!(apart.len(), names.len(), "{overlays:?}");
+    }
 }

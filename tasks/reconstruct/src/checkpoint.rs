@@ -62,7 +62,12 @@ impl Checkpoint {
     ///
     /// If it cannot be written.
     pub fn save(&self, path: &Path) -> anyhow::Result<()> {
-        write(path, &sealed(&serde_json::to_vec(&self.header)?, &self.records))
+        write(path, &self.bytes()?)
+    }
+
+    /// The content of its file.
+    pub(crate) fn bytes(&self) -> anyhow::Result<Vec<u8>> {
+        Ok(sealed(&serde_json::to_vec(&self.header)?, &self.records))
     }
 }
 
@@ -77,7 +82,7 @@ pub fn sealed(header: &[u8], records: &[u8]) -> Vec<u8> {
 /// # Errors
 ///
 /// If it cannot be written.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let made = path.parent().map_or(Ok(()), fs::create_dir_all);
     let written = made.and_then(|()| write_atomically(path, bytes));
     written.with_context(|| format!("cannot write {}", path.display()))

@@ -1,17 +1,23 @@
 use anyhow::Context;
 use serde_json::json;
-use softrast_lab::{Error, World, program::Output, report::Table};
+use softrast_lab::{
+    Error, Inputs, OutputFolder, World,
+    program::{Output, say},
+    report::Table,
+};
 use softrast_raster::{RasterBackend, TConorm};
 
 use crate::{
     Settings, Split, Template, Training,
     args::{self, CompareArgs},
-    checkpoint, data_set,
+    data_set,
     learner::trained,
     score::{Score, score, with_mean},
     train::CHECKPOINT,
 };
 
+/// The table, for people and programs.
+const RESULTS: [&str; 2] = ["compare.md", "compare.json"];
 /// Views of each test shape.
 const VIEWS: usize = 4;
 
@@ -30,10 +36,13 @@ const PAPER: [(&str, f64); 2] = [("MLP", 0.6076), ("best of 30 renderers for eac
 pub(crate) fn compare<B: RasterBackend>(
     args: &CompareArgs,
     command: &str,
+    inputs: &Inputs,
     device: &B::Device,
 ) -> anyhow::Result<Output> {
     let methods =
         args.methods.iter().map(|text| method(text)).collect::<anyhow::Result<Vec<_>>>()?;
+    let mut folder = OutputFolder::open(&args.out, "reconstruct compare", inputs)?;
+    folder.claim(RESULTS)?;
     let mut rows = Vec::new();
     for (name, softness, t_conorm) in methods {
         let training = Training {
@@ -43,9 +52,10 @@ pub(crate) fn compare<B: RasterBackend>(
             resume: args.common.resume,
             visible: !args.common.quiet,
             command: command.to_owned(),
+            inputs: inputs.clone(),
         };
         if training.visible {
-            eprintln!("{name}");
+            say(&name);
         }
         let (header, _) = training.run::<B>(&World::alone(), device)?;
         let (_, network) = trained::<B>(&training.out.join(CHECKPOINT), device)?;
@@ -57,9 +67,10 @@ pub(crate) fn compare<B: RasterBackend>(
         rows.push(Row { name, classes, score, minutes: seconds / 60.0, settings });
     }
     let table = markdown(args, &rows, command);
-    checkpoint::write(&args.out.join("compare.md"), table.as_bytes())?;
+    folder.stage(RESULTS[0], table.as_bytes())?;
     let json: Vec<_> = rows.iter().map(Row::json).collect();
-    checkpoint::write(&args.out.join("compare.json"), &serde_json::to_vec_pretty(&json)?)?;
+    folder.stage(RESULTS[1], &serde_json::to_vec_pretty(&json)?)?;
+    folder.commit()?;
     Ok(Output { json: json!({ "methods": json }), text: vec![table], ..Output::default() })
 }
 

@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
+use softrast_lab::shown;
 use softrast_raster::TConorm;
 use softrast_softness::{EdgeSoftness, ScheduledSoftness};
 
@@ -60,7 +61,12 @@ pub enum Data {
     /// [`Procedural`](crate::Procedural), with so many shapes of a class to learn from.
     Procedural(usize),
     /// The files of a folder, see [`NpzFolder`](crate::NpzFolder).
-    Files(PathBuf),
+    Files(#[serde(serialize_with = "as_text")] PathBuf),
+}
+
+/// A path as text, also where it is not UTF-8.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&shown(path))
 }
 
 impl fmt::Display for Data {

@@ -1,13 +1,19 @@
-use std::{ffi::OsString, io::Write, path::Path};
+use std::{
+    ffi::{OsStr, OsString},
+    io::Write,
+    path::Path,
+};
 
 use anyhow::{Context, ensure};
 use clap::CommandFactory;
 use image::{ImageReader, imageops};
 use serde_json::json;
 use softrast_lab::{
-    Error, Failure, INTERRUPTED, World, mean,
-    program::{Output, parse, repeated},
+    Error, Failure, INTERRUPTED, Inputs, OutputFile, World, mean,
+    program::{Output, parse, repeated, say},
+    shown,
 };
+use softrast_mesh::{Mesh, MeshError};
 use softrast_raster::{BackendChoice, RasterBackend, compiled_backends, on_backend};
 
 use crate::{
@@ -33,7 +39,8 @@ pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failu
     };
     let again = repeated("reconstruct", &words);
     let backend = backend(line.backend.as_deref())?;
-    let output = on_backend!(backend, B => work::<B>(line.command, again.clone()))
+    let inputs = Inputs::of_words(&words, &["--out"]);
+    let output = on_backend!(backend, B => work::<B>(line.command, again.clone(), inputs.clone()))
         .map_err(|error| stopped(error, &again))?;
     output.map_or(Ok(()), |output| output.print(line.json, &again, stdout))
 }
@@ -61,13 +68,17 @@ fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
     Ok(backend)
 }
 
-fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<Option<Output>> {
+fn work<B: RasterBackend>(
+    command: Command,
+    again: String,
+    inputs: Inputs,
+) -> anyhow::Result<Option<Output>> {
     let device = B::Device::default();
     match command {
-        Command::Train(args) => train::<B>(&args, again, &device),
+        Command::Train(args) => train::<B>(&args, again, inputs, &device),
         Command::Evaluate(args) => evaluate::<B>(&args, &device).map(Some),
-        Command::Predict(args) => predict_mesh::<B>(&args, &device).map(Some),
-        Command::Compare(args) => compare::<B>(&args, &again, &device).map(Some),
+        Command::Predict(args) => predict_mesh::<B>(&args, inputs, &device).map(Some),
+        Command::Compare(args) => compare::<B>(&args, &again, &inputs, &device).map(Some),
     }
 }
 
@@ -75,6 +86,7 @@ fn work<B: RasterBackend>(command: Command, again: String) -> anyhow::Result<Opt
 fn train<B: RasterBackend>(
     args: &TrainArgs,
     command: String,
+    inputs: Inputs,
     device: &B::Device,
 ) -> anyhow::Result<Option<Output>> {
     let softness = args::softness(&args.softness, args.scale, args.squared)?;
@@ -85,6 +97,7 @@ fn train<B: RasterBackend>(
         resume: args.common.resume,
         visible: !args.common.quiet,
         command,
+        inputs,
     };
     let world = World::join()?;
     let trained = training.run::<B>(&world, device);
@@ -100,7 +113,7 @@ fn train<B: RasterBackend>(
         "mean": mean(&iou),
         "sphere": mean(&sphere),
         "epochs": header.epochs.len() - 1,
-        "report": page,
+        "report": shown(&page),
     });
     Ok(Some(Output { json, text, ..Output::default() }))
 }
@@ -134,19 +147,34 @@ fn by_class(classes: &[String], iou: &[f64]) -> serde_json::Map<String, serde_js
 
 fn predict_mesh<B: RasterBackend>(
     args: &PredictArgs,
+    mut inputs: Inputs,
     device: &B::Device,
 ) -> anyhow::Result<Output> {
+    inputs.add(&args.checkpoint);
+    let write = writer(&args.out)?;
+    let out = OutputFile::open(&args.out, "mesh", |path| Mesh::load(path).is_ok(), &inputs)?;
     let (_, network) = trained::<B>(&args.checkpoint, device)?;
     let picture = read_picture(&args.picture)?;
     let template = Template::new(device);
     let vertices = predict(&network, &template, &[picture], device).remove(0);
-    let mesh = softrast_mesh::Mesh::new(vertices, template.faces().to_vec())
+    let mesh = Mesh::new(vertices, template.faces().to_vec())
         .context("the network gives no mesh: train it anew")?;
-    mesh.save(&args.out)?;
+    out.write(&write(&mesh))?;
     let [vertices, faces] = [template.vertices(), mesh.faces().len()];
     let text = vec![format!("{vertices} vertices, {faces} faces: {}", args.out.display())];
-    let json = json!({ "vertices": vertices, "faces": faces, "mesh": args.out });
+    let json = json!({ "vertices": vertices, "faces": faces, "mesh": shown(&args.out) });
     Ok(Output { json, text, ..Output::default() })
+}
+
+/// What makes a file of a mesh, by its ending.
+fn writer(path: &Path) -> Result<fn(&Mesh) -> Vec<u8>, MeshError> {
+    let ending = path.extension().map(OsStr::to_ascii_lowercase);
+    match ending.as_deref().and_then(OsStr::to_str) {
+        Some("obj") => Ok(|mesh| mesh.to_obj().into_bytes()),
+        Some("ply") => Ok(Mesh::to_ply),
+        Some("glb") => Ok(Mesh::to_glb),
+        _ => Err(MeshError::NotWritten { path: path.into() }),
+    }
 }
 
 /// A picture file as the network takes it: planes of red, green, blue and alpha, `[4 * 64 * 64]`.
@@ -165,10 +193,10 @@ fn read_picture(path: &Path) -> anyhow::Result<Vec<u8>> {
     let (width, height) = (image.width(), image.height());
     ensure!(width == height, "{name} is {width} x {height} pixels, expected a square");
     if !image.color().has_alpha() {
-        eprintln!(
+        say(&format!(
             "warning: {name} has no alpha, so all of it counts as the object; the network expects \
              alpha 0 around it"
-        );
+        ));
     }
     let mut image = image.to_rgba8();
     if width as usize != SIZE {

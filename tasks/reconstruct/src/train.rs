@@ -6,12 +6,11 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use burn::backend::Autodiff;
-use softrast_lab::{Error, Progress, World};
+use softrast_lab::{Error, Inputs, OutputFolder, Progress, World, program::say};
 use softrast_raster::RasterBackend;
 
 use crate::{
-    Checkpoint, Epoch, Header, Score, Settings, Shapes, Split, Template, Time, checkpoint,
-    data_set,
+    Checkpoint, Epoch, Header, Score, Settings, Shapes, Split, Template, Time, data_set,
     learner::Learner,
     pairs::Pairs,
     report,
@@ -22,6 +21,7 @@ use crate::{
 /// Files of a training in its folder.
 pub(crate) const CHECKPOINT: &str = "checkpoint.bin";
 pub(crate) const REPORT: &str = "report.html";
+const HISTORY: &str = "history.json";
 
 /// After this part of the epochs the learning rates fall to this factor.
 ///
@@ -43,6 +43,8 @@ pub struct Training {
     pub visible: bool,
     /// Command line that does the same again.
     pub command: String,
+    /// What it reads, and therefore never replaces.
+    pub inputs: Inputs,
 }
 
 impl Training {
@@ -77,6 +79,7 @@ impl Training {
         let shapes = data_set::open(&self.settings.data, Split::Train, self.settings.seed)?;
         let held_out = data_set::open(&self.settings.data, Split::Val, self.settings.seed)?;
         let (mut header, mut learner) = self.start::<B>(&path, shapes.as_ref(), device)?;
+        let mut folder = world.is_first().then(|| self.folder()).transpose()?;
         let template = Template::new(device);
         let mut bar = Progress::of_program(!self.visible || !world.is_first());
         bar.expect(self.epochs * self.settings.steps);
@@ -112,13 +115,26 @@ impl Training {
                 epoch.voxel_iou = judged.classes;
                 self.say(epoch, world);
             }
-            if world.is_first() {
+            if let Some(folder) = &mut folder {
                 let shapes = held_out.as_ref();
-                self.write(&header, &learner, &path, &sphere, &template, shapes, device)?;
+                self.write(&header, &learner, folder, &sphere, &template, shapes, device)?;
             }
         }
         bar.finish();
         Ok((header, sphere))
+    }
+
+    /// The folder, in which all files of the training may be written.
+    fn folder(&self) -> anyhow::Result<OutputFolder> {
+        let mut folder = OutputFolder::open(&self.out, "reconstruct train", &self.inputs)?;
+        if folder.file(CHECKPOINT).exists() {
+            // It has been read, so it is what a training wrote.
+            folder.adopt(CHECKPOINT)?;
+        }
+        folder.claim([REPORT, HISTORY])?;
+        let sheets = (1..=self.epochs).map(sheet_name);
+        folder.claim(sheets.filter(|name| folder.file(name).is_file()))?;
+        Ok(folder)
     }
 
     /// A new learner, or the one of the checkpoint.
@@ -132,7 +148,7 @@ impl Training {
         let name = path.display();
         if !path.exists() {
             if self.resume {
-                eprintln!("there is no {name}, so nothing to go on from");
+                say(&format!("there is no {name}, so nothing to go on from"));
             }
             let classes = shapes.classes().to_vec();
             let header = Header { settings: self.settings.clone(), classes, epochs: Vec::new() };
@@ -222,7 +238,7 @@ impl Training {
         &self,
         header: &Header,
         learner: &Learner<B>,
-        path: &Path,
+        folder: &mut OutputFolder,
         sphere: &[f64],
         template: &Template<B>,
         held_out: &dyn Shapes,
@@ -230,20 +246,26 @@ impl Training {
     ) -> anyhow::Result<()> {
         let number = header.epochs.len() - 1;
         let sheet = sheet::sheet(&learner.network(), template, held_out, device)?;
-        checkpoint::write(&self.sheet(number), &softrast_lab::png(&sheet)?)?;
+        let sheet = softrast_lab::png(&sheet)?;
         // Sheets of a few epochs tell how it went: the first, one amid, and the last.
         let shown = [1.min(number), number.div_ceil(3), number];
         let mut sheets: Vec<(usize, Vec<u8>)> = Vec::new();
         for number in shown {
             if sheets.iter().all(|(other, _)| *other != number) {
-                sheets.extend(std::fs::read(self.sheet(number)).ok().map(|png| (number, png)));
+                let earlier = || std::fs::read(folder.file(&sheet_name(number))).ok();
+                let png =
+                    if number + 1 == header.epochs.len() { Some(sheet.clone()) } else { earlier() };
+                sheets.extend(png.map(|png| (number, png)));
             }
         }
         let page = report::html(header, sphere, &sheets, &self.command)?;
-        checkpoint::write(&self.out.join(REPORT), page.as_bytes())?;
-        let history = serde_json::to_vec_pretty(header)?;
-        checkpoint::write(&self.out.join("history.json"), &history)?;
-        Checkpoint { header: header.clone(), records: learner.to_bytes()? }.save(path)
+        let checkpoint = Checkpoint { header: header.clone(), records: learner.to_bytes()? };
+        folder.stage(&sheet_name(number), &sheet)?;
+        folder.stage(REPORT, page.as_bytes())?;
+        folder.stage(HISTORY, &serde_json::to_vec_pretty(header)?)?;
+        folder.stage(CHECKPOINT, &checkpoint.bytes()?)?;
+        let sheets: Vec<String> = (0..number).map(sheet_name).collect();
+        Ok(folder.commit_beside(|name| sheets.iter().any(|sheet| sheet == name))?)
     }
 
     /// Tells on stderr what an epoch brought.
@@ -256,10 +278,10 @@ impl Training {
             eprintln!("epoch {}/{}: {loss}voxel IoU {iou:.3}, {speed}", epoch.number, self.epochs);
         }
     }
+}
 
-    fn sheet(&self, epoch: usize) -> PathBuf {
-        self.out.join(format!("epoch_{epoch:03}.png"))
-    }
+fn sheet_name(epoch: usize) -> String {
+    format!("epoch_{epoch:03}.png")
 }
 
 /// A line for each class and the mean, against the sphere.

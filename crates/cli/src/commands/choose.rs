@@ -24,6 +24,8 @@ use crate::{
 /// Source: Wu et al. 2024, Table 1, for the numbers of parameters.
 const FAMILIES: [Family; 5] =
     [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp];
+/// All errors.
+const CHOICE: &str = "choose.json";
 /// Images are not tried below this many pixels a side.
 const FEWEST: usize = 8;
 /// Largest errors of a pixel, from what a decay has if nobody says otherwise to what a softness has that stays.
@@ -38,8 +40,9 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
     if kept.shard.is_some() && auto.budget.is_some() {
         return Err(Error::usage("shards try all answers: leave out --budget"));
     }
-    let folder = session.folder()?;
-    let mut runner = session.runner(&folder, kept)?;
+    session.claim([CHOICE])?;
+    let mut folder = session.folder()?;
+    let mut runner = session.runner(&mut folder, kept)?;
     let training = seeds(TRAINING_SEED, training.search_runs);
     let found = find::<T>(&shared, auto.budget, &training, &mut runner);
     runner.progress.finish();
@@ -73,7 +76,7 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
     section(&found.stages, &mut report);
     let output = Output { json, text, warnings, partial: None };
     let beside = "choose.json holds all errors";
-    session.finish(folder, report, beside, Some("choose.json"), output)
+    session.finish(folder, report, beside, Some(CHOICE), output)
 }
 
 /// What `--softness auto` stands for.

@@ -1,6 +1,8 @@
 use anyhow::Context;
 use softrast_lab::{
-    Comparison, Error, Evaluation, Experiment, Partial, Work, program::Output, seeds,
+    Comparison, Error, Evaluation, Experiment, Partial, Work,
+    program::{Output, say},
+    seeds,
 };
 
 use super::{
@@ -11,7 +13,7 @@ use super::{
 use crate::{
     Answer, Given, Purpose, SoftnessChoice, Task, TaskExperiment,
     command_line::{Auto, Evaluate, Kept, Shared, Solve},
-    session::{RESULT, Session},
+    session::{DRAWING, OF_OTHERS, OF_RUN, OF_RUNS, RESULT, Session},
 };
 
 /// Solves one instance, or what the user gives.
@@ -23,6 +25,7 @@ pub(crate) fn solve<T: Task>(
     if let Some(answer) = solve_given::<T>(session, &mut shared, &pictures) {
         return answer;
     }
+    session.claim(names_of_runs::<T>(false, false))?;
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Solving)?;
     run(session, &first, None, &[shared.common.seed], false, Kept::default())
 }
@@ -39,12 +42,10 @@ fn solve_given<T: Task>(
     let Shared { args, common, method } = shared;
     let task = (T::NAME, T::SCALES);
     let given = Given { args, common, method, task, session };
-    // A folder that cannot be written is said before the work.
-    let folder = session.folder();
     let answer = T::solve_given(&given, pictures)?;
     Some(answer.and_then(|answer| {
         let Answer { page, output, files, beside } = answer;
-        let mut folder = folder?;
+        let mut folder = session.folder()?;
         files.iter().try_for_each(|(name, bytes)| folder.stage(name, bytes))?;
         session.finish(folder, page, &beside, Some(RESULT), output)
     }))
@@ -60,6 +61,7 @@ pub(crate) fn evaluate<T: Task>(
         let message = "shards may be of different speed, and so choose differently: run choose first, and name what it finds";
         return Err(Error::usage(message));
     }
+    session.claim(names_of_runs::<T>(true, against.is_some()))?;
     let first = prepared::<T>(&mut shared, auto, session, Purpose::Evaluating)?;
     let second = against.map(|method| {
         let method = method.beside(&shared.method);
@@ -73,6 +75,16 @@ pub(crate) fn evaluate<T: Task>(
     run(session, &first, second.as_ref(), &seeds, true, kept)
 }
 
+/// Names of the files that tell of runs.
+pub(super) fn names_of_runs<T: Task>(
+    many: bool,
+    others: bool,
+) -> impl Iterator<Item = &'static str> {
+    let more = [(many, OF_RUNS), (others, OF_OTHERS), (T::DRAWS, DRAWING)];
+    let more = more.into_iter().filter_map(|(is_one, name)| is_one.then_some(name));
+    OF_RUN.into_iter().chain(more)
+}
+
 /// The experiment of the flags; `--softness auto` is what `choose` finds.
 fn prepared<T: Task>(
     shared: &mut Shared<T::Args>,
@@ -83,7 +95,7 @@ fn prepared<T: Task>(
     shared.method.reconcile().map_err(Error::usage)?;
     if shared.method.softness == Some(SoftnessChoice::Auto) {
         let found = chosen::<T>(shared, auto.budget, session)?;
-        eprintln!("--softness auto is {}: {}", found.flags(), found.price());
+        say(&format!("--softness auto is {}: {}", found.flags(), found.price()));
         (shared.args, shared.method) = (found.answer.args, found.answer.method);
     }
     TaskExperiment::new(&shared.args, &shared.common, &shared.method, purpose)
@@ -97,8 +109,8 @@ fn run<T: Task>(
     many: bool,
     kept: Kept,
 ) -> anyhow::Result<Output> {
-    let folder = session.folder()?;
-    let mut runner = session.runner(&folder, kept)?;
+    let mut folder = session.folder()?;
+    let mut runner = session.runner(&mut folder, kept)?;
     let experiments: Vec<&dyn Experiment> =
         [Some(first), second].into_iter().flatten().map(|one| one as &dyn Experiment).collect();
     if kept.shard.is_some() {

@@ -14,9 +14,9 @@ use softrast_lab::{
     format::{line, short, short_or_none},
     peak_rss_mib,
     plot::{Axis, Plot, Series},
-    program::Output,
+    program::{Output, say},
     report::Report,
-    write_atomically,
+    shown, write_atomically,
 };
 use softrast_meta::{Best, Ranks, Record};
 use softrast_raster::HostBackend;
@@ -29,6 +29,13 @@ use crate::{
     learned_charts::learned_charts,
     session::Session,
 };
+
+const SOFTNESS: &str = "softness.json";
+const RESULT: &str = "learn.json";
+/// What `--resume` goes on from, and the records of all steps; each begins so.
+const CHECKPOINT: &str = "learn.checkpoint.json";
+const RECORDS: &str = "learn.jsonl";
+const BEGINS: &str = "{\"step\":";
 
 /// Learns a softness, and writes it with a report; with the other processes that `mpirun` started, of which the first alone writes and has
 /// something to say.
@@ -59,6 +66,11 @@ fn learn_with<T: Task>(
         return Err(Error::usage(message));
     }
     let experiment = TaskExperiment::<T>::new(&args, &common, &method, Purpose::Learning)?;
+    if world.is_first() {
+        let own = experiment.task.own_file(&experiment.task.own_phi(), "");
+        let own = own.context("the softness")?.map(|(name, _)| name);
+        session.claim([SOFTNESS, RESULT].into_iter().chain(own))?;
+    }
     let (about, identity) = (experiment.about(), experiment.identity());
     let TaskExperiment { task, method, solve, .. } = experiment;
     let (own_start, takes_rate) = (task.own_phi(), task.takes_learning_rate());
@@ -67,11 +79,11 @@ fn learn_with<T: Task>(
     let learning = Learning::<T, HostBackend>::new(task, &method, &solve, &config);
     let mut learning = learning.map_err(|error| Error::usage(error.to_string()))?;
     let job = json!({ "task": T::NAME, "method": identity, "learned": learning.identity() });
-    let folder = session.folder()?;
-    let mut log =
-        Log::new(&folder, resume.resume, &mut learning, &job.to_string(), world.is_first())?;
+    let mut folder = session.folder()?;
+    let (job, writes) = (job.to_string(), world.is_first());
+    let mut log = Log::new(&mut folder, resume.resume, &mut learning, &job, writes)?;
     let mut progress = Progress::of_program(session.quiet || !world.is_first());
-    let stopped = walk(&mut learning, &mut log, &mut progress, world);
+    let stopped = walk(&mut learning, &mut log, &mut folder, &mut progress, world);
     progress.finish();
     let kept = "learning stopped; what was learned before is kept, and --resume goes on from it";
     let stopped = stopped.context(kept)?;
@@ -130,7 +142,7 @@ fn write<T: Task>(
         "faces": about["faces"],
         "config": learning.config(),
         "settings": about["settings"],
-        "files": files,
+        "files": files.iter().map(|file| shown(file)).collect::<Vec<_>>(),
     });
     let mut text = text(learning, log, about);
     text.extend(files.iter().map(|file| line("learned", &file.display().to_string())));
@@ -149,13 +161,14 @@ fn write<T: Task>(
     }
     let beside = "learn.json holds the result, learn.jsonl every outer step; softness.json is for --softness of any task";
     let output = Output { json: result, text, warnings: warnings(learning), partial };
-    session.finish(folder, report, beside, Some("learn.json"), output)
+    session.finish(folder, report, beside, Some(RESULT), output)
 }
 
 /// Takes outer steps until learning has finished, or the user stops it: then true.
 fn walk<T: Task>(
     learning: &mut Learning<T, HostBackend>,
     log: &mut Log,
+    folder: &mut OutputFolder,
     progress: &mut Progress,
     world: &World,
 ) -> anyhow::Result<bool> {
@@ -168,7 +181,7 @@ fn walk<T: Task>(
     }
     let mut loss = f64::NAN;
     while let Some(record) = learning.step_shared(&Processes(world))? {
-        log.add(&record, learning)?;
+        log.add(&record, learning, folder)?;
         loss = record.loss.unwrap_or(loss);
         let stopped = progress.step((record.step + 1).min(outer) - before, loss).is_err();
         // The signal may reach only some of the ranks.
@@ -217,14 +230,13 @@ struct Point {
 impl Log {
     /// Goes on from the checkpoint in the folder if asked to; else from the beginning.
     fn new<T: Task>(
-        folder: &OutputFolder,
+        folder: &mut OutputFolder,
         resume: bool,
         learning: &mut Learning<T, HostBackend>,
         job: &str,
         writes: bool,
     ) -> anyhow::Result<Self> {
-        let (records, checkpoint) =
-            (folder.file("learn.jsonl"), folder.file("learn.checkpoint.json"));
+        let (records, checkpoint) = (folder.file(RECORDS), folder.file(CHECKPOINT));
         let (job, steps) = (job.to_owned(), Vec::new());
         let mut log = Self { writes, records, checkpoint, job, steps };
         let mut kept = String::new();
@@ -246,18 +258,23 @@ impl Log {
                     kept += line;
                 }
             }
+            if writes {
+                folder.adopt(CHECKPOINT)?;
+            }
             if log.steps.len() < next && writes {
-                eprintln!(
+                say(&format!(
                     "{} of {next} records of {} are missing or damaged: the charts leave them out",
                     next - log.steps.len(),
                     log.records.display()
-                );
+                ));
             }
         } else if resume && writes {
-            eprintln!("there is no {}, so nothing to go on from", log.checkpoint.display());
+            say(&format!("there is no {}, so nothing to go on from", log.checkpoint.display()));
         }
         if writes {
-            fs::write(&log.records, kept)
+            folder.claim([CHECKPOINT])?;
+            folder.journal(RECORDS, BEGINS, resume)?;
+            write_atomically(&log.records, kept.as_bytes())
                 .with_context(|| format!("cannot write {:?}", log.records))?;
         }
         Ok(log)
@@ -267,6 +284,7 @@ impl Log {
         &mut self,
         record: &Record,
         learning: &Learning<T, HostBackend>,
+        folder: &mut OutputFolder,
     ) -> anyhow::Result<()> {
         if self.writes {
             let written = OpenOptions::new().append(true).open(&self.records);
@@ -274,9 +292,7 @@ impl Log {
             written
                 .and_then(|mut file| writeln!(file, "{line}"))
                 .with_context(|| format!("cannot write {:?}", self.records))?;
-            let checkpoint = learning.checkpoint(&self.job)?;
-            write_atomically(&self.checkpoint, checkpoint.as_bytes())
-                .with_context(|| format!("cannot write {:?}", self.checkpoint))?;
+            folder.keep(CHECKPOINT, learning.checkpoint(&self.job)?.as_bytes())?;
         }
         let &Record { step, loss, validation_loss, .. } = record;
         self.steps.push(Point { step, loss, validation_loss });
@@ -321,7 +337,7 @@ fn files<T: Task>(
     softness: &ScheduledSoftness,
     own: &[f64],
 ) -> anyhow::Result<Vec<(&'static str, String)>> {
-    let name = "softness.json";
+    let name = SOFTNESS;
     let text = softness.text(Path::new(name)).context("the learned softness")?;
     let note = softness.note.as_deref().unwrap_or_default();
     let own = learning.problem().own_file(own, note).context("the learned softness")?;

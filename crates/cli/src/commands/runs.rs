@@ -13,7 +13,7 @@ use super::settings_section;
 use crate::{
     Task, TaskExperiment,
     diagnostics::diagnostics,
-    session::{RESULT, Session},
+    session::{DRAWING, OF_OTHERS, OF_RUNS, RESULT, Session},
 };
 
 /// An experiment and what it came to.
@@ -54,16 +54,16 @@ pub(super) fn write<T: Task>(
         folder.stage("before_after.png", &pictures.before_after)?;
         folder.stage("animation.gif", &pictures.animation)?;
         if let Some(drawing) = &pictures.drawing {
-            folder.stage("result.svg", drawing.as_bytes())?;
+            folder.stage(DRAWING, drawing.as_bytes())?;
         }
     }
     folder.stage("curve.csv", csv(metrics, &evaluation.runs).as_bytes())?;
     if summary.outcome.many {
         let named: Vec<_> = ["method", "against"].into_iter().zip(&convergences).collect();
-        folder.stage("convergence.csv", convergence_csv(metrics, &named).as_bytes())?;
+        folder.stage(OF_RUNS, convergence_csv(metrics, &named).as_bytes())?;
     }
     if let Some(second) = second {
-        folder.stage("against_curve.csv", csv(metrics, &second.evaluation.runs).as_bytes())?;
+        folder.stage(OF_OTHERS, csv(metrics, &second.evaluation.runs).as_bytes())?;
     }
     let what = format!("{} ({})", T::NAME, experiment.variant.name());
     let (parameters, steps) = (experiment.parameters(), experiment.solve.steps);

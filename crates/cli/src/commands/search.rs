@@ -11,6 +11,7 @@ use softrast_softness::ScheduledSoftness;
 
 use super::{
     ended,
+    evaluate::names_of_runs,
     runs::{Finished, write},
 };
 use crate::{
@@ -20,6 +21,9 @@ use crate::{
     task::HARD,
 };
 
+/// Every setting tried, as JSON and as a table.
+const TRIED: &str = "search.json";
+const TRIED_TABLE: &str = "search.csv";
 /// Half a decade.
 const RATIO: f64 = 3.162_277_660_168_379_5;
 /// Most steps from the last scale of the default decay to its first.
@@ -64,8 +68,9 @@ pub(crate) fn search<T: Task>(
     let training = seeds(TRAINING_SEED, flags.training.search_runs);
     let held_out = seeds(common.seed, flags.runs.unwrap_or(base.description.runs));
     check_held_out(&training, &held_out)?;
+    session.claim(names_of_runs::<T>(true, false).chain([TRIED, TRIED_TABLE]))?;
     let mut folder = session.folder()?;
-    let mut runner = session.runner(&folder, flags.kept)?;
+    let mut runner = session.runner(&mut folder, flags.kept)?;
     let score = base.metrics()[HARD];
     let score_name = [score.name, score.unit];
     let mut halving = Halving::new(space.clone(), score_name, training, flags.loops);
@@ -86,8 +91,8 @@ pub(crate) fn search<T: Task>(
     };
     let returned = |run: &Run| run.returned(HARD).map_or(f64::NAN, |point| point.values[HARD]);
     halving.held_out = evaluation.runs.iter().map(returned).collect();
-    folder.stage("search.csv", halving.csv().as_bytes())?;
-    folder.stage("search.json", &serde_json::to_vec_pretty(&halving.json())?)?;
+    folder.stage(TRIED_TABLE, halving.csv().as_bytes())?;
+    folder.stage(TRIED, &serde_json::to_vec_pretty(&halving.json())?)?;
     if evaluation.runs.is_empty() {
         return stopped_early::<T>(session, folder, &halving);
     }

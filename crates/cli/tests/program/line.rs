@@ -1,6 +1,6 @@
 //! Runs a task by its command line.
 
-use std::{ffi::OsString, fs, path::Path};
+use std::{collections::BTreeMap, ffi::OsString, fs, path::Path};
 
 use serde_json::Value;
 use softrast_cli::{Task, execute};
@@ -38,6 +38,14 @@ pub(crate) fn json(stdout: &str) -> Value {
 /// A JSON file of the folder.
 pub(crate) fn file(out: &Path, name: &str) -> Value {
     serde_json::from_slice(&fs::read(out.join(name)).unwrap()).unwrap()
+}
+
+/// Every file of the folder, with its bytes.
+pub(crate) fn files(out: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = fs::read_dir(out).unwrap().map(Result::unwrap);
+    let files = entries.filter(|entry| entry.path().is_file());
+    let name = |entry: &fs::DirEntry| entry.file_name().into_string().unwrap();
+    files.map(|entry| (name(&entry), fs::read(entry.path()).unwrap())).collect()
 }
 
 /// A list of numbers.

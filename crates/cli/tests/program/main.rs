@@ -5,6 +5,7 @@
 mod comparison;
 #[path = "../../examples/disc.rs"]
 mod disc;
+mod folder;
 mod learn;
 mod line;
 mod results;

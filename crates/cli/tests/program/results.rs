@@ -9,8 +9,15 @@ use softrast_cli::execute;
 use softrast_lab::Failure;
 use tempfile::TempDir;
 
-const FILES: [&str; 5] =
-    ["animation.gif", "before_after.png", "curve.csv", "report.html", "result.json"];
+/// The first is the list of the others.
+const FILES: [&str; 6] = [
+    ".softrast.json",
+    "animation.gif",
+    "before_after.png",
+    "curve.csv",
+    "report.html",
+    "result.json",
+];
 
 /// Runs the task with the words of a line, results in `out`, and gives its standard output.
 fn run_in(out: &Path, line: &str) -> Result<String, Failure> {

@@ -86,11 +86,12 @@ proptest! {
     fn a_damaged_cache_costs_time_and_nothing_else(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..5_u8), 1..6)
     ) {
-        static WHOLE: std::sync::LazyLock<(String, Value)> = std::sync::LazyLock::new(|| {
+        static WHOLE: std::sync::LazyLock<(String, String, Value)> = std::sync::LazyLock::new(|| {
             let (out, json) = solved::<Disc>("evaluate --runs 3 --size 8 --steps 2");
-            (fs::read_to_string(out.path().join("evaluate.jsonl")).unwrap(), timeless(json))
+            let text = |name: &str| fs::read_to_string(out.path().join(name)).unwrap();
+            (text("evaluate.jsonl"), text(".softrast.json"), timeless(json))
         });
-        let (text, expected) = &*WHOLE;
+        let (text, list, expected) = &*WHOLE;
         let mut bytes = text.clone().into_bytes();
         for (at, byte, kind) in changes {
             if bytes.is_empty() { break; }
@@ -105,6 +106,8 @@ proptest! {
         }
         let out = tempfile::tempdir().unwrap();
         fs::write(out.path().join("evaluate.jsonl"), bytes).unwrap();
+        // A folder where runs were kept has a list that says so.
+        fs::write(out.path().join(".softrast.json"), list).unwrap();
         prop_assert_eq!(&timeless(resumed(out.path(), "evaluate --runs 3 --size 8 --steps 2")), expected);
     }
 }

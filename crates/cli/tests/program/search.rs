@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::disc::Disc;
-use crate::line::{file, json, numbers, run_in, solved};
+use crate::line::{file, files, numbers, run_in, solved};
 use serde_json::Value;
 
 /// In so few steps a small rate goes nowhere, and a large one far beyond.
@@ -103,12 +103,11 @@ fn a_task_that_says_nothing_is_searched_around_its_defaults() {
 #[test]
 fn another_command_in_the_folder_keeps_the_search() {
     let (out, _) = solved::<Disc>(KNOWN);
-    let before = file(out.path(), "search.json");
-    let (stdout, ended) = run_in::<Disc>(out.path(), "--size 16 --steps 3");
-    ended.unwrap();
-    assert_eq!(json(&stdout)["command"], "solve");
-    assert_eq!(file(out.path(), "search.json"), before);
-    assert!(!out.path().join("convergence.csv").exists());
+    let before = files(out.path());
+    let (_, ended) = run_in::<Disc>(out.path(), "--size 16 --steps 3");
+    let failure = ended.unwrap_err();
+    assert!(failure.message.contains("is a result of `disc search`"), "{failure}");
+    assert_eq!(files(out.path()), before);
 }
 
 #[test]

@@ -1,16 +1,12 @@
 //! What the studies share: tasks with a method, and the page that a study writes.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    rc::Rc,
-};
+use std::{fs, path::Path, rc::Rc};
 
 use anyhow::Context;
 use clap::Parser;
 use softrast_cli::{Common, MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment};
 use softrast_inverse::{Method, SolveConfig};
-use softrast_lab::write_atomically;
+use softrast_lab::{Inputs, OutputFolder, write_atomically};
 use softrast_softness::Family;
 
 /// Name of the study, which is that of the example.
@@ -27,10 +23,13 @@ pub(crate) struct Study {
 impl Study {
     /// Writes a file to the documents, or to `out` in the quick mode.
     pub(crate) fn file(&self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies");
-        let folder = if self.quick { PathBuf::from("out") } else { docs };
-        fs::create_dir_all(&folder)?;
-        let path = folder.join(name);
+        if self.quick {
+            let study = format!("study {NAME}");
+            let mut folder = OutputFolder::open(Path::new("out"), &study, &Inputs::default())?;
+            folder.stage(name, bytes)?;
+            return Ok(folder.commit_beside(|_| true)?);
+        }
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies").join(name);
         write_atomically(&path, bytes).with_context(|| path.display().to_string())
     }
 

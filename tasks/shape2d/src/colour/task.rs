@@ -110,6 +110,7 @@ impl Task for Coloured {
     /// From a third of a pixel of the default size, so that edges find their place, down to where the soft image is nearly the hard one.
     const SCALES: Scales =
         Scales { schedule: Schedule::Decay, decay: [0.003, 0.0001], fixed: 0.0004 };
+    const DRAWS: bool = true;
 
     type Args = Args;
     type Pictures = NoArgs;

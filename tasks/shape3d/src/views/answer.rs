@@ -17,6 +17,16 @@ use softrast_mesh::Mesh;
 use super::painted::{self, Colours};
 use crate::Args;
 
+/// Files of every result, and those of one in colour.
+const MESHES: [&str; 3] = ["mesh.obj", "mesh.ply", "mesh.glb"];
+const VIEWS: &str = "views.png";
+const IN_COLOUR: [&str; 2] = ["colours.png", "textured.glb"];
+
+/// Names of all files of a result.
+pub(super) fn names(in_colour: bool) -> impl Iterator<Item = &'static str> {
+    MESHES.into_iter().chain([VIEWS]).chain(IN_COLOUR.into_iter().filter(move |_| in_colour))
+}
+
 /// Views that a picture of the result shows.
 const SHOWN: usize = 12;
 
@@ -61,7 +71,7 @@ pub(super) fn answer(
         train: mean(scored, false, iou).unwrap_or(f64::NAN),
         held_out: mean(scored, true, iou),
         psnr: [false, true].map(|held_out| mean(scored, held_out, psnr)),
-        path: given.folder().join("mesh.obj"),
+        path: given.folder().join(MESHES[0]),
         seconds,
     };
     let mut warnings = notes;
@@ -94,17 +104,17 @@ pub(super) fn answer(
     let json = json(mesh, scored, &summary, &warnings);
     let mut beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture".to_owned();
     let mut files = vec![
-        ("mesh.obj".to_owned(), mesh.to_obj().into_bytes()),
-        ("mesh.ply".to_owned(), mesh.to_ply()),
-        ("mesh.glb".to_owned(), mesh.to_glb()),
-        ("views.png".to_owned(), picture),
+        (MESHES[0].to_owned(), mesh.to_obj().into_bytes()),
+        (MESHES[1].to_owned(), mesh.to_ply()),
+        (MESHES[2].to_owned(), mesh.to_glb()),
+        (VIEWS.to_owned(), picture),
     ];
     if let Some(colours) = colours {
-        files.push(("colours.png".to_owned(), colours));
+        files.push((IN_COLOUR[0].to_owned(), colours));
         beside += ", colours.png the same in colour";
     }
     if let Some(textured) = textured {
-        files.push(("textured.glb".to_owned(), textured.to_glb()));
+        files.push((IN_COLOUR[1].to_owned(), textured.to_glb()));
         beside += ", textured.glb the mesh with its colours as a texture";
     }
     let output = Output { text, json, warnings, partial: None };
@@ -188,7 +198,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
     let mut json = json!({
         "train_iou": train,
         "held_out_iou": held_out,
-        "mesh": path,
+        "mesh": softrast_lab::shown(path),
         "vertices": mesh.positions().len(),
         "faces": mesh.faces().len(),
         "seconds": seconds,

@@ -1,4 +1,4 @@
-use std::{path::PathBuf, sync::Arc};
+use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
 use anyhow::ensure;
 use clap::ValueEnum;
@@ -13,7 +13,7 @@ use softrast_raster::on_backend;
 use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
 use super::{
-    answer::{Scored, answer},
+    answer::{Scored, answer, names},
     hull::{ball, hull},
     painted::{self, Colours},
     problem::FromViews,
@@ -129,7 +129,13 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
             "--detail is about a sphere: with --views it goes with --start sphere",
         ));
     }
-    let all = load_views(folder, |path| flags.masks.load(path))?;
+    let reads = RefCell::new(vec![folder.join("transforms.json")]);
+    let all = load_views(folder, |path| {
+        reads.borrow_mut().push(path.to_owned());
+        flags.masks.load(path)
+    })?;
+    let pictures = all.iter().map(|view| view.picture.clone());
+    given.will_write(names(flags.colour), reads.into_inner().into_iter().chain(pictures))?;
     let notes = reading_notes(&all);
     // What is wrong with a picture is said before the work.
     let paint = |views: &[View]| {

@@ -1,0 +1,170 @@
+//! Which files of an output folder are results, and of which command.
+//!
+//! A run replaces and removes nothing but files that an earlier run of the same command has listed, in `.softrast.json` in the folder, and
+//! that still have the content that it gave them: their length and a checksum. A file that a user has changed, or put there under the name of
+//! a result, is the user's. So is everything in a folder without the list, as versions before it left.
+//!
+//! The list is written before the files are: while a run writes, it names the content that a file has and the one that it will have. A
+//! program that is killed at any moment leaves files of either content, which the next run knows as results.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::{self, Read},
+    path::{Component, Path},
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::store::checksum;
+
+/// Name of the list.
+pub(crate) const MANIFEST: &str = ".softrast.json";
+
+const ABOUT: &str = "Results in this folder, by the command that wrote them. A run of the command replaces and removes these files, as long as \
+                     nobody has changed them, and no others.";
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Manifest {
+    about: String,
+    files: BTreeMap<String, Entry>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    /// Program and command.
+    by: String,
+    what: What,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum What {
+    /// A result, and what it may contain.
+    Result(Vec<String>),
+    /// What a later call goes on from: it stays where results are replaced.
+    Kept(Vec<String>),
+    /// A file that grows, and how it begins.
+    Journal(String),
+}
+
+impl Default for Manifest {
+    fn default() -> Self {
+        Self { about: ABOUT.to_owned(), files: BTreeMap::new() }
+    }
+}
+
+/// Whose a file is, for a command.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Owner {
+    /// The command's, as it left it.
+    Own,
+    /// Listed, but no longer as the command left it.
+    Changed,
+    /// That of another command.
+    Other(String),
+    /// Nobody has listed it.
+    User,
+}
+
+impl Manifest {
+    /// The list of a folder; an empty one if it has none.
+    pub(crate) fn of(folder: &Path) -> io::Result<Self> {
+        let path = folder.join(MANIFEST);
+        match fs::symlink_metadata(&path) {
+            Err(missing) if missing.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(reason) => return Err(reason),
+            Ok(found) if found.is_file() => {}
+            Ok(_) => return Err(no_list()),
+        }
+        let mut list: Self = serde_json::from_slice(&fs::read(&path)?).map_err(|_| no_list())?;
+        // Nothing outside of the folder is ever a result.
+        list.files.retain(|name, _| is_name(name));
+        Ok(list)
+    }
+
+    pub(crate) fn text(&self) -> Vec<u8> {
+        let text = serde_json::to_vec_pretty(self);
+        text.expect("a list of names is JSON")
+    }
+
+    /// Whose the regular file of this name at `path` is.
+    pub(crate) fn owner(&self, name: &str, path: &Path, command: &str) -> io::Result<Owner> {
+        let Some(Entry { by, what }) = self.files.get(name) else { return Ok(Owner::User) };
+        if by != command {
+            return Ok(Owner::Other(by.clone()));
+        }
+        let is_own = match what {
+            What::Result(contents) | What::Kept(contents) => contents.contains(&content(path)?),
+            What::Journal(head) => begins(path, head)?,
+        };
+        Ok(if is_own { Owner::Own } else { Owner::Changed })
+    }
+
+    /// Names of the results of a command.
+    pub(crate) fn results<'a>(&'a self, command: &'a str) -> impl Iterator<Item = &'a str> {
+        let results = self
+            .files
+            .iter()
+            .filter(move |(_, entry)| entry.by == command && matches!(entry.what, What::Result(_)));
+        results.map(|(name, _)| name.as_str())
+    }
+
+    /// All names.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.keys().map(String::as_str)
+    }
+
+    /// Lists a result, which has one of these contents.
+    pub(crate) fn result(&mut self, name: &str, command: &str, contents: Vec<String>) {
+        self.insert(name, command, What::Result(contents));
+    }
+
+    /// Lists what a later call goes on from.
+    pub(crate) fn kept(&mut self, name: &str, command: &str, contents: Vec<String>) {
+        self.insert(name, command, What::Kept(contents));
+    }
+
+    /// Lists a file that grows.
+    pub(crate) fn journal(&mut self, name: &str, command: &str, begins: &str) {
+        self.insert(name, command, What::Journal(begins.to_owned()));
+    }
+
+    fn insert(&mut self, name: &str, command: &str, what: What) {
+        self.files.insert(name.to_owned(), Entry { by: command.to_owned(), what });
+    }
+
+    pub(crate) fn remove(&mut self, name: &str) {
+        self.files.remove(name);
+    }
+}
+
+fn no_list() -> io::Error {
+    io::Error::other(format!("{MANIFEST} in it is not a list of results"))
+}
+
+/// Whether it is the name of a file, and not a path that leads elsewhere.
+pub(crate) fn is_name(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
+        && name != MANIFEST
+}
+
+/// What stands for the bytes of a file: their number and a checksum.
+pub(crate) fn content_of(bytes: &[u8]) -> String {
+    format!("{}-{}", bytes.len(), checksum(bytes))
+}
+
+/// That of the file at a path.
+pub(crate) fn content(path: &Path) -> io::Result<String> {
+    Ok(content_of(&fs::read(path)?))
+}
+
+/// Whether a file begins so, or ends before it can; an empty one does.
+pub(crate) fn begins(path: &Path, head: &str) -> io::Result<bool> {
+    let mut found = Vec::new();
+    File::open(path)?.take(head.len() as u64).read_to_end(&mut found)?;
+    Ok(head.as_bytes().starts_with(&found))
+}
