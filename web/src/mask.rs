@@ -92,7 +92,7 @@ impl<B: RasterBackend> Run for MaskRun<B> {
         let mut method = self.method.clone();
         method.softness.feedback = None;
         told(0.0);
-        let steps = search.steps(false) as f64;
+        let steps = search.steps(&self.mask, false) as f64;
         let starts = search.starts::<Backend>(
             &self.mesh,
             &self.mask,

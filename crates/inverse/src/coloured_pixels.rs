@@ -1,6 +1,8 @@
 use softrast_mesh::Mesh;
 use softrast_raster::{NEAR, Pinhole};
 
+use crate::Frame;
+
 /// Samples along each side of a pixel, where there are not too many of them.
 const SAMPLES: usize = 4;
 /// Samples of an image at most, at 32 bytes each. Larger pictures have fewer in a pixel, but one.
@@ -10,12 +12,14 @@ const MOST_SAMPLES: usize = 1 << 24;
 /// covers; each row by row from the top, from 0 to 1.
 ///
 /// A pixel is the mean of 4 × 4 samples, of fewer where a picture has more than a million pixels. A sample shows the nearest face, its
-/// colour interpolated in perspective. A mesh without colours is white. Faces with a corner behind the camera are not drawn.
+/// colour interpolated in perspective. A mesh without colours is white. Faces with a corner behind the camera
+/// are not drawn. Mesh and camera may be anywhere, in any unit.
 pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     let pixels = camera.size.pixels();
     let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
     let (width, height) = (each * camera.size.width, each * camera.size.height);
     let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * height];
+    let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
     let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
     for face in mesh.faces() {
         let corners = face.map(|v| {
@@ -24,7 +28,7 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
             [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
         });
         let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
-        samples(corners, [width, height], |x, y, depth, weights| {
+        samples(corners, near, [width, height], |x, y, depth, weights| {
             let sample = &mut nearest[y * width + x];
             if depth < sample[0] {
                 let [r, g, b] = [0, 1, 2].map(|k| {
@@ -48,9 +52,10 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
 
 /// Shows each sample inside of a triangle to `show`: its column and row, its depth, and the weights of the corners in space.
 ///
-/// Corners are columns and rows in samples, and depths.
+/// Corners are columns and rows in samples, and depths; a face with one below `near` is not shown.
 fn samples(
     corners: [[f64; 3]; 3],
+    near: f64,
     [width, height]: [usize; 2],
     mut show: impl FnMut(usize, usize, f64, [f64; 3]),
 ) {
@@ -59,7 +64,7 @@ fn samples(
         (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     };
     let area = side(a, b, c[0], c[1]);
-    let in_front = corners.iter().all(|corner| corner[2] >= NEAR);
+    let in_front = corners.iter().all(|corner| corner[2] >= near);
     if !(in_front && area != 0.0 && area.is_finite()) {
         return;
     }

@@ -10,7 +10,7 @@ use softrast_raster::{
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers, tensor};
 
-use crate::{PaintTargets, PaintedView, SolveConfig, Surface};
+use crate::{Frame, PaintTargets, PaintedView, SolveConfig, Surface};
 
 type B = Autodiff<HostBackend>;
 
@@ -29,7 +29,7 @@ const FACE_PX: f64 = 4.0;
 const BEYOND: f64 = 1e-3;
 
 /// The mesh with the colours of its vertices that some views show, found by the gradient of what a [`ColourRenderer`] draws of it. Its shape
-/// stays; faces that cover many pixels are cut into four, so that the colours have room.
+/// stays; faces that cover many pixels are cut into four, so that the colours have room. Mesh and cameras may be anywhere, in any unit.
 ///
 /// Of each view the square that is looked at of its mask counts, on `config.size` pixels a side. The loss is that of [`PaintTargets`] and a
 /// little smoothness; colours start at the mean of all views and stay within [0, 1]. `visit` is told the steps taken and the mean
@@ -57,10 +57,13 @@ pub fn paint(
         v.view.camera.cropped([left, top], [extent; 2], size)
     };
     let cameras: Vec<Pinhole> = looks().map(camera).collect();
+    let frame = Frame::of_cameras(&mesh, &cameras);
+    let framed = frame.mesh(&mesh);
+    let cameras: Vec<Pinhole> = cameras.iter().map(|camera| frame.camera(camera)).collect();
     let device = Default::default();
-    let world = vertices::<HostBackend>(mesh.positions(), &device);
-    let seen = project_pinhole(world, &Pinholes::new(&cameras, &device));
-    let renderer = renderer(&mesh, &faces, size, numbers(seen.clone().narrow(2, 2, 1)))?;
+    let corners = vertices::<HostBackend>(framed.positions(), &device);
+    let seen = project_pinhole(corners, &Pinholes::new(&cameras, &device));
+    let renderer = renderer(&framed, &faces, size, numbers(seen.clone().narrow(2, 2, 1)))?;
     let background = renderer.background::<B>(&[0.0; 3], &device);
     let surface = Surface::<B>::new(&Edges::new(&faces), count);
 

@@ -5,7 +5,7 @@ use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
 use softrast_softness::numbers;
 
-use crate::{Picture, rotation::SAID};
+use crate::{Frame, Picture, rotation::SAID};
 
 /// A camera as JSON: R, t, K, width and height, and the orbit if there is one that sees the same.
 pub fn camera_json(camera: &Pinhole) -> Value {
@@ -28,11 +28,13 @@ pub fn camera_json(camera: &Pinhole) -> Value {
     found
 }
 
-/// The hard silhouette that a camera sees of a mesh: its pixels, row by row from the top.
+/// The hard silhouette that a camera sees of a mesh: its pixels, row by row from the top. Mesh and camera may be anywhere, in any unit.
 pub fn silhouette_pixels(mesh: &Mesh, camera: &Pinhole) -> Vec<f64> {
     let device = Default::default();
-    let corners = vertices::<HostBackend>(mesh.positions(), &device);
-    let seen = project_pinhole(corners, &Pinholes::new(&[*camera], &device));
+    let frame = Frame::of_cameras(mesh, [camera]);
+    let positions: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| frame.point(p)).collect();
+    let corners = vertices::<HostBackend>(&positions, &device);
+    let seen = project_pinhole(corners, &Pinholes::new(&[frame.camera(camera)], &device));
     numbers(hard_silhouette(seen, mesh.faces(), camera.size))
 }
 

@@ -12,6 +12,8 @@ const FLOATS: u32 = 5126;
 const WHOLE: u32 = 5125;
 const OF_VERTICES: u32 = 34962;
 const OF_INDICES: u32 = 34963;
+/// Coordinates are written from the origin on where 32 bits round them by at most this part of the longest side of the mesh.
+const COARSEST: f64 = 1e-5;
 
 /// The binary chunk, and what the JSON says of it.
 #[derive(Default)]
@@ -57,10 +59,25 @@ impl Buffer {
     }
 }
 
+/// See [`Mesh::glb_origin`].
+pub(crate) fn origin(mesh: &Mesh) -> [f64; 3] {
+    let [low, high] = mesh.bounds();
+    let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+    let farthest = low.into_iter().chain(high).map(f64::abs).fold(0.0, f64::max);
+    if farthest * f64::from(f32::EPSILON) <= COARSEST * longest {
+        return [0.0; 3];
+    }
+    // Of 32 bits, so that programs that keep the node in as many have the same.
+    [0, 1, 2].map(|k| f64::from(f64::midpoint(low[k], high[k]) as f32))
+}
+
 /// See [`Mesh::to_glb`].
 pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     let (vertices, faces) = split(mesh);
-    let places = || vertices.iter().map(|&[vertex, _]| mesh.positions()[vertex as usize]);
+    let origin = origin(mesh);
+    let from_origin = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] - origin[k]);
+    let places =
+        || vertices.iter().map(|&[vertex, _]| from_origin(mesh.positions()[vertex as usize]));
     let rounded = || places().map(|p| p.map(|x| x as f32));
     let extreme =
         |pick: fn(f32, f32) -> f32| rounded().reduce(|a, b| [0, 1, 2].map(|k| pick(a[k], b[k])));
@@ -90,6 +107,9 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
     });
+    if origin != [0.0; 3] {
+        json["nodes"][0]["translation"] = json!(origin);
+    }
     if let Some(texture) = mesh.texture() {
         let down = vertices.iter().map(|&[_, k]| texture.coordinates()[k as usize]);
         attributes["TEXCOORD_0"] = json!(buffer.floats(down.map(|[u, v]| [u, 1.0 - v])));

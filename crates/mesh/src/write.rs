@@ -24,7 +24,8 @@ impl Mesh {
 
     /// The bytes of a GLB file (binary glTF 2.0) with one mesh and a two-sided material, grey unless the mesh has colours.
     ///
-    /// Coordinates are rounded to 32 bits: the format has no others. Colours are written as the linear ones that the
+    /// Coordinates are rounded to 32 bits: the format has no others. So a mesh that is far from the origin for its size is written around
+    /// [`Mesh::glb_origin`], to which its node moves it. Colours are written as the linear ones that the
     /// format asks for, in 32 bits. A texture is written with its picture, as it is; then colours are left out, since programs would
     /// show the product of both. The format has one texture coordinate for each vertex, so vertices on seams are doubled, and those that no
     /// face uses are left out.
@@ -34,6 +35,12 @@ impl Mesh {
     /// If the file would have 4 GiB or more, which the format cannot say.
     pub fn to_glb(&self) -> Vec<u8> {
         glb_writer::bytes(self)
+    }
+
+    /// The translation of the node in [`Mesh::to_glb`], in world units: about the middle of the mesh where 32 bits would round coordinates by
+    /// more than 1e-5 of its longest side, as on a map, and else zeros.
+    pub fn glb_origin(&self) -> [f64; 3] {
+        glb_writer::origin(self)
     }
 
     /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its ending, in any case.
@@ -93,6 +100,21 @@ mod tests {
             }
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_glb_keeps_the_shape_of_a_mesh_far_from_the_origin() {
+        let ball = crate::icosphere(2);
+        assert_eq!(ball.glb_origin(), [0.0; 3]);
+        let place = |p: &[f64; 3]| [4.123e5 + 0.1 * p[0], 5e6 + 0.1 * p[1], 0.1 * p[2]];
+        let map = ball.with_positions(ball.positions().iter().map(place).collect()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        map.save(&path).unwrap();
+        let back = Mesh::load(&path).unwrap();
+        let pairs = back.positions().iter().flatten().zip(map.positions().iter().flatten());
+        assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-8));
+        assert_eq!(map.glb_origin()[1], 5e6);
     }
 
     #[test]

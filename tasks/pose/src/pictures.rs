@@ -10,7 +10,8 @@ use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, MaskFlags, Variant, seen_by};
 use softrast_inverse::{
-    Lens, PaintedView, Picture, PoseFile, View, camera_json, coloured_pixels, faces_across_note,
+    Frame, Lens, PaintedView, Picture, PoseFile, View, camera_json, coloured_pixels, cut_sides,
+    faces_across_note,
     pose::{FoundPose, PoseSearch},
     reading_notes, silhouette_pixels,
 };
@@ -25,11 +26,7 @@ use softrast_lab::{
 use softrast_mesh::Mesh;
 use softrast_raster::{NEAR, Pinhole, on_backend};
 
-use crate::{
-    Args, Instances,
-    colour::coloured,
-    framing::{Framing, mesh},
-};
+use crate::{Args, Instances, colour::coloured, framing::mesh};
 
 /// Field of view along the shorter side where no camera is given, in degrees.
 const ASSUMED_FOV_DEG: f64 = 45.0;
@@ -122,7 +119,7 @@ pub(crate) fn solve_pictures(
 ) -> anyhow::Result<Answer> {
     let args = given.args;
     refuse_flags_of_seeds(given)?;
-    let (mesh, mesh_name, framing) = mesh(args)?;
+    let (mesh, mesh_name, frame) = mesh(args)?;
     if args.colour {
         coloured(args, &mesh)?;
     }
@@ -162,12 +159,14 @@ pub(crate) fn solve_pictures(
     let overlays = overlay_names(&paths, single);
     let poses = (!single).then_some(POSES);
     given.will_write(overlays.iter().map(String::as_str).chain(poses), paths)?;
-    let steps = search.steps(start.is_some());
-    let mut progress = given.progress(steps * tasks.len())?;
-    let mut solved = Vec::new();
-    for (k, (view, painted)) in tasks.into_iter().enumerate() {
+    let steps = |(view, _): &(View, _)| search.steps(&view.mask, start.is_some());
+    let mut progress = given.progress(tasks.iter().map(steps).sum())?;
+    let (mut solved, mut begun) = (Vec::new(), 0);
+    for task in tasks {
         let clock = std::time::Instant::now();
-        let visit = |step: usize, loss: f64| progress.step(k * steps + step, loss);
+        let (before, (view, painted)) = (begun, task);
+        begun += search.steps(&view.mask, start.is_some());
+        let visit = |step: usize, loss: f64| progress.step(before + step, loss);
         let (View { name, picture: path, mask, camera, .. }, started) = (view, start.is_some());
         let poses = on_backend!(backend, B => match &painted {
             Some(view) => search.run_by_colour::<B>(&mesh, view, started, &method, visit),
@@ -181,15 +180,16 @@ pub(crate) fn solve_pictures(
     let across = faces_across_note(&mesh, best, NEAR);
     let mut warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
     warnings.extend(notes.into_iter().chain(across));
-    let mesh = Framed { mesh, name: mesh_name, framing };
+    let mesh = Framed { mesh, name: mesh_name, frame };
     answer(&mesh, &solved, &overlays, warnings, single)
 }
 
-/// The mesh that is looked for, and where it was.
+/// The mesh that is looked for.
 struct Framed {
     mesh: Mesh,
     name: String,
-    framing: Framing,
+    /// In which it is looked for, of its file.
+    frame: Frame,
 }
 
 /// Flags that say what is drawn as a target.
@@ -219,7 +219,16 @@ fn warnings(calibrated: bool, optimised: bool, solved: &[Solved]) -> Vec<String>
             if optimised { "" } else { ", --optimise-fov looks for it" },
         ));
     }
-    for Solved { path, poses, .. } in solved {
+    for Solved { path, mask, poses, .. } in solved {
+        let cut = cut_sides(mask);
+        if !cut.is_empty() {
+            warnings.push(format!(
+                "{}: the mask reaches the {} of the picture, so the object may go on there: only what is in the picture is compared, and \
+                 other poses may fit as well",
+                path.display(),
+                cut.join(" and the ")
+            ));
+        }
         let iou = poses[0].iou;
         if iou < 0.8 {
             warnings.push(format!(
@@ -345,21 +354,22 @@ fn page(
 }
 
 fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> Value {
-    let Framed { name, framing, .. } = mesh;
+    let Framed { name, frame, .. } = mesh;
     let posed = |pose: &FoundPose| {
         json!({
             "camera": camera_json(&pose.camera),
-            "camera_in_file": camera_json(&framing.of_file(&pose.camera)),
+            "camera_in_file": camera_json(&frame.camera_to_world(&pose.camera)),
             "iou": pose.iou,
             "psnr": pose.psnr,
         })
     };
     let mut results: Vec<Value> = Vec::new();
     for one in solved {
-        let Solved { path, poses, seconds, .. } = one;
+        let Solved { path, mask, poses, seconds, .. } = one;
         let mut result = posed(&one.of_file(&poses[0]));
         result["target"] = shown(path).into();
         result["alternatives"] = poses[1..].iter().map(|pose| posed(&one.of_file(pose))).collect();
+        result["cut_sides"] = json!(cut_sides(mask));
         result["seconds"] = json!(seconds);
         results.push(result);
     }
@@ -369,7 +379,7 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
         let mean = solved.iter().map(|of| of.poses[0].iou).sum::<f64>() / solved.len() as f64;
         json!({ "mean_iou": mean, "pictures": results })
     };
-    json["mesh"] = json!({ "name": name, "middle": framing.middle, "scale": framing.scale });
+    json["mesh"] = json!({ "name": name, "middle": frame.middle, "scale": 1.0 / frame.unit });
     json["warnings"] = json!(warnings);
     json
 }
@@ -395,16 +405,18 @@ fn beside(mesh: &Mesh, one: &Solved) -> anyhow::Result<Option<RgbImage>> {
 
 /// The mesh with all poses that were found.
 fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
+    // A page keeps coordinates in 32 bits.
+    let frame = Frame::of_mesh(mesh);
     let views = solved.iter().flat_map(|Solved { path, mask, poses, .. }| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         poses.iter().enumerate().map(move |(rank, FoundPose { camera, iou, .. })| {
             let name =
                 if rank == 0 { name.to_string() } else { format!("{name}, alternative {rank}") };
-            seen_by(name, camera, mask, format!("IoU {iou:.4}"))
+            seen_by(name, &frame.camera(camera), mask, format!("IoU {iou:.4}"))
         })
     });
     Ok(Viewer {
-        positions: mesh.positions().to_vec(),
+        positions: mesh.positions().iter().map(|&p| frame.point(p)).collect(),
         faces: mesh.faces().to_vec(),
         colours: mesh.colours().map(<[_]>::to_vec),
         views: views.collect::<anyhow::Result<_>>()?,

@@ -111,6 +111,43 @@ fn a_result_is_a_start_and_a_camera_for_the_mesh_as_it_is_in_its_file() {
     assert!((z / w / 3.0 - 1.0).abs() < 0.05, "{z} and {w}");
 }
 
+/// The fox in millimetres where a map has metres: with its start in the coordinates of the file, and found in a frame of its own.
+#[test]
+fn a_mesh_on_a_map_is_seen_from_where_it_is() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (scale, origin) = (1e-3, [4.5e5, 5.2e6, 310.0]);
+    let mesh = softrast_mesh::fox();
+    let place = |p: &[f64; 3]| [0, 1, 2].map(|k| origin[k] + scale * p[k]);
+    let positions = mesh.positions().iter().map(place).collect();
+    let on_map = path("map.obj");
+    softrast_mesh::Mesh::new(positions, mesh.faces().to_vec()).unwrap().save(&on_map).unwrap();
+
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    let truth = &truth["views"][4];
+    let rotation = |camera: &Value| {
+        [0, 1, 2].map(|row| [0, 1, 2].map(|k| camera["R"][row][k].as_f64().unwrap()))
+    };
+    let eye = |camera: &Value| {
+        let (r, t) = (rotation(camera), [0, 1, 2].map(|k| camera["t"][k].as_f64().unwrap()));
+        [0, 1, 2].map(|k| -(0..3).map(|row| r[row][k] * t[row]).sum::<f64>())
+    };
+    let stood = place(&eye(truth));
+    let t = rotation(truth).map(|row| -(0..3).map(|k| row[k] * stood[k]).sum::<f64>());
+    let start = path("start.json");
+    fs::write(&start, json!({ "R": truth["R"], "t": t }).to_string()).unwrap();
+    let (target, camera) = (fox("images/04.png"), fox("transforms.json"));
+    let words = ["--target", &target, "--camera", &camera, "--mesh", &on_map];
+    for more in [vec!["--raw", "--start", &start, "--steps", "10"], vec!["--size", "64"]] {
+        let found = run(out.path(), &[&words[..], &more].concat()).unwrap();
+        assert!(found["iou"].as_f64().unwrap() > 0.97, "{more:?}: {found}");
+        let of_file = &found["camera_in_file"];
+        assert!(angle_deg(of_file, truth) < 3.0, "{more:?}: {found}");
+        let off = (0..3).map(|k| (eye(of_file)[k] - stood[k]).abs()).fold(0.0, f64::max);
+        assert!(off < 0.2 * scale, "{more:?}: the camera is {off} away from where it stood");
+    }
+}
+
 fn picture(folder: &Path, name: &str, pixel: impl Fn(u32, u32) -> u8) -> PathBuf {
     let path = folder.join(name);
     GrayImage::from_fn(40, 30, |x, y| Luma([pixel(x, y)])).save(&path).unwrap();
@@ -294,6 +331,44 @@ fn a_tall_picture_takes_no_more_memory_than_its_pixels_ask_for() {
     run(out.path(), &[&words[..], &["--size", "16", "--steps", "1"]].concat()).unwrap();
     let page = fs::metadata(out.path().join("report.html")).unwrap().len();
     assert!(page < 2_000_000, "{page} bytes");
+}
+
+/// The picture shows two fifths of the fox, so that neither its place nor its size is that of the mask.
+#[test]
+fn a_fox_that_the_picture_cuts_off_is_found() {
+    let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let rotation = [
+        [-0.9164520202629824, 0.26906426305615627, 0.296175820927275],
+        [0.38533065528645427, 0.3938902831633908, 0.8344883048467339],
+        [0.1078702028013735, 0.8788941160205314, -0.4646602545646432],
+    ];
+    let camera = Pinhole {
+        rotation,
+        translation: [0.0, 0.0, 3.771634736567437],
+        focal: [195.28171635289755; 2],
+        centre: [80.90161451093375, 119.34375],
+        size: [120, 160].into(),
+    };
+    // Four by four samples in a pixel.
+    let fine = silhouette_pixels(
+        &softrast_mesh::fox(),
+        &camera.cropped([0.0; 2], [160.0, 120.0], [480, 640]),
+    );
+    let level = |x: u32, y: u32| {
+        let sample = |k: u32| fine[((4 * y + k / 4) * 640 + 4 * x + k % 4) as usize];
+        Luma([((0..16).map(sample).sum::<f64>() / 16.0 * 255.0).round() as u8])
+    };
+    let (target, lens) = (path("mask.png"), path("camera.json"));
+    GrayImage::from_fn(160, 120, level).save(&target).unwrap();
+    let truth = camera_json(&camera);
+    fs::write(&lens, json!({ "K": truth["K"] }).to_string()).unwrap();
+    let found = run(out.path(), &["--target", &target, "--camera", &lens]).unwrap();
+    let off = angle_deg(&found["camera"], &truth);
+    assert!(off < 5.0, "{off} degrees off, {found}");
+    assert_eq!(found["cut_sides"], json!(["bottom"]));
+    let warning = found["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("mask.png: the mask reaches the bottom of the picture"), "{warning}");
 }
 
 /// A bottle looks the same however it is turned around itself: that is one answer, not six.

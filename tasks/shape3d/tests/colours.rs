@@ -133,6 +133,38 @@ fn shape_and_colours_are_found_together_and_without_the_flag_there_are_none() {
     assert!(!out.join("plain/colours.png").exists());
 }
 
+/// A hundredth of the size, in metres of a map.
+#[test]
+fn colours_are_found_on_a_map_and_in_a_small_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path(), false);
+    let place = |p: [f64; 3]| [4e5 + 0.01 * p[0], 5e6 + 0.01 * p[1], 0.01 * p[2]];
+    let cameras = folder.path().join("transforms.json");
+    let mut views: Value = serde_json::from_slice(&fs::read(&cameras).unwrap()).unwrap();
+    for frame in views["frames"].as_array_mut().unwrap() {
+        let rows = &mut frame["transform_matrix"];
+        let eye = place([0, 1, 2].map(|row| rows[row][3].as_f64().unwrap()));
+        (0..3).for_each(|row| rows[row][3] = json!(eye[row]));
+    }
+    fs::write(&cameras, views.to_string()).unwrap();
+    let known = folder.path().join("known.obj");
+    let placed = ball().positions().iter().map(|&p| place(p)).collect();
+    Mesh::new(placed, ball().faces().to_vec()).unwrap().save(&known).unwrap();
+    let (views, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
+    let words = ["--views", views, "--hold-out", "2", "--colour"];
+    let of_known = run(&out, &[&words[..], &["--mesh", known.to_str().unwrap()]].concat()).unwrap();
+    assert!(number(&of_known, "held_out_iou") > 0.98, "{of_known}");
+    assert!(number(&of_known, "held_out_psnr") > 30.0, "{of_known}");
+    let found = run(&out, &[&words[..], &["--steps", "40"]].concat()).unwrap();
+    assert!(number(&found, "held_out_iou") > 0.95, "{found}");
+    assert!(number(&found, "held_out_psnr") > 20.0, "{found}");
+    for name in ["mesh.obj", "mesh.glb", "textured.glb"] {
+        let [low, high] = Mesh::load(out.join(name)).unwrap().bounds();
+        let (first, last) = (place([-1.1; 3]), place([1.1; 3]));
+        assert!((0..3).all(|k| first[k] < low[k] && high[k] < last[k]), "{name}: {low:?} {high:?}");
+    }
+}
+
 #[test]
 fn a_luminance_that_is_the_mask_is_a_white_mesh() {
     let fox = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");

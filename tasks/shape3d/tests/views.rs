@@ -47,6 +47,15 @@ fn a_sphere_becomes_the_fox_without_a_hull() {
 
 /// Changes the cameras of the fox in a copy of its folder, then runs.
 fn with(change: impl Fn(&mut Value), more: &[&str]) -> Result<Value, String> {
+    with_results(change, more, |_| ())
+}
+
+/// The same, and the folder of results is shown to `look` if there are any.
+fn with_results(
+    change: impl Fn(&mut Value),
+    more: &[&str],
+    look: impl FnOnce(&Path),
+) -> Result<Value, String> {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("images")).unwrap();
     for k in 0..12 {
@@ -61,7 +70,61 @@ fn with(change: impl Fn(&mut Value), more: &[&str]) -> Result<Value, String> {
     let words = [&["--views", folder.path().to_str().unwrap(), "--steps", "1"], more].concat();
     let found = run(&out, &words);
     assert!(found.is_ok() || !out.join("report.html").exists(), "{found:?}");
+    if found.is_ok() {
+        look(&out);
+    }
     found
+}
+
+/// Cameras of a map in metres, of a map in millimetres, and of a scene a thousandth of the size.
+#[test]
+fn the_unit_and_the_origin_of_the_cameras_do_not_matter() {
+    let more = ["--hold-out", "2"];
+    let plain = with(|_| (), &more).unwrap();
+    let number = |found: &Value, name: &str| found[name].as_f64().unwrap();
+    for (scale, offset) in [
+        (1.0, [5e5, 4.5e6, 0.0]),
+        (1e3, [1e6, -4e6, 2e5]),
+        (1e-3, [0.0; 3]),
+        (1e-3, [40.0, -7.0, 0.0]),
+    ] {
+        let placed = |cameras: &mut Value| {
+            for frame in cameras["frames"].as_array_mut().unwrap() {
+                for (row, offset) in offset.iter().enumerate() {
+                    let x = &mut frame["transform_matrix"][row][3];
+                    *x = json!(offset + scale * x.as_f64().unwrap());
+                }
+            }
+        };
+        let mut boxes = Vec::new();
+        let found = with_results(placed, &more, |out| {
+            for name in ["mesh.obj", "mesh.ply", "mesh.glb"] {
+                boxes.push(Mesh::load(out.join(name)).unwrap().bounds());
+            }
+        });
+        let found = found.unwrap();
+        for name in ["train_iou", "held_out_iou"] {
+            let off = (number(&found, name) - number(&plain, name)).abs();
+            assert!(off < 0.005, "scale {scale}, offset {offset:?}: {found}");
+        }
+        assert!(found["warnings"].as_array().unwrap().is_empty(), "{found}");
+        // The fox reaches from about -1 to 1, and is where the cameras look.
+        for [low, high] in &boxes {
+            let relative = |x: f64, k: usize| (x - offset[k]) / scale;
+            for k in 0..3 {
+                let extent = relative(high[k], k) - relative(low[k], k);
+                assert!((0.3..2.6).contains(&extent), "scale {scale}: {low:?} {high:?}");
+                assert!(
+                    relative(low[k], k) > -1.4 && relative(high[k], k) < 1.4,
+                    "{low:?} {high:?}"
+                );
+                // All files have the same digits.
+                let apart = (low[k] - boxes[0][0][k]).abs().max((high[k] - boxes[0][1][k]).abs());
+                assert!(apart < 1e-5 * scale, "scale {scale}: {boxes:?}");
+            }
+        }
+        assert_eq!(found["glb_origin"][1] == 0.0, offset[1] == 0.0, "{found}");
+    }
 }
 
 #[test]

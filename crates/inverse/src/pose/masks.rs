@@ -4,13 +4,13 @@ use anyhow::Context;
 use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, small_product,
-    turned, vertices,
+    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, turned,
+    vertices,
 };
 use softrast_softness::{numbers, tensor};
 
 use super::{Coat, ColouredViews, parted};
-use crate::{InverseProblem, MaskTargets, PaintedView, Picture, SoftnessAt, SolveConfig};
+use crate::{Frame, InverseProblem, MaskTargets, PaintedView, Picture, SoftnessAt, SolveConfig};
 
 /// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
 const CLEARANCE: f64 = 1.05;
@@ -37,13 +37,15 @@ pub struct MaskPose {
 /// is the soft `IoU` loss over the part of the picture that is looked at; what lies outside of the picture does not count. Where the mesh
 /// and all instances have colours, images are those of [`ColouredViews`], and its loss is added.
 ///
+/// Mesh and cameras may be anywhere, in any unit: images are computed in the [`Frame`] of the mesh.
+///
 /// Not covered are cameras that stand within 1.05 times the distance of the farthest vertex from the middle of the mesh: depths are held
 /// beyond that, so that no part of the mesh comes behind the camera.
 #[derive(Clone, Debug)]
 pub struct MaskPoses {
+    /// In its frame.
     mesh: Mesh,
-    middle: [f64; 3],
-    radius: f64,
+    frame: Frame,
     optimise_fov: bool,
     instances: Vec<MaskPose>,
 }
@@ -51,17 +53,9 @@ pub struct MaskPoses {
 impl MaskPoses {
     /// Poses of a mesh, number `k` of them as the instance of seed `k`.
     pub fn new(mesh: &Mesh, instances: Vec<MaskPose>, optimise_fov: bool) -> Self {
-        let (middle, radius) = ball(mesh);
-        Self { mesh: mesh.clone(), middle, radius, optimise_fov, instances }
+        let frame = Frame::of_mesh(mesh);
+        Self { mesh: frame.mesh(mesh), frame, optimise_fov, instances }
     }
-}
-
-/// The middle of the box of a mesh, and how far its farthest vertex is from there.
-pub(crate) fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
-    let [low, high] = mesh.bounds();
-    let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
-    let distance = |p: [f64; 3]| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
-    (middle, mesh.triangles().flatten().map(distance).fold(0.0, f64::max))
 }
 
 impl InverseProblem for MaskPoses {
@@ -143,12 +137,12 @@ pub struct MaskScene<B: RasterBackend> {
     faces: Arc<[[u32; 3]]>,
     /// Cameras at the start, for what is looked at.
     cameras: Pinholes<B>,
-    /// The middle of the mesh `[views, 3, 1]`, in the world.
-    middle: Tensor<B, 3>,
-    /// Where cameras see it at the start, `[views, 2]`, as x and y at depth 1; its depth `[views, 1]`; the radius of the mesh at that depth.
+    /// Where cameras see the middle of the mesh at the start, `[views, 2]`, as x and y at depth 1; its depth `[views, 1]`; the radius of the
+    /// mesh at that depth.
     seen: Tensor<B, 2>,
     depth: Tensor<B, 2>,
     radius: Tensor<B, 2>,
+    frame: Frame,
     /// Least logarithm of the depth against the start, `[views, 1]`.
     nearest: Tensor<B, 2>,
     optimise_fov: bool,
@@ -159,20 +153,20 @@ pub struct MaskScene<B: RasterBackend> {
 impl<B: RasterBackend> MaskScene<B> {
     fn new(problem: &MaskPoses, instances: &[MaskPose], size: usize) -> Self {
         let (views, device) = (instances.len(), Default::default());
-        let MaskPoses { mesh, middle, radius, optimise_fov, .. } = problem;
+        let MaskPoses { mesh, frame, optimise_fov, .. } = problem;
         let cropped = |of: &MaskPose| {
             let [left, top, extent] = of.square;
-            of.start.cropped([left, top], [extent; 2], size)
+            frame.camera(&of.start).cropped([left, top], [extent; 2], size)
         };
         let cameras: Vec<Pinhole> = instances.iter().map(cropped).collect();
-        let seen: Vec<[f64; 3]> = cameras.iter().map(|camera| camera.seen(*middle)).collect();
+        // The middle of the mesh is the origin of the frame, and its radius is 1.
+        let seen: Vec<[f64; 3]> = cameras.iter().map(|camera| camera.translation).collect();
         let column = |of: &dyn Fn(&[f64; 3]) -> f64| {
             tensor::<B, 2>(seen.iter().map(of).collect(), [views, 1])
         };
         let at = seen.iter().flat_map(|[x, y, z]| [x / z, y / z]);
-        let nearest = |&[_, _, z]: &[f64; 3]| {
-            (CLEARANCE * radius / z).ln().clamp(-FARTHEST, FARTHEST).min(0.0)
-        };
+        let nearest =
+            |&[_, _, z]: &[f64; 3]| (CLEARANCE / z).ln().clamp(-FARTHEST, FARTHEST).min(0.0);
         let painted = instances.iter().map(|of| Some((of.painted.as_ref()?, of.square)));
         let painted: Option<Vec<_>> = painted.collect();
         let colours = mesh.colours().zip(painted).map(|(colours, painted)| {
@@ -183,10 +177,10 @@ impl<B: RasterBackend> MaskScene<B> {
             vertices: vertices(mesh.positions(), &device),
             faces: mesh.faces().into(),
             cameras: Pinholes::new(&cameras, &device),
-            middle: tensor::<B, 3>(middle.repeat(views), [views, 3, 1]),
             seen: tensor(at.collect(), [views, 2]),
             depth: column(&|p| p[2]),
-            radius: column(&|p| radius / p[2]),
+            radius: column(&|p| 1.0 / p[2]),
+            frame: *frame,
             nearest: column(&nearest),
             optimise_fov: *optimise_fov,
             targets: MaskTargets::new(instances.iter().map(|of| (&of.mask, of.square)), size),
@@ -217,8 +211,7 @@ impl<B: RasterBackend> MaskScene<B> {
         let beside = (self.seen.clone() + part(3, 2) * self.radius.clone()) * depth.clone();
         let Pinholes { rotation, intrinsics, size, .. } = self.cameras.clone();
         let rotation = turned(part(0, 3), rotation);
-        let middle = small_product(rotation.clone(), self.middle.clone()).squeeze_dim::<2>(2);
-        let translation = Tensor::cat(vec![beside, depth], 1) - middle;
+        let translation = Tensor::cat(vec![beside, depth], 1);
         let intrinsics = match zoom {
             None => intrinsics,
             Some(zoom) => {
@@ -256,7 +249,7 @@ impl MaskScene<HostBackend> {
             let r = &r[9 * view..9 * view + 9];
             let side = self.cameras.size.width as f64;
             let gain = side / of.square[2];
-            Pinhole {
+            self.frame.camera_to_world(&Pinhole {
                 rotation: orthonormal([0, 1, 2].map(|i| [r[3 * i], r[3 * i + 1], r[3 * i + 2]])),
                 translation: [0, 1, 2].map(|i| t[3 * view + i]),
                 focal: match self.optimise_fov {
@@ -264,7 +257,7 @@ impl MaskScene<HostBackend> {
                     false => of.start.focal,
                 },
                 ..of.start
-            }
+            })
         };
         instances.iter().enumerate().map(camera).collect()
     }

@@ -6,11 +6,14 @@
 
 mod coat;
 mod coloured;
+mod glance;
 mod instance;
 mod masks;
 mod problem;
 mod scene;
 mod search;
+mod shifts;
+mod target;
 
 pub use coat::Coat;
 pub use coloured::{ColouredViews, parted};

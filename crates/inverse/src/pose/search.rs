@@ -2,26 +2,19 @@ use std::borrow::{Borrow, Cow};
 
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
-use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, iou_loss, project_pinhole,
-    vertices,
-};
+use softrast_raster::{HostBackend, Pinhole, RasterBackend, hard_silhouette};
 use softrast_softness::{numbers, tensor};
 
 use super::{
-    Coat, ColouredViews,
-    masks::{MaskPose, MaskPoses, ball},
+    glance::glance,
+    masks::{MaskPose, MaskPoses},
+    target::Target,
 };
 use crate::{
-    InverseProblem, Iterate, Method, PaintedView, Picture, SolveConfig, coloured_pixels, mask_iou,
-    minimize, silhouette_pixels,
+    Frame, InverseProblem, Iterate, Method, PaintedView, Picture, SolveConfig, coloured_pixels,
+    cut_sides, frame::ball, mask_iou, minimize, silhouette_pixels,
 };
 
-/// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
-const GLANCE: usize = 32;
-const DIRECTIONS: usize = 160;
-const ROLLS: usize = 16;
-const AT_ONCE: usize = 256;
 /// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about a pixel and a half.
 const DETAIL: f64 = 1.0 / 20.0;
 /// A mesh whose surface is mostly such detail is looked at as it is.
@@ -38,14 +31,33 @@ const ALIKE: f64 = 0.985;
 const SIDE_VIEW: usize = 48;
 /// Poses of the first look that are improved on few pixels, a little, and the steps of that.
 const STARTS: (usize, usize) = (128, 12);
-/// Those of them that are improved on few pixels further, and the steps of that.
-const COARSE: (usize, usize) = (24, 48);
-/// Pixels a side of both.
+/// Pixels a side of that, and of what follows on few pixels.
 const COARSE_SIZE: usize = 48;
-/// Poses of these that are improved on many pixels.
-const FINE: usize = 6;
+/// Most answers.
+const ANSWERS: usize = 6;
 /// How much less than the best `IoU` a pose may have to count as another answer.
 const NEARLY: f64 = 0.03;
+
+/// What follows for the poses that were improved a little.
+struct Stages {
+    /// Those that are improved on few pixels further, and the steps of that.
+    coarse: (usize, usize),
+    /// Those of them that are improved on many pixels.
+    fine: usize,
+    /// Those of them that are improved on many pixels once more.
+    last: usize,
+}
+
+impl Stages {
+    const OF_WHOLE: Self = Self { coarse: (24, 48), fine: 6, last: 0 };
+    /// A part of an outline fits more poses nearly as well, and size, place and rotation make up for each other, so it takes more steps. Of 20
+    /// views of the fox that lack 30 to 60 % of its silhouette, one more was found than with the stages for whole ones.
+    const OF_CUT: Self = Self { coarse: (40, 72), fine: 10, last: 3 };
+
+    fn of(cut: bool) -> Self {
+        if cut { Self::OF_CUT } else { Self::OF_WHOLE }
+    }
+}
 
 /// How poses are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,36 +96,12 @@ impl Borrow<Pinhole> for FoundPose {
     }
 }
 
-/// What a pose is told by: a mask, its square that is looked at, and colours if they tell it too.
-#[derive(Clone, Copy)]
-struct Target<'a> {
-    mask: &'a Picture,
-    square: [f64; 3],
-    painted: Option<&'a PaintedView>,
-}
-
-impl<'a> Target<'a> {
-    fn new(mask: &'a Picture, painted: Option<&'a PaintedView>) -> anyhow::Result<Self> {
-        Ok(Self { mask, square: mask.looked_at()?, painted })
-    }
-
-    /// Starts of poses, told by silhouettes alone or by colours too.
-    fn poses(&self, starts: impl IntoIterator<Item = Pinhole>, by_colour: bool) -> Vec<MaskPose> {
-        let painted = self.painted.filter(|_| by_colour);
-        let pose = |start| MaskPose {
-            mask: self.mask.clone(),
-            square: self.square,
-            start,
-            painted: painted.cloned(),
-        };
-        starts.into_iter().map(pose).collect()
-    }
-}
-
 impl PoseSearch {
-    /// Steps that [`PoseSearch::run`] takes from a start, or from anywhere.
-    pub fn steps(&self, started: bool) -> usize {
-        self.fine_steps + if started { 0 } else { STARTS.1 + COARSE.1 }
+    /// Steps that [`PoseSearch::run`] takes for a mask from a start, or from anywhere.
+    pub fn steps(&self, mask: &Picture, started: bool) -> usize {
+        let Stages { coarse, last, .. } = Stages::of(!cut_sides(mask).is_empty());
+        let fine = if last > 0 { 2 * self.fine_steps } else { self.fine_steps };
+        fine + if started { 0 } else { STARTS.1 + coarse.1 }
     }
 
     /// What [`PoseSearch::run`] would refuse at once.
@@ -141,6 +129,9 @@ impl PoseSearch {
 
     /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before,
     /// look otherwise from some side, and fit nearly as well: their `IoU` is less by 0.03 at most.
+    ///
+    /// Mesh and camera may be anywhere, in any unit. A mask that reaches a side of the picture ([`cut_sides`]) may belong to an object that
+    /// goes on there: only what is in the picture is compared, and sizes and places of the whole object are tried.
     ///
     /// `camera` has the intrinsics; its pose is where to start if it is `started`, else all directions and rolls are tried. `visit` sees
     /// the number of each step and the least loss; an error of it ends the search.
@@ -191,13 +182,24 @@ impl PoseSearch {
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
         Self::check(mesh, target.mask, camera, started)?;
+        let frame = Frame::of_mesh(mesh);
+        let (mesh, camera) = (&frame.mesh(mesh), frame.camera(camera));
         let starts = match started {
-            true => vec![*camera],
-            false => self.hopeful::<B>(mesh, target, camera, method, visit)?,
+            true => vec![camera],
+            false => self.hopeful::<B>(mesh, target, &camera, method, visit)?,
         };
-        let begun = self.steps(started) - self.fine_steps;
+        let Stages { coarse: (_, coarse_steps), last, .. } = Stages::of(target.cut);
+        let mut begun = if started { 0 } else { STARTS.1 + coarse_steps };
         let (poses, fine) = (target.poses(starts, true), self.fine());
-        let found = self.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+        let mut found = self.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+        if last > 0 {
+            begun += self.fine_steps;
+            found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+            let best = found.drain(..last.min(found.len())).map(|(camera, _)| camera);
+            let poses = target.poses(best.collect::<Vec<_>>(), true);
+            let better = self.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+            found.extend(better);
+        }
         let scored = found.into_iter().map(|(camera, loss)| {
             let iou = mask_iou(&silhouette_pixels(mesh, &camera), target.mask);
             let psnr =
@@ -207,13 +209,16 @@ impl PoseSearch {
         });
         let few = coarse(mesh);
         let alike = target.painted.is_none().then_some(&*few);
-        let scored = apart(scored.collect(), FINE, ANSWERS_APART_DEG, alike);
+        let scored = apart(scored.collect(), ANSWERS, ANSWERS_APART_DEG, alike);
         let best = scored.first().context("no pose was tried")?.1;
         let nearly = scored.into_iter().filter(|(_, loss)| *loss <= best + NEARLY);
-        Ok(nearly.map(|(pose, _)| pose).collect())
+        let in_world =
+            |pose: FoundPose| FoundPose { camera: frame.camera_to_world(&pose.camera), ..pose };
+        Ok(nearly.map(|(pose, _)| in_world(pose)).collect())
     }
 
-    /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most hopeful first; at most six.
+    /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most hopeful first: at most six, or ten
+    /// where the picture cuts the object off.
     ///
     /// # Errors
     ///
@@ -227,7 +232,11 @@ impl PoseSearch {
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
         Self::check(mesh, mask, camera, false)?;
-        self.hopeful::<B>(mesh, &Target::new(mask, None)?, camera, method, &mut visit)
+        let frame = Frame::of_mesh(mesh);
+        let (mesh, camera, target) =
+            (frame.mesh(mesh), frame.camera(camera), Target::new(mask, None)?);
+        let starts = self.hopeful::<B>(&mesh, &target, &camera, method, &mut visit)?;
+        Ok(starts.iter().map(|camera| frame.camera_to_world(camera)).collect())
     }
 
     fn hopeful<B: RasterBackend>(
@@ -243,7 +252,8 @@ impl PoseSearch {
         let mut found = apart(glance(&few, target, camera), STARTS.0, APART_DEG, None);
         let mut begun = 0;
         // Few steps already tell the hopeless apart: many starts are had for little.
-        for ((_, steps), left) in [(STARTS, COARSE.0), (COARSE, FINE)] {
+        let Stages { coarse, fine, .. } = Stages::of(target.cut);
+        for ((_, steps), left) in [(STARTS, coarse.0), (coarse, fine)] {
             // Silhouettes bring a pose near for less time than colours; these say then which it is.
             let poses = target.poses(found.into_iter().map(|(start, _)| start), false);
             let stage = SolveConfig { steps, size: COARSE_SIZE, learning_rate: self.learning_rate };
@@ -314,125 +324,6 @@ fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
     merged.map_or(Cow::Borrowed(mesh), Cow::Owned)
 }
 
-/// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error before
-/// they were moved there for the last time.
-fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<(Pinhole, f64)> {
-    let &Target { mask, square, painted } = target;
-    let (middle, radius) = ball(mesh);
-    let [levels, covered] = mask.part(square, GLANCE);
-    let target = moments(&levels);
-    let [left, top, extent] = square;
-    let pixel = extent / GLANCE as f64;
-    // The mask, in the middle of its square, is that of a ball at first.
-    let at = [left + pixel * target.middle[0], top + pixel * target.middle[1]];
-    let ray = [0, 1].map(|k| (at[k] - camera.centre[k]) / camera.focal[k]);
-    let [_, _, white] = mask.square().unwrap_or(square);
-    let depth = 2.0 * radius * camera.focal[0] / white;
-    let towards = turned_to(ray);
-    let device = Default::default();
-    let corners = vertices::<HostBackend>(mesh.positions(), &device);
-    let place = |rotation: [[f64; 3]; 3], [x, y]: [f64; 2], depth: f64| {
-        let seen = rotation.map(|row| (0..3).map(|k| row[k] * middle[k]).sum::<f64>());
-        let at = [x * depth, y * depth, depth];
-        Pinhole { rotation, translation: [0, 1, 2].map(|k| at[k] - seen[k]), ..*camera }
-    };
-    let all: Vec<_> = directions().map(|local| times(towards, local)).collect();
-    let colours = mesh.colours().zip(painted).map(|(colours, view)| {
-        let coat = Coat::new(colours, mesh.faces().into());
-        ColouredViews::<HostBackend>::of_pictures(coat, &[(view, square); AT_ONCE], GLANCE)
-    });
-    let mut found = Vec::with_capacity(all.len());
-    for rotations in all.chunks(AT_ONCE) {
-        let views = rotations.len();
-        let mut cameras: Vec<Pinhole> = rotations.iter().map(|&r| place(r, ray, depth)).collect();
-        let mut losses = Vec::new();
-        // Twice moved to where the mask is, the second time as good as exactly.
-        for _ in 0..2 {
-            let cropped = cameras.iter().map(|of| of.cropped([left, top], [extent; 2], GLANCE));
-            let cropped = Pinholes::new(&cropped.collect::<Vec<_>>(), &device);
-            let of_views = |image: &[f64]| {
-                tensor::<HostBackend, 3>(image.repeat(views), [views, GLANCE, GLANCE])
-            };
-            // What lies outside of the picture does not count.
-            let seen = project_pinhole(corners.clone(), &cropped);
-            let drawn = hard_silhouette(seen.clone(), mesh.faces(), GLANCE) * of_views(&covered);
-            let loss = iou_loss(drawn.clone(), of_views(&levels));
-            losses = numbers(match &colours {
-                Some(colours) => loss + colours.hard_loss(seen, GLANCE),
-                None => loss,
-            });
-            let drawn = numbers(drawn);
-            for (camera, image) in cameras.iter_mut().zip(drawn.chunks(GLANCE * GLANCE)) {
-                let now = moments(image);
-                let [x, y, z] = camera.seen(middle);
-                // Nothing is seen where the mesh is far out: as it was.
-                let larger = if now.area > 0.0 { (now.area / target.area).sqrt() } else { 1.0 };
-                let off = [0, 1].map(|k| {
-                    let pixels = target.middle[k]
-                        - if now.area > 0.0 { now.middle[k] } else { target.middle[k] };
-                    pixels * pixel / camera.focal[k]
-                });
-                *camera = place(
-                    camera.rotation,
-                    [x / z + off[0], y / z + off[1]],
-                    (z * larger).max(1.2 * radius),
-                );
-            }
-        }
-        found.extend(cameras.into_iter().zip(losses));
-    }
-    found
-}
-
-/// How large an image is, and where its middle is, in its pixels.
-struct Moments {
-    area: f64,
-    middle: [f64; 2],
-}
-
-fn moments(image: &[f64]) -> Moments {
-    let area: f64 = image.iter().sum();
-    let sum = |at: fn(usize) -> usize| {
-        image.iter().enumerate().map(|(k, level)| level * (at(k) as f64 + 0.5)).sum::<f64>()
-    };
-    Moments { area, middle: [sum(|k| k % GLANCE) / area, sum(|k| k / GLANCE) / area] }
-}
-
-/// Rotations of a camera around what it looks at: directions spread evenly over the sphere, each with rolls all around.
-///
-/// Source: the Fibonacci sphere, González 2010.
-fn directions() -> impl Iterator<Item = [[f64; 3]; 3]> {
-    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    (0..DIRECTIONS * ROLLS).map(move |k| {
-        let (direction, roll) = (k / ROLLS, k % ROLLS);
-        let y = 1.0 - (2 * direction + 1) as f64 / DIRECTIONS as f64;
-        let (sin, cos) = (golden * direction as f64).sin_cos();
-        let around = (1.0 - y * y).sqrt();
-        // As a camera that orbits, then rolled. No direction is a pole.
-        let ahead = [around * cos, y, around * sin];
-        let right = [-ahead[2] / around, 0.0, ahead[0] / around];
-        let down = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| ahead[i] * right[j] - ahead[j] * right[i]);
-        let (sin, cos) = (std::f64::consts::TAU * roll as f64 / ROLLS as f64).sin_cos();
-        [
-            [0, 1, 2].map(|k| cos * right[k] + sin * down[k]),
-            [0, 1, 2].map(|k| cos * down[k] - sin * right[k]),
-            ahead,
-        ]
-    })
-}
-
-/// The least rotation that takes the axis ahead to where (x, y, 1) is.
-fn turned_to([x, y]: [f64; 2]) -> [[f64; 3]; 3] {
-    let length = (x * x + y * y + 1.0).sqrt();
-    let [x, y, z] = [x / length, y / length, 1.0 / length];
-    let h = 1.0 / (1.0 + z);
-    [[1.0 - h * x * x, -h * x * y, x], [-h * x * y, 1.0 - h * y * y, y], [-x, -y, z]]
-}
-
-fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    a.map(|row| [0, 1, 2].map(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
-}
-
 /// The best so many of these, each at least so many degrees from all that are better; with a mesh, only those at which it looks otherwise,
 /// so that the turns of a vase are one pose.
 fn apart<P: Copy + Borrow<Pinhole>>(
@@ -490,50 +381,4 @@ fn angle_deg(a: &Pinhole, b: &Pinhole) -> f64 {
     let trace: f64 =
         a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(x, y)| x * y).sum();
     ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn is_rotation(r: [[f64; 3]; 3]) -> bool {
-        let camera = Pinhole {
-            rotation: r,
-            translation: [0.0; 3],
-            focal: [1.0; 2],
-            centre: [0.0; 2],
-            size: 1.into(),
-        };
-        camera.check().is_ok()
-    }
-
-    #[test]
-    fn every_pose_is_near_one_that_is_looked_at() {
-        let all: Vec<_> = directions().collect();
-        assert!(all.iter().all(|&r| is_rotation(r)));
-        let camera = |rotation| Pinhole {
-            rotation,
-            translation: [0.0; 3],
-            focal: [1.0; 2],
-            centre: [0.0; 2],
-            size: 1.into(),
-        };
-        // Turned by any angles.
-        for k in 0..200 {
-            let [x, y] = [0.7 * f64::from(k), 1.3 * f64::from(k)].map(|a| a.sin() * 2.0);
-            let pose = times(
-                turned_to([x, y]),
-                times(all[37 * k as usize % all.len()], turned_to([y, -x])),
-            );
-            let nearest = all.iter().map(|&r| angle_deg(&camera(pose), &camera(r)));
-            assert!(nearest.fold(f64::INFINITY, f64::min) < 20.0);
-        }
-    }
-
-    #[test]
-    fn the_axis_ahead_is_turned_to_where_it_should_be() {
-        let r = turned_to([0.5, -2.0]);
-        assert!(is_rotation(r));
-        assert!((r[0][2] / r[2][2] - 0.5).abs() < 1e-12 && (r[1][2] / r[2][2] + 2.0).abs() < 1e-12);
-    }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, seen_by};
-use softrast_inverse::{View, faces_across_note};
+use softrast_inverse::{Frame, View, faces_across_note};
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
     format::{counted, line},
@@ -128,14 +128,18 @@ fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
         format!("3D SHAPE from {}", counted(scored.len(), "view")),
         line("IoU", &format!("{train:.4}")),
     ];
-    let rest = [
-        line("mesh", &format!("{}, {vertices} vertices, {faces} faces", path.display())),
-        line("seconds", &format!("{seconds:.1}")),
-    ];
+    let rest = [line("mesh", &format!("{}, {vertices} vertices, {faces} faces", path.display()))];
+    let origin = mesh.glb_origin();
+    let glb = (origin != [0.0; 3]).then(|| {
+        let [x, y, z] = origin;
+        line("mesh.glb", &format!("vertices in 32 bits, moved by its node to {x} {y} {z}"))
+    });
+    let seconds = line("seconds", &format!("{seconds:.1}"));
     let aside = held_out.map(|iou| line("IoU, held out", &format!("{iou:.4}")));
     let psnr = psnr.map(|psnr| line("PSNR", &format!("{psnr:.2} dB")));
     let aside_psnr = aside_psnr.map(|psnr| line("PSNR, held out", &format!("{psnr:.2} dB")));
-    head.into_iter().chain(aside).chain(psnr).chain(aside_psnr).chain(rest).collect()
+    let scores = head.into_iter().chain(aside).chain(psnr).chain(aside_psnr);
+    scores.chain(rest).chain(glb).chain([seconds]).collect()
 }
 
 fn page(
@@ -153,14 +157,16 @@ fn page(
     let mut page = Report::new("shape3d", about);
     page.warnings(warnings);
     let psnr = |one: &Scored| one.colours.as_ref().and_then(|colours| colours.psnr);
+    // A page keeps coordinates in 32 bits.
+    let frame = Frame::of_mesh(mesh);
     let views = scored.iter().map(|one| {
         let Scored { view, iou, held_out, .. } = one;
         let psnr = psnr(one).map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
         let note = format!("IoU {iou:.4}{psnr}{}", if *held_out { ", kept aside" } else { "" });
-        seen_by(view.name.clone(), &view.camera, &view.mask, note)
+        seen_by(view.name.clone(), &frame.camera(&view.camera), &view.mask, note)
     });
     let viewer = Viewer {
-        positions: mesh.positions().to_vec(),
+        positions: mesh.positions().iter().map(|&p| frame.point(p)).collect(),
         faces: mesh.faces().to_vec(),
         colours: mesh.colours().map(<[_]>::to_vec),
         views: views.collect::<anyhow::Result<_>>()?,
@@ -199,6 +205,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
         "train_iou": train,
         "held_out_iou": held_out,
         "mesh": softrast_lab::shown(path),
+        "glb_origin": mesh.glb_origin(),
         "vertices": mesh.positions().len(),
         "faces": mesh.faces().len(),
         "seconds": seconds,

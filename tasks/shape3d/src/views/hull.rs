@@ -3,9 +3,9 @@
 //! Source: Laurentini 1994.
 
 use anyhow::{Context, ensure};
-use softrast_inverse::{Picture, View};
+use softrast_inverse::{Frame, View, cut_sides};
 use softrast_mesh::Mesh;
-use softrast_raster::ImageSize;
+use softrast_raster::Pinhole;
 
 /// Pixels a side of what is looked at of each mask.
 const SIDE: usize = 128;
@@ -95,17 +95,28 @@ fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
     Ok(Mesh::new(positions, faces)?)
 }
 
-/// A ball that holds what the masks show: its middle is nearest to the lines of sight through the middle of all masks.
-pub(super) fn ball(views: &[View]) -> anyhow::Result<([f64; 3], f64)> {
+/// The frame in which the ball of radius 1 around the origin holds what the masks show: its middle is nearest to the lines of sight through
+/// the middle of the masks, those that a picture cuts off left out unless most are. So place and size come from the pictures, whatever the units and the origin of the cameras.
+///
+/// # Errors
+///
+/// If a mask is empty or full, or the cameras do not look at one thing.
+pub(super) fn frame(views: &[View]) -> anyhow::Result<Frame> {
     let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
-    region(&cones)
+    let (middle, unit) = region(&cones)?;
+    Ok(Frame { middle, unit })
 }
 
 fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
+    // From one of the cameras on, so that no digits are lost far from the origin.
+    let origin = eye(&cones.first().context("there is no view")?.view.camera)?;
     let mut matrix = [[0.0; 3]; 3];
     let mut right = [0.0; 3];
-    for cone in cones {
-        let (eye, ray) = (cone.view.camera.eye(), cone.ray());
+    // What is left of a mask that its picture cuts off has its middle elsewhere. Where most are cut off, they are all that there is.
+    let whole = cones.iter().filter(|cone| !cone.cut).count();
+    for cone in cones.iter().filter(|cone| !cone.cut || 2 * whole < cones.len()) {
+        let eye = eye(&cone.view.camera)?;
+        let (eye, ray) = ([0, 1, 2].map(|k| eye[k] - origin[k]), cone.ray());
         for i in 0..3 {
             for j in 0..3 {
                 let across = f64::from(u8::from(i == j)) - ray[i] * ray[j];
@@ -117,6 +128,7 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     let middle = solved(matrix, right).context(
         "the cameras do not tell how far away the object is: give views from at least two directions",
     )?;
+    let middle = [0, 1, 2].map(|k| origin[k] + middle[k]);
     let depth = |view: &View| view.camera.seen(middle)[2];
     let reach_of = |Cone { view, white, .. }: &Cone<'_>| {
         let [fx, fy] = view.camera.focal;
@@ -125,8 +137,8 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     };
     let reach = cones.iter().map(reach_of).fold(0.0, f64::max);
     for view in cones.iter().map(|cone| cone.view) {
-        let eye = view.camera.eye();
-        let away = (0..3).map(|k| (eye[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
+        let seen = view.camera.seen(middle);
+        let away = (0..3).map(|k| seen[k].powi(2)).sum::<f64>().sqrt();
         ensure!(
             away > 0.5 * reach,
             "{}: the camera is inside the object that the other masks show: check its transform_matrix",
@@ -148,7 +160,7 @@ impl<'a> Cone<'a> {
         let mask = view.mask.despeckled();
         let [levels, _] = mask.part(square, SIDE);
         let distance = signed_distance(&levels, square[2] / SIDE as f64);
-        Ok(Self { view, square, white, distance, cut: is_cut(&mask) })
+        Ok(Self { view, square, white, distance, cut: !cut_sides(&view.mask).is_empty() })
     }
 
     /// The line of sight through the middle of the mask, of length 1, in the world.
@@ -193,16 +205,6 @@ pub(super) fn square(view: &View) -> anyhow::Result<[f64; 3]> {
     view.mask.looked_at().with_context(|| view.name.clone())
 }
 
-/// Whether the mask reaches the border of its picture.
-fn is_cut(mask: &Picture) -> bool {
-    let ImageSize { width, height } = mask.size();
-    let inner = |k: usize, pixels: usize| k > 0 && k + 1 < pixels;
-    let levels = mask.pixels().iter().enumerate();
-    levels
-        .filter(|(_, level)| **level >= 0.5)
-        .any(|(k, _)| !(inner(k % width, width) && inner(k / width, height)))
-}
-
 /// Signed distance to where an image `[SIDE * SIDE]` is one half, negative where it is more, for cells of this width.
 fn signed_distance(levels: &[f64], cell: f64) -> Vec<f64> {
     let white: Vec<bool> = levels.iter().map(|&level| level >= 0.5).collect();
@@ -240,6 +242,11 @@ fn distances(on: &[bool]) -> Vec<f64> {
         squares.fold(f64::INFINITY, f64::min).sqrt()
     };
     (0..on.len()).map(nearest).collect()
+}
+
+/// Where a camera stands. Far from the origin, the digits that a file leaves out of a rotation would move the product with its transpose.
+fn eye(camera: &Pinhole) -> anyhow::Result<[f64; 3]> {
+    solved(camera.rotation, camera.translation.map(|x| -x)).context("a rotation has an inverse")
 }
 
 /// The solution of three linear equations, unless they are as good as two.

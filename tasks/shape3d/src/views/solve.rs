@@ -14,7 +14,7 @@ use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
 
 use super::{
     answer::{Scored, answer, names},
-    hull::{ball, hull},
+    hull::{frame, hull},
     painted::{self, Colours},
     problem::FromViews,
 };
@@ -153,8 +153,12 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let mut mesh = match &args.mesh {
         Some(path) => Mesh::load(path)?,
         None => {
-            let start = start(given, flags, &train)?;
-            deformed(given, flags, &stages, start, &train, &mut progress)?
+            let frame = frame(&train)?;
+            let framed = |view: &View| View { camera: frame.camera(&view.camera), ..view.clone() };
+            let views: Vec<View> = train.iter().map(framed).collect();
+            let start = start(given, flags, &views)?;
+            let found = deformed(given, flags, &stages, start, &views, &mut progress)?;
+            frame.mesh_to_world(&found)?
         }
     };
     let mut textured = None;
@@ -211,10 +215,10 @@ fn parted(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
     Ok([train, aside].map(|part| part.into_iter().map(|(_, view)| view).collect()))
 }
 
+/// What is deformed, for views of a [`frame`].
 fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Result<Mesh> {
     let placed = |mesh: Mesh, size: f64| {
-        let (middle, reach) = ball(views)?;
-        let place = |p: &[f64; 3]| [0, 1, 2].map(|k| middle[k] + size * reach * p[k]);
+        let place = |p: &[f64; 3]| p.map(|x| size * x);
         anyhow::Ok(mesh.with_positions(mesh.positions().iter().map(place).collect())?)
     };
     match (&given.args.template, flags.start.unwrap_or_default()) {
@@ -243,7 +247,7 @@ fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
     Ok(mesh)
 }
 
-/// The start after all stages: of each the best by its hard images.
+/// The start after all stages, for views of a [`frame`]: of each the best by its hard images.
 fn deformed(
     given: &Given<'_, Args>,
     flags: &Views,

@@ -1,0 +1,296 @@
+use std::borrow::Cow;
+
+use burn::tensor::Tensor;
+use softrast_mesh::Mesh;
+use softrast_raster::{
+    HostBackend, Pinhole, Pinholes, hard_silhouette, iou_loss, project_pinhole, vertices,
+};
+use softrast_softness::{numbers, tensor};
+
+use super::{
+    Coat, ColouredViews,
+    shifts::{Stencil, Window},
+    target::Target,
+};
+use crate::frame::ball;
+
+/// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
+const GLANCE: usize = Window::SIDE;
+const DIRECTIONS: usize = 160;
+const ROLLS: usize = 16;
+const AT_ONCE: usize = 256;
+/// The middle of a mesh is at least so many radii before a camera.
+const NEAREST: f64 = 1.2;
+/// Parts of an object that a picture may show which cuts it off.
+const SHOWN: [f64; 7] = [1.0, 0.87, 0.76, 0.66, 0.57, 0.5, 0.43];
+/// Of each rotation the best so many of these go on.
+const KEPT: usize = 2;
+
+/// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error.
+pub(super) fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<(Pinhole, f64)> {
+    let look = Look::new(mesh, target, camera);
+    let all: Vec<_> = directions().collect();
+    let found = all.chunks(AT_ONCE).flat_map(|some| match target.cut {
+        false => look.moved(some),
+        true => look.shifted(some),
+    });
+    found.collect()
+}
+
+/// What is looked at, and what with.
+struct Look<'a> {
+    mesh: &'a Mesh,
+    corners: Tensor<HostBackend, 3>,
+    middle: [f64; 3],
+    radius: f64,
+    camera: &'a Pinhole,
+    square: [f64; 3],
+    /// The mask on few pixels, and how much of each the picture covers.
+    levels: Vec<f64>,
+    covered: Vec<f64>,
+    /// Extent of what is white, in pixels of the picture.
+    white: f64,
+    colours: Option<ColouredViews<HostBackend>>,
+}
+
+impl<'a> Look<'a> {
+    fn new(mesh: &'a Mesh, target: &Target<'_>, camera: &'a Pinhole) -> Self {
+        let &Target { mask, square, painted, .. } = target;
+        let (middle, radius) = ball(mesh);
+        let [levels, covered] = mask.part(square, GLANCE);
+        let [_, _, white] = mask.square().unwrap_or(square);
+        let colours = mesh.colours().zip(painted).map(|(colours, view)| {
+            let coat = Coat::new(colours, mesh.faces().into());
+            ColouredViews::of_pictures(coat, &[(view, square); AT_ONCE], GLANCE)
+        });
+        let corners = vertices(mesh.positions(), &Default::default());
+        Self { mesh, corners, middle, radius, camera, square, levels, covered, white, colours }
+    }
+
+    /// Pixels of the picture along one of the few.
+    fn pixel(&self) -> f64 {
+        self.square[2] / GLANCE as f64
+    }
+
+    /// Where a place in the square is seen, as x and y at depth 1.
+    fn ray(&self, [column, row]: [f64; 2]) -> [f64; 2] {
+        let [left, top, _] = self.square;
+        let at = [left + self.pixel() * column, top + self.pixel() * row];
+        [0, 1].map(|k| (at[k] - self.camera.centre[k]) / self.camera.focal[k])
+    }
+
+    /// The camera of this rotation that sees the middle of the mesh there.
+    fn place(&self, rotation: [[f64; 3]; 3], [x, y]: [f64; 2], depth: f64) -> Pinhole {
+        let seen = rotation.map(|row| (0..3).map(|k| row[k] * self.middle[k]).sum::<f64>());
+        let at = [x * depth, y * depth, depth];
+        Pinhole { rotation, translation: [0, 1, 2].map(|k| at[k] - seen[k]), ..*self.camera }
+    }
+
+    /// The silhouettes of cameras in a square of the picture, `[views, side, side]`, and the corners of the mesh there.
+    fn drawn(
+        &self,
+        cameras: &[Pinhole],
+        [left, top, extent]: [f64; 3],
+        side: usize,
+    ) -> [Tensor<HostBackend, 3>; 2] {
+        let cropped = cameras.iter().map(|of| of.cropped([left, top], [extent; 2], side));
+        let cropped = Pinholes::new(&cropped.collect::<Vec<_>>(), &Default::default());
+        let seen = project_pinhole(self.corners.clone(), &cropped);
+        [hard_silhouette(seen.clone(), self.mesh.faces(), side), seen]
+    }
+
+    /// What is drawn within the picture, and the error of that.
+    fn judged(&self, cameras: &[Pinhole]) -> [Vec<f64>; 2] {
+        let mut cameras = Cow::Borrowed(cameras);
+        if self.colours.is_some() && cameras.len() < AT_ONCE {
+            // Pictures are there for as many.
+            cameras.to_mut().resize(AT_ONCE, *self.camera);
+        }
+        let views = cameras.len();
+        let of_views =
+            |image: &[f64]| tensor::<HostBackend, 3>(image.repeat(views), [views, GLANCE, GLANCE]);
+        let [drawn, seen] = self.drawn(&cameras, self.square, GLANCE);
+        // What lies outside of the picture does not count.
+        let drawn = drawn * of_views(&self.covered);
+        let loss = iou_loss(drawn.clone(), of_views(&self.levels));
+        let loss = match &self.colours {
+            Some(colours) => loss + colours.hard_loss(seen, GLANCE),
+            None => loss,
+        };
+        [numbers(drawn), numbers(loss)]
+    }
+
+    /// Cameras of these rotations that are moved to where the mask is, with their error before they were moved there for the last time.
+    fn moved(&self, rotations: &[[[f64; 3]; 3]]) -> Vec<(Pinhole, f64)> {
+        let target = moments(&self.levels);
+        // The mask, in the middle of its square, is that of a ball at first.
+        let ray = self.ray(target.middle);
+        let depth = 2.0 * self.radius * self.camera.focal[0] / self.white;
+        let towards = turned_to(ray);
+        let placed = rotations.iter().map(|&local| self.place(times(towards, local), ray, depth));
+        let mut cameras: Vec<Pinhole> = placed.collect();
+        let mut losses = Vec::new();
+        // Twice moved to where the mask is, the second time as good as exactly.
+        for _ in 0..2 {
+            let [drawn, error] = self.judged(&cameras);
+            losses = error;
+            for (camera, image) in cameras.iter_mut().zip(drawn.chunks(GLANCE * GLANCE)) {
+                let now = moments(image);
+                let [x, y, z] = camera.seen(self.middle);
+                // Nothing is seen where the mesh is far out: as it was.
+                let larger = if now.area > 0.0 { (now.area / target.area).sqrt() } else { 1.0 };
+                let off = [0, 1].map(|k| {
+                    let pixels = target.middle[k]
+                        - if now.area > 0.0 { now.middle[k] } else { target.middle[k] };
+                    pixels * self.pixel() / camera.focal[k]
+                });
+                *camera = self.place(
+                    camera.rotation,
+                    [x / z + off[0], y / z + off[1]],
+                    (z * larger).max(NEAREST * self.radius),
+                );
+            }
+        }
+        cameras.into_iter().zip(losses).collect()
+    }
+
+    /// Cameras of these rotations for a mask that the picture cuts off: place and size of what is left of it say little. So the whole
+    /// silhouette is tried in several sizes at all places, by what of it is in the picture.
+    fn shifted(&self, rotations: &[[[f64; 3]; 3]]) -> Vec<(Pinhole, f64)> {
+        let window = Window::new(&self.levels, &self.covered);
+        // In the middle, nearer than where a ball as large as what is left would be.
+        let [left, top, extent] = self.square;
+        let ray = self.ray([GLANCE as f64 / 2.0; 2]);
+        let towards = turned_to(ray);
+        let depth = (2.0 * self.radius * self.camera.focal[0] / self.white / 1.3)
+            .max(NEAREST * self.radius);
+        // A ball is seen as wide as its lines of sight touch it.
+        let across = (depth * depth - self.radius * self.radius).sqrt();
+        let reach = 1.05 * self.radius * self.camera.focal[0].max(self.camera.focal[1]) / across;
+        let middle = [left + extent / 2.0, top + extent / 2.0];
+        let around = [middle[0] - reach, middle[1] - reach, 2.0 * reach];
+        let placed: Vec<Pinhole> =
+            rotations.iter().map(|&local| self.place(times(towards, local), ray, depth)).collect();
+        let [drawn, _] = self.drawn(&placed, around, Stencil::SIDE);
+        let drawn = numbers(drawn);
+        // Cells of the window along one of the stencil.
+        let cell = 2.0 * reach / Stencil::SIDE as f64 / self.pixel();
+        let mut cameras = Vec::new();
+        for (&local, image) in rotations.iter().zip(drawn.chunks(Stencil::SIDE * Stencil::SIDE)) {
+            let area = image.iter().sum::<f64>() * cell * cell;
+            let fits = SHOWN.iter().filter_map(|shown| {
+                let larger = (window.area() / shown / area).sqrt();
+                let depth = depth / larger;
+                let stencil = Stencil::new(image, cell * larger);
+                let (at, overlap) = window.best(&stencil)?;
+                (depth >= NEAREST * self.radius).then(|| {
+                    let ray = self.ray(at);
+                    (self.place(times(turned_to(ray), local), ray, depth), overlap)
+                })
+            });
+            let mut fits: Vec<(Pinhole, f64)> = fits.collect();
+            fits.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+            cameras.extend(fits.into_iter().take(KEPT).map(|(camera, _)| camera));
+        }
+        let judged = cameras.chunks(AT_ONCE).flat_map(|some| {
+            let [_, losses] = self.judged(some);
+            some.iter().copied().zip(losses)
+        });
+        judged.collect()
+    }
+}
+
+/// How large an image is, and where its middle is, in its pixels.
+struct Moments {
+    area: f64,
+    middle: [f64; 2],
+}
+
+fn moments(image: &[f64]) -> Moments {
+    let area: f64 = image.iter().sum();
+    let sum = |at: fn(usize) -> usize| {
+        image.iter().enumerate().map(|(k, level)| level * (at(k) as f64 + 0.5)).sum::<f64>()
+    };
+    Moments { area, middle: [sum(|k| k % GLANCE) / area, sum(|k| k / GLANCE) / area] }
+}
+
+/// Rotations of a camera around what it looks at: directions spread evenly over the sphere, each with rolls all around.
+///
+/// Source: the Fibonacci sphere, González 2010.
+fn directions() -> impl Iterator<Item = [[f64; 3]; 3]> {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    (0..DIRECTIONS * ROLLS).map(move |k| {
+        let (direction, roll) = (k / ROLLS, k % ROLLS);
+        let y = 1.0 - (2 * direction + 1) as f64 / DIRECTIONS as f64;
+        let (sin, cos) = (golden * direction as f64).sin_cos();
+        let around = (1.0 - y * y).sqrt();
+        // As a camera that orbits, then rolled. No direction is a pole.
+        let ahead = [around * cos, y, around * sin];
+        let right = [-ahead[2] / around, 0.0, ahead[0] / around];
+        let down = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| ahead[i] * right[j] - ahead[j] * right[i]);
+        let (sin, cos) = (std::f64::consts::TAU * roll as f64 / ROLLS as f64).sin_cos();
+        [
+            [0, 1, 2].map(|k| cos * right[k] + sin * down[k]),
+            [0, 1, 2].map(|k| cos * down[k] - sin * right[k]),
+            ahead,
+        ]
+    })
+}
+
+/// The least rotation that takes the axis ahead to where (x, y, 1) is.
+fn turned_to([x, y]: [f64; 2]) -> [[f64; 3]; 3] {
+    let length = (x * x + y * y + 1.0).sqrt();
+    let [x, y, z] = [x / length, y / length, 1.0 / length];
+    let h = 1.0 / (1.0 + z);
+    [[1.0 - h * x * x, -h * x * y, x], [-h * x * y, 1.0 - h * y * y, y], [-x, -y, z]]
+}
+
+fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    a.map(|row| [0, 1, 2].map(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_rotation(r: [[f64; 3]; 3]) -> bool {
+        let camera = Pinhole {
+            rotation: r,
+            translation: [0.0; 3],
+            focal: [1.0; 2],
+            centre: [0.0; 2],
+            size: 1.into(),
+        };
+        camera.check().is_ok()
+    }
+
+    #[test]
+    fn every_pose_is_near_one_that_is_looked_at() {
+        let all: Vec<_> = directions().collect();
+        assert!(all.iter().all(|&r| is_rotation(r)));
+        let camera = |rotation| Pinhole {
+            rotation,
+            translation: [0.0; 3],
+            focal: [1.0; 2],
+            centre: [0.0; 2],
+            size: 1.into(),
+        };
+        // Turned by any angles.
+        for k in 0..200 {
+            let [x, y] = [0.7 * f64::from(k), 1.3 * f64::from(k)].map(|a| a.sin() * 2.0);
+            let pose = times(
+                turned_to([x, y]),
+                times(all[37 * k as usize % all.len()], turned_to([y, -x])),
+            );
+            let nearest = all.iter().map(|&r| angle_deg(&camera(pose), &camera(r)));
+            assert!(nearest.fold(f64::INFINITY, f64::min) < 20.0);
+        }
+    }
+
+    #[test]
+    fn the_axis_ahead_is_turned_to_where_it_should_be() {
+        let r = turned_to([0.5, -2.0]);
+        assert!(is_rotation(r));
+        assert!((r[0][2] / r[2][2] - 0.5).abs() < 1e-12 && (r[1][2] / r[2][2] + 2.0).abs() < 1e-12);
+    }
+}
