@@ -1,9 +1,9 @@
 //! Where a silhouette lies in a picture that cuts it off: all places on few pixels, of which each row is a number of as many bits.
 
 /// Cells between places that are tried first.
-const STRIDE: isize = 3;
+const STRIDE: isize = 2;
 /// A silhouette of which the picture shows a smaller or larger area than that of the mask, by this factor, is not compared.
-const AREAS: f64 = 1.25;
+const AREAS: f64 = 1.3;
 
 /// A mask, and the part of its square that the picture covers.
 pub(super) struct Window {
