@@ -78,13 +78,14 @@ impl ToleranceCase {
         self.deviations_on::<Exact>(2e-14, 0.0)
     }
 
-    /// The same in f32: vertices are rounded to that before they are compared, and 1e-5 for the rounding of tables and sums does not count.
+    /// The same in f32: vertices are rounded to that before they are compared. Rounding of tables and sums does not count: 1e-5 for the
+    /// pixel, and 3e-7 for each face.
     ///
     /// # Panics
     ///
     /// If the T-conorm has no such name, or there are no widths.
     pub fn deviations_in_f32(&self) -> Vec<Deviation> {
-        self.deviations_on::<NdArray<f32>>(1e-6, 1e-5)
+        self.deviations_on::<NdArray<f32>>(1e-6, 1e-5 + 3e-7 * self.faces as f64)
     }
 
     /// `rounding` is that of a distance, absolute (NDC) and relative; `of_sums` that of a coverage.

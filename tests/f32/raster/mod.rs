@@ -4,3 +4,4 @@ mod limits;
 mod second_order;
 mod soft_blend;
 mod threads;
+mod tolerance;
