@@ -95,6 +95,16 @@ impl ColourRenderer {
         (self.size[0], self.size[1])
     }
 
+    /// The largest error of a pixel under φ beside a background that is given no weight, as a part of the range of what is shown: the
+    /// tolerance, or more where no table can follow a softness to it.
+    #[getter]
+    fn error_bound(&self, py: Python<'_>) -> PyResult<f64> {
+        guarded(py, || {
+            let behind = self.renderer.background::<NdArray<f64>>(&[], &Default::default());
+            self.renderer.error_bound(&behind)
+        })
+    }
+
     /// How many faces there are.
     #[getter]
     fn face_count(&self) -> usize {

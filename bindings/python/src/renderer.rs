@@ -82,6 +82,12 @@ impl Renderer {
         (self.size[0], self.size[1])
     }
 
+    /// The largest error of a pixel under φ, in coverage: the tolerance, or more where no table can follow the softness to it.
+    #[getter]
+    fn error_bound(&self, py: Python<'_>) -> PyResult<f64> {
+        guarded(py, || self.renderer.error_bound::<HostBackend>())
+    }
+
     /// How many vertices the faces ask for.
     #[getter]
     fn least_vertices(&self) -> usize {

@@ -204,3 +204,13 @@ except KeyboardInterrupt:
     process.send_signal(signal.SIGINT)
     # A thousand calls would take minutes.
     assert process.wait(timeout=120) == 7
+
+
+def test_renderers_state_their_error():
+    faces = np.array([[0, 1, 2]])
+    softness = softrast.Softness("logistic", 0.01)
+    assert softrast.Renderer(faces, 16, softness, tolerance=1e-6).error_bound == 1e-6
+    assert softrast.ColourRenderer(faces, 16, softness, (1.0, 4.0), tolerance=1e-4).error_bound == 1e-4
+    # Powers below 1 of a law that begins rise faster than knots follow.
+    steep = softrast.Renderer(faces, 16, softrast.Softness("uniform", 1e-3, squared=True), tolerance=1e-7, t_conorm="yager:0.3")
+    assert steep.error_bound > 1e-7

@@ -226,7 +226,11 @@ impl ColourRenderer {
                     Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), precise))
                 });
                 let data = prepared.tables(phi).into_data();
-                if let Some(kept) = self.kept().as_mut() {
+                // Another thread may have prepared something else in between.
+                let own = |kept: &&mut Prepared| {
+                    (kept.edge, kept.depth) == (prepared.edge, prepared.depth)
+                };
+                if let Some(kept) = self.kept().as_mut().filter(own) {
                     kept.tables = Some((self.phi.clone(), precise, data.clone()));
                 }
                 data
@@ -316,8 +320,7 @@ impl ColourRenderer {
     /// Knots for these parameters and this logarithm of the background's weight.
     fn prepared(&self, phi: &[Vec<f64>; 2], log_weight: f64) -> Prepared {
         assert!(log_weight.is_finite(), "log weight {log_weight}");
-        let mut kept = self.kept();
-        if let Some(prepared) = kept.as_ref().filter(|kept| log_weight >= kept.log_weight) {
+        if let Some(prepared) = self.kept().as_ref().filter(|kept| log_weight >= kept.log_weight) {
             if prepared.phi == *phi {
                 return prepared.clone();
             }
@@ -326,14 +329,10 @@ impl ColourRenderer {
                 return stretched;
             }
         }
-        kept.insert(Prepared::new(
-            &self.weighting,
-            phi,
-            self.faces.len(),
-            self.tolerance,
-            log_weight,
-        ))
-        .clone()
+        // Without the lock: other threads of a pool may take up work in between, and ask for the same.
+        let (faces, tolerance) = (self.faces.len(), self.tolerance);
+        let prepared = Prepared::new(&self.weighting, phi, faces, tolerance, log_weight);
+        self.kept().insert(prepared).clone()
     }
 
     fn kept(&self) -> MutexGuard<'_, Option<Prepared>> {

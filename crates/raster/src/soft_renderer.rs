@@ -4,7 +4,8 @@ use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
 
 use crate::{
-    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, kernel::PixelLoss,
+    HostBackend, ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm,
+    kernel::PixelLoss,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -55,10 +56,11 @@ struct Prepared<S> {
     silhouette: Silhouette<S>,
 }
 
-/// The table of the parameters `phi`.
+/// The table of the parameters `phi` at the knots of a profile.
 #[derive(Debug)]
 struct Table {
     phi: Vec<f64>,
+    profile: Profile,
     on_host: bool,
     dtype: DType,
     data: TensorData,
@@ -189,16 +191,19 @@ impl<S: Softness> SoftRenderer<S> {
     /// If `phi` has the wrong length.
     pub fn prepared<B: RasterBackend>(&self, phi: &[f64]) -> Silhouette<S> {
         check(&self.softness, phi);
-        let mut kept = self.kept();
-        let prepared = kept.prepared.as_ref().filter(|prepared| prepared.on_host == B::ON_HOST);
-        if let Some(silhouette) = prepared.and_then(|prepared| prepared.stretched_to(phi)) {
+        let kept = |kept: &Kept<S>| {
+            let prepared = kept.prepared.as_ref().filter(|it| it.on_host == B::ON_HOST);
+            prepared.and_then(|prepared| prepared.stretched_to(phi))
+        };
+        if let Some(silhouette) = kept(&self.kept()) {
             return silhouette;
         }
+        // Without the lock: other threads of a pool may take up work in between, and ask for the same.
         let (faces, softness) = (&self.faces, self.softness.clone());
         let silhouette =
             self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, &[phi], B::ON_HOST);
         let prepared = silhouette.clone();
-        kept.prepared =
+        self.kept().prepared =
             Some(Prepared { phi: phi.to_vec(), on_host: B::ON_HOST, silhouette: prepared });
         silhouette
     }
@@ -266,15 +271,16 @@ impl<S: Softness> SoftRenderer<S> {
     ) -> (Silhouette<S>, Tensor<B, 2>) {
         let silhouette = self.prepared::<B>(&self.phi);
         let (dtype, on_host) = (vertices.dtype(), B::ON_HOST);
-        let mut kept = self.kept();
-        let table = match kept.table.take() {
-            Some(table) if table.is_of(&self.phi, on_host, dtype) => table,
-            _ => {
-                let data = silhouette.table_data::<B>(&self.phi, dtype);
-                Table { phi: self.phi.clone(), on_host, dtype, data }
-            }
-        };
-        let data = kept.table.insert(table).data.clone();
+        let profile = *silhouette.profile();
+        let is_of = |table: &&Table| table.is_of(&self.phi, &profile, on_host, dtype);
+        let kept = self.kept().table.as_ref().filter(is_of).map(|table| table.data.clone());
+        let data = kept.unwrap_or_else(|| {
+            let data = silhouette.table_data::<B>(&self.phi, dtype);
+            let phi = self.phi.clone();
+            let table = Table { phi, profile, on_host, dtype, data: data.clone() };
+            self.kept().table = Some(table);
+            data
+        });
         (silhouette, Tensor::from_data(data, (&vertices.device(), dtype)))
     }
 
@@ -344,8 +350,9 @@ pub(crate) fn stretch(softness: &impl Softness, before: &[f64], now: &[f64]) -> 
 }
 
 impl Table {
-    fn is_of(&self, phi: &[f64], on_host: bool, dtype: DType) -> bool {
-        self.phi == phi && self.on_host == on_host && self.dtype == dtype
+    fn is_of(&self, phi: &[f64], profile: &Profile, on_host: bool, dtype: DType) -> bool {
+        let same = self.on_host == on_host && self.dtype == dtype;
+        same && self.phi == phi && self.profile == *profile
     }
 }
 
