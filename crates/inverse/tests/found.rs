@@ -1,4 +1,4 @@
-//! Files that the example `fuzz` found, replayed: `tests/found/files` has one for each fault that was mended, named after its reader.
+//! Files that the example `fuzz_pictures` found, replayed: `tests/found/files` has one for each fault that was mended, named after its reader.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -1,4 +1,4 @@
-//! Gives mutated files to every reader of meshes: `cargo run --release -p softrast-mesh --example fuzz -- --inputs 200000`.
+//! Gives mutated files to every reader of meshes: `cargo run --release -p softrast-mesh --example fuzz_meshes -- --inputs 200000`.
 //!
 //! The checks of what is read are those of `tests/found.rs`, which replays what was found here.
 

@@ -1,5 +1,5 @@
 //! Gives mutated files to the readers of pictures, cameras and softnesses:
-//! `cargo run --release -p softrast-inverse --example fuzz -- --inputs 200000`.
+//! `cargo run --release -p softrast-inverse --example fuzz_pictures -- --inputs 200000`.
 //!
 //! The checks of what is read are those of `tests/found.rs`, which replays what was found here.
 
