@@ -23,7 +23,8 @@ pub(crate) fn all() -> Vec<Kind> {
             ending: "json",
             seeds: lenses,
             read: |bytes| {
-                let read = Lens::parse(bytes, "a.json").and_then(|lens| lens.pinhole([90, 120]));
+                let read =
+                    Lens::parse(bytes, "a.json").and_then(|lens| lens.pinhole([90, 120].into()));
                 if let Some(camera) = checked(read) {
                     let numbers = camera.focal.iter().chain(&camera.centre);
                     assert!(numbers.copied().all(f64::is_finite), "{camera:?}");
@@ -173,7 +174,9 @@ fn transforms() -> Vec<Vec<u8>> {
 }
 
 fn softnesses() -> Vec<Vec<u8>> {
-    let names = ["pose", "shape3d", "shape2d"];
-    let text = |name| ScheduledSoftness::learned(name).and_then(|it| it.text(name));
-    names.into_iter().filter_map(text).map(String::into_bytes).collect()
+    let text = |name| {
+        let text = ScheduledSoftness::learned(name).and_then(|softness| softness.text(name));
+        text.expect("a softness that comes along is sound").into_bytes()
+    };
+    ScheduledSoftness::learned_names().map(text).collect()
 }
