@@ -57,6 +57,10 @@ impl Frame {
     /// A mesh of the world in the frame.
     ///
     /// A vertex that 32 bits cannot hold there, which no face uses if the frame is that of the mesh, is moved to where they can.
+    ///
+    /// # Panics
+    ///
+    /// If the frame is not of finite numbers.
     #[must_use]
     pub fn mesh(&self, mesh: &Mesh) -> Mesh {
         let held = |x: f64| x.clamp(f64::from(f32::MIN), f64::from(f32::MAX));

@@ -9,6 +9,7 @@
 //! ([`Viewer`], [`overlay`]), and advice names flags of the programs.
 
 mod axis;
+mod checksum;
 mod comparison;
 pub mod curves;
 mod error;

@@ -16,7 +16,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::store::checksum;
+use crate::checksum::checksum;
 
 /// Name of the list.
 pub(crate) const MANIFEST: &str = ".softrast.json";

@@ -10,7 +10,7 @@ use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 
-use crate::{OutputFolder, Shard, write_atomically};
+use crate::{OutputFolder, Shard, checksum::checksum, write_atomically};
 
 /// Finished work by key, in a file that outlives the program.
 ///
@@ -257,12 +257,6 @@ const SUFFIX: &str = ".jsonl";
 /// A hash of what decides some results, to keep them under.
 pub fn key(identity: &Value) -> String {
     checksum(identity.to_string().as_bytes())
-}
-
-/// FNV-1a, which is enough against damage.
-pub(crate) fn checksum(bytes: &[u8]) -> String {
-    let mix = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
-    format!("{:016x}", bytes.iter().fold(0xcbf2_9ce4_8422_2325, mix))
 }
 
 /// How every file begins.

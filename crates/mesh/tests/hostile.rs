@@ -214,7 +214,10 @@ proptest! {
         prop_assert_eq!(&Mesh::parse(mesh.to_obj().as_bytes(), "a.obj").unwrap(), &mesh);
         prop_assert_eq!(&Mesh::parse(&mesh.to_ply(), "a.ply").unwrap(), &mesh);
         let glb = Mesh::parse(&mesh.to_glb(), "a.glb").unwrap();
-        let rounded = mesh.positions().iter().map(|p| p.map(|x| f64::from(x as f32)));
+        let origin = mesh.glb_origin();
+        let rounded = mesh.positions().iter().map(|p| {
+            [0, 1, 2].map(|k| origin[k] + f64::from((p[k] - origin[k]) as f32))
+        });
         prop_assert_eq!(glb.positions(), rounded.collect::<Vec<_>>());
         prop_assert_eq!(glb.faces(), mesh.faces());
     }

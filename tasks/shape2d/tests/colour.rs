@@ -92,7 +92,7 @@ fn contradictions_are_usage_errors_and_bad_files_are_not() {
         ("--colour --softness learned", 2, "no softness learned comes with the program"),
         ("--colour=yes", 2, "--colour"),
         ("--colour --triangles 0", 2, "from 1 to 100000"),
-        ("--colour --target missing.png", 1, "cannot open the picture missing.png"),
+        ("--colour --target missing.png", 1, "cannot read the picture missing.png"),
     ] {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");

@@ -100,7 +100,7 @@ fn contradictions_are_usage_errors_and_bad_files_are_not() {
         ("--triangles 0", 2, "from 1 to 100000"),
         ("--softness missing.json --scale 0.1", 2, "holds its own parameters"),
         ("--softness missing.json", 1, "missing.json"),
-        ("--target missing.png", 1, "cannot open the picture missing.png"),
+        ("--target missing.png", 1, "cannot read the picture missing.png"),
         (&no_picture, 1, "no picture that can be read"),
     ] {
         let failure = run(line).unwrap_err();

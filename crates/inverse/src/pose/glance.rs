@@ -32,7 +32,10 @@ pub(super) fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<
     let all: Vec<_> = directions().collect();
     let found = all.chunks(AT_ONCE).flat_map(|some| match target.cut {
         false => look.moved(some),
-        true => look.shifted(some),
+        // A picture may be too narrow for any place: then as if it showed all.
+        true => {
+            Some(look.shifted(some)).filter(|it| !it.is_empty()).unwrap_or_else(|| look.moved(some))
+        }
     });
     found.collect()
 }
