@@ -25,12 +25,14 @@ const MOST: usize = 1 << 30;
 /// No more inputs of one reader are kept than this.
 const MOST_KEPT: usize = 20;
 
+type Read<'a> = Box<dyn Fn(&[u8]) + 'a>;
+
 /// A reader under test.
 pub struct Reader<'a> {
     name: &'static str,
     ending: &'static str,
     seeds: Vec<Vec<u8>>,
-    read: Box<dyn Fn(&[u8]) + 'a>,
+    read: Read<'a>,
 }
 
 impl<'a> Reader<'a> {

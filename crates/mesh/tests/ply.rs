@@ -86,10 +86,10 @@ fn colours_are_bytes_shorts_or_floats() {
 fn second_red(kind: &str, words: [&str; 3]) -> (Option<f64>, Vec<String>) {
     let properties = ["red", "green", "blue"].map(|channel| format!("{kind} {channel}"));
     let properties: Vec<&str> = properties.iter().map(String::as_str).collect();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.ply");
-    std::fs::write(&path, text_of(&properties, words)).unwrap();
-    let (mesh, warnings) = Mesh::load_textured(&path).unwrap();
+    std::fs::write(&path, text_of(&properties, words)).expect("a file");
+    let (mesh, warnings) = Mesh::load_textured(&path).expect("a mesh");
     let name = path.display().to_string();
     let warnings = warnings.iter().map(|warning| warning.to_string().replace(&name, "a.ply"));
     (mesh.colours().map(|colours| colours[1][0]), warnings.collect())

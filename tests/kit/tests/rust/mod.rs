@@ -234,7 +234,7 @@ impl Reader<'_> {
                     self.import(&mut own, Vec::new(), is_public);
                 }
                 "mod" if self.word(2) == "{" => {
-                    let child = [&module[..], &[self.word(1).to_owned()]].concat();
+                    let child = [module, &[self.word(1).to_owned()]].concat();
                     self.at += 3;
                     self.read(&child);
                 }
@@ -243,16 +243,16 @@ impl Reader<'_> {
                     // A macro with an attribute of its own can be named from the root.
                     if !module.is_empty() {
                         let name = self.word(2).to_owned();
-                        let path = [&["crate".to_owned()][..], module, &[name.clone()]].concat();
+                        let path = [&["crate".to_owned()][..], module, std::slice::from_ref(&name)]
+                            .concat();
                         let root = self.found.modules.entry(Vec::new()).or_default();
                         root.imports.entry(name).or_insert(Import { path, is_public: true });
                     }
                 }
                 word if DEFINE.contains(&word) && is_name(self.word(1)) && self.word(1) != "fn" => {
                     // What is inside braces belongs to functions, types and implementations.
-                    if braces == 0 && word != "mod" {
-                        own.items.insert(self.word(1).to_owned());
-                    }
+                    let defines = braces == 0 && word != "mod";
+                    own.items.extend(defines.then(|| self.word(1).to_owned()));
                 }
                 word if is_name(word) => {
                     let mut path = vec![word.to_owned()];
