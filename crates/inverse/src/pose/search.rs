@@ -250,6 +250,10 @@ impl PoseSearch {
         let few = coarse(mesh);
         let alike = target.painted.is_none().then_some(&*few);
         let mut found = apart(glance(&few, target, camera), STARTS.0, APART_DEG, None);
+        ensure!(
+            !found.is_empty(),
+            "no pose can be searched for in a mask that is so narrow: give a pose to start from (--start)"
+        );
         let mut begun = 0;
         // Few steps already tell the hopeless apart: many starts are had for little.
         let Stages { coarse, fine, .. } = Stages::of(target.cut);
