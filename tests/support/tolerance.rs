@@ -17,7 +17,7 @@ const SIZE: usize = 12;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ToleranceCase {
-    /// What the triangles are drawn from.
+    /// Seed of the triangles.
     pub scene: u64,
     /// Number of triangles.
     pub faces: usize,
@@ -29,7 +29,7 @@ pub struct ToleranceCase {
     pub tolerance: f64,
     /// Scales of the softness, one after the other, as logarithms to base 10, in NDC.
     pub widths: Vec<f64>,
-    /// What is added to which of the other parameters before each image but the first.
+    /// Index of another parameter and the amount added to it, before each image except the first.
     pub moves: Vec<(usize, f64)>,
 }
 
@@ -170,7 +170,7 @@ impl ToleranceCase {
     }
 }
 
-/// What rounding of distances allows an image of every pixel-face pair to be.
+/// Ranges of coverage that rounding of distances allows.
 struct Ranges<'a> {
     vertices: &'a [f64],
     faces: &'a [[u32; 3]],

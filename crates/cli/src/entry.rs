@@ -4,7 +4,7 @@ use softrast_lab::Experiment;
 
 /// A task with a method, ready to be evaluated, whichever task it is.
 pub struct Entry {
-    /// What is run.
+    /// The command that is run.
     pub experiment: Box<dyn Experiment>,
     /// The method.
     pub method: Method,

@@ -20,7 +20,7 @@ pub(crate) struct Session {
     /// Name of the task, and of its program.
     pub(crate) task: &'static str,
     pub(crate) program: &'static str,
-    /// What it reads, and therefore never replaces.
+    /// Files that it reads, and therefore never replaces.
     pub(crate) inputs: RefCell<Inputs>,
     /// Where results go.
     pub(crate) out: PathBuf,

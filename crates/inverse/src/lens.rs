@@ -74,11 +74,11 @@ impl Lens {
         Self::parse(&bytes, &name)
     }
 
-    /// What the content of a camera file called `name` says of it.
+    /// The lens in the content of a camera file called `name`.
     ///
     /// # Errors
     ///
-    /// Those of [`Lens::load`], but for reading.
+    /// The errors of [`Lens::load`], except those of reading.
     pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
         let file = json(bytes, name)?;
         // A result of ours holds its camera one level down.

@@ -3,7 +3,7 @@ use anyhow::{anyhow, ensure};
 /// How the levels of a picture become a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaskRules {
-    /// What is black is the mask.
+    /// Black pixels are the mask.
     pub invert: bool,
     /// What is at least so bright, from 0 to 1, is the mask; after it is inverted. None keeps soft edges.
     pub threshold: Option<f64>,
@@ -106,7 +106,7 @@ impl MaskRules {
     }
 }
 
-/// What the brightest level is, and how it is taken.
+/// The brightest level, and the threshold that takes it.
 fn advice(levels: &Levels) -> String {
     let Levels { brightest, next: [below, _], .. } = *levels;
     match below {

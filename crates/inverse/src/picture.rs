@@ -26,7 +26,7 @@ pub struct Picture {
     /// From 0 to 1, row by row from the top.
     levels: Arc<[f32]>,
     width: usize,
-    /// Of the picture in the file, before it was reduced.
+    /// Size of the picture in the file, before it was reduced.
     whole: ImageSize,
     /// The level of the file that was taken for white, where it had just one above 0.
     only_level: Option<f32>,

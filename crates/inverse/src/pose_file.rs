@@ -17,7 +17,7 @@ pub struct PoseFile {
     pub rotation: [[f64; 3]; 3],
     /// t, in world units.
     pub translation: [f64; 3],
-    /// What should be said, where R was rounded and became the nearest rotation.
+    /// A note for the user where R was rounded and became the nearest rotation.
     pub note: Option<String>,
 }
 
@@ -33,11 +33,11 @@ impl PoseFile {
         Self::parse(&bytes, &name)
     }
 
-    /// The same of the content of a file called `name`.
+    /// The pose in the content of a file called `name`.
     ///
     /// # Errors
     ///
-    /// Those of [`PoseFile::load`], but for reading.
+    /// The errors of [`PoseFile::load`], except those of reading.
     pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
         #[derive(Deserialize)]
         struct Pose {

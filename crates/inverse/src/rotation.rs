@@ -4,7 +4,7 @@ use anyhow::{bail, ensure};
 const MOST_OFF: f64 = 1e-2;
 /// From here on it is said that a rotation was rounded: below it are numbers of 32 bits, and those with five decimals or more.
 pub(crate) const SAID: f64 = 5e-5;
-/// What is nearer to a rotation stays as it is.
+/// A matrix that is nearer to a rotation stays as it is.
 const EXACT: f64 = 1e-9;
 /// Each step squares what is missing.
 const STEPS: usize = 6;

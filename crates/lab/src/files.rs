@@ -336,7 +336,7 @@ impl Drop for OutputFolder {
     }
 }
 
-/// What was at a path.
+/// The previous content of a path.
 struct Before {
     path: PathBuf,
     /// The file under another name; none if there was none.

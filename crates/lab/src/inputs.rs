@@ -63,7 +63,7 @@ impl Inputs {
     }
 }
 
-/// What one file has and no other; none where there is no file.
+/// The identity of a file; none where there is no file.
 #[cfg(unix)]
 fn identity(path: &Path) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;

@@ -63,7 +63,7 @@ pub(crate) enum Owner {
     Own,
     /// Listed, but no longer as the command left it.
     Changed,
-    /// That of another command.
+    /// A result of another command.
     Other(String),
     /// Nobody has listed it.
     User,
@@ -152,12 +152,12 @@ pub(crate) fn is_name(name: &str) -> bool {
         && name != MANIFEST
 }
 
-/// What stands for the bytes of a file: their number and a checksum.
+/// The record of a file's content: its length and a checksum.
 pub(crate) fn content_of(bytes: &[u8]) -> String {
     format!("{}-{}", bytes.len(), checksum(bytes))
 }
 
-/// That of the file at a path.
+/// The record of the file at a path.
 pub(crate) fn content(path: &Path) -> io::Result<String> {
     Ok(content_of(&fs::read(path)?))
 }

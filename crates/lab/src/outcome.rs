@@ -17,7 +17,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Of finished runs; `many` asks for intervals.
+    /// A summary of finished runs; `many` asks for intervals.
     ///
     /// # Errors
     ///

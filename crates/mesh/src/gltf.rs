@@ -18,7 +18,7 @@ use crate::error::Trouble;
 #[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Gltf<'a> {
-    /// Of each buffer, or why there is none.
+    /// The content of each buffer, or the reason why there is none.
     #[serde(skip)]
     contents: Vec<Result<Cow<'a, [u8]>, &'static str>>,
     pub(crate) scene: Option<usize>,

@@ -162,7 +162,7 @@ impl Outline {
 struct Blockers {
     /// Their places, near ones next to each other; NaN once they are gone.
     points: Vec<[f64; 2]>,
-    /// Of each corner of the polygon its number in `points`, or `NOWHERE`.
+    /// The number in `points` of each corner of the polygon, or `NOWHERE`.
     slots: Vec<u32>,
     /// A tree: the box of node `i` holds those of nodes `2 i` and `2 i + 1`, and that of a leaf `LEAF` of the points.
     boxes: Vec<[[f64; 2]; 2]>,
@@ -327,7 +327,7 @@ mod tests {
         Mesh::new(positions, faces).unwrap()
     }
 
-    /// Of an outline that does not cross itself.
+    /// The case of an outline that does not cross itself.
     fn area(outline: &[[f64; 2]]) -> f64 {
         let next = outline.iter().cycle().skip(1);
         outline.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>().abs() / 2.0

@@ -40,7 +40,7 @@ const REFINEMENTS: usize = 4;
 /// Places in a cell at which its error is measured: those of a smooth profile's largest; and how many there are where it may lie elsewhere.
 pub(crate) const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const DENSE: u32 = 16;
-/// What an error that is exactly as large as it may be is rounded by.
+/// Relative rounding of an error that is exactly as large as allowed.
 const ROUNDING: f64 = 1e-3;
 /// The part of its rise that a cubic may miss the next knot by.
 const WIDE_OF: f64 = 0.1;
@@ -604,7 +604,7 @@ fn finest<B: Backend>(device: &B::Device) -> DType {
     if B::supports_dtype(device, DType::F64) { DType::F64 } else { DType::F32 }
 }
 
-/// What rounding alone makes of a value of 1 there.
+/// Relative rounding of a value there.
 fn rounding<B: Backend>(device: &B::Device) -> f64 {
     if finest::<B>(device) == DType::F64 { 1e-14 } else { 1e-6 }
 }

@@ -1,4 +1,4 @@
-//! What the program never does to files that it has not made.
+//! The program leaves files alone that it has not made.
 
 #![allow(
     clippy::unwrap_used,
@@ -31,13 +31,13 @@ fn inputs(folder: &Path) {
     };
     let coloured: String = OCTAHEDRON.lines().map(coloured).collect();
     fs::write(path("coloured.obj"), coloured).unwrap();
-    for folder in ["masks", "given", "work", "found"] {
+    for folder in ["masks", "given", "made", "found"] {
         fs::create_dir(path(folder)).unwrap();
     }
     let near = |x: u32, y: u32| (i64::from(x) - 8).abs() + (i64::from(y) - 8).abs() < 5;
     let mask = GrayImage::from_fn(16, 16, |x, y| Luma([if near(x, y) { 255 } else { 0 }]));
     for name in [
-        "work/overlay.png",
+        "made/overlay.png",
         "overlay-mask.png",
         "mask.png",
         "masks/a.png",
@@ -48,17 +48,17 @@ fn inputs(folder: &Path) {
     ] {
         mask.save(path(name)).unwrap();
     }
-    fs::write(path("work/result.json"), camera).unwrap();
+    fs::write(path("made/result.json"), camera).unwrap();
     fs::write(path("found/result.json"), camera).unwrap();
-    fs::write(path("work/mesh.obj"), OCTAHEDRON).unwrap();
+    fs::write(path("made/mesh.obj"), OCTAHEDRON).unwrap();
 }
 
 const LINES: &[(&str, &str)] = &[
     ("--mesh mesh.obj --out .", ""),
     ("--mesh mesh.obj --target overlay-mask.png --out .", ""),
-    ("--mesh mesh.obj --target work/overlay.png --out work", "overlay.png is an input of this run"),
+    ("--mesh mesh.obj --target made/overlay.png --out made", "overlay.png is an input of this run"),
     (
-        "--mesh ./masks/../mesh.obj --target ./work/overlay.png --out masks/../work",
+        "--mesh ./masks/../mesh.obj --target ./made/overlay.png --out masks/../made",
         "is an input of this run",
     ),
     ("--mesh mesh.obj --targets masks --out .", ""),
@@ -72,7 +72,7 @@ const LINES: &[(&str, &str)] = &[
         "--mesh mesh.obj --target mask.png --start found/result.json --out found",
         "result.json is an input of this run",
     ),
-    ("--mesh work/mesh.obj --out work", "result.json is not a recorded result"),
+    ("--mesh made/mesh.obj --out made", "result.json is not a recorded result"),
     ("--colour --mesh coloured.obj --out .", ""),
     ("--softness softness.json --out .", ""),
     ("--softness=found/result.json --out found", "result.json is an input of this run"),

@@ -166,7 +166,7 @@ fn predict_mesh<B: RasterBackend>(
     Ok(Output { json, text, ..Output::default() })
 }
 
-/// What makes a file of a mesh, by its ending.
+/// The writer of a mesh file, by its ending.
 fn writer(path: &Path) -> Result<fn(&Mesh) -> Vec<u8>, MeshError> {
     let ending = path.extension().map(OsStr::to_ascii_lowercase);
     match ending.as_deref().and_then(OsStr::to_str) {

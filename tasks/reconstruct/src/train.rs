@@ -43,7 +43,7 @@ pub struct Training {
     pub visible: bool,
     /// Command line that does the same again.
     pub command: String,
-    /// What it reads, and therefore never replaces.
+    /// Files that it reads, and therefore never replaces.
     pub inputs: Inputs,
 }
 

@@ -1,4 +1,4 @@
-//! What the program never does to files that it has not made.
+//! The program leaves files alone that it has not made.
 
 #![allow(
     clippy::unwrap_used,

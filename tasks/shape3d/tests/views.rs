@@ -50,7 +50,7 @@ fn with(change: impl Fn(&mut Value), more: &[&str]) -> Result<Value, String> {
     with_results(change, more, |_| ())
 }
 
-/// The same, and the folder of results is shown to `look` if there are any.
+/// Runs the case and passes the folder of results, if there are any, to `look`.
 fn with_results(
     change: impl Fn(&mut Value),
     more: &[&str],

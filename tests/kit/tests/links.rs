@@ -141,7 +141,7 @@ fn as_read(title: &str) -> String {
     read.replace(['`', '*'], "")
 }
 
-/// What GitHub names the headings of a page, and the anchors that it sets by itself.
+/// Anchors that GitHub gives to the headings of a page, and those that the page sets.
 fn anchors(text: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
@@ -160,7 +160,7 @@ fn anchors(text: &str) -> BTreeSet<String> {
     found
 }
 
-/// What stands behind each `docs/notes.md, `, in one line.
+/// The section named after each `docs/notes.md, `, in one line.
 fn citations(text: &str) -> Vec<String> {
     let lines = text.lines().map(|line| line.trim().trim_start_matches(['/', '!', '#']).trim());
     let text = lines.collect::<Vec<_>>().join(" ");

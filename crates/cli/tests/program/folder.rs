@@ -1,4 +1,4 @@
-//! What becomes of the files in the folder for the results.
+//! Tests of the files in the folder for the results.
 
 use std::fs;
 

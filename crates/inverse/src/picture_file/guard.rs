@@ -11,7 +11,7 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `work` returns, or nothing where it panics.
+/// The result of `work`, or nothing where it panics.
 ///
 /// A decoder that meets a file which its authors have not thought of may panic. That is an error in the file for whoever names it, and no reason
 /// to end the program. The panic is not printed; panics elsewhere are, as before.

@@ -40,7 +40,7 @@ pub(super) fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<
     found.collect()
 }
 
-/// What is looked at, and what with.
+/// Inputs of the first look: mesh, mask and camera.
 struct Look<'a> {
     mesh: &'a Mesh,
     corners: Tensor<HostBackend, 3>,
@@ -102,7 +102,7 @@ impl<'a> Look<'a> {
         [hard_silhouette(seen.clone(), self.mesh.faces(), side), seen]
     }
 
-    /// What is drawn within the picture, and the error of that.
+    /// The image within the picture, and its error.
     fn judged(&self, cameras: &[Pinhole]) -> [Vec<f64>; 2] {
         let mut cameras = Cow::Borrowed(cameras);
         if self.colours.is_some() && cameras.len() < AT_ONCE {

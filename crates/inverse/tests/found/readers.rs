@@ -54,7 +54,7 @@ pub(crate) fn all() -> Vec<Kind> {
     ]
 }
 
-/// What was read, if its error is one line.
+/// The value that was read; checks that an error is one line.
 fn checked<T>(read: anyhow::Result<T>) -> Option<T> {
     let message = match read {
         Ok(read) => return Some(read),

@@ -98,7 +98,7 @@ fn textured_mtl(bytes: &[u8], folder: &Path) {
     loaded(SQUARE.as_bytes(), folder, "a.obj");
 }
 
-/// What materials name.
+/// Files that materials name.
 fn beside(folder: &Path) {
     if !folder.join("a.png").exists() {
         fs::write(folder.join("a.png"), b"\x89PNG\r\n\x1a\n").expect("a file in the folder");

@@ -1,4 +1,4 @@
-//! What the kernels of a gradient read of each pixel.
+//! Inputs of the gradient kernels for each pixel.
 
 use cubecl::prelude::*;
 

@@ -18,7 +18,7 @@ pub(super) struct Lookup {
     /// From squared distances to what places are read from, without its start.
     pub(super) inverse_outer: f32,
     pub(super) inverse_inner: f32,
-    /// What these are where the cells begin; 0 without `far`.
+    /// Scaled squared distances at which the cells begin; 0 without `far`.
     pub(super) before_outer: f32,
     pub(super) before_inner: f32,
     pub(super) start: f32,

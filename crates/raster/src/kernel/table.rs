@@ -127,7 +127,7 @@ pub(crate) struct Lookup<F> {
     /// From squared distances to z, without its start.
     inverse_outer: F,
     inverse_inner: F,
-    /// What they are where the cells begin.
+    /// Scaled squared distances at which the cells begin.
     before_outer: F,
     before_inner: F,
     start: F,

@@ -1,4 +1,4 @@
-//! What cases of several parts share.
+//! Shared code of the cases.
 
 use softrast_cli::{Task, Variant};
 

@@ -215,7 +215,7 @@ fn parted(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
     Ok([train, aside].map(|part| part.into_iter().map(|(_, view)| view).collect()))
 }
 
-/// What is deformed, for views of a [`frame`].
+/// The mesh that is deformed, for views of a [`frame`].
 fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Result<Mesh> {
     let placed = |mesh: Mesh, size: f64| {
         let place = |p: &[f64; 3]| p.map(|x| size * x);

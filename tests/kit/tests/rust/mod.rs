@@ -21,7 +21,7 @@ pub(crate) struct Crate {
     modules: BTreeMap<Module, Contents>,
 }
 
-/// What a module holds.
+/// Items and imports of a module.
 #[derive(Default)]
 struct Contents {
     file: PathBuf,
@@ -41,7 +41,7 @@ struct Import {
     is_public: bool,
 }
 
-/// What a path leads to.
+/// The target of a path.
 enum Found {
     Module(Module),
     /// The module that defines the item, and its name.
@@ -113,7 +113,7 @@ impl Crate {
         links
     }
 
-    /// What a path in a module leads to, if it is of this crate.
+    /// The target of a path in a module, if it is of this crate.
     fn find(&self, module: &[String], path: &[String]) -> Option<Found> {
         self.found(module, path, 0)
     }

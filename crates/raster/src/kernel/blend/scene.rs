@@ -1,4 +1,4 @@
-//! What a walk in colour reads: the inputs of the op, in one number type.
+//! Inputs of a walk in colour, in one number type.
 
 use super::{
     depth::{DepthGrid, DepthLookup},
@@ -42,7 +42,7 @@ pub(crate) struct Inputs<'a, F> {
     /// Cells of the edge softness, mirrored: the inner side is outside a face.
     pub(crate) edge: Grid,
     pub(crate) depth: DepthGrid,
-    /// What is taken off the edge softness.
+    /// The floor of the edge softness.
     pub(crate) floor: f64,
     /// Depths of nearness 1 and 0.
     pub(crate) planes: [f64; 2],
@@ -123,7 +123,7 @@ pub(super) struct Blend<'a, T: Real> {
     pub(super) scene: Scene<'a, T>,
     pub(super) attributes: [&'a [Float<T>]; 2],
     pub(super) entries: &'a [[u32; 3]],
-    /// Of the image, but for the faces' share.
+    /// Channels of the image, without the faces' share.
     pub(super) channels: usize,
     /// Of an entry of the attributes.
     pub(super) numbers: usize,
