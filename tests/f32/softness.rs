@@ -5,7 +5,7 @@ use burn::{
     tensor::{DType, Tensor, TensorData, backend::Backend},
 };
 use proptest::prelude::*;
-use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_softness::{EdgeSoftness, Family, Softness, numbers, vector};
 
 type First = Autodiff<NdArray<f32>>;
 type Second = Autodiff<First>;
@@ -16,15 +16,6 @@ type Second = Autodiff<First>;
 const SECOND_ORDER_FROM: f64 = 1e-7;
 
 const SCALES: [f64; 7] = [1e-12, 1e-7, 1e-4, 1e-2, 1.0, 30.0, 1e3];
-
-fn tensor<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
-    let data = TensorData::new(values.to_vec(), [values.len()]).convert::<f32>();
-    Tensor::from_data(data, (&B::Device::default(), DType::F32))
-}
-
-fn numbers<B: Backend>(tensor: Tensor<B, 1>) -> Vec<f32> {
-    tensor.into_data().to_vec().expect("the tensor holds f32")
-}
 
 /// 0, and both signs of distances from the smallest to the largest.
 fn distances() -> Vec<f64> {
@@ -53,8 +44,8 @@ fn assert_finite<B: Backend>(found: Option<Tensor<B, 1>>, what: &str) {
 
 /// Value, optical depth and their derivatives by x, with the gradients of each.
 fn check(softness: EdgeSoftness, scale: f64, x: &[f64]) {
-    let phi = tensor::<First>(&softness.default_phi(scale)).require_grad();
-    let x = tensor::<First>(x).require_grad();
+    let phi = vector::<First>(&softness.default_phi(scale)).require_grad();
+    let x = vector::<First>(x).require_grad();
     let outer_x = Tensor::<Second, 1>::from_inner(x.clone()).require_grad();
     let outer_phi = Tensor::<Second, 1>::from_inner(phi.clone()).require_grad();
     let curves = [
@@ -108,14 +99,14 @@ fn values_are_those_of_f64_to_the_digits_of_f32() {
     for family in Family::ALL {
         let x: Vec<_> = near(0.01).collect();
         let phi = family.default_phi(0.01);
-        let single = numbers(family.value::<NdArray<f32>, 1>(tensor(&phi), tensor(&x)));
+        let single = numbers(family.value::<NdArray<f32>, 1>(vector(&phi), vector(&x)));
         let as_f64 = |values: &[f64]| {
             let data = TensorData::new(values.to_vec(), [values.len()]);
             Tensor::<NdArray<f32>, 1>::from_data(data, (&Default::default(), DType::F64))
         };
         let double = family.value(as_f64(&phi), as_f64(&x)).into_data();
         for (s, d) in single.into_iter().zip(double.iter::<f64>()) {
-            assert!((f64::from(s) - d).abs() < 2e-5, "{family}: {s}, expected {d}");
+            assert!((s - d).abs() < 2e-5, "{family}: {s}, expected {d}");
         }
     }
 }
@@ -135,7 +126,7 @@ proptest! {
         check(softness, scale, &x);
         let x: Vec<_> = x.iter().map(|x| x * scale / 1e5).collect();
         check(softness, scale, &x);
-        for s in numbers(softness.value::<NdArray<f32>, 1>(tensor(&phi), tensor(&x))) {
+        for s in numbers(softness.value::<NdArray<f32>, 1>(vector(&phi), vector(&x))) {
             prop_assert!((0.0..=1.0).contains(&s));
         }
     }

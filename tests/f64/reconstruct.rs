@@ -2,20 +2,13 @@
 
 use burn::{
     backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData},
+    tensor::Tensor,
 };
 use reconstruct::{convolution, convolved};
+use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;
 type A = Autodiff<B>;
-
-fn tensor(values: &[f64], shape: [usize; 4]) -> Tensor<A, 4> {
-    Tensor::from_data(TensorData::new(values.to_vec(), shape), (&Default::default(), DType::F64))
-}
-
-fn numbers(tensor: Tensor<B, 4>) -> Vec<f64> {
-    tensor.into_data().iter().collect()
-}
 
 /// A convolution, and its gradients to pictures and weights.
 fn results(

@@ -198,6 +198,11 @@ fn unwritten(path: &Path, reason: io::Error) -> SoftnessFileError {
     SoftnessFileError::Write { path: path.to_owned(), reason }
 }
 
+/// Whether `x` is finite in f32 too, in which images are drawn.
+pub(crate) fn fits_f32(x: f64) -> bool {
+    x.abs() <= f64::from(f32::MAX)
+}
+
 /// Checks that `phi` has the expected length, of which so many at the front are logarithms.
 pub(crate) fn check_phi(
     softness: &str,
@@ -208,8 +213,8 @@ pub(crate) fn check_phi(
         return Err(format!(" has {} parameters, but {softness} has {expected}", phi.len()));
     }
     for (index, found) in phi.iter().enumerate() {
-        if !found.is_finite() {
-            return Err(format!(": phi[{index}] is {found}, expected a finite number"));
+        if !fits_f32(*found) {
+            return Err(format!(": phi[{index}] is {found}, expected a number that fits an f32"));
         }
         if index < logarithms && found.abs() > LARGEST_LOGARITHM {
             let limit = LARGEST_LOGARITHM;

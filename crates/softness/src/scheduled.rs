@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     EdgeSoftness, Feedback, ScaleSchedule, Softness, SoftnessFileError,
-    file::{Stored, check_phi, learned, stored},
+    file::{Stored, check_phi, fits_f32, learned, stored},
     math::ln_scale,
 };
 
@@ -220,7 +220,9 @@ impl Stored for ScheduledSoftness {
 
     fn check(&self) -> Result<(), String> {
         let surrogate = self.surrogate.iter().map(|of| (of.softness, &of.phi));
-        for (softness, phi) in [(self.softness, &self.phi)].into_iter().chain(surrogate) {
+        let parameters: Vec<_> =
+            [(self.softness, &self.phi)].into_iter().chain(surrogate).collect();
+        for &(softness, phi) in &parameters {
             let expected = [softness.parameters(), softness.logarithms()];
             check_phi(softness.family.name(), expected, phi)?;
         }
@@ -243,7 +245,19 @@ impl Stored for ScheduledSoftness {
             None => {}
         }
         let Some(schedule) = &self.schedule else { return Ok(()) };
-        schedule.check().map_err(|wrong| format!(" has a path with {wrong}"))
+        schedule.check().map_err(|wrong| format!(" has a path with {wrong}"))?;
+        // Weights of a network are divided by the scale.
+        for (softness, phi) in parameters {
+            for knot in &schedule.knots {
+                let scaled = softness.with_scale_values(phi, knot.exp());
+                if let Some(wrong) = scaled.into_iter().find(|x| !fits_f32(*x)) {
+                    return Err(format!(
+                        " has a path whose knot {knot} makes a parameter {wrong}, expected a number that fits an f32"
+                    ));
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -388,7 +402,10 @@ mod tests {
         let mut file = example(Family::Exp);
         file.phi[1] = f64::NAN;
         let message = file.save(&path).unwrap_err().to_string();
-        assert!(message.ends_with("phi[1] is NaN, expected a finite number"), "{message}");
+        assert!(
+            message.ends_with("phi[1] is NaN, expected a number that fits an f32"),
+            "{message}"
+        );
         assert!(!path.exists());
     }
 

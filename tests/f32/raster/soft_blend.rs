@@ -1,4 +1,4 @@
-//! Soft colours of whole meshes in f32: finite, and right where the answer is known.
+//! Soft colours of whole meshes in f32: close to f64, and right where the answer is known.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::Tensor,
 };
-use softrast_raster::{Attributes, Background, ColourRenderer, NEAR, Weighting};
+use softrast_raster::{Attributes, Background, ColourRenderer, NEAR, RasterBackend, Weighting};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, tensor};
 
@@ -17,7 +17,7 @@ const SIZE: usize = 16;
 const EXP: DepthSoftness = DepthSoftness::Family(Family::Exp);
 
 /// How a scene is drawn.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Look {
     edge: EdgeSoftness,
     scale: f64,
@@ -36,17 +36,42 @@ const SOFT: Look = Look {
     log_weight: -10.0,
 };
 
-/// The image `[2, size, size]` of faces of these colours before a black background, having looked at all gradients.
+/// The image `[2, size, size]` of faces of these colours before a black background; its colours lie between theirs, and its gradients are
+/// finite.
 fn image(corners: &[[f64; 3]], colours: &[f64], look: Look) -> Vec<f64> {
+    drawn::<B>(corners, colours, look)
+}
+
+/// [`image`], no channel of which is farther than `bound` from the same image in f64.
+fn image_as_in_f64(corners: &[[f64; 3]], colours: &[f64], look: Look, bound: f64) {
+    // Both begin with the same numbers.
+    let corners: Vec<_> =
+        corners.iter().map(|corner| corner.map(|x| f64::from(x as f32))).collect();
+    let expected = drawn::<NdArray<f64>>(&corners, colours, look);
+    for (k, (found, expected)) in image(&corners, colours, look).iter().zip(expected).enumerate() {
+        assert!((found - expected).abs() <= bound, "{k}: {found} instead of {expected}, {look:?}");
+    }
+}
+
+/// The largest error of an image that the rounding of nearness leaves under a depth softness of this scale.
+fn of_nearness(depth_scale: f64) -> f64 {
+    1e-4 + 2e-7 / depth_scale
+}
+
+fn drawn<B: RasterBackend>(corners: &[[f64; 3]], colours: &[f64], look: Look) -> Vec<f64>
+where
+    Autodiff<B>: RasterBackend,
+{
     let faces: Arc<[[u32; 3]]> =
         (0..colours.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
     let weighting = Weighting { edge: look.edge, depth: look.depth, planes: look.planes };
     let phi = [look.edge.default_phi(look.scale), look.depth.default_phi(look.depth_scale)];
     let renderer = ColourRenderer::with_weighting(faces, SIZE, weighting, phi.clone());
-    let vertices = tensor::<A, 3>(corners.as_flattened(), [1, corners.len(), 3]).require_grad();
-    let values = tensor::<A, 3>(colours, [1, colours.len(), 1]).require_grad();
-    let [edge, depth] = phi.map(|phi| tensor::<A, 1>(&phi, [phi.len()]).require_grad());
-    let log_weight = tensor::<A, 1>(&[look.log_weight], [1]).require_grad();
+    let vertices =
+        tensor::<Autodiff<B>, 3>(corners.as_flattened(), [1, corners.len(), 3]).require_grad();
+    let values = tensor::<Autodiff<B>, 3>(colours, [1, colours.len(), 1]).require_grad();
+    let [edge, depth] = phi.map(|phi| tensor::<Autodiff<B>, 1>(&phi, [phi.len()]).require_grad());
+    let log_weight = tensor::<Autodiff<B>, 1>(&[look.log_weight], [1]).require_grad();
     let background = Background { colour: tensor(&[0.0], [1]), log_weight: log_weight.clone() };
     let attributes = Attributes::of_faces(values.clone());
     let image = renderer.image_with(vertices.clone(), &attributes, [&edge, &depth], &background);
@@ -92,7 +117,7 @@ fn faces_that_fight_for_the_front_blend_smoothly() {
     let tilted = [[-0.9, -0.9, 1.9], [0.9, -0.9, 2.1], [0.0, 0.9, 2.0]];
     for depth_scale in [1e-6, 1e-4, 1e-2] {
         let look = Look { depth_scale, log_weight: -2.0 / depth_scale, ..SOFT };
-        image(&[FACE, tilted].concat(), &[0.0, 1.0], look);
+        image_as_in_f64(&[FACE, tilted].concat(), &[0.0, 1.0], look, of_nearness(depth_scale));
     }
 }
 
@@ -146,8 +171,8 @@ fn a_background_that_weighs_nothing_is_seen_through() {
 }
 
 #[test]
-fn depths_of_all_sizes_are_finite() {
-    for scale in [1e-2, 1e-1, 1.0, 1e2, 5e3] {
+fn depths_of_all_sizes_are_told_apart_as_in_f64() {
+    for scale in [2e-2, 1e-1, 1.0, 1e2, 5e3] {
         let planes = [scale, 4.0 * scale];
         for depth in [EXP, DepthSoftness::Family(Family::Logistic), DepthSoftness::Mlp] {
             for depth_scale in [1e-5, 1e-2, 1.0] {
@@ -155,14 +180,15 @@ fn depths_of_all_sizes_are_finite() {
                 let at = |z: f64| FACE.map(|[x, y, _]| [x, y, z * scale]);
                 // At the planes, between them, before and behind.
                 let faces = [at(1.0), at(1.5), at(4.0), at(40.0), at(1.0 + 1e-6)];
-                image(&faces.concat(), &[0.1, 0.3, 0.5, 0.7, 0.9], look);
+                let colours = [0.1, 0.3, 0.5, 0.7, 0.9];
+                image_as_in_f64(&faces.concat(), &colours, look, of_nearness(depth_scale));
             }
         }
     }
 }
 
 #[test]
-fn faces_of_all_kinds_are_finite_under_every_softness() {
+fn faces_of_all_kinds_are_drawn_under_every_softness() {
     let p = [0.1, 0.1, 2.0];
     let faces = [
         [p, p, p],
@@ -184,6 +210,9 @@ fn faces_of_all_kinds_are_finite_under_every_softness() {
             for log_weight in [0.0, -10.0, -1000.0] {
                 let look = Look { edge, scale, log_weight, ..SOFT };
                 image(&faces.concat(), &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], look);
+                // Without those whose distances f32 cannot hold.
+                let sound = [faces[0], faces[1], faces[2], faces[5], faces[6]];
+                image_as_in_f64(&sound.concat(), &[0.1, 0.2, 0.3, 0.6, 0.7], look, 1e-4);
             }
         }
     }
@@ -196,7 +225,7 @@ fn second_order_is_finite_and_symmetric() {
     let faces = [[0, 1, 2], [3, 4, 5]];
     let renderer = ColourRenderer::new(&faces, SIZE, Family::Logistic, 0.05, [1.0, 4.0]);
     let product = |direction: [f64; 18]| {
-        let inner = tensor::<A, 3>(corners.as_flattened(), [1, 6, 3]).require_grad();
+        let inner = tensor::<Autodiff<B>, 3>(corners.as_flattened(), [1, 6, 3]).require_grad();
         let vertices = Tensor::<AA, 3>::from_inner(inner.clone()).require_grad();
         let attributes = Attributes::of_faces(tensor::<AA, 3>(&[0.2, 0.9], [1, 2, 1]));
         let background = renderer.background::<AA>(&[0.5], &Default::default());

@@ -6,7 +6,7 @@ use burn::{
 };
 use softrast_raster::{ImageSize, Rasterizer, TConorm, hard_silhouette, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
-use softrast_tests::vector;
+use softrast_tests::{numbers, vector};
 
 use super::triangles::triangles;
 
@@ -16,10 +16,6 @@ type AA = Autodiff<A>;
 
 const TOLERANCE: f64 = 1e-9;
 const SCALES: [f64; 3] = [0.03, 0.05, 0.08];
-
-fn numbers<const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
-    tensor.into_data().iter().collect()
-}
 
 fn assert_same(name: &str, found: &[f64], expected: &[f64], bound: f64) {
     let length = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();

@@ -1,6 +1,6 @@
 use std::{
     fs::{self, OpenOptions},
-    io::Write,
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -227,6 +227,14 @@ struct Point {
     validation_loss: Option<f64>,
 }
 
+/// The contents of a regular file; a pipe would be waited for, and a device read, for ever.
+fn whole(path: &Path) -> io::Result<Vec<u8>> {
+    match fs::metadata(path)?.is_file() {
+        true => fs::read(path),
+        false => Err(io::Error::other("it is not a regular file")),
+    }
+}
+
 impl Log {
     /// Goes on from the checkpoint in the folder if asked to; else from the beginning.
     fn new<T: Task>(
@@ -242,12 +250,12 @@ impl Log {
         let mut kept = String::new();
         if resume && log.checkpoint.exists() {
             let named = || log.checkpoint.display().to_string();
-            let checkpoint = fs::read(&log.checkpoint).with_context(named)?;
+            let checkpoint = whole(&log.checkpoint).with_context(named)?;
             learning.resume(&checkpoint, &log.job).with_context(named)?;
             let progress = learning.progress();
             // The record of the last step, after which there is no update, is on file too.
             let next = progress.step + usize::from(progress.finished);
-            let text = fs::read(&log.records).unwrap_or_default();
+            let text = whole(&log.records).unwrap_or_default();
             // A step that came after the checkpoint was written will come again, and the line behind the last line feed was being
             // written when the program was killed.
             for line in String::from_utf8_lossy(&text).split_inclusive('\n') {
