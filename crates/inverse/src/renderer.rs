@@ -135,11 +135,10 @@ impl ScheduledRenderer {
             let size = self.layout.size();
             let surrogate = self.values.surrogate_at(part, size).map(|found| found.phi);
             let phi = [self.values.phi_at(part, size)].into_iter().chain(surrogate);
-            let dtype = <B::FloatElem as Element>::dtype();
             let mut table = Vec::new();
             let silhouettes = self.renderers.iter().zip(phi).map(|(renderer, phi)| {
                 let silhouette = renderer.prepared::<B>(&phi);
-                table.extend(silhouette.table_data::<B>(&phi, dtype).iter::<f64>());
+                table.extend(silhouette.table_data(&phi).iter::<f64>());
                 silhouette
             });
             let silhouettes = silhouettes.collect();

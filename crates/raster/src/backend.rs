@@ -135,15 +135,15 @@ pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usiz
 ///
 /// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth, which only decides
 /// whether a face is drawn. `table` comes from [`Profile::table`](crate::Profile::table) of the profile that `op` was made for:
-/// `[rows, 4]`, or `[views, rows, 4]` for one of each view. The result is `[views, height, width]`, top row first.
+/// `[rows, 4]`. The result is `[views, height, width]`, top row first.
 ///
 /// # Panics
 ///
 /// If the shapes do not fit or the float types differ.
-pub fn profile_sum<B: RasterBackend, const D: usize>(
+pub fn profile_sum<B: RasterBackend>(
     op: &ProfileSum,
     vertices: Tensor<B, 3>,
-    table: Tensor<B, D>,
+    table: Tensor<B, 2>,
 ) -> Tensor<B, 3> {
     check(op, &vertices, &table);
     let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
@@ -151,19 +151,11 @@ pub fn profile_sum<B: RasterBackend, const D: usize>(
 }
 
 /// Panics unless vertices and table are for this op.
-fn check<B: RasterBackend, const D: usize>(
-    op: &ProfileSum,
-    vertices: &Tensor<B, 3>,
-    table: &Tensor<B, D>,
-) {
-    let [views, count, three] = vertices.dims();
+fn check<B: RasterBackend>(op: &ProfileSum, vertices: &Tensor<B, 3>, table: &Tensor<B, 2>) {
+    let [_, count, three] = vertices.dims();
     assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
     let (found, rows) = (table.dims(), op.grid.rows());
-    let fits = found[..] == [rows, 4] || found[..] == [views, rows, 4];
-    assert!(
-        fits,
-        "a table of this profile is [{rows}, 4] or [{views}, {rows}, 4], found {found:?}"
-    );
+    assert_eq!(found, [rows, 4], "a table of this profile is [{rows}, 4], found {found:?}");
     assert_eq!(vertices.dtype(), table.dtype(), "vertices and table differ in float type");
     let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
@@ -175,11 +167,11 @@ fn check<B: RasterBackend, const D: usize>(
 /// # Panics
 ///
 /// If the shapes do not fit or the float types differ.
-pub(crate) fn silhouette_loss<B: RasterBackend, const D: usize>(
+pub(crate) fn silhouette_loss<B: RasterBackend>(
     op: &ProfileSum,
     loss: PixelLoss,
     vertices: Tensor<B, 3>,
-    table: Tensor<B, D>,
+    table: Tensor<B, 2>,
     target: Tensor<B, 3>,
 ) -> Tensor<B, 1> {
     check(op, &vertices, &table);

@@ -1,11 +1,12 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
-use softrast_softness::{DepthSoftness, EdgeSoftness, OPAQUE, Softness, vector};
+use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness, vector};
 
 use crate::{
     Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
     backend::{fused, primitive},
+    curve::precise,
     fused::FusedOp,
     kernel::blend::OF_TEXEL,
     log_curve::{DepthCurve, LogCurve, Precision},
@@ -19,7 +20,7 @@ const MARGIN: f64 = 3.0;
 /// The background's part of what a face at the far plane weighs, where nothing else is asked for.
 const BEHIND: f64 = 1e-3;
 
-/// Draws soft colours of one mesh topology.
+/// Draws soft colours of one mesh topology, under any softness of the edge.
 ///
 /// At each pixel it takes the mean of what all faces show, and of a background behind them. A face weighs as much as it covers the pixel
 /// (its edge softness), times what its depth counts (its depth softness): `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` with `wⱼ = s(dⱼ) b(zⱼ)`. So
@@ -53,36 +54,38 @@ const BEHIND: f64 = 1e-3;
 /// assert_eq!(gradient.dims(), [1, 3, 3]);
 /// ```
 #[derive(Clone, Debug)]
-pub struct ColourRenderer {
+pub struct ColourRenderer<S = EdgeSoftness> {
     faces: Arc<[[u32; 3]]>,
     size: ImageSize,
-    weighting: Weighting,
+    weighting: Weighting<S>,
     phi: [Vec<f64>; 2],
     tolerance: f64,
-    kept: Arc<Mutex<Option<Prepared>>>,
+    kept: Arc<Mutex<Option<Prepared<S>>>>,
     #[cfg(feature = "wgpu")]
     topology: crate::gpu::Topology,
 }
 
 /// What the last image needed and the next one may need again.
 #[derive(Clone, Debug)]
-struct Prepared {
+struct Prepared<S> {
     phi: [Vec<f64>; 2],
     /// Logarithm of the background's weight that the tables reach.
     log_weight: f64,
-    edge: LogCurve,
+    edge: LogCurve<S>,
     depth: DepthCurve,
     /// The tables of the renderer's own parameters.
-    tables: Option<([Vec<f64>; 2], DType, TensorData)>,
+    tables: Option<([Vec<f64>; 2], TensorData)>,
 }
 
 impl ColourRenderer {
     /// Scale of the depth softness unless another is chosen, in units of the distance between the planes.
     pub const DEPTH_SCALE: f64 = 0.05;
+}
 
+impl<S: Softness> ColourRenderer<S> {
     /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under an edge
     /// softness of this `scale` in NDC and, between the depths `planes` of nearness 1 and 0 (ascending, world units), the reversed
-    /// exponential as depth softness: a face counts e times as much as one that lies [`DEPTH_SCALE`](Self::DEPTH_SCALE) of the distance
+    /// exponential as depth softness: a face counts e times as much as one that lies [`DEPTH_SCALE`](ColourRenderer::DEPTH_SCALE) of the distance
     /// between the planes behind it, as in `SoftRas` and PyTorch3D.
     ///
     /// # Panics
@@ -91,14 +94,13 @@ impl ColourRenderer {
     pub fn new(
         faces: &[[u32; 3]],
         size: impl Into<ImageSize>,
-        family: softrast_softness::Family,
+        edge: S,
         scale: f64,
         planes: [f64; 2],
     ) -> Self {
-        let edge = EdgeSoftness { family, squared: false };
-        let depth = DepthSoftness::Family(softrast_softness::Family::Exp);
+        let depth = DepthSoftness::Family(Family::Exp);
+        let phi = [edge.default_phi(scale), depth.default_phi(ColourRenderer::DEPTH_SCALE)];
         let weighting = Weighting { edge, depth, planes };
-        let phi = [edge.default_phi(scale), depth.default_phi(Self::DEPTH_SCALE)];
         Self::with_weighting(faces.into(), size, weighting, phi)
     }
 
@@ -110,7 +112,7 @@ impl ColourRenderer {
     pub fn with_weighting(
         faces: Arc<[[u32; 3]]>,
         size: impl Into<ImageSize>,
-        weighting: Weighting,
+        weighting: Weighting<S>,
         phi: [Vec<f64>; 2],
     ) -> Self {
         let size = size.into();
@@ -157,7 +159,7 @@ impl ColourRenderer {
     }
 
     /// How faces are weighted.
-    pub fn weighting(&self) -> &Weighting {
+    pub fn weighting(&self) -> &Weighting<S> {
         &self.weighting
     }
 
@@ -216,22 +218,19 @@ impl ColourRenderer {
     ) -> Tensor<B, 4> {
         let (device, dtype) = (vertices.device(), vertices.dtype());
         let mut prepared = self.prepared(&self.phi, number(background));
-        // A GPU gets what the CPU has computed in f64.
-        let precise = if B::ON_HOST { dtype } else { DType::F64 };
         let data = match prepared.tables.take() {
-            Some((phi, of, data)) if phi == self.phi && of == precise => data,
+            Some((phi, data)) if phi == self.phi => data,
             _ => {
-                let phi = self.phi.each_ref().map(|phi| {
-                    let data = TensorData::new(phi.clone(), [phi.len()]);
-                    Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), precise))
-                });
-                let data = prepared.tables(phi).into_data();
+                // In f64, whatever it is drawn with: in f32 some families lose five of their seven digits.
+                let precise = |phi: &Vec<f64>| precise::<HostBackend>(phi, &Default::default());
+                let data = prepared.tables(self.phi.each_ref().map(precise)).into_data();
                 // Another thread may have prepared something else in between.
-                let own = |kept: &&mut Prepared| {
-                    (kept.edge, kept.depth) == (prepared.edge, prepared.depth)
+                let own = |kept: &&mut Prepared<S>| {
+                    let same = kept.phi == prepared.phi && kept.depth == prepared.depth;
+                    same && kept.edge.grid() == prepared.edge.grid()
                 };
                 if let Some(kept) = self.kept().as_mut().filter(own) {
-                    kept.tables = Some((self.phi.clone(), precise, data.clone()));
+                    kept.tables = Some((self.phi.clone(), data.clone()));
                 }
                 data
             }
@@ -275,7 +274,7 @@ impl ColourRenderer {
         log_weight: f64,
         entries: Arc<[[u32; 3]]>,
         texture: Option<[usize; 2]>,
-    ) -> (FusedOp, WeightTables) {
+    ) -> (FusedOp, WeightTables<S>) {
         check(&self.weighting, phi);
         let prepared = self.prepared(phi, log_weight);
         let op = self.blend_op(&prepared, entries, texture);
@@ -284,7 +283,7 @@ impl ColourRenderer {
 
     fn drawn<B: RasterBackend>(
         &self,
-        prepared: &Prepared,
+        prepared: &Prepared<S>,
         vertices: Tensor<B, 3>,
         attributes: &Attributes<B>,
         tables: Tensor<B, 2>,
@@ -297,7 +296,7 @@ impl ColourRenderer {
 
     fn blend_op(
         &self,
-        prepared: &Prepared,
+        prepared: &Prepared<S>,
         entries: Arc<[[u32; 3]]>,
         texture: Option<[usize; 2]>,
     ) -> SoftBlend {
@@ -305,7 +304,7 @@ impl ColourRenderer {
             faces: self.faces.clone(),
             entries,
             texture,
-            edge: prepared.edge.grid,
+            edge: prepared.edge.grid(),
             depth: prepared.depth.grid(),
             floor: floor(&self.weighting.edge),
             planes: self.weighting.planes,
@@ -318,7 +317,7 @@ impl ColourRenderer {
     }
 
     /// Knots for these parameters and this logarithm of the background's weight.
-    fn prepared(&self, phi: &[Vec<f64>; 2], log_weight: f64) -> Prepared {
+    fn prepared(&self, phi: &[Vec<f64>; 2], log_weight: f64) -> Prepared<S> {
         assert!(log_weight.is_finite(), "log weight {log_weight}");
         if let Some(prepared) = self.kept().as_ref().filter(|kept| log_weight >= kept.log_weight) {
             if prepared.phi == *phi {
@@ -335,16 +334,16 @@ impl ColourRenderer {
         self.kept().insert(prepared).clone()
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<Prepared>> {
+    fn kept(&self) -> MutexGuard<'_, Option<Prepared<S>>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Prepared {
+impl<S: Softness> Prepared<S> {
     /// Half of the tolerance goes to culling, the other half to interpolation: an error of the logarithms of both factors of a weight by a
     /// quarter of it each would do, were they all of one sign; together they move a mean by at most half as much as they are.
     fn new(
-        weighting: &Weighting,
+        weighting: &Weighting<S>,
         phi: &[Vec<f64>; 2],
         faces: usize,
         tolerance: f64,
@@ -369,13 +368,13 @@ impl Prepared {
         let by_depth = Precision { accuracy, least, floor: 0.0 };
         let floor = floor(&weighting.edge);
         let by_edge = Precision { least: least - highest, floor, ..by_depth };
-        let edge = LogCurve::new::<HostBackend>(weighting.edge, edge, by_edge, &device);
+        let edge = LogCurve::new::<HostBackend>(weighting.edge.clone(), edge, by_edge, &device);
         let depth = DepthCurve::new::<HostBackend>(weighting.depth, depth, by_depth, &device);
         Self { phi: phi.clone(), log_weight, edge, depth, tables: None }
     }
 
     /// Knots for parameters `phi`, if their softnesses are the prepared ones stretched.
-    fn stretched_to(&self, weighting: &Weighting, phi: &[Vec<f64>; 2]) -> Option<Self> {
+    fn stretched_to(&self, weighting: &Weighting<S>, phi: &[Vec<f64>; 2]) -> Option<Self> {
         let [edge, depth] = &self.phi;
         let edge = self.edge.stretched(stretch(&weighting.edge, edge, &phi[0])?)?;
         let depth = match (self.depth, weighting.depth) {
@@ -397,12 +396,12 @@ impl Prepared {
 /// Makes the tables of an op that runs on slices.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
-pub struct WeightTables(Prepared);
+pub struct WeightTables<S>(Prepared<S>);
 
-impl WeightTables {
+impl<S: Softness> WeightTables<S> {
     /// Rows of both tables.
     pub fn rows(&self) -> usize {
-        self.0.edge.grid.rows() + self.0.depth.grid().rows()
+        self.0.edge.grid().rows() + self.0.depth.grid().rows()
     }
 
     /// Both tables, `[rows, 4]`, of parameters of the softnesses by edge and by depth.
@@ -418,7 +417,7 @@ fn number<B: Backend>(background: &Background<B>) -> f64 {
     numbers[0]
 }
 
-fn check(weighting: &Weighting, phi: &[Vec<f64>; 2]) {
+fn check(weighting: &Weighting<impl Softness>, phi: &[Vec<f64>; 2]) {
     let found = phi.each_ref().map(Vec::len);
     let expected = [weighting.edge.parameters(), weighting.depth.parameters()];
     assert_eq!(found, expected, "parameters of the softnesses by edge and by depth");

@@ -29,6 +29,7 @@ mod backend_choice;
 mod camera;
 mod colour;
 mod colour_renderer;
+mod curve;
 mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu;

@@ -1,36 +1,27 @@
-use std::iter;
-
 use burn::tensor::{Tensor, backend::Backend};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers, support};
+use softrast_softness::{
+    DepthSoftness, EdgeSoftness, Family, Mirrored, Softness, numbers, settled_beyond, support,
+};
 
 use crate::{
-    Profile, TConorm,
+    curve::{CubicCurve, FAR, precise, rounding, settled_until},
     kernel::{Grid, blend::DepthGrid},
-    profile::{FAR, PLACES, Reached, Sample, dense, precise, refined, samples, settled_until},
     weighting::NOTHING,
 };
 
-/// The nearest and the farthest distance at which a softness is asked how much it is, as in [`support`], in the unit of its argument.
-const NEAREST: f64 = 1e-12;
-const FARTHEST: f64 = 1e6;
 /// Stands for an infinite distance; its square fits an f32.
 const LIMIT: f64 = 1e18;
-/// Distances that are looked at, 4 % apart, and those by which each refinement divides what lies between two.
-const COARSE: usize = 1024;
-const FINE: usize = 64;
-const REFINEMENTS: usize = 2;
 /// The least optical depth that differs from its limit by more than it is rounded by.
 const ROUNDING: f64 = 1e-12;
 
 /// Minus the logarithm of a softness, as a piecewise cubic function of the squared distance.
 ///
-/// `-ln s(x)` is the optical depth of the mirrored step at `-x`. So the table is a [`Profile`] of that, under the probabilistic sum, with
-/// another idea of what is exact: an absolute error of a logarithm is a relative one of the weight, and an error ρ of the logarithms of
+/// `-ln s(x)` is the optical depth of the mirrored step at `-x`, whose inner side is outside the face. An absolute error of a logarithm is a relative one of the weight, and an error ρ of the logarithms of
 /// all weights moves their mean by at most `ρ / 2` times the range of what is averaged, to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LogCurve {
-    softness: EdgeSoftness,
-    pub(crate) grid: Grid,
+pub(crate) struct LogCurve<S> {
+    softness: Mirrored<S>,
+    curve: CubicCurve,
     /// How far it is off, in multiples of what was asked for.
     pub(crate) error: f64,
 }
@@ -61,64 +52,60 @@ impl Precision {
     }
 }
 
-impl LogCurve {
+impl<S: Softness> LogCurve<S> {
     /// A table for the parameters `phi`.
     pub(crate) fn new<B: Backend>(
-        softness: EdgeSoftness,
+        softness: S,
         phi: &[f64],
         precision: Precision,
         device: &B::Device,
     ) -> Self {
-        let softness = EdgeSoftness { family: softness.family.mirrored(), ..softness };
+        let softness = Mirrored(softness);
         let Precision { accuracy, least, floor } = precision;
+        let parameters = precise::<B>(phi, device);
+        let depths = |x: &[f64]| {
+            numbers(softness.optical_depth(parameters.clone(), precise::<B>(x, device)))
+        };
         let outer = support::<B>(&softness, phi, accuracy / 2.0, device).outer;
         // Until the weight is negligible, or at its limit.
         let close = if floor > 0.0 { least.exp() / floor } else { accuracy };
         let close = close.min(accuracy).max(ROUNDING) / 2.0;
-        let inner = settled_beyond::<B>(&softness, phi, -least, close, device);
+        let limit = depths(&[LIMIT])[0];
+        let inner = settled_beyond(depths, |q| q >= -least || (q - limit).abs() <= close);
         let from = || {
             let settled = |edge: f64, q: f64| (q - edge).abs() <= accuracy.max(ROUNDING) / 2.0;
-            settled_until::<B>(&softness, phi, [outer, inner], settled, device)
+            settled_until(depths, [outer, inner], settled)
         };
-        let missed = |grid: Grid, places: &[f64]| {
-            let (samples, rounding) = samples::<B>(&softness, depths(grid), phi, places, device);
-            let mut reached = Reached::NOTHING;
-            for Sample { exact, interpolated, innermost } in samples {
-                let error = precision.error(exact, interpolated, rounding);
-                let place = if innermost { &mut reached.innermost } else { &mut reached.rest };
-                *place = place.max(error);
-            }
-            reached
-        };
-        let (grid, reached) = refined([outer, inner], from, &FAR, |grid| missed(grid, &PLACES));
-        let mut error = reached.most();
-        if error > 1.0 {
-            error = missed(grid, &dense()).most();
-        }
-        Self { softness, grid, error }
+        let curve = |x: Tensor<B, 1>| softness.depth_and_hazard(parameters.clone(), x);
+        let rounding = rounding::<B>(device);
+        let miss = |exact: f64, interpolated: f64| precision.error(exact, interpolated, rounding);
+        let (curve, error) =
+            CubicCurve::chosen::<B>(curve, [outer, inner], from, &FAR, miss, device);
+        Self { softness, curve, error }
     }
 
     /// The same softness stretched by `factor` along its argument, to the same precision; None where it has to be chosen anew.
-    pub(crate) fn stretched(self, factor: f64) -> Option<Self> {
-        Some(Self { grid: depths(self.grid).stretched(factor)?.grid, ..self })
+    pub(crate) fn stretched(&self, factor: f64) -> Option<Self> {
+        Some(Self { curve: self.curve.stretched(factor)?, ..self.clone() })
+    }
+
+    /// The places of the knots.
+    pub(crate) fn grid(&self) -> Grid {
+        self.curve.grid
     }
 
     /// Coefficients of the cubics, `[rows, 4]`, in the float type of `phi` `[parameters]`.
     pub(crate) fn table<B: Backend>(&self, phi: Tensor<B, 1>) -> Tensor<B, 2> {
-        depths(self.grid).table(&self.softness, phi)
+        let like = (&phi.device(), phi.dtype());
+        self.curve.table(|x| self.softness.depth_and_hazard(phi.clone(), x), like)
     }
-}
-
-/// A profile of optical depths with these cells.
-fn depths(grid: Grid) -> Profile {
-    Profile { grid, t_conorm: TConorm::Probabilistic, error: 0.0, rough: false }
 }
 
 /// Logarithms of weights by depth, for a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum DepthCurve {
     /// A family, over the distance from the near plane.
-    Family(LogCurve),
+    Family(LogCurve<EdgeSoftness>),
     /// The reversed exponential: its logarithm is a straight line, until it is 0.
     Exponential,
     /// The network: without biases it is a straight line on each side of nearness 0.
@@ -154,7 +141,7 @@ impl DepthCurve {
 
     pub(crate) fn grid(&self) -> DepthGrid {
         match self {
-            Self::Family(curve) => DepthGrid::Table(curve.grid),
+            Self::Family(curve) => DepthGrid::Table(curve.grid()),
             Self::Exponential => DepthGrid::Exponential,
             Self::Mlp => DepthGrid::Line { floor: softrast_softness::OPAQUE },
         }
@@ -180,34 +167,6 @@ impl DepthCurve {
     }
 }
 
-/// The distance on the inner side beyond which an optical depth is at least `depth`, or as `close` as this to its limit.
-///
-/// Looked for as in [`support`], but without taking an exponential: depths may be beyond the range of weights.
-fn settled_beyond<B: Backend>(
-    softness: &EdgeSoftness,
-    phi: &[f64],
-    depth: f64,
-    close: f64,
-    device: &B::Device,
-) -> f64 {
-    let depths = |x: &[f64]| {
-        numbers(softness.optical_depth(precise::<B>(phi, device), precise::<B>(x, device)))
-    };
-    let limit = depths(&[LIMIT])[0];
-    let unsettled = |&q: &f64| q < depth && (q - limit).abs() > close;
-    let [mut near, mut far] = [NEAREST, FARTHEST];
-    for count in iter::once(COARSE).chain([FINE; REFINEMENTS]) {
-        let ratio = (far / near).ln() / (count - 1) as f64;
-        let places: Vec<f64> = (0..count).map(|k| near * (ratio * k as f64).exp()).collect();
-        match depths(&places).iter().rposition(unsettled) {
-            None => return near,
-            Some(last) if last + 1 == count => return f64::INFINITY,
-            Some(last) => [near, far] = [places[last], places[last + 1]],
-        }
-    }
-    far
-}
-
 #[cfg(all(test, feature = "ndarray"))]
 mod tests {
     use burn::backend::NdArray;
@@ -231,7 +190,7 @@ mod tests {
                 assert!(
                     error <= most,
                     "{family}, squared {squared}: {error} with {:?}",
-                    curve.grid
+                    curve.grid()
                 );
             }
         }
@@ -241,9 +200,8 @@ mod tests {
     fn weights_beyond_the_range_of_floats_have_a_place() {
         let softness = EdgeSoftness { family: Family::Exp, squared: false };
         let phi = softness.default_phi(1e-4);
-        let mirrored = EdgeSoftness { family: Family::ExpForward, ..softness };
-        let device = Default::default();
-        let beyond = settled_beyond::<NdArray<f64>>(&mirrored, &phi, 1e4, 1e-6, &device);
-        assert!((beyond - 1.0).abs() < 1e-4, "{beyond}");
+        let precision = Precision { accuracy: 1e-6, least: -1e4, floor: 0.0 };
+        let curve = LogCurve::new::<NdArray<f64>>(softness, &phi, precision, &Default::default());
+        assert!((curve.grid().inner - 1.0).abs() < 1e-4, "{curve:?}");
     }
 }

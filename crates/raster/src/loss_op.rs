@@ -24,7 +24,7 @@ impl SilhouetteLoss {
         Self { sum: self.sum.keeping(), kept, ..self.clone() }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[1 or views, rows, 4]` and a `target` `[1 or views, height, width]`, to losses
+    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[rows, 4]` and a `target` `[1 or views, height, width]`, to losses
     /// `[views]`. Only the vertices have a gradient.
     pub(crate) fn run<F: Float + Element + Number<Float = F>>(
         &self,

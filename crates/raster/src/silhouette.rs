@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
 
 use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
     backend::{elementary, pairs, primitive, silhouette_loss},
+    curve::precise,
     fused::{ElementaryOp, FusedOp},
     kernel::PixelLoss,
     profile_sum,
@@ -51,39 +52,22 @@ impl Rasterizer {
         if !B::ON_HOST {
             // Without a word between host and GPU for every attempt.
             type Host = burn::backend::NdArray<f32>;
-            return self.prepare_on::<Host, S>(faces, softness, &[&values], false);
+            return self.prepare_on::<Host, S>(faces, softness, &values, false);
         }
-        self.prepare_on::<B, S>(faces, softness, &[&values], B::ON_HOST)
+        self.prepare_on::<B, S>(faces, softness, &values, B::ON_HOST)
     }
 
-    /// [`Rasterizer::prepare`] for a softness of which each view has parameters of its own: `phi` `[views, parameters]`. Support and knots
-    /// are such that all of them keep the tolerance.
-    ///
-    /// # Panics
-    ///
-    /// If `faces`, the image or `phi` is empty, or a row of `phi` has the wrong length.
-    pub fn prepare_by_view<B: RasterBackend, S: Softness>(
-        &self,
-        faces: &Arc<[[u32; 3]]>,
-        softness: S,
-        phi: &Tensor<B, 2>,
-    ) -> Silhouette<S> {
-        let ([_, parameters], values) = (phi.dims(), phi.to_data().iter().collect::<Vec<f64>>());
-        let rows: Vec<&[f64]> = values.chunks(parameters.max(1)).collect();
-        self.prepare_on::<HostBackend, S>(faces, softness, &rows, B::ON_HOST)
-    }
-
-    /// [`Rasterizer::prepare`] from plain numbers, for drawing on the CPU (`on_host`) or on a GPU, with any of these `phi`; `H` is where
+    /// [`Rasterizer::prepare`] from plain numbers, for drawing on the CPU (`on_host`) or on a GPU; `H` is where
     /// support and knots are chosen, in f64 if it has that.
     ///
     /// # Panics
     ///
-    /// If `faces`, the image or `phi` is empty, or a `phi` has the wrong length.
+    /// If `faces` or the image is empty, or `phi` has the wrong length.
     pub fn prepare_on<H: Backend, S: Softness>(
         &self,
         faces: &Arc<[[u32; 3]]>,
         softness: S,
-        phi: &[&[f64]],
+        phi: &[f64],
         on_host: bool,
     ) -> Silhouette<S> {
         assert!(self.size.pixels() > 0, "an image needs at least one pixel");
@@ -91,13 +75,13 @@ impl Rasterizer {
         let (faces, device) = (faces.clone(), Default::default());
         let count = faces.len();
         let profile = match on_host {
-            true => Profile::for_all::<H>(&softness, t_conorm, phi, count, tolerance, &device),
+            true => Profile::new::<H>(&softness, t_conorm, phi, count, tolerance, &device),
             // The look-up of a GPU knows no cells that are counted from the far end.
             false => Profile::chosen::<H>(&softness, t_conorm, phi, count, tolerance, &[], &device),
         };
         let op = ProfileSum {
             faces,
-            grid: profile.grid,
+            grid: profile.grid(),
             size: self.size,
             near: NEAR,
             kept: None,
@@ -135,30 +119,19 @@ impl<S: Softness> Silhouette<S> {
         self.profile.table(&self.softness, phi)
     }
 
-    /// Tables of a softness of which each view has parameters of its own, `[views, rows, 4]` from `phi` `[views, parameters]`; see
-    /// [`Rasterizer::prepare_by_view`].
-    pub fn table_by_view<B: Backend>(&self, phi: Tensor<B, 2>) -> Tensor<B, 3> {
-        let table = |phi: Tensor<B, 2>| self.table(phi.squeeze_dim::<1>(0));
-        Tensor::stack(phi.split(1, 0).into_iter().map(table).collect(), 0)
-    }
-
-    /// The numbers of the table of plain parameters, for drawing on `B` with vertices of this float type.
-    ///
-    /// For a GPU it is computed on the CPU in f64: the GPU then gets it in one piece, instead of some sixty small kernels over a few
-    /// hundred numbers, and its curvature is not lost to rounding.
+    /// The numbers of the table of plain parameters, computed on the CPU in f64, whatever it is drawn with: in f32 some families lose five
+    /// of their seven digits, and all of them their curvature. A GPU gets it in one piece, instead of some sixty small kernels over a few
+    /// hundred numbers.
     #[doc(hidden)]
-    pub fn table_data<B: RasterBackend>(&self, phi: &[f64], dtype: DType) -> TensorData {
-        let dtype = if B::ON_HOST { dtype } else { DType::F64 };
-        let data = TensorData::new(phi.to_vec(), [phi.len()]);
-        let phi = Tensor::<HostBackend, 1>::from_data(data, (&Default::default(), dtype));
-        self.table(phi).into_data()
+    pub fn table_data(&self, phi: &[f64]) -> TensorData {
+        self.table(precise::<HostBackend>(phi, &Default::default())).into_data()
     }
 
-    /// Like [`Silhouette::coverage`], from a table `[rows, 4]`, or from one of each view `[views, rows, 4]`.
-    pub fn coverage_by_table<B: RasterBackend, const D: usize>(
+    /// Like [`Silhouette::coverage`], from a table `[rows, 4]`.
+    pub fn coverage_by_table<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, D>,
+        table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
         covered(self.profile.t_conorm(), self.sums(vertices, table))
     }
@@ -170,10 +143,10 @@ impl<S: Softness> Silhouette<S> {
     /// # Panics
     ///
     /// If shapes or float types do not fit.
-    pub fn mse_loss_by_table<B: RasterBackend, const D: usize>(
+    pub fn mse_loss_by_table<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, D>,
+        table: Tensor<B, 2>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
         self.loss(PixelLoss::SquaredError, vertices, table, target)
@@ -184,20 +157,20 @@ impl<S: Softness> Silhouette<S> {
     /// # Panics
     ///
     /// If shapes or float types do not fit.
-    pub fn iou_loss_by_table<B: RasterBackend, const D: usize>(
+    pub fn iou_loss_by_table<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, D>,
+        table: Tensor<B, 2>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
         self.loss(PixelLoss::Iou, vertices, table, target)
     }
 
-    pub(crate) fn loss<B: RasterBackend, const D: usize>(
+    pub(crate) fn loss<B: RasterBackend>(
         &self,
         loss: PixelLoss,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, D>,
+        table: Tensor<B, 2>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
         let (table, target) = (table.detach(), target.detach());
@@ -210,10 +183,10 @@ impl<S: Softness> Silhouette<S> {
     /// Sums over the faces of each pixel, `[views, height, width]`: what the T-conorm of the profile
     /// turns into coverage. Arguments are those of [`Silhouette::coverage_by_table`].
     #[doc(hidden)]
-    pub fn sums<B: RasterBackend, const D: usize>(
+    pub fn sums<B: RasterBackend>(
         &self,
         vertices: Tensor<B, 3>,
-        table: Tensor<B, D>,
+        table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
         profile_sum(&self.op, vertices, table)
     }
@@ -227,7 +200,7 @@ impl<S: Softness> Silhouette<S> {
     /// What draws with the softness stretched by `factor` along the distance, if it can be told from this.
     pub(crate) fn stretched(&self, factor: f64) -> Option<Self> {
         let profile = self.profile.stretched(factor)?;
-        let op = ProfileSum { grid: profile.grid, ..self.op.clone() };
+        let op = ProfileSum { grid: profile.grid(), ..self.op.clone() };
         Some(Self { softness: self.softness.clone(), profile, op })
     }
 
@@ -266,7 +239,7 @@ impl<S: Softness> Silhouette<S> {
     #[must_use]
     pub fn with_cells(mut self, bits: u32) -> Self {
         assert!(bits <= 12, "a table of 2^{bits} cells in an octave is too large");
-        self.profile.grid.bits = bits;
+        self.profile = self.profile.with_cells(bits);
         self.op.grid.bits = bits;
         self
     }

@@ -1,6 +1,6 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
+use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
 
 use crate::{
@@ -61,8 +61,6 @@ struct Prepared<S> {
 struct Table {
     phi: Vec<f64>,
     profile: Profile,
-    on_host: bool,
-    dtype: DType,
     data: TensorData,
 }
 
@@ -201,7 +199,7 @@ impl<S: Softness> SoftRenderer<S> {
         // Without the lock: other threads of a pool may take up work in between, and ask for the same.
         let (faces, softness) = (&self.faces, self.softness.clone());
         let silhouette =
-            self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, &[phi], B::ON_HOST);
+            self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, phi, B::ON_HOST);
         let prepared = silhouette.clone();
         self.kept().prepared =
             Some(Prepared { phi: phi.to_vec(), on_host: B::ON_HOST, silhouette: prepared });
@@ -270,18 +268,16 @@ impl<S: Softness> SoftRenderer<S> {
         vertices: &Tensor<B, 3>,
     ) -> (Silhouette<S>, Tensor<B, 2>) {
         let silhouette = self.prepared::<B>(&self.phi);
-        let (dtype, on_host) = (vertices.dtype(), B::ON_HOST);
         let profile = *silhouette.profile();
-        let is_of = |table: &&Table| table.is_of(&self.phi, &profile, on_host, dtype);
+        let is_of = |table: &&Table| table.phi == self.phi && table.profile == profile;
         let kept = self.kept().table.as_ref().filter(is_of).map(|table| table.data.clone());
         let data = kept.unwrap_or_else(|| {
-            let data = silhouette.table_data::<B>(&self.phi, dtype);
-            let phi = self.phi.clone();
-            let table = Table { phi, profile, on_host, dtype, data: data.clone() };
+            let data = silhouette.table_data(&self.phi);
+            let table = Table { phi: self.phi.clone(), profile, data: data.clone() };
             self.kept().table = Some(table);
             data
         });
-        (silhouette, Tensor::from_data(data, (&vertices.device(), dtype)))
+        (silhouette, Tensor::from_data(data, (&vertices.device(), vertices.dtype())))
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept<S>> {
@@ -347,13 +343,6 @@ pub(crate) fn stretch(softness: &impl Softness, before: &[f64], now: &[f64]) -> 
     let stretched = softness.with_scale_values(before, factor);
     let same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs().max(1.0);
     stretched.iter().zip(now).all(same).then(|| softness.width(now) / softness.width(before))
-}
-
-impl Table {
-    fn is_of(&self, phi: &[f64], profile: &Profile, on_host: bool, dtype: DType) -> bool {
-        let same = self.on_host == on_host && self.dtype == dtype;
-        same && self.phi == phi && self.profile == *profile
-    }
 }
 
 impl<S> Default for Kept<S> {

@@ -46,7 +46,7 @@ impl ProfileSum {
         }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and `tables` `[1 or views, rows, 4]`, to sums
+    /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and a `table` `[rows, 4]`, to sums
     /// `[views, height, width]`, top row first.
     pub(crate) fn run<F: Float + Element>(
         &self,

@@ -17,16 +17,16 @@ pub(crate) const NOTHING: f64 = 1e-4;
 ///
 /// Source: Wu et al. 2024, Eq. 3 and 4.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weighting {
+pub struct Weighting<S = EdgeSoftness> {
     /// `s`: how much a face covers a pixel.
-    pub edge: EdgeSoftness,
+    pub edge: S,
     /// `b`: how much its depth counts.
     pub depth: DepthSoftness,
     /// Depths of nearness 1 and 0, in world units, ascending.
     pub planes: [f64; 2],
 }
 
-impl Weighting {
+impl<S> Weighting<S> {
     /// Logarithm of the weight of points at a depth `[..]` in world units, under parameters φ of the depth softness.
     pub fn log_weight_of_depth<B: Backend, const D: usize>(
         &self,
@@ -41,7 +41,7 @@ impl Weighting {
 ///
 /// A softness that is 0 from some distance on is held at [`OPAQUE`] by its logarithm, which would let thousands of faces that are
 /// nowhere near a pixel make up much of it. For such a one it is that, for others 0.
-pub(crate) fn floor(edge: &EdgeSoftness) -> f64 {
+pub(crate) fn floor(edge: &impl Softness) -> f64 {
     let phi = vector::<HostBackend>(&edge.default_phi(1.0));
     // Squared it still fits an f32.
     let limit = edge.log_value(phi, vector::<HostBackend>(&[-1e18]));

@@ -19,19 +19,6 @@ pub struct EdgeSoftness {
 }
 
 impl EdgeSoftness {
-    /// `ln s(x)`, same shape as `x`; at most 0, and finite where `s` underflows.
-    ///
-    /// It is minus the optical depth of the mirrored step at `-x`, so it keeps the digits of tails.
-    /// Where `s` reaches 0 exactly, the logarithm stops at that of [`OPAQUE`](crate::OPAQUE).
-    pub fn log_value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        let mirrored = Self { family: self.family.mirrored(), ..*self };
-        mirrored.optical_depth(phi, x.neg()).neg()
-    }
-
     /// What the family sees of the distance `d`.
     fn argument<B: Backend, const D: usize>(&self, d: Tensor<B, D>) -> Tensor<B, D> {
         if self.squared { d.clone() * d.abs() } else { d }
@@ -67,6 +54,17 @@ impl Softness for EdgeSoftness {
     ) -> [Tensor<B, D>; 2] {
         let [depth, hazard] = self.family.depth_and_hazard(phi, self.argument(x.clone()));
         [depth, self.by_distance(hazard, x)]
+    }
+
+    curve!(self.log_value(phi, x) => self.family.log_value(phi, self.argument(x)));
+
+    fn log_value_and_slope<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        let [value, slope] = self.family.log_value_and_slope(phi, self.argument(x.clone()));
+        [value, self.by_distance(slope, x)]
     }
 
     fn parameters(&self) -> usize {

@@ -33,6 +33,7 @@ mod family;
 mod feedback;
 mod file;
 mod math;
+mod mirrored;
 mod name_or_file;
 mod network;
 mod schedule;
@@ -48,13 +49,14 @@ pub use family::{Family, UnknownFamily};
 pub use feedback::{Feedback, Follower, Place};
 pub use file::SoftnessFileError;
 pub use math::OPAQUE;
+pub use mirrored::Mirrored;
 pub use name_or_file::NameOrFile;
 pub use network::initial_mlp;
 pub use schedule::ScaleSchedule;
 pub use scheduled::{ScheduledSoftness, Surrogate};
 pub use soft_step::SoftStep;
 pub use softness::Softness;
-pub use support::{Support, support};
+pub use support::{Support, settled_beyond, support};
 pub use tensors::{numbers, tensor, tensor_on, vector};
 
 /// Compiles and runs the README's example.

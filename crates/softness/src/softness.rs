@@ -95,6 +95,32 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         [self.optical_depth(phi.clone(), x.clone()), self.hazard(phi, x)]
     }
 
+    /// `ln s(x)`, same shape as `x`; at most 0, and finite where `s` underflows: the weight by which faces are blended in colour.
+    ///
+    /// Provided: `ln(OPAQUE + (1 - OPAQUE) s)`. Override it where s loses digits that matter and does not reach 0.
+    fn log_value<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> Tensor<B, D> {
+        let covered = self.value(phi, x);
+        bounded_depth(covered.clone().neg() + 1.0, covered).neg()
+    }
+
+    /// `ln s(x)` and its derivative by `x`, each of the shape of `x`: what the table of weights needs of every knot.
+    ///
+    /// Provided: by automatic differentiation of [`log_value`](Softness::log_value), which must not call this method.
+    fn log_value_and_slope<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        let slope = slope(x.clone(), |x| {
+            self.log_value::<Autodiff<B>, D>(Tensor::from_inner(phi.clone()), x)
+        });
+        [self.log_value(phi, x), slope]
+    }
+
     /// Parameters to start from; `scale` is in the unit of x. Provided: its logarithm, then 0.
     ///
     /// # Panics

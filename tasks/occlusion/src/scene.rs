@@ -3,7 +3,7 @@ use std::cell::RefCell;
 use burn::tensor::Tensor;
 use softrast_meta::tensor;
 use softrast_raster::{Background, RasterBackend, blend, hard_colour, mse_loss, nearness};
-use softrast_softness::{DepthSoftness, EdgeSoftness};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
 
 use crate::{Instance, Problem, instance::places};
 

@@ -1,4 +1,4 @@
-//! Images that are no squares, and a softness of which each view has parameters of its own.
+//! Images that are no squares.
 
 use burn::{
     backend::{Autodiff, NdArray},
@@ -15,7 +15,7 @@ type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
 const TOLERANCE: f64 = 1e-9;
-const SCALES: [f64; 3] = [0.03, 0.05, 0.08];
+const SCALE: f64 = 0.05;
 
 fn assert_same(name: &str, found: &[f64], expected: &[f64], bound: f64) {
     let length = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
@@ -24,19 +24,19 @@ fn assert_same(name: &str, found: &[f64], expected: &[f64], bound: f64) {
     assert!(size > 0.0 && error <= bound * size, "{name}: off by {:e}", error / size);
 }
 
-/// Image, gradients and their derivatives of some views, whose rows of `phi` `[views, parameters]` are each used for one.
+/// Image, gradients and their derivatives of some views.
 fn passes(
     vertices: &[f64],
     phi: &[f64],
     views: usize,
-    image: impl Fn(Tensor<AA, 3>, Tensor<AA, 2>) -> Tensor<AA, 3>,
+    image: impl Fn(Tensor<AA, 3>, Tensor<AA, 1>) -> Tensor<AA, 3>,
 ) -> [Vec<f64>; 5] {
     let (inner_vertices, inner_phi) =
         (vector::<A>(vertices).require_grad(), vector::<A>(phi).require_grad());
     let outer = |inner: &Tensor<A, 1>| Tensor::<AA, 1>::from_inner(inner.clone()).require_grad();
     let (outer_vertices, outer_phi) = (outer(&inner_vertices), outer(&inner_phi));
     let shaped = outer_vertices.clone().reshape([views as i32, -1, 3]);
-    let image = image(shaped, outer_phi.clone().reshape([views as i32, -1]));
+    let image = image(shaped, outer_phi.clone());
     let wave = |count: usize| -> Vec<f64> { (0..count).map(|i| (0.37 * i as f64).sin()).collect() };
     let flat = image.flatten::<1>(0, 2);
     let weights = vector::<AA>(&wave(flat.dims()[0]));
@@ -56,7 +56,7 @@ fn passes(
 }
 
 #[test]
-fn any_image_and_any_parameters_of_views_agree_with_the_reference_to_second_order() {
+fn any_image_agrees_with_the_reference_to_second_order() {
     let (one, faces) = triangles(7, 12);
     // Three views that differ.
     let vertices: Vec<f64> = (0..3)
@@ -64,21 +64,15 @@ fn any_image_and_any_parameters_of_views_agree_with_the_reference_to_second_orde
         .collect();
     for (family, size) in [(Family::Logistic, [7, 16]), (Family::Exp, [16, 5])] {
         let softness = EdgeSoftness { family, squared: false };
-        let phi: Vec<f64> = SCALES.iter().flat_map(|&scale| softness.default_phi(scale)).collect();
-        let fused = |vertices, phi: Tensor<AA, 2>| {
+        let phi = softness.default_phi(SCALE);
+        let fused = |vertices, phi: Tensor<AA, 1>| {
             let rasterizer = Rasterizer { tolerance: TOLERANCE, ..Rasterizer::new(size) };
-            let silhouette = rasterizer.prepare_by_view(&faces, softness, &phi);
-            silhouette.coverage_by_table(vertices, silhouette.table_by_view(phi))
+            rasterizer.prepare(&faces, softness, &phi).coverage(vertices, phi)
         };
-        let dense = |vertices: Tensor<AA, 3>, phi: Tensor<AA, 2>| {
+        let dense = |vertices: Tensor<AA, 3>, phi: Tensor<AA, 1>| {
             let scene = reference::Scene { faces: &faces, size: size.into() };
             let conorm = TConorm::Probabilistic;
-            let view = |view: usize| {
-                let vertices = vertices.clone().narrow(0, view, 1);
-                let phi = phi.clone().narrow(0, view, 1).squeeze_dim::<1>(0);
-                conorm.coverage(reference::sums(scene, vertices, &softness, conorm, phi))
-            };
-            Tensor::cat((0..3).map(view).collect(), 0)
+            conorm.coverage(reference::sums(scene, vertices, &softness, conorm, phi))
         };
         let (found, expected) =
             (passes(&vertices, &phi, 3, fused), passes(&vertices, &phi, 3, dense));
@@ -116,17 +110,4 @@ fn a_lower_image_shows_the_middle_of_a_square_one() {
     for (found, whole) in drawn([SIDE, SIDE / 2].into(), 2.0).iter().zip(&square) {
         assert_same("a narrow image", found, &columns(whole), 1e-8);
     }
-}
-
-#[test]
-#[should_panic(expected = "or [2, ")]
-fn tables_of_another_number_of_views_are_refused() {
-    let (values, faces) = triangles(7, 3);
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let phi = vector::<B>(&[softness.default_phi(0.03), softness.default_phi(0.05)].concat());
-    let phi = phi.reshape([2, -1]);
-    let silhouette = Rasterizer::new(8).prepare_by_view(&faces, softness, &phi);
-    let vertices = vector::<B>(&values).reshape([1, -1, 3]).repeat_dim(0, 2);
-    let tables = silhouette.table_by_view(Tensor::cat(vec![phi.clone(), phi], 0));
-    silhouette.coverage_by_table(vertices, tables);
 }

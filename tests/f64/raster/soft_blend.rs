@@ -24,7 +24,7 @@ const PIXELS: usize = SIZE[0] * SIZE[1];
 const PLANES: [f64; 2] = [1.0, 4.0];
 
 /// What is drawn: vertices `[vertices, 3]`, faces, and how.
-struct Case {
+struct Case<S = EdgeSoftness> {
     vertices: Vec<f64>,
     faces: Arc<[[u32; 3]]>,
     /// `[entries, channels]` and the entries of the faces.
@@ -33,7 +33,7 @@ struct Case {
     channels: usize,
     /// Rows and columns of a texture, and its texels: then attributes are places on it.
     texture: Option<([usize; 2], Vec<f64>)>,
-    weighting: Weighting,
+    weighting: Weighting<S>,
     phi: [Vec<f64>; 2],
     /// The colour, then the logarithm of the weight.
     background: Vec<f64>,
@@ -43,9 +43,9 @@ struct Case {
 /// Inputs of a case, one after the other: vertices, attributes, both parameters, background, and texels if there are any.
 type Inputs<T> = Vec<Tensor<T, 1>>;
 
-impl Case {
+impl<S: Softness> Case<S> {
     /// Random triangles at random depths under these softnesses.
-    fn random(seed: u64, faces: usize, weighting: Weighting, phi: [Vec<f64>; 2]) -> Self {
+    fn random(seed: u64, faces: usize, weighting: Weighting<S>, phi: [Vec<f64>; 2]) -> Self {
         let (mut vertices, faces) = triangles(seed, faces);
         for (k, z) in vertices.iter_mut().skip(2).step_by(3).enumerate() {
             if *z > 0.0 {
@@ -100,7 +100,7 @@ impl Case {
             log_weight: background.narrow(0, self.channels, 1),
         };
         if by_kernel {
-            let (faces, weighting) = (self.faces.clone(), self.weighting);
+            let (faces, weighting) = (self.faces.clone(), self.weighting.clone());
             ColourRenderer::with_weighting(faces, SIZE, weighting, self.phi.clone())
                 .with_tolerance(self.tolerance)
                 .image_with(vertices, &attributes, [&edge, &depth], &background)
@@ -143,13 +143,13 @@ fn relative(a: &[f64], b: &[f64]) -> f64 {
     norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied()).max(1e-12)
 }
 
-fn weighting(edge: EdgeSoftness, depth: DepthSoftness) -> Weighting {
+fn weighting<S>(edge: S, depth: DepthSoftness) -> Weighting<S> {
     Weighting { edge, depth, planes: PLANES }
 }
 
 const NAMES: [&str; 6] = ["vertices", "attributes", "edge", "depth", "background", "texels"];
 
-fn compare(name: &str, case: &Case, bounds: [f64; 3]) {
+fn compare(name: &str, case: &Case<impl Softness>, bounds: [f64; 3]) {
     let (found, expected) = (case.derivatives(true), case.derivatives(false));
     for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let inputs = case.inputs::<B>().len();
@@ -169,6 +169,29 @@ fn the_kernel_agrees_with_the_reference_to_second_order() {
     let phi = [LOGISTIC.default_phi(0.05), EXP.default_phi(0.1)];
     for seed in 0..5 {
         compare("logistic", &Case::random(seed, 20, weighting, phi.clone()), [1e-8, 1e-6, 1e-4]);
+    }
+}
+
+/// A softness of one's own: nothing but its value.
+#[derive(Clone, Debug)]
+struct Tanh;
+
+impl Softness for Tanh {
+    fn value<T: Backend, const D: usize>(
+        &self,
+        phi: Tensor<T, 1>,
+        x: Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        ((x * phi.neg().exp().reshape([1; D])).tanh() + 1.0) * 0.5
+    }
+}
+
+#[test]
+fn a_softness_of_ones_own_draws_colours_to_second_order() {
+    let phi = [Tanh.default_phi(0.05), EXP.default_phi(0.1)];
+    for seed in 0..2 {
+        let case = Case::random(seed, 20, weighting(Tanh, EXP), phi.clone());
+        compare("tanh", &case, [1e-8, 1e-6, 1e-4]);
     }
 }
 
@@ -261,7 +284,7 @@ fn every_depth_softness_agrees_with_the_reference() {
 
 /// Faces `[3 faces, 3]` with one colour each, on an image of `size`.
 fn flat_faces<T: RasterBackend>(
-    renderer: &ColourRenderer,
+    renderer: &ColourRenderer<impl Softness>,
     corners: &[[f64; 3]],
     colours: &[f64],
     log_weight: f64,

@@ -1,7 +1,10 @@
 //! The logarithm of a softness, far into its tails.
 
-use burn::backend::NdArray;
-use softrast_softness::{EdgeSoftness, Family, OPAQUE, Softness};
+use burn::{
+    backend::NdArray,
+    tensor::{Tensor, backend::Backend},
+};
+use softrast_softness::{EdgeSoftness, Family, Mirrored, OPAQUE, Softness};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;
@@ -39,4 +42,54 @@ fn tails_that_underflow_keep_their_logarithm() {
     let expected = -0.5 * u * u - (u * (2.0 * std::f64::consts::PI).sqrt()).ln();
     assert!((log(Family::Gauss) - expected).abs() < 1e-5);
     assert!((log(Family::Uniform) - OPAQUE.ln()).abs() < 1e-12);
+}
+
+#[test]
+fn a_mirrored_family_is_the_family_of_the_mirrored_law() {
+    let x = [-0.4, -0.11, -0.02, 0.0, 0.03, 0.2, 0.7];
+    for family in Family::ALL {
+        for squared in [false, true] {
+            let softness = EdgeSoftness { family, squared };
+            let other = EdgeSoftness { family: family.mirrored(), squared };
+            let phi = vector::<B>(&softness.default_phi(0.1));
+            let depths = Mirrored(softness).depth_and_hazard(phi.clone(), vector(&x));
+            let expected = other.depth_and_hazard(phi, vector(&x));
+            assert_eq!(depths.map(numbers), expected.map(numbers), "{softness:?}");
+        }
+    }
+}
+
+/// The value of a family, with all else provided.
+#[derive(Clone, Debug)]
+struct ValueOf(Family);
+
+impl Softness for ValueOf {
+    fn value<T: Backend, const D: usize>(
+        &self,
+        phi: Tensor<T, 1>,
+        x: Tensor<T, D>,
+    ) -> Tensor<T, D> {
+        self.0.value(phi, x)
+    }
+}
+
+#[test]
+fn what_is_provided_is_the_logarithm_and_its_slope() {
+    // Where the value is far above what the provided logarithm is held at.
+    let x = [-0.2, -0.05, 0.0, 0.03, 0.2];
+    for family in [Family::Logistic, Family::Gauss, Family::Cauchy] {
+        let phi = vector::<B>(&family.default_phi(0.1));
+        let of = |[value, slope]: [Tensor<B, 1>; 2]| [numbers(value), numbers(slope)];
+        let found = of(ValueOf(family).log_value_and_slope(phi.clone(), vector(&x)));
+        let expected = of(family.log_value_and_slope(phi.clone(), vector(&x)));
+        let density = numbers(family.density(phi.clone(), vector(&x)));
+        let value = numbers(family.value(phi, vector(&x)));
+        for k in 0..x.len() {
+            assert!((found[0][k] - expected[0][k]).abs() < 1e-5, "{family} at {}", x[k]);
+            let slope = density[k] / value[k];
+            for found in [found[1][k], expected[1][k]] {
+                assert!((found - slope).abs() < 1e-4 * slope, "{family} at {}: {found}", x[k]);
+            }
+        }
+    }
 }

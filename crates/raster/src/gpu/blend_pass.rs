@@ -384,8 +384,8 @@ impl<'a> Blend<'a> {
         let along =
             if self.pass.second() { 3 * self.pass.views * self.pass.vertex_count } else { 0 };
         WeightsLaunch::new(
-            lookup(&op.edge, 0),
-            lookup(&depth, 0),
+            lookup(&op.edge),
+            lookup(&depth),
             op.edge.rows() as u32,
             self.starts[0] as u32,
             self.starts[1] as u32,

@@ -36,7 +36,6 @@ pub(super) fn sum_faces(
         terminate!();
     }
     let view = job as u32 / face_count + first_view;
-    let rows = lookup.first_row(view);
     let reach = Reach::load(reaches, job);
     let stride = comptime!(if second { 12usize } else { 6usize });
     let face = Face::new(corners, stride * job, second);
@@ -58,7 +57,7 @@ pub(super) fn sum_faces(
         let row = reach.top + pixel / width;
         let g = upstream[frame.pixel(view, row, column) as usize];
         let pair = face.pair(frame.column_centre(column), frame.row_centre(row), lookup);
-        let cubic = Cubic::new(table, rows + pair.row, direction, table_offset, second);
+        let cubic = Cubic::new(table, pair.row, direction, table_offset, second);
         let pull = pair.slope(cubic).scale(-2.0f32 * g);
         let x = pull.mul(pair.dx);
         let y = pull.mul(pair.dy);

@@ -36,8 +36,7 @@ pub(super) fn sum_pixels(
     }
     let px = frame.column_centre(column);
     let py = frame.row_centre(row);
-    let rows = lookup.first_row(first_view + view);
-    let tail = Cubic::new(table, rows + lookup.cells, direction, table_offset, second).first();
+    let tail = Cubic::new(table, lookup.cells, direction, table_offset, second).first();
     let drawn = f32::cast_from(of_cells.drawn(reaches, view));
     let mut sum = 0.0f32;
     let first_word = of_cells.first_word(view, column, row);
@@ -50,7 +49,7 @@ pub(super) fn sum_pixels(
             let face = (view * of_cells.face_count + face) as usize;
             if Reach::load(reaches, face).holds(column, row) {
                 let pair = Face::new(corners, stride * face, second).pair(px, py, lookup);
-                let cubic = Cubic::new(table, rows + pair.row, direction, table_offset, second);
+                let cubic = Cubic::new(table, pair.row, direction, table_offset, second);
                 sum += pair.value(cubic).sub(tail).stored(second);
             }
         }

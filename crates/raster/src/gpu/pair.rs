@@ -30,17 +30,10 @@ pub(super) struct Lookup {
     pub(super) end: f32,
     /// Cells of one side, without its tail.
     pub(super) cells: u32,
-    /// Rows from the table of a view to that of the next; 0 where all have one.
-    pub(super) stride: u32,
 }
 
 #[cube]
 impl Lookup {
-    /// First row of the table of a view.
-    pub(super) fn first_row(self, view: u32) -> u32 {
-        view * self.stride
-    }
-
     /// Where a squared distance lies in the table, on its inner side or not. Without `far` no cell is counted from the far end.
     pub(super) fn place(self, distance2: Dual, inner: bool, #[comptime] far: bool) -> Place {
         let inverse = select(inner, self.inverse_inner, self.inverse_outer);

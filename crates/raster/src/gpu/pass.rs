@@ -41,7 +41,6 @@ pub(super) struct Pass<'a> {
     /// `[rows, 4]`, or `[views, rows, 4]`.
     table: Buffer,
     /// Whether each view has a table of its own.
-    by_view: bool,
     /// Derivatives of both, flat and in this order, in a pass of second order.
     direction: Option<Buffer>,
     pub(super) topology: OnDevice,
@@ -90,13 +89,11 @@ impl<'a> Pass<'a> {
         {
             side *= 2;
         }
-        let by_view = table.shape().num_elements() > 4 * op.grid.rows();
         Self {
             op,
             client,
             vertices: into_contiguous(vertices),
             table: into_contiguous(table),
-            by_view,
             direction: direction.map(into_contiguous),
             topology,
             views,
@@ -125,9 +122,8 @@ impl<'a> Pass<'a> {
     /// derivative, and behind it that of the sums.
     pub(super) fn gradient(&self, upstream: Buffer, wrt_table: bool) -> Buffer {
         let upstream = into_contiguous(upstream);
-        let tables = if self.by_view { self.views } else { 1 };
         let coordinates = 3 * self.views * self.vertex_count;
-        let coefficients = 4 * self.rows() * tables;
+        let coefficients = 4 * self.rows();
         let sums = if self.second() { self.pixels() } else { 0 };
         let length = coordinates + coefficients + sums;
         // Where the table has no part, its gradient stays 0.
@@ -136,24 +132,17 @@ impl<'a> Pass<'a> {
         } else {
             self.zeros(length, DType::F32)
         };
-        let shared = (wrt_table && !self.by_view).then(|| self.partial(self.views, self.rows()));
+        let partial = wrt_table.then(|| self.partial(self.views, self.rows()));
         for culled in self.culled() {
             self.write_corners(&culled, &upstream, &gradient);
-            if let Some(partial) = &shared {
-                self.add_cubics(&culled, &upstream, partial, 0..culled.views);
-            } else if wrt_table {
-                for view in 0..culled.views {
-                    let partial = self.partial(1, self.rows());
-                    self.add_cubics(&culled, &upstream, &partial, view..view + 1);
-                    let rows = (culled.first_view + view) * self.rows();
-                    self.add_up(partial, &gradient, coordinates + 4 * rows);
-                }
+            if let Some(partial) = &partial {
+                self.add_cubics(&culled, &upstream, partial);
             }
             if self.second() {
                 self.write_sums(&culled, &gradient, coordinates + coefficients);
             }
         }
-        if let Some(partial) = shared {
+        if let Some(partial) = partial {
             self.add_up(partial, &gradient, coordinates);
         }
         gradient
@@ -310,14 +299,8 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// Adds the gradient to the table of some of the culled views to `partial`.
-    fn add_cubics(
-        &self,
-        culled: &Culled,
-        upstream: &Buffer,
-        partial: &Partial,
-        views: std::ops::Range<usize>,
-    ) {
+    /// Adds the gradient to the table of the culled views to `partial`.
+    fn add_cubics(&self, culled: &Culled, upstream: &Buffer, partial: &Partial) {
         sum_cubics::launch(
             &self.client,
             CubeCount::Static(partial.cubes as u32, 1, 1),
@@ -331,8 +314,6 @@ impl<'a> Pass<'a> {
             self.lookup(),
             self.frame(),
             culled.first_view as u32,
-            views.start as u32,
-            views.len() as u32,
             self.second(),
         );
     }
@@ -401,7 +382,7 @@ impl<'a> Pass<'a> {
     }
 
     fn lookup(&self) -> LookupLaunch<WgpuRuntime> {
-        lookup(&self.op.grid, if self.by_view { self.rows() as u32 } else { 0 })
+        lookup(&self.op.grid)
     }
 
     pub(super) fn cubes(&self, jobs: usize, units: u32) -> CubeCount {
@@ -421,8 +402,8 @@ impl<'a> Pass<'a> {
     }
 }
 
-/// A grid prepared for look-ups, and how many rows the table of a view is from that of the next.
-pub(super) fn lookup(grid: &Grid, stride: u32) -> LookupLaunch<WgpuRuntime> {
+/// A grid prepared for look-ups.
+pub(super) fn lookup(grid: &Grid) -> LookupLaunch<WgpuRuntime> {
     let [start, end] = [grid.octaves, grid.far + 1].map(|k| f64::exp2(-f64::from(k)));
     let [outer, inner] = grid.lookups(1.0).map(|side| side.map(|number| number as f32));
     LookupLaunch::new(
@@ -437,7 +418,6 @@ pub(super) fn lookup(grid: &Grid, stride: u32) -> LookupLaunch<WgpuRuntime> {
         (1.0 - 2.0 * end) as f32,
         end as f32,
         grid.cells() as u32,
-        stride,
     )
 }
 

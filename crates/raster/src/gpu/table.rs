@@ -11,7 +11,7 @@ use super::{
     tile::TILE,
 };
 
-/// Adds the gradient of the table of some `views` from `start` on, every unit to a table of its own over the pixels that it walks:
+/// Adds the gradient of the table, every unit to a table of its own over the pixels that it walks:
 /// there is no order of units on which a sum could depend. `partial` is `[units, rows, 4]`.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
@@ -25,15 +25,13 @@ pub(super) fn sum_cubics(
     lookup: Lookup,
     frame: Frame,
     first_view: u32,
-    start: u32,
-    views: u32,
     #[comptime] second: bool,
 ) {
     #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
     let across = (frame.width + TILE - 1u32) / TILE;
     #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
     let down = (frame.height + TILE - 1u32) / TILE;
-    let tiles = views * across * down;
+    let tiles = of_cells.views * across * down;
     let rows = 2u32 * (lookup.cells + 1u32);
     let own = ABSOLUTE_POS as u32 * rows * 4u32;
     let stride = comptime!(if second { 12usize } else { 6usize });
@@ -41,7 +39,7 @@ pub(super) fn sum_cubics(
     while tile < tiles {
         let column = tile % across * TILE + UNIT_POS_X;
         let row = tile / across % down * TILE + UNIT_POS_Y;
-        let view = start + tile / (across * down);
+        let view = tile / (across * down);
         if column < frame.width && row < frame.height {
             let px = frame.column_centre(column);
             let py = frame.row_centre(row);

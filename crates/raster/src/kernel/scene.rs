@@ -20,8 +20,8 @@ pub(crate) struct Scene<'a, T: Real> {
     /// Their tangents, where numbers have any.
     pub(crate) tangents: &'a [Float<T>],
     pub(crate) faces: &'a [[u32; 3]],
-    /// Cubic coefficients of each cell, `[1 or views, grid.rows()]`.
-    pub(crate) tables: Table<'a, T>,
+    /// Cubic coefficients of each cell, `[grid.rows()]`.
+    pub(crate) table: Table<'a, T>,
     pub(crate) grid: Grid,
     pub(crate) size: ImageSize,
     /// Rows of a band.
@@ -130,7 +130,7 @@ impl<'a, T: Real> Scene<'a, T> {
     pub(crate) fn new(
         vertices: [&'a [Float<T>]; 2],
         faces: &'a [[u32; 3]],
-        tables: Table<'a, T>,
+        table: Table<'a, T>,
         grid: Grid,
         size: ImageSize,
         rows: usize,
@@ -142,7 +142,7 @@ impl<'a, T: Real> Scene<'a, T> {
             vertices,
             tangents,
             faces,
-            tables,
+            table,
             grid,
             size,
             rows,
@@ -168,16 +168,8 @@ impl<'a, T: Real> Scene<'a, T> {
             let length = numbers.len() / views;
             &numbers[index * length..(index + 1) * length]
         };
-        let rows = self.grid.rows();
-        let first = if self.tables.values.len() > rows { index * rows } else { 0 };
-        let of_table =
-            |all: &'a [[Float<T>; 4]]| &all[first.min(all.len())..(first + rows).min(all.len())];
-        let table = Table {
-            values: of_table(self.tables.values),
-            tangents: of_table(self.tables.tangents),
-        };
         let [vertices, tangents] = [self.vertices, self.tangents].map(of_view);
-        Place { vertices, tangents, table, view, band, first_list: 0 }
+        Place { vertices, tangents, table: self.table, view, band, first_list: 0 }
     }
 
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.

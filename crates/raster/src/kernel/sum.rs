@@ -45,10 +45,9 @@ impl<F: Float> Inputs<'_, F> {
         T: Real,
         T::Lanes: super::lanes::Lanes<Float = F>,
     {
-        let tables =
-            Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
+        let table = Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
         let Self { vertices, faces, grid, size, rows, .. } = *self;
-        Scene::new([vertices, tangents[0]], faces, tables, grid, size, rows)
+        Scene::new([vertices, tangents[0]], faces, table, grid, size, rows)
     }
 }
 
@@ -61,7 +60,7 @@ pub(crate) fn forward<F: Float>(inputs: &Inputs<F>, bands: &Bands) -> Vec<F> {
     }
 }
 
-/// Gradients of `Σ upstream S` to vertices and tables, as they are wanted, flat and in this order.
+/// Gradients of `Σ upstream S` to vertices and table, as they are wanted, flat and in this order.
 pub(crate) fn vjp<F: Float>(
     inputs: &Inputs<F>,
     bands: &Bands,
@@ -147,7 +146,7 @@ fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, band: usize) -> Vec<r
 /// What a view or a band gives back: gradients, and its rows of the image.
 type Walked<F> = (BandGradient<F>, Vec<F>);
 
-/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and tables, and the sums, as they are wanted, flat
+/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and table, and the sums, as they are wanted, flat
 /// and in this order. The third row of each view's vertices is 0, because a silhouette does not see
 /// depth. Of dual numbers all that comes back are tangents.
 fn gradient<T: Real>(
@@ -193,15 +192,14 @@ fn gradient<T: Real>(
             gather(scene, &bands.views[index], upstream, walked, total)
         })
         .collect();
-    let mut tables = vec![[zero; 4]; if wrt_table { scene.tables.values.len() } else { 0 }];
-    for (index, (part, _)) in per_view.iter().enumerate() {
-        let first = if tables.len() > table_rows { index * table_rows } else { 0 };
-        for (total, part) in tables[first..].iter_mut().zip(part) {
+    let mut table = vec![[zero; 4]; table_rows];
+    for (part, _) in &per_view {
+        for (total, part) in table.iter_mut().zip(part) {
             total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
         }
     }
     let mut flat = if wrt_vertices { vertices } else { Vec::new() };
-    flat.extend_from_slice(tables.as_flattened());
+    flat.extend_from_slice(table.as_flattened());
     if with_image {
         per_view.iter().for_each(|(_, image)| flat.extend_from_slice(image));
     }

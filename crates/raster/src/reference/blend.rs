@@ -1,6 +1,7 @@
 //! Colours of whole meshes, in tensor ops.
 
 use burn::tensor::{Bool, Int, Tensor, TensorData, backend::Backend};
+use softrast_softness::Softness;
 
 use super::{Scene, between, chunks, corners, edge, lesser, places};
 use crate::{
@@ -32,7 +33,7 @@ pub fn blended<B: Backend>(
     scene: Scene,
     vertices: Tensor<B, 3>,
     attributes: &Attributes<B>,
-    weighting: &Weighting,
+    weighting: &Weighting<impl Softness>,
     phi: [Tensor<B, 1>; 2],
     background: &Background<B>,
 ) -> Tensor<B, 4> {

@@ -18,7 +18,7 @@ pub(crate) struct Scene {
     pub(crate) size: ImageSize,
     pub(crate) softness: EdgeSoftness,
     /// Of each view, or of all.
-    pub(crate) scales: Vec<f64>,
+    pub(crate) scale: f64,
 }
 
 /// Who draws it, and what beside the vertices is an input.
@@ -65,19 +65,13 @@ impl Products {
     pub(crate) fn new<T: RasterBackend>(scene: &Scene, dtype: DType, path: Path) -> Self {
         let Scene { views, size, softness, .. } = *scene;
         let count = scene.vertices.len() / 3 / views;
-        let phis: Vec<_> = scene.scales.iter().map(|&scale| softness.default_phi(scale)).collect();
-        let phi = phis[0].clone();
+        let phi = softness.default_phi(scene.scale);
         // Far below what is asked for, and the same on every backend.
         let rasterizer = Rasterizer { tolerance: 1e-7, ..Rasterizer::new(size) };
-        let exact = |phis: &[f64]| {
-            tensor::<NdArray<f64>, 2>(phis, [scene.scales.len(), phi.len()], DType::F64)
-        };
-        let silhouette = rasterizer.prepare_by_view(&scene.faces, softness, &exact(&phis.concat()));
-        let of_scales = |factor: f64| {
-            let phis = scene.scales.iter().flat_map(|scale| softness.default_phi(factor * scale));
-            numbers(silhouette.table_by_view(exact(&phis.collect::<Vec<f64>>())))
-        };
-        let (table, wider) = (of_scales(1.0), of_scales(1.01));
+        let exact = |phi: &[f64]| tensor::<NdArray<f64>, 1>(phi, [phi.len()], DType::F64);
+        let silhouette = rasterizer.prepare(&scene.faces, softness, &exact(&phi));
+        let of_scale = |scale: f64| numbers(silhouette.table(exact(&softness.default_phi(scale))));
+        let [table, wider] = [1.0, 1.01].map(|factor| of_scale(factor * scene.scale));
         let (other_values, along) = match path {
             Path::Table => (&table, wider.iter().zip(&table).map(|(b, a)| b - a).collect()),
             _ => (&phi, vec![1.0; phi.len()]),
@@ -92,12 +86,8 @@ impl Products {
         let image = match path {
             Path::Fused => silhouette.coverage(shaped, other.clone()),
             Path::Table => {
-                let rows = table.len() / 4 / scene.scales.len();
-                let tables = other.clone().reshape([scene.scales.len(), rows, 4]);
-                match scene.scales.len() {
-                    1 => silhouette.coverage_by_table(shaped, tables.squeeze_dim::<2>(0)),
-                    _ => silhouette.coverage_by_table(shaped, tables),
-                }
+                let table = other.clone().reshape([table.len() / 4, 4]);
+                silhouette.coverage_by_table(shaped, table)
             }
             Path::Reference => {
                 let t_conorm = TConorm::Probabilistic;
@@ -123,9 +113,7 @@ impl Products {
         let mut products = vec![numbers(to_vertices), numbers(to_other), numbers(mixed)];
         if path == Path::Table {
             for product in &mut products[1..] {
-                let rows = along.len() / scene.scales.len();
-                let of_view = |(g, x): (&[f64], &[f64])| g.iter().zip(x).map(|(g, x)| g * x).sum();
-                *product = product.chunks(rows).zip(along.chunks(rows)).map(of_view).collect();
+                *product = vec![product.iter().zip(&along).map(|(g, x)| g * x).sum()];
             }
         }
         if path == Path::Table {

@@ -1,0 +1,254 @@
+//! A function of the signed distance as cubics of its square: what the tables of kernels hold.
+
+mod knots;
+mod precise;
+mod settled;
+
+use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use softrast_softness::numbers;
+
+use crate::kernel::Grid;
+pub(crate) use knots::FAR;
+use knots::{EVERYWHERE, NARROWEST, Reached, refined};
+pub(crate) use precise::{precise, rounding};
+pub(crate) use settled::settled_until;
+
+/// Which way the sides lie: outer, inner.
+pub(crate) const SIGNS: [f64; 2] = [-1.0, 1.0];
+/// No drawn face is farther from a pixel, in NDC.
+pub(crate) const FARTHEST_DRAWN: f64 = 1.5e6;
+/// The largest radius that a curve may be stretched to, in NDC: its square fits an f32.
+const WIDEST: f64 = 1e9;
+/// Tails have the value of a place this many times as far as the support. Any place beyond it is as
+/// good for the image; but where the curve ends with a steep slope, its parameters must not move
+/// all that lies in the tail.
+pub(crate) const BEYOND: f64 = 1.1;
+/// How far before its end the slope at the end of the last cell is taken, as a part of the cell.
+const INSIDE: f64 = 1.0 / 1024.0;
+/// How far before the beginning of the cells the constant there is taken, as a part of the distance: more than an f32 is rounded by.
+const SHORT: f64 = 2e-6;
+/// Places in a cell at which its error is measured: those of a smooth curve's largest; and how many there are where it may lie elsewhere.
+const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+const DENSE: u32 = 16;
+/// The part of its rise that a cubic may miss the next knot by.
+const WIDE_OF: f64 = 0.1;
+
+/// The places of the cells of a curve, and how its cubics are made.
+///
+/// The table consists of two one-sided halves that meet at the edge of the face, where curves
+/// kink or rise with infinite slope. Its cells are spaced by the leading bits of the squared
+/// distance: each octave holds the same number of cells, so that no curve needs a spacing of its
+/// own, and a look-up needs no logarithm, no square root and no search.
+///
+/// Only the values and slopes at the knots touch the curve. They are tensor ops, so gradients of
+/// any order reach its parameters, and an MLP costs no more per pixel than a logistic.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CubicCurve {
+    pub(crate) grid: Grid,
+    /// Whether some cells are too wide for their cubics.
+    rough: bool,
+}
+
+impl CubicCurve {
+    /// Cells between the `radii`, outer and inner, that are fine enough for `error` to be at most 1, or as fine as they may be; and the
+    /// largest error.
+    ///
+    /// `curve` gives value and slope at distances in the most exact float type of the device, `error` what an exact value and that of a
+    /// cubic are worth. `from` says how far from the edge the sides begin to change: it is asked where knots that are close at the edge
+    /// are not enough. `far` holds octaves to be tried at the end of the support; none if it is empty, for look-ups that know none.
+    pub(crate) fn chosen<B: Backend>(
+        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
+        radii: [f64; 2],
+        from: impl FnOnce() -> [f64; 2],
+        far: &[u32],
+        error: impl Fn(f64, f64) -> f64,
+        device: &B::Device,
+    ) -> (Self, f64) {
+        let missed = |cells: Self, places: &[f64]| {
+            let mut reached = Reached::NOTHING;
+            for Sample { exact, interpolated, innermost } in cells.samples(&curve, places, device) {
+                let place = if innermost { &mut reached.innermost } else { &mut reached.rest };
+                *place = place.max(error(exact, interpolated));
+            }
+            reached
+        };
+        let smooth = |grid: Grid| Self { grid, rough: false };
+        let (grid, reached) = refined(radii, from, far, |grid| missed(smooth(grid), &PLACES));
+        if reached.most() <= 1.0 {
+            return (smooth(grid), reached.most());
+        }
+        let rough = Self { grid, rough: true };
+        let dense: Vec<f64> = (1..=DENSE).map(|k| f64::from(k) / f64::from(DENSE)).collect();
+        (rough, missed(rough, &dense).most())
+    }
+
+    /// The cells of the same curve stretched by `factor` along the distance, with the same errors.
+    ///
+    /// None where a radius would leave the range that can be drawn, so that it has to be chosen anew.
+    pub(crate) fn stretched(mut self, factor: f64) -> Option<Self> {
+        let stretch = |radius: &mut f64| {
+            let least = if *radius >= EVERYWHERE { FARTHEST_DRAWN } else { NARROWEST };
+            // A side of the least radius is constant, or all but that: a narrower one suits it no better.
+            if *radius > NARROWEST || factor > 1.0 {
+                *radius *= factor;
+            }
+            (least..=WIDEST).contains(radius)
+        };
+        self.grid.from = self.grid.from.map(|from| from * factor);
+        (stretch(&mut self.grid.outer) && stretch(&mut self.grid.inner)).then_some(self)
+    }
+
+    /// Coefficients of the cubics, `[rows, 4]`, of a `curve` that gives value and slope at distances `[N]` on this device and in this float
+    /// type.
+    ///
+    /// The cubic of a cell has the curve's value at the near end, and its slopes at both ends and
+    /// in the middle. Its error is that of the cubic with the values and slopes of both ends,
+    /// `t² (1 - t)²` times a 24th of the fourth derivative, to leading order. But differences of slopes
+    /// of neighbours keep their digits where differences of values do not, next to the edge above all:
+    /// in f32 these would leave the second derivative nothing.
+    pub(crate) fn table<B: Backend>(
+        &self,
+        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
+        (device, dtype): (&B::Device, DType),
+    ) -> Tensor<B, 2> {
+        let knots = self.grid.knots();
+        let cells = self.grid.cells();
+        let constant = |values: Vec<f64>| {
+            let shape = [values.len()];
+            Tensor::<B, 1>::from_data(TensorData::new(values, shape), (device, dtype))
+        };
+        // Behind the knots stand the middles of all cells but the innermost, whose slopes count, and
+        // the tail.
+        let middle = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
+        let middles = knots[1..].windows(2).map(middle);
+        let mut places: Vec<f64> =
+            knots.iter().copied().chain(middles).chain([BEYOND * BEYOND]).collect();
+        // A support often ends at a corner: rounding must not decide which of its slopes the last cell gets.
+        places[cells] -= INSIDE * (knots[cells] - knots[cells - 1]);
+        let grid = self.grid;
+        // A distance of 0 has no side; this one has, and is next to nothing also in a wide support. Where a side is constant before its
+        // cells, rounding must not decide on which side of a corner their beginning lies.
+        let nudged = |side: usize, y: f64| {
+            let least = grid.distance(side, 1.0).min(1.0) * 1e-15;
+            let distance = match y {
+                0.0 => least.max((1.0 - SHORT) * grid.from[side]),
+                _ => grid.distance(side, y),
+            };
+            SIGNS[side] * distance
+        };
+        let of_sides = |sides: &[usize]| {
+            let at = |of: &dyn Fn(usize, f64) -> f64| {
+                constant(
+                    sides
+                        .iter()
+                        .flat_map(|&side| places.iter().map(move |&y| of(side, y)))
+                        .collect(),
+                )
+            };
+            curve(at(&nudged))
+        };
+        // An op that is recorded costs more than its few hundred numbers, so both sides are one tensor there. Else each has a thread.
+        let sides = if B::ad_enabled(device) {
+            let both = of_sides(&[0, 1]);
+            [0, 1].map(|side| {
+                both.each_ref().map(|of| of.clone().narrow(0, side * places.len(), places.len()))
+            })
+        } else {
+            let (outer, inner) = rayon::join(|| of_sides(&[0]), || of_sides(&[1]));
+            [outer, inner]
+        };
+
+        let mut rows = Vec::with_capacity(6);
+        for (side, [value, slope]) in sides.into_iter().enumerate() {
+            let at = |k: usize| value.clone().narrow(0, k, 1).reshape([1, 1]);
+            let (first, tail) = (at(0), at(places.len() - 1));
+            let zero = first.clone() * 0.0;
+            let rise = at(1) - first.clone();
+            rows.push(Tensor::cat(vec![first, rise, zero.clone(), zero.clone()], 1));
+            // From slopes by distance to slopes by place in the cell, in one factor: each of two may leave the range of f32. Where the
+            // distance is 0 the slope by its square may be infinite; the innermost cell is linear and needs none.
+            let inner = |k: usize| {
+                let rate = |(pair, &y): (&[f64], &f64)| {
+                    SIGNS[side] * grid.rate(side, y) * (pair[1] - pair[0])
+                };
+                let rates = knots[1..].windows(2).zip(&places[k..]).map(rate).collect();
+                slope.clone().narrow(0, k, cells - 1) * constant(rates)
+            };
+            let [left, right, middle] = [1, 2, cells + 1].map(inner);
+            let (half, whole) = (middle - left.clone(), right - left.clone());
+            let square = half.clone() * 2.0 - whole.clone() * 0.5;
+            let cube = (whole - half * 2.0) * (2.0 / 3.0);
+            let values = value.clone().narrow(0, 1, cells - 1);
+            let mut cubic = [left, square, cube];
+            if self.rough {
+                let next = value.clone().narrow(0, 2, cells - 1);
+                cubic = bounded(&values, next, cubic);
+            }
+            let [left, square, cube] = cubic;
+            rows.push(Tensor::stack(vec![values, left, square, cube], 1));
+            rows.push(Tensor::cat(vec![tail, zero.clone(), zero.clone(), zero], 1));
+        }
+        Tensor::cat(rows, 0)
+    }
+
+    /// Values and cubics of a curve at these places in each cell.
+    fn samples<B: Backend>(
+        &self,
+        curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
+        places: &[f64],
+        device: &B::Device,
+    ) -> Vec<Sample> {
+        let grid = self.grid;
+        let dtype = precise::<B>(&[], device).dtype();
+        let table = self.table(&curve, (device, dtype));
+        let table = numbers(table);
+        let knots = grid.knots();
+        let mut distances = Vec::with_capacity(2 * places.len() * knots.len());
+        let mut interpolated = Vec::with_capacity(2 * places.len() * knots.len());
+        for side in [0, 1] {
+            for (cell, ends) in knots.windows(2).enumerate() {
+                let row = 4 * (side * (grid.cells() + 1) + cell);
+                for &t in places {
+                    let y = ends[0] + t * (ends[1] - ends[0]);
+                    distances.push(SIGNS[side] * grid.distance(side, y));
+                    let c = &table[row..row + 4];
+                    interpolated.push(c[0] + t * (c[1] + t * (c[2] + t * c[3])));
+                }
+            }
+        }
+        let [exact, _] = curve(precise::<B>(&distances, device));
+        let (in_cell, per_side) = (places.len(), places.len() * grid.cells());
+        let sample = |(i, (exact, interpolated))| Sample {
+            exact,
+            interpolated,
+            innermost: i % per_side < in_cell,
+        };
+        numbers(exact).into_iter().zip(interpolated).enumerate().map(sample).collect()
+    }
+}
+
+/// A curve and its cubics, at a place between knots.
+struct Sample {
+    exact: f64,
+    interpolated: f64,
+    /// Whether it lies in the innermost cell of its side.
+    innermost: bool,
+}
+
+/// Coefficients of cubics from these `values` to the `next`, where they miss those by more than a part of the rise replaced by
+/// straight lines: a cell that holds a jump or a pole gives slopes that lead anywhere.
+fn bounded<B: Backend>(
+    values: &Tensor<B, 1>,
+    next: Tensor<B, 1>,
+    [left, square, cube]: [Tensor<B, 1>; 3],
+) -> [Tensor<B, 1>; 3] {
+    let end = left.clone() + square.clone() + cube.clone();
+    let rise = next.clone() - values.clone();
+    let rounding = (values.clone().abs() + next.abs()) * WIDE_OF;
+    let missed = (end - rise.clone()).abs().greater(rise.clone().abs() * WIDE_OF + rounding * 1e-5);
+    [
+        left.mask_where(missed.clone(), rise),
+        square.mask_fill(missed.clone(), 0.0),
+        cube.mask_fill(missed, 0.0),
+    ]
+}

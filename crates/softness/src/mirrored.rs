@@ -1,0 +1,67 @@
+use burn::tensor::{Tensor, backend::Backend};
+
+use crate::{Softness, softness::curve};
+
+/// The mirrored step `1 - s(-x)` of a softness, with the same parameters.
+///
+/// Its optical depth is `-ln s(-x)`: the table of a weight is the table of the optical depth of this.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mirrored<S>(pub S);
+
+impl<S: Softness> Softness for Mirrored<S> {
+    curve!(self.value(phi, x) => self.0.value(phi, x.neg()).neg() + 1.0);
+    curve!(self.density(phi, x) => self.0.density(phi, x.neg()));
+    curve!(self.optical_depth(phi, x) => self.0.log_value(phi, x.neg()).neg());
+    curve!(self.hazard(phi, x) => {
+        let [_, slope] = self.0.log_value_and_slope(phi, x.neg());
+        slope
+    });
+
+    fn depth_and_hazard<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        let [value, slope] = self.0.log_value_and_slope(phi, x.neg());
+        [value.neg(), slope]
+    }
+
+    curve!(self.log_value(phi, x) => self.0.optical_depth(phi, x.neg()).neg());
+
+    fn log_value_and_slope<B: Backend, const D: usize>(
+        &self,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> [Tensor<B, D>; 2] {
+        let [depth, hazard] = self.0.depth_and_hazard(phi, x.neg());
+        [depth.neg(), hazard]
+    }
+
+    fn parameters(&self) -> usize {
+        self.0.parameters()
+    }
+
+    fn default_phi(&self, scale: f64) -> Vec<f64> {
+        self.0.default_phi(scale)
+    }
+
+    fn logarithms(&self) -> usize {
+        self.0.logarithms()
+    }
+
+    fn scale(&self, phi: &[f64]) -> f64 {
+        self.0.scale(phi)
+    }
+
+    fn width(&self, phi: &[f64]) -> f64 {
+        self.0.width(phi)
+    }
+
+    fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
+        self.0.with_scale(phi, factor)
+    }
+
+    fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
+        self.0.with_scale_values(phi, factor)
+    }
+}
