@@ -7,11 +7,11 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::{Tensor, backend::Backend},
 };
-use softrast_inverse::Method;
+use softrast_inverse::{Method, ScheduledSoftness};
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
 use softrast_raster::Rasterizer;
 use softrast_softness::{
-    EdgeSoftness, Family, ScheduledSoftness, Softness,
+    EdgeSoftness, Family, Softness,
     families::{Logistic, Mlp},
 };
 use softrast_tests::{Shape2d, numbers, shape2d_start, vector};

@@ -8,10 +8,12 @@ use pose::Pose;
 use shape2d::Shape2d;
 use shape3d::Shape3d;
 use softrast_cli::{EdgeChoice, Task, Variant};
-use softrast_inverse::{Instances, InverseProblem, LearnConfig, Method, OuterLoss, SolveConfig};
+use softrast_inverse::{
+    Instances, InverseProblem, LearnConfig, Method, OuterLoss, ScheduledSoftness, SolveConfig,
+};
 use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::RasterBackend;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, Family};
 use softrast_tests::{numbers, vector};
 use tempfile::TempDir;
 

@@ -21,6 +21,13 @@ pub(crate) fn check_size(size: [usize; 2]) -> PyResult<()> {
     Err(refused(format!("the image is {size:?}, expected at least one pixel")))
 }
 
+pub(crate) fn check_part(part: f64) -> PyResult<()> {
+    if (0.0..=1.0).contains(&part) {
+        return Ok(());
+    }
+    Err(refused(format!("the part of a run is {part}, expected 0 to 1")))
+}
+
 /// `name` is that of the argument, `of` that of the softness, which has `expected` parameters.
 pub(crate) fn check_phi(name: &str, of: &str, expected: usize, phi: &[f64]) -> PyResult<()> {
     if phi.len() != expected {

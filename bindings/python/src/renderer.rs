@@ -7,7 +7,7 @@ use softrast_raster::{HostBackend, ImageSize, Rasterizer, Silhouette, SoftRender
 use softrast_softness::{EdgeSoftness, Softness as _};
 
 use crate::{
-    checks::{check_phi, check_size, check_tolerance, corners, least},
+    checks::{check_part, check_phi, check_size, check_tolerance, corners, least},
     guard::{guarded, refused},
     op::Op,
     softness::Softness,
@@ -17,9 +17,6 @@ use crate::{
 #[pyclass(frozen, module = "softrast._native", subclass)]
 pub(crate) struct Renderer {
     renderer: SoftRenderer<EdgeSoftness>,
-    softness: EdgeSoftness,
-    /// What the gradient to vertices is taken of, where that is not the image itself, and its softness.
-    felt: Option<(SoftRenderer<EdgeSoftness>, EdgeSoftness)>,
     faces: usize,
     t_conorm: TConorm,
     least_vertices: usize,
@@ -53,21 +50,10 @@ impl Renderer {
         check_size(size)?;
         let faces = corners(&faces)?;
         let (least_vertices, count) = (least(&faces), faces.len());
-        let side = size[0].min(size[1]);
-        let phi = softness.parameters_at(part, side)?;
-        let felt = softness.0.surrogate_at(part, side);
-        let softness = softness.0.softness;
+        check_part(part)?;
         let rasterizer = Rasterizer { size: ImageSize::from(size), tolerance, t_conorm };
-        let of = |softness, phi| {
-            let faces = faces.clone();
-            guarded(py, || SoftRenderer::with_rasterizer(rasterizer, faces, softness, phi))
-        };
-        let renderer = of(softness, phi)?;
-        let felt = match felt {
-            Some(felt) => Some((of(felt.softness, felt.phi)?, felt.softness)),
-            None => None,
-        };
-        Ok(Self { renderer, softness, felt, faces: count, t_conorm, least_vertices, size })
+        let renderer = guarded(py, || softness.0.renderer_at(part, rasterizer, faces))?;
+        Ok(Self { renderer, faces: count, t_conorm, least_vertices, size })
     }
 
     /// Parameters φ `[P]`, float64: those that are drawn with where no others are given.
@@ -95,14 +81,15 @@ impl Renderer {
     }
 
     fn __repr__(&self) -> String {
-        let ([height, width], softness, faces) = (self.size, self.softness.family, self.faces);
-        let felt = if self.felt.is_some() { ", with a surrogate" } else { "" };
+        let ([height, width], faces) = (self.size, self.faces);
+        let softness = self.renderer.softness().family;
+        let felt = if self.renderer.surrogate().is_some() { ", with a surrogate" } else { "" };
         format!("Renderer({height} x {width} pixels, {faces} faces, {softness}{felt})")
     }
 
     /// Support and knots for `phi`.
     fn prepared(&self, py: Python<'_>, phi: Vec<f64>) -> PyResult<Prepared> {
-        self.prepared_of(py, &self.renderer, self.softness, &phi)
+        self.prepared_of(py, &self.renderer, &phi)
     }
 
     /// The surrogate, if the softness has one: its φ `[P]`, float64, and support and knots for it.
@@ -111,8 +98,8 @@ impl Renderer {
         &self,
         py: Python<'py>,
     ) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Prepared)>> {
-        let Some((renderer, softness)) = &self.felt else { return Ok(None) };
-        let prepared = self.prepared_of(py, renderer, *softness, renderer.phi())?;
+        let Some(renderer) = self.renderer.surrogate() else { return Ok(None) };
+        let prepared = self.prepared_of(py, renderer, renderer.phi())?;
         Ok(Some((PyArray1::from_slice(py, renderer.phi()), prepared)))
     }
 }
@@ -122,9 +109,9 @@ impl Renderer {
         &self,
         py: Python<'_>,
         renderer: &SoftRenderer<EdgeSoftness>,
-        softness: EdgeSoftness,
         phi: &[f64],
     ) -> PyResult<Prepared> {
+        let softness = renderer.softness();
         let parameters = softness.parameters();
         check_phi("phi", softness.family.name(), parameters, phi)?;
         let silhouette = guarded(py, || renderer.prepared::<HostBackend>(phi))?;

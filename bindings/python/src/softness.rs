@@ -2,10 +2,11 @@
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness as _};
+use softrast_inverse::ScheduledSoftness;
+use softrast_softness::{EdgeSoftness, Family, Softness as _};
 
 use crate::{
-    checks::check_phi,
+    checks::{check_part, check_phi},
     guard::{guarded, refused},
 };
 
@@ -104,10 +105,8 @@ impl Softness {
 impl Softness {
     /// Parameters at `part` of a run, on images whose shorter side has `size` pixels.
     pub(crate) fn parameters_at(&self, part: f64, size: usize) -> PyResult<Vec<f64>> {
-        match (0.0..=1.0).contains(&part) {
-            true => Ok(self.0.phi_at(part, size)),
-            false => Err(refused(format!("the part of a run is {part}, expected 0 to 1"))),
-        }
+        check_part(part)?;
+        Ok(self.0.phi_at(part, size))
     }
 }
 

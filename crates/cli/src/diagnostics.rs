@@ -1,5 +1,6 @@
+use softrast_inverse::{ScheduledSoftness, Surrogate};
 use softrast_lab::{Point, Run, best_point, median};
-use softrast_softness::{ScheduledSoftness, Softness, Surrogate};
+use softrast_softness::Softness;
 
 use crate::task::{HARD, PARAMETER, SCALE, SOFT};
 

@@ -1,10 +1,10 @@
 use std::rc::Rc;
 
 use serde_json::{Map, Value, json};
-use softrast_inverse::{Iterate, Method, Resolution, SolveConfig, minimize};
+use softrast_inverse::{Iterate, Method, Resolution, SolveConfig, Surrogate, minimize};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
 use softrast_raster::{BackendChoice, HostBackend, RasterBackend, on_backend};
-use softrast_softness::{Softness, Surrogate};
+use softrast_softness::Softness;
 
 use crate::{
     Common, Description, EdgeChoice, Entry, MethodArgs, SoftnessChoice, Task, Variant, backend,

@@ -4,12 +4,12 @@ use std::{fmt, path::PathBuf, str::FromStr};
 
 use clap::{Args, Parser, ValueEnum};
 use serde::{Deserialize, Serialize};
-use softrast_inverse::Resolution;
+use softrast_inverse::{NameOrFile, Resolution};
 use softrast_lab::{
     found,
     parse::{count, positive, seed, share, whole},
 };
-use softrast_softness::{Family, NameOrFile};
+use softrast_softness::Family;
 
 /// Heading of the flags that few need.
 pub(crate) const RARE: &str = "Rarely needed";

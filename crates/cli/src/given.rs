@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use softrast_inverse::{MaskRules, Method, Picture};
+use softrast_inverse::{MaskRules, Method, Picture, ScheduledSoftness};
 use softrast_lab::{
     Error, Progress, ViewerView, mask_png, parse::share, program::Output, report::Report,
 };
 use softrast_raster::{BackendChoice, Pinhole};
-use softrast_softness::ScheduledSoftness;
 
 use crate::{
     Common, MethodArgs, Scales, SoftnessChoice, backend,

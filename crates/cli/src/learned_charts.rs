@@ -1,10 +1,10 @@
 //! What a learned softness looks like.
 
-use softrast_inverse::PhiLayout;
+use softrast_inverse::{PhiLayout, ScheduledSoftness};
 use softrast_lab::plot::{Axis, Plot, Series};
 use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, Softness};
 
 /// The learned softness beside that of the start, and how its scale moves: charts and captions.
 pub(crate) fn learned_charts(

@@ -1,10 +1,10 @@
 //! From flags to a [`Method`].
 
-use softrast_inverse::{Method, distilled_mlp, mlp_like};
-use softrast_lab::Error;
-use softrast_softness::{
-    EdgeSoftness, Family, ScheduledSoftness, Softness, SoftnessFileError, Surrogate,
+use softrast_inverse::{
+    Method, ScheduledSoftness, SoftnessFileError, Surrogate, distilled_mlp, mlp_like,
 };
+use softrast_lab::Error;
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 use crate::{Init, MethodArgs, PRESET, Schedule, Searched, SoftnessChoice};
 

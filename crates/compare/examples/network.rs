@@ -15,7 +15,7 @@ use clap::Parser;
 use common::{Study, setup};
 use shape2d::{Args, Shape2d};
 use softrast_cli::{Common, MethodArgs, usual_args};
-use softrast_inverse::{Instances, LearnConfig, OuterLoss};
+use softrast_inverse::{Instances, LearnConfig, OuterLoss, ScheduledSoftness};
 use softrast_lab::{
     machine, mean, mean_interval,
     plot::{Axis, Plot, Series},
@@ -23,9 +23,7 @@ use softrast_lab::{
 };
 use softrast_meta::TaskDistribution;
 use softrast_raster::HostBackend as B;
-use softrast_softness::{
-    EdgeSoftness, Family, ScheduledSoftness, Softness, numbers, tensor_on, vector,
-};
+use softrast_softness::{EdgeSoftness, Family, Softness, numbers, tensor_on, vector};
 
 /// The networks that come along, by their names and tasks.
 const NETWORKS: [&str; 4] = ["shape2d-mlp", "shape3d-mlp", "pose-mlp", "occlusion-mlp"];

@@ -4,10 +4,9 @@ use clap::Parser;
 use softrast_cli::{
     MethodArgs, SoftnessChoice, Variant, is_preset, is_preset_learned, learned_kind,
 };
-use softrast_inverse::{Method, Resolution};
+use softrast_inverse::{Method, Resolution, ScheduledSoftness};
 use softrast_lab::Shard;
 use softrast_raster::compiled_backends;
-use softrast_softness::ScheduledSoftness;
 
 use crate::{
     Cell, Purpose, Variation,

@@ -3,11 +3,11 @@ use std::{cell::RefCell, marker::PhantomData, rc::Rc};
 use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_meta::{Adam, BilevelProblem, InnerLoop, TaskDistribution};
 use softrast_raster::{RasterBackend, Rasterizer};
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, numbers, vector};
+use softrast_softness::{EdgeSoftness, Family, numbers, vector};
 
 use crate::{
     Inner, InverseProblem, LearnConfig, Method, Outer, OuterLoss, PhiLayout, Resolution,
-    ScheduledRenderer, SolveConfig, minimize, objectives::OuterImage,
+    ScheduledRenderer, ScheduledSoftness, SolveConfig, minimize, objectives::OuterImage,
 };
 
 /// Scale of the softness that judges, in pixels of the image that judges: the least one whose gradient does not depend on where between

@@ -1,10 +1,8 @@
 use burn::tensor::Tensor;
 use softrast_raster::RasterBackend;
-use softrast_softness::{
-    EdgeSoftness, Feedback, ScaleSchedule, ScheduledSoftness, Softness, Surrogate, tensor, vector,
-};
+use softrast_softness::{EdgeSoftness, Softness, tensor, vector};
 
-use crate::{Input, LearnConfig};
+use crate::{Feedback, Input, LearnConfig, ScaleSchedule, ScheduledSoftness, Surrogate};
 
 /// Least share of a scale that stands above the floor where a learned schedule starts.
 const ABOVE_FLOOR: f64 = 0.05;
@@ -19,8 +17,8 @@ const KNOTS: usize = 3;
 /// ratio to the schedule that is its own. Then those of the feedback. Last come parameters of the problem's own.
 ///
 /// ```
-/// use softrast_inverse::PhiLayout;
-/// use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+/// use softrast_inverse::{PhiLayout, ScheduledSoftness};
+/// use softrast_softness::{EdgeSoftness, Family};
 ///
 /// // φ of an Exp is the logarithm of its scale and a shift.
 /// let exp = EdgeSoftness { family: Family::Exp, squared: false };

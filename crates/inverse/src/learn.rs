@@ -1,9 +1,11 @@
 use serde_json::{Value, json};
 use softrast_meta::{Adam, Alone, OuterLoop, Progress, Ranks, Record, Validation};
 use softrast_raster::RasterBackend;
-use softrast_softness::ScheduledSoftness;
 
-use crate::{Checkpoint, Instances, InverseProblem, LearnConfig, Method, PhiLayout, SolveConfig};
+use crate::{
+    Checkpoint, Instances, InverseProblem, LearnConfig, Method, PhiLayout, ScheduledSoftness,
+    SolveConfig,
+};
 
 /// Largest norm of the mean meta-gradient.
 const CLIP: f64 = 1.0;

@@ -1,7 +1,8 @@
 use anyhow::{bail, ensure};
 use serde::{Deserialize, Serialize};
 use softrast_meta::{MetaGradient, OuterSteps};
-use softrast_softness::ScheduledSoftness;
+
+use crate::ScheduledSoftness;
 
 /// How a softness is learned.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -18,7 +19,7 @@ pub struct LearnConfig {
     /// Whether the logarithm of the inner learning rate is learned too.
     pub learn_rate: bool,
     /// Whether a softness whose scale moves learns to move it by what a run sees, beginning with
-    /// [`Feedback::START`](softrast_softness::Feedback::START).
+    /// [`Feedback::START`](crate::Feedback::START).
     pub feedback: bool,
     /// Seed of the first training instance.
     pub seed: u64,

@@ -1,15 +1,15 @@
 //! Inverse rendering under a soft rasterizer: solving problems, and learning the softness on them.
 //!
 //! An [`InverseProblem`] says what is optimised, how its image is made and what is wrong with an image. A [`Method`] says how edges are
-//! softened over a run. [`minimize`] solves instances of a problem with a method and shows every step; [`learn()`] makes a better method,
-//! by the gradient of what whole runs end with. Both draw through a [`ScheduledRenderer`], with what a `SoftRenderer` of
-//! `softrast-raster` prepares: that decides when support and knots are chosen anew. [`PoseProblem`] finds a camera.
+//! softened over a run: its [`ScheduledSoftness`] has the parameters of a softness and how its scale moves, also in a file. [`minimize`]
+//! solves instances of a problem with a method and shows every step; [`learn()`] makes a better method, by the gradient of what whole runs
+//! end with. Both draw through a [`ScheduledRenderer`], with what a `SoftRenderer` of `softrast-raster` prepares: that decides when support
+//! and knots are chosen anew. [`PoseProblem`] finds a camera.
 //!
 //! ```
 //! use burn::backend::NdArray;
-//! use softrast_inverse::{InverseProblem, Method, PoseProblem, SolveConfig, minimize};
+//! use softrast_inverse::{InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize};
 //! use softrast_mesh::icosphere;
-//! use softrast_softness::ScheduledSoftness;
 //!
 //! let problem = PoseProblem::new(&icosphere(0));
 //! let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
@@ -55,6 +55,8 @@ mod problem;
 mod renderer;
 mod resolution;
 mod rotation;
+mod schedule;
+mod softness_file;
 mod surface;
 mod targets;
 mod transforms;
@@ -88,6 +90,8 @@ pub use pose_file::PoseFile;
 pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
+pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, Surrogate};
+pub use softness_file::{DepthSoftnessFile, NameOrFile, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
 pub use transforms::{Transforms, load_views};

@@ -1,8 +1,7 @@
 use serde::{Deserialize, Serialize};
 use softrast_raster::Rasterizer;
-use softrast_softness::ScheduledSoftness;
 
-use crate::Resolution;
+use crate::{Resolution, ScheduledSoftness};
 
 /// A way to solve any problem: a softness, how its scale moves, and how finely it is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

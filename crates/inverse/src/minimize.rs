@@ -7,10 +7,11 @@ use burn::{
 };
 use softrast_meta::{Adam, AdamState, Optimizer};
 use softrast_raster::{HostBackend, RasterBackend};
-use softrast_softness::{Follower, Place, ScaleSchedule};
 use web_time::Instant;
 
-use crate::{InverseProblem, Iterate, Method, SolveConfig, iterate::Run};
+use crate::{
+    Follower, InverseProblem, Iterate, Method, Place, ScaleSchedule, SolveConfig, iterate::Run,
+};
 
 /// Starts of a problem that a run with feedback goes through at most; then it begins again where it is.
 const STARTS: usize = 8;

@@ -2,9 +2,9 @@ use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
 
 use burn::tensor::{Element, Tensor, TensorData};
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer, iou_loss, mse_loss};
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, numbers, vector};
+use softrast_softness::{EdgeSoftness, numbers, vector};
 
-use crate::{PhiLayout, Resolution, Targets};
+use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 
 /// Draws soft silhouettes of one mesh topology at every step of a run.
 ///
@@ -20,8 +20,8 @@ pub struct ScheduledRenderer {
     size: usize,
     tolerance: f64,
     resolution: Resolution,
-    /// What draws silhouettes, if the problem has any: as they are seen, and as their gradient has it, if that is another.
-    renderers: Vec<SoftRenderer<EdgeSoftness>>,
+    /// What draws silhouettes, if the problem has any.
+    renderer: Option<SoftRenderer<EdgeSoftness>>,
     /// What was drawn with so far, by its place on the path.
     kept: RefCell<BTreeMap<u64, Rc<Kept>>>,
 }
@@ -29,7 +29,7 @@ pub struct ScheduledRenderer {
 /// What draws at a step, always the same: tables belong to its knots.
 #[derive(Debug)]
 struct Kept {
-    /// One for each renderer.
+    /// As they are seen, and as their gradient has it, if that is another.
     silhouettes: Vec<Silhouette<EdgeSoftness>>,
     /// Their tables of the values, one below the other, `[rows, 4]`.
     table: TensorData,
@@ -46,16 +46,10 @@ impl ScheduledRenderer {
         faces: Option<Arc<[[u32; 3]]>>,
     ) -> Self {
         let (values, own) = layout.softness(phi);
-        let renderers = faces.map_or_else(Vec::new, |faces| {
-            let of = |softness, phi| {
-                SoftRenderer::with_rasterizer(rasterizer, faces.clone(), softness, phi)
-            };
-            let surrogate = values.surrogate.clone().map(|found| of(found.softness, found.phi));
-            [of(values.softness, values.phi.clone())].into_iter().chain(surrogate).collect()
-        });
+        let renderer = faces.map(|faces| values.renderer_at(0.0, rasterizer, faces));
         let (size, tolerance) = (rasterizer.size.shorter(), rasterizer.tolerance);
         let (phi, kept) = (phi.to_vec(), RefCell::default());
-        Self { layout, phi, values, own, size, tolerance, resolution, renderers, kept }
+        Self { layout, phi, values, own, size, tolerance, resolution, renderer, kept }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
@@ -84,7 +78,7 @@ impl ScheduledRenderer {
         step: usize,
     ) -> Tensor<B, 1> {
         let step = step.min(self.layout.steps());
-        if self.renderers.is_empty() {
+        if self.renderer.is_none() {
             let parts = [self.layout.phi(phi, step), self.layout.own(phi)];
             return Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0);
         }
@@ -131,12 +125,14 @@ impl ScheduledRenderer {
     fn kept<B: RasterBackend>(&self, part: f64) -> Rc<Kept> {
         let mut kept = self.kept.borrow_mut();
         let kept = kept.entry(self.place(part)).or_insert_with(|| {
-            assert!(!self.renderers.is_empty(), "a problem that sees silhouettes has faces");
+            let renderer =
+                self.renderer.as_ref().expect("a problem that sees silhouettes has faces");
+            let renderers = [Some(renderer), renderer.surrogate()].into_iter().flatten();
             let size = self.layout.size();
             let surrogate = self.values.surrogate_at(part, size).map(|found| found.phi);
             let phi = [self.values.phi_at(part, size)].into_iter().chain(surrogate);
             let mut table = Vec::new();
-            let silhouettes = self.renderers.iter().zip(phi).map(|(renderer, phi)| {
+            let silhouettes = renderers.zip(phi).map(|(renderer, phi)| {
                 let silhouette = renderer.prepared::<B>(&phi);
                 table.extend(silhouette.table_data(&phi).iter::<f64>());
                 silhouette

@@ -1,7 +1,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
-use softrast_softness::{EdgeSoftness, ScheduledSoftness, Softness, Surrogate};
+use softrast_softness::Softness;
 
 use crate::{
     HostBackend, ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm,
@@ -112,11 +112,31 @@ impl<S: Softness> SoftRenderer<S> {
     ///
     /// If `scale` is not positive.
     #[must_use]
-    pub fn with_surrogate(mut self, softness: S, scale: f64) -> Self {
+    pub fn with_surrogate(self, softness: S, scale: f64) -> Self {
         let phi = softness.default_phi(scale);
+        self.with_surrogate_phi(softness, phi)
+    }
+
+    /// The same with parameters `phi` `[parameters]` of that softness in place of a scale.
+    ///
+    /// # Panics
+    ///
+    /// If `phi` has the wrong length.
+    #[must_use]
+    pub fn with_surrogate_phi(mut self, softness: S, phi: Vec<f64>) -> Self {
         let surrogate = Self::with_rasterizer(self.rasterizer, self.faces.clone(), softness, phi);
         self.surrogate = Some(Box::new(surrogate));
         self
+    }
+
+    /// The softness of the image.
+    pub fn softness(&self) -> &S {
+        &self.softness
+    }
+
+    /// The renderer that the gradient to the vertices is taken of, where that is not the image itself.
+    pub fn surrogate(&self) -> Option<&Self> {
+        self.surrogate.as_deref()
     }
 
     /// The parameters φ, `[parameters]`: those to draw with where no others are given.
@@ -289,43 +309,6 @@ impl<S: Softness> SoftRenderer<S> {
         self.kept = Arc::default();
         self.surrogate = self.surrogate.map(|surrogate| Box::new(surrogate.changed(change)));
         self
-    }
-}
-
-impl SoftRenderer<EdgeSoftness> {
-    /// Draws with a softness whose scale moves, as it is at the beginning of a run; its surrogate, if it has one, comes along.
-    ///
-    /// # Panics
-    ///
-    /// If `faces` or the image is empty.
-    pub fn scheduled(
-        faces: &[[u32; 3]],
-        size: impl Into<ImageSize>,
-        softness: &ScheduledSoftness,
-    ) -> Self {
-        let rasterizer = Rasterizer::new(size);
-        let side = rasterizer.size.shorter();
-        let phi = softness.phi_at(0.0, side);
-        let mut renderer = Self::with_rasterizer(rasterizer, faces.into(), softness.softness, phi);
-        renderer.surrogate = softness.surrogate_at(0.0, side).map(|Surrogate { softness, phi }| {
-            let (rasterizer, faces) = (renderer.rasterizer, renderer.faces.clone());
-            Box::new(Self::with_rasterizer(rasterizer, faces, softness, phi))
-        });
-        renderer
-    }
-
-    /// Draws from now on as `softness` does at `part` of a run, 0 to 1: the one that [`scheduled`](Self::scheduled) was given.
-    ///
-    /// # Panics
-    ///
-    /// If `part` is not in [0, 1], or the softness is another one.
-    pub fn move_to(&mut self, softness: &ScheduledSoftness, part: f64) {
-        let side = self.rasterizer.size.shorter();
-        assert_eq!(self.softness, softness.softness, "the softness of a renderer stays the same");
-        self.set_phi(softness.phi_at(part, side));
-        if let Some((own, now)) = self.surrogate.as_mut().zip(softness.surrogate_at(part, side)) {
-            own.set_phi(now.phi);
-        }
     }
 }
 

@@ -1,9 +1,10 @@
 use std::{path::PathBuf, str::FromStr};
 
 use clap::Parser;
+use softrast_inverse::NameOrFile;
 use softrast_lab::parse::{count, positive, share, whole};
 use softrast_raster::{Rasterizer, TConorm};
-use softrast_softness::{Family, NameOrFile};
+use softrast_softness::Family;
 
 /// Draws soft silhouettes or colours of a mesh and measures what they cost.
 #[derive(Debug, Parser)]

@@ -6,9 +6,10 @@ use std::{fs, path::Path, process::Command};
 
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
+use softrast_inverse::ScheduledSoftness;
 use softrast_lab::Failure;
 use softrast_mesh::{Mesh, icosphere};
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, Family};
 use softrast_test_kit::{Program, ended};
 
 fn mesh(folder: &Path) -> String {

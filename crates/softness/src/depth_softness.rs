@@ -1,12 +1,10 @@
-use std::{fmt, path::Path, str::FromStr};
+use std::{fmt, str::FromStr};
 
 use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    EdgeSoftness, Family, OPAQUE, Softness, SoftnessFileError,
-    file::{Stored, check_phi, learned, stored},
-    initial_mlp,
+    EdgeSoftness, Family, OPAQUE, Softness, initial_mlp,
     network::{WEIGHTS, weights},
 };
 
@@ -99,8 +97,8 @@ impl DepthSoftness {
         network(&phi, ends)
     }
 
-    /// How many of the leading parameters are logarithms.
-    fn logarithms(self) -> usize {
+    /// How many of the leading parameters are logarithms; 0 for the network.
+    pub fn logarithms(self) -> usize {
         match self {
             Self::Family(family) => family.logarithms(),
             Self::Mlp => 0,
@@ -155,45 +153,6 @@ impl TryFrom<String> for DepthSoftness {
     }
 }
 
-/// A depth softness and its parameters, as kept in a JSON file; they stay as they are over a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DepthSoftnessFile {
-    /// Which depth softness.
-    pub depth_softness: DepthSoftness,
-    /// Its parameters φ, as many as [`DepthSoftness::parameters`] says.
-    pub phi: Vec<f64>,
-    /// Where the parameters come from, in words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub note: Option<String>,
-}
-
-impl DepthSoftnessFile {
-    /// What the program of a task takes along with [`ScheduledSoftness::preset`](crate::ScheduledSoftness::preset).
-    ///
-    /// # Errors
-    ///
-    /// If there is none for a task of this name.
-    pub fn preset(task: &str) -> Result<Self, SoftnessFileError> {
-        match task {
-            "occlusion" => Self::parse(include_str!("../searched/occlusion_depth.json"), task),
-            _ => Self::learned(task),
-        }
-    }
-}
-
-stored!(DepthSoftnessFile);
-
-impl Stored for DepthSoftnessFile {
-    const LEARNED: &'static [(&'static str, &'static str)] =
-        learned!["_depth.json": "occlusion", "occlusion-mlp"];
-
-    fn check(&self) -> Result<(), String> {
-        let softness = self.depth_softness;
-        check_phi(softness.name(), [softness.parameters(), softness.logarithms()], &self.phi)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,35 +168,5 @@ mod tests {
         let message = "deep".parse::<DepthSoftness>().unwrap_err().to_string();
         assert!(message.contains("known are logistic, bilogit, "), "{message}");
         assert!(message.ends_with(" and depth_mlp"), "{message}");
-    }
-
-    #[test]
-    fn a_saved_depth_softness_comes_back_to_the_last_bit() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("depth.json");
-        for depth_softness in [DepthSoftness::Family(Family::Exp), DepthSoftness::Mlp] {
-            let phi = depth_softness.default_phi(0.1);
-            let file = DepthSoftnessFile { depth_softness, phi, note: Some("a start".into()) };
-            file.save(&path).unwrap();
-            assert_eq!(DepthSoftnessFile::load(&path).unwrap(), file);
-        }
-    }
-
-    #[test]
-    fn parameters_that_do_not_suit_are_refused_by_name() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("depth.json");
-        for (text, part) in [
-            (
-                r#"{"depth_softness": "depth_mlp", "phi": [0]}"#,
-                "1 parameters, but depth_mlp has 56",
-            ),
-            (r#"{"depth_softness": "gauss", "phi": [99]}"#, "phi[0] is the logarithm 99"),
-            (r#"{"depth_softness": "deep", "phi": [99]}"#, "unknown depth softness \"deep\""),
-        ] {
-            std::fs::write(&path, text).unwrap();
-            let message = DepthSoftnessFile::load(&path).unwrap_err().to_string();
-            assert!(message.contains(part), "{message}");
-        }
     }
 }

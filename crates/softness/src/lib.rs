@@ -4,8 +4,7 @@
 //! is optically. Its parameters are one explicit vector φ, so that an optimiser sees nothing else.
 //! One of your own has one method; the ones that come with the crate are in [`families`], and a
 //! [`Family`] is one chosen by name. An [`EdgeSoftness`] applies it to the distance or to its signed
-//! square; [`support`] gives how far from the edge it still changes; a [`ScheduledSoftness`] has its
-//! parameters and how its scale moves over a run, also in a file; a [`SoftStep`] puts it into a
+//! square; [`support`] gives how far from the edge it still changes; a [`SoftStep`] puts it into a
 //! network. A [`DepthSoftness`] gives how much a face counts by its depth.
 //!
 //! ```
@@ -30,30 +29,20 @@ mod edge;
 mod error_function;
 pub mod families;
 mod family;
-mod feedback;
-mod file;
 mod math;
 mod mirrored;
-mod name_or_file;
 mod network;
-mod schedule;
-mod scheduled;
 mod soft_step;
 mod softness;
 mod support;
 mod tensors;
 
-pub use depth_softness::{DepthSoftness, DepthSoftnessFile, UnknownDepthSoftness};
+pub use depth_softness::{DepthSoftness, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
 pub use family::{Family, UnknownFamily};
-pub use feedback::{Feedback, Follower, Place};
-pub use file::SoftnessFileError;
 pub use math::OPAQUE;
 pub use mirrored::Mirrored;
-pub use name_or_file::NameOrFile;
 pub use network::initial_mlp;
-pub use schedule::ScaleSchedule;
-pub use scheduled::{ScheduledSoftness, Surrogate};
 pub use soft_step::SoftStep;
 pub use softness::Softness;
 pub use support::{Support, settled_beyond, support};

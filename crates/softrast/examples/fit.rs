@@ -25,14 +25,14 @@ fn main() {
     let masks: Tensor<B, 3> = hard_silhouette(seen, fox.faces(), SIZE);
 
     let (sphere, cameras) = (icosphere(3), Orbit::tensors::<B>(&cameras, &device));
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let softness = ScheduledSoftness::decay(softness, 0.05, 0.005);
-    let mut renderer = SoftRenderer::scheduled(sphere.faces(), SIZE, &softness);
+    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let decay = ScheduledSoftness::decay(logistic, 0.05, 0.005);
+    let mut renderer = SoftRenderer::new(sphere.faces(), SIZE, logistic, 0.05);
     let mut corners = vertices::<Plain>(sphere.positions(), &device);
     let adam = Adam::new(0.01);
     let mut state = adam.init(&corners);
     for step in 0..=STEPS {
-        renderer.move_to(&softness, step as f64 / STEPS as f64);
+        renderer.set_phi(decay.phi_at(step as f64 / STEPS as f64, SIZE));
         let leaf = Tensor::<B, 3>::from_inner(corners.clone()).require_grad();
         let image = renderer.silhouette(project(leaf.clone(), cameras.clone()));
         let loss = iou_loss(image, masks.clone()).mean();

@@ -6,7 +6,8 @@
 //! - [`softness`]: soft step functions as burn tensor ops;
 //! - [`raster`]: cameras, silhouettes, colours, losses, exact to second order;
 //! - [`meta`]: optimisers and inner loops that can be differentiated;
-//! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them.
+//! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them;
+//!   softnesses over a run, and their files.
 //!
 //! Take burn 0.21, the version that this is built on: types of another do not fit. The Cargo features `ndarray` (default), `flex` and
 //! `wgpu` choose the backend.

@@ -3,7 +3,7 @@
 pub use burn::tensor::{Tensor, backend::Backend};
 pub use softrast_inverse::{
     InverseProblem, Iterate, LearnConfig, Lens, Method, Minimization, Picture, PoseProblem,
-    SoftnessAt, SolveConfig, learn, load_views, minimize,
+    ScheduledSoftness, SoftnessAt, SolveConfig, learn, load_views, minimize,
     pose::{FoundPose, PoseSearch},
     save_picture,
 };
@@ -13,4 +13,4 @@ pub use softrast_raster::{
     Attributes, Background, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, SoftRenderer,
     TConorm, Weighting, hard_silhouette, iou_loss, mse_loss, project, project_pinhole, vertices,
 };
-pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, ScheduledSoftness, Softness};
+pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};

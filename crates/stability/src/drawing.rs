@@ -6,10 +6,9 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::Tensor,
 };
-use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer};
+use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness};
 use softrast_meta::{numbers, tensor};
 use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
-use softrast_softness::ScheduledSoftness;
 
 use crate::planar_scene::{PlanarScene, Random};
 

@@ -3,11 +3,11 @@ use std::path::Path;
 use anyhow::Context;
 use serde_json::{Value, json};
 use softrast_cli::{Common, MethodArgs, Schedule, SoftnessChoice, Task, Variant};
-use softrast_inverse::{InverseProblem, Method, SolveConfig, minimize};
+use softrast_inverse::{InverseProblem, Method, ScheduledSoftness, SolveConfig, minimize};
 use softrast_lab::{Batch, Progress, Run};
 use softrast_meta::numbers;
 use softrast_raster::Rasterizer;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, Family};
 
 use crate::drawing::Single;
 

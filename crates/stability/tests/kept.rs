@@ -22,7 +22,7 @@ const STABILITY: Program = Program {
 fn inputs(folder: &Path) {
     fs::create_dir(folder.join("work")).unwrap();
     let network =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../softness/learned/occlusion-mlp.json");
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../inverse/learned/occlusion-mlp.json");
     for name in ["mlp.json", "work/stability.json"] {
         fs::copy(&network, folder.join(name)).unwrap();
     }

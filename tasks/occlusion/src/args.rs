@@ -1,5 +1,6 @@
+use softrast_inverse::NameOrFile;
 use softrast_lab::parse::positive;
-use softrast_softness::{DepthSoftness, NameOrFile};
+use softrast_softness::DepthSoftness;
 
 /// Name of the task.
 pub(crate) const NAME: &str = "occlusion";

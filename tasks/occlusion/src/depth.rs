@@ -1,9 +1,10 @@
 use anyhow::ensure;
 use softrast_cli::{EdgeChoice, PRESET, Schedule, Searched};
+use softrast_inverse::{DepthSoftnessFile, NameOrFile};
 use softrast_lab::Error;
 use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
-use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family, NameOrFile};
+use softrast_softness::{DepthSoftness, Family};
 
 use crate::{Args, args::NAME};
 

@@ -7,14 +7,14 @@ use softrast_cli::{
     Common, Description, EdgeChoice, Ended, Entry, Measures, MethodArgs, NoArgs, OwnAxis, Paper,
     Scales, Schedule, Task, Variant, theta_of,
 };
-use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
+use softrast_inverse::{DepthSoftnessFile, InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{
     plot::{Axis, Plot, Series},
     rgb_from_planes,
 };
 use softrast_meta::{numbers, vector};
 use softrast_raster::{HostBackend, RasterBackend};
-use softrast_softness::{DepthSoftness, DepthSoftnessFile, EdgeSoftness, Family, Softness};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 
 use crate::{
     Args, DepthError, Instance, Problem, Scene,

@@ -5,7 +5,8 @@
 use std::{fs, path::Path};
 
 use serde_json::Value;
-use softrast_softness::{DepthSoftness, DepthSoftnessFile, Family};
+use softrast_inverse::DepthSoftnessFile;
+use softrast_softness::{DepthSoftness, Family};
 use softrast_test_kit::{Failure, Program, assert_finite, warnings};
 
 const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_occlusion"));

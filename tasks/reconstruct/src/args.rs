@@ -1,12 +1,13 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use softrast_inverse::{NameOrFile, ScheduledSoftness};
 use softrast_lab::{
     Error,
     parse::{count, positive, seed, whole},
 };
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, Family, NameOrFile, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 
 use crate::{Data, Settings, Width};
 

@@ -6,9 +6,10 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize, Serializer};
+use softrast_inverse::ScheduledSoftness;
 use softrast_lab::shown;
 use softrast_raster::TConorm;
-use softrast_softness::{EdgeSoftness, ScheduledSoftness};
+use softrast_softness::EdgeSoftness;
 
 use crate::Width;
 

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use burn::backend::{Autodiff, NdArray};
 use softrast_cli::{MethodArgs, Scales, Schedule};
-use softrast_inverse::{Input, Instances, LearnConfig, Method, OuterLoss, PhiLayout, SolveConfig};
-use softrast_meta::{MetaGradient, Objective, TaskDistribution};
-use softrast_softness::{
-    EdgeSoftness, Family, Feedback, ScaleSchedule, ScheduledSoftness, Softness,
+use softrast_inverse::{
+    Feedback, Input, Instances, LearnConfig, Method, OuterLoss, PhiLayout, ScaleSchedule,
+    ScheduledSoftness, SolveConfig,
 };
+use softrast_meta::{MetaGradient, Objective, TaskDistribution};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, vector};
 
 use super::square::Square;

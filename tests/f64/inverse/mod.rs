@@ -4,5 +4,6 @@ mod another_phi;
 mod layout;
 mod minimize;
 mod paint;
+mod schedule;
 mod square;
 mod surrogate;

@@ -6,9 +6,11 @@ use burn::{
     backend::{Autodiff, NdArray},
     tensor::Tensor,
 };
-use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer};
-use softrast_raster::{Rasterizer, Silhouette};
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
+use softrast_inverse::{
+    PhiLayout, Resolution, ScaleSchedule, ScheduledRenderer, ScheduledSoftness, Surrogate,
+};
+use softrast_raster::{Rasterizer, Silhouette, SoftRenderer};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, tensor, vector};
 
 type B = NdArray<f64>;
@@ -102,5 +104,29 @@ fn both_move_together() {
     }
     for (a, b) in image_at(&moving, 1).iter().zip(image(narrow())) {
         assert!((a - b).abs() < 1e-12, "{a}, not {b}");
+    }
+}
+
+#[test]
+fn a_renderer_at_a_part_of_a_run_has_both_scales_of_that_part() {
+    let schedule = ScaleSchedule { knots: vec![-2.0, -3.0], floor_px: 0.1 };
+    let moving = ScheduledSoftness {
+        schedule: Some(schedule),
+        surrogate: Some(Surrogate { softness: LOGISTIC, phi: LOGISTIC.default_phi(3.0) }),
+        ..ScheduledSoftness::constant(LOGISTIC, 1.0)
+    };
+    for part in [0.0, 0.3, 1.0] {
+        let moved = moving.renderer_at(part, Rasterizer::new(SIZE), faces());
+        let scale = moving.scale_at(part, SIZE);
+        let by_hand = SoftRenderer::new(&faces(), SIZE, LOGISTIC, scale)
+            .with_surrogate(LOGISTIC, 3.0 * scale);
+        let [found, expected] = [moved, by_hand].map(|renderer| {
+            let image = numbers(renderer.silhouette(tensor::<B, 3>(&CORNERS, [1, 6, 3])));
+            let felt = gradient(|corners| (renderer.silhouette(corners) * weights()).sum());
+            [image, felt].concat()
+        });
+        for (a, b) in found.into_iter().zip(expected) {
+            assert!((a - b).abs() < 1e-4 * (1.0 + b.abs()), "{part}: {a}, not {b}");
+        }
     }
 }

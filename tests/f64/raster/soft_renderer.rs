@@ -5,9 +5,7 @@ use burn::{
     tensor::Tensor,
 };
 use softrast_raster::{Rasterizer, SoftRenderer, TConorm, reference};
-use softrast_softness::{
-    EdgeSoftness, Family, ScaleSchedule, ScheduledSoftness, Softness, Surrogate,
-};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, vector};
 
 use super::triangles::triangles;
@@ -135,33 +133,23 @@ fn gradients_to_vertices_and_parameters_are_those_of_the_image() {
 }
 
 #[test]
-fn a_scheduled_softness_is_drawn_as_it_is_at_each_part_with_the_gradient_of_its_surrogate() {
+fn parameters_that_are_set_draw_as_in_a_renderer_made_with_them_and_the_surrogate_stays() {
     type A = Autodiff<B>;
     let (vertices, faces) = triangles(4, 12);
     let softness = EdgeSoftness { family: Family::Gauss, squared: false };
-    let schedule = ScaleSchedule { knots: vec![-2.0, -3.0], floor_px: 0.1 };
-    let plain = ScheduledSoftness {
-        schedule: Some(schedule),
-        ..ScheduledSoftness::constant(softness, 1.0)
+    let of = |scale| SoftRenderer::new(&faces, SIZE, softness, scale).with_surrogate(softness, 0.3);
+    let image = |renderer: &SoftRenderer<EdgeSoftness>| {
+        let leaf = Tensor::<A, 3>::from_inner(shaped(&vertices)).require_grad();
+        let image = renderer.silhouette(leaf.clone());
+        let grads = image.clone().powi_scalar(2).sum().backward();
+        [numbers(image), numbers(leaf.grad(&grads).unwrap())].concat()
     };
-    let surrogate = Surrogate { softness, phi: softness.default_phi(3.0) };
-    let wide = ScheduledSoftness { surrogate: Some(surrogate), ..plain.clone() };
-    let mut scheduled = SoftRenderer::scheduled(&faces, SIZE, &wide);
-    for part in [0.0, 0.3, 1.0, 0.3] {
-        scheduled.move_to(&wide, part);
-        let scale = plain.scale_at(part, SIZE);
-        let by_hand =
-            SoftRenderer::new(&faces, SIZE, softness, scale).with_surrogate(softness, 3.0 * scale);
-        let image = |renderer: &SoftRenderer<EdgeSoftness>| {
-            let leaf = Tensor::<A, 3>::from_inner(shaped(&vertices)).require_grad();
-            let image = renderer.silhouette(leaf.clone());
-            let grads = image.clone().powi_scalar(2).sum().backward();
-            [numbers(image), numbers(leaf.grad(&grads).unwrap())]
-        };
-        let [found, expected] = [&scheduled, &by_hand].map(image);
-        for (found, expected) in found.concat().into_iter().zip(expected.concat()) {
+    let mut moved = of(0.2);
+    for scale in [0.1, 0.06, 0.04, 0.06] {
+        moved.set_phi(softness.default_phi(scale));
+        for (found, expected) in image(&moved).into_iter().zip(image(&of(scale))) {
             let close = (found - expected).abs() < 1e-4 * (1.0 + expected.abs());
-            assert!(close, "{part}: {found}, not {expected}");
+            assert!(close, "{scale}: {found}, not {expected}");
         }
     }
 }

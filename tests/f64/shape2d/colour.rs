@@ -6,10 +6,10 @@ use shape2d::{
     colour::{Coloured, Colours, Scene, Start, landscape},
 };
 use softrast_cli::{EdgeChoice, Task, Variant};
-use softrast_inverse::{InverseProblem, Method, SolveConfig, minimize};
+use softrast_inverse::{InverseProblem, Method, ScheduledSoftness, SolveConfig, minimize};
 use softrast_meta::Objective;
 use softrast_raster::RasterBackend;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness, Softness};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::numbers;
 
 use crate::differences::{check_gradient, check_meta_gradient};

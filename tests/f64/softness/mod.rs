@@ -8,7 +8,7 @@ mod hand_worked;
 mod mirror;
 mod mlp;
 mod provided;
-mod schedule;
+mod scale;
 mod soft_step;
 mod support;
 mod tails;

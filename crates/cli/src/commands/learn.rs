@@ -8,7 +8,7 @@ use anyhow::Context;
 use burn::tensor::backend::Backend;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
-use softrast_inverse::Learning;
+use softrast_inverse::{Learning, ScheduledSoftness};
 use softrast_lab::{
     Error, Experiment, OutputFolder, Progress, World,
     format::{line, short, short_or_none},
@@ -20,7 +20,6 @@ use softrast_lab::{
 };
 use softrast_meta::{Best, Ranks, Record};
 use softrast_raster::HostBackend;
-use softrast_softness::ScheduledSoftness;
 
 use super::settings_section;
 use crate::{

@@ -1,4 +1,5 @@
 use serde_json::json;
+use softrast_inverse::ScheduledSoftness;
 use softrast_lab::{
     Error, Evaluation, Experiment, OutputFolder, Partial, Run, Runner, Work, check_held_out,
     format::exact,
@@ -7,7 +8,6 @@ use softrast_lab::{
     report::Report,
     seeds, was_interrupted,
 };
-use softrast_softness::ScheduledSoftness;
 
 use super::{
     ended,

@@ -2,8 +2,10 @@
 
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage};
 use serde_json::json;
-use softrast_inverse::{Lens, MaskRules, Picture, PictureFile, PoseFile, Transforms};
-use softrast_softness::{ScheduledSoftness, SoftnessFileError};
+use softrast_inverse::{
+    Lens, MaskRules, Picture, PictureFile, PoseFile, ScheduledSoftness, SoftnessFileError,
+    Transforms,
+};
 
 /// A reader under test. The names of files that were found begin with the `name`.
 pub(crate) struct Kind {

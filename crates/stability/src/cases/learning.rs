@@ -1,11 +1,12 @@
 //! Meta-gradients through many steps.
 
 use burn::tensor::Tensor;
+use softrast_inverse::{ScaleSchedule, ScheduledSoftness};
 use softrast_meta::{
     Adam, BilevelProblem, InnerLoop, MetaGradient, Objective, OuterSteps, numbers, tensor,
 };
 use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss};
-use softrast_softness::{EdgeSoftness, ScaleSchedule, ScheduledSoftness};
+use softrast_softness::EdgeSoftness;
 
 use super::triangle::at_depth_2;
 use crate::{Case, Level, Tested, Trial, drawing::Exact, planar_scene::PlanarScene};

@@ -1,10 +1,10 @@
 //! Ends of floats: softnesses, scales of the world, files, meshes and parameters.
 
-use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer};
+use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_meta::{numbers, tensor};
 use softrast_raster::{RasterBackend, Rasterizer, project};
-use softrast_softness::{ScheduledSoftness, Softness};
+use softrast_softness::Softness;
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,

@@ -4,13 +4,13 @@ use anyhow::ensure;
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
-    Method, PaintedView, SolveConfig, View, baked, load_views, mask_iou, minimize, reading_notes,
-    silhouette_pixels,
+    Method, PaintedView, ScheduledSoftness, SolveConfig, View, baked, load_views, mask_iou,
+    minimize, reading_notes, silhouette_pixels,
 };
 use softrast_lab::{Error, Progress, format::counted};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::on_backend;
-use softrast_softness::{EdgeSoftness, Family, ScheduledSoftness};
+use softrast_softness::{EdgeSoftness, Family};
 
 use super::{
     answer::{Scored, answer, names},

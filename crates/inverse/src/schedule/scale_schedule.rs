@@ -1,7 +1,8 @@
 use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
+use softrast_softness::EdgeSoftness;
 
-use crate::{EdgeSoftness, file::LARGEST_LOGARITHM};
+use crate::softness_file::stored::LARGEST_LOGARITHM;
 
 /// How wide a softness is in the course of a run: at part t of it, s is seen at `d / scale(t)`.
 ///

@@ -1,7 +1,7 @@
 use std::{fmt, path::PathBuf, str::FromStr};
 
-/// A softness as a command line says it, `NAME|FILE.json`: a [`Family`](crate::Family) or a
-/// [`DepthSoftness`](crate::DepthSoftness) by its name, or a file.
+/// A softness as a command line says it, `NAME|FILE.json`: a [`Family`](softrast_softness::Family) or a
+/// [`DepthSoftness`](softrast_softness::DepthSoftness) by its name, or a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NameOrFile<T> {
     /// By its name.
@@ -24,8 +24,9 @@ impl<T: FromStr<Err: fmt::Display>> FromStr for NameOrFile<T> {
 
 #[cfg(test)]
 mod tests {
+    use softrast_softness::{DepthSoftness, Family};
+
     use super::*;
-    use crate::{DepthSoftness, Family};
 
     #[test]
     fn what_ends_in_json_is_a_file_and_all_else_a_name() {

@@ -1,11 +1,12 @@
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use serde::{Deserialize, Serialize};
+use softrast_raster::{Rasterizer, SoftRenderer};
+use softrast_softness::{EdgeSoftness, Softness};
 
-use crate::{
-    EdgeSoftness, Feedback, ScaleSchedule, Softness, SoftnessFileError,
-    file::{Stored, check_phi, fits_f32, learned, stored},
-    math::ln_scale,
+use super::{feedback::Feedback, scale_schedule::ScaleSchedule};
+use crate::softness_file::stored::{
+    SoftnessFileError, Stored, check_phi, fits_f32, learned, stored,
 };
 
 /// A second softness whose slope stands for that of the first in the backward pass.
@@ -27,11 +28,11 @@ pub struct Surrogate {
 /// In a JSON file its fields have these names, but for the schedule, which is called `path`.
 ///
 /// ```
-/// use softrast_softness::ScheduledSoftness;
+/// use softrast_inverse::ScheduledSoftness;
 ///
 /// let learned = ScheduledSoftness::learned("pose")?;
 /// assert!(learned.scale_at(1.0, 64) < learned.scale_at(0.0, 64));
-/// # Ok::<(), softrast_softness::SoftnessFileError>(())
+/// # Ok::<(), softrast_inverse::SoftnessFileError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -88,8 +89,8 @@ impl ScheduledSoftness {
     /// If there is none for a task of this name.
     pub fn searched(task: &str) -> Result<Self, SoftnessFileError> {
         match task {
-            "shape3d" => Self::parse(include_str!("../searched/shape3d.json"), task),
-            "occlusion" => Self::parse(include_str!("../searched/occlusion.json"), task),
+            "shape3d" => Self::parse(include_str!("../../searched/shape3d.json"), task),
+            "occlusion" => Self::parse(include_str!("../../searched/occlusion.json"), task),
             _ => Err(SoftnessFileError::Unknown {
                 name: task.to_owned(),
                 known: "shape3d, occlusion".to_owned(),
@@ -194,11 +195,41 @@ impl ScheduledSoftness {
         Some(Surrogate { softness: *softness, phi })
     }
 
+    /// A renderer with this softness as it is at `part` of a run, 0 to 1; its surrogate, if it has one, comes along.
+    ///
+    /// # Panics
+    ///
+    /// If `faces` or the image is empty, or `part` is not in [0, 1].
+    pub fn renderer_at(
+        &self,
+        part: f64,
+        rasterizer: Rasterizer,
+        faces: Arc<[[u32; 3]]>,
+    ) -> SoftRenderer<EdgeSoftness> {
+        let size = rasterizer.size.shorter();
+        let phi = self.phi_at(part, size);
+        let renderer = SoftRenderer::with_rasterizer(rasterizer, faces, self.softness, phi);
+        match self.surrogate_at(part, size) {
+            Some(Surrogate { softness, phi }) => renderer.with_surrogate_phi(softness, phi),
+            None => renderer,
+        }
+    }
+
     /// What the schedule multiplies the scale of the parameters by.
     fn factor_at(&self, part: f64, size: usize) -> Option<f64> {
         let schedule = self.schedule.as_ref()?;
         Some(schedule.at(schedule.floor(self.softness, size), part))
     }
+}
+
+/// The logarithm of a scale.
+///
+/// # Panics
+///
+/// If it is not positive.
+fn ln_scale(scale: f64) -> f64 {
+    assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
+    scale.ln()
 }
 
 fn scaled(softness: EdgeSoftness, phi: &[f64], factor: Option<f64>) -> Vec<f64> {
@@ -265,8 +296,10 @@ impl Stored for ScheduledSoftness {
 mod tests {
     use std::fs;
 
+    use softrast_softness::Family;
+
     use super::*;
-    use crate::{DepthSoftnessFile, Family};
+    use crate::DepthSoftnessFile;
 
     fn example(family: Family) -> ScheduledSoftness {
         let softness = EdgeSoftness { family, squared: true };

@@ -71,7 +71,7 @@ pub(crate) trait Stored: Serialize + DeserializeOwned {
 /// The list of [`Stored::LEARNED`]: files of `learned/`, whose names end in `$end`.
 macro_rules! learned {
     ($end:literal: $($name:literal),+) => {
-        &[$(($name, include_str!(concat!("../learned/", $name, $end)))),+]
+        &[$(($name, include_str!(concat!("../../learned/", $name, $end)))),+]
     };
 }
 pub(crate) use learned;
@@ -87,7 +87,7 @@ macro_rules! stored {
             /// If it cannot be read, is not JSON, has unknown or missing fields, or parameters that do
             /// not suit the softness.
             pub fn load(path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
-                Self::parse(&crate::file::read(path.as_ref())?, path)
+                Self::parse(&crate::softness_file::stored::read(path.as_ref())?, path)
             }
 
             /// Parses and checks the text of a file; `path` names it in errors.
@@ -96,7 +96,7 @@ macro_rules! stored {
             ///
             /// Those of `load` but for reading.
             pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
-                crate::file::parse(text, path.as_ref())
+                crate::softness_file::stored::parse(text, path.as_ref())
             }
 
             /// Checks the parameters and writes the file at `path`, replacing what was there.
@@ -108,7 +108,7 @@ macro_rules! stored {
             ///
             /// If the parameters do not suit the softness, or the file cannot be written.
             pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SoftnessFileError> {
-                crate::file::save(self, path.as_ref())
+                crate::softness_file::stored::save(self, path.as_ref())
             }
 
             /// Checks the parameters; what `save` would write at `path`.
@@ -117,7 +117,7 @@ macro_rules! stored {
             ///
             /// If the parameters do not suit the softness.
             pub fn text(&self, path: impl AsRef<Path>) -> Result<String, SoftnessFileError> {
-                crate::file::text(self, path.as_ref())
+                crate::softness_file::stored::text(self, path.as_ref())
             }
 
             /// What was learned on a task and comes with the crate; its note says how it was learned.
@@ -126,12 +126,14 @@ macro_rules! stored {
             ///
             /// If there is none of this name.
             pub fn learned(name: &str) -> Result<Self, SoftnessFileError> {
-                crate::file::learned_of(name)
+                crate::softness_file::stored::learned_of(name)
             }
 
             /// The names of those that come with the crate.
             pub fn learned_names() -> impl Iterator<Item = &'static str> {
-                <Self as crate::file::Stored>::LEARNED.iter().map(|(name, _)| *name)
+                <Self as crate::softness_file::stored::Stored>::LEARNED
+                    .iter()
+                    .map(|(name, _)| *name)
             }
         }
     };

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::file::LARGEST_LOGARITHM;
+use crate::softness_file::stored::LARGEST_LOGARITHM;
 
 /// How a run goes along the path of its scale by what it sees, and not by time: a closed loop.
 ///
