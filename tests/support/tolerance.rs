@@ -78,14 +78,17 @@ impl ToleranceCase {
         self.deviations_on::<Exact>(2e-14, 0.0)
     }
 
-    /// The same in f32: vertices are rounded to that before they are compared. Rounding of tables and sums does not count: 1e-5 for the
-    /// pixel, and 3e-7 for each face.
+    /// The same in f32: vertices are rounded to that before they are compared. Rounding of cubics and sums does not count: a relative error of
+    /// the sum, some 32 roundings for each term and one for each face that is added, moves the coverage by `S dA/dS` times as much, which
+    /// the T-conorm bounds.
     ///
     /// # Panics
     ///
     /// If the T-conorm has no such name, or there are no widths.
     pub fn deviations_in_f32(&self) -> Vec<Deviation> {
-        self.deviations_on::<NdArray<f32>>(1e-6, 1e-5 + 3e-7 * self.faces as f64)
+        let t_conorm: TConorm = self.t_conorm.parse().expect("a T-conorm");
+        let of_sum = f64::from(f32::EPSILON) / 2.0 * (32.0 + self.faces as f64);
+        self.deviations_on::<NdArray<f32>>(1e-6, of_sum * steepness(t_conorm).max(1.0))
     }
 
     /// `rounding` is that of a distance, absolute (NDC) and relative; `of_sums` that of a coverage.
@@ -168,6 +171,15 @@ impl ToleranceCase {
         }
         vertices
     }
+}
+
+/// The largest `S dA/dS` of a coverage A by its sum S.
+fn steepness(t_conorm: TConorm) -> f64 {
+    let moved = |k: i32| {
+        let sum = f64::exp2(0.25 * f64::from(k));
+        (t_conorm.coverage_of(1.001 * sum) - t_conorm.coverage_of(sum)) / 0.001
+    };
+    (-120..80).map(moved).fold(0.0, f64::max)
 }
 
 /// Ranges of coverage that rounding of distances allows.

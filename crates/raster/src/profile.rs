@@ -173,15 +173,20 @@ struct Bound {
     excess: f64,
     /// Where coverage rises fastest with the sum.
     steepest: f64,
-    /// Relative rounding of a term.
+    /// Relative rounding of a term, and relative errors of a term and of the coverage that it alone makes that interpolation may cost.
     rounding: f64,
+    of_term: f64,
+    of_coverage: f64,
 }
 
 impl Bound {
     fn new(t_conorm: TConorm, tolerance: f64, faces: usize, rounding: f64) -> Self {
         let faces = faces as f64;
         let excess = t_conorm.slack(tolerance / 2.0) / faces;
-        Self { t_conorm, tolerance, faces, excess, steepest: steepest(t_conorm), rounding }
+        let of_coverage = tolerance / 4.0 + rounding;
+        let of_term = tolerance / (4.0 * t_conorm.sensitivity().max(1.0)) + rounding;
+        let steepest = steepest(t_conorm);
+        Self { t_conorm, tolerance, faces, excess, steepest, rounding, of_term, of_coverage }
     }
 
     /// The coverage of a sum that is not below 0 but for rounding.
@@ -198,12 +203,11 @@ impl Bound {
     /// How far a term is off, in multiples of what interpolation may cost: either the term itself is right, or the coverage that it alone
     /// makes.
     fn of_interpolation(&self, exact: f64, interpolated: f64) -> f64 {
-        let Self { t_conorm, tolerance, faces, excess, rounding, .. } = *self;
-        let of_term = tolerance / (4.0 * t_conorm.sensitivity().max(1.0)) + rounding;
-        let term = (exact - interpolated).abs() / (of_term * exact.abs() + excess / 2.0);
-        let of_coverage = (tolerance / 4.0 + rounding) * self.covered(exact);
-        let alone = self.moved(exact, interpolated) / (of_coverage + tolerance / (4.0 * faces));
-        term.min(alone)
+        let of_term = self.of_term * exact.abs() + self.excess / 2.0;
+        let of_coverage =
+            self.of_coverage * self.covered(exact) + self.tolerance / (4.0 * self.faces);
+        let term = (exact - interpolated).abs() / of_term;
+        term.min(self.moved(exact, interpolated) / of_coverage)
     }
 
     /// How far terms are from the constants that stand for them before the cells and beyond them, in multiples of what culling may cost
@@ -213,8 +217,10 @@ impl Bound {
         for (side, sign) in SIGNS.into_iter().enumerate() {
             let end = grid.distance(side, 1.0);
             let ratio = (FARTHEST_DRAWN / end).max(1.0).powf(1.0 / f64::from(BEYOND_END));
+            // Nothing is drawn beyond a side that ends farther away.
+            let nearest = if end < FARTHEST_DRAWN { end } else { BEYOND * end };
             distances.push(sign * BEYOND * end);
-            distances.extend((0..=BEYOND_END).map(|k| sign * end * ratio.powi(k as i32)));
+            distances.extend((0..=BEYOND_END).map(|k| sign * nearest * ratio.powi(k as i32)));
             distances.push(sign * grid.distance(side, 0.0).max(1e-15));
             distances.extend((1..8).map(|k| sign * grid.from[side] * f64::from(k) / 8.0));
         }

@@ -158,7 +158,7 @@ fn the_same_numbers_come_out_every_time() {
         return;
     }
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let scene = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, &[0.02]);
+    let scene = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
     let [first, second] = [(); 2].map(|()| Products::new::<Wgpu>(&scene, DType::F32, Path::Fused));
     assert_eq!(first, second);
 }
