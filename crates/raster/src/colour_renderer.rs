@@ -396,7 +396,7 @@ impl<S: Softness> Prepared<S> {
 /// Makes the tables of an op that runs on slices.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
-pub struct WeightTables<S>(Prepared<S>);
+pub struct WeightTables<S = EdgeSoftness>(Prepared<S>);
 
 impl<S: Softness> WeightTables<S> {
     /// Rows of both tables.
