@@ -78,7 +78,7 @@ impl ToleranceCase {
         self.deviations_on::<Exact>(2e-14, 0.0)
     }
 
-    /// The same in f32: vertices are rounded to that before they are compared. Rounding of cubics and sums does not count: a relative error of
+    /// Deviations in f32: vertices are rounded to that before they are compared. Rounding of cubics and sums does not count: a relative error of
     /// the sum, some 32 roundings for each term and one for each face that is added, moves the coverage by `S dA/dS` times as much, which
     /// the T-conorm bounds.
     ///

@@ -20,7 +20,7 @@ pub struct ScheduledRenderer {
     size: usize,
     tolerance: f64,
     resolution: Resolution,
-    /// What draws silhouettes, if the problem has any.
+    /// Renderers of silhouettes, if the problem has any.
     renderer: Option<SoftRenderer<EdgeSoftness>>,
     /// What was drawn with so far, by its place on the path.
     kept: RefCell<BTreeMap<u64, Rc<Kept>>>,

@@ -221,7 +221,7 @@ impl<S: Softness> ColourRenderer<S> {
         let data = match prepared.tables.take() {
             Some((phi, data)) if phi == self.phi => data,
             _ => {
-                // In f64, whatever it is drawn with: in f32 some families lose five of their seven digits.
+                // In f64, whatever it is drawn with: rounding of an f32 shows in the tables of some families.
                 let precise = |phi: &Vec<f64>| precise::<HostBackend>(phi, &Default::default());
                 let data = prepared.tables(self.phi.each_ref().map(precise)).into_data();
                 // Another thread may have prepared something else in between.

@@ -135,7 +135,7 @@ impl Profile {
         self.curve.grid
     }
 
-    /// The same support with `2^bits` cells in each octave, whose error is not measured.
+    /// Another number of cells, `2^bits` in each octave, in the same support; their error is not measured.
     pub(crate) fn with_cells(mut self, bits: u32) -> Self {
         self.curve.grid.bits = bits;
         self
@@ -164,12 +164,12 @@ impl Profile {
     }
 }
 
-/// What terms may be off by, for a tolerance and a number of faces.
+/// Largest errors of terms, for a tolerance and a number of faces.
 struct Bound {
     t_conorm: TConorm,
     tolerance: f64,
     faces: f64,
-    /// What culling may cost the sum for each face.
+    /// Largest error of the sum by culling, for each face.
     excess: f64,
     /// Where coverage rises fastest with the sum.
     steepest: f64,

@@ -119,8 +119,8 @@ impl<S: Softness> Silhouette<S> {
         self.profile.table(&self.softness, phi)
     }
 
-    /// The numbers of the table of plain parameters, computed on the CPU in f64, whatever it is drawn with: in f32 some families lose five
-    /// of their seven digits, and all of them their curvature. A GPU gets it in one piece, instead of some sixty small kernels over a few
+    /// The numbers of the table of plain parameters, computed on the CPU in f64, whatever it is drawn with: tables made in f32
+    /// put a pixel off by 2e-5 under a Gamma law, and lose their curvature. A GPU gets it in one piece, instead of some sixty small kernels over a few
     /// hundred numbers.
     #[doc(hidden)]
     pub fn table_data(&self, phi: &[f64]) -> TensorData {

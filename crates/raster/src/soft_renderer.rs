@@ -117,7 +117,7 @@ impl<S: Softness> SoftRenderer<S> {
         self.with_surrogate_phi(softness, phi)
     }
 
-    /// The same with parameters `phi` `[parameters]` of that softness in place of a scale.
+    /// A surrogate with parameters `phi` `[parameters]` in place of a scale; see [`with_surrogate`](Self::with_surrogate).
     ///
     /// # Panics
     ///

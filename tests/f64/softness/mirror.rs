@@ -1,11 +1,10 @@
 //! The logarithm of a softness, far into its tails.
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
+use burn::{backend::NdArray, tensor::Tensor};
 use softrast_softness::{EdgeSoftness, Family, Mirrored, OPAQUE, Softness};
 use softrast_tests::{numbers, vector};
+
+use super::provided::ValueOf;
 
 type B = NdArray<f64>;
 
@@ -56,20 +55,6 @@ fn a_mirrored_family_is_the_family_of_the_mirrored_law() {
             let expected = other.depth_and_hazard(phi, vector(&x));
             assert_eq!(depths.map(numbers), expected.map(numbers), "{softness:?}");
         }
-    }
-}
-
-/// The value of a family, with all else provided.
-#[derive(Clone, Debug)]
-struct ValueOf(Family);
-
-impl Softness for ValueOf {
-    fn value<T: Backend, const D: usize>(
-        &self,
-        phi: Tensor<T, 1>,
-        x: Tensor<T, D>,
-    ) -> Tensor<T, D> {
-        self.0.value(phi, x)
     }
 }
 

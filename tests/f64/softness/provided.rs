@@ -20,7 +20,7 @@ const DISTANCES: [f64; 8] = [-0.93, -0.7, -0.41, -0.09, 0.087, 0.43, 0.71, 0.95]
 
 /// A family of which nothing is known but its value and the number of its parameters.
 #[derive(Clone, Debug)]
-struct ValueOf(Family);
+pub(crate) struct ValueOf(pub(crate) Family);
 
 impl Softness for ValueOf {
     fn value<B: Backend, const D: usize>(
