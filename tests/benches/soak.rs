@@ -6,10 +6,21 @@
 use std::{
     env,
     process::ExitCode,
+    sync::{
+        Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
     time::{Duration, Instant},
 };
 
 use softrast_tests::{Deviation, ToleranceCase};
+
+/// What each case is drawn in.
+const FLOATS: [&str; 2] = ["f64", "f32"];
+
+/// Time between two lines of progress.
+const PROGRESS: Duration = Duration::from_secs(60);
 
 /// Images that were compared, and what came of it.
 #[derive(Default)]
@@ -36,20 +47,38 @@ fn main() -> ExitCode {
     let words = env::args().skip(1).filter(|word| word != "--bench");
     let numbers: Vec<u64> = words.map(|word| word.parse().expect("a whole number")).collect();
     let &[seed, cases, seconds] = numbers.as_slice() else { panic!("usage: SEED CASES SECONDS") };
-    let (start, mut double, mut single) = (Instant::now(), Tally::default(), Tally::default());
     println!("seed {seed}");
-    let mut drawn = 0;
-    while drawn < cases && start.elapsed() < Duration::from_secs(seconds) {
-        let case = ToleranceCase::random(seed.wrapping_add(drawn));
-        double.take("f64", &case, &case.deviations());
-        single.take("f32", &case, &case.deviations_in_f32());
-        drawn += 1;
-    }
-    for (float, Tally { images, stated_above, violations }) in [("f64", &double), ("f32", &single)]
-    {
+    let (start, drawn) = (Instant::now(), AtomicU64::new(0));
+    let tallies = Mutex::new(([Tally::default(), Tally::default()], Instant::now()));
+    let search = || {
+        while start.elapsed() < Duration::from_secs(seconds) {
+            let draw = drawn.fetch_add(1, Ordering::Relaxed);
+            if draw >= cases {
+                break;
+            }
+            let case = ToleranceCase::random(seed.wrapping_add(draw));
+            let deviations = [case.deviations(), case.deviations_in_f32()];
+            let (tallies, told) = &mut *tallies.lock().expect("no draw panics");
+            for ((tally, float), deviations) in tallies.iter_mut().zip(FLOATS).zip(&deviations) {
+                tally.take(float, &case, deviations);
+            }
+            if told.elapsed() > PROGRESS {
+                *told = Instant::now();
+                eprintln!("{draw} cases");
+            }
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(search);
+        }
+    });
+    let drawn = drawn.into_inner().min(cases);
+    let (tallies, _) = tallies.into_inner().expect("no draw panics");
+    for (float, Tally { images, stated_above, violations }) in FLOATS.iter().zip(&tallies) {
         println!(
             "{float}: {drawn} cases, {images} images, {stated_above} with an error above the tolerance that is stated, {violations} violations"
         );
     }
-    ExitCode::from(u8::from(double.violations + single.violations > 0))
+    ExitCode::from(u8::from(tallies.iter().any(|tally| tally.violations > 0)))
 }

@@ -47,25 +47,17 @@ impl Softness for EdgeSoftness {
         self.by_distance(hazard, x)
     });
 
-    fn depth_and_hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.depth_and_hazard(phi, x); 2] => {
         let [depth, hazard] = self.family.depth_and_hazard(phi, self.argument(x.clone()));
         [depth, self.by_distance(hazard, x)]
-    }
+    });
 
     curve!(self.log_value(phi, x) => self.family.log_value(phi, self.argument(x)));
 
-    fn log_value_and_slope<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.log_value_and_slope(phi, x); 2] => {
         let [value, slope] = self.family.log_value_and_slope(phi, self.argument(x.clone()));
         [value, self.by_distance(slope, x)]
-    }
+    });
 
     fn parameters(&self) -> usize {
         self.family.parameters()

@@ -69,13 +69,9 @@ impl Softness for Family {
     curve!(self.optical_depth(phi, x) => families!(dispatch self.optical_depth(phi, x)));
     curve!(self.hazard(phi, x) => families!(dispatch self.hazard(phi, x)));
 
-    fn depth_and_hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.depth_and_hazard(phi, x); 2] => {
         families!(dispatch self.depth_and_hazard(phi, x))
-    }
+    });
 
     /// Minus the optical depth of the mirrored step at `-x`, which keeps the digits of tails.
     fn log_value<B: Backend, const D: usize>(
@@ -86,14 +82,10 @@ impl Softness for Family {
         self.mirrored().optical_depth(phi, x.neg()).neg()
     }
 
-    fn log_value_and_slope<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.log_value_and_slope(phi, x); 2] => {
         let [depth, hazard] = self.mirrored().depth_and_hazard(phi, x.neg());
         [depth.neg(), hazard]
-    }
+    });
 
     fn default_phi(&self, scale: f64) -> Vec<f64> {
         families!(dispatch self.default_phi(scale))

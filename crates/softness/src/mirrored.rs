@@ -17,25 +17,17 @@ impl<S: Softness> Softness for Mirrored<S> {
         slope
     });
 
-    fn depth_and_hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.depth_and_hazard(phi, x); 2] => {
         let [value, slope] = self.0.log_value_and_slope(phi, x.neg());
         [value.neg(), slope]
-    }
+    });
 
     curve!(self.log_value(phi, x) => self.0.optical_depth(phi, x.neg()).neg());
 
-    fn log_value_and_slope<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.log_value_and_slope(phi, x); 2] => {
         let [depth, hazard] = self.0.depth_and_hazard(phi, x.neg());
         [depth.neg(), hazard]
-    }
+    });
 
     fn parameters(&self) -> usize {
         self.0.parameters()

@@ -165,7 +165,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
     }
 }
 
-/// A method of [`Softness`] on distances: the trait's signature, with this body.
+/// A method of [`Softness`] on distances: the trait's signature, with this body; in brackets, one that gives as many tensors.
 macro_rules! curve {
     ($self:ident.$method:ident($phi:ident, $x:ident) => $body:expr) => {
         fn $method<B: Backend, const D: usize>(
@@ -173,6 +173,15 @@ macro_rules! curve {
             $phi: Tensor<B, 1>,
             $x: Tensor<B, D>,
         ) -> Tensor<B, D> {
+            $body
+        }
+    };
+    ([$self:ident.$method:ident($phi:ident, $x:ident); $count:literal] => $body:expr) => {
+        fn $method<B: Backend, const D: usize>(
+            &$self,
+            $phi: Tensor<B, 1>,
+            $x: Tensor<B, D>,
+        ) -> [Tensor<B, D>; $count] {
             $body
         }
     };

@@ -1,6 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use super::half_line::HalfLine;
+use super::half_line::{HalfLine, Law};
 use crate::math::rise;
 
 /// The exponential law, `F(y) = 1 - exp(-y)`; φ `[2]` is the logarithm of the scale, in the unit
@@ -12,25 +12,16 @@ use crate::math::rise;
 pub struct Exp;
 
 impl HalfLine for Exp {
-    fn split<B: Backend, const D: usize>(
+    fn law<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Law<B, D> {
+        let above = y.clone().neg().exp();
+        Law { below: rise(y), slope: above.clone(), above }
+    }
+
+    fn depth<B: Backend, const D: usize>(
         _phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
-    ) -> (Tensor<B, D>, Tensor<B, D>) {
-        (rise(y.clone()), y.neg().exp())
-    }
-
-    fn slope<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        y.neg().exp()
-    }
-
-    fn depth<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        y
-    }
-
-    fn depth_slope<B: Backend, const D: usize>(
-        _phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        y.ones_like()
+    ) -> [Tensor<B, D>; 2] {
+        let slope = y.ones_like();
+        [y, slope]
     }
 }

@@ -2,7 +2,7 @@ use std::ops::RangeInclusive;
 
 use burn::tensor::{Tensor, backend::Backend};
 
-use super::half_line::HalfLine;
+use super::half_line::{HalfLine, Law};
 use crate::math::{ln_gamma, parameter};
 
 /// The shapes that the fixed numbers of terms below are good for; others count as the nearest end.
@@ -31,41 +31,43 @@ const FLOOR: f64 = 1e-8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gamma;
 
-/// The pieces of the incomplete gamma function at one set of distances.
+/// The incomplete gamma function at one set of distances.
 struct Pieces<B: Backend, const D: usize> {
-    /// The shape, `[1; D]`.
-    p: Tensor<B, D>,
-    /// The distance, at least [`FLOOR`].
-    y: Tensor<B, D>,
     /// Where the continued fraction serves.
     far: Tensor<B, D, burn::tensor::Bool>,
     /// `P(p, y)` where the series serves, 0 elsewhere.
     below: Tensor<B, D>,
-    /// The continued fraction `y^p exp(-y) / (Γ(p) Q(p, y))`, at a farther distance where the
-    /// series serves.
-    fraction: Tensor<B, D>,
+    /// `dP/dy`.
+    slope: Tensor<B, D>,
     /// `-ln Q(p, y)` where the fraction serves.
     far_depth: Tensor<B, D>,
+    /// The derivative of `far_depth`.
+    far_depth_slope: Tensor<B, D>,
 }
 
 impl<B: Backend, const D: usize> Pieces<B, D> {
-    fn new(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Self {
+    fn new(phi: &Tensor<B, 1>, distance: Tensor<B, D>) -> Self {
         let p: Tensor<B, D> = parameter(phi, 1).clamp(SHAPES.start().ln(), SHAPES.end().ln()).exp();
-        let y = y.clamp_min(FLOOR);
+        let y = distance.clone().clamp_min(FLOOR);
         let switch = p.clone() + SWITCH;
         let far = (y.clone() - switch.clone()).greater_equal_elem(0.0);
 
         // Both are selected by their argument, so that neither meets one that it cannot bear.
         let y_near = y.clone().clamp_max(SHAPES.end() + SWITCH);
-        let ln_front = p.clone() * y_near.clone().log() - y_near.clone();
+        let ln_front = y_near.clone().log() * p.clone() - y_near.clone();
         let below = (ln_front - ln_gamma(p.clone() + 1.0)).exp() * series(p.clone(), y_near);
         let below = below.mask_fill(far.clone(), 0.0);
 
         let y_far = (y.clone() + switch).mask_where(far.clone(), y.clone());
         let fraction = fraction(p.clone(), y_far.clone());
         let far_depth =
-            y_far.clone() - p.clone() * y_far.log() + ln_gamma(p.clone()) + fraction.clone().log();
-        Self { p, y, far, below, fraction, far_depth }
+            y_far.clone() - y_far.log() * p.clone() + ln_gamma(p.clone()) + fraction.clone().log();
+
+        let close = distance.clone().lower_elem(FLOOR);
+        let (part, rate) = begun(&p, distance);
+        let curve = (y.clone().log() * (p.clone() - 1.0) - y.clone() - ln_gamma(p)).exp();
+        let slope = curve.mask_where(close, below.clone() * rate);
+        Self { far, below: below * part, slope, far_depth, far_depth_slope: fraction / y }
     }
 }
 
@@ -94,7 +96,7 @@ fn fraction<B: Backend, const D: usize>(p: Tensor<B, D>, y: Tensor<B, D>) -> Ten
     let deepest = start.clone() + 2.0 * TERMS as f64;
     (1..=TERMS).rev().fold(deepest, |rest, k| {
         let k = k as f64;
-        start.clone() + 2.0 * (k - 1.0) - (p.clone().neg() + k) * k / rest
+        rest.recip() * ((p.clone() - k) * k) + start.clone() + 2.0 * (k - 1.0)
     })
 }
 
@@ -102,39 +104,22 @@ impl HalfLine for Gamma {
     // The shape that the paper uses.
     const SHAPES: &'static [f64] = &[0.5];
 
-    fn split<B: Backend, const D: usize>(
+    fn law<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Law<B, D> {
+        let Pieces { far, below, slope, far_depth, .. } = Pieces::new(phi, y);
+        let far_above = far_depth.neg().exp();
+        let above = (below.clone().neg() + 1.0).mask_where(far.clone(), far_above.clone());
+        Law { below: below.mask_where(far, far_above.neg() + 1.0), above, slope }
+    }
+
+    fn depth<B: Backend, const D: usize>(
         phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
-    ) -> (Tensor<B, D>, Tensor<B, D>) {
-        let start = y.clone();
-        let Pieces { p, far, below, far_depth, .. } = Pieces::new(phi, y);
-        let above = far_depth.neg().exp();
-        let below = below * begun(&p, start).0;
-        let (near_rest, far_rest) = (below.clone().neg() + 1.0, above.clone().neg() + 1.0);
-        (below.mask_where(far.clone(), far_rest), near_rest.mask_where(far, above))
-    }
-
-    fn slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        let close = y.clone().lower_elem(FLOOR);
-        let start = y.clone();
-        let Pieces { p, y, below, .. } = Pieces::new(phi, y);
-        let (_, rate) = begun(&p, start);
-        let curve = ((p.clone() - 1.0) * y.clone().log() - y - ln_gamma(p)).exp();
-        curve.mask_where(close, below * rate)
-    }
-
-    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        let start = y.clone();
-        let Pieces { p, far, below, far_depth, .. } = Pieces::new(phi, y);
-        (below * begun(&p, start).0).neg().log1p().neg().mask_where(far, far_depth)
-    }
-
-    fn depth_slope<B: Backend, const D: usize>(
-        phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        let (start, slope) = (y.clone(), Self::slope(phi, y.clone()));
-        let Pieces { p, y, far, below, fraction, .. } = Pieces::new(phi, y);
-        (slope / ((below * begun(&p, start).0).neg() + 1.0)).mask_where(far, fraction / y)
+    ) -> [Tensor<B, D>; 2] {
+        let Pieces { far, below, slope, far_depth, far_depth_slope } = Pieces::new(phi, y);
+        let below = below.neg();
+        [
+            below.clone().log1p().neg().mask_where(far.clone(), far_depth),
+            (slope / (below + 1.0)).mask_where(far, far_depth_slope),
+        ]
     }
 }

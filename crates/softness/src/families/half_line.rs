@@ -16,28 +16,13 @@ pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
     /// Positive parameters of the law, to start from; φ holds their logarithms.
     const SHAPES: &'static [f64] = &[];
 
-    /// The distribution function `F(y)` and its complement `1 - F(y)`, each with its own digits.
-    fn split<B: Backend, const D: usize>(
-        phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> (Tensor<B, D>, Tensor<B, D>);
+    /// The law at each distance.
+    fn law<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Law<B, D>;
 
-    /// `dF/dy`.
-    fn slope<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D>;
-
-    /// `-ln(1 - F(y))`.
-    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        let (below, above) = Self::split(phi, y);
-        optical_depth_of(below, above)
-    }
-
-    /// The derivative of [`HalfLine::depth`].
-    fn depth_slope<B: Backend, const D: usize>(
-        phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        let (_, above) = Self::split(phi, y.clone());
-        Self::slope(phi, y) / above
+    /// `-ln(1 - F(y))` and its derivative.
+    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> [Tensor<B, D>; 2] {
+        let Law { below, above, slope } = Self::law(phi, y);
+        [optical_depth_of(below, above.clone()), slope / above]
     }
 
     /// Parameters to start from: no shift.
@@ -45,6 +30,16 @@ pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
         let shapes = Self::SHAPES.iter().map(|shape| shape.ln());
         [ln_scale(scale)].into_iter().chain(shapes).chain([0.0]).collect()
     }
+}
+
+/// A distribution at one set of distances.
+pub(crate) struct Law<B: Backend, const D: usize> {
+    /// `F(y)`.
+    pub(crate) below: Tensor<B, D>,
+    /// `1 - F(y)`, with its own digits.
+    pub(crate) above: Tensor<B, D>,
+    /// `dF/dy`.
+    pub(crate) slope: Tensor<B, D>,
 }
 
 /// A one-sided law as it stands: `s = F(x / scale + shift)`, which is 0 outside and rises inside.
@@ -81,12 +76,12 @@ fn law_distance<L: HalfLine, B: Backend, const D: usize>(
 }
 
 /// `f(max(y, 0))` where the law has begun, 0 before.
-fn where_begun<B: Backend, const D: usize>(
+fn where_begun<B: Backend, const D: usize, const N: usize>(
     y: Tensor<B, D>,
-    f: impl FnOnce(Tensor<B, D>) -> Tensor<B, D>,
-) -> Tensor<B, D> {
+    f: impl FnOnce(Tensor<B, D>) -> [Tensor<B, D>; N],
+) -> [Tensor<B, D>; N] {
     let before = y.clone().lower_elem(0.0);
-    f(y.clamp(0.0, FAR)).mask_fill(before, 0.0)
+    f(y.clamp(0.0, FAR)).map(|it| it.mask_fill(before.clone(), 0.0))
 }
 
 impl<L: HalfLine> Softness for Forward<L> {
@@ -103,21 +98,30 @@ impl<L: HalfLine> Softness for Forward<L> {
     }
 
     curve!(self.value(phi, x) => {
-        where_begun(law_distance::<L, B, D>(&phi, x, 1.0), |y| L::split(&phi, y).0)
+        let [below] = where_begun(law_distance::<L, B, D>(&phi, x, 1.0), |y| [L::law(&phi, y).below]);
+        below
     });
 
     curve!(self.density(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, 1.0);
-        where_begun(y, |y| L::slope(&phi, y)) * per_scale(&phi)
+        let [slope] = where_begun(y, |y| [L::law(&phi, y).slope]);
+        slope * per_scale(&phi)
     });
 
     curve!(self.optical_depth(phi, x) => {
-        where_begun(law_distance::<L, B, D>(&phi, x, 1.0), |y| L::depth(&phi, y))
+        let [depth, _] = self.depth_and_hazard(phi, x);
+        depth
     });
 
     curve!(self.hazard(phi, x) => {
+        let [_, hazard] = self.depth_and_hazard(phi, x);
+        hazard
+    });
+
+    curve!([self.depth_and_hazard(phi, x); 2] => {
         let y = law_distance::<L, B, D>(&phi, x, 1.0);
-        where_begun(y, |y| L::depth_slope(&phi, y)) * per_scale(&phi)
+        let [depth, slope] = where_begun(y, |y| L::depth(&phi, y));
+        [depth, slope * per_scale(&phi)]
     });
 }
 
@@ -136,26 +140,30 @@ impl<L: HalfLine> Softness for Reversed<L> {
 
     curve!(self.value(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
-        L::split(&phi, y.clamp(0.0, FAR)).1
+        L::law(&phi, y.clamp(0.0, FAR)).above
     });
 
     curve!(self.density(phi, x) => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
-        where_begun(y, |y| L::slope(&phi, y)) * per_scale(&phi)
+        let [slope] = where_begun(y, |y| [L::law(&phi, y).slope]);
+        slope * per_scale(&phi)
     });
 
     curve!(self.optical_depth(phi, x) => {
-        let y = law_distance::<L, B, D>(&phi, x, -1.0);
-        let (open, covered) = L::split(&phi, y.clamp(0.0, FAR));
-        bounded_depth(covered, open)
+        let [depth, _] = self.depth_and_hazard(phi, x);
+        depth
     });
 
     curve!(self.hazard(phi, x) => {
+        let [_, hazard] = self.depth_and_hazard(phi, x);
+        hazard
+    });
+
+    curve!([self.depth_and_hazard(phi, x); 2] => {
         let y = law_distance::<L, B, D>(&phi, x, -1.0);
-        let slope = where_begun(y, |y| {
-            let (open, _) = L::split(&phi, y.clone());
-            bounded_hazard(L::slope(&phi, y), open)
-        });
-        slope * per_scale(&phi)
+        let before = y.clone().lower_elem(0.0);
+        let Law { below: open, above: covered, slope } = L::law(&phi, y.clamp(0.0, FAR));
+        let hazard = bounded_hazard(slope, open.clone()).mask_fill(before, 0.0);
+        [bounded_depth(covered, open), hazard * per_scale(&phi)]
     });
 }

@@ -1,6 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 
-use super::half_line::HalfLine;
+use super::half_line::{HalfLine, Law};
 use crate::error_function::{erf, erfc};
 
 /// Distances below this count as it: `erfc(sqrt(1 / 2y))` is 0 there in f64 already.
@@ -15,23 +15,13 @@ const FLOOR: f64 = 5e-4;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Levy;
 
-/// `1 / 2y`.
-fn half_inverse<B: Backend, const D: usize>(y: Tensor<B, D>) -> Tensor<B, D> {
-    (y.clamp_min(FLOOR) * 2.0).recip()
-}
-
 impl HalfLine for Levy {
-    fn split<B: Backend, const D: usize>(
-        _phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> (Tensor<B, D>, Tensor<B, D>) {
-        let root = half_inverse(y).sqrt();
-        (erfc(root.clone()), erf(root))
-    }
-
-    fn slope<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Tensor<B, D> {
-        // y^(-3/2) exp(-1 / 2y) / sqrt(2 π), in powers of 1 / 2y.
-        let v = half_inverse(y);
-        v.clone().sqrt() * v.clone() * v.neg().exp() * (2.0 / std::f64::consts::PI.sqrt())
+    fn law<B: Backend, const D: usize>(_phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Law<B, D> {
+        // The slope is y^(-3/2) exp(-1 / 2y) / sqrt(2 π), in powers of v = 1 / 2y.
+        let v = (y.clamp_min(FLOOR) * 2.0).recip();
+        let root = v.clone().sqrt();
+        let slope =
+            root.clone() * v.clone() * v.neg().exp() * (2.0 / std::f64::consts::PI.sqrt());
+        Law { below: erfc(root.clone()), above: erf(root), slope }
     }
 }

@@ -110,12 +110,8 @@ impl Softness for Mlp {
         hazard
     });
 
-    fn depth_and_hazard<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    curve!([self.depth_and_hazard(phi, x); 2] => {
         let (logit, slope) = Self::logit_and_slope(&phi, x);
         [Logistic::depth(logit.clone()), Logistic::depth_slope(logit) * slope]
-    }
+    });
 }
