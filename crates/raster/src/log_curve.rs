@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::{DType, Tensor, backend::Backend};
 use softrast_softness::{
     DepthSoftness, EdgeSoftness, Family, Mirrored, Softness, numbers, settled_beyond, support,
 };
@@ -80,7 +80,7 @@ impl<S: Softness> LogCurve<S> {
         let rounding = rounding::<B>(device);
         let miss = |exact: f64, interpolated: f64| precision.error(exact, interpolated, rounding);
         let (curve, error) =
-            CubicCurve::chosen::<B>(curve, [outer, inner], from, &FAR, miss, device);
+            CubicCurve::chosen::<B>(curve, [outer, inner], from, &FAR, miss, DType::F32, device);
         Self { softness, curve, error }
     }
 

@@ -1,9 +1,11 @@
-use burn::tensor::{Tensor, backend::Backend};
+use burn::tensor::{DType, Element, Tensor, backend::Backend};
 use softrast_softness::{Softness, numbers, support};
 
 use crate::{
-    TConorm,
-    curve::{BEYOND, CubicCurve, FAR, FARTHEST_DRAWN, SIGNS, precise, rounding, settled_until},
+    HostBackend, RasterBackend, Rasterizer, TConorm,
+    curve::{
+        BEYOND, CubicCurve, FAR, FARTHEST_DRAWN, SIGNS, precise, rounding, settled_until, worse,
+    },
     kernel::Grid,
 };
 
@@ -23,6 +25,8 @@ const BEYOND_END: u32 = 24;
 pub struct Profile {
     curve: CubicCurve,
     t_conorm: TConorm,
+    /// Float type of the sums.
+    sums: DType,
     error: f64,
 }
 
@@ -51,42 +55,30 @@ impl Profile {
     /// the culled tail is below Adam's usual epsilon of 1e-8 times the image's own; choose a
     /// smaller tolerance where faces must be drawn in from afar (docs/notes.md, Culling: gradient).
     ///
-    /// `device` belongs to the backend that evaluates the softness, in f64 where it can.
+    /// `B` is the backend that draws; support and knots are chosen on the CPU, in f64.
     ///
     /// # Panics
     ///
-    /// If `tolerance` is not in (0, 1), `faces` is 0, or `phi` has the wrong length.
-    pub fn new<B: Backend>(
+    /// If the tolerance is not in (0, 1), `faces` is 0, or `phi` has the wrong length.
+    pub fn new<B: RasterBackend>(
+        &Rasterizer { t_conorm, tolerance, .. }: &Rasterizer,
         softness: &impl Softness,
-        t_conorm: TConorm,
         phi: &[f64],
         faces: usize,
-        tolerance: f64,
-        device: &B::Device,
     ) -> Self {
-        Self::chosen::<B>(softness, t_conorm, phi, faces, tolerance, &FAR, device)
-    }
-
-    /// [`Profile::new`] with the choice of octaves at the end of the support; none of them if `far`
-    /// is empty, for look-ups that know none.
-    pub(crate) fn chosen<B: Backend>(
-        softness: &impl Softness,
-        t_conorm: TConorm,
-        phi: &[f64],
-        faces: usize,
-        tolerance: f64,
-        far: &[u32],
-        device: &B::Device,
-    ) -> Self {
+        let sums = <B::FloatElem as Element>::dtype();
+        // The look-up of a GPU knows no cells that are counted from the far end.
+        let far = if B::ON_HOST { &FAR[..] } else { &[] };
+        let device = &Default::default();
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         assert!(faces > 0, "a profile needs at least one face");
         let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
         // The T-conorm bends the optical depth: ask for the depth that makes up the excess.
-        let limits = support::<B>(softness, phi, excess, device);
+        let limits = support::<HostBackend>(softness, phi, excess, device);
         let depth = depth_of_excess(t_conorm, limits.left, excess);
-        let support = support::<B>(softness, phi, depth, device);
+        let support = support::<HostBackend>(softness, phi, depth, device);
         // Deep inside, what counts is the light left, which knows nothing of the number of faces.
-        let shallow = support_inside::<B>(softness, phi, tolerance / 2.0, device);
+        let shallow = support_inside(softness, phi, tolerance / 2.0);
         let radii = [support.outer, support.inner.min(shallow)];
         let from = || {
             // What is left of the budget of interpolation then suffices for the first cells.
@@ -95,23 +87,34 @@ impl Profile {
                 (q - edge).abs() <= depth / 4.0 || (-q.min(edge)).exp() <= light / 4.0
             };
             let depths = |x: &[f64]| {
-                numbers(softness.optical_depth(precise::<B>(phi, device), precise::<B>(x, device)))
+                numbers(softness.optical_depth(
+                    precise::<HostBackend>(phi, device),
+                    precise::<HostBackend>(x, device),
+                ))
             };
             settled_until(depths, radii, settled)
         };
-        let phi = precise::<B>(phi, device);
-        let terms = |x: Tensor<B, 1>| <[_; 2]>::from(t_conorm.profile(softness, phi.clone(), x));
-        let bound = Bound::new(t_conorm, tolerance, faces, rounding::<B>(device));
+        let phi = precise::<HostBackend>(phi, device);
+        let terms = |x: Tensor<HostBackend, 1>| {
+            <[_; 2]>::from(t_conorm.profile_for(sums, softness, phi.clone(), x))
+        };
+        let bound = Bound::new(t_conorm, tolerance, faces, rounding::<HostBackend>(device));
         let miss = |exact: f64, interpolated: f64| bound.of_interpolation(exact, interpolated);
-        let (curve, missed) = CubicCurve::chosen::<B>(terms, radii, from, far, miss, device);
+        let (curve, missed) =
+            CubicCurve::chosen::<HostBackend>(terms, radii, from, far, miss, sums, device);
         let values = |x: &[f64]| {
-            let [values, _] = terms(precise::<B>(x, device));
+            let [values, _] = terms(precise::<HostBackend>(x, device));
             numbers(values)
         };
         let of_half = |error: f64| if error <= 1.0 + ROUNDING { 1.0 } else { error };
         let culled = bound.of_constants(&curve.grid, values);
-        let error = tolerance / 2.0 * (of_half(missed) + of_half(culled));
-        Self { curve, t_conorm, error }
+        let end = precise::<HostBackend>(&[BEYOND * curve.grid.inner], device);
+        let [deepest] = numbers(softness.optical_depth(phi, end))[..] else {
+            unreachable!("a distance has an optical depth")
+        };
+        let lost = t_conorm.lost_to_range(sums, deepest);
+        let error = tolerance / 2.0 * (of_half(missed) + of_half(culled)) + lost;
+        Self { curve, t_conorm, sums, error }
     }
 
     /// The profile of the same softness stretched by `factor` along the distance, with the same bounds: all that they were proven and
@@ -127,7 +130,8 @@ impl Profile {
     /// `softness` may differ from the one the profile was chosen for only in its parameters.
     pub fn table<B: Backend>(&self, softness: &impl Softness, phi: Tensor<B, 1>) -> Tensor<B, 2> {
         let like = (&phi.device(), phi.dtype());
-        self.curve.table(|x| self.t_conorm.profile(softness, phi.clone(), x).into(), like)
+        let terms = |x| self.t_conorm.profile_for(self.sums, softness, phi.clone(), x).into();
+        self.curve.table(terms, like)
     }
 
     /// The places of the knots.
@@ -234,7 +238,7 @@ impl Bound {
                 let Some((&constant, rest)) = values.split_first() else { continue };
                 most = rest
                     .iter()
-                    .fold(most, |most, &value| most.max(self.of_constant(constant, value)));
+                    .fold(most, |most, &value| worse(most, self.of_constant(constant, value)));
             }
         }
         most
@@ -284,12 +288,42 @@ fn depth_of_excess(t_conorm: TConorm, left: f64, excess: f64) -> f64 {
 }
 
 /// Depth inside a face beyond which it lets less than `light` through; infinite if there is none.
-fn support_inside<B: Backend>(
-    softness: &impl Softness,
-    phi: &[f64],
-    light: f64,
-    device: &B::Device,
-) -> f64 {
-    let support = support::<B>(softness, phi, light, device);
+fn support_inside(softness: &impl Softness, phi: &[f64], light: f64) -> f64 {
+    let support = support::<HostBackend>(softness, phi, light, &Default::default());
     if (-support.right).exp() <= light { support.inner } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How many times the allowed error of each of ten faces these terms are off their constants, at a tolerance of 1e-5.
+    fn off(from: [f64; 2], terms: impl Fn(f64) -> f64) -> f64 {
+        let bound = Bound::new(TConorm::Probabilistic, 1e-5, 10, 1e-14);
+        let grid = Grid { outer: 0.1, inner: 0.2, from, octaves: 20, far: 0, bits: 3 };
+        bound.of_constants(&grid, |x| x.iter().map(|&x| terms(x)).collect())
+    }
+
+    #[test]
+    fn terms_that_leave_their_constant_count_on_either_side_before_the_cells_and_beyond_them() {
+        let [near, far] = [[0.0, 0.0], [0.05, 0.05]];
+        let within = |x: f64| (-0.1..=0.2).contains(&x);
+        assert_eq!(off(near, |x| if within(x) { x } else { 0.0 }), 0.0);
+        // A term of 1e-3 is off by 2000 times the 5e-7 that culling may cost a face.
+        let beyond =
+            [off(near, |x| f64::from(x < -3.0) * 1e-3), off(near, |x| f64::from(x > 3.0) * 1e-3)];
+        let before = |side: f64| off(far, |x| f64::from((0.01..0.04).contains(&(side * x))) * 1e-3);
+        for found in [beyond, [before(-1.0), before(1.0)]].concat() {
+            assert!((found / 2000.0 - 1.0).abs() < 0.01, "{found}");
+        }
+        // What lies before the cells is in the cells where these begin at the edge.
+        assert_eq!(off(near, |x| f64::from((0.01..0.04).contains(&x)) * 1e-3), 0.0);
+    }
+
+    #[test]
+    fn a_side_that_covers_the_pixel_may_change_by_the_light_that_it_lets_through() {
+        // exp(-16) = 1.1e-7 of the light is left, of the 5e-6 that may be.
+        assert!(off([0.0; 2], |x| if x > 3.0 { 16.0 } else { 17.0 }) < 0.03);
+        assert!(off([0.0; 2], |x| if x > 3.0 { 9.0 } else { 17.0 }) > 20.0);
+    }
 }

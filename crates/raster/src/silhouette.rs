@@ -48,37 +48,23 @@ impl Rasterizer {
         phi: &Tensor<B, 1>,
     ) -> Silhouette<S> {
         let values: Vec<f64> = phi.to_data().iter().collect();
-        #[cfg(feature = "wgpu")]
-        if !B::ON_HOST {
-            // Without a word between host and GPU for every attempt.
-            type Host = burn::backend::NdArray<f32>;
-            return self.prepare_on::<Host, S>(faces, softness, &values, false);
-        }
-        self.prepare_on::<B, S>(faces, softness, &values, B::ON_HOST)
+        self.prepare_from::<B, S>(faces, softness, &values)
     }
 
-    /// [`Rasterizer::prepare`] from plain numbers, for drawing on the CPU (`on_host`) or on a GPU; `H` is where
-    /// support and knots are chosen, in f64 if it has that.
+    /// [`Rasterizer::prepare`] from plain numbers. Support and knots are chosen on the CPU, in f64.
     ///
     /// # Panics
     ///
     /// If `faces` or the image is empty, or `phi` has the wrong length.
-    pub fn prepare_on<H: Backend, S: Softness>(
+    pub fn prepare_from<B: RasterBackend, S: Softness>(
         &self,
         faces: &Arc<[[u32; 3]]>,
         softness: S,
         phi: &[f64],
-        on_host: bool,
     ) -> Silhouette<S> {
         assert!(self.size.pixels() > 0, "an image needs at least one pixel");
-        let Self { t_conorm, tolerance, .. } = *self;
-        let (faces, device) = (faces.clone(), Default::default());
-        let count = faces.len();
-        let profile = match on_host {
-            true => Profile::new::<H>(&softness, t_conorm, phi, count, tolerance, &device),
-            // The look-up of a GPU knows no cells that are counted from the far end.
-            false => Profile::chosen::<H>(&softness, t_conorm, phi, count, tolerance, &[], &device),
-        };
+        let faces = faces.clone();
+        let profile = Profile::new::<B>(self, &softness, phi, faces.len());
         let op = ProfileSum {
             faces,
             grid: profile.grid(),

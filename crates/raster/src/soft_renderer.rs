@@ -1,11 +1,10 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
 
 use crate::{
-    HostBackend, ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm,
-    kernel::PixelLoss,
+    ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm, kernel::PixelLoss,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -52,7 +51,8 @@ struct Kept<S> {
 #[derive(Debug)]
 struct Prepared<S> {
     phi: Vec<f64>,
-    on_host: bool,
+    /// Whether it is drawn on the CPU, and in which float type.
+    drawn: (bool, DType),
     silhouette: Silhouette<S>,
 }
 
@@ -209,8 +209,9 @@ impl<S: Softness> SoftRenderer<S> {
     /// If `phi` has the wrong length.
     pub fn prepared<B: RasterBackend>(&self, phi: &[f64]) -> Silhouette<S> {
         check(&self.softness, phi);
+        let drawn = (B::ON_HOST, <B::FloatElem as Element>::dtype());
         let kept = |kept: &Kept<S>| {
-            let prepared = kept.prepared.as_ref().filter(|it| it.on_host == B::ON_HOST);
+            let prepared = kept.prepared.as_ref().filter(|it| it.drawn == drawn);
             prepared.and_then(|prepared| prepared.stretched_to(phi))
         };
         if let Some(silhouette) = kept(&self.kept()) {
@@ -218,11 +219,9 @@ impl<S: Softness> SoftRenderer<S> {
         }
         // Without the lock: other threads of a pool may take up work in between, and ask for the same.
         let (faces, softness) = (&self.faces, self.softness.clone());
-        let silhouette =
-            self.rasterizer.prepare_on::<HostBackend, S>(faces, softness, phi, B::ON_HOST);
+        let silhouette = self.rasterizer.prepare_from::<B, S>(faces, softness, phi);
         let prepared = silhouette.clone();
-        self.kept().prepared =
-            Some(Prepared { phi: phi.to_vec(), on_host: B::ON_HOST, silhouette: prepared });
+        self.kept().prepared = Some(Prepared { phi: phi.to_vec(), drawn, silhouette: prepared });
         silhouette
     }
 

@@ -11,6 +11,8 @@ const DEEPEST: f64 = 40.0;
 const LARGEST: [f64; 2] = [64.0, 600.0];
 /// Smallest number that enters a power or a logarithm.
 const SMALLEST: f64 = 1e-30;
+/// Sums below this, in f32 and f64, count as 0: the second derivative of a root fits an f64 there, the first an f32.
+const LEAST_SUM: [f64; 2] = [1e-30, 1e-150];
 
 /// How the coverages of several faces make one: an Archimedean T-conorm `A = g⁻¹(Σ g(s))`.
 ///
@@ -110,6 +112,18 @@ impl TConorm {
         phi: Tensor<B, 1>,
         x: Tensor<B, D>,
     ) -> (Tensor<B, D>, Tensor<B, D>) {
+        let sums = x.dtype();
+        self.profile_for(sums, softness, phi, x)
+    }
+
+    /// [`TConorm::profile`] in the float type of `x`, small enough for `sums` of another one.
+    pub(crate) fn profile_for<B: Backend, S: Softness, const D: usize>(
+        self,
+        sums: DType,
+        softness: &S,
+        phi: Tensor<B, 1>,
+        x: Tensor<B, D>,
+    ) -> (Tensor<B, D>, Tensor<B, D>) {
         let q = || softness.optical_depth(phi.clone(), x.clone());
         let s = || softness.value(phi.clone(), x.clone());
         let density = || softness.density(phi.clone(), x.clone());
@@ -149,25 +163,29 @@ impl TConorm {
             Self::Dombi(p) => {
                 // d ln(e^q - 1) / dq = 1 / s.
                 let q = q();
-                let deepest = deepest(p, q.dtype());
-                let q = q.clamp_max(deepest);
-                let odds = expm1(q).clamp_min(SMALLEST);
+                let deepest = deepest(p, sums);
+                let hazard = hazard().mask_fill(q.clone().greater_elem(deepest), 0.0);
+                let odds = expm1(q.clamp_max(deepest)).clamp_min(SMALLEST);
                 let value = power(odds, p);
-                let slope = value.clone() * hazard() * p / s().clamp_min(SMALLEST);
+                let slope = value.clone() * hazard * p / s().clamp_min(SMALLEST);
                 (value, slope)
             }
             Self::SchweizerSklar(p) => {
                 let q = q();
-                let deepest = deepest(-p, q.dtype());
+                let deepest = deepest(-p, sums);
+                let hazard = hazard().mask_fill(q.clone().greater_elem(deepest), 0.0);
                 let power = expm1(q.clamp_max(deepest) * -p);
-                (power.clone(), (power + 1.0) * hazard() * -p)
+                (power.clone(), (power + 1.0) * hazard * -p)
             }
         }
     }
 
     /// Coverage `A = g⁻¹(S)` in [0, 1] of the sum `S >= 0`, same shape.
     pub fn coverage<B: Backend, const D: usize>(self, sum: Tensor<B, D>) -> Tensor<B, D> {
-        let root = |sum: Tensor<B, D>, p: f64| power(sum.clamp_min(SMALLEST), 1.0 / p);
+        let root = |sum: Tensor<B, D>, p: f64| {
+            let nothing = sum.clone().lower_elem(for_type(LEAST_SUM, sum.dtype()));
+            power(sum.mask_fill(nothing.clone(), 1.0), 1.0 / p).mask_fill(nothing, 0.0)
+        };
         match self {
             Self::Probabilistic => covered(sum),
             Self::Einstein => sum.tanh(),
@@ -259,6 +277,19 @@ impl TConorm {
             Self::SchweizerSklar(p) => (q.min(deepest(-p, DType::F64)) * -p).exp_m1(),
         }
     }
+
+    /// The coverage that a pixel loses at most to the range of its sum, in this float type: of a face with the optical depth `q`, which is
+    /// held below the largest power, and of a sum that counts as 0.
+    pub(crate) fn lost_to_range(self, sums: DType, q: f64) -> f64 {
+        let held = |p: f64| (-q.min(deepest(p, sums))).exp() - (-q.min(DEEPEST)).exp();
+        let least = |p: f64| for_type(LEAST_SUM, sums).powf(1.0 / p);
+        match self {
+            Self::Dombi(p) => held(p).max(least(p)),
+            Self::SchweizerSklar(p) => held(-p),
+            Self::Yager(p) | Self::AczelAlsina(p) => least(p),
+            _ => 0.0,
+        }
+    }
 }
 
 /// `1 - exp(-sum)`. Not by way of [`expm1`]: its gradient would lose the digits of `exp(-sum)`,
@@ -267,9 +298,14 @@ fn covered<B: Backend, const D: usize>(sum: Tensor<B, D>) -> Tensor<B, D> {
     sum.neg().exp().neg() + 1.0
 }
 
-/// The optical depth up to which `exp(p q)` is told from what is deeper.
+/// The optical depth from which on `exp(p q)` counts as constant.
 fn deepest(p: f64, dtype: DType) -> f64 {
-    DEEPEST.min(LARGEST[usize::from(dtype == DType::F64)] / p)
+    DEEPEST.min(for_type(LARGEST, dtype) / p)
+}
+
+/// The number meant for this float type, of f32 and f64.
+fn for_type([single, double]: [f64; 2], dtype: DType) -> f64 {
+    if dtype == DType::F64 { double } else { single }
 }
 
 /// `x^p` of positive numbers.

@@ -1,5 +1,8 @@
 //! No pixel is off by more than is stated, but for the rounding of f32.
 
+use burn::backend::NdArray;
+use softrast_raster::{SoftRenderer, TConorm};
+use softrast_softness::{EdgeSoftness, Family};
 use softrast_tests::ToleranceCase;
 
 fn assert_kept(case: &ToleranceCase) {
@@ -19,4 +22,39 @@ fn no_case_that_a_random_search_has_found_is_off_by_more_than_is_stated() {
         serde_json::from_str(include_str!("found.json")).expect("a list of cases");
     assert!(!found.is_empty());
     found.iter().for_each(assert_kept);
+}
+
+#[test]
+fn every_number_of_a_table_fits_the_float_type() {
+    let t_conorms = [
+        "probabilistic",
+        "einstein",
+        "hamacher:8",
+        "frank:16",
+        "yager:4",
+        "aczel_alsina:4",
+        "dombi:4",
+        "dombi:8",
+        "schweizer_sklar:-4",
+    ];
+    for (family, squared) in Family::ALL.into_iter().flat_map(|it| [(it, false), (it, true)]) {
+        let softness = EdgeSoftness { family, squared };
+        for t_conorm in t_conorms.map(|name| name.parse::<TConorm>().expect("a T-conorm")) {
+            for (scale, tolerance) in [(1e-6, 1e-7), (1e-2, 1e-2), (0.1, 1e-8), (10.0, 1e-5)] {
+                let renderer = SoftRenderer::new(&[[0, 1, 2]], 8, softness, scale)
+                    .with_tolerance(tolerance)
+                    .with_t_conorm(t_conorm);
+                let silhouette = renderer.prepared::<NdArray<f32>>(renderer.phi());
+                let table = silhouette.table_data(renderer.phi());
+                let worst = table.iter::<f64>().fold(0.0, |most: f64, it| match it.is_nan() {
+                    true => f64::INFINITY,
+                    false => most.max(it.abs()),
+                });
+                assert!(
+                    worst <= f64::from(f32::MAX),
+                    "{worst:e} in a table of {softness:?}, {t_conorm}, {scale}, {tolerance}"
+                );
+            }
+        }
+    }
 }

@@ -30,6 +30,10 @@ const SHORT: f64 = 2e-6;
 /// Places in a cell at which its error is measured: those of a smooth curve's largest; and how many there are where it may lie elsewhere.
 const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const DENSE: u32 = 16;
+/// The innermost cell is a straight line over all that is nearer than its end: powers of its place at which that is measured too, each at
+/// a quarter of the distance of the one before.
+const INNERMOST: std::ops::RangeInclusive<i32> = 1..=20;
+const NEARER: f64 = 1.0 / 16.0;
 /// The part of its rise that a cubic may miss the next knot by.
 const WIDE_OF: f64 = 0.1;
 
@@ -54,7 +58,7 @@ impl CubicCurve {
     /// largest error.
     ///
     /// `curve` gives value and slope at distances in the most exact float type of the device, `error` what an exact value and that of a
-    /// cubic are worth. `from` says how far from the edge the sides begin to change: it is asked where knots that are close at the edge
+    /// cubic are worth, looked up in the float type `sums`. `from` says how far from the edge the sides begin to change: it is asked where knots that are close at the edge
     /// are not enough. `far` holds octaves to be tried at the end of the support; none if it is empty, for look-ups that know none.
     pub(crate) fn chosen<B: Backend>(
         curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
@@ -62,13 +66,17 @@ impl CubicCurve {
         from: impl FnOnce() -> [f64; 2],
         far: &[u32],
         error: impl Fn(f64, f64) -> f64,
+        sums: DType,
         device: &B::Device,
     ) -> (Self, f64) {
         let missed = |cells: Self, places: &[f64]| {
             let mut reached = Reached::NOTHING;
-            for Sample { exact, interpolated, innermost } in cells.samples(&curve, places, device) {
-                let place = if innermost { &mut reached.innermost } else { &mut reached.rest };
-                *place = place.max(error(exact, interpolated));
+            for sample in cells.samples(&curve, places, sums, device) {
+                let place =
+                    if sample.innermost { &mut reached.innermost } else { &mut reached.rest };
+                for interpolated in sample.interpolated {
+                    *place = worse(*place, error(sample.exact, interpolated));
+                }
             }
             reached
         };
@@ -191,11 +199,12 @@ impl CubicCurve {
         Tensor::cat(rows, 0)
     }
 
-    /// Values and cubics of a curve at these places in each cell.
+    /// Values and cubics of a curve at these places in each cell, and nearer ones in the innermost.
     fn samples<B: Backend>(
         &self,
         curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
         places: &[f64],
+        sums: DType,
         device: &B::Device,
     ) -> Vec<Sample> {
         let grid = self.grid;
@@ -203,34 +212,48 @@ impl CubicCurve {
         let table = self.table(&curve, (device, dtype));
         let table = numbers(table);
         let knots = grid.knots();
+        let nearer: Vec<f64> =
+            INNERMOST.map(|power| NEARER.powi(power)).chain(places.iter().copied()).collect();
+        // A place is what is left of a number that is at least 2^bits times as large as a cell is wide.
+        let digits = if sums == DType::F64 { 53 } else { 24 };
+        let rounding = f64::exp2(f64::from(grid.bits) - f64::from(digits));
         let mut distances = Vec::with_capacity(2 * places.len() * knots.len());
-        let mut interpolated = Vec::with_capacity(2 * places.len() * knots.len());
+        let mut samples = Vec::with_capacity(2 * places.len() * knots.len());
         for side in [0, 1] {
             for (cell, ends) in knots.windows(2).enumerate() {
                 let row = 4 * (side * (grid.cells() + 1) + cell);
-                for &t in places {
+                let innermost = cell == 0;
+                for &t in if innermost { &nearer } else { places } {
                     let y = ends[0] + t * (ends[1] - ends[0]);
                     distances.push(SIGNS[side] * grid.distance(side, y));
                     let c = &table[row..row + 4];
-                    interpolated.push(c[0] + t * (c[1] + t * (c[2] + t * c[3])));
+                    let value = |t: f64| c[0] + t * (c[1] + t * (c[2] + t * c[3]));
+                    let interpolated = match innermost {
+                        true => [value((t - rounding).max(0.0)), value(t + rounding)],
+                        false => [value(t); 2],
+                    };
+                    samples.push(Sample { exact: 0.0, interpolated, innermost });
                 }
             }
         }
         let [exact, _] = curve(precise::<B>(&distances, device));
-        let (in_cell, per_side) = (places.len(), places.len() * grid.cells());
-        let sample = |(i, (exact, interpolated))| Sample {
-            exact,
-            interpolated,
-            innermost: i % per_side < in_cell,
-        };
-        numbers(exact).into_iter().zip(interpolated).enumerate().map(sample).collect()
+        for (sample, exact) in samples.iter_mut().zip(numbers(exact)) {
+            sample.exact = exact;
+        }
+        samples
     }
+}
+
+/// The larger of two errors; infinite where the second is no number.
+pub(crate) fn worse(most: f64, error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { most.max(error) }
 }
 
 /// A curve and its cubics, at a place between knots.
 struct Sample {
     exact: f64,
-    interpolated: f64,
+    /// At the places next to it to which a look-up may round it.
+    interpolated: [f64; 2],
     /// Whether it lies in the innermost cell of its side.
     innermost: bool,
 }
