@@ -31,7 +31,9 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 pub use backend::backend;
 pub use entry::Entry;
 pub use experiment::{Purpose, TaskExperiment};
-pub use flags::{Common, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args};
+pub use flags::{
+    Common, EXPERIMENTS, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args,
+};
 pub use given::{Answer, Given, MaskFlags, seen_by};
 pub use method::{Scales, is_preset, is_preset_learned, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};

@@ -50,10 +50,16 @@ where
     U: Task<Args = T::Args, Pictures = T::Pictures>,
 {
     let words = with_command::<T>(words);
-    let command = CommandLine::<T::Args, T::Pictures>::command()
+    let command = CommandLine::<T::Args, T::Pictures>::command();
+    // Help lists them where no command is named; a command line gets `solve` there before it is parsed.
+    let solve = command.find_subcommand("solve").into_iter();
+    let of_solve: Vec<_> = solve.flat_map(clap::Command::get_arguments).cloned().collect();
+    let command = command
         .name(T::PROGRAM)
         .version(env!("CARGO_PKG_VERSION"))
         .about(T::ABOUT)
+        .args(of_solve)
+        .args_conflicts_with_subcommands(true)
         .after_help("Without a command: solve. `COMMAND --help` lists the flags of a command.");
     let line = parse::<CommandLine<T::Args, T::Pictures>>(command.clone(), &words, stdout);
     let Some(line) = line.map_err(|failure| with_owner(failure, &command))? else {
