@@ -6,7 +6,7 @@ use softrast_lab::{
     parse::{count, positive},
 };
 
-use crate::{Common, MethodArgs, learn_args::LearnArgs};
+use crate::{Common, EXPERIMENTS, MethodArgs, learn_args::LearnArgs};
 
 /// Everything on the command line of a task.
 #[derive(Debug, Parser)]
@@ -50,9 +50,9 @@ pub(crate) struct Shared<A: Args> {
     #[command(flatten)]
     pub(crate) args: A,
     #[command(flatten)]
-    pub(crate) common: Common,
-    #[command(flatten)]
     pub(crate) method: MethodArgs,
+    #[command(flatten)]
+    pub(crate) common: Common,
 }
 
 #[derive(Args, Clone, Debug)]
@@ -129,7 +129,7 @@ pub(crate) struct Learn<A: Args> {
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Auto {
     /// Seconds that choosing a method may take [default: no limit]
-    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = EXPERIMENTS)]
     pub(crate) budget: Option<f64>,
 }
 

@@ -11,14 +11,20 @@ use softrast_lab::{
 };
 use softrast_softness::Family;
 
+/// Heading of the flags that only runs on seeds need, and nobody with pictures.
+pub const EXPERIMENTS: &str = "Experiments";
 /// Heading of the flags that few need.
 pub(crate) const RARE: &str = "Rarely needed";
 
 /// What is solved, and where results go.
 #[derive(Args, Clone, Debug, PartialEq)]
 pub struct Common {
+    /// Folder for the results; made if missing [default: out/TASK, or out/TASK-COMMAND]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+
     /// The variant that a softness is tuned on, or the one it is transferred to
-    #[arg(long, value_enum, default_value = "original")]
+    #[arg(long, value_enum, default_value = "original", help_heading = EXPERIMENTS)]
     pub variant: Variant,
 
     /// Optimisation steps
@@ -30,12 +36,8 @@ pub struct Common {
     pub size: Option<usize>,
 
     /// Seed of the run, or the first of several
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed, allow_negative_numbers = true, help_heading = EXPERIMENTS)]
     pub seed: u64,
-
-    /// Folder for the results; made if missing [default: out/TASK, or out/TASK-COMMAND]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
 
     /// Print one JSON object instead of the summary
     #[arg(long)]

@@ -1,6 +1,6 @@
 //! The command line of a task: `solve`, `evaluate`, `search`, `choose` and `learn`.
 //!
-//! A program is a type that implements [`Task`] and a `main` of one call of [`main()`]. [`MethodArgs`] are the flags of a method; together
+//! A program is a type that implements [`Task`] and a `main` of one call of [`main()`], or of [`main_of_two`]. [`MethodArgs`] are the flags of a method; together
 //! with a task they make a [`TaskExperiment`], which is what `softrast-lab` runs, keeps and compares.
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
@@ -31,10 +31,12 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 pub use backend::backend;
 pub use entry::Entry;
 pub use experiment::{Purpose, TaskExperiment};
-pub use flags::{Common, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args};
+pub use flags::{
+    Common, EXPERIMENTS, Init, MethodArgs, PRESET, Schedule, SoftnessChoice, Variant, usual_args,
+};
 pub use given::{Answer, Given, MaskFlags, seen_by};
 pub use method::{Scales, is_preset, is_preset_learned, learned_kind, method_colour};
 pub use paper::{InOurUnits, Paper};
-pub use program::{execute, main};
+pub use program::{execute, main, main_of_two};
 pub use searched::Searched;
 pub use task::{Description, Detail, EdgeChoice, Ended, Measures, NoArgs, OwnAxis, Task, theta_of};

@@ -18,6 +18,15 @@ pub fn main<T: Task>() -> ExitCode {
     run_main(execute::<T>)
 }
 
+/// The whole `main` of a program that does a second task, with the same flags, where these say so.
+pub fn main_of_two<T, U>(is_second: fn(&T::Args) -> bool) -> ExitCode
+where
+    T: Task,
+    U: Task<Args = T::Args, Pictures = T::Pictures>,
+{
+    run_main(move |words, stdout| execute_one_of::<T, U>(words, is_second, stdout))
+}
+
 /// Does what a command line asks, the name of the program being its first word.
 ///
 /// Results go to `stdout` and to the output folder, progress and warnings to stderr.
@@ -27,26 +36,57 @@ pub fn main<T: Task>() -> ExitCode {
 /// Everything that should end the program with an error line. Unless only `stdout` failed or the user stopped the work, no result file
 /// was touched then. What a user who stops it has finished is written and printed before, as partial.
 pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
+    execute_one_of::<T, T>(words, |_| false, stdout)
+}
+
+/// As [`execute`], by the task `U` where `is_second` of the flags, else by `T`.
+fn execute_one_of<T, U>(
+    words: Vec<OsString>,
+    is_second: fn(&T::Args) -> bool,
+    stdout: &mut dyn Write,
+) -> Result<(), Failure>
+where
+    T: Task,
+    U: Task<Args = T::Args, Pictures = T::Pictures>,
+{
     let words = with_command::<T>(words);
-    let command = CommandLine::<T::Args, T::Pictures>::command()
+    let command = CommandLine::<T::Args, T::Pictures>::command();
+    // Help lists them where no command is named; a command line gets `solve` there before it is parsed.
+    let solve = command.find_subcommand("solve").into_iter();
+    let of_solve: Vec<_> = solve.flat_map(clap::Command::get_arguments).cloned().collect();
+    let command = command
         .name(T::PROGRAM)
         .version(env!("CARGO_PKG_VERSION"))
         .about(T::ABOUT)
+        .args(of_solve)
+        .args_conflicts_with_subcommands(true)
         .after_help("Without a command: solve. `COMMAND --help` lists the flags of a command.");
     let line = parse::<CommandLine<T::Args, T::Pictures>>(command.clone(), &words, stdout);
     let Some(line) = line.map_err(|failure| with_owner(failure, &command))? else {
         return Ok(());
     };
+    match is_second(&line.command.shared().1.args) {
+        true => run::<U>(line, &words, stdout),
+        false => run::<T>(line, &words, stdout),
+    }
+}
+
+/// Does what a parsed command line asks; `words` are those that it was parsed from.
+fn run<T: Task>(
+    line: CommandLine<T::Args, T::Pictures>,
+    words: &[OsString],
+    stdout: &mut dyn Write,
+) -> Result<(), Failure> {
     let (command, shared) = line.command.shared();
     let Common { json, quiet, ref out, .. } = shared.common;
     // Results of different commands do not mix.
     let folder = if command == "solve" { T::NAME.into() } else { format!("{}-{command}", T::NAME) };
     let session = Session {
-        again: repeated(T::PROGRAM, &words),
+        again: repeated(T::PROGRAM, words),
         command,
         task: T::NAME,
         program: T::PROGRAM,
-        inputs: RefCell::new(Inputs::of_words(&words, &["--out"])),
+        inputs: RefCell::new(Inputs::of_words(words, &["--out"])),
         out: out.clone().unwrap_or_else(|| Path::new("out").join(folder)),
         quiet,
     };

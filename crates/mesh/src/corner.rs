@@ -2,13 +2,18 @@
 
 use crate::{Fault, error::shown};
 
+/// The field of a corner that says the vertex.
+pub(crate) fn first_field(corner: &str) -> &str {
+    corner.split('/').next().unwrap_or(corner)
+}
+
 /// The vertex, counted from 1, that a corner such as `7`, `7/1/2`, `7//2` or `-1` means.
 pub(crate) fn absolute(
     corner: &str,
     vertices_read: usize,
     vertices: usize,
 ) -> Result<usize, Fault> {
-    let field = corner.split('/').next().unwrap_or(corner);
+    let field = first_field(corner);
     let index = || shown(field);
     let (back, digits) = match field.strip_prefix('-') {
         Some(digits) => (true, digits),

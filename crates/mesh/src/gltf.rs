@@ -225,18 +225,27 @@ impl<'a> Gltf<'a> {
         Ok(gltf)
     }
 
+    /// The result of `read` for the accessor with this number; the number is part of an error.
+    fn of_accessor<T>(
+        &self,
+        number: usize,
+        read: impl FnOnce(&Accessor) -> Result<T, String>,
+    ) -> Result<T, Trouble> {
+        let accessor = self.accessors.get(number).ok_or_else(|| "there is none".to_owned());
+        accessor.and_then(read).map_err(|why| Trouble::part(format!("accessor {number}"), why))
+    }
+
     /// How many entries the accessor claims.
     pub(crate) fn count(&self, accessor: usize) -> Result<usize, Trouble> {
-        let missing = || Trouble::part(format!("accessor {accessor}"), "there is none");
-        Ok(self.accessors.get(accessor).ok_or_else(missing)?.count)
+        self.of_accessor(accessor, |it| Ok(it.count))
     }
 
     /// The entries of an accessor of 3-vectors.
     pub(crate) fn positions(&self, accessor: usize) -> Result<Vec<[f64; 3]>, Trouble> {
-        let count = self.count(accessor)?;
-        let it = &self.accessors[accessor];
-        let values = Self::are_positions(it).and_then(|()| self.values(it, count, it.normalized));
-        values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+        self.of_accessor(accessor, |it| {
+            Self::are_positions(it)?;
+            self.values(it, it.normalized)
+        })
     }
 
     fn are_positions(accessor: &Accessor) -> Result<(), String> {
@@ -248,38 +257,30 @@ impl<'a> Gltf<'a> {
 
     /// The entries of an accessor of linear colours, without transparency; the value that stands for full; and whether the accessor says so.
     pub(crate) fn colours(&self, accessor: usize) -> Result<(Vec<[f64; 3]>, f64, bool), Trouble> {
-        let count = self.count(accessor)?;
-        let it = &self.accessors[accessor];
-        let at = |why: String| Trouble::part(format!("accessor {accessor}"), why);
-        let (full, said) = match Component::of(it.component_type) {
-            Some(Component::U8) => (f64::from(u8::MAX), it.normalized),
-            Some(Component::U16) => (f64::from(u16::MAX), it.normalized),
-            Some(Component::F32) => (1.0, true),
-            _ => {
-                return Err(at("colours are floats, or bytes or shorts without a sign".to_owned()));
-            }
-        };
-        let values = match it.shape.as_str() {
-            "VEC3" => self.values(it, count, false),
-            "VEC4" => {
-                let values = self.values(it, count, false);
-                values.map(|all| all.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
-            }
-            shape => Err(format!("colours are of type VEC3 or VEC4, not {shape:?}")),
-        };
-        Ok((values.map_err(at)?, full, said))
+        self.of_accessor(accessor, |it| {
+            let (full, said) = match Component::of(it.component_type) {
+                Some(Component::U8) => (f64::from(u8::MAX), it.normalized),
+                Some(Component::U16) => (f64::from(u16::MAX), it.normalized),
+                Some(Component::F32) => (1.0, true),
+                _ => return Err("colours are floats, or bytes or shorts without a sign".to_owned()),
+            };
+            let values = match it.shape.as_str() {
+                "VEC3" => self.values(it, false)?,
+                "VEC4" => {
+                    self.values(it, false)?.into_iter().map(|[r, g, b, _]| [r, g, b]).collect()
+                }
+                shape => return Err(format!("colours are of type VEC3 or VEC4, not {shape:?}")),
+            };
+            Ok((values, full, said))
+        })
     }
 
     /// The entries of an accessor of texture coordinates, v down.
     pub(crate) fn coordinates(&self, accessor: usize) -> Result<Vec<[f64; 2]>, Trouble> {
-        let count = self.count(accessor)?;
-        let it = &self.accessors[accessor];
-        let values = if it.shape == "VEC2" {
-            self.values(it, count, it.normalized)
-        } else {
-            Err(format!("texture coordinates are of type VEC2, not {:?}", it.shape))
-        };
-        values.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+        self.of_accessor(accessor, |it| match it.shape.as_str() {
+            "VEC2" => self.values(it, it.normalized),
+            shape => Err(format!("texture coordinates are of type VEC2, not {shape:?}")),
+        })
     }
 
     /// A buffer view, and its bytes if they are there.
@@ -309,18 +310,18 @@ impl<'a> Gltf<'a> {
         accessor: usize,
         check: impl Fn(&Accessor) -> Result<(), String>,
     ) -> Result<usize, Trouble> {
-        let count = self.count(accessor)?;
-        let it = &self.accessors[accessor];
-        let found = check(it).and_then(|()| match self.source(it, count)? {
-            Some(source) => source.entries::<N>(self, count).map(|_| count),
-            None => Ok(count),
-        });
-        found.map_err(|reason| Trouble::part(format!("accessor {accessor}"), reason))
+        self.of_accessor(accessor, |it| {
+            check(it)?;
+            match self.source(it)? {
+                Some(source) => source.entries::<N>(self, it.count).map(|_| it.count),
+                None => Ok(it.count),
+            }
+        })
     }
 
     /// Where the entries of an accessor lie; none if they are zero, but for sparse ones.
-    fn source(&self, accessor: &Accessor, count: usize) -> Result<Option<Source>, String> {
-        let component = component(accessor.component_type)?;
+    fn source(&self, accessor: &Accessor) -> Result<Option<Source>, String> {
+        let (component, count) = (component(accessor.component_type)?, accessor.count);
         match accessor.buffer_view {
             Some(view) => Ok(Some(Source { view, offset: accessor.byte_offset, component })),
             // Such entries take no bytes, so their number could be anything.
@@ -339,11 +340,10 @@ impl<'a> Gltf<'a> {
 
     /// The entries of an accessor of vertex indices.
     pub(crate) fn indices(&self, accessor: usize) -> Result<Vec<u32>, Trouble> {
-        let count = self.count(accessor)?;
-        let it = &self.accessors[accessor];
-        let values = Self::are_indices(it).and_then(|()| self.values(it, count, false));
-        let values = values.map_err(|why| Trouble::part(format!("accessor {accessor}"), why))?;
-        Ok(values.into_iter().map(|[index]| index as u32).collect())
+        self.of_accessor(accessor, |it| {
+            Self::are_indices(it)?;
+            Ok(self.values(it, false)?.into_iter().map(|[index]| index as u32).collect())
+        })
     }
 
     fn are_indices(accessor: &Accessor) -> Result<(), String> {
@@ -357,15 +357,15 @@ impl<'a> Gltf<'a> {
     fn values<const N: usize>(
         &self,
         accessor: &Accessor,
-        count: usize,
         normalized: bool,
     ) -> Result<Vec<[f64; N]>, String> {
+        let count = accessor.count;
         let component = component(accessor.component_type)?;
         if normalized && matches!(component, Component::F32 | Component::U32) {
             return Err("floats and 32-bit integers cannot be normalized".to_owned());
         }
         let read = |bytes: [&[u8]; N]| bytes.map(|b| component.value(b, normalized));
-        let mut values = match self.source(accessor, count)? {
+        let mut values = match self.source(accessor)? {
             Some(source) => source.entries(self, count)?.map(read).collect(),
             None => vec![[0.0; N]; count],
         };

@@ -1,20 +1,29 @@
-//! An OBJ file: its statements checked, then parsed by `tobj`; and the text of one.
+//! An OBJ file, which `tobj` parses; and the text of one.
+//!
+//! `tobj` pulls the file through [`Lines`], one statement at a time, so each number is parsed once and the text is never copied as a whole. A
+//! line for `tobj` has the coordinates or the vertices of a statement and nothing else: it refuses or misreads much that programs write after
+//! them. The same walk takes colours and the texture, whose faults are warnings that name a line.
+//!
+//! An error of `tobj` names neither line nor word, and a face may come before its vertices. So a file that is refused is walked once
+//! more, by [`fault`], to find the first statement that is wrong.
 
 use std::{
-    fmt::{self, Write as _},
+    collections::VecDeque,
+    fmt,
+    io::{self, BufReader, Read},
     path::Path,
 };
 
 use crate::{
     Fault, Mesh, Texture,
     colours::{Beyond, Colours},
-    corner::absolute,
+    corner::{absolute, first_field},
     error::{Place, Trouble, shown},
     mesh::fits_f32,
-    obj_texture,
+    obj_texture::{self, Found},
     parts::Parts,
     polygon::Polygons,
-    statements::statements,
+    statements::{count, statements},
 };
 
 /// The mesh in `bytes`; see [`Mesh::parse`]. With the `folder` of the file also its texture.
@@ -22,31 +31,34 @@ use crate::{
 /// Only `v` and `f` matter to the mesh, in lower case; of a vertex the first three numbers and, where there are six, the other three as a
 /// colour; of a corner the field before the first slash.
 pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Trouble> {
-    // A face may come before its vertices, so their number must be known first.
-    let vertices = statements(bytes).filter(|s| s.words().next() == Some("v")).count();
-    let mut colours = Colours::new([1.0; 3], Beyond::LeftOut);
-    // The parser numbers vertices as faces first use them. A first polygon that lists them all keeps the order of the file, and those which
-    // no face uses.
-    let all: String = (1..=vertices).map(|vertex| format!(" {vertex}")).collect();
-    let (mut text, mut vertices_read) = (format!("f{all}\n"), 0);
-    for statement in statements(bytes) {
-        let line = statement.line;
-        let mut words = statement.words();
-        let read = match words.next() {
-            Some("v") => {
-                vertices_read += 1;
-                position(&mut words, &mut text).map(|()| {
-                    if let Some(channels) = colour(words) {
-                        colours.push(channels, || Place::Line(line));
-                    }
-                })
-            }
-            Some("f") => face(words, vertices_read, vertices, &mut text),
-            _ => Ok(()),
+    let (mut vertices, mut colours) = (0, Colours::new([1.0; 3], Beyond::LeftOut));
+    let mut texture = folder.map(|_| Found::new());
+    let lines = statements(bytes).map(Some).chain([None]).map(|statement| {
+        // tobj numbers vertices as faces first use them. A last polygon of all says which is which, and keeps those that no face uses.
+        let Some(statement) = statement else {
+            return line("f", (1..=vertices).map(|vertex| vertex.to_string()));
         };
-        read.map_err(|reason| Trouble::Line(line, reason))?;
-    }
-    let (positions, polygons) = parsed(&text)?;
+        if texture.as_mut().is_some_and(|found| found.add(&statement, usize::MAX).is_err()) {
+            texture = None;
+        }
+        let mut words = statement.words();
+        match words.next() {
+            Some("v") => {
+                vertices += 1;
+                let line = line("v", words.by_ref().take(3));
+                if let Some(channels) = colour(words) {
+                    colours.push(channels, || Place::Line(statement.line));
+                }
+                line
+            }
+            Some("f") => line("f", words.map(first_field)),
+            _ => String::new(),
+        }
+    });
+    let (positions, polygons) = parsed(lines).ok_or_else(|| {
+        let too_long = || Trouble::part("faces", "more corners than 32 bits can number");
+        fault(bytes).unwrap_or_else(too_long)
+    })?;
     let cut = polygons.cut(&positions)?;
     if cut.is_empty() {
         return Err(Trouble::NoFaces("an OBJ file lists them on lines that start with f"));
@@ -57,52 +69,95 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
         false => (None, None),
     };
     let mut warnings = Vec::from_iter(warning);
-    let texture = folder.and_then(|folder| obj_texture::parse(bytes, folder, &cut, &mut warnings));
+    let texture =
+        folder.and_then(|folder| obj_texture::parse(texture, bytes, folder, &cut, &mut warnings));
     Ok(Parts { positions, faces, colours, texture, warnings })
 }
 
-/// Vertices and polygons of checked statements, less the first polygon.
-fn parsed(text: &str) -> Result<(Vec<[f64; 3]>, Polygons), Trouble> {
-    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let fault = |reason| Trouble::part("statements", reason);
-    let (models, _) =
-        tobj::load_obj_buf(&mut text.as_bytes(), &tobj::LoadOptions::default(), no_materials)
-            .map_err(|reason| fault(reason.to_string()))?;
-    let (mut positions, mut polygons) = (Vec::new(), Polygons::default());
-    for tobj::Model { mesh, .. } in models {
-        positions.extend(mesh.positions.as_chunks().0);
-        for polygon in split(&mesh.indices, &mesh.face_arities).skip(1) {
-            polygons.add(polygon).map_err(|reason| fault(reason.to_string()))?;
-        }
+/// A line for `tobj`, which splits words at any white space and not only at spaces and tabs: a word that is not plain ASCII is no number, and
+/// stays none.
+fn line(keyword: &str, words: impl Iterator<Item = impl AsRef<str>>) -> String {
+    let mut line = keyword.to_owned();
+    for word in words {
+        let word = word.as_ref();
+        let is_plain = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_graphic());
+        line.extend([" ", if is_plain { word } else { "?" }]);
     }
-    Ok((positions, polygons))
+    line.push('\n');
+    line
 }
 
-/// The polygons of a parsed model; no `arities` means that all are triangles.
-fn split<'a>(mut indices: &'a [u32], arities: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
-    let mut arities = arities.iter();
-    std::iter::from_fn(move || {
-        let corners = arities.next().map_or(3, |&n| n as usize);
-        let (polygon, rest) = indices.split_at_checked(corners)?;
-        indices = rest;
-        Some(polygon)
+/// Lines as the content of a file, each made when it is read.
+struct Lines<I> {
+    lines: I,
+    unread: VecDeque<u8>,
+}
+
+impl<I: Iterator<Item = String>> Read for Lines<I> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        while self.unread.is_empty()
+            && let Some(line) = self.lines.next()
+        {
+            self.unread = line.into_bytes().into();
+        }
+        self.unread.read(buffer)
+    }
+}
+
+/// Vertices and polygons of lines, the last of which is a polygon of all vertices; none if a line is wrong or there are too many.
+fn parsed(lines: impl Iterator<Item = String>) -> Option<(Vec<[f64; 3]>, Polygons)> {
+    let mut file = BufReader::new(Lines { lines, unread: VecDeque::new() });
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let options = tobj::LoadOptions::default();
+    let (models, _) = tobj::load_obj_buf(&mut file, &options, no_materials).ok()?;
+    let tobj::Mesh { positions, indices: mut corners, face_arities: mut arities, .. } =
+        models.into_iter().next()?.mesh;
+    u32::try_from(corners.len()).ok()?;
+    if arities.is_empty() {
+        // All are triangles.
+        arities = vec![3; corners.len() / 3];
+    }
+    let vertices = arities.pop()? as usize;
+    let order = corners.split_off(corners.len() - vertices);
+    let mut numbers = vec![0; vertices];
+    for (number, &index) in (0..).zip(&order) {
+        numbers[index as usize] = number;
+    }
+    corners.iter_mut().for_each(|corner| *corner = numbers[*corner as usize]);
+    let is_sound = positions.iter().all(|&x| fits_f32(x)) && arities.iter().all(|&n| n >= 3);
+    let position = |&index: &u32| positions.as_chunks().0[index as usize];
+    is_sound.then(|| (order.iter().map(position).collect(), Polygons { corners, arities }))
+}
+
+/// The first statement that keeps `bytes` from being a mesh.
+fn fault(bytes: &[u8]) -> Option<Trouble> {
+    let (vertices, mut before) = (count(bytes, "v"), 0);
+    statements(bytes).find_map(|statement| {
+        let mut words = statement.words();
+        let checked = match words.next() {
+            Some("v") => {
+                before += 1;
+                three(words.take(3).map(coordinate), Fault::Coordinates)
+            }
+            Some("f") => three(words.map(|word| absolute(word, before, vertices)), Fault::Corners),
+            _ => Ok(()),
+        };
+        checked.err().map(|reason| Trouble::Line(statement.line, reason))
     })
 }
 
-/// Copies three coordinates to `text`.
-fn position<'a>(words: impl Iterator<Item = &'a str>, text: &mut String) -> Result<(), Fault> {
-    text.push('v');
-    let mut found = 0;
-    for word in words.take(3) {
-        let x: f64 = word.parse().map_err(|_| Fault::Number(shown(word)))?;
-        if !fits_f32(x) {
-            return Err(Fault::NotFinite(shown(word)));
-        }
-        text.extend([" ", word]);
-        found += 1;
-    }
-    text.push('\n');
-    if found < 3 { Err(Fault::Coordinates(found)) } else { Ok(()) }
+/// The first error, or that there are `fewer` than three.
+fn three<T>(
+    found: impl Iterator<Item = Result<T, Fault>>,
+    fewer: fn(usize) -> Fault,
+) -> Result<(), Fault> {
+    let found = found.collect::<Result<Vec<T>, Fault>>()?.len();
+    if found >= 3 { Ok(()) } else { Err(fewer(found)) }
+}
+
+fn coordinate(word: &str) -> Result<f64, Fault> {
+    let x = word.parse().map_err(|_| Fault::Number(shown(word)))?;
+    if fits_f32(x) { Ok(x) } else { Err(Fault::NotFinite(shown(word))) }
 }
 
 /// The colour after the coordinates of a vertex. One further number is a weight, and other lists are not of the format.
@@ -110,26 +165,6 @@ fn colour<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 3]> {
     let mut channel = || words.next().map(|word| word.parse().unwrap_or(f64::NAN));
     let channels = [channel()?, channel()?, channel()?];
     words.next().is_none().then_some(channels)
-}
-
-/// Writes the absolute indices of one polygon, from 1, to `text`.
-fn face<'a>(
-    words: impl Iterator<Item = &'a str>,
-    vertices_read: usize,
-    vertices: usize,
-    text: &mut String,
-) -> Result<(), Fault> {
-    text.push('f');
-    let mut found = 0;
-    for word in words {
-        let number = absolute(word, vertices_read, vertices)?;
-        u32::try_from(number - 1)
-            .map_err(|_| Fault::format("more vertices than 32 bits can number"))?;
-        write!(text, " {number}").expect("a string can be written to");
-        found += 1;
-    }
-    text.push('\n');
-    if found >= 3 { Ok(()) } else { Err(Fault::Corners(found)) }
 }
 
 /// A mesh as the text of an OBJ file.

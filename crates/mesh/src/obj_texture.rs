@@ -10,16 +10,16 @@ use crate::{
     beside::{beside, picture, read},
     corner::absolute,
     error::{FARTHEST, Trouble, shown},
-    statements::{Statement, statements},
+    statements::{Statement, count, statements},
     texture::is_near,
 };
 
 /// Libraries of materials that a file may name, and words of their names.
 const MOST_LIBRARIES: usize = 100;
 
-/// The texture of a file, as its statements have it.
+/// The texture of a file, as the statements read so far have it.
 #[derive(Default)]
-struct Found {
+pub(crate) struct Found {
     coordinates: Vec<[f64; 2]>,
     /// Of each corner of each face, in the order of the file.
     corners: Vec<u32>,
@@ -27,18 +27,28 @@ struct Found {
     libraries: Vec<String>,
     /// The materials of faces; that of faces without one is "".
     materials: BTreeSet<String>,
+    /// The material of the next faces, until one has it.
+    material: Option<String>,
+    /// Lines of the first corner that has a coordinate, and of the first that has none.
+    with: Option<usize>,
+    without: Option<usize>,
 }
 
 /// The texture in `bytes`, a file in `folder` whose vertices and faces are sound; `warnings` gets why it, its picture or a library was left
-/// out. `cut` has the corners of the triangles, all corners of the file being numbered in order.
+/// out. `found` is what its statements have unless one is wrong, `cut` the corners of the triangles, all corners of the file being numbered
+/// in order.
 pub(crate) fn parse(
+    found: Option<Found>,
     bytes: &[u8],
     folder: &Path,
     cut: &[[u32; 3]],
     warnings: &mut Vec<Trouble>,
 ) -> Option<Texture> {
-    let mut of = || {
-        let Some(found) = found(bytes)? else { return Ok(None) };
+    let of = || {
+        let found = found.filter(Found::is_in_range).map_or_else(|| Found::of(bytes), Ok)?;
+        if !found.is_on_faces()? {
+            return Ok(None);
+        }
         let corners = cut.iter().map(|triangle| triangle.map(|k| found.corners[k as usize]));
         let corners = corners.collect();
         let shown = of_materials(&found, folder, warnings);
@@ -51,48 +61,60 @@ pub(crate) fn parse(
     })
 }
 
-/// Coordinates and materials; none if no corner of a face has a coordinate.
-fn found(bytes: &[u8]) -> Result<Option<Found>, Trouble> {
-    let all = statements(bytes).filter(|s| s.words().next() == Some("vt")).count();
-    let mut found = Found::default();
-    // Lines of the first corner that has a coordinate, and of the first that has none.
-    let (mut with, mut without) = (None, None);
-    // The material of the next faces, until one has it.
-    let mut material = Some(String::new());
-    for statement in statements(bytes) {
+impl Found {
+    pub(crate) fn new() -> Self {
+        Self { material: Some(String::new()), ..Self::default() }
+    }
+
+    /// What all of `bytes` has, or the first statement that is wrong.
+    fn of(bytes: &[u8]) -> Result<Self, Trouble> {
+        let (mut found, all) = (Self::new(), count(bytes, "vt"));
+        statements(bytes).try_for_each(|statement| found.add(&statement, all))?;
+        Ok(found)
+    }
+
+    /// Adds what `statement` has, in a file of at most `all` coordinates.
+    pub(crate) fn add(&mut self, statement: &Statement, all: usize) -> Result<(), Trouble> {
         let line = statement.line;
         let at = |reason| Trouble::Line(line, reason);
         let mut words = statement.words();
         match words.next() {
-            Some("vt") => found.coordinates.push(coordinate(words).map_err(at)?),
+            Some("vt") => self.coordinates.push(coordinate(words).map_err(at)?),
             Some("f") => {
-                found.materials.extend(material.take());
+                self.materials.extend(self.material.take());
                 for corner in words {
                     let field = corner.split('/').nth(1).filter(|field| !field.is_empty());
-                    let first = if field.is_some() { &mut with } else { &mut without };
+                    let first = if field.is_some() { &mut self.with } else { &mut self.without };
                     first.get_or_insert(line);
                     if let Some(field) = field {
-                        let number = index(field, found.coordinates.len(), all).map_err(at)?;
-                        found.corners.push(number);
+                        let number = index(field, self.coordinates.len(), all).map_err(at)?;
+                        self.corners.push(number);
                     }
                 }
             }
-            Some("mtllib") if found.libraries.len() <= MOST_LIBRARIES => {
-                add(&mut found.libraries, rest(&statement));
+            Some("mtllib") if self.libraries.len() <= MOST_LIBRARIES => {
+                add(&mut self.libraries, rest(statement));
             }
-            Some("usemtl") => material = Some(rest(&statement)),
+            Some("usemtl") => self.material = Some(rest(statement)),
             _ => {}
         }
+        Ok(())
     }
-    match (with, without) {
-        (None, _) => Ok(None),
-        (Some(_), None) => Ok(Some(found)),
-        (Some(with), Some(line)) => {
+
+    /// Whether there is each coordinate that a corner has: it may come after the face.
+    fn is_in_range(&self) -> bool {
+        self.corners.iter().all(|&number| (number as usize) < self.coordinates.len())
+    }
+
+    /// Whether corners have coordinates; an error if only some have.
+    fn is_on_faces(&self) -> Result<bool, Trouble> {
+        if let (Some(with), Some(line)) = (self.with, self.without) {
             let reason = format!(
                 "a corner has no texture coordinate, but one of line {with} has: all need one"
             );
-            Err(Trouble::Line(line, Fault::format(reason)))
+            return Err(Trouble::Line(line, Fault::format(reason)));
         }
+        Ok(self.with.is_some())
     }
 }
 

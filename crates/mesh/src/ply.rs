@@ -37,7 +37,7 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
     }
 
     let mut body = Body { rest: bytes, encoding, line: lines };
-    let (mut positions, mut polygons, mut polygon) = (Vec::new(), Polygons::default(), Vec::new());
+    let (mut positions, mut polygons) = (Vec::new(), Polygons::default());
     let mut colours = None;
     for element in &elements {
         match element.name.as_str() {
@@ -73,11 +73,11 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
                     if indices.len() < 3 {
                         return Err(Fault::Corners(indices.len()));
                     }
-                    polygon.clear();
                     for &index in indices {
-                        polygon.push(vertex(index, vertices)?);
+                        polygons.corners.push(vertex(index, vertices)?);
                     }
-                    polygons.add(&polygon)
+                    polygons.arities.push(indices.len() as u32);
+                    Ok(())
                 })?;
             }
             _ => body.rows(element, &[], 0, |_, []| Ok(()))?,

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use crate::{
-    Fault,
     error::Trouble,
     mesh::{cross, difference},
 };
@@ -23,20 +22,12 @@ const LEAF: usize = 8;
 #[derive(Default)]
 pub(crate) struct Polygons {
     /// The vertices of all corners.
-    corners: Vec<u32>,
-    /// Where each polygon ends.
-    ends: Vec<u32>,
+    pub(crate) corners: Vec<u32>,
+    /// How many corners each polygon has, at least three.
+    pub(crate) arities: Vec<u32>,
 }
 
 impl Polygons {
-    /// Adds the next polygon, with at least three corners.
-    pub(crate) fn add(&mut self, corners: &[u32]) -> Result<(), Fault> {
-        self.corners.extend(corners);
-        let end = u32::try_from(self.corners.len());
-        self.ends.push(end.map_err(|_| Fault::format("more corners than 32 bits can number"))?);
-        Ok(())
-    }
-
     /// The triangles between vertices, of triangles between [`Polygons::cut`] corners.
     pub(crate) fn faces(&self, cut: &[[u32; 3]]) -> Vec<[u32; 3]> {
         cut.iter().map(|triangle| triangle.map(|k| self.corners[k as usize])).collect()
@@ -48,10 +39,13 @@ impl Polygons {
     /// cut off, so a concave outline keeps its area; a convex one becomes the fan from its first corner. What has no such corner (crossing
     /// itself, no area) is cut anyhow. `n` corners take about `n log n` steps.
     pub(crate) fn cut(&self, positions: &[[f64; 3]]) -> Result<Vec<[u32; 3]>, Trouble> {
+        u32::try_from(self.corners.len())
+            .map_err(|_| Trouble::part("faces", "more corners than 32 bits can number"))?;
         let mut looks = LOOKS + LOOKS_PER_CORNER * self.corners.len() as u64;
-        let mut cut = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.ends.len()));
+        let mut cut = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.arities.len()));
         let mut start = 0;
-        for (number, &end) in self.ends.iter().enumerate() {
+        for (number, &arity) in self.arities.iter().enumerate() {
+            let end = start + arity;
             let polygon = &self.corners[start as usize..end as usize];
             let mut add = |triangle: [u32; 3]| cut.push(triangle.map(|k| start + k));
             if polygon.len() == 3 {
@@ -320,8 +314,8 @@ mod tests {
     /// The polygon with these corners in the plane, lifted onto x = 2y.
     fn cut(outline: &[[f64; 2]]) -> Mesh {
         let positions: Vec<_> = outline.iter().map(|&[y, z]| [2.0 * y, y, z]).collect();
-        let mut polygons = Polygons::default();
-        polygons.add(&(0..outline.len() as u32).collect::<Vec<_>>()).unwrap();
+        let n = outline.len() as u32;
+        let polygons = Polygons { corners: (0..n).collect(), arities: vec![n] };
         let Ok(faces) = polygons.cut(&positions) else { panic!("{} corners", outline.len()) };
         assert_eq!(faces.len(), outline.len() - 2);
         Mesh::new(positions, faces).unwrap()
@@ -416,11 +410,9 @@ mod tests {
     fn polygons_that_would_take_the_square_of_their_length_are_one_line() {
         let place = |k: u32| [0.0, f64::from(k * k % 1009), f64::from(k * k * k % 997)];
         let positions: Vec<_> = (0..500).map(place).collect();
-        let mut polygons = Polygons::default();
-        for polygon in 0..10u32 {
-            let corner = |k: u32| (k * (k + polygon) + k / 500) % 500;
-            polygons.add(&(0..50_000).map(corner).collect::<Vec<_>>()).unwrap();
-        }
+        let polygon = |by: u32| (0..50_000).map(move |k| (k * (k + by) + k / 500) % 500);
+        let corners = (0..10).flat_map(polygon).collect();
+        let polygons = Polygons { corners, arities: vec![50_000; 10] };
         let message = polygons.cut(&positions).err().unwrap().of_file("a.obj").to_string();
         let expected = "cross themselves too often: export the mesh with triangles";
         assert!(message.starts_with("a.obj: polygon ") && message.ends_with(expected), "{message}");

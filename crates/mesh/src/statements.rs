@@ -1,12 +1,14 @@
 //! The statements of an OBJ file: its lines without comments, with continued lines joined.
 
+use std::borrow::Cow;
+
 /// One statement, and the physical line (from 1) on which it starts.
-pub(crate) struct Statement {
+pub(crate) struct Statement<'a> {
     pub(crate) line: usize,
-    text: String,
+    text: Cow<'a, str>,
 }
 
-impl Statement {
+impl Statement<'_> {
     /// The fields, which spaces and tabs separate; the first is the keyword.
     pub(crate) fn words(&self) -> impl Iterator<Item = &str> {
         self.text.split([' ', '\t']).filter(|word| !word.is_empty())
@@ -17,28 +19,30 @@ impl Statement {
 ///
 /// A UTF-8 byte order mark is skipped. LF, CRLF and CR end a line. `#` starts a comment anywhere.
 /// A backslash at the very end of a line joins the next one to it, but not at the end of a
-/// comment, where it may well be part of a path. Bytes that are not UTF-8 become U+FFFD.
-pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement> {
+/// comment, where it may well be part of a path. Bytes of a line that are not UTF-8 become U+FFFD.
+pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
     let mut rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut lines_read = 0;
     std::iter::from_fn(move || {
         let line = lines_read + 1;
-        let mut joined = Vec::new();
+        let mut text = Cow::default();
         while let Some(physical) = next_line(&mut rest) {
             lines_read += 1;
             let comment = physical.iter().position(|&byte| byte == b'#');
-            let text = &physical[..comment.unwrap_or(physical.len())];
-            match text.strip_suffix(b"\\") {
-                Some(part) if comment.is_none() => joined.extend_from_slice(part),
-                _ => {
-                    joined.extend_from_slice(text);
-                    break;
-                }
+            let part = &physical[..comment.unwrap_or(physical.len())];
+            let continued = part.strip_suffix(b"\\").filter(|_| comment.is_none());
+            text += String::from_utf8_lossy(continued.unwrap_or(part));
+            if continued.is_none() {
+                break;
             }
         }
-        let text = String::from_utf8_lossy(&joined).into_owned();
         (line <= lines_read).then_some(Statement { line, text })
     })
+}
+
+/// How many statements of `bytes` start with `keyword`.
+pub(crate) fn count(bytes: &[u8], keyword: &str) -> usize {
+    statements(bytes).filter(|statement| statement.words().next() == Some(keyword)).count()
 }
 
 /// Takes the next physical line off `rest`, without its end.

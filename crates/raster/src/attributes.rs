@@ -70,16 +70,6 @@ impl<B: Backend> Attributes<B> {
         Self::new(values, entries)
     }
 
-    /// Other numbers at the same places, of the same shape or not.
-    ///
-    /// # Panics
-    ///
-    /// If there is no channel, or a face has an entry that is not there.
-    #[must_use]
-    pub fn with_values(&self, values: Tensor<B, 3>) -> Self {
-        Self { texture: self.texture.clone(), ..Self::new(values, self.entries.clone()) }
-    }
-
     /// Shows a picture `[height, width, channels]`, the top row first: the numbers, two for each entry, are places on it.
     ///
     /// The first, u, goes from 0 at the left end to 1 at the right one, the second, v, from 0 at the bottom to 1 at the top, as in an OBJ

@@ -1,37 +1,38 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use softrast_cli::EXPERIMENTS;
 
 /// Flags that only POSE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
+    /// Mesh to view (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
+    #[arg(long, value_name = "FILE", display_order = 0)]
+    pub mesh: Option<PathBuf>,
+
     /// Find the camera by a picture in colours, of a mesh with colours at its vertices
     #[arg(long)]
     pub colour: bool,
 
-    /// Mesh to view (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
-    #[arg(long, value_name = "FILE")]
-    pub mesh: Option<PathBuf>,
+    /// Optimise the field of view too, from a random start, instead of knowing it
+    #[arg(long)]
+    pub optimise_fov: bool,
 
     /// Take the mesh as it stands, as the paper's experiments do
     #[arg(long, requires = "mesh")]
     pub raw: bool,
 
     /// Degrees between the start and the target [default: 35-55]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = EXPERIMENTS)]
     pub range: Option<Range>,
 
     /// Where the pairs of start and target come from
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = EXPERIMENTS)]
     pub instances: Instances,
 
     /// Poses to start from while the image does not fit [default: 8 to solve a seed, else 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), help_heading = EXPERIMENTS)]
     pub starts: Option<u32>,
-
-    /// Optimise the field of view too, from a random start, instead of knowing it
-    #[arg(long)]
-    pub optimise_fov: bool,
 }
 
 /// How far from the target a run starts.

@@ -38,8 +38,5 @@ pub use task::Pose;
 
 /// The whole program: `--colour` makes another task of it, with another image and loss.
 pub fn main() -> std::process::ExitCode {
-    match std::env::args_os().any(|word| word == "--colour") {
-        true => softrast_cli::main::<colour::Coloured>(),
-        false => softrast_cli::main::<Pose>(),
-    }
+    softrast_cli::main_of_two::<Pose, colour::Coloured>(|args| args.colour)
 }

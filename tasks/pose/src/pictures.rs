@@ -35,9 +35,8 @@ const SHOWN: usize = 12;
 
 /// A picture and the camera that took it.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Your own pictures")]
 pub struct Pictures {
-    /// Mask whose pose is asked: its transparency, or its luminance where all of it is opaque. With --colour the picture itself counts too
+    /// Mask of the object: the transparency of a picture, or its luminance if all of it is opaque. With --colour the colours count too
     #[arg(long, value_name = "PICTURE")]
     pub target: Option<PathBuf>,
 

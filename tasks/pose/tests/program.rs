@@ -164,6 +164,20 @@ fn a_camera_that_its_silhouette_leaves_elsewhere_is_found_by_colour() {
 }
 
 #[test]
+fn colour_is_a_flag_and_not_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let task = |words: &[&str]| {
+        let fixed = ["--size=8", "--steps=1", "--starts=1", "--quiet", "--json"];
+        let ended = PROGRAM.command().current_dir(&folder).args(words).args(fixed).output();
+        let json: Value = serde_json::from_slice(&ended.unwrap().stdout).unwrap();
+        json["task"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(task(&["--out=--colour"]), "pose");
+    assert_eq!(task(&["solve", "--out=a", "--colour"]), "pose-colour");
+    assert_eq!(task(&["--colour", "--out=b"]), "pose-colour");
+}
+
+#[test]
 fn every_command_runs_by_colour_at_any_size_and_with_a_mesh_of_its_own() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ball.ply");
@@ -210,6 +224,8 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         ("--backend cuda", 2, "expected ndarray, flex or wgpu"),
         ("--mesh missing.obj", 1, "missing.obj"),
         ("--colour --mesh missing.obj", 1, "missing.obj"),
+        ("--mesh --colour", 2, "a value is required for '--mesh"),
+        ("--colour solve", 2, "unexpected argument 'solve'"),
     ] {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");

@@ -33,8 +33,5 @@ pub use task::Shape2d;
 
 /// The whole program: `--colour` makes another task of it, with another θ, image and method.
 pub fn main() -> std::process::ExitCode {
-    match std::env::args_os().any(|word| word == "--colour") {
-        true => softrast_cli::main::<colour::Coloured>(),
-        false => softrast_cli::main::<Shape2d>(),
-    }
+    softrast_cli::main_of_two::<Shape2d, colour::Coloured>(|args| args.colour)
 }

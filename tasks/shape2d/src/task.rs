@@ -116,10 +116,7 @@ impl Task for Shape2d {
     type Pictures = NoArgs;
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
-        let usual_triangles = match variant {
-            Variant::Original => 800,
-            Variant::Transfer => 4000,
-        };
+        let usual_triangles = Args::usual_triangles(variant);
         let target = match &args.target {
             None => Target::logo(variant),
             Some(path) => Target::load(path)?,
@@ -189,12 +186,7 @@ impl Task for Shape2d {
     }
 
     fn detail(&self, args: &Args) -> Option<Detail<Args>> {
-        let usual = self.usual_triangles;
-        args.triangles.is_none().then(|| Detail {
-            flag: "triangles",
-            values: vec![usual / 4, usual / 2, usual],
-            set: |args: &mut Args, value| args.triangles = Some(value),
-        })
+        args.detail(self.usual_triangles)
     }
 
     fn paper() -> &'static Paper {

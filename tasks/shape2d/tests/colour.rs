@@ -93,6 +93,8 @@ fn contradictions_are_usage_errors_and_bad_files_are_not() {
         ("--colour=yes", 2, "--colour"),
         ("--colour --triangles 0", 2, "from 1 to 100000"),
         ("--colour --target missing.png", 1, "cannot read the picture missing.png"),
+        ("--target=--colour", 1, "cannot read the picture --colour"),
+        ("--target --colour", 2, "a value is required for '--target"),
     ] {
         let failure = run(line).unwrap_err();
         assert_eq!(failure.code, code, "{line}: {failure}");

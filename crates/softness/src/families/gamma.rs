@@ -111,10 +111,7 @@ impl HalfLine for Gamma {
         Law { below: below.mask_where(far, far_above.neg() + 1.0), above, slope }
     }
 
-    fn depth<B: Backend, const D: usize>(
-        phi: &Tensor<B, 1>,
-        y: Tensor<B, D>,
-    ) -> [Tensor<B, D>; 2] {
+    fn depth<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> [Tensor<B, D>; 2] {
         let Pieces { far, below, slope, far_depth, far_depth_slope } = Pieces::new(phi, y);
         let below = below.neg();
         [

@@ -20,8 +20,7 @@ impl HalfLine for Levy {
         // The slope is y^(-3/2) exp(-1 / 2y) / sqrt(2 π), in powers of v = 1 / 2y.
         let v = (y.clamp_min(FLOOR) * 2.0).recip();
         let root = v.clone().sqrt();
-        let slope =
-            root.clone() * v.clone() * v.neg().exp() * (2.0 / std::f64::consts::PI.sqrt());
+        let slope = root.clone() * v.clone() * v.neg().exp() * (2.0 / std::f64::consts::PI.sqrt());
         Law { below: erfc(root.clone()), above: erf(root), slope }
     }
 }

@@ -1,7 +1,22 @@
 //! The families of soft steps, a file each. [`Family`](crate::Family) has them by name.
 
+mod bilogit;
+mod cauchy;
+mod cubic_hermite;
+mod exp;
+mod gamma;
+mod gauss;
+mod gudermannian;
+mod gumbel;
 mod half_line;
+mod laplace;
+mod levy;
+mod logistic;
+mod mlp;
+mod reciprocal;
+mod uniform;
 mod unit_step;
+mod wigner;
 
 pub use half_line::{Forward, Reversed};
 
@@ -33,9 +48,9 @@ macro_rules! families {
 }
 pub(crate) use families;
 
-macro_rules! modules {
+macro_rules! exports {
     ([] $($file:ident: $($variant:ident $name:literal => $softness:expr),+;)+) => {
-        $(mod $file; pub use $file::*;)+
+        $(pub use $file::*;)+
     };
 }
-families!(modules);
+families!(exports);

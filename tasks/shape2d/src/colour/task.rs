@@ -13,7 +13,7 @@ use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 
 use crate::{
-    Args,
+    Args, Shape2d,
     colour::{Colours, Scene, Start, landscape},
 };
 
@@ -116,10 +116,7 @@ impl Task for Coloured {
     type Pictures = NoArgs;
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
-        let usual_triangles = match variant {
-            Variant::Original => 800,
-            Variant::Transfer => 4000,
-        };
+        let usual_triangles = Args::usual_triangles(variant);
         let (name, picture) = match &args.target {
             None => ("landscape".to_owned(), None),
             Some(path) => (path.display().to_string(), Some(Picture::load_colours(path)?)),
@@ -134,11 +131,8 @@ impl Task for Coloured {
 
     fn measures() -> Measures {
         Measures {
-            soft: "soft MSE",
-            hard: "hard MSE",
-            parameter: ["hard MSE (stands in)", ""],
-            further: &[],
             gains: &[["psnr.hard", "hard PSNR", "dB"], ["psnr.soft", "soft PSNR", "dB"]],
+            ..Shape2d::measures()
         }
     }
 
@@ -199,12 +193,7 @@ impl Task for Coloured {
     }
 
     fn detail(&self, args: &Args) -> Option<Detail<Args>> {
-        let usual = self.usual_triangles;
-        args.triangles.is_none().then(|| Detail {
-            flag: "triangles",
-            values: vec![usual / 4, usual / 2, usual],
-            set: |args: &mut Args, value| args.triangles = Some(value),
-        })
+        args.detail(self.usual_triangles)
     }
 }
 

@@ -55,7 +55,6 @@ const FITS: f64 = 0.995;
 
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
-#[command(next_help_heading = "Your own pictures")]
 pub struct Views {
     /// Folder with transforms.json, as instant-ngp and nerfstudio write it, and masks: transparency, or luminance where all is opaque
     #[arg(long, value_name = "DIR")]
