@@ -231,7 +231,7 @@ impl<S: Softness> Silhouette<S> {
     }
 
     /// Coverage with another function in the backward pass: the image is that of `self`, the
-    /// gradient to the vertices is that of `felt` times the image's own `dA/dS`.
+    /// gradient to the vertices is that of `surrogate` times the image's own `dA/dS`.
     ///
     /// This is a straight-through estimator: a sharp image with a wide gradient. What comes back is
     /// **not** the derivative of the image. Gradients reach the parameters of neither softness at the
@@ -242,12 +242,12 @@ impl<S: Softness> Silhouette<S> {
         &self,
         vertices: Tensor<B, 3>,
         table: Tensor<B, 2>,
-        felt: &Silhouette<T>,
-        felt_table: Tensor<B, 2>,
+        surrogate: &Silhouette<T>,
+        surrogate_table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
-        let shown = profile_sum(&self.op, vertices.clone().detach(), table.detach());
-        let felt = profile_sum(&felt.op, vertices, felt_table.detach());
-        covered(self.profile.t_conorm(), shown + (felt.clone() - felt.detach()))
+        let forward = profile_sum(&self.op, vertices.clone().detach(), table.detach());
+        let backward = profile_sum(&surrogate.op, vertices, surrogate_table.detach());
+        covered(self.profile.t_conorm(), forward + (backward.clone() - backward.detach()))
     }
 
     /// Support, knots and error of the table in use.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     float::Float,
-    lanes::{LANES, Lanes, Plain, has_vectors},
+    lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
     reach::{Reach, grown, in_pixels},
     real::splat,
 };
@@ -72,10 +72,23 @@ impl Bands {
             let place = |((&x, &y), &z)| in_pixels([x, y, z], near, size);
             let places: Vec<_> = x.iter().zip(y).zip(z).map(place).collect();
             let mut reaches = vec![Reach::NOTHING; faces.len()];
+            let (places, reached) = (&places, &mut reaches);
             let drawn = if has_vectors() {
-                reach_of_faces::<F::Best>(&places, faces, radius, size, &mut reaches)
+                run::<F::Best, _>(ReachOfFaces::<F::Best> {
+                    places,
+                    faces,
+                    radius,
+                    size,
+                    reaches: reached,
+                })
             } else {
-                reach_of_faces::<Plain<F>>(&places, faces, radius, size, &mut reaches)
+                run::<Plain<F>, _>(ReachOfFaces::<Plain<F>> {
+                    places,
+                    faces,
+                    radius,
+                    size,
+                    reaches: reached,
+                })
             };
             let (offsets, entries) = by_band(&reaches, count, rows);
             View { offsets, entries, reaches, drawn, radii: Vec::new() }
@@ -85,73 +98,48 @@ impl Bands {
     }
 }
 
-/// Writes the pixels that each face may reach, and counts the faces that are drawn. `places` are those of the vertices in the
-/// image, `radius` is in pixels.
-fn reach_of_faces<L: Lanes>(
-    places: &[[L::Float; 2]],
-    faces: &[[u32; 3]],
+/// Writes the pixels that each face may reach, and counts the faces that are drawn.
+struct ReachOfFaces<'a, L: Lanes> {
+    /// Those of the vertices in the image.
+    places: &'a [[L::Float; 2]],
+    faces: &'a [[u32; 3]],
+    /// In pixels.
     radius: L::Float,
     size: ImageSize,
-    reaches: &mut [Reach],
-) -> usize {
-    #[cfg(target_arch = "x86_64")]
-    {
-        #[target_feature(enable = "avx2")]
-        fn avx2<L: Lanes>(
-            places: &[[L::Float; 2]],
-            faces: &[[u32; 3]],
-            radius: L::Float,
-            size: ImageSize,
-            reaches: &mut [Reach],
-        ) -> usize {
-            reach_of_blocks::<L>(places, faces, radius, size, reaches)
-        }
-        if L::NEEDS_AVX2 {
-            // SAFETY: the feature was detected before there were such vectors.
-            #[allow(unsafe_code)]
-            return unsafe { avx2::<L>(places, faces, radius, size, reaches) };
-        }
-        if L::GAINS_AVX2 && has_vectors() {
-            // SAFETY: the feature was just detected.
-            #[allow(unsafe_code)]
-            return unsafe { avx2::<L>(places, faces, radius, size, reaches) };
-        }
-    }
-    reach_of_blocks::<L>(places, faces, radius, size, reaches)
+    reaches: &'a mut [Reach],
 }
 
-#[inline(always)]
-fn reach_of_blocks<L: Lanes>(
-    places: &[[L::Float; 2]],
-    faces: &[[u32; 3]],
-    radius: L::Float,
-    size: ImageSize,
-    reaches: &mut [Reach],
-) -> usize {
-    let mut drawn = 0;
-    for (faces, reaches) in faces.chunks(LANES).zip(reaches.chunks_mut(LANES)) {
-        let mut corners = [[[L::Float::ZERO; LANES]; 3]; 2];
-        for (lane, face) in faces.iter().enumerate() {
-            for k in 0..3 {
-                let [x, y] = places[face[k] as usize];
-                (corners[0][k][lane], corners[1][k][lane]) = (x, y);
+impl<L: Lanes> Work for ReachOfFaces<'_, L> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        let Self { places, faces, radius, size, reaches } = self;
+        let mut drawn = 0;
+        for (faces, reaches) in faces.chunks(LANES).zip(reaches.chunks_mut(LANES)) {
+            let mut corners = [[[L::Float::ZERO; LANES]; 3]; 2];
+            for (lane, face) in faces.iter().enumerate() {
+                for k in 0..3 {
+                    let [x, y] = places[face[k] as usize];
+                    (corners[0][k][lane], corners[1][k][lane]) = (x, y);
+                }
+            }
+            let [x, y] = &corners;
+            let columns = Range::<L>::new(x, radius, size.width);
+            let rows = Range::<L>::new(y, radius, size.height);
+            for (lane, reach) in reaches.iter_mut().enumerate() {
+                let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
+                let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
+                // A vertex that is not drawn is at infinity in both.
+                let is_drawn = columns.highest[lane] < L::Float::from_f64(f64::INFINITY);
+                drawn += usize::from(is_drawn);
+                if is_drawn && left < right && top < bottom {
+                    *reach = Reach { top, bottom, left, right };
+                }
             }
         }
-        let [x, y] = &corners;
-        let columns = Range::<L>::new(x, radius, size.width);
-        let rows = Range::<L>::new(y, radius, size.height);
-        for (lane, reach) in reaches.iter_mut().enumerate() {
-            let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
-            let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
-            // A vertex that is not drawn is at infinity in both.
-            let is_drawn = columns.highest[lane] < L::Float::from_f64(f64::INFINITY);
-            drawn += usize::from(is_drawn);
-            if is_drawn && left < right && top < bottom {
-                *reach = Reach { top, bottom, left, right };
-            }
-        }
+        drawn
     }
-    drawn
 }
 
 /// Pixels that faces may reach along an axis: first and after the last.

@@ -9,16 +9,16 @@ use rayon::prelude::*;
 
 use super::{
     bands::{Bands, View},
+    face::Face,
     float::Float,
-    lanes::{LANES, Lanes, Places, Plain, Work, has_vectors, run},
-    list::{AHEAD, Chunk, LISTED, List, group, rows_of_bands},
-    pair::closest,
+    lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
+    list::{LISTED, List, group, rows_of_bands},
+    pair::CornerSums,
     pixel_loss::{PARTS, PixelLoss, overlap_and_union, squared_error},
-    real::{Table, splat},
+    real::splat,
     scene::{Place, Scene},
     sum::Inputs,
-    table::Place as Cell,
-    walk::{BandGradient, RING, TOGETHER, walk_gradient, walk_image},
+    walk::{Gradient, Image, Pair, TOGETHER, Visitor, walk},
 };
 use crate::ImageSize;
 
@@ -88,12 +88,12 @@ fn of_views<L: Lanes>(
     [losses, gradient]
 }
 
-/// What a band gives back: its sums over pixels, and parts of the gradient to the corners of its faces.
+/// What a band gives back: its sums over pixels, and parts of the gradient to x and y of the three corners of each of its faces.
 struct Walked<F> {
     sums: [F; PARTS],
     /// Whether the band is all of its view: then there is one part, which has its factor already.
     whole: bool,
-    parts: Vec<BandGradient<F>>,
+    parts: Vec<Vec<[F; 6]>>,
 }
 
 /// The loss of a view from its bands, in their order, and its gradient.
@@ -110,16 +110,10 @@ fn gather<L: Lanes>(
         sums[1] += band.sums[1];
     }
     let (value, factors) = loss.of_sums(sums, scene.size.pixels());
-    let (x, rest) = gradient.split_at_mut(gradient.len() / 3);
     for (band, Walked { whole, parts, .. }) in walked.iter().enumerate() {
-        for (part, &factor) in parts.iter().zip(&factors) {
+        for (corners, &factor) in parts.iter().zip(&factors) {
             let factor = if *whole { L::Float::ONE } else { factor };
-            for (&face, corners) in view.faces(band).iter().zip(&part.corners) {
-                for (corner, xy) in scene.faces[face as usize].iter().zip(corners.chunks_exact(2)) {
-                    x[*corner as usize] += xy[0] * factor;
-                    rest[*corner as usize] += xy[1] * factor;
-                }
-            }
+            scene.gather(view.faces(band), corners, factor, gradient);
         }
     }
     value
@@ -129,8 +123,7 @@ fn gather<L: Lanes>(
 /// squared distance, and its weights on the second and the third corner.
 #[derive(Clone, Copy)]
 struct Kept<L> {
-    dx: L,
-    dy: L,
+    offset: [L; 2],
     weights: [L; 2],
 }
 
@@ -199,7 +192,7 @@ impl<L: Lanes> Work for Band<'_, '_, L> {
 }
 
 impl<L: Lanes> Band<'_, '_, L> {
-    /// Draws the band and keeps what its gradient needs, of so many lists of faces as it says.
+    /// Draws the band and keeps what its gradient needs, of the first lists of faces: their number.
     #[inline(always)]
     fn draw(&mut self) -> usize {
         let Self { scene, place, room, .. } = self;
@@ -207,29 +200,16 @@ impl<L: Lanes> Band<'_, '_, L> {
         room.kept.clear();
         room.at.clear();
         room.corners.clear();
+        room.corners.resize(place.view.faces(place.band).len(), [0, 1, 2]);
         room.image.clear();
         room.image.resize(length, place.empty(&scene.grid));
         let tail = place.tail(&scene.grid);
-        let mut list = List::new();
-        let mut listed = 0;
-        for numbers in place.view.faces(place.band).chunks(LISTED) {
-            list.fill(scene, place, numbers);
-            if room.kept.len() + list.len() + AHEAD > KEPT {
-                break;
-            }
-            let first = (listed * LISTED) as u32;
-            room.corners.extend((0..numbers.len()).map(|owner| list.face(owner).corners()));
-            match (scene.lookup.has_far_cells(), list.slivers) {
-                (false, false) => room.take::<false, false>(scene, place.table, tail, &list, first),
-                (false, true) => room.take::<false, true>(scene, place.table, tail, &list, first),
-                (true, _) => room.take::<true, true>(scene, place.table, tail, &list, first),
-            }
-            listed += 1;
-        }
-        let place = Place { first_list: listed, ..*place };
+        let Room { kept, at, corners, image, .. } = &mut **room;
+        let image = Image { image, tail };
+        let listed = walk(scene, *place, &mut Keep { image, kept, at, corners });
         if listed * LISTED < place.view.faces(place.band).len() {
-            let mut none = BandGradient { corners: Vec::new(), table: Vec::new() };
-            walk_image(scene, place, &[], &mut room.image, &mut none);
+            let place = Place { first_list: listed, ..*place };
+            walk(scene, place, &mut Image { image: &mut room.image, tail });
         }
         listed
     }
@@ -278,112 +258,78 @@ impl<L: Lanes> Band<'_, '_, L> {
 
     /// The gradients of the sums of so many parts times the sums of profiles, to the corners of the faces.
     #[inline(always)]
-    fn pull<const COUNT: usize>(&mut self, listed: usize) -> Vec<BandGradient<L::Float>> {
+    fn pull<const COUNT: usize>(&mut self, listed: usize) -> Vec<Vec<[L::Float; 6]>> {
         let Self { scene, place, room, .. } = self;
         let faces = place.view.faces(place.band).len();
-        let nothing =
-            || BandGradient { corners: vec![[L::Float::ZERO; 6]; faces], table: Vec::new() };
-        let mut gradients: Vec<_> = (0..COUNT).map(|_| nothing()).collect();
-        let (mut sums, mut face) = ([[splat::<L>(0.0); 6]; COUNT], u32::MAX);
-        for (k, (kept, &(at, owner))) in room.kept.iter().zip(&room.at).enumerate() {
-            if owner != face || k % TOGETHER == 0 {
-                for part in 0..COUNT {
-                    flush(&room.corners, face, &sums[part], scene.half, &mut gradients[part]);
-                }
-                (sums, face) = ([[splat(0.0); 6]; COUNT], owner);
+        let mut gradients = vec![vec![[L::Float::ZERO; 6]; faces]; COUNT];
+        let (mut sums, mut last) = ([CornerSums::nothing(); COUNT], None);
+        for (k, (kept, &(at, face))) in room.kept.iter().zip(&room.at).enumerate() {
+            if let Some(last) = last
+                && (last != face || k % TOGETHER == 0)
+            {
+                flush(last, room.corners[last as usize], scene.half, &mut sums, &mut gradients);
             }
-            let [second, third] = kept.weights;
+            last = Some(face);
             for part in 0..COUNT {
                 let upstream = &room.parts[part];
                 let pull = L::of_groups(group(upstream, at[0]), group(upstream, at[1]));
-                let (x, y) = (pull * kept.dx, pull * kept.dy);
-                let sums = &mut sums[part];
-                sums[0] += x;
-                sums[1] += y;
-                sums[2] += x * second;
-                sums[3] += y * second;
-                sums[4] += x * third;
-                sums[5] += y * third;
+                let [x, y] = kept.offset;
+                sums[part].add([pull * x, pull * y], kept.weights);
             }
         }
-        for part in 0..COUNT {
-            flush(&room.corners, face, &sums[part], scene.half, &mut gradients[part]);
+        if let Some(last) = last {
+            flush(last, room.corners[last as usize], scene.half, &mut sums, &mut gradients);
         }
-        let place = Place { first_list: listed, ..*place };
         if listed * LISTED < faces {
-            for (gradient, upstream) in gradients.iter_mut().zip(&room.parts) {
-                walk_gradient(scene, place, upstream, &mut [], gradient);
+            let place = Place { first_list: listed, ..*place };
+            for (corners, upstream) in gradients.iter_mut().zip(&room.parts) {
+                walk(scene, place, &mut Gradient::new(scene, upstream, corners));
             }
         }
         gradients
     }
 }
 
-impl<L: Lanes> Room<L> {
-    /// Draws and keeps the chunks of a list, whose first face is number `first` of the band.
-    #[inline(always)]
-    fn take<const FAR: bool, const SLIVERS: bool>(
-        &mut self,
-        scene: &Scene<L>,
-        table: Table<L>,
-        tail: L,
-        list: &List<L>,
-        first: u32,
-    ) {
-        let zero = splat::<L>(0.0);
-        let (mut rows, mut places) = ([Places::FIRST; RING], [zero; RING]);
-        let mut rates = [zero; RING];
-        let start = self.kept.len();
-        for (ahead, Chunk { places: from_origin, at, owner }) in list.chunks(AHEAD).enumerate() {
-            let slot = ahead % RING;
-            let (px, py) = L::pixels(from_origin);
-            let point = closest::<L, SLIVERS>(list.face(owner), px, py);
-            let Cell { row, t, rate } = scene.lookup.place::<L, FAR>(point.distance2, point.inside);
-            (rows[slot], places[slot], rates[slot]) = (row, t, rate);
-            let [_, second, third] = point.weights;
-            let weights = [second, third];
-            self.kept.push(Kept { dx: point.dx, dy: point.dy, weights });
-            self.at.push((at, first + owner as u32));
-            if ahead < AHEAD {
-                continue;
-            }
-            let slot = (ahead - AHEAD) % RING;
-            let [a, b, c, d] = L::rows(table.values, &rows[slot]);
-            let t = places[slot];
-            let before = start + ahead - AHEAD;
-            (a + t * (b + t * (c + t * d)) - tail)
-                .add_to_groups(&mut self.image, self.at[before].0);
-            let slope = rates[slot] * (b + t * (c * splat(2.0) + t * (d * splat(3.0))));
-            let kept = &mut self.kept[before];
-            (kept.dx, kept.dy) = (slope * kept.dx, slope * kept.dy);
-        }
-        let end = self.kept.len() - AHEAD;
-        self.kept.truncate(end);
-        self.at.truncate(end);
+/// Adds the sums of each part to the corners of a face, given as the face has them. A function, since closures have not the features of
+/// their callers.
+#[inline(always)]
+fn flush<L: Lanes>(
+    face: u32,
+    order: [usize; 3],
+    half: f64,
+    sums: &mut [CornerSums<L>],
+    gradients: &mut [Vec<[L::Float; 6]>],
+) {
+    for (sums, corners) in sums.iter_mut().zip(gradients) {
+        sums.flush(order, half, &mut corners[face as usize]);
     }
 }
 
-/// Adds sums over the chunks of a face to its corners. The sums have neither the factor -2 nor the share of the first corner, which is
-/// what the others leave.
-#[inline(always)]
-fn flush<L: Lanes>(
-    corners: &[[usize; 3]],
-    face: u32,
-    sums: &[L; 6],
-    half: f64,
-    gradient: &mut BandGradient<L::Float>,
-) {
-    let Some(order) = corners.get(face as usize) else { return };
-    // From pixels, with y down, to NDC.
-    let [right, down] = [-2.0, 2.0].map(|k| L::Float::from_f64(k * half));
-    let of_corner = [
-        [sums[0] - sums[2] - sums[4], sums[1] - sums[3] - sums[5]],
-        [sums[2], sums[3]],
-        [sums[4], sums[5]],
-    ];
-    let own = &mut gradient.corners[face as usize];
-    for (&corner, [x, y]) in order.iter().zip(of_corner) {
-        own[2 * corner] += x.sum() * right;
-        own[2 * corner + 1] += y.sum() * down;
+/// Draws pairs and keeps them for the gradient, while there is room.
+struct Keep<'a, L: Lanes> {
+    image: Image<'a, L>,
+    kept: &'a mut Vec<Kept<L>>,
+    at: &'a mut Vec<([u32; 2], u32)>,
+    corners: &'a mut [[usize; 3]],
+}
+
+impl<L: Lanes> Visitor<L> for Keep<'_, L> {
+    #[inline(always)]
+    fn begins(&mut self, list: &List<L>) -> bool {
+        self.kept.len() + list.len() <= KEPT
+    }
+
+    #[inline(always)]
+    fn pair(&mut self, pair: &Pair<L>) {
+        self.image.pair(pair);
+        let slope = pair.slope(splat(1.0));
+        let [x, y] = pair.offset;
+        self.kept.push(Kept { offset: [slope * x, slope * y], weights: pair.weights });
+        self.at.push((pair.at, pair.face as u32));
+    }
+
+    #[inline(always)]
+    fn face(&mut self, number: usize, face: Face<L>) {
+        self.corners[number] = face.corners();
     }
 }

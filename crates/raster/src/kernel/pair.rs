@@ -2,6 +2,7 @@
 
 use super::{
     face::{Edge, Face},
+    float::Float as _,
     lanes::Lanes,
     real::{Mask, Real, splat},
 };
@@ -69,6 +70,51 @@ pub(crate) fn closest<T: Real, const SLIVERS: bool>(
     ];
     let Point { distance2, dx, dy, .. } = point;
     Closest { distance2, dx, dy, weights, inside, along, edges }
+}
+
+/// The gradient of a sum to the corners of a face, chunk by chunk.
+///
+/// The closest point is where it is closest, so the squared distance moves as though the point stayed on its edge where it is: by -2 times
+/// the way from it to the pixel, shared by the corners as the point is.
+#[derive(Clone, Copy)]
+pub(crate) struct CornerSums<L>([L; 6]);
+
+impl<L: Lanes> CornerSums<L> {
+    #[inline(always)]
+    pub(crate) fn nothing() -> Self {
+        Self([splat(0.0); 6])
+    }
+
+    /// Adds the way from the closest points to the pixels times the derivatives by the squared distance, `x` and `y`; `second` and
+    /// `third` are the weights of the points on these corners.
+    #[inline(always)]
+    pub(crate) fn add<T: Real<Lanes = L>>(&mut self, [x, y]: [T; 2], [second, third]: [T; 2]) {
+        self.0[0] += x.output();
+        self.0[1] += y.output();
+        self.0[2] += (x * second).output();
+        self.0[3] += (y * second).output();
+        self.0[4] += (x * third).output();
+        self.0[5] += (y * third).output();
+    }
+
+    /// Adds it to the x and y of the three corners of a face, in NDC, and begins again. `order` says where each was given, `half` is the
+    /// number of pixels in a unit.
+    #[inline(always)]
+    pub(crate) fn flush(&mut self, order: [usize; 3], half: f64, corners: &mut [L::Float; 6]) {
+        let sums = std::mem::replace(self, Self::nothing()).0;
+        // From pixels, with y down, to NDC.
+        let [right, down] = [-2.0, 2.0].map(|k| L::Float::from_f64(k * half));
+        // The first corner has what the others leave.
+        let of_corner = [
+            [sums[0] - sums[2] - sums[4], sums[1] - sums[3] - sums[5]],
+            [sums[2], sums[3]],
+            [sums[4], sums[5]],
+        ];
+        for (&corner, [x, y]) in order.iter().zip(of_corner) {
+            corners[2 * corner] += x.sum() * right;
+            corners[2 * corner + 1] += y.sum() * down;
+        }
+    }
 }
 
 /// The closest point of an edge.

@@ -172,6 +172,23 @@ impl<'a, T: Real> Scene<'a, T> {
         Place { vertices, tangents, table: self.table, view, band, first_list: 0 }
     }
 
+    /// Adds the gradients to x and y of the three corners of some faces, times a factor, to those of the vertices, `[3, vertices]`.
+    pub(crate) fn gather(
+        &self,
+        faces: &[u32],
+        corners: &[[Float<T>; 6]],
+        factor: Float<T>,
+        vertices: &mut [Float<T>],
+    ) {
+        let (x, rest) = vertices.split_at_mut(vertices.len() / 3);
+        for (&face, corners) in faces.iter().zip(corners) {
+            for (corner, xy) in self.faces[face as usize].iter().zip(corners.chunks_exact(2)) {
+                x[*corner as usize] += xy[0] * factor;
+                rest[*corner as usize] += xy[1] * factor;
+            }
+        }
+    }
+
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.
     pub(crate) fn stride(&self) -> usize {
         self.size.width + GROUP

@@ -9,10 +9,7 @@ use super::{
     real::{self, Dual, Real, Table},
     scene::Scene,
     table::Grid,
-    walk::{
-        BandGradient, walk_everything, walk_gradient, walk_gradient_and_table, walk_image,
-        walk_image_and_gradient,
-    },
+    walk::{Gradient, Image, TableGradient, walk},
 };
 use crate::ImageSize;
 
@@ -113,10 +110,10 @@ fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<real::Float<T>> {
         |(index, (image, view))| {
             image.par_chunks_mut(scene.rows * scene.size.width).enumerate().for_each(
                 |(band, image)| {
-                    let mut none = BandGradient { corners: Vec::new(), table: Vec::new() };
                     let place = scene.place(view, index, views, band);
                     let mut padded = vec![place.empty(&scene.grid); scene.band_length(band)];
-                    walk_image(scene, place, &[], &mut padded, &mut none);
+                    let tail = place.tail(&scene.grid);
+                    walk(scene, place, &mut Image { image: &mut padded, tail });
                     trim(&padded, image, scene);
                 },
             );
@@ -143,8 +140,12 @@ fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, band: usize) -> Vec<r
     padded
 }
 
-/// What a view or a band gives back: gradients, and its rows of the image.
-type Walked<F> = (BandGradient<F>, Vec<F>);
+/// What a band gives back: for each face the gradient to x and y of its three corners, that to the table, and rows of the image.
+struct Walked<F> {
+    corners: Vec<[F; 6]>,
+    table: Vec<[F; 4]>,
+    image: Vec<F>,
+}
 
 /// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and table, and the sums, as they are wanted, flat
 /// and in this order. The third row of each view's vertices is 0, because a silhouette does not see
@@ -159,26 +160,42 @@ fn gradient<T: Real>(
     let views = bands.views.len();
     let (pixels, width) = (scene.size.pixels(), scene.size.width);
     let table_rows = if wrt_table { scene.grid.rows() } else { 0 };
-    // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
-    let walk = if T::DUAL {
-        if wrt_table { walk_everything } else { walk_image_and_gradient }
-    } else {
-        if wrt_table { walk_gradient_and_table } else { walk_gradient }
-    };
     let in_band = |index: usize, band: usize| {
         let view = &bands.views[index];
         let rows = scene.band_rows(band);
         let place = scene.place(view, index, views, band);
-        let empty = || vec![place.empty(&scene.grid); scene.band_length(band)];
-        let mut image = if T::DUAL { empty() } else { vec![] };
-        let mut gradient = BandGradient {
+        // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
+        let length = if T::DUAL { scene.band_length(band) } else { 0 };
+        let mut walked = Walked {
             corners: vec![[zero; 6]; view.faces(band).len()],
             table: vec![[zero; 4]; table_rows],
+            image: vec![place.empty(&scene.grid); length],
         };
         let of_band = index * pixels + rows.start * width..index * pixels + rows.end * width;
-        let upstream = pad(&upstream[of_band], scene, band);
-        walk(scene, place, &upstream, &mut image, &mut gradient);
-        (gradient, image)
+        let upstream = &pad(&upstream[of_band], scene, band);
+        let gradient = Gradient::new(scene, upstream, &mut walked.corners);
+        let image = Image { image: &mut walked.image, tail: place.tail(&scene.grid) };
+        let table = TableGradient::new(upstream, &mut walked.table);
+        let tail = scene.grid.tail();
+        match (T::DUAL, wrt_table) {
+            (false, false) => {
+                walk(scene, place, &mut { gradient });
+            }
+            (true, false) => {
+                walk(scene, place, &mut (image, gradient));
+            }
+            (false, true) => {
+                let mut both = (gradient, table);
+                walk(scene, place, &mut both);
+                both.1.finish(tail);
+            }
+            (true, true) => {
+                let mut all = ((image, gradient), table);
+                walk(scene, place, &mut all);
+                all.1.finish(tail);
+            }
+        }
+        walked
     };
     let count = scene.vertices.len();
     let mut vertices = vec![zero; count];
@@ -215,20 +232,14 @@ fn gather<T: Real>(
     vertices: &mut [real::Float<T>],
 ) -> (Vec<[real::Float<T>; 4]>, Vec<real::Float<T>>) {
     let zero = real::Float::<T>::ZERO;
-    let mut table = vec![[zero; 4]; walked.first().map_or(0, |(band, _)| band.table.len())];
-    let mut image = Vec::with_capacity(walked.iter().map(|(_, rows)| rows.len()).sum());
-    let (x, rest) = vertices.split_at_mut(vertices.len() / 3);
-    for (band, (gradient, rows)) in walked.into_iter().enumerate() {
-        for (&face, corners) in view.faces(band).iter().zip(&gradient.corners) {
-            for (corner, xy) in scene.faces[face as usize].iter().zip(corners.chunks_exact(2)) {
-                x[*corner as usize] += xy[0];
-                rest[*corner as usize] += xy[1];
-            }
-        }
-        for (total, part) in table.iter_mut().zip(&gradient.table) {
+    let mut table = vec![[zero; 4]; walked.first().map_or(0, |band| band.table.len())];
+    let mut image = Vec::with_capacity(walked.iter().map(|band| band.image.len()).sum());
+    for (band, walked) in walked.into_iter().enumerate() {
+        scene.gather(view.faces(band), &walked.corners, real::Float::<T>::ONE, vertices);
+        for (total, part) in table.iter_mut().zip(&walked.table) {
             total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
         }
-        for row in rows.chunks_exact(scene.stride()) {
+        for row in walked.image.chunks_exact(scene.stride()) {
             image.extend_from_slice(&row[..scene.size.width]);
         }
     }

@@ -1,115 +1,157 @@
-//! One walk over the pixel-face pairs of a band, for the image, its gradient or both.
+//! The walk over the pixel-face pairs of a band: silhouettes, their gradients and their losses are visitors of it.
 
 use super::{
-    float::Float as _,
-    lanes::{Lanes, Places},
+    face::Face,
+    lanes::{Lanes, Places, Work, run},
     list::{AHEAD, Chunk, LISTED, List, group},
-    pair::closest,
-    real::{Float, Real, Table, splat},
+    pair::{CornerSums, closest},
+    real::{Float, Real, splat},
     scene::{Place, Scene},
     table::Place as Cell,
 };
 
-/// Room for chunks whose geometry is known: a power of two. Adding up follows [`AHEAD`] chunks behind: while one waits for the table, the
+/// Room for chunks whose geometry is known: a power of two. Visits follow [`AHEAD`] chunks behind: while one waits for the table, the
 /// arithmetic of the other goes on.
-pub(crate) const RING: usize = 8;
+const RING: usize = 8;
 
 /// Chunks whose gradients are added up lane by lane: fewer terms in a row keep more digits.
 pub(crate) const TOGETHER: usize = 16;
 
-/// What one band gives back.
-pub(crate) struct BandGradient<F> {
-    /// For each face of the band, the gradient to x and y of its three corners.
-    pub(crate) corners: Vec<[F; 6]>,
-    pub(crate) table: Vec<[F; 4]>,
+/// A face and eight pixels.
+pub(crate) struct Pair<T: Real> {
+    /// Where the two groups of pixels lie in the band.
+    pub(crate) at: [u32; 2],
+    /// Number of the face in the band.
+    pub(crate) face: usize,
+    /// From the closest point to the pixel.
+    pub(crate) offset: [T; 2],
+    /// Weights of the closest point on the second and the third corner.
+    pub(crate) weights: [T; 2],
+    /// Place in the cell of the table, how it changes with the squared distance, the row of the cell, and its cubic.
+    pub(crate) t: T,
+    pub(crate) rate: T::Lanes,
+    pub(crate) row: Places,
+    pub(crate) cubic: [T; 4],
 }
 
-/// One walk over the pairs of a band. `upstream` and `image` are `[rows, stride]` and a group more.
-#[inline(always)]
-fn walk<T: Real, const IMAGE: bool, const GRADIENT: bool, const TABLE: bool>(
+impl<T: Real> Pair<T> {
+    /// The profile.
+    #[inline(always)]
+    pub(crate) fn value(&self) -> T {
+        let [a, b, c, d] = self.cubic;
+        a + self.t * (b + self.t * (c + self.t * d))
+    }
+
+    /// The derivative of the profile by the squared distance, times a factor that depends on no input.
+    #[inline(always)]
+    pub(crate) fn slope(&self, factor: T::Lanes) -> T {
+        let [_, b, c, d] = self.cubic;
+        let by_place = b + self.t * (c.scale(splat(2.0)) + self.t * d.scale(splat(3.0)));
+        by_place.scale(self.rate * factor)
+    }
+}
+
+/// What is done with the pairs of a band.
+pub(crate) trait Visitor<T: Real> {
+    /// Whether the chunks of this list are visited; if not, the walk ends before it.
+    #[inline(always)]
+    fn begins(&mut self, list: &List<T>) -> bool {
+        let _ = list;
+        true
+    }
+
+    /// Takes a pair. Those of a face follow each other.
+    fn pair(&mut self, pair: &Pair<T>);
+
+    /// Has taken all pairs of a face, or up to [`TOGETHER`] of them; the face has this number in the band.
+    #[inline(always)]
+    fn face(&mut self, number: usize, face: Face<T>) {
+        let _ = (number, face);
+    }
+}
+
+/// Two visitors, one after the other.
+impl<T: Real, A: Visitor<T>, B: Visitor<T>> Visitor<T> for (A, B) {
+    #[inline(always)]
+    fn pair(&mut self, pair: &Pair<T>) {
+        self.0.pair(pair);
+        self.1.pair(pair);
+    }
+
+    #[inline(always)]
+    fn face(&mut self, number: usize, face: Face<T>) {
+        self.0.face(number, face);
+        self.1.face(number, face);
+    }
+}
+
+/// Shows the pairs of a band to a visitor: the number of lists of faces that were visited, counted from the first of the band.
+pub(crate) fn walk<T: Real>(
     scene: &Scene<T>,
     place: Place<T>,
-    upstream: &[Float<T>],
-    image: &mut [Float<T>],
-    gradient: &mut BandGradient<Float<T>>,
-) {
-    let mut list = List::new();
-    let mut walker = Walker {
-        scene,
-        table: place.table,
-        upstream,
-        image,
-        gradient,
-        visited: splat(0.0),
-        tail: place.tail(&scene.grid),
-    };
-    let lists = place.view.faces(place.band).chunks(LISTED).enumerate();
-    for (k, numbers) in lists.skip(place.first_list) {
-        list.fill(scene, &place, numbers);
-        let first = k * LISTED;
-        match (scene.lookup.has_far_cells(), list.slivers) {
-            (false, false) => walker.take::<IMAGE, GRADIENT, TABLE, false, false>(&list, first),
-            (false, true) => walker.take::<IMAGE, GRADIENT, TABLE, false, true>(&list, first),
-            (true, _) => walker.take::<IMAGE, GRADIENT, TABLE, true, true>(&list, first),
-        }
-    }
-    if TABLE {
-        let visited = walker.visited.sum();
-        gradient.table[scene.grid.tail()][0] += -visited;
-    }
+    visitor: &mut impl Visitor<T>,
+) -> usize {
+    run::<T::Lanes, _>(Walk { scene, place, visitor })
 }
 
-/// Where the pairs of a band go.
-struct Walker<'a, 's, T: Real> {
+/// A [`walk`], to be compiled for the vectors at hand.
+struct Walk<'a, 's, T: Real, V> {
     scene: &'a Scene<'s, T>,
-    table: Table<'a, T>,
-    upstream: &'a [Float<T>],
-    image: &'a mut [Float<T>],
-    gradient: &'a mut BandGradient<Float<T>>,
-    /// Sums of `upstream` over the pairs, each of which replaced a tail.
-    visited: T::Lanes,
-    tail: T,
+    place: Place<'a, T>,
+    visitor: &'a mut V,
+}
+
+impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(mut self) -> usize {
+        let mut list = List::new();
+        let mut visited = self.place.first_list;
+        let lists = self.place.view.faces(self.place.band).chunks(LISTED);
+        for numbers in lists.skip(self.place.first_list) {
+            list.fill(self.scene, &self.place, numbers);
+            if !self.visitor.begins(&list) {
+                break;
+            }
+            let first = visited * LISTED;
+            match (self.scene.lookup.has_far_cells(), list.slivers) {
+                (false, false) => self.take::<false, false>(&list, first),
+                (false, true) => self.take::<false, true>(&list, first),
+                (true, _) => self.take::<true, true>(&list, first),
+            }
+            visited += 1;
+        }
+        visited
+    }
 }
 
 /// Chunks whose geometry is known: closest points, their weights, and their places in the table.
 struct Ring<T: Real> {
     at: [[u32; 2]; RING],
     owner: [usize; RING],
-    dx: [T; RING],
-    dy: [T; RING],
-    weights: [[T; 3]; RING],
+    offset: [[T; 2]; RING],
+    weights: [[T; 2]; RING],
     t: [T; RING],
     row: [Places; RING],
     rate: [T::Lanes; RING],
 }
 
-impl<T: Real> Walker<'_, '_, T> {
+impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
     /// Takes the chunks of a list, whose first face is number `first` of the band.
     #[inline(always)]
-    fn take<
-        const IMAGE: bool,
-        const GRADIENT: bool,
-        const TABLE: bool,
-        const FAR: bool,
-        const SLIVERS: bool,
-    >(
-        &mut self,
-        list: &List<T>,
-        first: usize,
-    ) {
+    fn take<const FAR: bool, const SLIVERS: bool>(&mut self, list: &List<T>, first: usize) {
         let zero = T::constant(splat(0.0));
         let mut ring = Ring {
             at: [[0; 2]; RING],
             owner: [0; RING],
-            dx: [zero; RING],
-            dy: [zero; RING],
-            weights: [[zero; 3]; RING],
+            offset: [[zero; 2]; RING],
+            weights: [[zero; 2]; RING],
             t: [zero; RING],
             row: [Places::FIRST; RING],
             rate: [splat(0.0); RING],
         };
-        let mut sums = [splat::<T::Lanes>(0.0); 6];
-        let mut face = usize::MAX;
+        let mut last = None;
         for (ahead, Chunk { places, at, owner }) in list.chunks(AHEAD).enumerate() {
             let slot = ahead % RING;
             (ring.at[slot], ring.owner[slot]) = (at, owner);
@@ -117,136 +159,118 @@ impl<T: Real> Walker<'_, '_, T> {
             let point = closest::<T, SLIVERS>(list.face(owner), px, py);
             let Cell { row, t, rate } =
                 self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
-            (ring.row[slot], ring.t[slot]) = (row, t);
-            if GRADIENT {
-                (ring.dx[slot], ring.dy[slot]) = (point.dx, point.dy);
-                (ring.weights[slot], ring.rate[slot]) = (point.weights, rate);
-            }
+            (ring.row[slot], ring.t[slot], ring.rate[slot]) = (row, t, rate);
+            let [_, second, third] = point.weights;
+            (ring.offset[slot], ring.weights[slot]) = ([point.dx, point.dy], [second, third]);
             if ahead < AHEAD {
                 continue;
             }
             let slot = (ahead - AHEAD) % RING;
-            let (at, owner) = (ring.at[slot], ring.owner[slot]);
-            if GRADIENT && (owner != face || ahead % TOGETHER == 0) {
-                self.corners(list, first, face, &sums);
-                face = owner;
-                sums = [splat(0.0); 6];
-            }
-            let cubic = T::rows(self.table, &ring.row[slot]);
-            if IMAGE {
-                self.value(&ring, slot, cubic, at);
-            }
-            if GRADIENT {
-                self.pull::<TABLE>(&ring, slot, cubic, at, &mut sums);
-            }
-        }
-        if GRADIENT {
-            self.corners(list, first, face, &sums);
-        }
-    }
-
-    /// Adds `profile - tail` to the pixels of a chunk.
-    #[inline(always)]
-    fn value(&mut self, ring: &Ring<T>, slot: usize, [a, b, c, d]: [T; 4], at: [u32; 2]) {
-        let t = ring.t[slot];
-        let value = a + t * (b + t * (c + t * d)) - self.tail;
-        value.output().add_to_groups(self.image, at);
-    }
-
-    /// Adds to the gradient of a face, without its factor -2, and to that of the table.
-    #[inline(always)]
-    fn pull<const TABLE: bool>(
-        &mut self,
-        ring: &Ring<T>,
-        slot: usize,
-        [_, b, c, d]: [T; 4],
-        [low, high]: [u32; 2],
-        sums: &mut [T::Lanes; 6],
-    ) {
-        let upstream = T::Lanes::of_groups(group(self.upstream, low), group(self.upstream, high));
-        let t = ring.t[slot];
-        let slope = b + t * (c.scale(splat(2.0)) + t * d.scale(splat(3.0)));
-        let pull = slope.scale(ring.rate[slot] * upstream);
-        let (x, y) = (pull * ring.dx[slot], pull * ring.dy[slot]);
-        let [w0, w1, w2] = ring.weights[slot];
-        sums[0] += (x * w0).output();
-        sums[1] += (y * w0).output();
-        sums[2] += (x * w1).output();
-        sums[3] += (y * w1).output();
-        sums[4] += (x * w2).output();
-        sums[5] += (y * w2).output();
-        if TABLE {
-            let one = T::constant(upstream);
-            let (first, second) = (one * t, one * t * t);
-            let powers = [one, first, second, second * t];
-            let columns =
-                [powers[0].output(), powers[1].output(), powers[2].output(), powers[3].output()];
-            T::Lanes::add_to_rows(&mut self.gradient.table, &ring.row[slot], columns);
-            self.visited += one.output();
-        }
-    }
-
-    /// Adds to the gradient of a face.
-    #[inline(always)]
-    fn corners(&mut self, list: &List<T>, first: usize, face: usize, sums: &[T::Lanes; 6]) {
-        if face == usize::MAX {
-            return;
-        }
-        let order = list.face(face).corners();
-        let corners = &mut self.gradient.corners[first + face];
-        // From pixels, with y down, to NDC.
-        let [right, down] = [-2.0, 2.0].map(|k| Float::<T>::from_f64(k * self.scene.half));
-        for k in 0..3 {
-            corners[2 * order[k]] += sums[2 * k].sum() * right;
-            corners[2 * order[k] + 1] += sums[2 * k + 1].sum() * down;
-        }
-    }
-}
-
-/// Compiles a walk for AVX2 and for what every machine has, and picks one at run time. Products and
-/// sums are never contracted, so that both give the same bits.
-macro_rules! dispatched {
-    ($name:ident, $image:literal, $gradient:literal, $table:literal) => {
-        pub(crate) fn $name<T: Real>(
-            scene: &Scene<T>,
-            place: Place<T>,
-            upstream: &[Float<T>],
-            image: &mut [Float<T>],
-            gradient: &mut BandGradient<Float<T>>,
-        ) {
-            #[cfg(target_arch = "x86_64")]
+            let owner = ring.owner[slot];
+            if let Some(face) = last
+                && (face != owner || ahead % TOGETHER == 0)
             {
-                #[target_feature(enable = "avx2")]
-                fn avx2<T: Real>(
-                    scene: &Scene<T>,
-                    place: Place<T>,
-                    upstream: &[Float<T>],
-                    image: &mut [Float<T>],
-                    gradient: &mut BandGradient<Float<T>>,
-                ) {
-                    walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
-                }
-                // Two questions, so that the compiler leaves out what no machine asks for.
-                if T::Lanes::NEEDS_AVX2 {
-                    // SAFETY: the feature was detected before there were such vectors.
-                    #[allow(unsafe_code)]
-                    return unsafe { avx2(scene, place, upstream, image, gradient) };
-                }
-                if T::Lanes::GAINS_AVX2 {
-                    if super::lanes::has_vectors() {
-                        // SAFETY: the feature was just detected.
-                        #[allow(unsafe_code)]
-                        return unsafe { avx2(scene, place, upstream, image, gradient) };
-                    }
-                }
+                self.visitor.face(first + face, list.face(face));
             }
-            walk::<T, $image, $gradient, $table>(scene, place, upstream, image, gradient);
+            last = Some(owner);
+            let (row, t, rate) = (ring.row[slot], ring.t[slot], ring.rate[slot]);
+            self.visitor.pair(&Pair {
+                at: ring.at[slot],
+                face: first + owner,
+                offset: ring.offset[slot],
+                weights: ring.weights[slot],
+                t,
+                rate,
+                row,
+                cubic: T::rows(self.place.table, &row),
+            });
         }
-    };
+        if let Some(face) = last {
+            self.visitor.face(first + face, list.face(face));
+        }
+    }
 }
 
-dispatched!(walk_image, true, false, false);
-dispatched!(walk_gradient, false, true, false);
-dispatched!(walk_image_and_gradient, true, true, false);
-dispatched!(walk_gradient_and_table, false, true, true);
-dispatched!(walk_everything, true, true, true);
+/// Adds `profile - tail` to the pixels of a band, `[rows, stride]` and a group more.
+pub(crate) struct Image<'a, T: Real> {
+    pub(crate) image: &'a mut [Float<T>],
+    pub(crate) tail: T,
+}
+
+impl<T: Real> Visitor<T> for Image<'_, T> {
+    #[inline(always)]
+    fn pair(&mut self, pair: &Pair<T>) {
+        (pair.value() - self.tail).output().add_to_groups(self.image, pair.at);
+    }
+}
+
+/// Adds the gradient of `Σ upstream S` to x and y of the three corners of each face of a band.
+pub(crate) struct Gradient<'a, T: Real> {
+    upstream: &'a [Float<T>],
+    half: f64,
+    corners: &'a mut [[Float<T>; 6]],
+    sums: CornerSums<T::Lanes>,
+}
+
+impl<'a, T: Real> Gradient<'a, T> {
+    pub(crate) fn new(
+        scene: &Scene<T>,
+        upstream: &'a [Float<T>],
+        corners: &'a mut [[Float<T>; 6]],
+    ) -> Self {
+        Self { upstream, half: scene.half, corners, sums: CornerSums::nothing() }
+    }
+}
+
+impl<T: Real> Visitor<T> for Gradient<'_, T> {
+    #[inline(always)]
+    fn pair(&mut self, pair: &Pair<T>) {
+        let pull = pair.slope(of_pixels::<T>(self.upstream, pair.at));
+        let [x, y] = pair.offset;
+        self.sums.add([pull * x, pull * y], pair.weights);
+    }
+
+    #[inline(always)]
+    fn face(&mut self, number: usize, face: Face<T>) {
+        self.sums.flush(face.corners(), self.half, &mut self.corners[number]);
+    }
+}
+
+/// Adds the gradient of `Σ upstream S` to the rows of the table.
+pub(crate) struct TableGradient<'a, T: Real> {
+    upstream: &'a [Float<T>],
+    rows: &'a mut [[Float<T>; 4]],
+    /// Sums of `upstream` over the pairs, each of which replaced a tail.
+    visited: T::Lanes,
+}
+
+impl<'a, T: Real> TableGradient<'a, T> {
+    pub(crate) fn new(upstream: &'a [Float<T>], rows: &'a mut [[Float<T>; 4]]) -> Self {
+        Self { upstream, rows, visited: splat(0.0) }
+    }
+
+    /// Takes the tails that pairs have replaced off row `tail`.
+    pub(crate) fn finish(self, tail: usize) {
+        self.rows[tail][0] += -self.visited.sum();
+    }
+}
+
+impl<T: Real> Visitor<T> for TableGradient<'_, T> {
+    #[inline(always)]
+    fn pair(&mut self, pair: &Pair<T>) {
+        let one = T::constant(of_pixels::<T>(self.upstream, pair.at));
+        let t = pair.t;
+        let (first, second) = (one * t, one * t * t);
+        let powers = [one, first, second, second * t];
+        let columns =
+            [powers[0].output(), powers[1].output(), powers[2].output(), powers[3].output()];
+        T::Lanes::add_to_rows(self.rows, &pair.row, columns);
+        self.visited += one.output();
+    }
+}
+
+/// The numbers of two groups of pixels.
+#[inline(always)]
+fn of_pixels<T: Real>(numbers: &[Float<T>], [low, high]: [u32; 2]) -> T::Lanes {
+    T::Lanes::of_groups(group(numbers, low), group(numbers, high))
+}
