@@ -91,7 +91,7 @@ pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
 pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, Surrogate};
-pub use softness_file::{DepthSoftnessFile, NameOrFile, SoftnessFileError};
+pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
 pub use transforms::{Transforms, load_views};

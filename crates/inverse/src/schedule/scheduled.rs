@@ -225,7 +225,7 @@ impl<S: Softness> ScheduledSoftness<S> {
     }
 
     /// If it cannot be used, says what was found and what was expected; `name` is what a softness is called.
-    fn check_as(&self, name: impl Fn(&S) -> &'static str) -> Result<(), String> {
+    pub(super) fn check_as(&self, name: impl Fn(&S) -> &'static str) -> Result<(), String> {
         let surrogate = self.surrogate.iter().map(|of| (&of.softness, &of.phi));
         let parameters: Vec<_> =
             [(&self.softness, &self.phi)].into_iter().chain(surrogate).collect();
@@ -265,6 +265,25 @@ impl<S: Softness> ScheduledSoftness<S> {
             }
         }
         Ok(())
+    }
+}
+
+impl<S> ScheduledSoftness<S> {
+    /// The same numbers with `softness` of each softness in its place.
+    pub(super) fn map<T>(self, softness: impl Fn(S) -> T) -> ScheduledSoftness<T> {
+        let of =
+            |found: Surrogate<S>| Surrogate { softness: softness(found.softness), phi: found.phi };
+        ScheduledSoftness {
+            surrogate: self.surrogate.map(of),
+            softness: softness(self.softness),
+            phi: self.phi,
+            schedule: self.schedule,
+            feedback: self.feedback,
+            learning_rate: self.learning_rate,
+            rate_end: self.rate_end,
+            task: self.task,
+            note: self.note,
+        }
     }
 }
 
