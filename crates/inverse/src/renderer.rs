@@ -31,10 +31,11 @@ pub struct ScheduledRenderer<S = EdgeSoftness> {
     colours: RefCell<Option<Colours<S>>>,
 }
 
-/// A renderer of colours and what it was made for: faces, pixels a side, planes, depth softness and its scale.
+/// A renderer of colours, the faces that it draws, and pixels a side.
 #[derive(Debug)]
 struct Colours<S> {
-    of: (Arc<[[u32; 3]]>, usize, [f64; 2], DepthSoftness, f64),
+    faces: Arc<[[u32; 3]]>,
+    side: usize,
     renderer: ColourRenderer<S>,
 }
 
@@ -253,9 +254,11 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         (layout.edge(), phi)
     }
 
-    /// Draws these faces in colours under this softness of edges with its parameters, on images of [`side`](Self::side) pixels a side. Planes
-    /// and `depth` are those of [`ColourRenderer::new`] and [`ColourRenderer::with_depth`]. Its tables are kept for the next image of the same
-    /// faces. Where φ has a gradient, [`ColourRenderer::image_with`] takes it along, with the parameters of [`edge`](Self::edge).
+    /// A renderer of these faces in colours under this softness of edges, on images of [`side`](Self::side) pixels a side.
+    ///
+    /// `planes` are the depths of nearness 1 and 0 in world units, `depth_scale` is in units of the distance between them. The tables of the
+    /// latest renderer are kept for the next call with the same arguments. [`ColourRenderer::image_with`] passes gradients on to φ, under the
+    /// parameters of [`edge`](Self::edge).
     ///
     /// # Panics
     ///
@@ -267,20 +270,24 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         depth: DepthSoftness,
         depth_scale: f64,
     ) -> ColourRenderer<S> {
-        let (edge, phi) = self.edge();
+        let ((edge, phi), side) = (self.edge(), self.side());
         let phi = [numbers(phi), depth.default_phi(depth_scale)];
-        let of = (faces.clone(), self.side(), planes, depth, depth_scale);
+        let same = |kept: &Colours<S>| {
+            let of = kept.renderer.weighting();
+            let drawn = kept.side == side && kept.faces == *faces;
+            drawn && of.depth == depth && of.planes == planes
+        };
         let mut colours = self.renderer.colours.borrow_mut();
-        let mut renderer = match colours.take().filter(|kept| kept.of == of) {
+        let mut renderer = match colours.take().filter(same) {
             Some(kept) => kept.renderer,
             None => {
                 let weighting = Weighting { edge: edge.clone(), depth, planes };
-                ColourRenderer::with_weighting(faces.clone(), self.side(), weighting, phi.clone())
+                ColourRenderer::with_weighting(faces.clone(), side, weighting, phi.clone())
                     .with_tolerance(self.tolerance())
             }
         };
         renderer.set_phi(phi);
-        colours.insert(Colours { of, renderer }).renderer.clone()
+        colours.insert(Colours { faces: faces.clone(), side, renderer }).renderer.clone()
     }
 
     /// Parameters of the problem's own, `[P]`.

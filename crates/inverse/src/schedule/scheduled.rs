@@ -25,7 +25,8 @@ pub struct Surrogate<S = EdgeSoftness> {
 
 /// A softness with its parameters, and how its scale moves over a run.
 ///
-/// In a JSON file its fields have these names, but for the schedule, which is called `path`.
+/// In a JSON file its fields have these names, except for the schedule, which is called `path`. A file of a softness of one's own holds its
+/// [`NAME`](crate::NamedSoftness::NAME) in the field `softness`.
 ///
 /// ```
 /// use softrast_inverse::ScheduledSoftness;
