@@ -6,7 +6,7 @@ use softrast_inverse::{
     triangles::{Instance, Scene},
 };
 use softrast_raster::RasterBackend;
-use softrast_softness::numbers;
+use softrast_softness::{Softness, numbers};
 
 use crate::{Coming, Frame, Run, Settings};
 
@@ -40,7 +40,7 @@ impl InverseProblem for Covering {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(scene.vertices(theta))
     }

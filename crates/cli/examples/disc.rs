@@ -15,6 +15,7 @@ use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, Targets
 use softrast_mesh::icosphere;
 use softrast_meta::{numbers, tensor};
 use softrast_raster::{HostBackend, RasterBackend, hard_silhouette, mse_loss};
+use softrast_softness::Softness;
 
 #[allow(dead_code, reason = "the tests include this file as a module")]
 fn main() -> ExitCode {
@@ -103,7 +104,7 @@ impl InverseProblem for Disc {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(scene.vertices(theta))
     }

@@ -3,7 +3,7 @@ use std::{cell::RefCell, marker::PhantomData, rc::Rc};
 use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_meta::{Adam, BilevelProblem, InnerLoop, TaskDistribution};
 use softrast_raster::{RasterBackend, Rasterizer};
-use softrast_softness::{EdgeSoftness, Family, numbers, vector};
+use softrast_softness::{EdgeSoftness, Family, Softness, numbers, vector};
 
 use crate::{
     Inner, InverseProblem, LearnConfig, Method, Outer, OuterLoss, PhiLayout, Resolution,
@@ -17,20 +17,20 @@ const SHARP_PX: f64 = 0.25;
 /// what they cost the hard image.
 const NEARLY_HARD_PX: f64 = 0.05;
 /// The distribution that a softness is learned on: instances of a problem by seed, each solved as `solve` says.
-pub struct Instances<P: InverseProblem, B: RasterBackend> {
+pub struct Instances<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     solve: SolveConfig,
     pub(crate) config: LearnConfig,
-    pub(crate) layout: PhiLayout,
+    pub(crate) layout: PhiLayout<S>,
     tolerance: f64,
     /// What judges, where that does not depend on φ.
-    judge: OuterImage,
+    judge: OuterImage<S>,
     /// What draws under the latest φ.
-    latest: RefCell<Option<Rc<ScheduledRenderer>>>,
+    latest: RefCell<Option<Rc<ScheduledRenderer<S>>>>,
     backend: PhantomData<B>,
 }
 
-impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
+impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
     /// Of a problem, whose softness begins with what `method` does.
     ///
     /// # Errors
@@ -38,7 +38,7 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
     /// If choices contradict each other.
     pub fn new(
         problem: P,
-        method: &Method,
+        method: &Method<S>,
         solve: &SolveConfig,
         config: &LearnConfig,
     ) -> anyhow::Result<Self> {
@@ -69,7 +69,7 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
     }
 
     /// What draws under a softness, the latest one kept.
-    fn renderer(&self, phi: &[f64]) -> Rc<ScheduledRenderer> {
+    fn renderer(&self, phi: &[f64]) -> Rc<ScheduledRenderer<S>> {
         let mut latest = self.latest.borrow_mut();
         let kept = latest.take().filter(|renderer| renderer.phi() == phi);
         let renderer = kept.unwrap_or_else(|| {
@@ -82,7 +82,7 @@ impl<P: InverseProblem, B: RasterBackend> Instances<P, B> {
     }
 
     /// The instance of a seed, with the inner loss as the outer one if `own`, else by what the configuration says.
-    fn made(&self, seed: u64, phi: &[f64], own: bool) -> InstanceProblem<P, B> {
+    fn made(&self, seed: u64, phi: &[f64], own: bool) -> InstanceProblem<P, B, S> {
         let (softness, optimizer) = self.parted(phi);
         let (problem, renderer) = (&self.problem, self.renderer(softness));
         let instance = problem.instance(seed).expect("instances of all seeds can be made");
@@ -152,14 +152,14 @@ fn sharp<P: InverseProblem>(problem: &P, size: usize, config: &LearnConfig) -> S
     ScheduledRenderer::new(layout, &phi, rasterizer, Resolution::Full, faces)
 }
 
-type InstanceProblem<P, B> = BilevelProblem<B, Inner<P, B>, Outer<P, B>, Adam>;
+type InstanceProblem<P, B, S> = BilevelProblem<B, Inner<P, B, S>, Outer<P, B, S>, Adam>;
 
-impl<P: InverseProblem, B: RasterBackend> TaskDistribution<B> for Instances<P, B> {
-    type Objective = Inner<P, B>;
-    type OuterLoss = Outer<P, B>;
+impl<P: InverseProblem, B: RasterBackend, S: Softness> TaskDistribution<B> for Instances<P, B, S> {
+    type Objective = Inner<P, B, S>;
+    type OuterLoss = Outer<P, B, S>;
     type Optimizer = Adam;
 
-    fn problem(&self, seed: u64, phi: &Tensor<B, 1>) -> InstanceProblem<P, B> {
+    fn problem(&self, seed: u64, phi: &Tensor<B, 1>) -> InstanceProblem<P, B, S> {
         self.made(seed, &numbers(phi.clone()), self.is_own())
     }
 

@@ -6,7 +6,7 @@ use burn::{
     tensor::{Tensor, TensorData, Transaction, backend::Backend},
 };
 use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
-use softrast_softness::numbers;
+use softrast_softness::{Softness, numbers};
 
 use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
 
@@ -37,11 +37,11 @@ pub struct Iterate {
 }
 
 /// Instances that are solved side by side, and what draws them.
-pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R> {
+pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R, S> {
     pub(crate) problem: R,
     instances: usize,
     size: usize,
-    renderer: ScheduledRenderer,
+    renderer: ScheduledRenderer<S>,
     pub(crate) scene: P::Scene<Autodiff<B>>,
     /// The scene on the CPU.
     pub(crate) host: P::Scene<HostBackend>,
@@ -56,11 +56,11 @@ pub(crate) struct Seen<B: RasterBackend> {
     pub(crate) loss: Tensor<Autodiff<B>, 1>,
 }
 
-impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Run<P, B, R> {
+impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R, S> {
     pub(crate) fn new(
         of: R,
         instances: &[P::Instance],
-        method: &Method,
+        method: &Method<S>,
         SolveConfig { size, steps, .. }: &SolveConfig,
     ) -> Self {
         let (problem, size) = (of.borrow(), *size);

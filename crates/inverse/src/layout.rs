@@ -32,24 +32,24 @@ const KNOTS: usize = 3;
 /// assert_eq!(learned.phi[1], 0.3);
 /// ```
 #[derive(Clone, Debug)]
-pub struct PhiLayout {
+pub struct PhiLayout<S = EdgeSoftness> {
     /// Parameters to start from, and what has none.
-    start: ScheduledSoftness,
+    start: ScheduledSoftness<S>,
     own: Vec<f64>,
     steps: usize,
     size: usize,
 }
 
-impl PhiLayout {
+impl<S: Softness> PhiLayout<S> {
     /// Of a softness as it is, with `own` parameters of the problem, on runs of `steps` steps and images of `size` × `size` pixels.
-    pub fn new(start: ScheduledSoftness, own: Vec<f64>, steps: usize, size: usize) -> Self {
+    pub fn new(start: ScheduledSoftness<S>, own: Vec<f64>, steps: usize, size: usize) -> Self {
         Self { start, own, steps, size }
     }
 
     /// Of a softness as it is learned: a scale that stays is part of the parameters, or apart from them if `config` says so; one that
     /// moves is a schedule with a floor.
     pub fn learned(
-        start: &ScheduledSoftness,
+        start: &ScheduledSoftness<S>,
         own: Vec<f64>,
         steps: usize,
         size: usize,
@@ -73,7 +73,7 @@ impl PhiLayout {
         }
         let floor_px = config.floor_px.unwrap_or(FLOOR_PX);
         let mut schedule = ScaleSchedule { knots: Vec::new(), floor_px };
-        let floor = schedule.floor(start.softness, size);
+        let floor = schedule.floor(&start.softness, size);
         let knots = if start.is_constant() { 1 } else { config.knots.unwrap_or(KNOTS) };
         let last = knots.max(2) - 1;
         let knot = |k: usize| {
@@ -102,7 +102,7 @@ impl PhiLayout {
     /// # Panics
     ///
     /// If the vector is shorter than that of [`start`](Self::start).
-    pub fn softness(&self, learned: &[f64]) -> (ScheduledSoftness, Vec<f64>) {
+    pub fn softness(&self, learned: &[f64]) -> (ScheduledSoftness<S>, Vec<f64>) {
         let (knots, rest) = learned.split_at(self.knots());
         let (phi, rest) = rest.split_at(self.start.phi.len() - self.replaced());
         let (surrogate, rest) = rest.split_at(self.surrogate_len());
@@ -118,9 +118,9 @@ impl PhiLayout {
         (softness, own.to_vec())
     }
 
-    /// Which softness of edges it is.
-    pub fn edge(&self) -> EdgeSoftness {
-        self.start.softness
+    /// The softness of edges.
+    pub fn edge(&self) -> &S {
+        &self.start.softness
     }
 
     /// Steps of a run.
@@ -211,7 +211,7 @@ impl PhiLayout {
 }
 
 /// The parameters at scale 1, for a schedule to go with.
-fn at_unit_scale(softness: &ScheduledSoftness) -> ScheduledSoftness {
+fn at_unit_scale<S: Softness>(softness: &ScheduledSoftness<S>) -> ScheduledSoftness<S> {
     let mut unit = softness.clone();
     if softness.schedule.is_none() {
         let factor = softness.softness.scale(&softness.phi).recip();

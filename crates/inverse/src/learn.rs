@@ -1,6 +1,7 @@
 use serde_json::{Value, json};
 use softrast_meta::{Adam, Alone, OuterLoop, Progress, Ranks, Record, Validation};
 use softrast_raster::RasterBackend;
+use softrast_softness::{EdgeSoftness, Softness};
 
 use crate::{
     Checkpoint, Instances, InverseProblem, LearnConfig, Method, PhiLayout, ScheduledSoftness,
@@ -13,13 +14,13 @@ const CLIP: f64 = 1.0;
 const VALIDATIONS: usize = 10;
 
 /// A softness that is being learned on a problem, one update at a time.
-pub struct Learning<P: InverseProblem, B: RasterBackend> {
-    instances: Instances<P, B>,
+pub struct Learning<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
+    instances: Instances<P, B, S>,
     outer_loop: OuterLoop,
     progress: Progress,
 }
 
-impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
+impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
     /// Begins with what `method` does on runs as `solve` has them.
     ///
     /// # Errors
@@ -27,11 +28,11 @@ impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
     /// If choices contradict each other, or an instance cannot be made.
     pub fn new(
         problem: P,
-        method: &Method,
+        method: &Method<S>,
         solve: &SolveConfig,
         config: &LearnConfig,
     ) -> anyhow::Result<Self> {
-        let instances = Instances::<P, B>::new(problem, method, solve, config)?;
+        let instances = Instances::<P, B, S>::new(problem, method, solve, config)?;
         let config = &instances.config;
         // What would fail later fails here, where an error can be told.
         let last =
@@ -112,12 +113,12 @@ impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
     }
 
     /// The layout of the vector that is learned.
-    pub fn layout(&self) -> &PhiLayout {
+    pub fn layout(&self) -> &PhiLayout<S> {
         &self.instances.layout
     }
 
     /// The best softness so far, and the best parameters of the problem's own. It holds the learning rate of its runs.
-    pub fn learned(&self) -> (ScheduledSoftness, Vec<f64>) {
+    pub fn learned(&self) -> (ScheduledSoftness<S>, Vec<f64>) {
         let (phi, optimizer) = self.instances.parted(self.progress.best_phi());
         let (softness, own) = self.layout().softness(phi);
         let learning_rate = Some(optimizer.learning_rate);
@@ -135,14 +136,14 @@ impl<P: InverseProblem, B: RasterBackend> Learning<P, B> {
 /// # Errors
 ///
 /// Those of [`Learning`] and of `visit`.
-pub fn learn<P: InverseProblem, B: RasterBackend>(
+pub fn learn<P: InverseProblem, B: RasterBackend, S: Softness>(
     problem: P,
-    method: &Method,
+    method: &Method<S>,
     solve: &SolveConfig,
     config: &LearnConfig,
     mut visit: impl FnMut(&Record) -> anyhow::Result<()>,
-) -> anyhow::Result<ScheduledSoftness> {
-    let mut learning = Learning::<P, B>::new(problem, method, solve, config)?;
+) -> anyhow::Result<ScheduledSoftness<S>> {
+    let mut learning = Learning::<P, B, S>::new(problem, method, solve, config)?;
     while let Some(record) = learning.step()? {
         visit(&record)?;
     }

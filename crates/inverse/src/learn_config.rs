@@ -1,6 +1,7 @@
 use anyhow::{bail, ensure};
 use serde::{Deserialize, Serialize};
 use softrast_meta::{MetaGradient, OuterSteps};
+use softrast_softness::Softness;
 
 use crate::ScheduledSoftness;
 
@@ -103,7 +104,11 @@ impl LearnConfig {
     /// # Errors
     ///
     /// If choices contradict each other.
-    pub fn resolved(&self, softness: &ScheduledSoftness, own: usize) -> anyhow::Result<Self> {
+    pub fn resolved(
+        &self,
+        softness: &ScheduledSoftness<impl Softness>,
+        own: usize,
+    ) -> anyhow::Result<Self> {
         let (parameters, has_surrogate) =
             (softness.parameters() + own, softness.surrogate.is_some());
         let has_feedback = self.feedback || softness.feedback.is_some();

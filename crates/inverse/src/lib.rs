@@ -6,6 +6,9 @@
 //! end with. Both draw through a [`ScheduledRenderer`], with what a `SoftRenderer` of `softrast-raster` prepares: that decides when support
 //! and knots are chosen anew. [`PoseProblem`] finds a camera.
 //!
+//! The softness is a type parameter, by default an `EdgeSoftness` of a family. Any other `Softness` takes the same path, and a
+//! [`NamedSoftness`] has files too.
+//!
 //! ```
 //! use burn::backend::NdArray;
 //! use softrast_inverse::{InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize};
@@ -91,7 +94,7 @@ pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
 pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, Surrogate};
-pub use softness_file::{DepthSoftnessFile, NameOrFile, SoftnessFileError};
+pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
 pub use transforms::{Transforms, load_views};

@@ -1,15 +1,16 @@
 use serde::{Deserialize, Serialize};
 use softrast_raster::Rasterizer;
+use softrast_softness::{EdgeSoftness, Softness};
 
 use crate::{Resolution, ScheduledSoftness};
 
 /// A way to solve any problem: a softness, how its scale moves, and how finely it is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Method {
+pub struct Method<S = EdgeSoftness> {
     /// What it is called in tables.
     pub name: String,
     /// The softness of edges, with its schedule, surrogate and learning rate.
-    pub softness: ScheduledSoftness,
+    pub softness: ScheduledSoftness<S>,
     /// How many pixels the image has that is optimised on.
     #[serde(default)]
     pub resolution: Resolution,
@@ -25,11 +26,6 @@ pub struct Method {
 const LEARNING_TOLERANCE: f64 = 1e-3;
 
 impl Method {
-    /// A method that draws as usual.
-    pub fn new(name: &str, softness: ScheduledSoftness) -> Self {
-        Self { name: name.to_owned(), softness, resolution: Resolution::Full, tolerance: None }
-    }
-
     /// The largest error of a pixel unless another is asked for, where the scale stays or `moves`.
     ///
     /// A scale that stays is narrow, and what reaches the pixels far from an edge is a gradient that nobody sees in the image but that
@@ -37,10 +33,17 @@ impl Method {
     pub const fn usual_tolerance(moves: bool) -> f64 {
         if moves { 1e-2 } else { Rasterizer::TOLERANCE }
     }
+}
+
+impl<S: Softness> Method<S> {
+    /// A method that draws as usual.
+    pub fn new(name: &str, softness: ScheduledSoftness<S>) -> Self {
+        Self { name: name.to_owned(), softness, resolution: Resolution::Full, tolerance: None }
+    }
 
     /// The largest error of a pixel.
     pub fn tolerance(&self) -> f64 {
-        self.tolerance.unwrap_or(Self::usual_tolerance(!self.softness.is_constant()))
+        self.tolerance.unwrap_or(Method::usual_tolerance(!self.softness.is_constant()))
     }
 
     /// The same while the softness is learned: unless asked for, at most 1e-3 where that `differentiates` runs.
@@ -53,7 +56,7 @@ impl Method {
 
 #[cfg(test)]
 mod tests {
-    use softrast_softness::{EdgeSoftness, Family};
+    use softrast_softness::Family;
 
     use super::*;
 

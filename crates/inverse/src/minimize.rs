@@ -7,6 +7,7 @@ use burn::{
 };
 use softrast_meta::{Adam, AdamState, Optimizer};
 use softrast_raster::{HostBackend, RasterBackend};
+use softrast_softness::{EdgeSoftness, Softness};
 use web_time::Instant;
 
 use crate::{
@@ -29,13 +30,13 @@ const STARTS: usize = 8;
 pub fn minimize<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     instances: &[P::Instance],
-    method: &Method,
+    method: &Method<impl Softness>,
     config: &SolveConfig,
     pictures: bool,
     mut visit: impl FnMut(&Iterate, &P::Scene<HostBackend>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Iterate> {
     let mut run =
-        Minimization::<P, B, &P>::new(problem, instances.to_vec(), method, config, pictures)?;
+        Minimization::<P, B, &P, _>::new(problem, instances.to_vec(), method, config, pictures)?;
     let mut last = None;
     while let Some(iterate) = run.next().transpose()? {
         visit(&iterate, run.scene())?;
@@ -47,8 +48,13 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
 /// [`minimize`] one step at a time, for programs that stop and go on: an iterator over all iterates from the start to the end.
 ///
 /// It holds the problem, or borrows it. After an error nothing comes any more.
-pub struct Minimization<P: InverseProblem, B: RasterBackend, R: Borrow<P> = P> {
-    run: Run<P, B, R>,
+pub struct Minimization<
+    P: InverseProblem,
+    B: RasterBackend,
+    R: Borrow<P> = P,
+    S: Softness = EdgeSoftness,
+> {
+    run: Run<P, B, R, S>,
     instances: Vec<P::Instance>,
     config: SolveConfig,
     pictures: bool,
@@ -76,7 +82,7 @@ struct Latest<B: RasterBackend> {
     drawing: Duration,
 }
 
-impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
+impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimization<P, B, R, S> {
     /// A run that has not begun. With `pictures` its iterates have images.
     ///
     /// # Errors
@@ -85,7 +91,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
     pub fn new(
         problem: R,
         instances: Vec<P::Instance>,
-        method: &Method,
+        method: &Method<S>,
         config: &SolveConfig,
         pictures: bool,
     ) -> anyhow::Result<Self> {
@@ -97,7 +103,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
             "a softness with feedback solves one instance at a time, found {} side by side: name another softness",
             instances.len()
         );
-        let run = Run::<P, B, R>::new(problem, &instances, method, config);
+        let run = Run::<P, B, R, S>::new(problem, &instances, method, config);
         let problem = run.problem.borrow();
         let optimizer = problem.optimizer(config.learning_rate);
         let theta = problem.start(&run.scene).inner();
@@ -195,7 +201,9 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Minimization<P, B, R> {
     }
 }
 
-impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>> Iterator for Minimization<P, B, R> {
+impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Iterator
+    for Minimization<P, B, R, S>
+{
     type Item = anyhow::Result<Iterate>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -3,20 +3,20 @@ use std::rc::Rc;
 use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_meta::Objective;
 use softrast_raster::RasterBackend;
-use softrast_softness::tensor;
+use softrast_softness::{EdgeSoftness, Softness, tensor};
 
 use crate::{InverseProblem, ScheduledRenderer, SoftnessAt, problem::lowered};
 
 type Twice<B> = Autodiff<Autodiff<B>>;
 
 /// What the inner loop lowers.
-pub struct Inner<P: InverseProblem, B: RasterBackend> {
+pub struct Inner<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     pub(crate) scene: P::Scene<Twice<B>>,
-    pub(crate) renderer: Rc<ScheduledRenderer>,
+    pub(crate) renderer: Rc<ScheduledRenderer<S>>,
 }
 
-impl<P: InverseProblem, B: RasterBackend> Objective<Twice<B>> for Inner<P, B> {
+impl<P: InverseProblem, B: RasterBackend, S: Softness> Objective<Twice<B>> for Inner<P, B, S> {
     fn loss(
         &self,
         theta: Tensor<Twice<B>, 1>,
@@ -49,23 +49,23 @@ impl<P: InverseProblem, B: RasterBackend> Objective<Twice<B>> for Inner<P, B> {
 }
 
 /// The outer loss: how far the result of an inner loop is from its target.
-pub struct Outer<P: InverseProblem, B: RasterBackend> {
+pub struct Outer<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     pub(crate) scene: P::Scene<Autodiff<B>>,
-    pub(crate) image: OuterImage,
+    pub(crate) image: OuterImage<S>,
 }
 
 #[derive(Clone)]
-pub(crate) enum OuterImage {
+pub(crate) enum OuterImage<S> {
     /// By a sharp soft image.
     Sharp(Rc<ScheduledRenderer>),
     /// By the hard image.
     Hard,
     /// By the loss at the last step, under the softness itself.
-    Inner(Rc<ScheduledRenderer>),
+    Inner(Rc<ScheduledRenderer<S>>),
 }
 
-impl<P: InverseProblem, B: RasterBackend> Objective<Autodiff<B>> for Outer<P, B> {
+impl<P: InverseProblem, B: RasterBackend, S: Softness> Objective<Autodiff<B>> for Outer<P, B, S> {
     fn loss(
         &self,
         theta: Tensor<Autodiff<B>, 1>,
@@ -91,7 +91,7 @@ fn inner_loss<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     scene: &P::Scene<B>,
     theta: Tensor<B, 1>,
-    softness: &SoftnessAt<'_, B>,
+    softness: &SoftnessAt<'_, B, impl Softness>,
 ) -> Tensor<B, 1> {
     let image = problem.image(scene, theta.clone(), softness);
     lowered(problem, scene, theta, problem.image_loss(scene, image)).sum()

@@ -3,6 +3,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_meta::Adam;
 use softrast_raster::RasterBackend;
+use softrast_softness::Softness;
 
 use crate::SoftnessAt;
 
@@ -63,7 +64,7 @@ pub trait InverseProblem: 'static {
         &self,
         scene: &Self::Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3>;
 
     /// The hard image at θ, shaped like the soft one; it has no gradient.
@@ -78,7 +79,7 @@ pub trait InverseProblem: 'static {
         &self,
         scene: &Self::Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         self.image(scene, theta, softness)
     }
@@ -96,7 +97,7 @@ pub trait InverseProblem: 'static {
         &self,
         scene: &Self::Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 1> {
         self.image_loss(scene, self.image(scene, theta, softness))
     }

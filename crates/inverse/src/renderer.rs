@@ -1,8 +1,11 @@
 use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
 
 use burn::tensor::{Element, Tensor, TensorData};
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, SoftRenderer, iou_loss, mse_loss};
-use softrast_softness::{EdgeSoftness, numbers, vector};
+use softrast_raster::{
+    ColourRenderer, RasterBackend, Rasterizer, Silhouette, SoftRenderer, Weighting, iou_loss,
+    mse_loss,
+};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Softness, numbers, vector};
 
 use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 
@@ -11,35 +14,45 @@ use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 /// Support and knots follow the softness as in a [`SoftRenderer`]. Those of every step are kept, with the tables of steps without a
 /// gradient to φ, as many runs under one softness need them again.
 #[derive(Debug)]
-pub struct ScheduledRenderer {
-    layout: PhiLayout,
+pub struct ScheduledRenderer<S = EdgeSoftness> {
+    layout: PhiLayout<S>,
     phi: Vec<f64>,
     /// What is drawn where nothing is differentiated by φ.
-    values: ScheduledSoftness,
+    values: ScheduledSoftness<S>,
     own: Vec<f64>,
     size: usize,
     tolerance: f64,
     resolution: Resolution,
     /// Renderers of silhouettes, if the problem has any.
-    renderer: Option<SoftRenderer<EdgeSoftness>>,
+    renderer: Option<SoftRenderer<S>>,
     /// What was drawn with so far, by its place on the path.
-    kept: RefCell<BTreeMap<u64, Rc<Kept>>>,
+    kept: RefCell<BTreeMap<u64, Rc<Kept<S>>>>,
+    /// What drew colours last.
+    colours: RefCell<Option<Colours<S>>>,
+}
+
+/// A renderer of colours, the faces that it draws, and pixels a side.
+#[derive(Debug)]
+struct Colours<S> {
+    faces: Arc<[[u32; 3]]>,
+    side: usize,
+    renderer: ColourRenderer<S>,
 }
 
 /// What draws at a step, always the same: tables belong to its knots.
 #[derive(Debug)]
-struct Kept {
+struct Kept<S> {
     /// As they are seen, and as their gradient has it, if that is another.
-    silhouettes: Vec<Silhouette<EdgeSoftness>>,
+    silhouettes: Vec<Silhouette<S>>,
     /// Their tables of the values, one below the other, `[rows, 4]`.
     table: TensorData,
 }
 
-impl ScheduledRenderer {
+impl<S: Softness> ScheduledRenderer<S> {
     /// Draws with the softness that the vector `phi` stands for, as the layout has it, at the size of the rasterizer or a lower
     /// resolution. Without `faces` it draws nothing and only gives parameters.
     pub fn new(
-        layout: PhiLayout,
+        layout: PhiLayout<S>,
         phi: &[f64],
         rasterizer: Rasterizer,
         resolution: Resolution,
@@ -48,17 +61,18 @@ impl ScheduledRenderer {
         let (values, own) = layout.softness(phi);
         let renderer = faces.map(|faces| values.renderer_at(0.0, rasterizer, faces));
         let (size, tolerance) = (rasterizer.size.shorter(), rasterizer.tolerance);
-        let (phi, kept) = (phi.to_vec(), RefCell::default());
-        Self { layout, phi, values, own, size, tolerance, resolution, renderer, kept }
+        let phi = phi.to_vec();
+        let (kept, colours) = (RefCell::default(), RefCell::default());
+        Self { layout, phi, values, own, size, tolerance, resolution, renderer, kept, colours }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
-    pub fn at<B: RasterBackend>(&self, step: usize) -> SoftnessAt<'_, B> {
+    pub fn at<B: RasterBackend>(&self, step: usize) -> SoftnessAt<'_, B, S> {
         self.at_part(self.layout.part(step))
     }
 
     /// The softness at a part of its path, 0 to 1, of which nothing is differentiated by φ.
-    pub(crate) fn at_part<B: RasterBackend>(&self, part: f64) -> SoftnessAt<'_, B> {
+    pub(crate) fn at_part<B: RasterBackend>(&self, part: f64) -> SoftnessAt<'_, B, S> {
         SoftnessAt { renderer: self, part, prepared: None }
     }
 
@@ -67,7 +81,7 @@ impl ScheduledRenderer {
         &self,
         step: usize,
         prepared: Tensor<B, 1>,
-    ) -> SoftnessAt<'_, B> {
+    ) -> SoftnessAt<'_, B, S> {
         SoftnessAt { prepared: Some(prepared), ..self.at(step) }
     }
 
@@ -100,7 +114,7 @@ impl ScheduledRenderer {
     }
 
     /// How the vector is laid out.
-    pub fn layout(&self) -> &PhiLayout {
+    pub fn layout(&self) -> &PhiLayout<S> {
         &self.layout
     }
 
@@ -122,7 +136,7 @@ impl ScheduledRenderer {
     /// # Panics
     ///
     /// If the problem has no faces.
-    fn kept<B: RasterBackend>(&self, part: f64) -> Rc<Kept> {
+    fn kept<B: RasterBackend>(&self, part: f64) -> Rc<Kept<S>> {
         let mut kept = self.kept.borrow_mut();
         let kept = kept.entry(self.place(part)).or_insert_with(|| {
             let renderer =
@@ -147,15 +161,15 @@ impl ScheduledRenderer {
 
 /// The softness at one place of its path, as [`InverseProblem::image`](crate::InverseProblem::image) sees it.
 #[derive(Clone, Debug)]
-pub struct SoftnessAt<'a, B: RasterBackend> {
-    renderer: &'a ScheduledRenderer,
+pub struct SoftnessAt<'a, B: RasterBackend, S = EdgeSoftness> {
+    renderer: &'a ScheduledRenderer<S>,
     /// Part of the path.
     part: f64,
     /// What was prepared of a vector φ; without it, the renderer's own values count.
     prepared: Option<Tensor<B, 1>>,
 }
 
-impl<B: RasterBackend> SoftnessAt<'_, B> {
+impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with the gradient of the surrogate if
     /// there is one; the side is the size of the image or fewer pixels, as the resolution has it.
     ///
@@ -210,7 +224,7 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     }
 
     /// What draws, and its table, if only vertices have a gradient, and the image's own.
-    fn alone(&self, vertices: &Tensor<B, 3>) -> Option<(Silhouette<EdgeSoftness>, Tensor<B, 2>)> {
+    fn alone(&self, vertices: &Tensor<B, 3>) -> Option<(Silhouette<S>, Tensor<B, 2>)> {
         let kept = self.renderer.kept::<B>(self.part);
         if self.prepared.is_some() || kept.silhouettes.len() > 1 {
             return None;
@@ -231,13 +245,49 @@ impl<B: RasterBackend> SoftnessAt<'_, B> {
     }
 
     /// The softness of edges and its parameters `[P]`.
-    pub fn edge(&self) -> (EdgeSoftness, Tensor<B, 1>) {
+    pub fn edge(&self) -> (&'a S, Tensor<B, 1>) {
         let ScheduledRenderer { layout, values, .. } = self.renderer;
         let phi = match &self.prepared {
             Some(prepared) => prepared.clone().narrow(0, 0, values.phi.len()),
             None => vector(&values.phi_at(self.part, layout.size())),
         };
         (layout.edge(), phi)
+    }
+
+    /// A renderer of these faces in colours under this softness of edges, on images of [`side`](Self::side) pixels a side.
+    ///
+    /// `planes` are the depths of nearness 1 and 0 in world units, `depth_scale` is in units of the distance between them. The tables of the
+    /// latest renderer are kept for the next call with the same arguments. [`ColourRenderer::image_with`] passes gradients on to φ, under the
+    /// parameters of [`edge`](Self::edge).
+    ///
+    /// # Panics
+    ///
+    /// If there is no face, the planes do not ascend, or the scale is not positive.
+    pub fn colour_renderer(
+        &self,
+        faces: &Arc<[[u32; 3]]>,
+        planes: [f64; 2],
+        depth: DepthSoftness,
+        depth_scale: f64,
+    ) -> ColourRenderer<S> {
+        let ((edge, phi), side) = (self.edge(), self.side());
+        let phi = [numbers(phi), depth.default_phi(depth_scale)];
+        let same = |kept: &Colours<S>| {
+            let of = kept.renderer.weighting();
+            let drawn = kept.side == side && kept.faces == *faces;
+            drawn && of.depth == depth && of.planes == planes
+        };
+        let mut colours = self.renderer.colours.borrow_mut();
+        let mut renderer = match colours.take().filter(same) {
+            Some(kept) => kept.renderer,
+            None => {
+                let weighting = Weighting { edge: edge.clone(), depth, planes };
+                ColourRenderer::with_weighting(faces.clone(), side, weighting, phi.clone())
+                    .with_tolerance(self.tolerance())
+            }
+        };
+        renderer.set_phi(phi);
+        colours.insert(Colours { faces: faces.clone(), side, renderer }).renderer.clone()
     }
 
     /// Parameters of the problem's own, `[P]`.

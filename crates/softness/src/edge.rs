@@ -10,7 +10,10 @@ use crate::{Family, Softness, softness::curve};
 ///
 /// Source: Liu et al. 2019, Eq. 1 (squared); Wu et al. 2024, Sec. 4.1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a family such as {\"family\": \"gauss\", \"squared\": false}"
+)]
 pub struct EdgeSoftness {
     /// The shape of the step.
     pub family: Family,
@@ -76,9 +79,8 @@ impl Softness for EdgeSoftness {
         self.family.scale(phi)
     }
 
-    /// In NDC.
-    fn width(&self, phi: &[f64]) -> f64 {
-        if self.squared { self.scale(phi).sqrt() } else { self.scale(phi) }
+    fn scale_is_squared(&self) -> bool {
+        self.squared
     }
 
     fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {

@@ -45,6 +45,10 @@ impl<S: Softness> Softness for Mirrored<S> {
         self.0.scale(phi)
     }
 
+    fn scale_is_squared(&self) -> bool {
+        self.0.scale_is_squared()
+    }
+
     fn width(&self, phi: &[f64]) -> f64 {
         self.0.width(phi)
     }

@@ -143,11 +143,16 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         phi[0].exp()
     }
 
-    /// How wide the step is, in the unit of `x`: the scale, unless that has another unit. Where
-    /// [`with_scale`](Softness::with_scale) is all that changes the parameters, the step is stretched
-    /// along `x` by as much as the width grows.
+    /// Whether the scale is in the square of the unit of `x`, as in a step of `x |x|`. Provided: no.
+    fn scale_is_squared(&self) -> bool {
+        false
+    }
+
+    /// Width of the step, in the unit of `x`. Provided: the scale, or its root where that
+    /// [is squared](Softness::scale_is_squared). Where [`with_scale`](Softness::with_scale) is all that
+    /// changes the parameters, the step is stretched along `x` by as much as the width grows.
     fn width(&self, phi: &[f64]) -> f64 {
-        self.scale(phi)
+        if self.scale_is_squared() { self.scale(phi).sqrt() } else { self.scale(phi) }
     }
 
     /// Parameters of a step whose scale is `factor` `[1]` times that of `phi`, and which is the same

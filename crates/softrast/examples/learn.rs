@@ -15,7 +15,7 @@ fn main() -> anyhow::Result<()> {
     let start = Method::new("start", ScheduledSoftness::decay(logistic, 0.3, 0.05));
     let estimator = Some(MetaGradient::default()); // exact, through all steps
     let config = LearnConfig { estimator, updates: 20, outer_rate: 0.2, ..LearnConfig::default() };
-    let learned = learn::<_, NdArray>(problem.clone(), &start, &runs, &config, |record| {
+    let learned = learn::<_, NdArray, _>(problem.clone(), &start, &runs, &config, |record| {
         let validated = record.validation_loss.map(|loss| format!(", validation {loss:.3}"));
         println!("update {:2}{}", record.step, validated.unwrap_or_default());
         Ok(())

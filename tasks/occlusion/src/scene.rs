@@ -3,7 +3,7 @@ use std::cell::RefCell;
 use burn::tensor::Tensor;
 use softrast_meta::tensor;
 use softrast_raster::{Background, RasterBackend, blend, hard_colour, mse_loss, nearness};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
+use softrast_softness::{DepthSoftness, Softness};
 
 use crate::{Instance, Problem, instance::places};
 
@@ -78,7 +78,7 @@ impl<B: RasterBackend> Scene<B> {
 
     /// Logarithm of the edge part `a(d)` of Eq. 4, `[views, quads, pixels]`, for a softness with the
     /// parameters `phi`. It does not depend on θ: compute it once for every `phi`.
-    pub fn edges(&self, softness: EdgeSoftness, phi: Tensor<B, 1>) -> Tensor<B, 3> {
+    pub fn edges(&self, softness: &impl Softness, phi: Tensor<B, 1>) -> Tensor<B, 3> {
         softness.log_value(phi, self.distance.clone())
     }
 
@@ -86,7 +86,7 @@ impl<B: RasterBackend> Scene<B> {
     pub(crate) fn fixed_edges(
         &self,
         place: u64,
-        softness: EdgeSoftness,
+        softness: &impl Softness,
         phi: Tensor<B, 1>,
     ) -> Tensor<B, 3> {
         let mut kept = self.fixed_edges.borrow_mut();

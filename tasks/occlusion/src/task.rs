@@ -75,7 +75,7 @@ impl InverseProblem for Occlusion {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         let (edge, phi) = softness.edge();
         let edges = match softness.fixed_place() {
@@ -94,11 +94,11 @@ impl InverseProblem for Occlusion {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        _softness: &SoftnessAt<'_, B>,
+        _softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         let [edge, depth] = SHARP.map(|scale| vector(&Family::Logistic.default_phi(scale)));
         let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-        let edges = scene.fixed_edges(0, softness, edge);
+        let edges = scene.fixed_edges(0, &softness, edge);
         let sharp = DepthSoftness::Family(Family::Logistic);
         scene.image(scene.by_view(theta), edges, sharp, depth)
     }

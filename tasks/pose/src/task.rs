@@ -14,6 +14,7 @@ use softrast_inverse::{
 use softrast_lab::Error;
 use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
+use softrast_softness::Softness;
 
 use crate::{
     Args, Instances, Pictures, PoseError, Range, framing::mesh, paper::PAPER, picture::outlined,
@@ -88,7 +89,7 @@ impl InverseProblem for Pose {
         &self,
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         self.problem.image(scene, theta, softness)
     }
@@ -113,7 +114,7 @@ impl InverseProblem for Pose {
         &self,
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 1> {
         self.problem.loss_at(scene, theta, softness)
     }

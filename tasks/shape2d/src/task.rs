@@ -9,6 +9,7 @@ use softrast_cli::{
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
+use softrast_softness::Softness;
 
 use crate::{Args, Instance, Scene, paper::PAPER, target::Target};
 
@@ -64,7 +65,7 @@ impl InverseProblem for Shape2d {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(scene.vertices(theta))
     }
@@ -81,7 +82,7 @@ impl InverseProblem for Shape2d {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 1> {
         softness.mse_loss(scene.vertices(theta), scene.targets())
     }

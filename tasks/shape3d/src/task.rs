@@ -12,6 +12,7 @@ use softrast_lab::{contact_sheet, rgb_from_gray};
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
 use softrast_meta::{Adam, numbers};
 use softrast_raster::{HostBackend, RasterBackend};
+use softrast_softness::Softness;
 
 use crate::{
     Args, Chamfer, Instance, Scene, Views,
@@ -75,7 +76,7 @@ impl InverseProblem for Shape3d {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(scene.project(scene.vertices(theta)))
     }
@@ -92,7 +93,7 @@ impl InverseProblem for Shape3d {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 1> {
         softness.iou_loss(scene.project(scene.vertices(theta)), scene.targets()).mean()
     }

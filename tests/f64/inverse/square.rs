@@ -5,6 +5,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig};
 use softrast_raster::RasterBackend;
+use softrast_softness::Softness;
 use softrast_tests::vector;
 
 /// `θ²` of numbers that may not fall below `floor`.
@@ -53,7 +54,7 @@ impl InverseProblem for Square {
         &self,
         _scene: &Vec<f64>,
         theta: Tensor<B, 1>,
-        _softness: &SoftnessAt<'_, B>,
+        _softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         let theta = if self.seen { theta } else { theta.detach() };
         let [count] = theta.dims();

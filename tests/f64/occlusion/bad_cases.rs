@@ -33,7 +33,7 @@ fn assert_finite(name: &str, (problem, instance): &(Problem, Instance), size: us
         for scale in [1e-9, 1e-3, 0.1, 1e6] {
             for edge_scale in [1e-9, 0.01, 1e3] {
                 let edge_phi = edge.default_phi(edge_scale);
-                let edges = scene.edges(edge, tensor(&edge_phi, [edge_phi.len()]));
+                let edges = scene.edges(&edge, tensor(&edge_phi, [edge_phi.len()]));
                 let leaf = scene.start().require_grad();
                 let phi = depth.default_phi(scale);
                 let phi = tensor(&phi, [phi.len()]);
@@ -76,7 +76,7 @@ fn one_quad_alone_is_drawn_as_it_is() {
     let scene = Scene::<B>::new(&problem, &[instance], 16);
     let edge = EdgeSoftness { family: Family::Exp, squared: false };
     let phi = edge.default_phi(1e-4);
-    let edges = scene.edges(edge, tensor(&phi, [2]));
+    let edges = scene.edges(&edge, tensor(&phi, [2]));
     let depth = DepthSoftness::Family(Family::Exp);
     let image = scene.image(scene.start(), edges, depth, tensor(&depth.default_phi(0.1), [2]));
     let loss: f64 = scene.loss(image).into_scalar();

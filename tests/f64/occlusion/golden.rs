@@ -38,7 +38,7 @@ fn the_target_of_seed_0_shows_three_quads_and_so_does_a_narrow_softness() {
     let depth = DepthSoftness::Family(Family::Logistic);
     let theta = tensor::<B, 2>(&instance.target, [1, 3]);
     let drawn = |depth_scale: f64| {
-        let edges = scene.edges(edge, vector(&edge.default_phi(1e-7)));
+        let edges = scene.edges(&edge, vector(&edge.default_phi(1e-7)));
         let phi = vector(&depth.default_phi(depth_scale));
         let image = scene.image(theta.clone(), edges, depth, phi);
         letters(&numbers(image), &instance)

@@ -46,7 +46,7 @@ impl Case {
         let scene = self.scene::<T>();
         let (depths, edge) = (VIEWS * self.problem.quads, self.edge.default_phi(1.0).len());
         let theta = x.clone().narrow(0, 0, depths).reshape([VIEWS, self.problem.quads]);
-        let edges = scene.edges(self.edge, x.clone().narrow(0, depths, edge));
+        let edges = scene.edges(&self.edge, x.clone().narrow(0, depths, edge));
         let phi = x.clone().narrow(0, depths + edge, self.depth.parameters());
         scene.loss(scene.image(theta, edges, self.depth, phi)).sum()
     }

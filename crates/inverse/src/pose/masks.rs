@@ -7,7 +7,7 @@ use softrast_raster::{
     HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, turned,
     vertices,
 };
-use softrast_softness::{numbers, tensor};
+use softrast_softness::{Softness, numbers, tensor};
 
 use super::{Coat, ColouredViews, parted};
 use crate::{Frame, InverseProblem, MaskTargets, PaintedView, Picture, SoftnessAt, SolveConfig};
@@ -88,7 +88,7 @@ impl InverseProblem for MaskPoses {
         &self,
         scene: &MaskScene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         let seen = scene.project(theta.clone());
         let coverage = softness.silhouette(seen.clone());

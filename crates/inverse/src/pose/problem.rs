@@ -3,6 +3,7 @@ use std::sync::Arc;
 use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::RasterBackend;
+use softrast_softness::Softness;
 
 use super::{PoseInstance, PoseScene};
 use crate::{InverseProblem, SoftnessAt, SolveConfig};
@@ -64,7 +65,7 @@ impl InverseProblem for PoseProblem {
         &self,
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(scene.project(scene.by_view(theta)))
     }
@@ -89,7 +90,7 @@ impl InverseProblem for PoseProblem {
         &self,
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 1> {
         softness.iou_loss(scene.project(scene.by_view(theta)), scene.targets())
     }

@@ -3,7 +3,7 @@ use std::borrow::{Borrow, Cow};
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole, RasterBackend, hard_silhouette};
-use softrast_softness::{numbers, tensor};
+use softrast_softness::{Softness, numbers, tensor};
 
 use super::{
     glance::glance,
@@ -145,7 +145,7 @@ impl PoseSearch {
         mask: &Picture,
         camera: &Pinhole,
         started: bool,
-        method: &Method,
+        method: &Method<impl Softness>,
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
         let target = Target::new(mask, None)?;
@@ -164,7 +164,7 @@ impl PoseSearch {
         mesh: &Mesh,
         view: &PaintedView,
         started: bool,
-        method: &Method,
+        method: &Method<impl Softness>,
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
         ensure!(mesh.colours().is_some(), "the mesh has no colours at its vertices");
@@ -178,7 +178,7 @@ impl PoseSearch {
         target: &Target<'_>,
         camera: &Pinhole,
         started: bool,
-        method: &Method,
+        method: &Method<impl Softness>,
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
         Self::check(mesh, target.mask, camera, started)?;
@@ -228,7 +228,7 @@ impl PoseSearch {
         mesh: &Mesh,
         mask: &Picture,
         camera: &Pinhole,
-        method: &Method,
+        method: &Method<impl Softness>,
         mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
         Self::check(mesh, mask, camera, false)?;
@@ -244,7 +244,7 @@ impl PoseSearch {
         mesh: &Mesh,
         target: &Target<'_>,
         camera: &Pinhole,
-        method: &Method,
+        method: &Method<impl Softness>,
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
         let few = coarse(mesh);
@@ -299,7 +299,7 @@ impl PoseSearch {
         &self,
         mesh: &Mesh,
         poses: Vec<MaskPose>,
-        method: &Method,
+        method: &Method<impl Softness>,
         stage: &SolveConfig,
         begun: usize,
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,

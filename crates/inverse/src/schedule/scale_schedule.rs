@@ -1,6 +1,6 @@
 use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
-use softrast_softness::EdgeSoftness;
+use softrast_softness::Softness;
 
 use crate::softness_file::stored::LARGEST_LOGARITHM;
 
@@ -36,9 +36,9 @@ impl ScaleSchedule {
     }
 
     /// The floor in the unit of the scale of `softness`, on images of `size` × `size` pixels.
-    pub fn floor(&self, softness: EdgeSoftness, size: usize) -> f64 {
+    pub fn floor(&self, softness: &impl Softness, size: usize) -> f64 {
         let width = self.floor_px * 2.0 / size as f64;
-        if softness.squared { width * width } else { width }
+        if softness.scale_is_squared() { width * width } else { width }
     }
 
     /// The scale `[1]` at `part` of a run, 0 to 1, for these `knots` `[K]` and `floor`.

@@ -16,16 +16,17 @@ use crate::softness_file::stored::{
 /// [`ScaleSchedule`], this one is seen at `d / scale(t)` too: it keeps its ratio to the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Surrogate {
+pub struct Surrogate<S = EdgeSoftness> {
     /// Which softness.
-    pub softness: EdgeSoftness,
+    pub softness: S,
     /// Its parameters φ, as many as [`Softness::parameters`] says.
     pub phi: Vec<f64>,
 }
 
 /// A softness with its parameters, and how its scale moves over a run.
 ///
-/// In a JSON file its fields have these names, but for the schedule, which is called `path`.
+/// In a JSON file its fields have these names, except for the schedule, which is called `path`. A file of a softness of one's own holds its
+/// [`NAME`](crate::NamedSoftness::NAME) in the field `softness`.
 ///
 /// ```
 /// use softrast_inverse::ScheduledSoftness;
@@ -35,10 +36,10 @@ pub struct Surrogate {
 /// # Ok::<(), softrast_inverse::SoftnessFileError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ScheduledSoftness {
+#[serde(deny_unknown_fields, bound(deserialize = "S: Deserialize<'de>"))]
+pub struct ScheduledSoftness<S = EdgeSoftness> {
     /// Which softness.
-    pub softness: EdgeSoftness,
+    pub softness: S,
     /// Its parameters φ, as many as [`Softness::parameters`] says.
     pub phi: Vec<f64>,
     /// How its width moves over a run; a softness without one stays as it is.
@@ -50,7 +51,7 @@ pub struct ScheduledSoftness {
     /// What the gradient is taken of, where that is not the softness itself; it moves along the same
     /// schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub surrogate: Option<Surrogate>,
+    pub surrogate: Option<Surrogate<S>>,
     /// The learning rate of the optimisations that it was learned on, which suits it best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate: Option<f64>,
@@ -97,13 +98,15 @@ impl ScheduledSoftness {
             }),
         }
     }
+}
 
+impl<S: Softness> ScheduledSoftness<S> {
     /// A softness that stays at `scale`, in NDC (NDC² if squared).
     ///
     /// # Panics
     ///
     /// If `scale` is not positive.
-    pub fn constant(softness: EdgeSoftness, scale: f64) -> Self {
+    pub fn constant(softness: S, scale: f64) -> Self {
         Self::new(softness, scale, None)
     }
 
@@ -113,13 +116,13 @@ impl ScheduledSoftness {
     /// # Panics
     ///
     /// If one of them is not positive.
-    pub fn decay(softness: EdgeSoftness, first: f64, last: f64) -> Self {
+    pub fn decay(softness: S, first: f64, last: f64) -> Self {
         let mut knots = vec![ln_scale(first), ln_scale(last)];
         knots.dedup();
         Self::new(softness, 1.0, Some(ScaleSchedule { knots, floor_px: 0.0 }))
     }
 
-    fn new(softness: EdgeSoftness, scale: f64, schedule: Option<ScaleSchedule>) -> Self {
+    fn new(softness: S, scale: f64, schedule: Option<ScaleSchedule>) -> Self {
         let phi = softness.default_phi(scale);
         let (feedback, surrogate, task, note) = (None, None, None, None);
         let (learning_rate, rate_end) = (None, None);
@@ -138,7 +141,8 @@ impl ScheduledSoftness {
     pub fn with_surrogate_scale(self, scale: f64) -> Self {
         let first = self.schedule.as_ref().map_or(1.0, |schedule| schedule.at(0.0, 0.0));
         let phi = self.softness.default_phi(scale / first);
-        Self { surrogate: Some(Surrogate { softness: self.softness, phi }), ..self }
+        let softness = self.softness.clone();
+        Self { surrogate: Some(Surrogate { softness, phi }), ..self }
     }
 
     /// Whether the scale stays as it is.
@@ -181,7 +185,7 @@ impl ScheduledSoftness {
     ///
     /// If `part` is not in [0, 1].
     pub fn phi_at(&self, part: f64, size: usize) -> Vec<f64> {
-        scaled(self.softness, &self.phi, self.factor_at(part, size))
+        scaled(&self.softness, &self.phi, self.factor_at(part, size))
     }
 
     /// The surrogate at `part` of a run, 0 to 1, on images of `size` × `size` pixels.
@@ -189,10 +193,10 @@ impl ScheduledSoftness {
     /// # Panics
     ///
     /// If `part` is not in [0, 1].
-    pub fn surrogate_at(&self, part: f64, size: usize) -> Option<Surrogate> {
+    pub fn surrogate_at(&self, part: f64, size: usize) -> Option<Surrogate<S>> {
         let Surrogate { softness, phi } = self.surrogate.as_ref()?;
-        let phi = scaled(*softness, phi, self.factor_at(part, size));
-        Some(Surrogate { softness: *softness, phi })
+        let phi = scaled(softness, phi, self.factor_at(part, size));
+        Some(Surrogate { softness: softness.clone(), phi })
     }
 
     /// A renderer with this softness as it is at `part` of a run, 0 to 1; its surrogate, if it has one, comes along.
@@ -205,10 +209,10 @@ impl ScheduledSoftness {
         part: f64,
         rasterizer: Rasterizer,
         faces: Arc<[[u32; 3]]>,
-    ) -> SoftRenderer<EdgeSoftness> {
+    ) -> SoftRenderer<S> {
         let size = rasterizer.size.shorter();
         let phi = self.phi_at(part, size);
-        let renderer = SoftRenderer::with_rasterizer(rasterizer, faces, self.softness, phi);
+        let renderer = SoftRenderer::with_rasterizer(rasterizer, faces, self.softness.clone(), phi);
         match self.surrogate_at(part, size) {
             Some(Surrogate { softness, phi }) => renderer.with_surrogate_phi(softness, phi),
             None => renderer,
@@ -218,44 +222,17 @@ impl ScheduledSoftness {
     /// What the schedule multiplies the scale of the parameters by.
     fn factor_at(&self, part: f64, size: usize) -> Option<f64> {
         let schedule = self.schedule.as_ref()?;
-        Some(schedule.at(schedule.floor(self.softness, size), part))
+        Some(schedule.at(schedule.floor(&self.softness, size), part))
     }
-}
 
-/// The logarithm of a scale.
-///
-/// # Panics
-///
-/// If it is not positive.
-fn ln_scale(scale: f64) -> f64 {
-    assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
-    scale.ln()
-}
-
-fn scaled(softness: EdgeSoftness, phi: &[f64], factor: Option<f64>) -> Vec<f64> {
-    factor.map_or_else(|| phi.to_vec(), |factor| softness.with_scale_values(phi, factor))
-}
-
-stored!(ScheduledSoftness);
-
-impl Stored for ScheduledSoftness {
-    const LEARNED: &'static [(&'static str, &'static str)] = learned![
-        ".json":
-        "shape2d", "shape2d-mlp", "shape2d-surrogate", "shape3d", "shape3d-mlp", "shape3d-surrogate",
-        "shape2d-feedback", "shape3d-feedback",
-        "pose", "pose-mlp", "pose-surrogate", "pose-feedback", "occlusion", "occlusion-mlp", "networks/pose",
-        "networks/pose-15-35", "networks/pose-55-75", "networks/shape3d", "networks/shape3d-0",
-        "networks/shape3d-30", "networks/shape3d-60", "networks/shape3d-minus30",
-        "networks/shape3d-minus60"
-    ];
-
-    fn check(&self) -> Result<(), String> {
-        let surrogate = self.surrogate.iter().map(|of| (of.softness, &of.phi));
+    /// If it cannot be used, says what was found and what was expected; `name` is what a softness is called.
+    pub(super) fn check_as(&self, name: impl Fn(&S) -> &'static str) -> Result<(), String> {
+        let surrogate = self.surrogate.iter().map(|of| (&of.softness, &of.phi));
         let parameters: Vec<_> =
-            [(self.softness, &self.phi)].into_iter().chain(surrogate).collect();
+            [(&self.softness, &self.phi)].into_iter().chain(surrogate).collect();
         for &(softness, phi) in &parameters {
             let expected = [softness.parameters(), softness.logarithms()];
-            check_phi(softness.family.name(), expected, phi)?;
+            check_phi(name(softness), expected, phi)?;
         }
         if let Some(rate) = self.learning_rate.filter(|rate| !(*rate > 0.0 && rate.is_finite())) {
             return Err(format!(": the learning rate is {rate}, expected a positive number"));
@@ -289,6 +266,57 @@ impl Stored for ScheduledSoftness {
             }
         }
         Ok(())
+    }
+}
+
+impl<S> ScheduledSoftness<S> {
+    /// The same numbers with `softness` of each softness in its place.
+    pub(super) fn map<T>(self, softness: impl Fn(S) -> T) -> ScheduledSoftness<T> {
+        let of =
+            |found: Surrogate<S>| Surrogate { softness: softness(found.softness), phi: found.phi };
+        ScheduledSoftness {
+            surrogate: self.surrogate.map(of),
+            softness: softness(self.softness),
+            phi: self.phi,
+            schedule: self.schedule,
+            feedback: self.feedback,
+            learning_rate: self.learning_rate,
+            rate_end: self.rate_end,
+            task: self.task,
+            note: self.note,
+        }
+    }
+}
+
+/// The logarithm of a scale.
+///
+/// # Panics
+///
+/// If it is not positive.
+fn ln_scale(scale: f64) -> f64 {
+    assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
+    scale.ln()
+}
+
+fn scaled(softness: &impl Softness, phi: &[f64], factor: Option<f64>) -> Vec<f64> {
+    factor.map_or_else(|| phi.to_vec(), |factor| softness.with_scale_values(phi, factor))
+}
+
+stored!(ScheduledSoftness);
+
+impl Stored for ScheduledSoftness {
+    const LEARNED: &'static [(&'static str, &'static str)] = learned![
+        ".json":
+        "shape2d", "shape2d-mlp", "shape2d-surrogate", "shape3d", "shape3d-mlp", "shape3d-surrogate",
+        "shape2d-feedback", "shape3d-feedback",
+        "pose", "pose-mlp", "pose-surrogate", "pose-feedback", "occlusion", "occlusion-mlp", "networks/pose",
+        "networks/pose-15-35", "networks/pose-55-75", "networks/shape3d", "networks/shape3d-0",
+        "networks/shape3d-30", "networks/shape3d-60", "networks/shape3d-minus30",
+        "networks/shape3d-minus60"
+    ];
+
+    fn check(&self) -> Result<(), String> {
+        self.check_as(|softness| softness.family.name())
     }
 }
 

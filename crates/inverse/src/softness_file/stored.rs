@@ -96,7 +96,10 @@ macro_rules! stored {
             ///
             /// Those of `load` but for reading.
             pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
-                crate::softness_file::stored::parse(text, path.as_ref())
+                let stored = crate::softness_file::stored::parsed(text, path.as_ref())?;
+                let checked = crate::softness_file::stored::Stored::check(&stored);
+                crate::softness_file::stored::checked(checked, path.as_ref())?;
+                Ok(stored)
             }
 
             /// Checks the parameters and writes the file at `path`, replacing what was there.
@@ -108,7 +111,7 @@ macro_rules! stored {
             ///
             /// If the parameters do not suit the softness, or the file cannot be written.
             pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SoftnessFileError> {
-                crate::softness_file::stored::save(self, path.as_ref())
+                crate::softness_file::stored::save(&self.text(path.as_ref())?, path.as_ref())
             }
 
             /// Checks the parameters; what `save` would write at `path`.
@@ -117,6 +120,8 @@ macro_rules! stored {
             ///
             /// If the parameters do not suit the softness.
             pub fn text(&self, path: impl AsRef<Path>) -> Result<String, SoftnessFileError> {
+                let checked = crate::softness_file::stored::Stored::check(self);
+                crate::softness_file::stored::checked(checked, path.as_ref())?;
                 crate::softness_file::stored::text(self, path.as_ref())
             }
 
@@ -126,7 +131,7 @@ macro_rules! stored {
             ///
             /// If there is none of this name.
             pub fn learned(name: &str) -> Result<Self, SoftnessFileError> {
-                crate::softness_file::stored::learned_of(name)
+                Self::parse(crate::softness_file::stored::learned_text::<Self>(name)?, name)
             }
 
             /// The names of those that come with the crate.
@@ -156,23 +161,20 @@ pub(crate) fn read(path: &Path) -> Result<String, SoftnessFileError> {
     read().map_err(|reason| SoftnessFileError::Read { path: path.to_owned(), reason })
 }
 
-pub(crate) fn parse<T: Stored>(text: &str, path: &Path) -> Result<T, SoftnessFileError> {
+pub(crate) fn parsed<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, SoftnessFileError> {
     // Editors of Windows write a byte order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let stored: T = serde_json::from_str(text)
-        .map_err(|reason| SoftnessFileError::Parse { path: path.to_owned(), reason })?;
-    checked(&stored, path)?;
-    Ok(stored)
+    serde_json::from_str(text)
+        .map_err(|reason| SoftnessFileError::Parse { path: path.to_owned(), reason })
 }
 
-pub(crate) fn text(stored: &impl Stored, path: &Path) -> Result<String, SoftnessFileError> {
-    checked(stored, path)?;
+pub(crate) fn text(stored: &impl Serialize, path: &Path) -> Result<String, SoftnessFileError> {
     let text = serde_json::to_string_pretty(stored).map_err(io::Error::from);
     text.map(|text| text + "\n").map_err(|reason| unwritten(path, reason))
 }
 
-pub(crate) fn save(stored: &impl Stored, path: &Path) -> Result<(), SoftnessFileError> {
-    let text = text(stored, path)?;
+/// Writes the text through a temporary file beside `path`.
+pub(crate) fn save(text: &str, path: &Path) -> Result<(), SoftnessFileError> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}.tmp", std::process::id()));
     fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|reason| {
@@ -182,18 +184,18 @@ pub(crate) fn save(stored: &impl Stored, path: &Path) -> Result<(), SoftnessFile
     })
 }
 
-pub(crate) fn learned_of<T: Stored>(name: &str) -> Result<T, SoftnessFileError> {
+pub(crate) fn learned_text<T: Stored>(name: &str) -> Result<&'static str, SoftnessFileError> {
     let found = T::LEARNED.iter().find(|(of, _)| *of == name);
     let (_, text) = found.ok_or_else(|| {
         let known: Vec<_> = T::LEARNED.iter().map(|(name, _)| *name).collect();
         SoftnessFileError::Unknown { name: name.to_owned(), known: known.join(", ") }
     })?;
-    parse(text, Path::new(name))
+    Ok(text)
 }
 
-fn checked(stored: &impl Stored, path: &Path) -> Result<(), SoftnessFileError> {
-    let invalid = |wrong| SoftnessFileError::Invalid { path: path.to_owned(), wrong };
-    stored.check().map_err(invalid)
+/// An error of a check as that of a file.
+pub(crate) fn checked(check: Result<(), String>, path: &Path) -> Result<(), SoftnessFileError> {
+    check.map_err(|wrong| SoftnessFileError::Invalid { path: path.to_owned(), wrong })
 }
 
 fn unwritten(path: &Path, reason: io::Error) -> SoftnessFileError {

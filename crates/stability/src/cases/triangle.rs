@@ -6,6 +6,7 @@ use burn::tensor::Tensor;
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Targets};
 use softrast_meta::{numbers, tensor};
 use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, mse_loss};
+use softrast_softness::Softness;
 
 use super::common::{SCALE, levels};
 use crate::{
@@ -128,7 +129,7 @@ impl InverseProblem for Triangles {
         &self,
         _: &Targets<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(at_depth_2(theta))
     }

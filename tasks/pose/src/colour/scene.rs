@@ -5,6 +5,7 @@ use softrast_inverse::{
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Orbit, RasterBackend, project, vertices};
+use softrast_softness::Softness;
 
 /// Instances of POSE by colour that are solved together, one view each.
 ///
@@ -49,7 +50,11 @@ impl<B: RasterBackend> Scene<B> {
     }
 
     /// The soft image at θ under the softness of a step, `[4 views, side, side]`.
-    pub fn image(&self, theta: Tensor<B, 1>, softness: &SoftnessAt<'_, B>) -> Tensor<B, 3> {
+    pub fn image(
+        &self,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
+    ) -> Tensor<B, 3> {
         self.image_with(theta, |seen| softness.silhouette(seen))
     }
 

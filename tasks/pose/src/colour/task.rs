@@ -10,6 +10,7 @@ use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, pose::P
 use softrast_lab::rgb_from_planes;
 use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
+use softrast_softness::Softness;
 
 use super::{Scene, coloured};
 use crate::{Args, Pictures, Pose, picture::outlined};
@@ -56,7 +57,7 @@ impl InverseProblem for Coloured {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         scene.image(theta, softness)
     }

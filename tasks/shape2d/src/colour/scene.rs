@@ -1,4 +1,4 @@
-use std::{cell::RefCell, sync::Arc};
+use std::sync::Arc;
 
 use burn::tensor::Tensor;
 use softrast_inverse::{SoftnessAt, Targets};
@@ -6,7 +6,7 @@ use softrast_meta::{numbers, tensor};
 use softrast_raster::{
     Attributes, ColourRenderer, RasterBackend, Weighting, mse_loss, nearest_faces,
 };
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family};
+use softrast_softness::{DepthSoftness, Family, Softness};
 
 use crate::colour::{Colours, Start};
 
@@ -34,15 +34,6 @@ pub struct Scene<B: RasterBackend> {
     background: [f64; 3],
     faces: Arc<[[u32; 3]]>,
     size: usize,
-    /// What drew last. It is kept because its tables are.
-    renderer: RefCell<Option<Kept>>,
-}
-
-#[derive(Debug)]
-struct Kept {
-    side: usize,
-    edge: EdgeSoftness,
-    renderer: ColourRenderer,
 }
 
 impl<B: RasterBackend> Scene<B> {
@@ -66,7 +57,6 @@ impl<B: RasterBackend> Scene<B> {
             background: picture.mean(),
             faces: (0..count as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
             size,
-            renderer: RefCell::default(),
         }
     }
 
@@ -90,49 +80,41 @@ impl<B: RasterBackend> Scene<B> {
     ///
     /// The weight of a triangle among those that overlap is its edge softness times its depth softness, so its depth is its opacity too:
     /// there is no other.
-    pub fn image(&self, theta: Tensor<B, 1>, softness: &SoftnessAt<'_, B>) -> Tensor<B, 3> {
-        let (edge, phi) = softness.edge();
-        let (side, tolerance) = (softness.side(), softness.tolerance());
-        match softness.fixed_place() {
-            Some(_) => self.drawn(theta, edge, numbers(phi), side, tolerance, None),
-            None => self.drawn(theta, edge, numbers(phi.clone()), side, tolerance, Some(phi)),
-        }
+    pub fn image(
+        &self,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
+    ) -> Tensor<B, 3> {
+        let renderer = softness.colour_renderer(&self.faces, PLANES, DEPTH, DEPTH_SCALE);
+        let tracked = softness.fixed_place().is_none().then(|| softness.edge().1);
+        self.drawn(theta, &renderer, softness.side(), tracked)
     }
 
     /// [`image`](Self::image) at full size under the parameters `phi` of an edge softness, which get a gradient.
     pub fn image_with(
         &self,
         theta: Tensor<B, 1>,
-        edge: EdgeSoftness,
+        edge: impl Softness,
         phi: Tensor<B, 1>,
         tolerance: f64,
     ) -> Tensor<B, 3> {
-        self.drawn(theta, edge, numbers(phi.clone()), self.size, tolerance, Some(phi))
+        let (faces, weighting) =
+            (self.faces.clone(), Weighting { edge, depth: DEPTH, planes: PLANES });
+        let values = [numbers(phi.clone()), DEPTH.default_phi(DEPTH_SCALE)];
+        let renderer = ColourRenderer::with_weighting(faces, self.size, weighting, values);
+        self.drawn(theta, &renderer.with_tolerance(tolerance), self.size, Some(phi))
     }
 
     fn drawn(
         &self,
         theta: Tensor<B, 1>,
-        edge: EdgeSoftness,
-        phi: Vec<f64>,
+        renderer: &ColourRenderer<impl Softness>,
         side: usize,
-        tolerance: f64,
         tracked: Option<Tensor<B, 1>>,
     ) -> Tensor<B, 3> {
         let [corners, colours, nearness] = self.parts(theta);
         let vertices = self.vertices(corners, nearness);
         let colours = Attributes::of_faces(colours.reshape([1, self.faces.len(), 3]));
-        let phi = [phi, DEPTH.default_phi(DEPTH_SCALE)];
-        let mut kept = self.renderer.borrow_mut();
-        let fits = |kept: &Kept| kept.side == side && kept.edge == edge;
-        if !kept.as_ref().is_some_and(fits) {
-            let weighting = Weighting { edge, depth: DEPTH, planes: PLANES };
-            let faces = self.faces.clone();
-            let renderer = ColourRenderer::with_weighting(faces, side, weighting, phi.clone());
-            *kept = Some(Kept { side, edge, renderer: renderer.with_tolerance(tolerance) });
-        }
-        let Some(Kept { renderer, .. }) = kept.as_mut() else { unreachable!("made above") };
-        renderer.set_phi(phi);
         let background = renderer.background(&self.background, &vertices.device());
         let image = match tracked {
             None => renderer.image(vertices, &colours, &background),
@@ -251,7 +233,7 @@ mod tests {
     #[test]
     fn a_narrow_softness_shows_nearly_the_hard_image() {
         let scene = scene();
-        let edge = EdgeSoftness { family: Family::Gauss, squared: false };
+        let edge = Family::Gauss;
         let phi = vector(&edge.default_phi(1e-3));
         let soft = numbers(scene.image_with(scene.start(), edge, phi, 1e-4));
         let hard = numbers(scene.hard(scene.start()));

@@ -11,6 +11,7 @@ use softrast_inverse::{InverseProblem, Iterate, Picture, SoftnessAt, SolveConfig
 use softrast_lab::rgb_from_planes;
 use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
+use softrast_softness::Softness;
 
 use crate::{
     Args, Shape2d,
@@ -83,7 +84,7 @@ impl InverseProblem for Coloured {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         scene.image(theta, softness)
     }

@@ -8,6 +8,7 @@ use softrast_meta::{Adam, numbers, tensor};
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole,
 };
+use softrast_softness::Softness;
 
 use super::hull::square;
 
@@ -78,7 +79,7 @@ impl InverseProblem for FromViews {
         &self,
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
-        softness: &SoftnessAt<'_, B>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 3> {
         softness.silhouette(scene.project(theta))
     }
