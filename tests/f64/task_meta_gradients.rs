@@ -13,11 +13,11 @@ use softrast_inverse::{
 };
 use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::RasterBackend;
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tests::{numbers, vector};
 use tempfile::TempDir;
 
-use crate::differences::relative_error;
+use crate::{differences::relative_error, inverse::own_softness::Arctan};
 
 type B = NdArray<f64>;
 /// What `learn` computes on.
@@ -32,16 +32,16 @@ const AGREE: f64 = 1e-4;
 const SEED: u64 = 5;
 
 /// A problem at the size of its images, with a softness and how the result is judged.
-struct Case<'a, P> {
+struct Case<'a, P, S> {
     name: &'a str,
     problem: &'a dyn Fn() -> P,
     size: usize,
-    softness: ScheduledSoftness,
+    softness: ScheduledSoftness<S>,
     outer_loss: OuterLoss,
 }
 
-impl<P: InverseProblem> Case<'_, P> {
-    fn instances<T: RasterBackend>(&self) -> Instances<P, T> {
+impl<P: InverseProblem, S: Softness> Case<'_, P, S> {
+    fn instances<T: RasterBackend>(&self) -> Instances<P, T, S> {
         let problem = (self.problem)();
         let learning_rate = problem.defaults().learning_rate;
         let solve = SolveConfig { size: self.size, steps: 3, learning_rate };
@@ -187,6 +187,20 @@ fn shape2d() {
 fn shape3d() {
     let (_folder, args) = small_shape3d();
     check(Shape3d::NAME, 12, scales::<Shape3d>(Some(0.05)), || task::<Shape3d>(&args));
+}
+
+#[test]
+fn an_own_softness() {
+    let (_folder, args) = small_pose();
+    let problem = || task::<Pose>(&args);
+    for softness in
+        [ScheduledSoftness::constant(Arctan, 0.02), ScheduledSoftness::decay(Arctan, 0.02, 0.01)]
+    {
+        for outer_loss in [OuterLoss::Fixed, OuterLoss::Own] {
+            let (name, softness) = ("arctan", softness.clone());
+            Case { name, problem: &problem, size: 16, softness, outer_loss }.check();
+        }
+    }
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 pub use burn::tensor::{Tensor, backend::Backend};
 pub use softrast_inverse::{
-    InverseProblem, Iterate, LearnConfig, Lens, Method, Minimization, Picture, PoseProblem,
-    ScheduledSoftness, SoftnessAt, SolveConfig, learn, load_views, minimize,
+    InverseProblem, Iterate, LearnConfig, Lens, Method, Minimization, NamedSoftness, Picture,
+    PoseProblem, ScheduledSoftness, SoftnessAt, SolveConfig, learn, load_views, minimize,
     pose::{FoundPose, PoseSearch},
     save_picture,
 };

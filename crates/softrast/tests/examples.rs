@@ -89,6 +89,14 @@ fn an_own_softness_draws_a_fox() {
 }
 
 #[test]
+fn an_own_softness_is_learned_kept_in_a_file_and_solved_with() {
+    let said = runs("own_learned");
+    let [start, learned] =
+        ["start: IoU loss", "learned: IoU loss"].map(|of| number_after(&said, of));
+    assert!(learned < start, "{said}");
+}
+
+#[test]
 fn a_sphere_comes_to_fit_two_silhouettes() {
     assert!(number_after(&runs("fit"), "IoU loss") < 0.1);
 }

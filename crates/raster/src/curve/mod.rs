@@ -162,8 +162,7 @@ impl CubicCurve {
                 both.each_ref().map(|of| of.clone().narrow(0, side * places.len(), places.len()))
             })
         } else {
-            let (outer, inner) = rayon::join(|| of_sides(&[0]), || of_sides(&[1]));
-            [outer, inner]
+            on_two_threads(|side| of_sides(&[side]))
         };
 
         let mut rows = Vec::with_capacity(6);
@@ -256,6 +255,23 @@ struct Sample {
     interpolated: [f64; 2],
     /// Whether it lies in the innermost cell of its side.
     innermost: bool,
+}
+
+/// `of` 0 and 1.
+///
+/// The second thread is not one of rayon's. A softness may take its slope by autodiff, which waits for every graph of the process, and a
+/// backward pass holds its graph while it waits for a thread of rayon: with all of those in here, both would wait for ever.
+fn on_two_threads<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; 2] {
+    std::thread::scope(|scope| {
+        let second = std::thread::Builder::new().spawn_scoped(scope, || of(1));
+        let first = of(0);
+        let second = match second {
+            Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            // A browser has one thread.
+            Err(_) => of(1),
+        };
+        [first, second]
+    })
 }
 
 /// Coefficients of cubics from these `values` to the `next`, where they miss those by more than a part of the rise replaced by
