@@ -2,7 +2,7 @@ use burn::tensor::{DType, Element, Tensor, backend::Backend};
 use softrast_softness::{Softness, numbers, support};
 
 use crate::{
-    HostBackend, RasterBackend, Rasterizer, TConorm,
+    HostBackend, RasterBackend, TConorm,
     curve::{
         BEYOND, CubicCurve, FAR, FARTHEST_DRAWN, SIGNS, precise, rounding, settled_until, worse,
     },
@@ -59,12 +59,13 @@ impl Profile {
     ///
     /// # Panics
     ///
-    /// If the tolerance is not in (0, 1), `faces` is 0, or `phi` has the wrong length.
+    /// If `tolerance` is not in (0, 1), `faces` is 0, or `phi` has the wrong length.
     pub fn new<B: RasterBackend>(
-        &Rasterizer { t_conorm, tolerance, .. }: &Rasterizer,
         softness: &impl Softness,
+        t_conorm: TConorm,
         phi: &[f64],
         faces: usize,
+        tolerance: f64,
     ) -> Self {
         let sums = <B::FloatElem as Element>::dtype();
         // The look-up of a GPU knows no cells that are counted from the far end.

@@ -63,8 +63,9 @@ impl Rasterizer {
         phi: &[f64],
     ) -> Silhouette<S> {
         assert!(self.size.pixels() > 0, "an image needs at least one pixel");
+        let Self { t_conorm, tolerance, .. } = *self;
         let faces = faces.clone();
-        let profile = Profile::new::<B>(self, &softness, phi, faces.len());
+        let profile = Profile::new::<B>(&softness, t_conorm, phi, faces.len(), tolerance);
         let op = ProfileSum {
             faces,
             grid: profile.grid(),
