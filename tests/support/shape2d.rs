@@ -16,7 +16,7 @@ enum Drawing<S> {
     /// Plain tensor ops over every pair.
     Reference(S),
     /// The fused op, with support and knots that were chosen beforehand.
-    Fused(Silhouette<S>),
+    Fused(Box<Silhouette<S>>),
 }
 
 /// Six triangles, each free to move its corners, against the image of a disk.
@@ -37,7 +37,8 @@ impl<S: Softness> Shape2d<S> {
     /// Drawn by the fused op, prepared for parameters near `phi`.
     pub fn by_fused_op<B: RasterBackend>(softness: S, phi: &Tensor<B, 1>, tolerance: f64) -> Self {
         let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(SIZE) };
-        Self { drawing: Drawing::Fused(rasterizer.prepare(&faces().into(), softness, phi)) }
+        let silhouette = rasterizer.prepare(&faces().into(), softness, phi);
+        Self { drawing: Drawing::Fused(Box::new(silhouette)) }
     }
 }
 

@@ -270,11 +270,10 @@ impl<L: Lanes> Band<'_, '_, L> {
                 flush(last, room.corners[last as usize], scene.half, &mut sums, &mut gradients);
             }
             last = Some(face);
-            for part in 0..COUNT {
-                let upstream = &room.parts[part];
+            for (sums, upstream) in sums.iter_mut().zip(&room.parts) {
                 let pull = L::of_groups(group(upstream, at[0]), group(upstream, at[1]));
                 let [x, y] = kept.offset;
-                sums[part].add([pull * x, pull * y], kept.weights);
+                sums.add([pull * x, pull * y], kept.weights);
             }
         }
         if let Some(last) = last {
