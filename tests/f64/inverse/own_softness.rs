@@ -70,7 +70,7 @@ fn poses_come_nearer_along_the_schedule_of_an_own_softness_and_of_its_surrogate(
     let config = SolveConfig { size: 24, steps: 40, learning_rate: 2.0 };
     let decay = ScheduledSoftness::decay(Arctan, 0.05, 0.002);
     for softness in [decay.clone(), decay.with_surrogate_scale(0.1)] {
-        let [first, last] = solved::<_, NdArray>(&PoseProblem::new(&body()), 8, softness, &config);
+        let [first, last] = solved::<_, B>(&PoseProblem::new(&body()), 8, softness, &config);
         assert!((first[1] - 0.05).abs() < 1e-12 && (last[1] - 0.002).abs() < 1e-12);
         assert!(last[0] < 0.9 * first[0], "{first:?} to {last:?}");
     }
