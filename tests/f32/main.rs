@@ -4,6 +4,7 @@
 
 mod exact_rows;
 mod meta;
+mod own_softness;
 mod raster;
 mod reconstruct;
 mod shape3d;

@@ -14,10 +14,10 @@ use softrast_inverse::{
 use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::RasterBackend;
 use softrast_softness::{EdgeSoftness, Family, Softness};
-use softrast_tests::{numbers, vector};
+use softrast_tests::{Arctan, numbers, vector};
 use tempfile::TempDir;
 
-use crate::{differences::relative_error, inverse::own_softness::Arctan};
+use crate::differences::relative_error;
 
 type B = NdArray<f64>;
 /// What `learn` computes on.

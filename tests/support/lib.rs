@@ -1,7 +1,9 @@
 //! What the tests that cross crates share: workloads with known results, small problems, tensors; and the examples of the pages.
 
+mod arctan;
 mod colours;
 mod known_row;
+mod lopsided_mesh;
 mod outputs;
 mod paper_mesh;
 mod shape2d;
@@ -11,8 +13,10 @@ mod tolerance;
 mod waves;
 mod workload;
 
+pub use arctan::Arctan;
 pub use colours::colours;
 pub use known_row::KnownRow;
+pub use lopsided_mesh::lopsided_mesh;
 pub use outputs::{Outputs, outputs};
 pub use paper_mesh::paper_mesh;
 pub use shape2d::{Shape2d, shape2d_start};

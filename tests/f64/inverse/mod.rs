@@ -3,7 +3,7 @@
 mod another_phi;
 mod layout;
 mod minimize;
-pub(crate) mod own_softness;
+mod own_softness;
 mod paint;
 mod schedule;
 mod square;
