@@ -2,7 +2,7 @@ use burn::tensor::{DType, Element, Tensor, backend::Backend};
 use softrast_softness::{Softness, numbers, support};
 
 use crate::{
-    HostBackend, RasterBackend, TConorm,
+    RasterBackend, TConorm,
     curve::{
         BEYOND, CubicCurve, FAR, FARTHEST_DRAWN, SIGNS, precise, rounding, settled_until, worse,
     },
@@ -55,12 +55,12 @@ impl Profile {
     /// the culled tail is below Adam's usual epsilon of 1e-8 times the image's own; choose a
     /// smaller tolerance where faces must be drawn in from afar (docs/notes.md, Culling: gradient).
     ///
-    /// `B` is the backend that draws; support and knots are chosen on the CPU, in f64.
+    /// `B` is the backend that draws; support and knots are chosen on `H`, in f64 if it has that.
     ///
     /// # Panics
     ///
     /// If `tolerance` is not in (0, 1), `faces` is 0, or `phi` has the wrong length.
-    pub fn new<B: RasterBackend>(
+    pub fn new<B: RasterBackend, H: Backend>(
         softness: &impl Softness,
         t_conorm: TConorm,
         phi: &[f64],
@@ -70,16 +70,16 @@ impl Profile {
         let sums = <B::FloatElem as Element>::dtype();
         // The look-up of a GPU knows no cells that are counted from the far end.
         let far = if B::ON_HOST { &FAR[..] } else { &[] };
-        let device = &Default::default();
+        let device = &H::Device::default();
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         assert!(faces > 0, "a profile needs at least one face");
         let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
         // The T-conorm bends the optical depth: ask for the depth that makes up the excess.
-        let limits = support::<HostBackend>(softness, phi, excess, device);
+        let limits = support::<H>(softness, phi, excess, device);
         let depth = depth_of_excess(t_conorm, limits.left, excess);
-        let support = support::<HostBackend>(softness, phi, depth, device);
+        let support = support::<H>(softness, phi, depth, device);
         // Deep inside, what counts is the light left, which knows nothing of the number of faces.
-        let shallow = support_inside(softness, phi, tolerance / 2.0);
+        let shallow = support_inside::<H>(softness, phi, tolerance / 2.0);
         let radii = [support.outer, support.inner.min(shallow)];
         let from = || {
             // What is left of the budget of interpolation then suffices for the first cells.
@@ -88,28 +88,23 @@ impl Profile {
                 (q - edge).abs() <= depth / 4.0 || (-q.min(edge)).exp() <= light / 4.0
             };
             let depths = |x: &[f64]| {
-                numbers(softness.optical_depth(
-                    precise::<HostBackend>(phi, device),
-                    precise::<HostBackend>(x, device),
-                ))
+                numbers(softness.optical_depth(precise::<H>(phi, device), precise::<H>(x, device)))
             };
             settled_until(depths, radii, settled)
         };
-        let phi = precise::<HostBackend>(phi, device);
-        let terms = |x: Tensor<HostBackend, 1>| {
-            <[_; 2]>::from(t_conorm.profile_for(sums, softness, phi.clone(), x))
-        };
-        let bound = Bound::new(t_conorm, tolerance, faces, rounding::<HostBackend>(device));
+        let phi = precise::<H>(phi, device);
+        let terms =
+            |x: Tensor<H, 1>| <[_; 2]>::from(t_conorm.profile_for(sums, softness, phi.clone(), x));
+        let bound = Bound::new(t_conorm, tolerance, faces, rounding::<H>(device));
         let miss = |exact: f64, interpolated: f64| bound.of_interpolation(exact, interpolated);
-        let (curve, missed) =
-            CubicCurve::chosen::<HostBackend>(terms, radii, from, far, miss, sums, device);
+        let (curve, missed) = CubicCurve::chosen::<H>(terms, radii, from, far, miss, sums, device);
         let values = |x: &[f64]| {
-            let [values, _] = terms(precise::<HostBackend>(x, device));
+            let [values, _] = terms(precise::<H>(x, device));
             numbers(values)
         };
         let of_half = |error: f64| if error <= 1.0 + ROUNDING { 1.0 } else { error };
         let culled = bound.of_constants(&curve.grid, values);
-        let end = precise::<HostBackend>(&[BEYOND * curve.grid.inner], device);
+        let end = precise::<H>(&[BEYOND * curve.grid.inner], device);
         let [deepest] = numbers(softness.optical_depth(phi, end))[..] else {
             unreachable!("a distance has an optical depth")
         };
@@ -289,8 +284,8 @@ fn depth_of_excess(t_conorm: TConorm, left: f64, excess: f64) -> f64 {
 }
 
 /// Depth inside a face beyond which it lets less than `light` through; infinite if there is none.
-fn support_inside(softness: &impl Softness, phi: &[f64], light: f64) -> f64 {
-    let support = support::<HostBackend>(softness, phi, light, &Default::default());
+fn support_inside<H: Backend>(softness: &impl Softness, phi: &[f64], light: f64) -> f64 {
+    let support = support::<H>(softness, phi, light, &Default::default());
     if (-support.right).exp() <= light { support.inner } else { f64::INFINITY }
 }
 

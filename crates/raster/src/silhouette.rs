@@ -48,15 +48,19 @@ impl Rasterizer {
         phi: &Tensor<B, 1>,
     ) -> Silhouette<S> {
         let values: Vec<f64> = phi.to_data().iter().collect();
-        self.prepare_from::<B, S>(faces, softness, &values)
+        match B::ON_HOST {
+            true => self.prepare_on::<B, B, S>(faces, softness, &values),
+            // Without a word between host and GPU for every attempt.
+            false => self.prepare_on::<B, HostBackend, S>(faces, softness, &values),
+        }
     }
 
-    /// [`Rasterizer::prepare`] from plain numbers. Support and knots are chosen on the CPU, in f64.
+    /// [`Rasterizer::prepare`] from plain numbers. Support and knots are chosen on `H`, in f64 if it has that.
     ///
     /// # Panics
     ///
     /// If `faces` or the image is empty, or `phi` has the wrong length.
-    pub fn prepare_from<B: RasterBackend, S: Softness>(
+    pub fn prepare_on<B: RasterBackend, H: Backend, S: Softness>(
         &self,
         faces: &Arc<[[u32; 3]]>,
         softness: S,
@@ -65,7 +69,7 @@ impl Rasterizer {
         assert!(self.size.pixels() > 0, "an image needs at least one pixel");
         let Self { t_conorm, tolerance, .. } = *self;
         let faces = faces.clone();
-        let profile = Profile::new::<B>(&softness, t_conorm, phi, faces.len(), tolerance);
+        let profile = Profile::new::<B, H>(&softness, t_conorm, phi, faces.len(), tolerance);
         let op = ProfileSum {
             faces,
             grid: profile.grid(),

@@ -4,7 +4,8 @@ use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
 
 use crate::{
-    ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm, kernel::PixelLoss,
+    HostBackend, ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm,
+    kernel::PixelLoss,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -219,7 +220,7 @@ impl<S: Softness> SoftRenderer<S> {
         }
         // Without the lock: other threads of a pool may take up work in between, and ask for the same.
         let (faces, softness) = (&self.faces, self.softness.clone());
-        let silhouette = self.rasterizer.prepare_from::<B, S>(faces, softness, phi);
+        let silhouette = self.rasterizer.prepare_on::<B, HostBackend, S>(faces, softness, phi);
         let prepared = silhouette.clone();
         self.kept().prepared = Some(Prepared { phi: phi.to_vec(), drawn, silhouette: prepared });
         silhouette
