@@ -16,7 +16,7 @@ use std::{
 
 use softrast_tests::{Deviation, ToleranceCase};
 
-/// What each case is drawn in.
+/// Float types that each case is drawn in.
 const FLOATS: [&str; 2] = ["f64", "f32"];
 
 /// Time between two lines of progress.

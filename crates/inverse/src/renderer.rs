@@ -27,7 +27,7 @@ pub struct ScheduledRenderer<S = EdgeSoftness> {
     renderer: Option<SoftRenderer<S>>,
     /// What was drawn with so far, by its place on the path.
     kept: RefCell<BTreeMap<u64, Rc<Kept<S>>>>,
-    /// What drew colours last.
+    /// The latest renderer of colours.
     colours: RefCell<Option<Colours<S>>>,
 }
 

@@ -66,7 +66,7 @@ impl Found {
         Self { material: Some(String::new()), ..Self::default() }
     }
 
-    /// What all of `bytes` has, or the first statement that is wrong.
+    /// Everything that `bytes` holds, or the first statement that is wrong.
     fn of(bytes: &[u8]) -> Result<Self, Trouble> {
         let (mut found, all) = (Self::new(), count(bytes, "vt"));
         statements(bytes).try_for_each(|statement| found.add(&statement, all))?;

@@ -11,7 +11,7 @@ impl<S: NamedSoftness> ScheduledSoftness<S> {
     ///
     /// # Errors
     ///
-    /// Those of [`ScheduledSoftness::load`]; if the file is of another softness than [`NAME`](NamedSoftness::NAME).
+    /// As [`ScheduledSoftness::load`]; if the file is of another softness than [`NAME`](NamedSoftness::NAME).
     pub fn load_own(softness: S, path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
         Self::parse_own(softness, &stored::read(path.as_ref())?, path)
     }
@@ -20,7 +20,7 @@ impl<S: NamedSoftness> ScheduledSoftness<S> {
     ///
     /// # Errors
     ///
-    /// Those of [`load_own`](Self::load_own), except for reading.
+    /// As [`load_own`](Self::load_own), except for reading.
     pub fn parse_own(
         softness: S,
         text: &str,

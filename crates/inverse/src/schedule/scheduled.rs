@@ -270,7 +270,7 @@ impl<S: Softness> ScheduledSoftness<S> {
 }
 
 impl<S> ScheduledSoftness<S> {
-    /// The same numbers with `softness` of each softness in its place.
+    /// These numbers with each softness replaced by `softness` of it.
     pub(super) fn map<T>(self, softness: impl Fn(S) -> T) -> ScheduledSoftness<T> {
         let of =
             |found: Surrogate<S>| Surrogate { softness: softness(found.softness), phi: found.phi };

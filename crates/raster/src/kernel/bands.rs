@@ -100,7 +100,7 @@ impl Bands {
 
 /// Writes the pixels that each face may reach, and counts the faces that are drawn.
 struct ReachOfFaces<'a, L: Lanes> {
-    /// Those of the vertices in the image.
+    /// Places of the vertices in the image.
     places: &'a [[L::Float; 2]],
     faces: &'a [[u32; 3]],
     /// In pixels.

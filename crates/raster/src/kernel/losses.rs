@@ -88,7 +88,7 @@ fn of_views<L: Lanes>(
     [losses, gradient]
 }
 
-/// What a band gives back: its sums over pixels, and parts of the gradient to x and y of the three corners of each of its faces.
+/// Results of a band: its sums over pixels, and parts of the gradient to x and y of the three corners of each of its faces.
 struct Walked<F> {
     sums: [F; PARTS],
     /// Whether the band is all of its view: then there is one part, which has its factor already.

@@ -140,7 +140,7 @@ fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, band: usize) -> Vec<r
     padded
 }
 
-/// What a band gives back: for each face the gradient to x and y of its three corners, that to the table, and rows of the image.
+/// Results of a band: for each face the gradient to x and y of its three corners, that to the table, and rows of the image.
 struct Walked<F> {
     corners: Vec<[F; 6]>,
     table: Vec<[F; 4]>,

@@ -51,7 +51,7 @@ impl<T: Real> Pair<T> {
     }
 }
 
-/// What is done with the pairs of a band.
+/// An operation on the pairs of a band.
 pub(crate) trait Visitor<T: Real> {
     /// Whether the chunks of this list are visited; if not, the walk ends before it.
     #[inline(always)]
