@@ -8,8 +8,8 @@
 
 use std::{env, time::Instant};
 
-use burn::backend::NdArray;
 use softrast_lab::peak_rss_mib;
+use softrast_tensor::NdArray;
 use softrast_tests::{KnownRow, Row, Workload};
 
 type B = NdArray<f64>;

@@ -1,7 +1,7 @@
 //! The fused op as binaries use it, in f32 with the default tolerance, against exact results.
 
-use burn::backend::NdArray;
-use softrast_raster::Rasterizer;
+use softrast_raster::low_level::Rasterizer;
+use softrast_tensor::NdArray;
 use softrast_tests::KnownRow;
 
 type B = NdArray<f32>;

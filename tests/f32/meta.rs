@@ -1,7 +1,7 @@
 //! Meta-gradients in f32, against the same in f64.
 
-use burn::{backend::NdArray, tensor::backend::Backend};
 use softrast_meta::{Adam, BilevelProblem, InnerLoop, MetaGradient, OuterSteps};
+use softrast_tensor::{Backend, NdArray};
 use softrast_tests::{WAVES, numbers, vector};
 
 fn meta_gradient<B: Backend>(scene: usize, steps: usize) -> Vec<f64> {

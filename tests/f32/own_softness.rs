@@ -1,9 +1,9 @@
 //! Poses under a softness of one's own. `minimize` judges hard images in f32, as programs do, so this is not tested in f64.
 
-use burn::backend::NdArray;
 use softrast_inverse::{
     InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize,
 };
+use softrast_tensor::NdArray;
 use softrast_tests::{Arctan, lopsided_mesh};
 
 #[test]

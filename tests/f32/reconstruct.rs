@@ -1,8 +1,8 @@
 //! Single-view reconstruction: pictures, template and smoothness.
 
-use burn::tensor::{Tensor, TensorData};
 use reconstruct::{Procedural, SIZE, Shapes, Smoothness, Split, Template, Voxels, orbit};
 use softrast_raster::{HostBackend as Backend, hard_silhouette, project};
+use softrast_tensor::{Tensor, TensorData};
 
 /// Corners of the full cells as a point cloud, in world units.
 fn centres(voxels: &Voxels) -> Vec<[f64; 3]> {

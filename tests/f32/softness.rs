@@ -1,11 +1,8 @@
 //! Extreme distances and scales in f32: everything stays finite, gradients included.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData, backend::Backend},
-};
 use proptest::prelude::*;
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers, vector};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData, numbers, vector};
 
 type First = Autodiff<NdArray<f32>>;
 type Second = Autodiff<First>;

@@ -1,10 +1,7 @@
 //! Derivatives against central differences, wherever a loss comes from.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_meta::{Adam, InnerLoop, Objective};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

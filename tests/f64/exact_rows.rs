@@ -4,7 +4,7 @@
 //! `cargo bench -p softrast-tests --bench exact_row -- fox reference`; the tests hold it against the
 //! fused op on a small image of the same; views beside one another are in the exact rows.
 
-use burn::backend::NdArray;
+use softrast_tensor::NdArray;
 use softrast_tests::{KnownRow, Workload};
 
 type B = NdArray<f64>;

@@ -3,17 +3,14 @@
 //!
 //! The fused op keeps the support and knots that were chosen at φ while φ is varied.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_inverse::{Method, ScheduledSoftness};
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
-use softrast_raster::Rasterizer;
+use softrast_raster::low_level::Rasterizer;
 use softrast_softness::{
     EdgeSoftness, Family, Softness,
     families::{Logistic, Mlp},
 };
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::{Shape2d, numbers, shape2d_start, vector};
 
 use crate::differences::relative_error;

@@ -1,10 +1,7 @@
 //! Convolutions as products of matrices against those of burn.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use reconstruct::{convolution, convolved};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;

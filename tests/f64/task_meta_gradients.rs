@@ -2,7 +2,6 @@
 
 use std::{fs, path::PathBuf};
 
-use burn::backend::NdArray;
 use occlusion::Occlusion;
 use pose::Pose;
 use shape2d::Shape2d;
@@ -14,6 +13,7 @@ use softrast_inverse::{
 use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::RasterBackend;
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::NdArray;
 use softrast_tests::{Arctan, numbers, vector};
 use tempfile::TempDir;
 

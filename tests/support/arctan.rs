@@ -1,8 +1,8 @@
 use std::f64::consts::FRAC_1_PI;
 
-use burn::tensor::{Tensor, backend::Backend};
 use softrast_inverse::NamedSoftness;
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, Tensor};
 
 /// A softness of one's own, of one method: `s(x) = 1/2 + atan(x / scale) / π`; φ `[1]` is the logarithm of the scale.
 #[derive(Clone, Debug, PartialEq)]

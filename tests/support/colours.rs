@@ -1,9 +1,9 @@
 //! Everything that the op in colour computes of one scene.
 
-use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_mesh::fox;
 use softrast_raster::{Attributes, Background, ColourRenderer, RasterBackend, Weighting, project};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Tensor, numbers};
 
 use crate::{outputs::Outputs, tensors::tensor};
 

@@ -20,7 +20,7 @@ pub use lopsided_mesh::lopsided_mesh;
 pub use outputs::{Outputs, outputs};
 pub use paper_mesh::paper_mesh;
 pub use shape2d::{Shape2d, shape2d_start};
-pub use softrast_softness::{numbers, vector};
+pub use softrast_tensor::{numbers, vector};
 pub use tensors::tensor;
 pub use threads::assert_same_on_threads;
 pub use tolerance::{Deviation, ToleranceCase};

@@ -1,12 +1,9 @@
 //! Everything that the fused op computes of one scene.
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_mesh::fox;
-use softrast_raster::{RasterBackend, Rasterizer, project};
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers};
+use softrast_raster::{RasterBackend, low_level::Rasterizer, project};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, Tensor, numbers};
 
 use crate::tensors::tensor;
 

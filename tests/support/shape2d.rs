@@ -1,9 +1,13 @@
 //! A small 2-D problem: triangles that move until they show a target.
 
-use burn::tensor::{Tensor, TensorData, backend::Backend};
 use softrast_meta::Objective;
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, TConorm, mse_loss, reference};
+use softrast_raster::{
+    RasterBackend, TConorm,
+    low_level::{Rasterizer, Silhouette},
+    mse_loss, reference,
+};
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, Tensor, TensorData};
 
 /// Width and height of the image in pixels.
 const SIZE: usize = 12;

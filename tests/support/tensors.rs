@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 /// A tensor in the float type of its backend, whatever type the device defaults to.
 ///
@@ -6,5 +6,5 @@ use burn::tensor::{Tensor, backend::Backend};
 ///
 /// If the number of values is not that of the shape.
 pub fn tensor<B: Backend, const D: usize>(values: &[f64], shape: [usize; D]) -> Tensor<B, D> {
-    softrast_softness::tensor(values.to_vec(), shape)
+    softrast_tensor::tensor(values.to_vec(), shape)
 }

@@ -1,13 +1,10 @@
 //! The promise that no pixel is off by more than its bound, for one random scene and softness.
 
-use burn::{
-    backend::NdArray,
-    tensor::{DType, Tensor, TensorData},
-};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde::{Deserialize, Serialize};
 use softrast_raster::{RasterBackend, SoftRenderer, TConorm, reference};
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers, vector};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{DType, NdArray, Tensor, TensorData, numbers, vector};
 
 type Exact = NdArray<f64>;
 

@@ -1,5 +1,5 @@
-use burn::tensor::{Tensor, backend::Backend};
 use softrast_meta::Objective;
+use softrast_tensor::{Backend, Tensor};
 
 /// A loss in closed form: `Σ exp(φ0) log cosh(θ - 0.2) + φ1 sin(θ) θ_next`, at step t times
 /// `1 + 0.1 t`.

@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_mesh::Mesh;
-use softrast_raster::{RasterBackend, Rasterizer, TConorm, mse_loss, project, reference};
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers, tensor};
+use softrast_raster::{
+    RasterBackend, TConorm, low_level::Rasterizer, mse_loss, project, reference,
+};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, Tensor, numbers, tensor};
 
 /// The logistic of the signed squared distance.
 const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };

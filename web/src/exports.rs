@@ -34,7 +34,7 @@ pub fn fault() -> String {
 #[cfg(target_family = "wasm")]
 #[wasm_bindgen]
 pub async fn set_up_gpu() {
-    use burn::backend::wgpu::{WgpuDevice, graphics::AutoGraphicsApi, init_setup_async};
+    use softrast_tensor::wgpu::{AutoGraphicsApi, WgpuDevice, init_setup_async};
     init_setup_async::<AutoGraphicsApi>(&WgpuDevice::default(), Default::default()).await;
 }
 

@@ -1,8 +1,8 @@
 use std::pin::Pin;
 
-use burn::tensor::read_sync;
 use serde::Serialize;
 use softrast_inverse::Iterate;
+use softrast_tensor::read_sync;
 
 use crate::CameraView;
 

@@ -26,7 +26,7 @@ pub use settings::{Settings, SoftnessChoice, curves};
 pub use shape::ShapeRun;
 
 /// What everything is computed on unless a GPU was chosen: the CPU, in one thread where there is no other.
-pub type Backend = burn::backend::NdArray<f32>;
+pub type Backend = softrast_tensor::NdArray<f32>;
 /// What runs are computed on where a GPU was chosen, through WebGPU. On a computer it stands for the CPU.
 #[cfg(target_family = "wasm")]
 pub type Gpu = softrast_raster::Wgpu;

@@ -5,7 +5,7 @@ use softrast_inverse::{
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Pinhole, RasterBackend};
-use softrast_softness::numbers;
+use softrast_tensor::numbers;
 
 use crate::{Backend, CameraView, Coming, Frame, Run, Settings};
 

@@ -1,10 +1,10 @@
 use std::sync::Arc;
 
 use anyhow::ensure;
-use burn::{backend::Autodiff, tensor::Tensor};
 use serde::Deserialize;
-use softrast_raster::{RasterBackend, Rasterizer, SoftRenderer, TConorm};
-use softrast_softness::{EdgeSoftness, Softness, numbers, tensor};
+use softrast_raster::{RasterBackend, SoftRenderer, TConorm, low_level::Rasterizer};
+use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
 use crate::{Backend, SoftnessChoice};
 

@@ -3,7 +3,7 @@ use softrast_inverse::{
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, RasterBackend, view_rotation};
-use softrast_softness::{numbers, vector};
+use softrast_tensor::{numbers, vector};
 
 use crate::{CameraView, Coming, Frame, Run, Settings};
 

@@ -1,8 +1,8 @@
 use anyhow::{Context, ensure};
-use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
 use softrast_inverse::{Method, ScheduledSoftness, SolveConfig};
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers, vector};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Tensor, numbers, vector};
 
 use crate::Backend;
 

@@ -1,12 +1,12 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_inverse::{
     InverseProblem, Minimization, Picture, SoftnessAt, SolveConfig,
     triangles::{Instance, Scene},
 };
 use softrast_raster::RasterBackend;
-use softrast_softness::{Softness, numbers};
+use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers};
 
 use crate::{Coming, Frame, Run, Settings};
 
@@ -41,16 +41,16 @@ impl InverseProblem for Covering {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(scene.vertices(theta))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(scene.vertices(theta)).unsqueeze_dim(1)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        scene.hard(scene.vertices(theta))
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
+        scene.hard(scene.vertices(theta)).unsqueeze_dim(1)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        scene.image_loss(image)
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        scene.image_loss(image.squeeze_dim(1))
     }
 
     fn regularizer<B: RasterBackend>(

@@ -2,15 +2,12 @@
 //!
 //! A line has a name and the bits of its numbers, in hexadecimal.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
-use softrast_meta::{Adam, InnerLoop, Objective, tensor, vector};
+use softrast_meta::{Adam, InnerLoop, Objective};
 use softrast_raster::{
     Attributes, Background, ColourRenderer, Orbit, RasterBackend, SoftRenderer, project,
 };
-use softrast_softness::{EdgeSoftness, Family, numbers};
+use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor, numbers, tensor, vector};
 
 type Plain = NdArray<f64>;
 type Outer = Autodiff<Plain>;

@@ -2,12 +2,9 @@
 
 use std::time::Instant;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_raster::{Orbit, SoftRenderer, mse_loss, project, vertices};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 
 type B = Autodiff<NdArray<f32>>;
 

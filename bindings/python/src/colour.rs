@@ -1,10 +1,10 @@
 //! Soft colours of one mesh topology.
 
-use burn::backend::NdArray;
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use softrast_raster::{ImageSize, Weighting};
 use softrast_softness::{DepthSoftness, Softness as _};
+use softrast_tensor::NdArray;
 
 use crate::{
     checks::{check_phi, check_size, check_tolerance, corners, least},

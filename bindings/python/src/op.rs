@@ -1,12 +1,15 @@
 //! Ops over arrays: the values, the gradient, and the gradient of that.
 
-use burn::tensor::{Shape, TensorData};
 use numpy::{
     Element, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
-use softrast_raster::{ElementaryOp, FusedOp, Numbers, Pass, Silhouette, TConorm, WeightTables};
+use softrast_raster::{
+    TConorm,
+    low_level::{ElementaryOp, FusedOp, Numbers, Pass, Silhouette, WeightTables},
+};
 use softrast_softness::EdgeSoftness;
+use softrast_tensor::{Shape, TensorData};
 
 use crate::{
     guard::{guarded, refused},

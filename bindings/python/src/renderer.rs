@@ -1,10 +1,13 @@
 //! Renderers: faces, image size, softness, T-conorm and tolerance.
 
-use burn::tensor::{DType, Tensor, TensorData};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use softrast_raster::{HostBackend, ImageSize, Rasterizer, Silhouette, SoftRenderer, TConorm};
+use softrast_raster::{
+    HostBackend, ImageSize, SoftRenderer, TConorm,
+    low_level::{Rasterizer, Silhouette},
+};
 use softrast_softness::{EdgeSoftness, Softness as _};
+use softrast_tensor::{DType, Tensor, TensorData};
 
 use crate::{
     checks::{check_part, check_phi, check_size, check_tolerance, corners, least},

@@ -1,11 +1,11 @@
 //! Functions of one vector that are tensor ops: their gradients come from automatic differentiation, in f64.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData, backend::Backend},
+use softrast_raster::{
+    TConorm,
+    low_level::{Silhouette, WeightTables},
 };
-use softrast_raster::{Silhouette, TConorm, WeightTables};
 use softrast_softness::EdgeSoftness;
+use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData};
 
 type Plain = NdArray<f64>;
 type Once = Autodiff<Plain>;

@@ -4,7 +4,6 @@
 
 use std::{process::ExitCode, sync::Arc};
 
-use burn::tensor::Tensor;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde_json::{Map, json};
 use softrast_cli::{
@@ -13,9 +12,9 @@ use softrast_cli::{
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, Targets};
 use softrast_mesh::icosphere;
-use softrast_meta::{numbers, tensor};
-use softrast_raster::{HostBackend, RasterBackend, hard_silhouette, mse_loss};
+use softrast_raster::{HostBackend, RasterBackend, hard_silhouette};
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers, tensor};
 
 #[allow(dead_code, reason = "the tests include this file as a module")]
 fn main() -> ExitCode {
@@ -105,17 +104,16 @@ impl InverseProblem for Disc {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(scene.vertices(theta))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(scene.vertices(theta)).unsqueeze_dim(1)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        hard_silhouette(scene.vertices(theta), &scene.faces, scene.size)
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
+        hard_silhouette(scene.vertices(theta), &scene.faces, scene.size).unsqueeze_dim(1)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        let target = scene.targets.of(&image);
-        mse_loss(image, target)
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        scene.targets.mse_loss(image.squeeze_dim(1))
     }
 
     fn defaults(&self) -> SolveConfig {

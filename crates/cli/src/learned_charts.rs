@@ -2,9 +2,9 @@
 
 use softrast_inverse::{PhiLayout, ScheduledSoftness};
 use softrast_lab::plot::{Axis, Plot, Series};
-use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
 use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{numbers, tensor, vector};
 
 /// The learned softness beside that of the start, and how its scale moves: charts and captions.
 pub(crate) fn learned_charts(

@@ -1,10 +1,10 @@
-use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::{Map, Value};
 use softrast_inverse::{InverseProblem, Iterate};
 use softrast_lab::{Metric, Role, plot::Plot, rgb_from_gray};
 use softrast_raster::HostBackend;
 use softrast_softness::Family;
+use softrast_tensor::Tensor;
 
 use crate::{Answer, Common, Entry, Given, MethodArgs, Paper, Scales, Schedule, Variant};
 
@@ -272,6 +272,6 @@ pub struct Detail<A> {
 
 /// θ of one of so many instances.
 pub fn theta_of(theta: &Tensor<HostBackend, 1>, instances: usize) -> Vec<Vec<f64>> {
-    let values = softrast_meta::numbers(theta.clone());
+    let values = softrast_tensor::numbers(theta.clone());
     values.chunks((values.len() / instances).max(1)).map(<[_]>::to_vec).collect()
 }

@@ -20,9 +20,10 @@ use shape3d::Shape3d;
 use softrast_cli::{Common, Init, MethodArgs, SoftnessChoice, Task, Variant, usual_args};
 use softrast_inverse::{Instances, LearnConfig, OuterLoss, SIGMA};
 use softrast_lab::{machine, mean, paired, report::Table};
-use softrast_meta::{MetaGradient, TaskDistribution, vector};
+use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::HostBackend as B;
 use softrast_softness::Family;
+use softrast_tensor::vector;
 
 /// Rates of the Adam that moves φ.
 const RATES: [f64; 4] = [0.001, 0.01, 0.03, 0.1];

@@ -20,9 +20,10 @@ use shape2d::Shape2d;
 use softrast_cli::{Common, MethodArgs, Task, usual_args};
 use softrast_inverse::{Instances, LearnConfig, OuterLoss};
 use softrast_lab::{machine, mean, report::Table};
-use softrast_meta::{MetaGradient, TaskDistribution, numbers, vector};
+use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::HostBackend as B;
 use softrast_softness::Family;
+use softrast_tensor::{numbers, vector};
 
 /// Half the distance of the differences, in the natural logarithm: a tenth of a decade.
 const HALF: f64 = 0.1 * std::f64::consts::LN_10;

@@ -17,16 +17,16 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use burn::backend::NdArray;
 use clap::Parser;
 use common::{Study, constant, setup};
 use shape3d::{Args, Shape3d};
 use softrast_cli::{Common, MethodArgs};
 use softrast_inverse::{Instances, LearnConfig};
 use softrast_lab::{machine, peak_rss_mib, report::Table};
-use softrast_meta::{MetaGradient, TaskDistribution, vector};
+use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::RasterBackend;
 use softrast_softness::Family;
+use softrast_tensor::{NdArray, vector};
 
 /// What the peak has to stay below, in MiB.
 const LIMIT: f64 = 1024.0;

@@ -23,7 +23,8 @@ use softrast_lab::{
 };
 use softrast_meta::TaskDistribution;
 use softrast_raster::HostBackend as B;
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers, tensor_on, vector};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{numbers, tensor_on, vector};
 
 /// The networks that come along, by their names and tasks.
 const NETWORKS: [&str; 4] = ["shape2d-mlp", "shape3d-mlp", "pose-mlp", "occlusion-mlp"];

@@ -23,9 +23,10 @@ use softrast_lab::{
     plot::{Axis, Plot, Series},
     report::Table,
 };
-use softrast_meta::{MetaGradient, TaskDistribution, vector};
+use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_raster::HostBackend as B;
 use softrast_softness::{Family, Softness};
+use softrast_tensor::vector;
 
 /// Four times as wide as is best.
 const START: f64 = 0.03;

@@ -6,9 +6,9 @@ use softrast_lab::{
     plot::{Axis, Mark, Plot, Series},
     quantile,
 };
-use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
 use softrast_softness::Softness;
+use softrast_tensor::{numbers, tensor, vector};
 
 use crate::{Measured, Purpose, Variation, groups::grouped, measured::short};
 

@@ -1,14 +1,9 @@
 use std::sync::LazyLock;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_meta::{Adam, Optimizer};
 use softrast_raster::HostBackend;
-use softrast_softness::{
-    EdgeSoftness, Family, Softness, families::Mlp, initial_mlp, numbers, vector,
-};
+use softrast_softness::{EdgeSoftness, Family, Softness, families::Mlp, initial_mlp};
+use softrast_tensor::{Autodiff, Backend, Tensor, numbers, vector};
 
 /// The fit reaches so many scales from the edge, and so large a logit. That is far above the 14.1 which an MLP
 /// needs far outside, so that many faces are not seen there: see [`initial_mlp`].

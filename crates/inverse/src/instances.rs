@@ -1,9 +1,9 @@
 use std::{cell::RefCell, marker::PhantomData, rc::Rc};
 
-use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_meta::{Adam, BilevelProblem, InnerLoop, TaskDistribution};
-use softrast_raster::{RasterBackend, Rasterizer};
-use softrast_softness::{EdgeSoftness, Family, Softness, numbers, vector};
+use softrast_raster::{RasterBackend, low_level::Rasterizer};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Tensor, numbers, vector};
 
 use crate::{
     Inner, InverseProblem, LearnConfig, Method, Outer, OuterLoss, PhiLayout, Resolution,

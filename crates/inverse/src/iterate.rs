@@ -1,12 +1,9 @@
 use std::borrow::Borrow;
 
 use anyhow::Context;
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, TensorData, Transaction, backend::Backend},
-};
-use softrast_raster::{HostBackend, RasterBackend, Rasterizer};
-use softrast_softness::{Softness, numbers};
+use softrast_raster::{HostBackend, RasterBackend, low_level::Rasterizer};
+use softrast_softness::Softness;
+use softrast_tensor::{Autodiff, Backend, Tensor, TensorData, Transaction, numbers};
 
 use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
 
@@ -50,7 +47,7 @@ pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R, S> {
 /// What is seen at a step, on the device.
 pub(crate) struct Seen<B: RasterBackend> {
     pub(crate) theta: Tensor<B, 1>,
-    image: Option<Tensor<B, 3>>,
+    image: Option<Tensor<B, 4>>,
     soft_loss: Tensor<B, 1>,
     /// What is lowered, of each instance, with a tape.
     pub(crate) loss: Tensor<Autodiff<B>, 1>,
@@ -92,7 +89,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         seen: Seen<B>,
     ) -> anyhow::Result<Iterate> {
         let image = seen.image.map(|image| of_first(image, self.instances));
-        let rows = image.as_ref().map(|image| image.dims()[2]);
+        let rows = image.as_ref().map(|image| image.dims()[3]);
         // One round trip to the device for all of it.
         let read = Transaction::default().register(seen.theta).register(seen.loss.inner());
         let read = read.register(seen.soft_loss);
@@ -122,8 +119,8 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
 }
 
 /// The views of the first of so many instances.
-fn of_first<B: Backend>(image: Tensor<B, 3>, instances: usize) -> Tensor<B, 3> {
-    let [views, _, _] = image.dims();
+fn of_first<B: Backend>(image: Tensor<B, 4>, instances: usize) -> Tensor<B, 4> {
+    let [views, ..] = image.dims();
     image.narrow(0, 0, views / instances)
 }
 

@@ -1,6 +1,6 @@
-use burn::tensor::Tensor;
 use softrast_raster::RasterBackend;
-use softrast_softness::{EdgeSoftness, Softness, tensor, vector};
+use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{Tensor, tensor, vector};
 
 use crate::{Feedback, Input, LearnConfig, ScaleSchedule, ScheduledSoftness, Surrogate};
 

@@ -10,7 +10,7 @@
 //! [`NamedSoftness`] has files too.
 //!
 //! ```
-//! use burn::backend::NdArray;
+//! use softrast_tensor::NdArray;
 //! use softrast_inverse::{InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize};
 //! use softrast_mesh::icosphere;
 //!
@@ -43,7 +43,6 @@ mod learn;
 mod learn_config;
 mod lens;
 mod mask_rules;
-mod mask_targets;
 mod method;
 mod minimize;
 mod objectives;
@@ -79,7 +78,6 @@ pub use learn::{Learning, learn};
 pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
 pub use lens::Lens;
 pub use mask_rules::MaskRules;
-pub use mask_targets::MaskTargets;
 pub use method::Method;
 pub use minimize::{Minimization, minimize};
 pub use objectives::{Inner, Outer};

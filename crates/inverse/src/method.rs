@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use softrast_raster::Rasterizer;
+use softrast_raster::low_level::Rasterizer;
 use softrast_softness::{EdgeSoftness, Softness};
 
 use crate::{Resolution, ScheduledSoftness};

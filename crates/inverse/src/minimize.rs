@@ -1,13 +1,10 @@
 use std::{borrow::Borrow, time::Duration};
 
 use anyhow::{Context, ensure};
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, read_sync},
-};
 use softrast_meta::{Adam, AdamState, Optimizer};
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{Autodiff, Tensor, read_sync};
 use web_time::Instant;
 
 use crate::{

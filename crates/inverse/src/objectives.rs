@@ -1,9 +1,9 @@
 use std::rc::Rc;
 
-use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_meta::Objective;
 use softrast_raster::RasterBackend;
-use softrast_softness::{EdgeSoftness, Softness, tensor};
+use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{Autodiff, Tensor, tensor};
 
 use crate::{InverseProblem, ScheduledRenderer, SoftnessAt, problem::lowered};
 

@@ -1,14 +1,14 @@
 use std::sync::Arc;
 
 use anyhow::{Context, ensure};
-use burn::{backend::Autodiff, tensor::Tensor};
 use softrast_mesh::{Edges, Mesh};
 use softrast_meta::{Adam, InnerLoop, descend};
 use softrast_raster::{
     Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Weighting, project_pinhole,
     vertices,
 };
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers, tensor};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
 use crate::{Frame, PaintTargets, PaintedView, SolveConfig, Surface};
 

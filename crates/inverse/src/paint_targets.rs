@@ -1,5 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
-use softrast_softness::tensor;
+use softrast_tensor::{Backend, Tensor, tensor};
 
 use crate::PaintedView;
 

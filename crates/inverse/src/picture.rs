@@ -1,10 +1,9 @@
 use std::{path::Path, sync::Arc};
 
 use anyhow::{Context, anyhow, ensure};
-use burn::tensor::{Tensor, backend::Backend};
 use image::{GrayImage, Luma};
 use softrast_raster::{ImageSize, Pinhole};
-use softrast_softness::{numbers, tensor_on};
+use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
 
 use crate::{
     MaskRules, PictureFile,
@@ -331,8 +330,8 @@ fn shares(count: usize, from: f64, cell: f64, cells: usize) -> Vec<Shares> {
 
 #[cfg(test)]
 mod tests {
-    use burn::backend::NdArray;
     use image::{DynamicImage, LumaA, Rgba};
+    use softrast_tensor::NdArray;
 
     use super::*;
 

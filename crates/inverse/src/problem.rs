@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_meta::Adam;
 use softrast_raster::RasterBackend;
 use softrast_softness::Softness;
+use softrast_tensor::Tensor;
 
 use crate::SoftnessAt;
 
@@ -59,20 +59,20 @@ pub trait InverseProblem: 'static {
         theta
     }
 
-    /// The soft image at θ: `[views, height, width]`, or `[views, channels, pixels]` where it has colours.
+    /// The soft image at θ, `[views, channels, height, width]`; a silhouette has one channel.
     fn image<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3>;
+    ) -> Tensor<B, 4>;
 
     /// The hard image at θ, shaped like the soft one; it has no gradient.
     fn hard_image<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
         theta: Tensor<B, 1>,
-    ) -> Tensor<B, 3>;
+    ) -> Tensor<B, 4>;
 
     /// The soft image by which the result of learning is judged, under the narrow softness that it is given.
     fn sharp_image<B: RasterBackend>(
@@ -80,7 +80,7 @@ pub trait InverseProblem: 'static {
         scene: &Self::Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         self.image(scene, theta, softness)
     }
 
@@ -89,7 +89,7 @@ pub trait InverseProblem: 'static {
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
-        image: Tensor<B, 3>,
+        image: Tensor<B, 4>,
     ) -> Tensor<B, 1>;
 
     /// [`image_loss`](Self::image_loss) of the [`image`](Self::image) at θ, where the image itself is not asked for.

@@ -1,11 +1,11 @@
 use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
 
-use burn::tensor::{Element, Tensor, TensorData};
 use softrast_raster::{
-    ColourRenderer, RasterBackend, Rasterizer, Silhouette, SoftRenderer, Weighting, iou_loss,
-    mse_loss,
+    ColourRenderer, RasterBackend, SoftRenderer, Weighting,
+    low_level::{Rasterizer, Silhouette},
 };
-use softrast_softness::{DepthSoftness, EdgeSoftness, Softness, numbers, vector};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
+use softrast_tensor::{Element, Tensor, TensorData, numbers, vector};
 
 use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 
@@ -196,30 +196,34 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         seen.coverage_with_surrogate(vertices, table, &surrogate.clone().sized(side), below)
     }
 
-    /// The [`iou_loss`] `[views]` of the [`silhouette`](Self::silhouette) against its targets: in one op where nothing is differentiated by φ
-    /// and there is no surrogate.
+    /// The [`Targets::iou_loss`] `[views]` of the [`silhouette`](Self::silhouette): in one op where nothing is differentiated by φ and there is
+    /// no surrogate.
     ///
     /// # Panics
     ///
     /// If the problem has no faces, or there is no target of this many pixels.
     pub fn iou_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
-        let target = targets.of_side(self.side());
         match self.alone(&vertices) {
-            Some((seen, table)) => seen.iou_loss_by_table(vertices, table, target),
-            None => iou_loss(self.silhouette(vertices), target),
+            Some((seen, table)) => {
+                let (target, counted) = targets.at(self.side());
+                seen.iou_loss_by_table(vertices, table, target, counted)
+            }
+            None => targets.iou_loss(self.silhouette(vertices)),
         }
     }
 
-    /// The [`mse_loss`] `[views]`, likewise.
+    /// The [`Targets::mse_loss`] `[views]`, likewise.
     ///
     /// # Panics
     ///
     /// If the problem has no faces, or there is no target of this many pixels.
     pub fn mse_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
-        let target = targets.of_side(self.side());
         match self.alone(&vertices) {
-            Some((seen, table)) => seen.mse_loss_by_table(vertices, table, target),
-            None => mse_loss(self.silhouette(vertices), target),
+            Some((seen, table)) => {
+                let (target, counted) = targets.at(self.side());
+                seen.mse_loss_by_table(vertices, table, target, counted)
+            }
+            None => targets.mse_loss(self.silhouette(vertices)),
         }
     }
 

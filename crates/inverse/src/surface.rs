@@ -1,14 +1,13 @@
-use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData, backend::Backend};
 use softrast_mesh::Edges;
-use softrast_meta::tensor;
 use softrast_raster::{edge_length, flatness, normal_consistency};
+use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData, tensor};
 
 /// The connections of a surface, for losses that keep it smooth. Each takes `vertices` `[3, vertices]` in world units and gives `[1]`.
 ///
 /// Coordinates come with the axes first: so they are many times faster to gather on the CPU than rows of three.
 ///
 /// ```
-/// use burn::{backend::NdArray, tensor::Tensor};
+/// use softrast_tensor::{NdArray, Tensor};
 /// use softrast_inverse::Surface;
 /// use softrast_mesh::{Edges, icosphere};
 ///

@@ -1,6 +1,9 @@
-use burn::tensor::{Tensor, backend::Backend};
+use std::sync::Arc;
 
-use crate::Resolution;
+use softrast_raster::{RasterBackend, iou_loss, mse_loss};
+use softrast_tensor::{Backend, Tensor, tensor};
+
+use crate::{Picture, Resolution};
 
 /// A target image at every size that a run may draw at: its own and, averaged over areas, each
 /// half of the one before as long as that is a whole number.
@@ -8,19 +11,29 @@ use crate::Resolution;
 pub struct Targets<B: Backend> {
     /// `[views, size, size]`, the largest first.
     levels: Vec<Tensor<B, 3>>,
+    /// The share of each pixel that counts, in the same sizes, unless all of every pixel does.
+    counted: Option<Vec<Tensor<B, 3>>>,
 }
 
 impl<B: Backend> Targets<B> {
     /// All sizes of `target` `[views, size, size]`.
     pub fn new(target: Tensor<B, 3>) -> Self {
-        let [_, size, _] = target.dims();
-        let smaller = Resolution::sides(size).skip(1);
-        let levels = smaller.fold(vec![target], |mut levels, _| {
-            let next = halved(levels[levels.len() - 1].clone());
-            levels.push(next);
-            levels
-        });
-        Self { levels }
+        Self { levels: halves(target), counted: None }
+    }
+
+    /// A square of each mask, given by its left, its top and its extent in pixels, on `size` × `size` pixels. What lies outside of a picture
+    /// does not count.
+    pub fn of_masks<'a>(
+        masks: impl IntoIterator<Item = (&'a Picture, [f64; 3])>,
+        size: usize,
+    ) -> Self {
+        let parts = parts(masks, size);
+        let images = |k: usize| {
+            let numbers = parts.iter().flat_map(|part| part[k].iter().copied()).collect();
+            halves(tensor::<B, 3>(numbers, [parts.len(), size, size]))
+        };
+        let whole = parts.iter().flat_map(|part| &part[1]).all(|&share| share > 1.0 - 1e-9);
+        Self { levels: images(0), counted: (!whole).then(|| images(1)) }
     }
 
     /// The target as it was given.
@@ -39,18 +52,83 @@ impl<B: Backend> Targets<B> {
     ///
     /// If the image has another size than all of them.
     pub fn of(&self, image: &Tensor<B, 3>) -> Tensor<B, 3> {
-        self.of_side(image.dims()[1])
+        self.at(image.dims()[1]).0
     }
 
-    /// The target of `side` pixels a side.
+    /// The target of `side` pixels a side, and the share of each pixel that counts, unless all of every pixel does; both
+    /// `[views, side, side]`.
     ///
     /// # Panics
     ///
     /// If there is none.
-    pub fn of_side(&self, side: usize) -> Tensor<B, 3> {
-        let level = self.levels.iter().find(|level| level.dims()[1] == side);
-        level.cloned().unwrap_or_else(|| panic!("there is no target of {side} pixels a side"))
+    pub fn at(&self, side: usize) -> (Tensor<B, 3>, Option<Tensor<B, 3>>) {
+        let level = self.levels.iter().position(|level| level.dims()[1] == side);
+        let level = level.unwrap_or_else(|| panic!("there is no target of {side} pixels a side"));
+        let counted = self.counted.as_ref().map(|counted| counted[level].clone());
+        (self.levels[level].clone(), counted)
     }
+}
+
+impl<B: RasterBackend> Targets<B> {
+    /// The [`iou_loss`] `[views]` of what counts of an `image` `[views, side, side]`.
+    ///
+    /// # Panics
+    ///
+    /// If the image has another size than all targets.
+    pub fn iou_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        let (image, target) = self.judged(image);
+        iou_loss(image, target)
+    }
+
+    /// The [`mse_loss`] `[views]`, likewise.
+    ///
+    /// # Panics
+    ///
+    /// If the image has another size than all targets.
+    pub fn mse_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
+        let (image, target) = self.judged(image);
+        mse_loss(image, target)
+    }
+
+    fn judged(&self, image: Tensor<B, 3>) -> (Tensor<B, 3>, Tensor<B, 3>) {
+        match self.at(image.dims()[1]) {
+            (target, Some(counted)) => (image * counted, target),
+            (target, None) => (image, target),
+        }
+    }
+}
+
+/// An image `[views, size, size]` at all sizes, the largest first.
+fn halves<B: Backend>(image: Tensor<B, 3>) -> Vec<Tensor<B, 3>> {
+    let [_, size, _] = image.dims();
+    let smaller = Resolution::sides(size).skip(1);
+    smaller.fold(vec![image], |mut levels, _| {
+        let next = halved(levels[levels.len() - 1].clone());
+        levels.push(next);
+        levels
+    })
+}
+
+/// Squares of pictures on `size` × `size` pixels, each with how much of each pixel the picture covers.
+pub(crate) fn parts<'a>(
+    pictures: impl IntoIterator<Item = (&'a Picture, [f64; 3])>,
+    size: usize,
+) -> Vec<Arc<[Vec<f64>; 2]>> {
+    let mut parts: Vec<Arc<[Vec<f64>; 2]>> = Vec::new();
+    let mut last = None;
+    for (picture, square) in pictures {
+        // Instances mostly share one picture, which may be large.
+        let same = |&(other, at): &(&Picture, [f64; 3])| {
+            std::ptr::eq(other.pixels(), picture.pixels()) && at == square
+        };
+        let part = match parts.last().filter(|_| last.as_ref().is_some_and(same)) {
+            Some(part) => part.clone(),
+            None => picture.part(square, size).into(),
+        };
+        parts.push(part);
+        last = Some((picture, square));
+    }
+    parts
 }
 
 /// Means of two by two pixels: `[views, size, size]` to `[views, size / 2, size / 2]`.
@@ -66,7 +144,7 @@ mod tests {
     use softrast_raster::HostBackend;
 
     use super::*;
-    use softrast_softness::{numbers, tensor};
+    use softrast_tensor::{numbers, tensor};
 
     #[test]
     fn a_smaller_target_has_the_means_of_areas() {

@@ -3,7 +3,7 @@ use std::{fmt::Display, path::PathBuf};
 use serde_json::{Value, json};
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
-use softrast_softness::numbers;
+use softrast_tensor::numbers;
 
 use crate::{Frame, Picture, rotation::SAID};
 

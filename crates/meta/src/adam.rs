@@ -1,5 +1,5 @@
-use burn::tensor::{Tensor, backend::Backend};
 use serde::Serialize;
+use softrast_tensor::{Backend, Tensor};
 
 use crate::Optimizer;
 

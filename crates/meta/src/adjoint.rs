@@ -1,12 +1,8 @@
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor, numbers};
 
 use crate::{
     Objective, Optimizer,
     inner_loop::{allowed, gradient_of},
-    numbers,
 };
 
 /// Derivatives of the outer loss by the scene and by the optimiser's state after some step.

@@ -1,9 +1,6 @@
 use std::convert::Infallible;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::{
     Adam, BilevelProblem, MetaEstimate, Objective, Optimizer, descend, inner_loop::allowed,

@@ -1,14 +1,10 @@
 use std::convert::Infallible;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor, numbers};
 
 use crate::{
     InnerLoop, Objective, Optimizer, OuterSteps, descend,
     inner_loop::{allowed, gradient},
-    numbers,
     objective::loss_under,
 };
 

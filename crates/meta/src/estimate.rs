@@ -1,6 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
-
-use crate::numbers;
+use softrast_tensor::{Backend, Tensor, numbers};
 
 /// A meta-gradient and what its making tells.
 #[derive(Clone, Debug)]

@@ -1,9 +1,9 @@
 use std::f64::consts::TAU;
 
-use burn::tensor::{Tensor, backend::Backend};
 use rand::{Rng, SeedableRng, rngs::StdRng};
+use softrast_tensor::{Backend, Tensor, numbers, vector};
 
-use crate::{MetaEstimate, numbers, vector};
+use crate::MetaEstimate;
 
 /// The mean of `(L(φ + σ ε) - L(φ - σ ε)) / 2σ · ε` over `pairs` normal ε drawn from `seed`.
 ///

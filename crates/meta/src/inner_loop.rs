@@ -1,9 +1,6 @@
 use std::convert::Infallible;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::{Objective, Optimizer, objective::loss_under};
 

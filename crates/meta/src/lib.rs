@@ -7,8 +7,8 @@
 //! `Autodiff<B>` its result still depends on φ. Nothing here knows of rendering.
 //!
 //! ```
-//! use burn::{backend::{Autodiff, NdArray}, tensor::{Tensor, backend::Backend}};
-//! use softrast_meta::{InnerLoop, Objective, Sgd, vector};
+//! use softrast_tensor::{vector, Autodiff, Backend, NdArray, Tensor};
+//! use softrast_meta::{InnerLoop, Objective, Sgd};
 //!
 //! /// A parabola around φ.
 //! struct Parabola;
@@ -59,7 +59,6 @@ pub use progress::{Best, Progress};
 pub use ranks::{Alone, Ranks};
 pub use record::Record;
 pub use sgd::Sgd;
-pub use softrast_softness::{numbers, tensor, vector};
 pub use task_distribution::TaskDistribution;
 
 /// Compiles and runs the README's example.

@@ -1,8 +1,5 @@
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
 use serde::Serialize;
+use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::{
     BilevelProblem, MetaEstimate, Objective, Optimizer, TaskDistribution,

@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 /// What an inner loop minimises over `theta`, given `phi`; or what judges its result.
 ///

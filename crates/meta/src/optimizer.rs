@@ -1,6 +1,6 @@
 use std::fmt::Debug;
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 /// An optimiser as a pure function: state in, state out.
 ///

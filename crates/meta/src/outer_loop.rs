@@ -1,10 +1,10 @@
-use burn::tensor::{Tensor, backend::Backend};
 use serde::Serialize;
+use softrast_tensor::{Backend, Tensor, numbers, vector};
 use web_time::Instant;
 
 use crate::{
     Adam, Alone, MetaEstimate, MetaGradient, Optimizer, Progress, Ranks, Record, TaskDistribution,
-    adjoint::norm, numbers, progress::Best, ranks::shared, vector,
+    adjoint::norm, progress::Best, ranks::shared,
 };
 
 /// The outer loop: Adam on the mean meta-gradient of batches of instances.

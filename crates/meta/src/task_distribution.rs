@@ -1,7 +1,4 @@
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::{BilevelProblem, Objective, Optimizer};
 

@@ -1,14 +1,10 @@
 use std::collections::VecDeque;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor, numbers};
 
 use crate::{
     BilevelProblem, MetaEstimate, Objective, Optimizer,
     adjoint::{Adjoint, Stored, norm},
-    numbers,
     objective::loss_under,
 };
 

@@ -17,13 +17,10 @@ mod workload;
 
 use std::{hint::black_box, time::Instant};
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor},
-};
 use coloured::Coloured;
-use softrast_raster::{ColourRenderer, Rasterizer, SoftRenderer, mse_loss, project};
+use softrast_raster::{ColourRenderer, SoftRenderer, low_level::Rasterizer, mse_loss, project};
 use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{Workload, disk, tensor};
 
 /// As in the programs.

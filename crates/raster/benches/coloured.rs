@@ -2,12 +2,9 @@
 
 use std::{sync::Arc, time::Instant};
 
-use burn::{
-    backend::Autodiff,
-    tensor::{DType, Tensor},
-};
 use softrast_raster::{Attributes, ColourRenderer, RasterBackend, Weighting, mse_loss, project};
 use softrast_softness::{DepthSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, DType, Tensor};
 
 use crate::workload::{Workload, disk, tensor};
 

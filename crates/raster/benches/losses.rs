@@ -12,11 +12,8 @@ mod workload;
 
 use std::time::Instant;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor},
-};
-use softrast_raster::{Rasterizer, iou_loss, mse_loss, project};
+use softrast_raster::{iou_loss, low_level::Rasterizer, mse_loss, project};
+use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{Workload, disk, tensor};
 
 /// As in the programs.
@@ -45,8 +42,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let table = Tensor::<A, 2>::from_inner(table.clone());
             let target = Tensor::from_inner(target.clone());
             let loss = match (together, iou) {
-                (true, false) => silhouette.mse_loss_by_table(vertices, table, target),
-                (true, true) => silhouette.iou_loss_by_table(vertices, table, target),
+                (true, false) => silhouette.mse_loss_by_table(vertices, table, target, None),
+                (true, true) => silhouette.iou_loss_by_table(vertices, table, target, None),
                 (false, false) => mse_loss(silhouette.coverage_by_table(vertices, table), target),
                 (false, true) => iou_loss(silhouette.coverage_by_table(vertices, table), target),
             };

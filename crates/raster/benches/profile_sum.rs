@@ -25,16 +25,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor},
-};
 use machine::machine;
 use rayon::ThreadPool;
 use record::Record;
 use scalar::Scalar;
-use softrast_raster::{Rasterizer, Silhouette, project};
+use softrast_raster::{
+    low_level::{Rasterizer, Silhouette},
+    project,
+};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{Workload, disk, tensor};
 
 /// As in the programs.
@@ -336,7 +336,7 @@ impl Step {
         let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
         let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
         let (table, target) = (Tensor::from_inner(table), Tensor::from_inner(self.target.clone()));
-        let loss = self.op.silhouette.mse_loss_by_table(vertices, table, target).mean();
+        let loss = self.op.silhouette.mse_loss_by_table(vertices, table, target, None).mean();
         backward((loss, world))
     }
 }

@@ -2,10 +2,14 @@
 
 use std::{env, path::Path, sync::Arc};
 
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
 use softrast_mesh::{Mesh, fox, icosphere};
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, TConorm, project};
+use softrast_raster::{
+    RasterBackend, TConorm,
+    low_level::{Rasterizer, Silhouette},
+    project,
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Backend, DType, Tensor, TensorData};
 
 /// A logistic of the signed squared distance: `width` is the root of its scale, in NDC.
 pub(crate) const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::kernel::blend::OF_TEXEL;
 
@@ -11,7 +11,7 @@ use crate::kernel::blend::OF_TEXEL;
 /// entry of its own, so are barycentric coordinates.
 ///
 /// ```
-/// use burn::{backend::NdArray, tensor::Tensor};
+/// use softrast_tensor::{NdArray, Tensor};
 /// use softrast_raster::Attributes;
 ///
 /// let faces = [[0, 1, 2], [2, 1, 3]];

@@ -1,18 +1,10 @@
 //! Fused ops as a burn backend extension: each with its gradient and the gradient of that.
 
-use burn::{
-    backend::{
-        Autodiff,
-        autodiff::{
-            checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
-            grads::Gradients,
-            ops::{Backward, Ops, OpsKind},
-        },
-    },
-    tensor::{
-        DType, Element, Shape, Slice, Tensor, TensorData, TensorMetadata, TensorPrimitive,
-        backend::Backend, ops::FloatTensor, try_read_sync,
-    },
+use softrast_tensor::{
+    Autodiff, Backend, DType, Element, FloatTensor, Shape, Slice, Tensor, TensorData,
+    TensorMetadata, TensorPrimitive,
+    autodiff::{Backward, CheckpointStrategy, Checkpointer, Gradients, Ops, OpsKind},
+    try_read_sync,
 };
 
 use crate::{
@@ -51,7 +43,18 @@ pub trait RasterBackend: Backend {
             other => panic!("fused ops work in f32, and outside browsers in f64; found {other:?}"),
         }
     }
+
+    /// Runs `seen` forward; at the outermost level of autodiff the gradient is that of `wide`, below it each op has its own.
+    #[doc(hidden)]
+    fn straight_through(seen: Call<Self>, wide: Call<Self>) -> FloatTensor<Self> {
+        let _ = wide;
+        Self::run(&seen.0, &Pass::Forward, seen.1)
+    }
 }
+
+/// An op and its inputs.
+#[doc(hidden)]
+pub type Call<B> = (FusedOp, Vec<FloatTensor<B>>);
 
 /// The numbers of a tensor, or of its copy.
 fn numbers<'a, B: RasterBackend, F: Element>(
@@ -85,11 +88,8 @@ fn on_host<B: RasterBackend, F: HostFloat>(
 
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]
 mod ndarray {
-    use burn::{
-        backend::{NdArray, ndarray::NdArrayTensor},
-        tensor::{DType, Element},
-    };
     use bytemuck::checked::try_cast_slice;
+    use softrast_tensor::{DType, Element, NdArray, NdArrayTensor};
 
     use super::RasterBackend;
 
@@ -117,7 +117,7 @@ mod ndarray {
     }
 }
 #[cfg(feature = "flex")]
-impl RasterBackend for burn::backend::Flex {}
+impl RasterBackend for softrast_tensor::Flex {}
 
 /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what each pass over all views visits.
 pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usize {
@@ -134,7 +134,7 @@ pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usiz
 /// Sums `profile(d)` over the faces of each pixel: the one op under every silhouette.
 ///
 /// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth, which only decides
-/// whether a face is drawn. `table` comes from [`Profile::table`](crate::Profile::table) of the profile that `op` was made for:
+/// whether a face is drawn. `table` comes from [`Profile::table`](crate::low_level::Profile::table) of the profile that `op` was made for:
 /// `[rows, 4]`. The result is `[views, height, width]`, top row first.
 ///
 /// # Panics
@@ -145,9 +145,34 @@ pub fn profile_sum<B: RasterBackend>(
     vertices: Tensor<B, 3>,
     table: Tensor<B, 2>,
 ) -> Tensor<B, 3> {
+    let (op, inputs) = sum_call(op, vertices, table);
+    fused(&op, inputs)
+}
+
+/// The sums of `seen` with the gradient of those of `wide` to the vertices; see [`RasterBackend::straight_through`].
+///
+/// # Panics
+///
+/// If the shapes do not fit or the float types differ.
+pub(crate) fn straight_through_sum<B: RasterBackend>(
+    seen: (&ProfileSum, Tensor<B, 2>),
+    wide: (&ProfileSum, Tensor<B, 2>),
+    vertices: Tensor<B, 3>,
+) -> Tensor<B, 3> {
+    assert_eq!(seen.0.size, wide.0.size, "the image and its surrogate differ in size");
+    let seen = sum_call(seen.0, vertices.clone(), seen.1.detach());
+    let wide = sum_call(wide.0, vertices, wide.1.detach());
+    of_primitive(B::straight_through(seen, wide))
+}
+
+fn sum_call<B: RasterBackend>(
+    op: &ProfileSum,
+    vertices: Tensor<B, 3>,
+    table: Tensor<B, 2>,
+) -> Call<B> {
     check(op, &vertices, &table);
     let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
-    fused(&FusedOp::ProfileSum(op.clone()), inputs)
+    (FusedOp::ProfileSum(op.clone()), inputs)
 }
 
 /// Panics unless vertices and table are for this op.
@@ -161,8 +186,8 @@ fn check<B: RasterBackend>(op: &ProfileSum, vertices: &Tensor<B, 3>, table: &Ten
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
 }
 
-/// How silhouettes of the probabilistic sum differ from a target `[1 or views, height, width]`, `[views]`. Only where tensors lie on the host,
-/// and only the vertices may need a gradient.
+/// How silhouettes of the probabilistic sum differ from a target `[1 or views, height, width]`, `[views]`, where a share of each pixel counts
+/// (likewise), or all of it. Only where tensors lie on the host, and only the vertices may need a gradient.
 ///
 /// # Panics
 ///
@@ -173,15 +198,21 @@ pub(crate) fn silhouette_loss<B: RasterBackend>(
     vertices: Tensor<B, 3>,
     table: Tensor<B, 2>,
     target: Tensor<B, 3>,
+    counted: Option<Tensor<B, 3>>,
 ) -> Tensor<B, 1> {
     check(op, &vertices, &table);
-    let ([views, _, _], found) = (vertices.dims(), target.dims());
-    let fits =
-        found[1..] == [op.size.height, op.size.width] && (found[0] == 1 || found[0] == views);
-    assert!(fits, "a target of {views} views of {:?} cannot be {found:?}", op.size);
-    assert_eq!(vertices.dtype(), target.dtype(), "vertices and target differ in float type");
-    let inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table), primitive(target)];
-    let op = SilhouetteLoss { sum: op.clone(), loss, kept: None };
+    let ([views, _, _], weighted) = (vertices.dims(), counted.is_some());
+    let images: Vec<Tensor<B, 3>> = [target].into_iter().chain(counted).collect();
+    for image in &images {
+        let found = image.dims();
+        let fits =
+            found[1..] == [op.size.height, op.size.width] && (found[0] == 1 || found[0] == views);
+        assert!(fits, "a target of {views} views of {:?} cannot be {found:?}", op.size);
+        assert_eq!(vertices.dtype(), image.dtype(), "vertices and target differ in float type");
+    }
+    let mut inputs = vec![primitive(vertices.swap_dims(1, 2)), primitive(table)];
+    inputs.extend(images.into_iter().map(primitive));
+    let op = SilhouetteLoss { sum: op.clone(), loss, weighted, kept: None };
     fused(&FusedOp::SilhouetteLoss(op), inputs)
 }
 
@@ -240,6 +271,12 @@ impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
             many => panic!("no op has {many} inputs"),
         }
     }
+
+    fn straight_through(seen: Call<Self>, wide: Call<Self>) -> FloatTensor<Self> {
+        let below = seen.1.into_iter().map(|tensor| tensor.primitive).collect();
+        let result = B::run(&seen.0, &Pass::Forward, below);
+        recorded_as::<B, C, 2>(&wide.0, &Pass::Forward, wide.1, |_, _| result)
+    }
 }
 
 /// A pass whose own derivative is the next pass.
@@ -278,15 +315,25 @@ fn recorded<B: RasterBackend, C: CheckpointStrategy, const N: usize>(
     pass: &Pass,
     tensors: Vec<FloatTensor<Autodiff<B, C>>>,
 ) -> FloatTensor<Autodiff<B, C>> {
+    recorded_as::<B, C, N>(op, pass, tensors, |op, tensors| B::run(op, pass, tensors))
+}
+
+/// The result of `work`, recorded as that of a pass: its gradient is that of the pass.
+fn recorded_as<B: RasterBackend, C: CheckpointStrategy, const N: usize>(
+    op: &FusedOp,
+    pass: &Pass,
+    tensors: Vec<FloatTensor<Autodiff<B, C>>>,
+    work: impl FnOnce(&FusedOp, Vec<FloatTensor<B>>) -> FloatTensor<B>,
+) -> FloatTensor<Autodiff<B, C>> {
     let nodes: Vec<_> = tensors.iter().map(|tensor| tensor.node.clone()).collect();
     let nodes: [_; N] = nodes.try_into().expect("as many nodes as tensors");
     let tensors: Vec<_> = tensors.into_iter().map(|tensor| tensor.primitive).collect();
     match Backward::<B, N>::prepare::<C>(Recorded, nodes).compute_bound().stateful() {
         OpsKind::Tracked(prep) => {
             let op = op.keeping();
-            let result = B::run(&op, pass, tensors.clone());
+            let result = work(&op, tensors.clone());
             prep.finish((op, pass.clone(), tensors), result)
         }
-        OpsKind::UnTracked(prep) => prep.finish(B::run(op, pass, tensors)),
+        OpsKind::UnTracked(prep) => prep.finish(work(op, tensors)),
     }
 }

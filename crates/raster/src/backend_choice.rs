@@ -7,11 +7,11 @@ use crate::NoAdapter;
 /// Where little things are computed whatever backend draws: parameters, supports, figures. On the
 /// CPU, in floats of 32 bits; with `ndarray` or `wgpu` it also has floats of 64 bits.
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]
-pub type HostBackend = burn::backend::NdArray<f32>;
+pub type HostBackend = softrast_tensor::NdArray<f32>;
 /// Where little things are computed whatever backend draws: parameters, supports, figures. On the
 /// CPU, in floats of 32 bits.
 #[cfg(not(any(feature = "ndarray", feature = "wgpu")))]
-pub type HostBackend = burn::backend::Flex;
+pub type HostBackend = softrast_tensor::Flex;
 
 /// A backend that programs compute on, in floats of 32 bits.
 ///
@@ -134,7 +134,7 @@ macro_rules! compiled_backends {
 /// Does `$work` with `$Backend` standing for the chosen backend: `on_backend!(choice, B => draw::<B>())`.
 ///
 /// Compiled once for each of `ndarray`, `flex` and `wgpu` whose feature is on in the crate that asks,
-/// whatever features others have turned on in this one. That crate depends on burn.
+/// whatever features others have turned on in this one.
 ///
 /// # Panics
 ///
@@ -145,12 +145,12 @@ macro_rules! on_backend {
         match $choice {
             #[cfg(feature = "ndarray")]
             $crate::BackendChoice::NdArray => {
-                type $Backend = ::burn::backend::NdArray<f32>;
+                type $Backend = $crate::tensor::NdArray<f32>;
                 $work
             }
             #[cfg(feature = "flex")]
             $crate::BackendChoice::Flex => {
-                type $Backend = ::burn::backend::Flex;
+                type $Backend = $crate::tensor::Flex;
                 $work
             }
             #[cfg(feature = "wgpu")]

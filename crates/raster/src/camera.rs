@@ -1,5 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
-use softrast_softness::{numbers, tensor_on};
+use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
 
 use crate::{
     RasterBackend,
@@ -14,7 +13,7 @@ const SHORTEST: f64 = 1e-12;
 /// A camera that looks at the origin, with y up.
 ///
 /// ```
-/// # use burn::backend::NdArray;
+/// # use softrast_tensor::NdArray;
 /// use softrast_raster::Orbit;
 ///
 /// let front = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 0.0, fov_deg: 40.0 };

@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 /// What a face shares a pixel with where it covers it little: the colour behind all faces.
 #[derive(Clone, Debug)]
@@ -95,7 +95,7 @@ pub fn hard_colour<B: Backend>(
 fn nearest_face<B: Backend>(
     distance: Tensor<B, 3>,
     depth: Tensor<B, 2>,
-) -> Tensor<B, 3, burn::tensor::Int> {
+) -> Tensor<B, 3, softrast_tensor::Int> {
     let [views, faces, pixels] = distance.dims();
     let device = distance.device();
     let [distance, depth]: [Vec<f64>; 2] =
@@ -109,5 +109,5 @@ fn nearest_face<B: Backend>(
             nearest.push(front.map_or(-1, |face| face as i64));
         }
     }
-    Tensor::from_data(burn::tensor::TensorData::new(nearest, [views, 1, pixels]), &device)
+    Tensor::from_data(softrast_tensor::TensorData::new(nearest, [views, 1, pixels]), &device)
 }

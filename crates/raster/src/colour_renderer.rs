@@ -1,7 +1,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness, vector};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness};
+use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 
 use crate::{
     Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
@@ -38,7 +38,7 @@ const BEHIND: f64 = 1e-3;
 /// above rounding.
 ///
 /// ```
-/// use burn::backend::{Autodiff, NdArray};
+/// use softrast_tensor::{Autodiff, NdArray};
 /// use softrast_raster::{Attributes, ColourRenderer, vertices};
 /// use softrast_softness::Family;
 ///

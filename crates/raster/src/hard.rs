@@ -1,5 +1,5 @@
-use burn::tensor::{Tensor, TensorData, backend::Backend};
 use rayon::prelude::*;
+use softrast_tensor::{Backend, Tensor, TensorData};
 
 use crate::{ImageSize, NEAR, kernel::inside_spans};
 
@@ -96,7 +96,7 @@ fn covered(vertices: &[f64], views: usize, faces: &[[u32; 3]], size: ImageSize) 
 
 #[cfg(test)]
 mod tests {
-    use burn::backend::NdArray;
+    use softrast_tensor::NdArray;
 
     use super::*;
 

@@ -1,13 +1,13 @@
 //! Differentiable soft rasterizer ops on burn: cameras, silhouettes, exact second order.
 //!
 //! A silhouette is a sum over faces of a one-dimensional function of the signed distance
-//! ([`profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
-//! softness and the T-conorm ([`Profile`]). A [`SoftRenderer`] puts the pieces together;
+//! ([`low_level::profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
+//! softness and the T-conorm ([`low_level::Profile`]). A [`SoftRenderer`] puts the pieces together;
 //! [`mod@reference`] is the same in plain tensor ops over every pixel-face pair. A [`ColourRenderer`]
 //! draws what faces show, soft by edge and by depth; [`blend`] does so for a few faces of any kind.
 //!
 //! ```
-//! use burn::{backend::NdArray, tensor::Tensor};
+//! use softrast_tensor::{NdArray, Tensor};
 //! use softrast_raster::SoftRenderer;
 //! use softrast_softness::Family;
 //!
@@ -56,15 +56,11 @@ mod view;
 mod weighting;
 
 pub use attributes::Attributes;
-pub use backend::{RasterBackend, profile_sum};
+pub use backend::RasterBackend;
 pub use backend_choice::{BackendChoice, HostBackend, NoBackend};
 pub use camera::{Orbit, project, vertices};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
-#[doc(hidden)]
-pub use colour_renderer::WeightTables;
-#[doc(hidden)]
-pub use fused::{ElementaryOp, FusedOp, Numbers, Pass};
 #[cfg(feature = "wgpu")]
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
@@ -73,23 +69,33 @@ pub use hard::{hard_silhouette, nearest_faces};
 pub use image_size::ImageSize;
 pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
-#[doc(hidden)]
-pub use loss_op::SilhouetteLoss;
 pub use no_adapter::NoAdapter;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
-pub use profile::Profile;
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
-pub use silhouette::{Rasterizer, Silhouette};
-#[doc(hidden)]
-pub use small_product::small_product;
-#[doc(hidden)]
-pub use soft_blend::SoftBlend;
 pub use soft_renderer::SoftRenderer;
-pub use sum_op::ProfileSum;
+/// For [`on_backend!`].
+#[doc(hidden)]
+pub use softrast_tensor as tensor;
 pub use t_conorm::{TConorm, UnknownTConorm};
 pub use view::view_rotation;
 pub use weighting::Weighting;
+
+/// What renderers are made of, for callers that prepare tables, run ops on slices, or measure them.
+pub mod low_level {
+    pub use crate::{
+        backend::{Call, profile_sum},
+        colour_renderer::WeightTables,
+        fused::{ElementaryOp, FusedOp, Numbers, Pass},
+        loss_op::SilhouetteLoss,
+        profile::Profile,
+        silhouette::{Rasterizer, Silhouette},
+        small_product::small_product,
+        soft_blend::SoftBlend,
+        sum_op::ProfileSum,
+    };
+}
+pub(crate) use low_level::*;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

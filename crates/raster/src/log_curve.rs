@@ -1,7 +1,7 @@
-use burn::tensor::{DType, Tensor, backend::Backend};
 use softrast_softness::{
-    DepthSoftness, EdgeSoftness, Family, Mirrored, Softness, numbers, settled_beyond, support,
+    DepthSoftness, EdgeSoftness, Family, Mirrored, Softness, settled_beyond, support,
 };
+use softrast_tensor::{Backend, DType, Tensor, numbers};
 
 use crate::{
     curve::{CubicCurve, FAR, precise, rounding, settled_until},
@@ -169,7 +169,7 @@ impl DepthCurve {
 
 #[cfg(all(test, feature = "ndarray"))]
 mod tests {
-    use burn::backend::NdArray;
+    use softrast_tensor::NdArray;
 
     use super::*;
     use crate::weighting::floor;

@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::{
     RasterBackend,

@@ -1,11 +1,11 @@
 use std::sync::{Arc, OnceLock};
 
-use burn::tensor::{Element, TensorData};
+use softrast_tensor::{Element, TensorData};
 
 use crate::{
     ProfileSum,
     fused::{ElementaryOp, Number, dual_upstream, flat, pass::Pass},
-    kernel::{self, Float, Inputs, PixelLoss, rows_of_losses},
+    kernel::{self, Float, Inputs, Judged, PixelLoss, rows_of_losses},
 };
 
 /// The loss of silhouettes against a target, in one op: its gradient to the vertices is computed along with it.
@@ -13,6 +13,8 @@ use crate::{
 pub struct SilhouetteLoss {
     pub(crate) sum: ProfileSum,
     pub(crate) loss: PixelLoss,
+    /// Whether the share of each pixel that counts is an input.
+    pub(crate) weighted: bool,
     /// The gradients of the losses, of an op that is recorded; as many numbers as the vertices have.
     pub(crate) kept: Option<Arc<OnceLock<TensorData>>>,
 }
@@ -24,21 +26,23 @@ impl SilhouetteLoss {
         Self { sum: self.sum.keeping(), kept, ..self.clone() }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[rows, 4]` and a `target` `[1 or views, height, width]`, to losses
-    /// `[views]`. Only the vertices have a gradient.
+    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[rows, 4]`, a `target` and, if the op is weighted, the share of each pixel
+    /// that counts, both `[1 or views, height, width]`, to losses `[views]`. Only the vertices have a gradient.
     pub(crate) fn run<F: Float + Element + Number<Float = F>>(
         &self,
         pass: &Pass,
         slices: &[&[F]],
         dims: &[Vec<usize>],
     ) -> TensorData {
-        let [vertices, table, target] = [slices[0], slices[1], slices[2]];
+        let (images, rest) = slices[2..].split_at(if self.weighted { 2 } else { 1 });
+        let [vertices, table] = [slices[0], slices[1]];
+        let judged = Judged { target: images[0], counted: images.get(1).copied() };
         let views = dims[0][0];
         let rows = rows_of_losses(views, self.sum.size);
         let inputs = Inputs { rows, ..self.sum.inputs(views, vertices, table) };
         let own = OnceLock::new();
         let bands = self.sum.kept.as_deref().unwrap_or(&own).get_or_init(|| inputs.bands());
-        let losses = |gradient| kernel::losses(&inputs, bands, target, self.loss, gradient);
+        let losses = |gradient| kernel::losses(&inputs, bands, judged, self.loss, gradient);
         let own_gradient = OnceLock::new();
         let gradient = || {
             let kept = self.kept.as_deref().unwrap_or(&own_gradient);
@@ -59,21 +63,22 @@ impl SilhouetteLoss {
                 flat(losses)
             }
             Pass::Vjp { wanted } => {
-                assert!(wanted == &[true, false, false], "only the vertices have a gradient");
+                let vertices_alone = wanted[0] && !wanted[1..].contains(&true);
+                assert!(vertices_alone, "only the vertices have a gradient");
                 let mut gradient = gradient();
                 let numbers = gradient.as_mut_slice::<F>().expect("numbers of this type");
-                for (view, &factor) in numbers.chunks_mut(of_view.max(1)).zip(slices[3]) {
+                for (view, &factor) in numbers.chunks_mut(of_view.max(1)).zip(rest[0]) {
                     view.iter_mut().for_each(|number| *number = *number * factor);
                 }
                 gradient
             }
             Pass::VjpOfVjp { wanted, .. } => {
-                let (upstream, direction) = (slices[3], slices[4]);
+                let (upstream, direction) = (rest[0], rest[1]);
                 let mut all = Vec::new();
                 if wanted[0] {
-                    all = self.along(&inputs, bands, [target, upstream, direction], dims);
+                    all = self.along(&inputs, bands, judged, [upstream, direction], dims);
                 }
-                if wanted[3] {
+                if wanted[slices.len() - rest.len()] {
                     let gradient = gradient();
                     let numbers = gradient.as_slice::<F>().expect("numbers of this type");
                     let views =
@@ -93,7 +98,8 @@ impl SilhouetteLoss {
         &self,
         inputs: &Inputs<F>,
         bands: &kernel::Bands,
-        [target, upstream, direction]: [&[F]; 3],
+        judged: Judged<F>,
+        [upstream, direction]: [&[F]; 2],
         dims: &[Vec<usize>],
     ) -> Vec<F> {
         let sums = kernel::forward(inputs, bands);
@@ -105,11 +111,11 @@ impl SilhouetteLoss {
         };
         // The derivatives by the sums do not depend on how the sums move, but how those move depends on them being known.
         let still = vec![F::ZERO; sums.len()];
-        let [by_sums, _] = dual_upstream(loss, [&sums, &still, target, upstream], &shapes);
+        let [by_sums, _] = dual_upstream(loss, [&sums, &still], judged, upstream, &shapes);
         let (along, wanted) = ([true, false], [true, false, true]);
         let pulled = kernel::vjp_of_vjp(inputs, bands, &by_sums, direction, along, wanted);
         let (curved, moved) = pulled.split_at(inputs.vertices.len());
-        let [_, change] = dual_upstream(loss, [&sums, moved, target, upstream], &shapes);
+        let [_, change] = dual_upstream(loss, [&sums, moved], judged, upstream, &shapes);
         let rest = kernel::vjp(inputs, bands, &change, [true, false]);
         curved.iter().zip(rest).map(|(&a, b)| a + b).collect()
     }

@@ -1,6 +1,6 @@
 //! What is wrong with a picture, beside what [`mse_loss`](crate::mse_loss) and [`iou_loss`](crate::iou_loss) say of it.
 
-use burn::tensor::{Tensor, TensorData, backend::Backend};
+use softrast_tensor::{Backend, Tensor, TensorData};
 
 /// Pixels across the window of [`ssim_loss`], and the width of the Gauss curve in it.
 const WINDOW: usize = 11;

@@ -1,5 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
-use softrast_softness::tensor_on;
+use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use crate::{
     ImageSize, Orbit, RasterBackend,
@@ -20,7 +19,7 @@ const ROUNDED: f64 = 1e-3;
 /// calibrates counts from the middle of the first pixel, so add ½ to its cx and cy. There is no skew and no distortion.
 ///
 /// ```
-/// # use burn::backend::NdArray;
+/// # use softrast_tensor::NdArray;
 /// use softrast_raster::{Pinhole, Pinholes, project_pinhole, vertices};
 ///
 /// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, [150, 200]);

@@ -1,5 +1,5 @@
-use burn::tensor::{DType, Element, Tensor, backend::Backend};
-use softrast_softness::{Softness, numbers, support};
+use softrast_softness::{Softness, support};
+use softrast_tensor::{Backend, DType, Element, Tensor, numbers};
 
 use crate::{
     RasterBackend, TConorm,
@@ -17,7 +17,7 @@ const ROUNDING: f64 = 1e-3;
 const BEYOND_END: u32 = 24;
 
 /// A softness under a T-conorm as a piecewise cubic function of the squared distance: what
-/// [`profile_sum`](crate::profile_sum) adds up over the faces of a pixel.
+/// [`profile_sum`](crate::low_level::profile_sum) adds up over the faces of a pixel.
 ///
 /// Its cells suit no family more than another, so that a family needs no knots of its own, and an MLP costs no more per pixel than a
 /// logistic. Gradients of any order reach the parameters through the values and slopes at the knots.

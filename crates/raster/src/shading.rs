@@ -1,6 +1,6 @@
 //! Light on surfaces, in tensor ops: at vertices, or at pixels whose points and normals were drawn as attributes.
 
-use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData, backend::Backend};
+use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData};
 
 /// Where light comes from.
 #[derive(Clone, Debug)]

@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, Tensor, TensorData};
 
 use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
-    backend::{elementary, pairs, primitive, silhouette_loss},
+    backend::{elementary, pairs, primitive, silhouette_loss, straight_through_sum},
     curve::precise,
     fused::{ElementaryOp, FusedOp},
     kernel::PixelLoss,
@@ -128,8 +128,8 @@ impl<S: Softness> Silhouette<S> {
     }
 
     /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of
-    /// [`Silhouette::coverage_by_table`], in one op on the CPU under the probabilistic sum. Gradients reach the vertices alone, to second
-    /// order.
+    /// [`Silhouette::coverage_by_table`], times the share of each pixel that is `counted` (shaped like a target) unless all is, in one op on
+    /// the CPU under the probabilistic sum. Gradients reach the vertices alone, to second order.
     ///
     /// # Panics
     ///
@@ -139,8 +139,9 @@ impl<S: Softness> Silhouette<S> {
         vertices: Tensor<B, 3>,
         table: Tensor<B, 2>,
         target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, table, target)
+        self.loss(PixelLoss::SquaredError, vertices, table, target, counted)
     }
 
     /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
@@ -153,8 +154,9 @@ impl<S: Softness> Silhouette<S> {
         vertices: Tensor<B, 3>,
         table: Tensor<B, 2>,
         target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, table, target)
+        self.loss(PixelLoss::Iou, vertices, table, target, counted)
     }
 
     pub(crate) fn loss<B: RasterBackend>(
@@ -163,12 +165,19 @@ impl<S: Softness> Silhouette<S> {
         vertices: Tensor<B, 3>,
         table: Tensor<B, 2>,
         target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
         let (table, target) = (table.detach(), target.detach());
+        let counted = counted.map(Tensor::detach);
         if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
-            return loss.of_images(self.coverage_by_table(vertices, table), target);
+            let coverage = self.coverage_by_table(vertices, table);
+            let coverage = match counted {
+                Some(counted) => coverage * counted,
+                None => coverage,
+            };
+            return loss.of_images(coverage, target);
         }
-        silhouette_loss(&self.op, loss, vertices, table, target)
+        silhouette_loss(&self.op, loss, vertices, table, target, counted)
     }
 
     /// Sums over the faces of each pixel, `[views, height, width]`: what the T-conorm of the profile
@@ -240,7 +249,7 @@ impl<S: Softness> Silhouette<S> {
     ///
     /// This is a straight-through estimator: a sharp image with a wide gradient. What comes back is
     /// **not** the derivative of the image. Gradients reach the parameters of neither softness at the
-    /// outermost level of autodiff. Costs one more forward pass.
+    /// outermost level of autodiff. A step takes as many passes as without.
     ///
     /// Not in the paper. Source: docs/notes.md, Surrogate gradient.
     pub fn coverage_with_surrogate<B: RasterBackend, T: Softness>(
@@ -250,9 +259,9 @@ impl<S: Softness> Silhouette<S> {
         surrogate: &Silhouette<T>,
         surrogate_table: Tensor<B, 2>,
     ) -> Tensor<B, 3> {
-        let forward = profile_sum(&self.op, vertices.clone().detach(), table.detach());
-        let backward = profile_sum(&surrogate.op, vertices, surrogate_table.detach());
-        covered(self.profile.t_conorm(), forward + (backward.clone() - backward.detach()))
+        let wide = (&surrogate.op, surrogate_table);
+        let sums = straight_through_sum((&self.op, table), wide, vertices);
+        covered(self.profile.t_conorm(), sums)
     }
 
     /// Support, knots and error of the table in use.

@@ -1,4 +1,4 @@
-use burn::tensor::Tensor;
+use softrast_tensor::Tensor;
 
 use crate::RasterBackend;
 

@@ -1,7 +1,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use burn::tensor::{DType, Element, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
 
 use crate::{
     HostBackend, ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm,
@@ -19,7 +19,7 @@ const SAME: f64 = 1e-12;
 /// are stretched, which costs nothing; where its shape has, they are chosen anew, which takes milliseconds.
 ///
 /// ```
-/// use burn::backend::{Autodiff, NdArray};
+/// use softrast_tensor::{Autodiff, NdArray};
 /// use softrast_raster::{Orbit, SoftRenderer, project, vertices};
 /// use softrast_softness::Family;
 ///
@@ -94,7 +94,7 @@ impl<S: Softness> SoftRenderer<S> {
         Self { rasterizer, faces, softness, phi, surrogate: None, kept: Arc::default() }
     }
 
-    /// With another largest error of a pixel, in (0, 1); see [`Profile::new`](crate::Profile::new).
+    /// With another largest error of a pixel, in (0, 1); see [`Profile::new`](crate::low_level::Profile::new).
     #[must_use]
     pub fn with_tolerance(self, tolerance: f64) -> Self {
         self.changed(|rasterizer| rasterizer.tolerance = tolerance)
@@ -155,7 +155,7 @@ impl<S: Softness> SoftRenderer<S> {
     /// jump or a corner that no table can follow to it. In exact arithmetic; rounding in `f32` adds some 1e-6.
     ///
     /// ```
-    /// use burn::backend::NdArray;
+    /// use softrast_tensor::NdArray;
     /// use softrast_raster::SoftRenderer;
     /// use softrast_softness::Family;
     ///
@@ -266,7 +266,7 @@ impl<S: Softness> SoftRenderer<S> {
             return loss.of_images(self.silhouette(vertices), target.detach());
         }
         let (silhouette, table) = self.own_table(&vertices);
-        silhouette.loss(loss, vertices, table, target)
+        silhouette.loss(loss, vertices, table, target, None)
     }
 
     fn drawn<B: RasterBackend>(

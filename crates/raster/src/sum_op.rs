@@ -1,6 +1,6 @@
 use std::sync::{Arc, OnceLock};
 
-use burn::tensor::{Element, TensorData};
+use softrast_tensor::{Element, TensorData};
 
 use crate::{
     ImageSize,

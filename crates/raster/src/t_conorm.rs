@@ -1,7 +1,7 @@
 use std::{fmt, str::FromStr};
 
-use burn::tensor::{DType, Tensor, backend::Backend};
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, DType, Tensor};
 
 /// Optical depth beyond which `exp(q)` is held: a face that lets less than e^-40 = 4e-18 of the
 /// light through counts as that.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::RasterBackend;
 
@@ -83,8 +83,7 @@ fn by_series<B: Backend, const D: usize>(radians: Tensor<B, D>) -> [Tensor<B, D>
 
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu")))]
 mod tests {
-    use burn::backend::{Autodiff, NdArray};
-    use softrast_softness::{numbers, vector};
+    use softrast_tensor::{Autodiff, NdArray, numbers, vector};
 
     use super::*;
 

@@ -1,5 +1,5 @@
-use burn::tensor::{Tensor, backend::Backend};
-use softrast_softness::{DepthSoftness, EdgeSoftness, OPAQUE, Softness, vector};
+use softrast_softness::{DepthSoftness, EdgeSoftness, OPAQUE, Softness};
+use softrast_tensor::{Backend, Tensor, vector};
 
 use crate::HostBackend;
 

@@ -3,7 +3,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::Parser;
 use softrast_inverse::NameOrFile;
 use softrast_lab::parse::{count, positive, share, whole};
-use softrast_raster::{Rasterizer, TConorm};
+use softrast_raster::{TConorm, low_level::Rasterizer};
 use softrast_softness::Family;
 
 /// Draws soft silhouettes or colours of a mesh and measures what they cost.

@@ -2,12 +2,12 @@
 
 use std::{array, sync::Arc, time::Instant};
 
-use burn::tensor::Tensor;
 use softrast_raster::{
     Attributes, Background, ColourRenderer, Light, NEAR, RasterBackend, Weighting, lambert,
     project, vertex_normals, view_rotation,
 };
-use softrast_softness::{DepthSoftness, Family, numbers};
+use softrast_softness::{DepthSoftness, Family};
+use softrast_tensor::{Tensor, numbers};
 
 use crate::{
     fused::milliseconds,

@@ -2,12 +2,13 @@
 
 use std::time::Instant;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{ElementConversion, Tensor},
+use softrast_raster::{
+    RasterBackend,
+    low_level::{Rasterizer, Silhouette},
+    mse_loss, project,
 };
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss, project};
 use softrast_softness::EdgeSoftness;
+use softrast_tensor::{Autodiff, ElementConversion, Tensor};
 
 use crate::scene::{Scene, Step};
 

@@ -3,13 +3,12 @@
 use std::{fmt, sync::Arc};
 
 use anyhow::{Context, bail};
-use burn::tensor::{Tensor, TensorData, backend::Backend};
 use image::RgbImage;
 use softrast_inverse::PictureFile;
 use softrast_lab::Error;
 use softrast_mesh::{Mesh, MeshError, Texture};
 use softrast_raster::Attributes;
-use softrast_softness::tensor;
+use softrast_tensor::{Backend, Tensor, TensorData, tensor};
 
 use crate::args::Args;
 

@@ -15,7 +15,9 @@ use softrast_lab::{
     program::{Output, parse, repeated},
     rgb_from_gray, rgb_from_planes, shown,
 };
-use softrast_raster::{BackendChoice, RasterBackend, Rasterizer, compiled_backends, on_backend};
+use softrast_raster::{
+    BackendChoice, RasterBackend, compiled_backends, low_level::Rasterizer, on_backend,
+};
 
 use crate::{
     args::Args,

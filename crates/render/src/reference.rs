@@ -2,13 +2,10 @@
 
 use std::time::Instant;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 use softrast_raster::{mse_loss, project, reference};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 
 use crate::scene::{Scene, Step};
 

@@ -1,13 +1,13 @@
 use std::{path::Path, sync::Arc};
 
 use anyhow::Context;
-use burn::tensor::{Tensor, backend::Backend};
 use image::{GrayImage, imageops};
 use softrast_inverse::{NameOrFile, Picture, ScheduledSoftness, faces_across_note};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::{ImageSize, NEAR, Orbit, Pinhole, TConorm};
-use softrast_softness::{EdgeSoftness, Family, Softness, tensor, vector};
+use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Backend, Tensor, tensor, vector};
 
 use crate::{
     args::{Args, Target},

@@ -1,7 +1,7 @@
 use std::{fmt, str::FromStr};
 
-use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::{
     EdgeSoftness, Family, OPAQUE, Softness, initial_mlp,

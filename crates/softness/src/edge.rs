@@ -1,5 +1,5 @@
-use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::{Family, Softness, softness::curve};
 

@@ -8,7 +8,7 @@
 //! network. A [`DepthSoftness`] gives how much a face counts by its depth.
 //!
 //! ```
-//! use burn::{backend::NdArray, tensor::{DType, Tensor}};
+//! use softrast_tensor::{DType, NdArray, Tensor};
 //! use softrast_softness::{EdgeSoftness, Family, Softness};
 //!
 //! let softness = EdgeSoftness { family: Family::Logistic, squared: false };
@@ -35,7 +35,6 @@ mod network;
 mod soft_step;
 mod softness;
 mod support;
-mod tensors;
 
 pub use depth_softness::{DepthSoftness, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
@@ -46,7 +45,6 @@ pub use network::initial_mlp;
 pub use soft_step::SoftStep;
 pub use softness::Softness;
 pub use support::{Support, settled_beyond, support};
-pub use tensors::{numbers, tensor, tensor_on, vector};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

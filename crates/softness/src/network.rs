@@ -1,6 +1,6 @@
 //! What the two networks of the paper share: their weights, and those to start from.
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 /// Width of the hidden layers.
 pub(crate) const WIDTH: usize = 4;

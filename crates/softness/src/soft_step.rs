@@ -1,6 +1,9 @@
-use burn::{
-    module::{Module, Param},
-    tensor::{DType, Tensor, TensorData, backend::Backend},
+use softrast_tensor::{
+    Backend, DType, Tensor, TensorData,
+    burn::{
+        self,
+        module::{Module, Param},
+    },
 };
 
 use crate::{EdgeSoftness, Softness};

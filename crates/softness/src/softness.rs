@@ -1,9 +1,6 @@
 use std::fmt::Debug;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::math::{bounded_depth, ln_scale, with_first};
 
@@ -21,7 +18,7 @@ use crate::math::{bounded_depth, ln_scale, with_first};
 /// ```
 /// use std::f64::consts::FRAC_1_PI;
 ///
-/// use burn::tensor::{Tensor, backend::Backend};
+/// use softrast_tensor::{Backend, Tensor};
 /// use softrast_softness::Softness;
 ///
 /// #[derive(Clone, Debug)]

@@ -1,4 +1,4 @@
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use softrast_tensor::{Backend, DType, Tensor, TensorData};
 
 use crate::Softness;
 

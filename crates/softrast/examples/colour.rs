@@ -2,8 +2,11 @@
 //!
 //! `cargo run --release -p softrast --example colour`
 
-use burn::backend::{Autodiff, NdArray};
-use softrast::{mesh::fox, prelude::*};
+use softrast::{
+    mesh::fox,
+    prelude::*,
+    tensor::{Autodiff, NdArray},
+};
 
 type Plain = NdArray;
 type B = Autodiff<Plain>;

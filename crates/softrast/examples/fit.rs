@@ -2,10 +2,10 @@
 //!
 //! `cargo run --release -p softrast --example fit`
 
-use burn::backend::{Autodiff, NdArray};
 use softrast::{
     mesh::{fox, icosphere},
     prelude::*,
+    tensor::{Autodiff, NdArray},
 };
 
 type Plain = NdArray;

@@ -2,8 +2,7 @@
 //!
 //! `cargo run --release -p softrast --example learn`
 
-use burn::backend::NdArray;
-use softrast::{mesh::icosphere, prelude::*};
+use softrast::{mesh::icosphere, prelude::*, tensor::NdArray};
 
 fn main() -> anyhow::Result<()> {
     let ball = icosphere(1);

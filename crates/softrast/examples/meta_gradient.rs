@@ -4,8 +4,11 @@
 //!
 //! `cargo run --release -p softrast --example meta_gradient`
 
-use burn::backend::{Autodiff, NdArray};
-use softrast::{mesh::fox, prelude::*};
+use softrast::{
+    mesh::fox,
+    prelude::*,
+    tensor::{Autodiff, NdArray},
+};
 
 type Plain = NdArray<f64>;
 type Outer = Autodiff<Plain>;

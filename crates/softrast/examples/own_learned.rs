@@ -2,8 +2,7 @@
 //!
 //! `cargo run --release -p softrast --example own_learned`
 
-use burn::backend::NdArray;
-use softrast::{mesh::fox, prelude::*};
+use softrast::{mesh::fox, prelude::*, tensor::NdArray};
 
 #[derive(Clone, Debug)]
 struct Arctan;

@@ -4,8 +4,7 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use burn::backend::NdArray;
-use softrast::{mesh::fox, prelude::*};
+use softrast::{mesh::fox, prelude::*, tensor::NdArray};
 
 #[derive(Clone, Debug)]
 struct Arctan;

@@ -2,8 +2,7 @@
 //!
 //! `cargo run --release -p softrast --example pose_from_mask`
 
-use burn::backend::NdArray;
-use softrast::{mesh::fox, prelude::*};
+use softrast::{mesh::fox, prelude::*, tensor::NdArray};
 
 fn main() -> anyhow::Result<()> {
     let (mesh, device) = (fox(), Default::default()); // of your own: Mesh::load("my.obj")?

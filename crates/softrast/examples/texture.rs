@@ -2,8 +2,11 @@
 //!
 //! `cargo run --release -p softrast --example texture`
 
-use burn::backend::{Autodiff, NdArray};
-use softrast::{prelude::*, raster::*};
+use softrast::{
+    prelude::*,
+    raster::*,
+    tensor::{Autodiff, NdArray},
+};
 
 type Plain = NdArray;
 type B = Autodiff<Plain>;

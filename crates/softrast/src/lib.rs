@@ -9,12 +9,11 @@
 //! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them;
 //!   softnesses over a run, and their files.
 //!
-//! Take burn 0.21, the version that this is built on: types of another do not fit. The Cargo features `ndarray` (default), `flex` and
-//! `wgpu` choose the backend.
+//! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other releases of burn do not fit. The Cargo features
+//! `ndarray` (default), `flex` and `wgpu` choose the backend.
 //!
 //! ```
-//! use burn::backend::{Autodiff, NdArray};
-//! use softrast::{mesh::fox, prelude::*};
+//! use softrast::{mesh::fox, prelude::*, tensor::{Autodiff, NdArray}};
 //!
 //! let (mesh, device) = (fox(), Default::default());
 //! let camera = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 30.0, fov_deg: 60.0 };
@@ -39,6 +38,8 @@ pub use softrast_meta as meta;
 pub use softrast_raster as raster;
 #[doc(inline)]
 pub use softrast_softness as softness;
+#[doc(inline)]
+pub use softrast_tensor as tensor;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -1,6 +1,5 @@
 //! What most programs need, for `use softrast::prelude::*`.
 
-pub use burn::tensor::{Tensor, backend::Backend};
 pub use softrast_inverse::{
     InverseProblem, Iterate, LearnConfig, Lens, Method, Minimization, NamedSoftness, Picture,
     PoseProblem, ScheduledSoftness, SoftnessAt, SolveConfig, learn, load_views, minimize,
@@ -14,3 +13,4 @@ pub use softrast_raster::{
     TConorm, Weighting, hard_silhouette, iou_loss, mse_loss, project, project_pinhole, vertices,
 };
 pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+pub use softrast_tensor::{Backend, Tensor};

@@ -2,11 +2,11 @@
 
 use std::{env, fs, path::PathBuf, process::Command};
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData},
+use softrast::{
+    mesh::fox,
+    prelude::*,
+    tensor::{Autodiff, DType, NdArray, Tensor, TensorData},
 };
-use softrast::{mesh::fox, prelude::*};
 
 fn folder() -> PathBuf {
     let test = env::current_exe().expect("a test has a path");

@@ -2,13 +2,9 @@
 
 use std::marker::PhantomData;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness};
-use softrast_meta::{numbers, tensor};
-use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
+use softrast_raster::{RasterBackend, TConorm, low_level::Rasterizer, reference};
+use softrast_tensor::{Autodiff, NdArray, Tensor, numbers, tensor};
 
 use crate::planar_scene::{PlanarScene, Random};
 

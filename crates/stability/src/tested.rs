@@ -5,9 +5,9 @@ use serde_json::{Value, json};
 use softrast_cli::{Common, MethodArgs, Schedule, SoftnessChoice, Task, Variant};
 use softrast_inverse::{InverseProblem, Method, ScheduledSoftness, SolveConfig, minimize};
 use softrast_lab::{Batch, Progress, Run};
-use softrast_meta::numbers;
-use softrast_raster::Rasterizer;
+use softrast_raster::low_level::Rasterizer;
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::numbers;
 
 use crate::drawing::Single;
 

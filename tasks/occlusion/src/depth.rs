@@ -2,9 +2,9 @@ use anyhow::ensure;
 use softrast_cli::{EdgeChoice, PRESET, Schedule, Searched};
 use softrast_inverse::{DepthSoftnessFile, NameOrFile};
 use softrast_lab::Error;
-use softrast_meta::{numbers, tensor, vector};
 use softrast_raster::HostBackend;
 use softrast_softness::{DepthSoftness, Family};
+use softrast_tensor::{numbers, tensor, vector};
 
 use crate::{Args, args::NAME};
 

@@ -1,9 +1,8 @@
 use std::cell::RefCell;
 
-use burn::tensor::Tensor;
-use softrast_meta::tensor;
 use softrast_raster::{Background, RasterBackend, blend, hard_colour, mse_loss, nearness};
 use softrast_softness::{DepthSoftness, Softness};
+use softrast_tensor::{Tensor, tensor};
 
 use crate::{Instance, Problem, instance::places};
 

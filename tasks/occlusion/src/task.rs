@@ -1,6 +1,5 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
@@ -12,9 +11,9 @@ use softrast_lab::{
     plot::{Axis, Plot, Series},
     rgb_from_planes,
 };
-use softrast_meta::{numbers, vector};
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Tensor, numbers, vector};
 
 use crate::{
     Args, DepthError, Instance, Problem, Scene,
@@ -76,17 +75,17 @@ impl InverseProblem for Occlusion {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let (edge, phi) = softness.edge();
         let edges = match softness.fixed_place() {
             Some(place) => scene.fixed_edges(place, edge, phi),
             None => scene.edges(edge, phi),
         };
-        scene.image(scene.by_view(theta), edges, self.depth.softness, softness.own())
+        in_rows(scene.image(scene.by_view(theta), edges, self.depth.softness, softness.own()))
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        scene.hard(scene.by_view(theta))
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
+        in_rows(scene.hard(scene.by_view(theta)))
     }
 
     /// Under two narrow logistics of its own.
@@ -95,16 +94,16 @@ impl InverseProblem for Occlusion {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         _softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let [edge, depth] = SHARP.map(|scale| vector(&Family::Logistic.default_phi(scale)));
         let softness = EdgeSoftness { family: Family::Logistic, squared: false };
         let edges = scene.fixed_edges(0, &softness, edge);
         let sharp = DepthSoftness::Family(Family::Logistic);
-        scene.image(scene.by_view(theta), edges, sharp, depth)
+        in_rows(scene.image(scene.by_view(theta), edges, sharp, depth))
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        scene.loss(image)
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        scene.loss(image.flatten(2, 3))
     }
 
     /// The transfer has to cross 3.5 world units in ten steps. Front quads found of 50 with `evaluate --variant transfer --size 32
@@ -115,6 +114,13 @@ impl InverseProblem for Occlusion {
             Variant::Transfer => SolveConfig { size: 64, steps: 10, learning_rate: 0.7 },
         }
     }
+}
+
+/// An image `[views, channels, pixels]` as `[views, channels, size, size]`.
+fn in_rows<B: RasterBackend>(image: Tensor<B, 3>) -> Tensor<B, 4> {
+    let [views, channels, pixels] = image.dims();
+    let size = pixels.isqrt();
+    image.reshape([views, channels, size, size])
 }
 
 impl Task for Occlusion {

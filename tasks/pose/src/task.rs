@@ -1,6 +1,5 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
@@ -12,9 +11,9 @@ use softrast_inverse::{
     pose::{PoseInstance, PoseScene, nearest_distance},
 };
 use softrast_lab::Error;
-use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers};
 
 use crate::{
     Args, Instances, Pictures, PoseError, Range, framing::mesh, paper::PAPER, picture::outlined,
@@ -90,7 +89,7 @@ impl InverseProblem for Pose {
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         self.problem.image(scene, theta, softness)
     }
 
@@ -98,14 +97,14 @@ impl InverseProblem for Pose {
         &self,
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         self.problem.hard_image(scene, theta)
     }
 
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &PoseScene<B>,
-        image: Tensor<B, 3>,
+        image: Tensor<B, 4>,
     ) -> Tensor<B, 1> {
         self.problem.image_loss(scene, image)
     }

@@ -5,16 +5,18 @@ use std::{
 };
 
 use anyhow::{Context, ensure};
-use burn::{
-    backend::Autodiff,
-    module::{AutodiffModule, Module},
-    optim::{Adam, AdamConfig, GradientsParams, Optimizer, adaptor::OptimizerAdaptor},
-    record::{FullPrecisionSettings, NamedMpkBytesRecorder, Recorder},
-    tensor::Tensor,
-};
 use softrast_lab::World;
 use softrast_raster::RasterBackend;
-use softrast_softness::{SoftStep, numbers};
+use softrast_softness::SoftStep;
+use softrast_tensor::{
+    Autodiff, Tensor,
+    burn::{
+        module::{AutodiffModule, Module},
+        optim::{Adam, AdamConfig, GradientsParams, Optimizer, adaptor::OptimizerAdaptor},
+        record::{FullPrecisionSettings, NamedMpkBytesRecorder, Recorder},
+    },
+    numbers,
+};
 
 use crate::{
     Checkpoint, Network, Settings, Template, Time,

@@ -1,12 +1,16 @@
-use burn::{
-    module::Module,
-    nn::{
-        BatchNorm, BatchNormConfig, Linear, LinearConfig, PaddingConfig2d,
-        conv::{Conv2d, Conv2dConfig},
-    },
-    tensor::{Tensor, activation::relu, backend::Backend},
-};
 use serde::{Deserialize, Serialize};
+use softrast_tensor::{
+    Backend, Tensor,
+    activation::relu,
+    burn::{
+        self,
+        module::Module,
+        nn::{
+            BatchNorm, BatchNormConfig, Linear, LinearConfig, PaddingConfig2d,
+            conv::{Conv2d, Conv2dConfig},
+        },
+    },
+};
 
 use crate::SIZE;
 

@@ -1,11 +1,13 @@
 //! What a training lowers: `1 - IoU` of silhouettes, and what keeps surfaces smooth.
 
-use burn::tensor::{Element, Int, Tensor, TensorData, backend::Backend};
 use softrast_mesh::Edges;
 use softrast_raster::{
-    RasterBackend, Rasterizer, Silhouette, TConorm, flatness, iou_loss, project,
+    RasterBackend, TConorm, flatness, iou_loss,
+    low_level::{Rasterizer, Silhouette},
+    project,
 };
-use softrast_softness::{EdgeSoftness, SoftStep, tensor_on};
+use softrast_softness::{EdgeSoftness, SoftStep};
+use softrast_tensor::{Backend, Element, Int, Tensor, TensorData, tensor_on};
 
 use crate::{SIZE, Template, orbit};
 

@@ -1,8 +1,8 @@
 use std::{ops::Range, sync::Arc};
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rayon::prelude::*;
+use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
 use crate::{SIZE, Shapes, VIEWS};
 

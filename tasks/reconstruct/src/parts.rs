@@ -1,9 +1,11 @@
 //! What the parts of a step send to each other: gradients, and the states that a forward pass moves, as plain numbers.
 
-use burn::{
-    module::{Module, ModuleMapper, ModuleVisitor, Param},
-    optim::GradientsParams,
-    tensor::{Tensor, TensorData, backend::AutodiffBackend},
+use softrast_tensor::{
+    AutodiffBackend, Tensor, TensorData,
+    burn::{
+        module::{Module, ModuleMapper, ModuleVisitor, Param},
+        optim::GradientsParams,
+    },
 };
 
 /// Gradients of a module, 0 where there is none, and its states, in the order of its parameters.

@@ -1,6 +1,5 @@
-use burn::tensor::backend::Backend;
 use rayon::prelude::*;
-use softrast_softness::{numbers, tensor_on};
+use softrast_tensor::{Backend, numbers, tensor_on};
 
 use crate::{Network, Shapes, Template, VIEWS, Voxels, pairs, template::points};
 

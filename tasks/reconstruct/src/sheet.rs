@@ -1,8 +1,8 @@
 //! What the network sees and what it makes of it.
 
-use burn::tensor::backend::Backend;
 use image::{Rgb, RgbImage, imageops};
 use softrast_lab::contact_sheet;
+use softrast_tensor::Backend;
 
 use crate::{
     Network, SIZE, Shapes, Template, VIEWS, score,

@@ -1,8 +1,7 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, backend::Backend};
 use softrast_mesh::icosphere;
-use softrast_softness::tensor_on;
+use softrast_tensor::{Backend, Tensor, tensor_on};
 
 /// A coordinate this near to a plane through the origin, in world units, stays in that plane: its
 /// log-odds would be about minus infinity.

@@ -5,9 +5,9 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use burn::backend::Autodiff;
 use softrast_lab::{Error, Inputs, OutputFolder, Progress, World, program::say};
 use softrast_raster::RasterBackend;
+use softrast_tensor::Autodiff;
 
 use crate::{
     Checkpoint, Epoch, Header, Score, Settings, Shapes, Split, Template, Time, data_set,

@@ -1,15 +1,14 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
-use burn::tensor::Tensor;
 use serde_json::json;
 use softrast_cli::{
     Common, Description, Detail, EdgeChoice, Ended, Entry, Measures, MethodArgs, NoArgs, Paper,
     Scales, Schedule, Task, Variant,
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
-use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers};
 
 use crate::{Args, Instance, Scene, paper::PAPER, target::Target};
 
@@ -66,16 +65,16 @@ impl InverseProblem for Shape2d {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(scene.vertices(theta))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(scene.vertices(theta)).unsqueeze_dim(1)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        scene.hard(scene.vertices(theta))
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
+        scene.hard(scene.vertices(theta)).unsqueeze_dim(1)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        scene.image_loss(image)
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        scene.image_loss(image.squeeze_dim(1))
     }
 
     fn loss_at<B: RasterBackend>(

@@ -1,10 +1,9 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_inverse::{Surface, Targets};
 use softrast_mesh::{Edges, Mesh};
-use softrast_meta::tensor;
-use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, project};
+use softrast_raster::{RasterBackend, hard_silhouette, project};
+use softrast_tensor::{Tensor, tensor};
 
 use crate::Instance;
 
@@ -107,8 +106,7 @@ impl<B: RasterBackend> Scene<B> {
     /// `IoU` loss of `image` `[views, side, side]`, mean over the views, `[1]`; the side is the size of
     /// the scene, or that halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        let target = self.targets.of(&image);
-        iou_loss(image, target).mean()
+        self.targets.iou_loss(image).mean()
     }
 
     /// The targets at every size that a run may draw at.

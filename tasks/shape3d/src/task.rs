@@ -1,6 +1,5 @@
 use std::{path::Path, sync::Arc};
 
-use burn::tensor::Tensor;
 use image::RgbImage;
 use serde_json::json;
 use softrast_cli::{
@@ -10,9 +9,10 @@ use softrast_cli::{
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::{contact_sheet, rgb_from_gray};
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
-use softrast_meta::{Adam, numbers};
+use softrast_meta::Adam;
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers};
 
 use crate::{
     Args, Chamfer, Instance, Scene, Views,
@@ -77,16 +77,16 @@ impl InverseProblem for Shape3d {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(scene.project(scene.vertices(theta)))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(scene.project(scene.vertices(theta))).unsqueeze_dim(1)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        scene.hard(scene.project(scene.vertices(theta)))
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
+        scene.hard(scene.project(scene.vertices(theta))).unsqueeze_dim(1)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        scene.image_loss(image)
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        scene.image_loss(image.squeeze_dim(1))
     }
 
     fn loss_at<B: RasterBackend>(

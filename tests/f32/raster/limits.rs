@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData, backend::Backend},
-};
 use softrast_mesh::{Mesh, fox};
-use softrast_raster::{RasterBackend, Rasterizer, project};
+use softrast_raster::{RasterBackend, low_level::Rasterizer, project};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData};
 
 const SIZE: usize = 16;
 

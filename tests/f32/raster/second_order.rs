@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData, backend::Backend},
-};
 use softrast_mesh::icosphere;
-use softrast_raster::{Rasterizer, project};
+use softrast_raster::{low_level::Rasterizer, project};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData};
 
 type A = Autodiff<NdArray<f32>>;
 type AA = Autodiff<A>;

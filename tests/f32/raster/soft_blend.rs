@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_raster::{Attributes, Background, ColourRenderer, NEAR, RasterBackend, Weighting};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f32>;

@@ -1,8 +1,8 @@
 //! No pixel is off by more than is stated, but for the rounding of f32.
 
-use burn::backend::NdArray;
 use softrast_raster::{SoftRenderer, TConorm};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::NdArray;
 use softrast_tests::ToleranceCase;
 
 fn assert_kept(case: &ToleranceCase) {

@@ -1,8 +1,8 @@
 //! Hinges worked by hand.
 
-use burn::backend::NdArray;
 use softrast_inverse::Surface;
 use softrast_mesh::Edges;
+use softrast_tensor::NdArray;
 use softrast_tests::tensor;
 
 /// Flatness and normal consistency of two faces on an edge along x, the second turned up to the point (y, z).

@@ -1,8 +1,8 @@
 //! A triangle worked by hand.
 
-use burn::backend::NdArray;
 use softrast_inverse::Surface;
 use softrast_mesh::Edges;
+use softrast_tensor::NdArray;
 use softrast_tests::tensor;
 
 fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {

@@ -1,12 +1,12 @@
 //! The loss of a problem under another softness than it was made for.
 
-use burn::backend::NdArray;
 use softrast_inverse::{
     Instances, LearnConfig, Method, PoseProblem, ScheduledSoftness, SolveConfig,
 };
 use softrast_mesh::icosphere;
 use softrast_meta::{MetaGradient, TaskDistribution};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

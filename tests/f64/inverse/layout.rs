@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use burn::backend::{Autodiff, NdArray};
 use softrast_cli::{MethodArgs, Scales, Schedule};
 use softrast_inverse::{
     Feedback, Input, Instances, LearnConfig, Method, OuterLoss, PhiLayout, ScaleSchedule,
@@ -10,6 +9,7 @@ use softrast_inverse::{
 };
 use softrast_meta::{MetaGradient, Objective, TaskDistribution};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray};
 use softrast_tests::{numbers, vector};
 
 use super::square::Square;

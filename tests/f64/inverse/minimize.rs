@@ -1,9 +1,9 @@
 //! Descents whose every place is known.
 
-use burn::backend::NdArray;
 use softrast_inverse::{Feedback, InverseProblem, Iterate, Method, ScheduledSoftness, minimize};
 use softrast_meta::{Adam, Optimizer};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, vector};
 
 use super::square::Square;

@@ -1,9 +1,5 @@
 //! A softness of one's own, of one method, over runs: solved with, learned and kept in a file.
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
 use occlusion::Occlusion;
 use shape2d::colour::Coloured;
 use softrast_cli::{EdgeChoice, Task, Variant};
@@ -12,8 +8,9 @@ use softrast_inverse::{
     SolveConfig, learn, minimize,
 };
 use softrast_meta::MetaGradient;
-use softrast_raster::Rasterizer;
+use softrast_raster::low_level::Rasterizer;
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, NdArray, Tensor};
 use softrast_tests::{Arctan, lopsided_mesh, vector};
 
 type B = NdArray<f64>;

@@ -1,4 +1,3 @@
-use burn::tensor::Tensor;
 use softrast_inverse::{
     PaintTargets, PaintedView, Picture, SolveConfig, View, coloured_pixels, paint,
 };
@@ -8,6 +7,7 @@ use softrast_raster::{
     Attributes, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, project_pinhole, vertices,
 };
 use softrast_softness::Family;
+use softrast_tensor::Tensor;
 
 use crate::differences::check_gradient;
 

@@ -1,8 +1,8 @@
 //! Scales that move over the steps.
 
-use burn::backend::NdArray;
 use softrast_inverse::{ScaleSchedule, ScheduledSoftness};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

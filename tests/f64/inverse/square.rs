@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig};
 use softrast_raster::RasterBackend;
 use softrast_softness::Softness;
+use softrast_tensor::Tensor;
 use softrast_tests::vector;
 
 /// `θ²` of numbers that may not fall below `floor`.
@@ -55,19 +55,19 @@ impl InverseProblem for Square {
         _scene: &Vec<f64>,
         theta: Tensor<B, 1>,
         _softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let theta = if self.seen { theta } else { theta.detach() };
         let [count] = theta.dims();
-        theta.reshape([count, 1, 1])
+        theta.reshape([count, 1, 1, 1])
     }
 
-    fn hard_image<B: RasterBackend>(&self, _scene: &Vec<f64>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    fn hard_image<B: RasterBackend>(&self, _scene: &Vec<f64>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
         let [count] = theta.dims();
-        theta.round().reshape([count, 1, 1])
+        theta.round().reshape([count, 1, 1, 1])
     }
 
-    fn image_loss<B: RasterBackend>(&self, _scene: &Vec<f64>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        (image.clone() * image).flatten(0, 2)
+    fn image_loss<B: RasterBackend>(&self, _scene: &Vec<f64>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        (image.clone() * image).flatten(0, 3)
     }
 
     fn defaults(&self) -> SolveConfig {

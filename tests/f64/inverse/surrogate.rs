@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_inverse::{
     PhiLayout, Resolution, ScaleSchedule, ScheduledRenderer, ScheduledSoftness, Surrogate,
 };
-use softrast_raster::{Rasterizer, Silhouette, SoftRenderer};
+use softrast_raster::{
+    SoftRenderer,
+    low_level::{Rasterizer, Silhouette},
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, tensor, vector};
 
 type B = NdArray<f64>;

@@ -1,7 +1,7 @@
 //! Steps of Adam worked by hand.
 
-use burn::backend::NdArray;
 use softrast_meta::{Adam, Optimizer};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

@@ -1,10 +1,7 @@
 //! Scene and softness that move together.
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_meta::{BilevelProblem, InnerLoop, MetaGradient, Objective, OuterSteps, Sgd};
+use softrast_tensor::{Backend, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

@@ -1,10 +1,7 @@
 //! Two steps of an inner loop whose meta-gradients are known, and what every loop keeps to.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::vector;
 
 type B = NdArray<f64>;

@@ -1,13 +1,10 @@
 //! Meta-gradients on losses in closed form, in f64.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_meta::{
     Adam, BilevelProblem, InnerLoop, MetaEstimate, MetaGradient, Objective, Optimizer, OuterSteps,
     Sgd,
 };
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::{WAVES, Waves, numbers, vector};
 
 type B = NdArray<f64>;

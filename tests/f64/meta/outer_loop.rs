@@ -1,14 +1,11 @@
 //! Learning a step size: one softness parameter whose best value is known.
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_inverse::Checkpoint;
 use softrast_meta::{
     Adam, Best, BilevelProblem, InnerLoop, LearnError, MetaGradient, Objective, OuterLoop,
     OuterSteps, Progress, Record, Sgd, TaskDistribution, Validation,
 };
+use softrast_tensor::{Backend, NdArray, Tensor};
 
 type B = NdArray<f64>;
 

@@ -2,9 +2,9 @@
 
 use std::panic::catch_unwind;
 
-use burn::backend::{Autodiff, NdArray};
 use occlusion::{Instance, Pattern, Problem, Quad, Scene, Texture};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray};
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;

@@ -1,8 +1,8 @@
 //! What an instance looks like, small enough to read.
 
-use burn::backend::NdArray;
 use occlusion::{Instance, Problem, Scene};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, tensor, vector};
 
 type B = NdArray<f64>;

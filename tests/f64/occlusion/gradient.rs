@@ -1,13 +1,10 @@
 //! The gradient of the loss to depths and parameters, and its Hessian-vector products, against
 //! central differences in f64.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use occlusion::{Instance, Problem, Scene};
 use softrast_raster::RasterBackend;
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;

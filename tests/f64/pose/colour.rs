@@ -1,12 +1,12 @@
 //! POSE by colour: the gradient of the loss against central differences.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use pose::colour::Scene;
 use softrast_inverse::pose::PoseInstance;
 use softrast_mesh::painted_fox;
 use softrast_meta::Objective;
-use softrast_raster::{RasterBackend, Rasterizer};
+use softrast_raster::{RasterBackend, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
 
 use crate::differences::check_gradient_to;

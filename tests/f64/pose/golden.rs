@@ -2,11 +2,11 @@
 //!
 //! Source: docs/notes.md, Values before any step. The mesh belongs to others and is not part of this repository.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use pose::{PoseError, released24};
 use softrast_inverse::pose::{PoseInstance, PoseScene};
-use softrast_raster::{Rasterizer, iou_loss};
+use softrast_raster::{iou_loss, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::{paper_mesh, vector};
 
 type B = NdArray<f64>;

@@ -1,13 +1,13 @@
 //! The gradient of the loss to the pose against central differences, in f64.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_inverse::pose::{PoseInstance, PoseScene};
 use softrast_mesh::fox;
-use softrast_raster::{Rasterizer, Silhouette, iou_loss};
+use softrast_raster::{
+    iou_loss,
+    low_level::{Rasterizer, Silhouette},
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, tensor, vector};
 
 type B = NdArray<f64>;

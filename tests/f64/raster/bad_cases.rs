@@ -3,9 +3,13 @@
 
 use std::sync::{Arc, LazyLock};
 
-use burn::backend::{Autodiff, NdArray};
-use softrast_raster::{NEAR, Rasterizer, Silhouette, TConorm, reference};
+use softrast_raster::{
+    NEAR, TConorm,
+    low_level::{Rasterizer, Silhouette},
+    reference,
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray};
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

@@ -1,8 +1,8 @@
 //! Cameras against one that looks at the origin.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use proptest::prelude::*;
 use softrast_raster::{NEAR, project, view_rotation};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
 
 type B = NdArray<f64>;

@@ -1,12 +1,9 @@
 //! Colours of faces that share pixels: by hand, against direct sums, by differences, to second
 //! order, in any order of the faces, and where weights leave the range of floats.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use proptest::prelude::*;
 use softrast_raster::{Background, blend, hard_colour, nearness};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;

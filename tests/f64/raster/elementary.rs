@@ -1,11 +1,7 @@
 //! What a step does around the sums in one op each, against the same in tensor ops: values, gradients, second order.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_raster::{iou_loss, mse_loss, project, reference};
-use softrast_softness::{numbers, vector};
+use softrast_tensor::{Autodiff, NdArray, Tensor, numbers, vector};
 
 type B = NdArray<f64>;
 type A = Autodiff<B>;

@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
-use softrast_raster::{RasterBackend, Rasterizer, TConorm, reference};
+use softrast_raster::{RasterBackend, TConorm, low_level::Rasterizer, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::vector;
 
 use super::triangles::triangles;

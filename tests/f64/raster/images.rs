@@ -1,11 +1,8 @@
 //! Images that are no squares.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
-use softrast_raster::{ImageSize, Rasterizer, TConorm, hard_silhouette, reference};
+use softrast_raster::{ImageSize, TConorm, hard_silhouette, low_level::Rasterizer, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
 
 use super::triangles::triangles;

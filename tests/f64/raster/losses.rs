@@ -1,13 +1,9 @@
 //! Losses of pictures and surfaces: values worked out another way, derivatives against central differences.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use softrast_raster::{
     edge_length, huber_loss, l1_loss, multi_scale_loss, normal_consistency, ssim_loss,
 };
-use softrast_softness::{numbers, vector};
+use softrast_tensor::{Autodiff, NdArray, Tensor, numbers, vector};
 
 type B = NdArray<f64>;
 type A = Autodiff<B>;

@@ -1,13 +1,10 @@
 //! Pinhole cameras: worked numbers, conventions there and back, derivatives against differences.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use proptest::prelude::*;
 use softrast_raster::{
     Orbit, Pinhole, PinholeError, Pinholes, project, project_pinhole, turned, vertices,
 };
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::numbers;
 
 type B = NdArray<f64>;

@@ -3,10 +3,10 @@
 //!
 //! Source: Liu et al. 2019, Eq. 1 and its aggregate function for silhouettes, as in `sigmoid_alpha_blend` of `PyTorch3D`.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{Orbit, Pinhole, Pinholes, SoftRenderer, project, project_pinhole, vertices};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
 
 type B = NdArray<f64>;

@@ -1,8 +1,8 @@
 //! Signed distances of the reference, by hand and against many points of the boundary.
 
-use burn::backend::NdArray;
 use proptest::prelude::*;
 use softrast_raster::reference::signed_distance;
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, tensor};
 
 type B = NdArray<f64>;

@@ -1,11 +1,8 @@
 //! Light on surfaces: by hand, by sums over a sphere, and derivatives against central differences.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_mesh::icosphere;
 use softrast_raster::{Light, lambert, phong, spherical_harmonics, vertex_normals};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::{numbers, tensor, vector};
 
 use super::losses::{Of, assert_derivatives, derivatives, wave};

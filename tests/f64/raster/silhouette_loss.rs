@@ -1,12 +1,9 @@
 //! A loss that is computed along with the silhouette is that of the silhouette, and so are its derivatives.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
 use proptest::prelude::*;
-use softrast_raster::{SoftRenderer, iou_loss, mse_loss};
+use softrast_raster::{SoftRenderer, iou_loss, low_level::Silhouette, mse_loss};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
 
 use super::triangles::triangles;
@@ -16,19 +13,51 @@ type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
 type Renderer = SoftRenderer<EdgeSoftness>;
-type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>) -> Tensor<AA, 1>;
+/// Of vertices, a target, and the share of each pixel that counts.
+type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>, Option<Tensor<AA, 3>>) -> Tensor<AA, 1>;
 
 /// In one op, and in two.
 const LOSSES: [[Loss; 2]; 2] = [
     [
-        |renderer, vertices, target| renderer.mse_loss(vertices, target),
-        |renderer, vertices, target| mse_loss(renderer.silhouette(vertices), target),
+        |renderer, vertices, target, counted| match counted {
+            None => renderer.mse_loss(vertices, target),
+            Some(_) => {
+                let (silhouette, table) = by_table(renderer);
+                silhouette.mse_loss_by_table(vertices, table, target, counted)
+            }
+        },
+        |renderer, vertices, target, counted| mse_loss(part(renderer, vertices, counted), target),
     ],
     [
-        |renderer, vertices, target| renderer.iou_loss(vertices, target),
-        |renderer, vertices, target| iou_loss(renderer.silhouette(vertices), target),
+        |renderer, vertices, target, counted| match counted {
+            None => renderer.iou_loss(vertices, target),
+            Some(_) => {
+                let (silhouette, table) = by_table(renderer);
+                silhouette.iou_loss_by_table(vertices, table, target, counted)
+            }
+        },
+        |renderer, vertices, target, counted| iou_loss(part(renderer, vertices, counted), target),
     ],
 ];
+
+fn by_table(renderer: &Renderer) -> (Silhouette<EdgeSoftness>, Tensor<AA, 2>) {
+    let silhouette = renderer.prepared::<AA>(renderer.phi());
+    let table = silhouette.table(vector(renderer.phi()));
+    (silhouette, table)
+}
+
+/// What counts of a silhouette.
+fn part(
+    renderer: &Renderer,
+    vertices: Tensor<AA, 3>,
+    counted: Option<Tensor<AA, 3>>,
+) -> Tensor<AA, 3> {
+    let silhouette = renderer.silhouette(vertices);
+    match counted {
+        Some(counted) => silhouette * counted,
+        None => silhouette,
+    }
+}
 
 /// Losses of views, the gradient of a sum of them to the vertices, and the gradients of a product with that to vertices and to the
 /// factors of the sum.
@@ -36,6 +65,7 @@ fn derivatives(
     loss: Loss,
     renderer: &Renderer,
     [vertices, target]: [Tensor<B, 3>; 2],
+    counted: Option<Tensor<B, 3>>,
 ) -> [Vec<f64>; 4] {
     let views = vertices.dims()[0];
     let wave = |count: usize, step: f64| -> Vec<f64> {
@@ -46,8 +76,8 @@ fn derivatives(
     let inner = Tensor::<A, 3>::from_inner(vertices).require_grad();
     let factors = vector::<A>(&wave(views, 0.7)).require_grad();
     let vertices = Tensor::<AA, 3>::from_inner(inner.clone()).require_grad();
-    let target = Tensor::from_inner(Tensor::from_inner(target));
-    let losses = loss(renderer, vertices.clone(), target);
+    let constant = |image| Tensor::from_inner(Tensor::from_inner(image));
+    let losses = loss(renderer, vertices.clone(), constant(target), counted.map(constant));
     let total = (losses.clone() * Tensor::from_inner(factors.clone())).sum();
     let gradient = vertices.grad(&total.backward()).expect("a gradient");
     let second = (gradient.clone() * direction).sum().backward();
@@ -56,13 +86,15 @@ fn derivatives(
     [numbers(losses), numbers(gradient), numbers(to_vertices), numbers(to_factors)]
 }
 
-/// Asserts that both ways agree, for a renderer, so many views and a target of each or one of all.
+/// Asserts that both ways agree, for a renderer, so many views and a target of each or one of all, where all of each pixel counts or a share
+/// of it.
 fn assert_same(
     renderer: &Renderer,
     seed: u64,
     [height, width]: [usize; 2],
     views: usize,
     own: bool,
+    weighted: bool,
 ) {
     let (values, _) = triangles(seed, 20);
     let view = |k: usize| {
@@ -75,9 +107,14 @@ fn assert_same(
     let pixel = |k: usize| 0.5 + 0.5 * (0.37 * k as f64).sin();
     let pixels: Vec<f64> = (0..targets * height * width).map(pixel).collect();
     let target = vector::<B>(&pixels).reshape([targets, height, width]);
+    // Some pixels do not count at all.
+    let share = |k: usize| (1.2 * (0.23 * k as f64).cos()).clamp(0.0, 1.0);
+    let shares: Vec<f64> = (0..pixels.len()).map(share).collect();
+    let counted = weighted.then(|| vector::<B>(&shares).reshape([targets, height, width]));
     for [one, two] in LOSSES {
+        let images = || [vertices.clone(), target.clone()];
         let [found, wanted] =
-            [one, two].map(|loss| derivatives(loss, renderer, [vertices.clone(), target.clone()]));
+            [one, two].map(|loss| derivatives(loss, renderer, images(), counted.clone()));
         for (which, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
             let largest = wanted.iter().fold(1e-12, |largest: f64, x| largest.max(x.abs()));
             for (found, wanted) in found.iter().zip(wanted) {
@@ -100,12 +137,13 @@ proptest! {
         size in proptest::sample::select(vec![[9, 9], [70, 13], [13, 70]]),
         views in 1usize..6,
         own: bool,
+        weighted: bool,
     ) {
         let softness = EdgeSoftness { family, squared };
         let scale = 10f64.powf(if squared { 2.0 * width } else { width });
         let (_, faces) = triangles(seed, 20);
         let renderer = SoftRenderer::new(&faces, size, softness, scale).with_tolerance(1e-4);
-        assert_same(&renderer, seed, size, views, own);
+        assert_same(&renderer, seed, size, views, own, weighted);
     }
 }
 
@@ -117,5 +155,7 @@ fn more_pairs_than_are_kept_are_walked_again() {
     let (_, faces) = triangles(3, 20);
     let many = faces.repeat(20);
     let renderer = SoftRenderer::new(&many, size, softness, 0.1);
-    assert_same(&renderer, 3, size, 1, true);
+    for weighted in [false, true] {
+        assert_same(&renderer, 3, size, 1, true, weighted);
+    }
 }

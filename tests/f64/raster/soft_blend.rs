@@ -2,15 +2,12 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_raster::{
     Attributes, Background, ColourRenderer, RasterBackend, Weighting,
     reference::{self, Scene},
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::{numbers, tensor, vector};
 
 use super::triangles::triangles;

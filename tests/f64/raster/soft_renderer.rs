@@ -1,11 +1,8 @@
 //! Support and knots follow the parameters: the promised error holds whatever happens to them.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::Tensor,
-};
-use softrast_raster::{Rasterizer, SoftRenderer, TConorm, reference};
+use softrast_raster::{SoftRenderer, TConorm, low_level::Rasterizer, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
 
 use super::triangles::triangles;

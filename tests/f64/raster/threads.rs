@@ -1,6 +1,6 @@
 //! The same bits on any number of threads, in f64.
 
-use burn::backend::NdArray;
+use softrast_tensor::NdArray;
 use softrast_tests::assert_same_on_threads;
 
 #[test]

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use burn::backend::NdArray;
-use softrast_raster::{Rasterizer, SoftRenderer, TConorm, reference};
+use softrast_raster::{SoftRenderer, TConorm, low_level::Rasterizer, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::NdArray;
 use softrast_tests::{ToleranceCase, numbers, vector};
 
 use super::triangles::triangles;

@@ -1,6 +1,5 @@
 //! 2D SHAPE in colour: derivatives of the loss against central differences, and a short solve.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use shape2d::{
     Args,
     colour::{Coloured, Colours, Scene, Start, landscape},
@@ -10,6 +9,7 @@ use softrast_inverse::{InverseProblem, Method, ScheduledSoftness, SolveConfig, m
 use softrast_meta::Objective;
 use softrast_raster::RasterBackend;
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
 
 use crate::differences::{check_gradient, check_meta_gradient};

@@ -2,9 +2,9 @@
 //!
 //! Source: this test and [`shape2d`]'s own logos; a change of them is a change of the task.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use shape2d::{Instance, Logo, Scene};
 use softrast_cli::Variant;
+use softrast_tensor::{NdArray, Tensor};
 
 type B = NdArray<f64>;
 

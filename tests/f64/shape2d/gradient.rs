@@ -1,11 +1,14 @@
 //! Derivatives of the loss against central differences, in f64.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use shape2d::{Instance, Logo, Scene};
 use softrast_cli::Variant;
 use softrast_meta::Objective;
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette};
+use softrast_raster::{
+    RasterBackend,
+    low_level::{Rasterizer, Silhouette},
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::vector;
 
 use crate::differences::{check_gradient, check_meta_gradient};

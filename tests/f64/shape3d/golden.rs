@@ -2,9 +2,9 @@
 //!
 //! Source: docs/notes.md, Values before any step. The meshes belong to others and are not part of this repository.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use shape3d::{Instance, Scene, VIEWS};
 use softrast_mesh::{Mesh, airplane, chair, icosphere};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::paper_mesh;
 
 type B = NdArray<f64>;

@@ -1,7 +1,7 @@
 //! The network that sees depths.
 
-use burn::backend::{Autodiff, NdArray};
 use softrast_softness::{DepthSoftness, OPAQUE, initial_mlp};
+use softrast_tensor::{Autodiff, NdArray};
 use softrast_tests::{numbers, vector};
 
 type B = Autodiff<NdArray<f64>>;

@@ -1,7 +1,7 @@
 //! How much a face counts by its depth.
 
-use burn::backend::NdArray;
 use softrast_softness::{DepthSoftness, Family, OPAQUE, initial_mlp};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

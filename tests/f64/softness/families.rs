@@ -1,10 +1,7 @@
 //! Every family against differences of itself, in f64.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
 use softrast_softness::{EdgeSoftness, Family, OPAQUE, Softness};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::vector;
 
 use super::numbers;

@@ -1,7 +1,7 @@
 //! The logarithm of a softness, far into its tails.
 
-use burn::{backend::NdArray, tensor::Tensor};
 use softrast_softness::{EdgeSoftness, Family, Mirrored, OPAQUE, Softness};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::{numbers, vector};
 
 use super::provided::ValueOf;

@@ -13,10 +13,7 @@ mod soft_step;
 mod support;
 mod tails;
 
-use burn::{
-    backend::NdArray,
-    tensor::{Tensor, backend::Backend},
-};
+use softrast_tensor::{Backend, NdArray, Tensor};
 
 type B = NdArray<f64>;
 

@@ -1,11 +1,8 @@
 //! What a softness with one method gets: density, optical depth and hazard from its value alone.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{Tensor, backend::Backend},
-};
-use softrast_raster::Rasterizer;
+use softrast_raster::low_level::Rasterizer;
 use softrast_softness::{Family, OPAQUE, Softness};
+use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
 use softrast_tests::{tensor, vector};
 
 use super::numbers;

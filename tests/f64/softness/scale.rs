@@ -1,7 +1,7 @@
 //! Parameters at another scale.
 
-use burn::backend::NdArray;
 use softrast_softness::{EdgeSoftness, Family, Softness, families::Mlp, initial_mlp};
+use softrast_tensor::NdArray;
 use softrast_tests::{numbers, vector};
 
 type B = NdArray<f64>;

@@ -1,11 +1,10 @@
 //! A softness as a module of burn.
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    module::{AutodiffModule, Module},
-    tensor::{DType, Tensor},
-};
 use softrast_softness::{EdgeSoftness, Family, SoftStep, Softness};
+use softrast_tensor::{
+    Autodiff, DType, NdArray, Tensor,
+    burn::module::{AutodiffModule, Module},
+};
 
 type B = Autodiff<NdArray<f64>>;
 

@@ -1,4 +1,4 @@
-//! No file imports another in a circle.
+//! No file imports another in a circle, and burn is imported in one place.
 //!
 //! A file imports another where it names something that the other defines, by `use` or by a path. A re-export is followed to the file that
 //! defines the item, so a module that only gathers names ties nothing together. Modules of tests do not count, nor do types that are never
@@ -29,6 +29,20 @@ fn no_file_imports_another_in_a_circle() {
     }
     assert!(links > 500, "the links of this repository are found, not {links} alone");
     assert!(circles.is_empty(), "{} circles of imports:\n{}", circles.len(), circles.join("\n"));
+}
+
+/// Another release of burn, or tensors of our own, are then a change of `crates/tensor`.
+#[test]
+fn only_the_tensor_crate_depends_on_burn() {
+    let manifests = files(root(), "toml").into_iter().filter(|path| path.ends_with("Cargo.toml"));
+    let depend: Vec<String> = manifests
+        .filter(|path| {
+            let text = fs::read_to_string(path).unwrap();
+            path.parent() != Some(root()) && text.lines().any(|line| line.starts_with("burn"))
+        })
+        .map(|path| shown(&path))
+        .collect();
+    assert_eq!(depend, ["crates/tensor/Cargo.toml"]);
 }
 
 /// The folders in which a crate begins: those with a `lib.rs`, or with a `main.rs` alone.

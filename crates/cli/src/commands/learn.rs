@@ -5,7 +5,6 @@ use std::{
 };
 
 use anyhow::Context;
-use burn::tensor::backend::Backend;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use softrast_inverse::{Learning, ScheduledSoftness};
@@ -20,6 +19,7 @@ use softrast_lab::{
 };
 use softrast_meta::{Best, Ranks, Record};
 use softrast_raster::HostBackend;
+use softrast_tensor::Backend;
 
 use super::settings_section;
 use crate::{

@@ -1,10 +1,10 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
-use burn::tensor::{Tensor, TensorData};
 use softrast_raster::{
     Attributes, ColourRenderer, HostBackend, RasterBackend, Weighting, nearest_faces, vertices,
 };
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness, numbers, tensor};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Tensor, TensorData, numbers, tensor};
 
 const EDGE: EdgeSoftness = EdgeSoftness { family: Family::Uniform, squared: false };
 /// Half the width of the edge of a face, in pixels. A near face outweighs those behind it up to where its softness ends, so this one ends

@@ -1,9 +1,8 @@
-use burn::tensor::Tensor;
 use softrast_raster::{RasterBackend, mse_loss};
-use softrast_softness::tensor;
+use softrast_tensor::{Tensor, tensor};
 
 use super::Coat;
-use crate::{PaintedView, Picture, Targets, mask_targets::parts};
+use crate::{PaintedView, Picture, Targets, targets::parts};
 
 /// Weight of the error of colours beside the `IoU` loss. With 5, 10 and 20, colours found 25, 24 and 24 of 28 poses that silhouettes did not
 /// (docs/notes.md, Pose by colour).
@@ -13,8 +12,8 @@ const SIDES: std::ops::RangeInclusive<usize> = 4..=8;
 
 /// Views of a mesh with colours, and the pictures that they should be.
 ///
-/// An image `[4 views, side, side]` has of each view red, green and blue over black, from 0 to 1, then the coverage. The side is the size of
-/// the pictures, or that halved some times.
+/// An image `[views, 4, side, side]` has red, green and blue over black, from 0 to 1, then the coverage. The side is the size of the
+/// pictures, or that halved some times.
 #[derive(Debug)]
 pub struct ColouredViews<B: RasterBackend> {
     coat: Coat<B>,
@@ -64,12 +63,12 @@ impl<B: RasterBackend> ColouredViews<B> {
     }
 
     /// The image to arrive at, with its coverage `[views, size, size]`.
-    pub fn target(&self, coverage: Tensor<B, 3>) -> Tensor<B, 3> {
+    pub fn target(&self, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
         let [views, size, _] = coverage.dims();
         joined(self.over_black.full().reshape([views, 3, size, size]), coverage)
     }
 
-    /// The soft image `[4 views, side, side]` of what is `seen`, `[views, vertices, 3]`, by cameras at this `distance` `[views, 1]` of the
+    /// The soft image `[views, 4, side, side]` of what is `seen`, `[views, vertices, 3]`, by cameras at this `distance` `[views, 1]` of the
     /// mesh, with its soft `coverage` `[views, side, side]`.
     ///
     /// Colours are hardly softened, but multiplied by the coverage.
@@ -78,14 +77,14 @@ impl<B: RasterBackend> ColouredViews<B> {
         seen: Tensor<B, 3>,
         distance: Tensor<B, 2>,
         coverage: Tensor<B, 3>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let colours = self.coat.soft(seen, distance, coverage.dims()[1]);
         let shape = colours.dims();
         joined(colours * coverage.clone().unsqueeze_dim::<4>(1).expand(shape), coverage)
     }
 
-    /// The hard image `[4 views, size, size]` of what is seen, with its hard `coverage`. It has no gradient.
-    pub fn hard_image(&self, seen: Tensor<B, 3>, coverage: Tensor<B, 3>) -> Tensor<B, 3> {
+    /// The hard image `[views, 4, size, size]` of what is seen, with its hard `coverage`. It has no gradient.
+    pub fn hard_image(&self, seen: Tensor<B, 3>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
         joined(self.coat.hard(seen, coverage.dims()[1]), coverage)
     }
 
@@ -127,16 +126,12 @@ impl<B: RasterBackend> ColouredViews<B> {
 }
 
 /// Colours `[views, 3, side, side]` and coverage `[views, side, side]` as an image.
-fn joined<B: RasterBackend>(colours: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Tensor<B, 3> {
-    let [views, side, _] = coverage.dims();
-    Tensor::cat(vec![colours, coverage.unsqueeze_dim(1)], 1).reshape([4 * views, side, side])
+fn joined<B: RasterBackend>(colours: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
+    Tensor::cat(vec![colours, coverage.unsqueeze_dim(1)], 1)
 }
 
-/// Colours and coverage of an image.
-pub fn parted<B: RasterBackend>(image: Tensor<B, 3>) -> (Tensor<B, 4>, Tensor<B, 3>) {
-    let [planes, side, _] = image.dims();
-    let views = planes / 4;
-    let image = image.reshape([views, 4, side, side]);
-    let coverage = image.clone().narrow(1, 3, 1).reshape([views, side, side]);
+/// Colours `[views, 3, side, side]` and coverage `[views, side, side]` of an image `[views, 4, side, side]`.
+pub fn split_coverage<B: RasterBackend>(image: Tensor<B, 4>) -> (Tensor<B, 4>, Tensor<B, 3>) {
+    let coverage = image.clone().narrow(1, 3, 1).squeeze_dim(1);
     (image.narrow(1, 0, 3), coverage)
 }

@@ -1,11 +1,10 @@
 use std::borrow::Cow;
 
-use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, hard_silhouette, iou_loss, project_pinhole, vertices,
 };
-use softrast_softness::{numbers, tensor};
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::{
     Coat, ColouredViews,

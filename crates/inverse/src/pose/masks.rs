@@ -1,16 +1,16 @@
 use std::sync::Arc;
 
 use anyhow::Context;
-use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, turned,
     vertices,
 };
-use softrast_softness::{Softness, numbers, tensor};
+use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers, tensor};
 
-use super::{Coat, ColouredViews, parted};
-use crate::{Frame, InverseProblem, MaskTargets, PaintedView, Picture, SoftnessAt, SolveConfig};
+use super::{Coat, ColouredViews, split_coverage};
+use crate::{Frame, InverseProblem, PaintedView, Picture, SoftnessAt, SolveConfig, Targets};
 
 /// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
 const CLEARANCE: f64 = 1.05;
@@ -89,12 +89,12 @@ impl InverseProblem for MaskPoses {
         scene: &MaskScene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let seen = scene.project(theta.clone());
         let coverage = softness.silhouette(seen.clone());
         match &scene.colours {
             Some(colours) => colours.image(seen, scene.depth(theta), coverage),
-            None => coverage,
+            None => coverage.unsqueeze_dim(1),
         }
     }
 
@@ -102,26 +102,38 @@ impl InverseProblem for MaskPoses {
         &self,
         scene: &MaskScene<B>,
         theta: Tensor<B, 1>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let seen = scene.project(theta);
         let coverage = hard_silhouette(seen.clone(), &scene.faces, scene.cameras.size);
         match &scene.colours {
             Some(colours) => colours.hard_image(seen, coverage),
-            None => coverage,
+            None => coverage.unsqueeze_dim(1),
         }
     }
 
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &MaskScene<B>,
-        image: Tensor<B, 3>,
+        image: Tensor<B, 4>,
     ) -> Tensor<B, 1> {
         match &scene.colours {
             Some(views) => {
-                let (colours, coverage) = parted(image);
+                let (colours, coverage) = split_coverage(image);
                 scene.targets.iou_loss(coverage) + views.loss(colours)
             }
-            None => scene.targets.iou_loss(image),
+            None => scene.targets.iou_loss(image.squeeze_dim(1)),
+        }
+    }
+
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &MaskScene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
+    ) -> Tensor<B, 1> {
+        match &scene.colours {
+            Some(_) => self.image_loss(scene, self.image(scene, theta, softness)),
+            None => softness.iou_loss(scene.project(theta), &scene.targets),
         }
     }
 
@@ -146,7 +158,7 @@ pub struct MaskScene<B: RasterBackend> {
     /// Least logarithm of the depth against the start, `[views, 1]`.
     nearest: Tensor<B, 2>,
     optimise_fov: bool,
-    targets: MaskTargets<B>,
+    targets: Targets<B>,
     colours: Option<ColouredViews<B>>,
 }
 
@@ -183,7 +195,7 @@ impl<B: RasterBackend> MaskScene<B> {
             frame: *frame,
             nearest: column(&nearest),
             optimise_fov: *optimise_fov,
-            targets: MaskTargets::new(instances.iter().map(|of| (&of.mask, of.square)), size),
+            targets: Targets::of_masks(instances.iter().map(|of| (&of.mask, of.square)), size),
             colours,
         }
     }

@@ -16,7 +16,7 @@ mod shifts;
 mod target;
 
 pub use coat::Coat;
-pub use coloured::{ColouredViews, parted};
+pub use coloured::{ColouredViews, split_coverage};
 pub use instance::PoseInstance;
 pub use masks::{MaskPose, MaskPoses, MaskScene};
 pub use problem::PoseProblem;

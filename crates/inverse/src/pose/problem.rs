@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::RasterBackend;
 use softrast_softness::Softness;
+use softrast_tensor::Tensor;
 
 use super::{PoseInstance, PoseScene};
 use crate::{InverseProblem, SoftnessAt, SolveConfig};
@@ -66,24 +66,24 @@ impl InverseProblem for PoseProblem {
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(scene.project(scene.by_view(theta)))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(scene.project(scene.by_view(theta))).unsqueeze_dim(1)
     }
 
     fn hard_image<B: RasterBackend>(
         &self,
         scene: &PoseScene<B>,
         theta: Tensor<B, 1>,
-    ) -> Tensor<B, 3> {
-        scene.hard(scene.project(scene.by_view(theta)))
+    ) -> Tensor<B, 4> {
+        scene.hard(scene.project(scene.by_view(theta))).unsqueeze_dim(1)
     }
 
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &PoseScene<B>,
-        image: Tensor<B, 3>,
+        image: Tensor<B, 4>,
     ) -> Tensor<B, 1> {
-        scene.image_loss(image)
+        scene.image_loss(image.squeeze_dim(1))
     }
 
     fn loss_at<B: RasterBackend>(

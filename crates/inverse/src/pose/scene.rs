@@ -1,11 +1,10 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Orbit, RasterBackend, hard_silhouette, iou_loss, project, vertices, view_rotation,
+    HostBackend, Orbit, RasterBackend, hard_silhouette, project, vertices, view_rotation,
 };
-use softrast_softness::{numbers, tensor};
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use crate::{Targets, pose::PoseInstance};
 
@@ -97,8 +96,7 @@ impl<B: RasterBackend> PoseScene<B> {
     /// `IoU` loss of each `image` `[views, side, side]`, `[views]`; the side is the size of the scene, or
     /// that halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        let target = self.targets.of(&image);
-        iou_loss(image, target)
+        self.targets.iou_loss(image)
     }
 
     /// The targets at every size that a run may draw at.

@@ -3,7 +3,8 @@ use std::borrow::{Borrow, Cow};
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole, RasterBackend, hard_silhouette};
-use softrast_softness::{Softness, numbers, tensor};
+use softrast_softness::Softness;
+use softrast_tensor::{numbers, tensor};
 
 use super::{
     glance::glance,

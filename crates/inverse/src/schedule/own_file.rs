@@ -72,8 +72,8 @@ fn named<S: NamedSoftness>(found: &Value, what: &str) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
-    use burn::tensor::{Tensor, backend::Backend};
     use softrast_softness::{EdgeSoftness, Family, Softness};
+    use softrast_tensor::{Backend, Tensor};
 
     use super::*;
     use crate::{Feedback, ScaleSchedule};

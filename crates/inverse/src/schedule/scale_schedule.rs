@@ -1,6 +1,6 @@
-use burn::tensor::{Tensor, backend::Backend};
 use serde::{Deserialize, Serialize};
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, Tensor};
 
 use crate::softness_file::stored::LARGEST_LOGARITHM;
 

@@ -1,7 +1,7 @@
 use std::{path::Path, sync::Arc};
 
 use serde::{Deserialize, Serialize};
-use softrast_raster::{Rasterizer, SoftRenderer};
+use softrast_raster::{SoftRenderer, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Softness};
 
 use super::{feedback::Feedback, scale_schedule::ScaleSchedule};

@@ -7,7 +7,7 @@ use softrast_softness::Softness;
 ///
 /// ```
 /// use softrast_inverse::{NamedSoftness, ScheduledSoftness};
-/// # use burn::tensor::{Tensor, backend::Backend};
+/// # use softrast_tensor::{Backend, Tensor};
 /// # use softrast_softness::Softness;
 /// # #[derive(Clone, Debug, PartialEq)]
 /// # struct Arctan;

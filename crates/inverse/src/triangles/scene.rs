@@ -1,8 +1,7 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
-use softrast_meta::tensor;
-use softrast_raster::{RasterBackend, hard_silhouette, mse_loss};
+use softrast_raster::{RasterBackend, hard_silhouette};
+use softrast_tensor::{Tensor, tensor};
 
 use crate::{Targets, triangles::Instance};
 
@@ -69,8 +68,7 @@ impl<B: RasterBackend> Scene<B> {
     /// Mean squared difference of `image` `[1, side, side]` to the picture, `[1]`; the side is the size
     /// of the scene, or that halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        let target = self.targets.of(&image);
-        mse_loss(image, target)
+        self.targets.mse_loss(image)
     }
 
     /// The picture at every size that a run may draw at.

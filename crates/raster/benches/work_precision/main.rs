@@ -22,19 +22,16 @@ mod workload;
 
 use std::{env, fs, hint::black_box, path::Path, sync::Arc, time::Instant};
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor},
-};
 use chart::Panel;
 use coloured::Coloured;
 use machine::machine;
 use scalar::Scalar;
 use softrast_mesh::icosphere;
 use softrast_raster::{
-    ColourRenderer, RasterBackend, Silhouette, TConorm, mse_loss, project, reference,
+    ColourRenderer, RasterBackend, TConorm, low_level::Silhouette, mse_loss, project, reference,
 };
 use softrast_softness::EdgeSoftness;
+use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 use workload::{SOFTNESS, Workload, disk, tensor};
 
 type B32 = NdArray<f32>;
@@ -266,7 +263,7 @@ fn plain(workload: &Workload, radius: f32) -> Drawn {
     let views = vertices.dims()[0];
     let flat: Vec<f32> = vertices.clone().inner().into_data().iter().collect();
     let tensor_of = |values: Vec<f32>, shape: [usize; 3]| {
-        let data = burn::tensor::TensorData::new(values, shape);
+        let data = softrast_tensor::TensorData::new(values, shape);
         Tensor::<B32, 3>::from_data(data, (&Default::default(), DType::F32))
     };
     let sums = tensor_of(scalar.forward(&flat, count), [views, size, size]);

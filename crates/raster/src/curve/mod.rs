@@ -4,8 +4,7 @@ mod knots;
 mod precise;
 mod settled;
 
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
-use softrast_softness::numbers;
+use softrast_tensor::{Backend, DType, Tensor, TensorData, numbers};
 
 use crate::kernel::Grid;
 pub(crate) use knots::FAR;

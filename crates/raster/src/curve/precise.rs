@@ -1,6 +1,6 @@
 //! Numbers as exact as a device has them.
 
-use burn::tensor::{DType, Tensor, TensorData, backend::Backend};
+use softrast_tensor::{Backend, DType, Tensor, TensorData};
 
 /// A tensor of the most exact float type that a device has.
 pub(crate) fn precise<B: Backend>(values: &[f64], device: &B::Device) -> Tensor<B, 1> {

@@ -1,6 +1,6 @@
 //! What an op is that is written once for any number, and how its passes run.
 
-use burn::tensor::{Element, TensorData};
+use softrast_tensor::{Element, TensorData};
 
 use super::{number::Number, pass::Pass};
 use crate::kernel::{Dual, Float};

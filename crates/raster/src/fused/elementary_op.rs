@@ -1,6 +1,6 @@
 //! The ops that are written for any number.
 
-use burn::tensor::{Element, TensorData};
+use softrast_tensor::{Element, TensorData};
 
 use super::{
     camera::{OrbitMatrix, Perspective},
@@ -9,7 +9,7 @@ use super::{
     number::Number,
     pass::Pass,
 };
-use crate::kernel::{Dual, Float};
+use crate::kernel::{Dual, Float, Judged};
 
 /// An op that is written for any number.
 #[derive(Clone, Copy, Debug)]
@@ -43,10 +43,12 @@ impl ElementaryOp {
 }
 
 /// The derivatives of `Σ upstream · loss` by sums of profiles `[views, height, width]`, whose coverages a loss compares with a target, and how
-/// they change as the sums move by `moved`. `dims` are the shapes of both images.
+/// they change as the sums move by `moved`. `dims` are the shapes of the image and of the target.
 pub(crate) fn dual_upstream<F>(
     loss: ElementaryOp,
-    [sums, moved, target, upstream]: [&[F]; 4],
+    [sums, moved]: [&[F]; 2],
+    Judged { target, counted }: Judged<F>,
+    upstream: &[F],
     dims: &[Vec<usize>],
 ) -> [Vec<F>; 2]
 where
@@ -55,14 +57,19 @@ where
     let dual = |(&value, &tangent)| Dual { value, tangent };
     let sums: Vec<_> = sums.iter().zip(moved).map(dual).collect();
     let target: Vec<_> = target.iter().map(|&value| Dual::constant(value)).collect();
-    let coverage = Coverage.forward(&[&sums], &dims[..1]);
+    let share = |k: usize| counted.map_or(F::ONE, |counted| counted[k % counted.len()]);
+    let mut coverage = Coverage.forward(&[&sums], &dims[..1]);
+    let slopes: Vec<_> = coverage.iter().map(|&c| Dual::constant(F::ONE) - c).collect();
+    for (k, coverage) in coverage.iter_mut().enumerate() {
+        *coverage = coverage.scale(share(k));
+    }
     let (inputs, wanted) = ([&coverage[..], &target[..]], [true, false]);
     let by_coverage = match loss {
         ElementaryOp::Iou => Iou.vjp(&inputs, dims, upstream, &wanted),
         _ => SquaredError.vjp(&inputs, dims, upstream, &wanted),
     };
-    let one = Dual::constant(F::ONE);
-    let by_sums = by_coverage.into_iter().zip(coverage).map(|(by, c)| by * (one - c));
+    let by_sums = by_coverage.into_iter().zip(slopes).enumerate();
+    let by_sums = by_sums.map(|(k, (by, slope))| (by * slope).scale(share(k)));
     let (values, tangents) = by_sums.map(|number| (number.value, number.tangent)).unzip();
     [values, tangents]
 }

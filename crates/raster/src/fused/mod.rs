@@ -10,7 +10,7 @@ mod image;
 mod number;
 pub(crate) mod pass;
 
-use burn::tensor::{Element, TensorData};
+use softrast_tensor::{Element, TensorData};
 
 pub(crate) use elementary::flat;
 pub use elementary_op::ElementaryOp;
@@ -26,7 +26,7 @@ use crate::{
 /// An op with derivatives of its own.
 #[derive(Clone, Debug)]
 pub enum FusedOp {
-    /// See [`crate::profile_sum`].
+    /// See [`crate::low_level::profile_sum`].
     ProfileSum(ProfileSum),
     /// See [`crate::ColourRenderer`].
     #[doc(hidden)]

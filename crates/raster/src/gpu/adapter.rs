@@ -1,11 +1,8 @@
 use std::sync::OnceLock;
 
-use burn::backend::wgpu::{
-    WgpuDevice, WgpuRuntime,
-    graphics::{AutoGraphicsApi, GraphicsApi},
-    init_setup,
+use softrast_tensor::wgpu::{
+    AutoGraphicsApi, GraphicsApi, WgpuDevice, WgpuRuntime, cubecl::Runtime, init_setup,
 };
-use burn_cubecl::cubecl::Runtime;
 
 use crate::NoAdapter;
 

@@ -1,10 +1,9 @@
 //! One call of the op of colours: which kernels run over which buffers.
 
-use burn::{
-    backend::wgpu::WgpuRuntime,
-    tensor::{DType, Slice, TensorMetadata, ops::FloatTensorOps},
+use softrast_tensor::{
+    DType, FloatTensorOps, Slice, TensorMetadata,
+    wgpu::{WgpuRuntime, cubecl::prelude::*, into_contiguous},
 };
-use burn_cubecl::{cubecl::prelude::*, kernel::into_contiguous};
 
 use super::{
     backend::Wgpu,

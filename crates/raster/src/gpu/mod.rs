@@ -34,10 +34,7 @@ pub use adapter::adapter_name;
 pub use backend::Wgpu;
 pub(crate) use topology::Topology;
 
-use burn::tensor::{
-    FloatDType, Slice, TensorMetadata,
-    ops::{FloatTensor, FloatTensorOps},
-};
+use softrast_tensor::{FloatDType, FloatTensor, FloatTensorOps, Slice, TensorMetadata};
 
 use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
 use blend_pass::{Blend, culling};

@@ -1,13 +1,12 @@
 //! One call of the op: which kernels run over which buffers.
 
-use burn::{
-    backend::wgpu::{CubeTensor, WgpuRuntime},
-    tensor::{DType, TensorMetadata},
-};
-use burn_cubecl::{
-    cubecl::{calculate_cube_count_elemwise, prelude::*},
-    kernel::into_contiguous,
-    ops::numeric::zeros_client,
+use softrast_tensor::{
+    DType, TensorMetadata,
+    wgpu::{
+        CubeTensor, WgpuRuntime,
+        cubecl::{calculate_cube_count_elemwise, prelude::*},
+        into_contiguous, zeros_client,
+    },
 };
 
 use super::{

@@ -1,7 +1,6 @@
 use std::sync::{Arc, OnceLock};
 
-use burn::backend::wgpu::{CubeTensor, WgpuDevice, WgpuRuntime};
-use burn_cubecl::cubecl::prelude::*;
+use softrast_tensor::wgpu::{CubeTensor, WgpuDevice, WgpuRuntime, cubecl::prelude::*};
 
 /// The faces of an op on a device: uploaded by its first pass there, kept for all that follow.
 #[derive(Clone, Default)]
@@ -53,7 +52,7 @@ impl OnDevice {
                 device.clone(),
                 [values.len()].into(),
                 client.create_from_slice(u32::as_bytes(values)),
-                burn::tensor::DType::U32,
+                softrast_tensor::DType::U32,
             )
         };
         let corners = corners_of_vertices(faces.as_flattened(), vertex_count);

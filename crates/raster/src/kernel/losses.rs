@@ -3,7 +3,7 @@
 //! What a pair of pixel and face is to the image is kept for the gradient while it is near the processor, so that nothing is computed
 //! twice.
 
-use std::{any::Any, cell::RefCell};
+use std::{any::Any, cell::RefCell, ops::Range};
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use super::{
     lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
     list::{LISTED, List, group, rows_of_bands},
     pair::CornerSums,
-    pixel_loss::{PARTS, PixelLoss, overlap_and_union, squared_error},
+    pixel_loss::{Compared, PARTS, PixelLoss, overlap_and_union, squared_error},
     real::splat,
     scene::{Place, Scene},
     sum::Inputs,
@@ -37,27 +37,45 @@ pub(crate) fn rows_of_losses(views: usize, size: ImageSize) -> usize {
     PIXELS.div_ceil(size.width.max(1)).next_power_of_two().clamp(LEAST_ROWS, most)
 }
 
-/// Losses `[views]`, and the gradient of each to its vertices, `[views, 3, vertices]`, if it is wanted: else it is 0. `target` is
-/// `[1 or views, height, width]`.
+/// Images that silhouettes are compared with, each `[1 or views, height, width]`.
+#[derive(Clone, Copy)]
+pub(crate) struct Judged<'a, F> {
+    pub(crate) target: &'a [F],
+    /// The share of each pixel that counts, unless all do: coverage is multiplied by it.
+    pub(crate) counted: Option<&'a [F]>,
+}
+
+impl<'a, F> Judged<'a, F> {
+    /// The same of some pixels of a view.
+    fn part(self, view: usize, pixels: usize, range: Range<usize>) -> Self {
+        let of = |image: &'a [F]| {
+            let first = if image.len() > pixels { view * pixels } else { 0 };
+            &image[first + range.start..first + range.end]
+        };
+        Self { target: of(self.target), counted: self.counted.map(of) }
+    }
+}
+
+/// Losses `[views]`, and the gradient of each to its vertices, `[views, 3, vertices]`, if it is wanted: else it is 0.
 pub(crate) fn losses<F: Float>(
     inputs: &Inputs<F>,
     bands: &Bands,
-    target: &[F],
+    judged: Judged<F>,
     loss: PixelLoss,
     with_gradient: bool,
 ) -> [Vec<F>; 2] {
     let asked = (loss, with_gradient);
     if has_vectors() {
-        of_views::<F::Best>(&inputs.scene([&[]; 2]), bands, target, asked)
+        of_views::<F::Best>(&inputs.scene([&[]; 2]), bands, judged, asked)
     } else {
-        of_views::<Plain<F>>(&inputs.scene([&[]; 2]), bands, target, asked)
+        of_views::<Plain<F>>(&inputs.scene([&[]; 2]), bands, judged, asked)
     }
 }
 
 fn of_views<L: Lanes>(
     scene: &Scene<L>,
     bands: &Bands,
-    target: &[L::Float],
+    judged: Judged<L::Float>,
     (loss, with_gradient): (PixelLoss, bool),
 ) -> [Vec<L::Float>; 2] {
     let zero = L::Float::ZERO;
@@ -65,12 +83,11 @@ fn of_views<L: Lanes>(
     let in_band = |view: usize, band: usize| {
         let mut room = Room::taken();
         let (rows, width) = (scene.band_rows(band), scene.size.width);
-        let first = if target.len() > pixels { view * pixels } else { 0 };
-        let target = &target[first + rows.start * width..first + rows.end * width];
+        let judged = judged.part(view, pixels, rows.start * width..rows.end * width);
         let place = scene.place(&bands.views[view], view, views, band);
         let whole = bands.count == 1;
         let done =
-            run::<L, _>(Band { scene, place, target, loss, with_gradient, whole, room: &mut room });
+            run::<L, _>(Band { scene, place, judged, loss, with_gradient, whole, room: &mut room });
         room.leave();
         done
     };
@@ -136,6 +153,7 @@ struct Room<L: Lanes> {
     corners: Vec<[usize; 3]>,
     image: Vec<L::Float>,
     target: Vec<L::Float>,
+    counted: Vec<L::Float>,
     parts: [Vec<L::Float>; PARTS],
 }
 
@@ -159,7 +177,8 @@ impl<L: Lanes> Room<L> {
     fn new() -> Self {
         let parts = [Vec::new(), Vec::new()];
         let (kept, at, corners) = (Vec::new(), Vec::new(), Vec::new());
-        Self { kept, at, corners, image: Vec::new(), target: Vec::new(), parts }
+        let [image, target, counted] = [const { Vec::new() }; 3];
+        Self { kept, at, corners, image, target, counted, parts }
     }
 }
 
@@ -167,7 +186,7 @@ impl<L: Lanes> Room<L> {
 struct Band<'a, 's, L: Lanes> {
     scene: &'a Scene<'s, L>,
     place: Place<'a, L>,
-    target: &'a [L::Float],
+    judged: Judged<'a, L::Float>,
     loss: PixelLoss,
     with_gradient: bool,
     /// Whether the view has no other.
@@ -219,18 +238,25 @@ impl<L: Lanes> Band<'_, '_, L> {
     #[inline(always)]
     fn compare(&mut self) -> [L::Float; PARTS] {
         let (width, stride) = (self.scene.size.width, self.scene.stride());
-        let Room { image, target, parts, .. } = &mut *self.room;
-        target.clear();
-        target.resize(image.len(), L::Float::ZERO);
-        for (row, own) in self.target.chunks(width).enumerate() {
-            target[row * stride..row * stride + width].copy_from_slice(own);
+        let Room { image, target, counted, parts, .. } = &mut *self.room;
+        let length = image.len();
+        let in_rows = |room: &mut Vec<L::Float>, own: &[L::Float]| {
+            room.clear();
+            room.resize(length, L::Float::ZERO);
+            for (row, own) in own.chunks(width).enumerate() {
+                room[row * stride..row * stride + width].copy_from_slice(own);
+            }
+        };
+        in_rows(target, self.judged.target);
+        if let Some(own) = self.judged.counted {
+            in_rows(counted, own);
         }
         let [first, second] = parts;
         for part in [&mut *first, &mut *second] {
             part.resize(image.len(), L::Float::ZERO);
         }
         // What belongs to no pixel is covered by nothing, and adds nothing to the sums.
-        let rows = self.target.len() / width.max(1);
+        let rows = self.judged.target.len() / width.max(1);
         let beside = |numbers: &mut [L::Float]| {
             numbers[rows * stride..].fill(L::Float::ZERO);
             for row in numbers[..rows * stride].chunks_mut(stride) {
@@ -238,13 +264,15 @@ impl<L: Lanes> Band<'_, '_, L> {
             }
         };
         beside(image);
+        let counted = self.judged.counted.map(|_| &counted[..]);
+        let compared = Compared { sums: &image[..], target: &target[..], counted };
         let sums = match self.loss {
-            PixelLoss::SquaredError => squared_error::<L>(image, target, first),
-            PixelLoss::Iou => overlap_and_union::<L>(image, target, first, second),
+            PixelLoss::SquaredError => squared_error::<L>(compared, first),
+            PixelLoss::Iou => overlap_and_union::<L>(compared, first, second),
         };
         let sums = [sums[0].sum(), sums[1].sum()];
         if self.whole {
-            let (_, [by_first, by_second]) = self.loss.of_sums(sums, self.target.len());
+            let (_, [by_first, by_second]) = self.loss.of_sums(sums, self.judged.target.len());
             let [by_first, by_second] = [L::splat(by_first), L::splat(by_second)];
             let pairs = first.as_chunks_mut().0.iter_mut().zip(second.as_chunks().0);
             for (first, second) in pairs {

@@ -26,7 +26,7 @@ mod walk;
 pub(crate) use bands::Bands;
 pub(crate) use float::Float;
 pub(crate) use list::rows_of_bands;
-pub(crate) use losses::{losses, rows_of_losses};
+pub(crate) use losses::{Judged, losses, rows_of_losses};
 pub(crate) use pairs::pairs;
 pub(crate) use pixel_loss::{EMPTY, PixelLoss};
 pub(crate) use reach::{FAR_AWAY, inside_spans};

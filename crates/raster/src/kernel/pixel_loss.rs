@@ -40,45 +40,65 @@ impl PixelLoss {
     }
 }
 
-/// `Σ (c - t)²` for the coverages `c = 1 - exp(-sum)`, lane by lane; `part` becomes half its derivatives by the sums.
+/// Sums of profiles over the pixels of a band, what they are compared with, and the share of each pixel that counts, unless all do.
+#[derive(Clone, Copy)]
+pub(super) struct Compared<'a, F> {
+    pub(super) sums: &'a [F],
+    pub(super) target: &'a [F],
+    pub(super) counted: Option<&'a [F]>,
+}
+
+impl<'a, F: Float> Compared<'a, F> {
+    /// Eight pixels at a time: the coverage `w (1 - exp(-sum))` of the share `w` that counts, its derivative by the sum, and the target.
+    #[inline(always)]
+    fn pixels<L: Lanes<Float = F>>(self) -> impl Iterator<Item = [L; 3]> + use<'a, F, L> {
+        let one = splat::<L>(1.0);
+        let pixels = self.sums.as_chunks().0.iter().zip(self.target.as_chunks().0);
+        let counted = self.counted.map(|counted| counted.as_chunks().0);
+        pixels.enumerate().map(move |(k, (sums, target))| {
+            let rest = L::of(sums).neg().exp();
+            let [coverage, slope] = match counted {
+                None => [one - rest, rest],
+                Some(counted) => [one - rest, rest].map(|number| number * L::of(&counted[k])),
+            };
+            [coverage, slope, L::of(target)]
+        })
+    }
+}
+
+/// `Σ (c - t)²` for coverages `c` and targets `t`, lane by lane; `part` becomes half its derivatives by the sums.
 #[inline(always)]
 pub(super) fn squared_error<L: Lanes>(
-    sums: &[L::Float],
-    target: &[L::Float],
+    compared: Compared<L::Float>,
     part: &mut [L::Float],
 ) -> [L; 2] {
-    let one = splat::<L>(1.0);
     let mut total = splat::<L>(0.0);
-    let pixels = sums.as_chunks().0.iter().zip(target.as_chunks().0);
-    for (part, (sums, target)) in part.as_chunks_mut().0.iter_mut().zip(pixels) {
-        let rest = L::of(sums).neg().exp();
-        let difference = one - rest - L::of(target);
+    let parts = part.as_chunks_mut().0.iter_mut();
+    for (part, [coverage, slope, target]) in parts.zip(compared.pixels::<L>()) {
+        let difference = coverage - target;
         total += difference * difference;
-        *part = (difference * rest).array();
+        *part = (difference * slope).array();
     }
     [total, splat(0.0)]
 }
 
-/// `Σ c t` and `Σ (c + t - c t)` for the coverages `c = 1 - exp(-sum)`, lane by lane, and the derivatives of each by the sums.
+/// `Σ c t` and `Σ (c + t - c t)` for coverages `c` and targets `t`, lane by lane, and the derivatives of each by the sums.
 #[inline(always)]
 pub(super) fn overlap_and_union<L: Lanes>(
-    sums: &[L::Float],
-    target: &[L::Float],
+    compared: Compared<L::Float>,
     to_overlap: &mut [L::Float],
     to_union: &mut [L::Float],
 ) -> [L; 2] {
     let one = splat::<L>(1.0);
     let (mut overlap, mut union) = (splat::<L>(0.0), splat::<L>(0.0));
-    let pixels = sums.as_chunks().0.iter().zip(target.as_chunks().0);
     let parts = to_overlap.as_chunks_mut().0.iter_mut().zip(to_union.as_chunks_mut().0);
-    for ((to_overlap, to_union), (sums, target)) in parts.zip(pixels) {
-        let (rest, target) = (L::of(sums).neg().exp(), L::of(target));
-        let coverage = one - rest;
+    let pixels = compared.pixels::<L>();
+    for ((to_overlap, to_union), [coverage, slope, target]) in parts.zip(pixels) {
         let both = coverage * target;
         overlap += both;
         union += coverage + target - both;
-        *to_overlap = (target * rest).array();
-        *to_union = ((one - target) * rest).array();
+        *to_overlap = (target * slope).array();
+        *to_union = ((one - target) * slope).array();
     }
     [overlap, union]
 }

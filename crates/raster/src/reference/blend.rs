@@ -1,7 +1,7 @@
 //! Colours of whole meshes, in tensor ops.
 
-use burn::tensor::{Bool, Int, Tensor, TensorData, backend::Backend};
 use softrast_softness::Softness;
+use softrast_tensor::{Backend, Bool, Int, Tensor, TensorData};
 
 use super::{Scene, between, chunks, corners, edge, lesser, places};
 use crate::{

@@ -5,11 +5,8 @@
 mod blend;
 mod step;
 
-use burn::{
-    backend::Autodiff,
-    tensor::{Int, Tensor, TensorData, backend::Backend},
-};
 use softrast_softness::Softness;
+use softrast_tensor::{Autodiff, Backend, Int, Tensor, TensorData};
 
 use crate::{ImageSize, NEAR, TConorm};
 pub use blend::blended;
@@ -66,7 +63,7 @@ pub fn signed_distance<B: Backend>(
 /// Signed distances of squared ones.
 fn signed<B: Backend>(
     distance2: Tensor<B, 3>,
-    inside: Tensor<B, 3, burn::tensor::Bool>,
+    inside: Tensor<B, 3, softrast_tensor::Bool>,
 ) -> Tensor<B, 3> {
     // Selected by the argument, so that neither the root nor its gradient meets 0.
     let on_edge = distance2.clone().lower_elem(ON_EDGE);
@@ -195,7 +192,7 @@ fn chunk_sums<B: Backend>(
 fn hidden<B: Backend>(
     vertices: Tensor<B, 3>,
     faces: &[[u32; 3]],
-) -> Tensor<B, 3, burn::tensor::Bool> {
+) -> Tensor<B, 3, softrast_tensor::Bool> {
     let [a, b, c] = corners(vertices, faces).map(|[_, _, depth]| depth.lower_elem(NEAR));
     a.bool_or(b).bool_or(c)
 }

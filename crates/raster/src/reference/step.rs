@@ -1,6 +1,6 @@
 //! What a step does around the sums: cameras and losses, in tensor ops. A GPU runs these.
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::{
     NEAR, RasterBackend,

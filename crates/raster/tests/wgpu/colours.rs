@@ -2,15 +2,12 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor},
-};
 use softrast_mesh::icosphere;
 use softrast_raster::{
     Attributes, Background, ColourRenderer, RasterBackend, Weighting, Wgpu, project,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
+use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
 
 use crate::{
     adapter,

@@ -11,14 +11,11 @@ mod workloads;
 
 use std::sync::Arc;
 
-use burn::{
-    backend::NdArray,
-    tensor::{DType, Tensor},
-};
 use products::{Path, Products, Scene, tensor};
 use softrast_mesh::{Mesh, fox, icosphere};
-use softrast_raster::{ImageSize, Rasterizer, Wgpu, adapter_name, project};
+use softrast_raster::{ImageSize, Wgpu, adapter_name, low_level::Rasterizer, project};
 use softrast_softness::{EdgeSoftness, Family, Softness};
+use softrast_tensor::{DType, NdArray, Tensor};
 
 /// Says which adapter the test runs on, or that it does not.
 fn adapter() -> bool {

@@ -2,12 +2,9 @@
 
 use std::sync::Arc;
 
-use burn::{
-    backend::{Autodiff, NdArray},
-    tensor::{DType, Tensor, TensorData, backend::Backend},
-};
-use softrast_raster::{ImageSize, RasterBackend, Rasterizer, TConorm, reference};
+use softrast_raster::{ImageSize, RasterBackend, TConorm, low_level::Rasterizer, reference};
 use softrast_softness::{EdgeSoftness, Softness};
+use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData};
 
 /// What is drawn, and how softly.
 pub(crate) struct Scene {

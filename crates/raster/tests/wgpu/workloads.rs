@@ -10,10 +10,10 @@ mod paper_mesh;
 #[path = "../../../../tests/support/workload.rs"]
 mod workload;
 
-use burn::{backend::NdArray, tensor::DType};
 use known_row::KnownRow;
-use softrast_raster::{Rasterizer, Wgpu};
+use softrast_raster::{Wgpu, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{DType, NdArray};
 use workload::Workload;
 
 use crate::{

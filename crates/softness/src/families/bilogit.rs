@@ -1,4 +1,4 @@
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use super::{logistic::Logistic, unit_step::UnitStep};
 use crate::{

@@ -1,6 +1,6 @@
 use std::ops::RangeInclusive;
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use super::half_line::{HalfLine, Law};
 use crate::math::{ln_gamma, parameter};
@@ -34,7 +34,7 @@ pub struct Gamma;
 /// The incomplete gamma function at one set of distances.
 struct Pieces<B: Backend, const D: usize> {
     /// Where the continued fraction serves.
-    far: Tensor<B, D, burn::tensor::Bool>,
+    far: Tensor<B, D, softrast_tensor::Bool>,
     /// `P(p, y)` where the series serves, 0 elsewhere.
     below: Tensor<B, D>,
     /// `dP/dy`.

@@ -1,6 +1,6 @@
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, PI};
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use super::unit_step::UnitStep;
 use crate::{

@@ -1,6 +1,6 @@
 use std::fmt::Debug;
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use crate::{
     Softness,

@@ -1,6 +1,6 @@
 use std::f64::consts::LN_2;
 
-use burn::tensor::{Tensor, backend::Backend};
+use softrast_tensor::{Backend, Tensor};
 
 use super::unit_step::UnitStep;
 use crate::math::magnitude;

@@ -1,11 +1,10 @@
 //! Colours where they fail: what lies behind shows through, or is not felt any more.
 
-use burn::{backend::Autodiff, tensor::Tensor};
 use pose::{Args, Range, colour::Coloured};
 use softrast_mesh::icosphere;
-use softrast_meta::{numbers, tensor};
 use softrast_raster::{Attributes, ColourRenderer, Weighting, mse_loss};
 use softrast_softness::{DepthSoftness, Family};
+use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
 use super::common::{ORIGINAL, PARAMETER, SCALE, levels, trials};
 use crate::{

@@ -1,12 +1,14 @@
 //! Meta-gradients through many steps.
 
-use burn::tensor::Tensor;
 use softrast_inverse::{ScaleSchedule, ScheduledSoftness};
-use softrast_meta::{
-    Adam, BilevelProblem, InnerLoop, MetaGradient, Objective, OuterSteps, numbers, tensor,
+use softrast_meta::{Adam, BilevelProblem, InnerLoop, MetaGradient, Objective, OuterSteps};
+use softrast_raster::{
+    RasterBackend,
+    low_level::{Rasterizer, Silhouette},
+    mse_loss,
 };
-use softrast_raster::{RasterBackend, Rasterizer, Silhouette, mse_loss};
 use softrast_softness::EdgeSoftness;
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::triangle::at_depth_2;
 use crate::{Case, Level, Tested, Trial, drawing::Exact, planar_scene::PlanarScene};

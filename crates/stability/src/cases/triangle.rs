@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Targets};
-use softrast_meta::{numbers, tensor};
-use softrast_raster::{RasterBackend, hard_silhouette, iou_loss, mse_loss};
+use softrast_raster::{RasterBackend, hard_silhouette, iou_loss};
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::common::{SCALE, levels};
 use crate::{
@@ -130,28 +129,28 @@ impl InverseProblem for Triangles {
         _: &Targets<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(at_depth_2(theta))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(at_depth_2(theta)).unsqueeze_dim(1)
     }
 
     fn hard_image<B: RasterBackend>(
         &self,
         targets: &Targets<B>,
         theta: Tensor<B, 1>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let [_, size, _] = targets.full().dims();
-        hard_silhouette(at_depth_2(theta), &self.flat.faces, size)
+        hard_silhouette(at_depth_2(theta), &self.flat.faces, size).unsqueeze_dim(1)
     }
 
     fn image_loss<B: RasterBackend>(
         &self,
         targets: &Targets<B>,
-        image: Tensor<B, 3>,
+        image: Tensor<B, 4>,
     ) -> Tensor<B, 1> {
-        let target = targets.of(&image);
+        let image = image.squeeze_dim(1);
         let loss = match self.loss {
-            Loss::Iou => iou_loss(image, target),
-            Loss::Mse => mse_loss(image, target),
+            Loss::Iou => targets.iou_loss(image),
+            Loss::Mse => targets.mse_loss(image),
         };
         loss * self.factor
     }

@@ -1,12 +1,11 @@
 //! Colours of faces that hide one another, by depth (Wu et al. 2024, Eq. 4).
 
-use burn::backend::Autodiff;
 use occlusion::{Args, Instance, Occlusion, Problem, Quad, Texture};
 use softrast_cli::{EdgeChoice, Task, Variant};
 use softrast_inverse::SolveConfig;
-use softrast_meta::{numbers, tensor};
 use softrast_raster::{Background, blend};
 use softrast_softness::{DepthSoftness, Family};
+use softrast_tensor::{Autodiff, numbers, tensor};
 use stability::{
     Level, Trial,
     cases::SCALE,

@@ -14,8 +14,8 @@ mod numbers;
 
 use std::sync::Arc;
 
-use softrast_meta::{numbers, tensor};
 use softrast_softness::{Family, Softness};
+use softrast_tensor::{numbers, tensor};
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,

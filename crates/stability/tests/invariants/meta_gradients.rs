@@ -1,10 +1,8 @@
 //! Meta-gradients: without any gradient, against differences, clipped, with broken instances.
 
-use burn::tensor::Tensor;
 use softrast_inverse::ScheduledSoftness;
-use softrast_meta::{
-    Adam, MetaGradient, OuterLoop, Progress, TaskDistribution, Validation, numbers, tensor,
-};
+use softrast_meta::{Adam, MetaGradient, OuterLoop, Progress, TaskDistribution, Validation};
+use softrast_tensor::{Tensor, numbers, tensor};
 use stability::{
     Level, Tested, Trial,
     cases::learning::{Inner, SIDE, SOFT, Triangles, disk, phi, problem, three},

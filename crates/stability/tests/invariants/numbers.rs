@@ -2,9 +2,9 @@
 
 use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness};
 use softrast_mesh::{Mesh, icosphere};
-use softrast_meta::{numbers, tensor};
-use softrast_raster::{RasterBackend, Rasterizer, project};
+use softrast_raster::{RasterBackend, low_level::Rasterizer, project};
 use softrast_softness::Softness;
+use softrast_tensor::{numbers, tensor};
 use stability::{
     Level, Tested, Trial,
     cases::SCALE,

@@ -1,11 +1,11 @@
-use burn::tensor::Tensor;
 use softrast_inverse::{
     SoftnessAt,
-    pose::{Coat, ColouredViews, PoseInstance, PoseScene, parted},
+    pose::{Coat, ColouredViews, PoseInstance, PoseScene, split_coverage},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Orbit, RasterBackend, project, vertices};
 use softrast_softness::Softness;
+use softrast_tensor::Tensor;
 
 /// Instances of POSE by colour that are solved together, one view each.
 ///
@@ -44,17 +44,17 @@ impl<B: RasterBackend> Scene<B> {
         &self.silhouettes
     }
 
-    /// The hard image to arrive at, `[4 views, size, size]`.
-    pub fn target(&self) -> Tensor<B, 3> {
+    /// The hard image to arrive at, `[views, 4, size, size]`.
+    pub fn target(&self) -> Tensor<B, 4> {
         self.colours.target(self.silhouettes.target())
     }
 
-    /// The soft image at θ under the softness of a step, `[4 views, side, side]`.
+    /// The soft image at θ under the softness of a step, `[views, 4, side, side]`.
     pub fn image(
         &self,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         self.image_with(theta, |seen| softness.silhouette(seen))
     }
 
@@ -63,7 +63,7 @@ impl<B: RasterBackend> Scene<B> {
         &self,
         theta: Tensor<B, 1>,
         silhouette: impl Fn(Tensor<B, 3>) -> Tensor<B, 3>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let theta = self.silhouettes.by_view(theta);
         let distance = theta.clone().narrow(1, 0, 1);
         let seen = self.silhouettes.project(theta);
@@ -71,15 +71,15 @@ impl<B: RasterBackend> Scene<B> {
         self.colours.image(seen, distance, coverage)
     }
 
-    /// The hard image at θ, `[4 views, size, size]`. It has no gradient.
-    pub fn hard(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    /// The hard image at θ, `[views, 4, size, size]`. It has no gradient.
+    pub fn hard(&self, theta: Tensor<B, 1>) -> Tensor<B, 4> {
         let seen = self.silhouettes.project(self.silhouettes.by_view(theta));
         self.colours.hard_image(seen.clone(), self.silhouettes.hard(seen))
     }
 
-    /// What is wrong with an image `[4 views, side, side]`, `[views]`: the `IoU` loss of its silhouette, and [`ColouredViews::loss`].
-    pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        let (colours, coverage) = parted(image);
+    /// What is wrong with an image `[views, 4, side, side]`, `[views]`: the `IoU` loss of its silhouette, and [`ColouredViews::loss`].
+    pub fn image_loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        let (colours, coverage) = split_coverage(image);
         self.silhouettes.image_loss(coverage) + self.colours.loss(colours)
     }
 }

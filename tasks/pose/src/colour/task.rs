@@ -1,6 +1,5 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use image::RgbImage;
 use softrast_cli::{
     Answer, Common, Description, EdgeChoice, Ended, Entry, Given, Measures, MethodArgs, Scales,
@@ -8,9 +7,9 @@ use softrast_cli::{
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, pose::PoseInstance};
 use softrast_lab::rgb_from_planes;
-use softrast_meta::numbers;
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers};
 
 use super::{Scene, coloured};
 use crate::{Args, Pictures, Pose, picture::outlined};
@@ -58,15 +57,15 @@ impl InverseProblem for Coloured {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         scene.image(theta, softness)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
         scene.hard(theta)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
         scene.image_loss(image)
     }
 

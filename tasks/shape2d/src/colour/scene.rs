@@ -1,12 +1,9 @@
 use std::sync::Arc;
 
-use burn::tensor::Tensor;
 use softrast_inverse::{SoftnessAt, Targets};
-use softrast_meta::{numbers, tensor};
-use softrast_raster::{
-    Attributes, ColourRenderer, RasterBackend, Weighting, mse_loss, nearest_faces,
-};
+use softrast_raster::{Attributes, ColourRenderer, RasterBackend, Weighting, nearest_faces};
 use softrast_softness::{DepthSoftness, Family, Softness};
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use crate::colour::{Colours, Start};
 
@@ -76,7 +73,7 @@ impl<B: RasterBackend> Scene<B> {
         Tensor::cat(vec![corners, colours.clamp(0.0, 1.0), nearness.clamp(0.0, 1.0)], 0)
     }
 
-    /// The soft image at θ under the softness of a step, `[3, side, side]`.
+    /// The soft image at θ under the softness of a step, `[1, 3, side, side]`.
     ///
     /// The weight of a triangle among those that overlap is its edge softness times its depth softness, so its depth is its opacity too:
     /// there is no other.
@@ -84,10 +81,10 @@ impl<B: RasterBackend> Scene<B> {
         &self,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let renderer = softness.colour_renderer(&self.faces, PLANES, DEPTH, DEPTH_SCALE);
         let tracked = softness.fixed_place().is_none().then(|| softness.edge().1);
-        self.drawn(theta, &renderer, softness.side(), tracked)
+        self.drawn(theta, &renderer, tracked)
     }
 
     /// [`image`](Self::image) at full size under the parameters `phi` of an edge softness, which get a gradient.
@@ -97,21 +94,20 @@ impl<B: RasterBackend> Scene<B> {
         edge: impl Softness,
         phi: Tensor<B, 1>,
         tolerance: f64,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let (faces, weighting) =
             (self.faces.clone(), Weighting { edge, depth: DEPTH, planes: PLANES });
         let values = [numbers(phi.clone()), DEPTH.default_phi(DEPTH_SCALE)];
         let renderer = ColourRenderer::with_weighting(faces, self.size, weighting, values);
-        self.drawn(theta, &renderer.with_tolerance(tolerance), self.size, Some(phi))
+        self.drawn(theta, &renderer.with_tolerance(tolerance), Some(phi))
     }
 
     fn drawn(
         &self,
         theta: Tensor<B, 1>,
         renderer: &ColourRenderer<impl Softness>,
-        side: usize,
         tracked: Option<Tensor<B, 1>>,
-    ) -> Tensor<B, 3> {
+    ) -> Tensor<B, 4> {
         let [corners, colours, nearness] = self.parts(theta);
         let vertices = self.vertices(corners, nearness);
         let colours = Attributes::of_faces(colours.reshape([1, self.faces.len(), 3]));
@@ -124,11 +120,11 @@ impl<B: RasterBackend> Scene<B> {
                 renderer.image_with(vertices, &colours, [&phi, &depth], &background)
             }
         };
-        image.narrow(1, 0, 3).reshape([3, side, side])
+        image.narrow(1, 0, 3)
     }
 
-    /// The hard image at θ, `[3, size, size]`: at each pixel the colour of the nearest triangle. It has no gradient.
-    pub fn hard(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    /// The hard image at θ, `[1, 3, size, size]`: at each pixel the colour of the nearest triangle. It has no gradient.
+    pub fn hard(&self, theta: Tensor<B, 1>) -> Tensor<B, 4> {
         let [corners, colours, nearness] = self.parts(theta);
         let vertices = self.vertices(corners, nearness).reshape([-1, 3]);
         let (colours, size) = (numbers(colours), self.size);
@@ -137,14 +133,13 @@ impl<B: RasterBackend> Scene<B> {
             face.map_or(self.background[k], |face| colours[3 * face as usize + k])
         };
         let planes = (0..3).flat_map(|k| nearest.iter().map(move |&face| level(k, face)));
-        tensor(planes.collect(), [3, size, size])
+        tensor(planes.collect(), [1, 3, size, size])
     }
 
-    /// Mean squared difference of `image` `[3, side, side]` to the picture, `[1]`; the side is the size of the scene, or that halved some
+    /// Mean squared difference of `image` `[1, 3, side, side]` to the picture, `[1]`; the side is the size of the scene, or that halved some
     /// times.
-    pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        let target = self.targets.of(&image);
-        mse_loss(image, target).mean()
+    pub fn image_loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        self.targets.mse_loss(image.squeeze_dim(0)).mean()
     }
 
     /// The hard image at θ as SVG: the background, and one polygon a triangle, the farthest first.
@@ -193,7 +188,8 @@ impl<B: RasterBackend> Scene<B> {
 #[cfg(test)]
 mod tests {
     use softrast_raster::HostBackend;
-    use softrast_softness::{Softness, vector};
+    use softrast_softness::Softness;
+    use softrast_tensor::vector;
 
     use super::*;
 

@@ -1,14 +1,14 @@
 use std::sync::Arc;
 
 use anyhow::ensure;
-use burn::tensor::Tensor;
-use softrast_inverse::{InverseProblem, MaskTargets, SoftnessAt, SolveConfig, Surface, View};
+use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Surface, Targets, View};
 use softrast_mesh::{Edges, Mesh, MeshError};
-use softrast_meta::{Adam, numbers, tensor};
+use softrast_meta::Adam;
 use softrast_raster::{
     HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole,
 };
 use softrast_softness::Softness;
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::hull::square;
 
@@ -80,16 +80,25 @@ impl InverseProblem for FromViews {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
         softness: &SoftnessAt<'_, B, impl Softness>,
-    ) -> Tensor<B, 3> {
-        softness.silhouette(scene.project(theta))
+    ) -> Tensor<B, 4> {
+        softness.silhouette(scene.project(theta)).unsqueeze_dim(1)
     }
 
-    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        hard_silhouette(scene.project(theta), &self.faces, scene.cameras.size)
+    fn hard_image<B: RasterBackend>(&self, scene: &Scene<B>, theta: Tensor<B, 1>) -> Tensor<B, 4> {
+        hard_silhouette(scene.project(theta), &self.faces, scene.cameras.size).unsqueeze_dim(1)
     }
 
-    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 3>) -> Tensor<B, 1> {
-        scene.targets.iou_loss(image).mean()
+    fn image_loss<B: RasterBackend>(&self, scene: &Scene<B>, image: Tensor<B, 4>) -> Tensor<B, 1> {
+        scene.targets.iou_loss(image.squeeze_dim(1)).mean()
+    }
+
+    fn loss_at<B: RasterBackend>(
+        &self,
+        scene: &Scene<B>,
+        theta: Tensor<B, 1>,
+        softness: &SoftnessAt<'_, B, impl Softness>,
+    ) -> Tensor<B, 1> {
+        softness.iou_loss(scene.project(theta), &scene.targets).mean()
     }
 
     fn regularizer<B: RasterBackend>(
@@ -119,7 +128,7 @@ pub(super) struct Scene<B: RasterBackend> {
     reach: f64,
     cameras: Pinholes<B>,
     surface: Surface<B>,
-    targets: MaskTargets<B>,
+    targets: Targets<B>,
 }
 
 impl<B: RasterBackend> Scene<B> {
@@ -136,7 +145,7 @@ impl<B: RasterBackend> Scene<B> {
             reach: *reach,
             cameras: Pinholes::new(&cameras, &Default::default()),
             surface: Surface::new(&edges, count),
-            targets: MaskTargets::new(looks().map(|(view, &square)| (&view.mask, square)), size),
+            targets: Targets::of_masks(looks().map(|(view, &square)| (&view.mask, square)), size),
         }
     }
 

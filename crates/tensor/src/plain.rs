@@ -1,6 +1,6 @@
 //! Tensors of plain numbers, in the float type of their backend whatever type the device defaults to.
 
-use burn::tensor::{Element, Tensor, TensorData, backend::Backend};
+use crate::{Backend, Element, Tensor, TensorData};
 
 /// A tensor of these values, row by row.
 ///

@@ -1,0 +1,60 @@
+//! Tensors, backends and automatic differentiation of softrast: those of burn 0.21.
+//!
+//! This is the only crate of the project that names burn, so that another release, or tensors of our own, are a change of one file.
+//! The types are burn's own: a tensor of burn 0.21 is a tensor here. Networks use burn's modules and optimisers through [`burn`].
+//!
+//! The Cargo features `ndarray`, `flex` and `wgpu` compile the backends of these names.
+//!
+//! ```
+//! use softrast_tensor::{Autodiff, NdArray, numbers, vector};
+//!
+//! let x = vector::<Autodiff<NdArray>>(&[1.0, 2.0]).require_grad();
+//! let gradients = (x.clone() * x.clone()).sum().backward();
+//! assert_eq!(numbers(x.grad(&gradients).unwrap()), [2.0, 4.0]);
+//! ```
+
+mod plain;
+
+#[doc(no_inline)]
+pub use burn;
+#[cfg(feature = "flex")]
+#[doc(no_inline)]
+pub use burn::backend::Flex;
+#[cfg(feature = "ndarray")]
+#[doc(no_inline)]
+pub use burn::backend::{NdArray, ndarray::NdArrayTensor};
+#[doc(no_inline)]
+pub use burn::{
+    backend::Autodiff,
+    tensor::{
+        Bool, DType, Element, ElementConversion, FloatDType, IndexingUpdateOp, Int, Shape, Slice,
+        Tensor, TensorData, TensorMetadata, TensorPrimitive, Transaction, activation,
+        backend::{AutodiffBackend, Backend},
+        ops::{FloatTensor, FloatTensorOps},
+        read_sync, try_read_sync,
+    },
+};
+pub use plain::{numbers, tensor, tensor_on, vector};
+
+/// What an op with a backward pass of its own is registered with.
+pub mod autodiff {
+    #[doc(no_inline)]
+    pub use burn::backend::autodiff::{
+        checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
+        grads::Gradients,
+        ops::{Backward, Ops, OpsKind},
+    };
+}
+
+/// The backend for GPUs, and what its kernels are written with.
+#[cfg(feature = "wgpu")]
+pub mod wgpu {
+    #[doc(no_inline)]
+    pub use burn::backend::wgpu::{
+        CubeBackend, CubeTensor, WgpuDevice, WgpuRuntime,
+        graphics::{AutoGraphicsApi, GraphicsApi},
+        init_setup, init_setup_async,
+    };
+    #[doc(no_inline)]
+    pub use burn_cubecl::{cubecl, kernel::into_contiguous, ops::numeric::zeros_client};
+}
