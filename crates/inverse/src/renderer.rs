@@ -1,11 +1,10 @@
-use std::{cell::RefCell, collections::BTreeMap, rc::Rc, sync::Arc};
+use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    ColourRenderer, RasterBackend, SoftRenderer, Weighting,
-    low_level::{Rasterizer, Silhouette},
+    ColourRenderer, RasterBackend, SoftRenderer, Weighting, low_level::Rasterizer,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
-use softrast_tensor::{Element, Tensor, TensorData, numbers, vector};
+use softrast_tensor::{Tensor, numbers, vector};
 
 use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 
@@ -25,8 +24,8 @@ pub struct ScheduledRenderer<S = EdgeSoftness> {
     resolution: Resolution,
     /// Renderers of silhouettes, if the problem has any.
     renderer: Option<SoftRenderer<S>>,
-    /// What was drawn with so far, by its place on the path.
-    kept: RefCell<BTreeMap<u64, Rc<Kept<S>>>>,
+    /// Those that drew so far, by their place on the path, each with its table.
+    placed: RefCell<BTreeMap<u64, SoftRenderer<S>>>,
     /// The latest renderer of colours.
     colours: RefCell<Option<Colours<S>>>,
 }
@@ -37,15 +36,6 @@ struct Colours<S> {
     faces: Arc<[[u32; 3]]>,
     side: usize,
     renderer: ColourRenderer<S>,
-}
-
-/// What draws at a step, always the same: tables belong to its knots.
-#[derive(Debug)]
-struct Kept<S> {
-    /// As they are seen, and as their gradient has it, if that is another.
-    silhouettes: Vec<Silhouette<S>>,
-    /// Their tables of the values, one below the other, `[rows, 4]`.
-    table: TensorData,
 }
 
 impl<S: Softness> ScheduledRenderer<S> {
@@ -62,8 +52,8 @@ impl<S: Softness> ScheduledRenderer<S> {
         let renderer = faces.map(|faces| values.renderer_at(0.0, rasterizer, faces));
         let (size, tolerance) = (rasterizer.size.shorter(), rasterizer.tolerance);
         let phi = phi.to_vec();
-        let (kept, colours) = (RefCell::default(), RefCell::default());
-        Self { layout, phi, values, own, size, tolerance, resolution, renderer, kept, colours }
+        let (placed, colours) = (RefCell::default(), RefCell::default());
+        Self { layout, phi, values, own, size, tolerance, resolution, renderer, placed, colours }
     }
 
     /// The softness at a step of which nothing is differentiated by φ.
@@ -96,9 +86,12 @@ impl<S: Softness> ScheduledRenderer<S> {
             let parts = [self.layout.phi(phi, step), self.layout.own(phi)];
             return Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0);
         }
+        let renderer = self.silhouettes::<B>(self.layout.part(step));
+        let own = [Some(&renderer), renderer.surrogate()].into_iter().flatten();
         let phi = [self.layout.phi(phi, step)].into_iter().chain(self.layout.surrogate(phi, step));
-        let kept = self.kept::<B>(self.layout.part(step));
-        let tables = kept.silhouettes.iter().zip(phi).map(|(of, phi)| of.table(phi).flatten(0, 1));
+        // By the knots of the values: nothing is read from the device.
+        let table = |(of, phi): (&SoftRenderer<S>, _)| of.prepared::<B>(of.phi()).table(phi);
+        let tables = own.zip(phi).map(|both| table(both).flatten(0, 1));
         Tensor::cat(tables.collect(), 0)
     }
 
@@ -133,29 +126,20 @@ impl<S: Softness> ScheduledRenderer<S> {
         self.resolution.side(self.size, self.values.width_at(part, self.layout.size()))
     }
 
+    /// What draws silhouettes at a part of the path.
+    ///
     /// # Panics
     ///
     /// If the problem has no faces.
-    fn kept<B: RasterBackend>(&self, part: f64) -> Rc<Kept<S>> {
-        let mut kept = self.kept.borrow_mut();
-        let kept = kept.entry(self.place(part)).or_insert_with(|| {
-            let renderer =
-                self.renderer.as_ref().expect("a problem that sees silhouettes has faces");
-            let renderers = [Some(renderer), renderer.surrogate()].into_iter().flatten();
+    fn silhouettes<B: RasterBackend>(&self, part: f64) -> SoftRenderer<S> {
+        let renderer = self.renderer.as_ref().expect("a problem that sees silhouettes has faces");
+        let mut placed = self.placed.borrow_mut();
+        let placed = placed.entry(self.place(part)).or_insert_with(|| {
             let size = self.layout.size();
             let surrogate = self.values.surrogate_at(part, size).map(|found| found.phi);
-            let phi = [self.values.phi_at(part, size)].into_iter().chain(surrogate);
-            let mut table = Vec::new();
-            let silhouettes = renderers.zip(phi).map(|(renderer, phi)| {
-                let silhouette = renderer.prepared::<B>(&phi);
-                table.extend(silhouette.table_data(&phi).iter::<f64>());
-                silhouette
-            });
-            let silhouettes = silhouettes.collect();
-            let rows = table.len() / 4;
-            Rc::new(Kept { silhouettes, table: TensorData::new(table, [rows, 4]) })
+            renderer.with_phi::<B>(self.values.phi_at(part, size), surrogate)
         });
-        kept.clone()
+        placed.sized(self.side(part))
     }
 }
 
@@ -177,23 +161,17 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     ///
     /// If the problem has no faces.
     pub fn silhouette(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
-        let kept = self.renderer.kept::<B>(self.part);
-        let table = match &self.prepared {
-            Some(table) => table.clone().reshape([-1, 4]),
-            None => {
-                let options = (&vertices.device(), <B::FloatElem as Element>::dtype());
-                Tensor::from_data(kept.table.clone(), options)
-            }
-        };
-        let side = self.renderer.side(self.part);
-        let seen = kept.silhouettes[0].clone().sized(side);
-        let Some(surrogate) = kept.silhouettes.get(1) else {
+        let renderer = self.renderer.silhouettes::<B>(self.part);
+        let Some(prepared) = &self.prepared else { return renderer.silhouette(vertices) };
+        let (seen, table) = (renderer.prepared::<B>(renderer.phi()), prepared.clone());
+        let table = table.reshape([-1, 4]);
+        let Some(surrogate) = renderer.surrogate() else {
             return seen.coverage_by_table(vertices, table);
         };
         let ([rows, _], own) = (table.dims(), seen.profile().knots());
         let below = table.clone().narrow(0, own, rows - own);
-        let table = table.narrow(0, 0, own);
-        seen.coverage_with_surrogate(vertices, table, &surrogate.clone().sized(side), below)
+        let surrogate = surrogate.prepared::<B>(surrogate.phi());
+        seen.coverage_with_surrogate(vertices, table.narrow(0, 0, own), &surrogate, below)
     }
 
     /// The [`Targets::iou_loss`] `[views]` of the [`silhouette`](Self::silhouette): in one op where nothing is differentiated by φ and there is
@@ -203,13 +181,12 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     ///
     /// If the problem has no faces, or there is no target of this many pixels.
     pub fn iou_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
-        match self.alone(&vertices) {
-            Some((seen, table)) => {
-                let (target, counted) = targets.at(self.side());
-                seen.iou_loss_by_table(vertices, table, target, counted)
-            }
-            None => targets.iou_loss(self.silhouette(vertices)),
+        if self.prepared.is_some() {
+            return targets.iou_loss(self.silhouette(vertices));
         }
+        let (target, counted) = targets.at(self.side());
+        let renderer = self.renderer.silhouettes::<B>(self.part);
+        renderer.weighted_iou_loss(vertices, target, counted)
     }
 
     /// The [`Targets::mse_loss`] `[views]`, likewise.
@@ -218,24 +195,12 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     ///
     /// If the problem has no faces, or there is no target of this many pixels.
     pub fn mse_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
-        match self.alone(&vertices) {
-            Some((seen, table)) => {
-                let (target, counted) = targets.at(self.side());
-                seen.mse_loss_by_table(vertices, table, target, counted)
-            }
-            None => targets.mse_loss(self.silhouette(vertices)),
+        if self.prepared.is_some() {
+            return targets.mse_loss(self.silhouette(vertices));
         }
-    }
-
-    /// What draws, and its table, if only vertices have a gradient, and the image's own.
-    fn alone(&self, vertices: &Tensor<B, 3>) -> Option<(Silhouette<S>, Tensor<B, 2>)> {
-        let kept = self.renderer.kept::<B>(self.part);
-        if self.prepared.is_some() || kept.silhouettes.len() > 1 {
-            return None;
-        }
-        let options = (&vertices.device(), <B::FloatElem as Element>::dtype());
-        let table = Tensor::from_data(kept.table.clone(), options);
-        Some((kept.silhouettes[0].clone().sized(self.side()), table))
+        let (target, counted) = targets.at(self.side());
+        let renderer = self.renderer.silhouettes::<B>(self.part);
+        renderer.weighted_mse_loss(vertices, target, counted)
     }
 
     /// Pixels a side of the image.

@@ -1,4 +1,4 @@
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness};
 use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
@@ -6,6 +6,7 @@ use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 use crate::{
     Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
     backend::{fused, primitive},
+    cache::Cache,
     curve::precise,
     fused::FusedOp,
     kernel::blend::OF_TEXEL,
@@ -60,12 +61,12 @@ pub struct ColourRenderer<S = EdgeSoftness> {
     weighting: Weighting<S>,
     phi: [Vec<f64>; 2],
     tolerance: f64,
-    kept: Arc<Mutex<Option<Prepared<S>>>>,
+    cache: Cache<Prepared<S>>,
     #[cfg(feature = "wgpu")]
     topology: crate::gpu::Topology,
 }
 
-/// What the last image needed and the next one may need again.
+/// Knots for the parameters `phi`.
 #[derive(Clone, Debug)]
 struct Prepared<S> {
     phi: [Vec<f64>; 2],
@@ -73,8 +74,6 @@ struct Prepared<S> {
     log_weight: f64,
     edge: LogCurve<S>,
     depth: DepthCurve,
-    /// The tables of the renderer's own parameters.
-    tables: Option<([Vec<f64>; 2], TensorData)>,
 }
 
 impl ColourRenderer {
@@ -121,14 +120,14 @@ impl<S: Softness> ColourRenderer<S> {
         let [near, far] = weighting.planes;
         assert!(near < far, "the near plane {near} is not nearer than the far plane {far}");
         check(&weighting, &phi);
-        let (tolerance, kept) = (Rasterizer::TOLERANCE, Arc::default());
+        let tolerance = Rasterizer::TOLERANCE;
         Self {
             faces,
             size,
             weighting,
             phi,
             tolerance,
-            kept,
+            cache: Cache::default(),
             #[cfg(feature = "wgpu")]
             topology: Default::default(),
         }
@@ -142,7 +141,7 @@ impl<S: Softness> ColourRenderer<S> {
     #[must_use]
     pub fn with_tolerance(mut self, tolerance: f64) -> Self {
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
-        (self.tolerance, self.kept) = (tolerance, Arc::default());
+        (self.tolerance, self.cache) = (tolerance, Cache::default());
         self
     }
 
@@ -154,7 +153,7 @@ impl<S: Softness> ColourRenderer<S> {
     #[must_use]
     pub fn with_depth(mut self, depth: DepthSoftness, scale: f64) -> Self {
         (self.weighting.depth, self.phi[1]) = (depth, depth.default_phi(scale));
-        self.kept = Arc::default();
+        self.cache = Cache::default();
         self
     }
 
@@ -217,24 +216,12 @@ impl<S: Softness> ColourRenderer<S> {
         background: &Background<B>,
     ) -> Tensor<B, 4> {
         let (device, dtype) = (vertices.device(), vertices.dtype());
-        let mut prepared = self.prepared(&self.phi, number(background));
-        let data = match prepared.tables.take() {
-            Some((phi, data)) if phi == self.phi => data,
-            _ => {
-                // In f64, whatever it is drawn with: rounding of an f32 shows in the tables of some families.
-                let precise = |phi: &Vec<f64>| precise::<HostBackend>(phi, &Default::default());
-                let data = prepared.tables(self.phi.each_ref().map(precise)).into_data();
-                // Another thread may have prepared something else in between.
-                let own = |kept: &&mut Prepared<S>| {
-                    let same = kept.phi == prepared.phi && kept.depth == prepared.depth;
-                    same && kept.edge.grid() == prepared.edge.grid()
-                };
-                if let Some(kept) = self.kept().as_mut().filter(own) {
-                    kept.tables = Some((self.phi.clone(), data.clone()));
-                }
-                data
-            }
-        };
+        let prepared = self.prepared(&self.phi, number(background));
+        let data = self.cache.table(&prepared, || {
+            // In f64, whatever it is drawn with: rounding of an f32 shows in the tables of some families.
+            let precise = |phi: &Vec<f64>| precise::<HostBackend>(phi, &Default::default());
+            prepared.tables(self.phi.each_ref().map(precise)).into_data()
+        });
         let tables = Tensor::from_data(data, (&device, dtype));
         self.drawn(&prepared, vertices, attributes, tables, background)
     }
@@ -319,23 +306,14 @@ impl<S: Softness> ColourRenderer<S> {
     /// Knots for these parameters and this logarithm of the background's weight.
     fn prepared(&self, phi: &[Vec<f64>; 2], log_weight: f64) -> Prepared<S> {
         assert!(log_weight.is_finite(), "log weight {log_weight}");
-        if let Some(prepared) = self.kept().as_ref().filter(|kept| log_weight >= kept.log_weight) {
-            if prepared.phi == *phi {
-                return prepared.clone();
-            }
-            // What was chosen first stays, so that no rounding piles up.
-            if let Some(stretched) = prepared.stretched_to(&self.weighting, phi) {
-                return stretched;
-            }
-        }
-        // Without the lock: other threads of a pool may take up work in between, and ask for the same.
+        let reused = |last: &Prepared<S>| {
+            (log_weight >= last.log_weight)
+                .then(|| last.stretched_to(&self.weighting, phi))
+                .flatten()
+        };
         let (faces, tolerance) = (self.faces.len(), self.tolerance);
-        let prepared = Prepared::new(&self.weighting, phi, faces, tolerance, log_weight);
-        self.kept().insert(prepared).clone()
-    }
-
-    fn kept(&self) -> MutexGuard<'_, Option<Prepared<S>>> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        let choose = || Prepared::new(&self.weighting, phi, faces, tolerance, log_weight);
+        self.cache.knots(reused, choose)
     }
 }
 
@@ -370,11 +348,14 @@ impl<S: Softness> Prepared<S> {
         let by_edge = Precision { least: least - highest, floor, ..by_depth };
         let edge = LogCurve::new::<HostBackend>(weighting.edge.clone(), edge, by_edge, &device);
         let depth = DepthCurve::new::<HostBackend>(weighting.depth, depth, by_depth, &device);
-        Self { phi: phi.clone(), log_weight, edge, depth, tables: None }
+        Self { phi: phi.clone(), log_weight, edge, depth }
     }
 
     /// Knots for parameters `phi`, if their softnesses are the prepared ones stretched.
     fn stretched_to(&self, weighting: &Weighting<S>, phi: &[Vec<f64>; 2]) -> Option<Self> {
+        if self.phi == *phi {
+            return Some(self.clone());
+        }
         let [edge, depth] = &self.phi;
         let edge = self.edge.stretched(stretch(&weighting.edge, edge, &phi[0])?)?;
         let depth = match (self.depth, weighting.depth) {
@@ -385,11 +366,18 @@ impl<S: Softness> Prepared<S> {
             (curve, _) if *depth == phi[1] => curve,
             _ => return None,
         };
-        Some(Self { edge, depth, tables: None, ..self.clone() })
+        Some(Self { phi: phi.clone(), edge, depth, ..*self })
     }
 
     fn tables<B: Backend>(&self, [edge, depth]: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
         tables(self.edge.table(edge), self.depth.table(depth))
+    }
+}
+
+impl<S: Softness> PartialEq for Prepared<S> {
+    fn eq(&self, other: &Self) -> bool {
+        let curves = |of: &Self| (of.edge.grid(), of.depth);
+        self.phi == other.phi && curves(self) == curves(other)
     }
 }
 

@@ -26,6 +26,7 @@ compile_error!("softrast-raster needs a backend: turn on one of the features nda
 mod attributes;
 mod backend;
 mod backend_choice;
+mod cache;
 mod camera;
 mod colour;
 mod colour_renderer;

@@ -43,12 +43,17 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
 }
 
 impl PixelLoss {
-    /// The loss of each view.
+    /// The loss of each view, where a share of each pixel of the image counts, or all of it.
     pub(crate) fn of_images<B: RasterBackend>(
         self,
         image: Tensor<B, 3>,
         target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
+        let image = match counted {
+            Some(counted) => image * counted,
+            None => image,
+        };
         match self {
             Self::SquaredError => mse_loss(image, target),
             Self::Iou => iou_loss(image, target),

@@ -170,12 +170,7 @@ impl<S: Softness> Silhouette<S> {
         let (table, target) = (table.detach(), target.detach());
         let counted = counted.map(Tensor::detach);
         if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
-            let coverage = self.coverage_by_table(vertices, table);
-            let coverage = match counted {
-                Some(counted) => coverage * counted,
-                None => coverage,
-            };
-            return loss.of_images(coverage, target);
+            return loss.of_images(self.coverage_by_table(vertices, table), target, counted);
         }
         silhouette_loss(&self.op, loss, vertices, table, target, counted)
     }

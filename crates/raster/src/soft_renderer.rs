@@ -1,10 +1,10 @@
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
 
 use crate::{
-    HostBackend, ImageSize, Profile, RasterBackend, Rasterizer, Silhouette, TConorm,
+    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, cache::Cache,
     kernel::PixelLoss,
 };
 
@@ -38,31 +38,16 @@ pub struct SoftRenderer<S> {
     softness: S,
     phi: Vec<f64>,
     surrogate: Option<Box<Self>>,
-    kept: Arc<Mutex<Kept<S>>>,
+    cache: Cache<Knots<S>>,
 }
 
-/// What the last image needed and the next one may need again.
-#[derive(Debug)]
-struct Kept<S> {
-    prepared: Option<Prepared<S>>,
-    table: Option<Table>,
-}
-
-/// Support and knots, for the parameters `phi` and others of the same shape.
-#[derive(Debug)]
-struct Prepared<S> {
+/// Support and knots for the parameters `phi`.
+#[derive(Clone, Debug)]
+struct Knots<S> {
     phi: Vec<f64>,
     /// Whether it is drawn on the CPU, and in which float type.
     drawn: (bool, DType),
     silhouette: Silhouette<S>,
-}
-
-/// The table of the parameters `phi` at the knots of a profile.
-#[derive(Debug)]
-struct Table {
-    phi: Vec<f64>,
-    profile: Profile,
-    data: TensorData,
 }
 
 impl<S: Softness> SoftRenderer<S> {
@@ -91,7 +76,7 @@ impl<S: Softness> SoftRenderer<S> {
         assert!(rasterizer.size.pixels() > 0, "an image needs at least one pixel");
         assert!(!faces.is_empty(), "a silhouette needs at least one face");
         check(&softness, &phi);
-        Self { rasterizer, faces, softness, phi, surrogate: None, kept: Arc::default() }
+        Self { rasterizer, faces, softness, phi, surrogate: None, cache: Cache::default() }
     }
 
     /// With another largest error of a pixel, in (0, 1); see [`Profile::new`](crate::low_level::Profile::new).
@@ -203,27 +188,60 @@ impl<S: Softness> SoftRenderer<S> {
         self.drawn(&silhouette, vertices, table)
     }
 
+    /// The same on images of another size. They share knots and tables.
+    ///
+    /// # Panics
+    ///
+    /// If the image is empty.
+    #[must_use]
+    pub fn sized(&self, size: impl Into<ImageSize>) -> Self {
+        let size = size.into();
+        assert!(size.pixels() > 0, "an image needs at least one pixel");
+        let rasterizer = Rasterizer { size, ..self.rasterizer };
+        let surrogate = self.surrogate.as_ref().map(|surrogate| Box::new(surrogate.sized(size)));
+        Self { rasterizer, surrogate, ..self.clone() }
+    }
+
+    /// The same under other parameters, of the surrogate too if there is one. It begins with knots that follow from those of this one, and
+    /// has a table of its own.
+    ///
+    /// # Panics
+    ///
+    /// If there are more or fewer parameters than the softnesses have, or parameters of a surrogate that there is not.
+    #[must_use]
+    pub fn with_phi<B: RasterBackend>(
+        &self,
+        phi: Vec<f64>,
+        surrogate_phi: Option<Vec<f64>>,
+    ) -> Self {
+        let surrogate = match (&self.surrogate, surrogate_phi) {
+            (Some(surrogate), Some(phi)) => Some(Box::new(surrogate.with_phi::<B>(phi, None))),
+            (None, None) => None,
+            _ => panic!("parameters of a surrogate belong to a renderer that has one"),
+        };
+        let cache = Cache::beginning_with(self.knots::<B>(&phi));
+        Self { phi, surrogate, cache, ..self.clone() }
+    }
+
     /// What draws under parameters `phi`, with support and knots for them.
     ///
     /// # Panics
     ///
     /// If `phi` has the wrong length.
     pub fn prepared<B: RasterBackend>(&self, phi: &[f64]) -> Silhouette<S> {
+        self.knots::<B>(phi).silhouette.sized(self.rasterizer.size)
+    }
+
+    fn knots<B: RasterBackend>(&self, phi: &[f64]) -> Knots<S> {
         check(&self.softness, phi);
         let drawn = (B::ON_HOST, <B::FloatElem as Element>::dtype());
-        let kept = |kept: &Kept<S>| {
-            let prepared = kept.prepared.as_ref().filter(|it| it.drawn == drawn);
-            prepared.and_then(|prepared| prepared.stretched_to(phi))
-        };
-        if let Some(silhouette) = kept(&self.kept()) {
-            return silhouette;
-        }
-        // Without the lock: other threads of a pool may take up work in between, and ask for the same.
-        let (faces, softness) = (&self.faces, self.softness.clone());
-        let silhouette = self.rasterizer.prepare_on::<B, HostBackend, S>(faces, softness, phi);
-        let prepared = silhouette.clone();
-        self.kept().prepared = Some(Prepared { phi: phi.to_vec(), drawn, silhouette: prepared });
-        silhouette
+        let reused =
+            |knots: &Knots<S>| (knots.drawn == drawn).then(|| knots.stretched_to(phi)).flatten();
+        self.cache.knots(reused, || {
+            let (faces, softness) = (&self.faces, self.softness.clone());
+            let silhouette = self.rasterizer.prepare_on::<B, HostBackend, S>(faces, softness, phi);
+            Knots { phi: phi.to_vec(), drawn, silhouette }
+        })
     }
 
     /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of the
@@ -240,7 +258,7 @@ impl<S: Softness> SoftRenderer<S> {
         vertices: Tensor<B, 3>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, target)
+        self.loss(PixelLoss::SquaredError, vertices, target, None)
     }
 
     /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
@@ -253,7 +271,36 @@ impl<S: Softness> SoftRenderer<S> {
         vertices: Tensor<B, 3>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, target)
+        self.loss(PixelLoss::Iou, vertices, target, None)
+    }
+
+    /// [`mse_loss`](Self::mse_loss) where a share of each pixel counts, `[1 or views, height, width]` in [0, 1]: the coverage is multiplied by
+    /// it. Without one, all of every pixel counts.
+    ///
+    /// # Panics
+    ///
+    /// If the target or the shares are of another size.
+    pub fn weighted_mse_loss<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
+    ) -> Tensor<B, 1> {
+        self.loss(PixelLoss::SquaredError, vertices, target, counted)
+    }
+
+    /// [`iou_loss`](Self::iou_loss), likewise.
+    ///
+    /// # Panics
+    ///
+    /// If the target or the shares are of another size.
+    pub fn weighted_iou_loss<B: RasterBackend>(
+        &self,
+        vertices: Tensor<B, 3>,
+        target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
+    ) -> Tensor<B, 1> {
+        self.loss(PixelLoss::Iou, vertices, target, counted)
     }
 
     fn loss<B: RasterBackend>(
@@ -261,12 +308,14 @@ impl<S: Softness> SoftRenderer<S> {
         loss: PixelLoss,
         vertices: Tensor<B, 3>,
         target: Tensor<B, 3>,
+        counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
         if self.surrogate.is_some() {
-            return loss.of_images(self.silhouette(vertices), target.detach());
+            let counted = counted.map(Tensor::detach);
+            return loss.of_images(self.silhouette(vertices), target.detach(), counted);
         }
         let (silhouette, table) = self.own_table(&vertices);
-        silhouette.loss(loss, vertices, table, target, None)
+        silhouette.loss(loss, vertices, table, target, counted)
     }
 
     fn drawn<B: RasterBackend>(
@@ -287,36 +336,35 @@ impl<S: Softness> SoftRenderer<S> {
         &self,
         vertices: &Tensor<B, 3>,
     ) -> (Silhouette<S>, Tensor<B, 2>) {
-        let silhouette = self.prepared::<B>(&self.phi);
-        let profile = *silhouette.profile();
-        let is_of = |table: &&Table| table.phi == self.phi && table.profile == profile;
-        let kept = self.kept().table.as_ref().filter(is_of).map(|table| table.data.clone());
-        let data = kept.unwrap_or_else(|| {
-            let data = silhouette.table_data(&self.phi);
-            let table = Table { phi: self.phi.clone(), profile, data: data.clone() };
-            self.kept().table = Some(table);
-            data
-        });
-        (silhouette, Tensor::from_data(data, (&vertices.device(), vertices.dtype())))
-    }
-
-    fn kept(&self) -> MutexGuard<'_, Kept<S>> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+        let knots = self.knots::<B>(&self.phi);
+        let data = self.cache.table(&knots, || knots.silhouette.table_data(&self.phi));
+        let table = Tensor::from_data(data, (&vertices.device(), vertices.dtype()));
+        (knots.silhouette.sized(self.rasterizer.size), table)
     }
 
     fn changed(mut self, change: impl Fn(&mut Rasterizer) + Copy) -> Self {
         change(&mut self.rasterizer);
-        self.kept = Arc::default();
+        self.cache = Cache::default();
         self.surrogate = self.surrogate.map(|surrogate| Box::new(surrogate.changed(change)));
         self
     }
 }
 
-impl<S: Softness> Prepared<S> {
-    /// What draws under parameters `phi`, if their softness is the prepared one stretched.
-    fn stretched_to(&self, phi: &[f64]) -> Option<Silhouette<S>> {
+impl<S: Softness> Knots<S> {
+    /// Those for parameters `phi`, if their softness is that of these stretched.
+    fn stretched_to(&self, phi: &[f64]) -> Option<Self> {
+        if self.phi == phi {
+            return Some(self.clone());
+        }
         let widened = stretch(self.silhouette.softness(), &self.phi, phi)?;
-        self.silhouette.stretched(widened)
+        let silhouette = self.silhouette.stretched(widened)?;
+        Some(Self { phi: phi.to_vec(), silhouette, ..*self })
+    }
+}
+
+impl<S: Softness> PartialEq for Knots<S> {
+    fn eq(&self, other: &Self) -> bool {
+        self.phi == other.phi && self.silhouette.profile() == other.silhouette.profile()
     }
 }
 
@@ -326,12 +374,6 @@ pub(crate) fn stretch(softness: &impl Softness, before: &[f64], now: &[f64]) -> 
     let stretched = softness.with_scale_values(before, factor);
     let same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs().max(1.0);
     stretched.iter().zip(now).all(same).then(|| softness.width(now) / softness.width(before))
-}
-
-impl<S> Default for Kept<S> {
-    fn default() -> Self {
-        Self { prepared: None, table: None }
-    }
 }
 
 fn check(softness: &impl Softness, phi: &[f64]) {
