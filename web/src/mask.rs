@@ -44,7 +44,7 @@ impl<B: RasterBackend> MaskRun<B> {
         PoseSearch::check(mesh, &mask, &camera, false)?;
         let (method, config) =
             settings.method("mask", PoseSearch::default().fine().learning_rate)?;
-        let square = mask.looked_at()?;
+        let square = mask.view_square()?;
         Ok(Self {
             mesh: mesh.clone(),
             mask,

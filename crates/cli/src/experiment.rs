@@ -58,7 +58,7 @@ impl<T: Task> TaskExperiment<T> {
         let task = T::new(args, common.variant, &edges)?;
         let mut method = method_args.method(T::NAME, &T::SCALES, preset_by_default)?;
         if !T::MOVES_EDGES {
-            refuse_what_edges_that_stay_do_not_know(method_args)?;
+            reject_moving_edge_flags(method_args)?;
             method.softness.surrogate = None;
         }
         if task.faces().is_none() {
@@ -113,7 +113,7 @@ impl<T: Task> TaskExperiment<T> {
             set("resolution", self.method.resolution.to_string().into());
             set("tolerance", self.method.tolerance().into());
         }
-        if T::FITS.is_finite() {
+        if T::RESTART_ABOVE.is_finite() {
             set("starts", self.starts.into());
         }
         let schedule = match (softness.is_constant(), softness.feedback) {
@@ -319,7 +319,7 @@ impl<T: Task> Experiment for TaskExperiment<T> {
         let instances = instances.collect::<anyhow::Result<Vec<_>>>()?;
         let mut kept = self.solve_once(&instances, batch, progress)?;
         for start in 1..self.starts {
-            let again = (0..kept.len()).filter(|&k| kept[k].hard() > T::FITS);
+            let again = (0..kept.len()).filter(|&k| kept[k].hard() > T::RESTART_ABOVE);
             let again = again
                 .filter_map(|k| Some((k, self.task.restart(&instances[k], start, self.starts)?)));
             let (places, others): (Vec<_>, Vec<_>) = again.unzip();
@@ -357,7 +357,7 @@ impl Solved {
     }
 }
 
-fn refuse_what_edges_that_stay_do_not_know(method: &MethodArgs) -> anyhow::Result<()> {
+fn reject_moving_edge_flags(method: &MethodArgs) -> anyhow::Result<()> {
     let given = [
         (method.resolution.is_some_and(|asked| asked != Resolution::Full), "--resolution"),
         (method.tolerance.is_some(), "--tolerance"),

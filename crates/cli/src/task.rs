@@ -33,7 +33,7 @@ pub trait Task: InverseProblem + Sized {
     const MOVES_EDGES: bool = true;
 
     /// Errors of hard images above this say that another start is worth its time.
-    const FITS: f64 = f64::INFINITY;
+    const RESTART_ABOVE: f64 = f64::INFINITY;
 
     /// Flags that only this task has; [`NoArgs`] for none.
     type Args: clap::Args + Clone;

@@ -61,7 +61,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
     }
 
     /// The part of φ that is the softness, and what steps the inner loop.
-    pub(crate) fn parted<'a>(&self, phi: &'a [f64]) -> (&'a [f64], Adam) {
+    pub(crate) fn split_phi<'a>(&self, phi: &'a [f64]) -> (&'a [f64], Adam) {
         match phi.split_last().filter(|_| self.config.learn_rate) {
             Some((rate, softness)) => (softness, self.problem.optimizer(rate.exp())),
             None => (phi, self.problem.optimizer(self.solve.learning_rate)),
@@ -83,7 +83,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
 
     /// The instance of a seed, with the inner loss as the outer one if `own`, else by what the configuration says.
     fn made(&self, seed: u64, phi: &[f64], own: bool) -> InstanceProblem<P, B, S> {
-        let (softness, optimizer) = self.parted(phi);
+        let (softness, optimizer) = self.split_phi(phi);
         let (problem, renderer) = (&self.problem, self.renderer(softness));
         let instance = problem.instance(seed).expect("instances of all seeds can be made");
         let instance = std::slice::from_ref(&instance);
@@ -110,13 +110,13 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         if self.config.outer_loss == Some(OuterLoss::Returned) {
             return self.returned(seed, &phi).sqrt();
         }
-        let (softness, _) = self.parted(&phi);
+        let (softness, _) = self.split_phi(&phi);
         self.made(seed, &phi, own).loss(&vector(softness))
     }
 
     /// The least hard error of a whole run; not a number where none is finite.
     fn returned(&self, seed: u64, phi: &[f64]) -> f64 {
-        let (softness, Adam { learning_rate, .. }) = self.parted(phi);
+        let (softness, Adam { learning_rate, .. }) = self.split_phi(phi);
         let (softness, _) = self.layout.softness(softness);
         let tolerance = Some(self.tolerance);
         let method = Method { tolerance, ..Method::new("learned", softness) };

@@ -5,7 +5,9 @@ use softrast_raster::{HostBackend, RasterBackend, low_level::Rasterizer};
 use softrast_softness::Softness;
 use softrast_tensor::{Autodiff, Backend, Tensor, TensorData, Transaction, numbers};
 
-use crate::{InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::lowered};
+use crate::{
+    InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::total_loss,
+};
 
 /// All instances after some steps.
 #[derive(Clone, Debug)]
@@ -20,7 +22,7 @@ pub struct Iterate {
     pub scale: f64,
     /// The parameters of the scene, on the CPU, `[N]`.
     pub theta: Tensor<HostBackend, 1>,
-    /// What is lowered, of each instance.
+    /// The total loss of each instance: of the image, and the regularizer.
     pub loss: Vec<f64>,
     /// What is wrong with its soft image.
     pub soft_loss: Vec<f64>,
@@ -49,7 +51,7 @@ pub(crate) struct Seen<B: RasterBackend> {
     pub(crate) theta: Tensor<B, 1>,
     image: Option<Tensor<B, 4>>,
     soft_loss: Tensor<B, 1>,
-    /// What is lowered, of each instance, with a tape.
+    /// The total loss of each instance, with a tape.
     pub(crate) loss: Tensor<Autodiff<B>, 1>,
 }
 
@@ -76,7 +78,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         // Beside the loss, which is the same to the last bit with pictures and without.
         let image = pictures.then(|| problem.image(scene, theta.clone().detach(), &softness));
         let soft = problem.loss_at(scene, theta.clone(), &softness);
-        let loss = lowered(problem, scene, theta.clone(), soft.clone());
+        let loss = total_loss(problem, scene, theta.clone(), soft.clone());
         let image = image.map(Tensor::inner);
         Seen { theta: theta.inner(), image, soft_loss: soft.inner(), loss }
     }

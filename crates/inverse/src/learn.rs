@@ -119,7 +119,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
 
     /// The best softness so far, and the best parameters of the problem's own. It holds the learning rate of its runs.
     pub fn learned(&self) -> (ScheduledSoftness<S>, Vec<f64>) {
-        let (phi, optimizer) = self.instances.parted(self.progress.best_phi());
+        let (phi, optimizer) = self.instances.split_phi(self.progress.best_phi());
         let (softness, own) = self.layout().softness(phi);
         let learning_rate = Some(optimizer.learning_rate);
         (ScheduledSoftness { learning_rate, ..softness }, own)

@@ -5,7 +5,7 @@ use softrast_raster::RasterBackend;
 use softrast_softness::{EdgeSoftness, Softness};
 use softrast_tensor::{Autodiff, Tensor, tensor};
 
-use crate::{InverseProblem, ScheduledRenderer, SoftnessAt, problem::lowered};
+use crate::{InverseProblem, ScheduledRenderer, SoftnessAt, problem::total_loss};
 
 type Twice<B> = Autodiff<Autodiff<B>>;
 
@@ -94,5 +94,5 @@ fn inner_loss<P: InverseProblem, B: RasterBackend>(
     softness: &SoftnessAt<'_, B, impl Softness>,
 ) -> Tensor<B, 1> {
     let image = problem.image(scene, theta.clone(), softness);
-    lowered(problem, scene, theta, problem.image_loss(scene, image)).sum()
+    total_loss(problem, scene, theta, problem.image_loss(scene, image)).sum()
 }

@@ -45,7 +45,7 @@ pub fn paint(
     mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
 ) -> anyhow::Result<Mesh> {
     let SolveConfig { size, steps, learning_rate } = *config;
-    let square = |v: &PaintedView| v.view.mask.looked_at().with_context(|| v.view.name.clone());
+    let square = |v: &PaintedView| v.view.mask.view_square().with_context(|| v.view.name.clone());
     let squares = views.iter().map(square).collect::<anyhow::Result<Vec<_>>>()?;
     let looks = || views.iter().zip(squares.iter().copied());
     let targets = PaintTargets::<B>::new(looks(), size);

@@ -217,7 +217,7 @@ impl Picture {
     /// # Errors
     ///
     /// If nothing or all of the mask is white.
-    pub fn looked_at(&self) -> anyhow::Result<[f64; 3]> {
+    pub fn view_square(&self) -> anyhow::Result<[f64; 3]> {
         let [left, top, extent] =
             self.square().context("the mask is empty: no pixel is half white or more")?;
         ensure!(
@@ -380,12 +380,24 @@ mod tests {
         assert_eq!(speckled.square(), Some([1.0, 0.0, 5.0]));
         assert_eq!(picture.clone().thresholded(2.0).square(), None);
         assert!(
-            picture.clone().thresholded(2.0).looked_at().unwrap_err().to_string().contains("empty")
+            picture
+                .clone()
+                .thresholded(2.0)
+                .view_square()
+                .unwrap_err()
+                .to_string()
+                .contains("empty")
         );
         assert!(
-            picture.clone().thresholded(0.0).looked_at().unwrap_err().to_string().contains("full")
+            picture
+                .clone()
+                .thresholded(0.0)
+                .view_square()
+                .unwrap_err()
+                .to_string()
+                .contains("full")
         );
-        assert_eq!(picture.looked_at().unwrap(), [-0.5, 0.0, 3.0]);
+        assert_eq!(picture.view_square().unwrap(), [-0.5, 0.0, 3.0]);
         assert_eq!(picture.inverted().square(), Some([0.0, -0.5, 3.0]));
     }
 

@@ -102,7 +102,7 @@ pub trait InverseProblem: 'static {
         self.image_loss(scene, self.image(scene, theta, softness))
     }
 
-    /// What is lowered beside it to keep the scene regular, `[instances]`.
+    /// A term added to the loss that keeps the scene regular, `[instances]`.
     fn regularizer<B: RasterBackend>(
         &self,
         _scene: &Self::Scene<B>,
@@ -131,8 +131,8 @@ pub struct SolveConfig {
     pub learning_rate: f64,
 }
 
-/// What is lowered, `[instances]`: the loss of an image at θ, and the regularizer.
-pub(crate) fn lowered<P: InverseProblem, B: RasterBackend>(
+/// The total loss `[instances]`: that of an image at θ, and the regularizer.
+pub(crate) fn total_loss<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     scene: &P::Scene<B>,
     theta: Tensor<B, 1>,

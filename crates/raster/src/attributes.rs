@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use softrast_tensor::{Backend, Tensor};
 
-use crate::kernel::blend::OF_TEXEL;
+use crate::kernel::blend::TEXEL_CHANNELS;
 
 /// What faces show: numbers at their corners, as many channels as you like, interpolated between them in perspective.
 ///
@@ -88,7 +88,7 @@ impl<B: Backend> Attributes<B> {
         let texels = height * width;
         assert!((1..=1 << 26).contains(&texels), "a texture of {height} x {width} texels");
         assert!(
-            (1..=OF_TEXEL).contains(&channels),
+            (1..=TEXEL_CHANNELS).contains(&channels),
             "a texture has 1 to 4 channels, not {channels}"
         );
         Self { texture: Some(texture), ..self }

@@ -9,8 +9,8 @@ use softrast_tensor::{
 
 use crate::{
     ProfileSum, SilhouetteLoss,
-    fused::{ElementaryOp, FusedOp, HostFloat, Pass},
     kernel::PixelLoss,
+    ops::{ElementaryOp, FusedOp, HostFloat, Pass},
 };
 
 fn slice<F: Element>(data: &TensorData) -> &[F] {

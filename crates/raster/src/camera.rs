@@ -3,8 +3,8 @@ use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
 use crate::{
     RasterBackend,
     backend::{elementary, primitive},
-    fused::ElementaryOp,
-    reference,
+    ops::ElementaryOp,
+    tensor_ops,
 };
 
 /// A line of sight, or an up across it, that is not longer than this has no direction, in world units.
@@ -97,7 +97,7 @@ pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -
     assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", orbits.dims());
     let matrices = match B::ON_HOST {
         true => elementary(ElementaryOp::OrbitMatrix, vec![primitive(orbits)]),
-        false => reference::orbit_matrices(orbits),
+        false => tensor_ops::orbit_matrices(orbits),
     };
     perspective(vertices, matrices)
 }
@@ -110,7 +110,7 @@ pub(crate) fn perspective<B: RasterBackend>(
     let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
     assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
     if !B::ON_HOST {
-        return reference::perspective(vertices, matrices);
+        return tensor_ops::perspective(vertices, matrices);
     }
     // The rasterizer wants one row for each axis, and turning them back is free.
     let inputs = vec![primitive(vertices), primitive(matrices)];

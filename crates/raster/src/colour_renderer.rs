@@ -8,10 +8,10 @@ use crate::{
     backend::{fused, primitive},
     cache::Cache,
     curve::precise,
-    fused::FusedOp,
-    kernel::blend::OF_TEXEL,
+    kernel::blend::TEXEL_CHANNELS,
     log_curve::{DepthCurve, LogCurve, Precision},
-    soft_blend::SoftBlend,
+    ops::FusedOp,
+    ops::blend::SoftBlend,
     soft_renderer::stretch,
     weighting::floor,
 };
@@ -458,11 +458,11 @@ fn soft_blend<B: RasterBackend>(
 fn texels<B: Backend>(texture: Tensor<B, 3>) -> Tensor<B, 2> {
     let [height, width, channels] = texture.dims();
     let rows = texture.reshape([height * width, channels]);
-    if channels == OF_TEXEL {
+    if channels == TEXEL_CHANNELS {
         return rows;
     }
     let options = (&rows.device(), rows.dtype());
-    let rest = Tensor::zeros([height * width, OF_TEXEL - channels], options);
+    let rest = Tensor::zeros([height * width, TEXEL_CHANNELS - channels], options);
     Tensor::cat(vec![rows, rest], 1)
 }
 

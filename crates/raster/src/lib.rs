@@ -31,7 +31,6 @@ mod camera;
 mod colour;
 mod colour_renderer;
 mod curve;
-mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod hard;
@@ -40,8 +39,8 @@ mod kernel;
 mod limits;
 mod log_curve;
 mod loss;
-mod loss_op;
 mod no_adapter;
+mod ops;
 mod picture_loss;
 mod pinhole;
 mod profile;
@@ -49,10 +48,9 @@ pub mod reference;
 mod shading;
 mod silhouette;
 mod small_product;
-mod soft_blend;
 mod soft_renderer;
-mod sum_op;
 mod t_conorm;
+mod tensor_ops;
 mod view;
 mod weighting;
 
@@ -72,7 +70,7 @@ pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use no_adapter::NoAdapter;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
-pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, turned};
+pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, rotate_by_tangent};
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use soft_renderer::SoftRenderer;
 /// For [`on_backend!`].
@@ -87,13 +85,13 @@ pub mod low_level {
     pub use crate::{
         backend::{Call, profile_sum},
         colour_renderer::WeightTables,
-        fused::{ElementaryOp, FusedOp, Numbers, Pass},
-        loss_op::SilhouetteLoss,
+        ops::blend::SoftBlend,
+        ops::loss::SilhouetteLoss,
+        ops::sum::ProfileSum,
+        ops::{ElementaryOp, FusedOp, Numbers, Pass},
         profile::Profile,
         silhouette::{Rasterizer, Silhouette},
         small_product::small_product,
-        soft_blend::SoftBlend,
-        sum_op::ProfileSum,
     };
 }
 pub(crate) use low_level::*;

@@ -3,9 +3,9 @@ use softrast_tensor::{Backend, Tensor};
 use crate::{
     RasterBackend,
     backend::{elementary, primitive},
-    fused::ElementaryOp,
     kernel::PixelLoss,
-    reference,
+    ops::ElementaryOp,
+    tensor_ops,
 };
 
 /// `1 - |p ∩ t| / |p ∪ t|` of each view, soft: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
@@ -22,7 +22,7 @@ use crate::{
 pub fn iou_loss<B: RasterBackend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
     match B::ON_HOST {
         true => compared(ElementaryOp::Iou, image, target),
-        false => reference::iou_loss(image, target),
+        false => tensor_ops::iou_loss(image, target),
     }
 }
 
@@ -38,7 +38,7 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
 ) -> Tensor<B, 1> {
     match B::ON_HOST {
         true => compared(ElementaryOp::SquaredError, image, target),
-        false => reference::mse_loss(image, target),
+        false => tensor_ops::mse_loss(image, target),
     }
 }
 

@@ -335,7 +335,10 @@ pub fn project_pinhole<B: RasterBackend>(
 /// # Panics
 ///
 /// If the shapes do not fit.
-pub fn turned<B: RasterBackend>(tangent: Tensor<B, 2>, rotation: Tensor<B, 3>) -> Tensor<B, 3> {
+pub fn rotate_by_tangent<B: RasterBackend>(
+    tangent: Tensor<B, 2>,
+    rotation: Tensor<B, 3>,
+) -> Tensor<B, 3> {
     let [views, ..] = rotation.dims();
     assert_eq!(tangent.dims(), [views, 3], "tangents of {views} rotations");
     let square = (tangent.clone() * tangent.clone()).sum_dim(1); // [views, 1]

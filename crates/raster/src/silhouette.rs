@@ -7,8 +7,8 @@ use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
     backend::{elementary, pairs, primitive, silhouette_loss, straight_through_sum},
     curve::precise,
-    fused::{ElementaryOp, FusedOp},
     kernel::PixelLoss,
+    ops::{ElementaryOp, FusedOp},
     profile_sum,
 };
 

@@ -140,7 +140,7 @@ impl Task for Pose {
     const SCALES: Scales = Scales { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
 
     /// Poses within 5 degrees end below 0.08, others hardly ever below 0.2.
-    const FITS: f64 = 0.1;
+    const RESTART_ABOVE: f64 = 0.1;
 
     type Args = Args;
     type Pictures = Pictures;

@@ -108,7 +108,7 @@ impl<B: RasterBackend> Objective<B> for Painted {
         let count = self.mesh.positions().len();
         let device = theta.device();
         let part = |from: usize| theta.clone().narrow(0, from, 3 * count).reshape([1, count, 3]);
-        let squares = self.views.iter().map(|v| v.view.mask.looked_at().unwrap());
+        let squares = self.views.iter().map(|v| v.view.mask.view_square().unwrap());
         let looks: Vec<_> = self.views.iter().zip(squares).collect();
         let cameras: Vec<Pinhole> = looks
             .iter()

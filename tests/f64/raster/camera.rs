@@ -20,7 +20,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// x and y in NDC and the depth of one vertex, with the camera built by `look_at`.
-fn looked_at(vertex: [f64; 3], [distance, elevation, azimuth, fov]: [f64; 4]) -> [f64; 3] {
+fn view_square(vertex: [f64; 3], [distance, elevation, azimuth, fov]: [f64; 4]) -> [f64; 3] {
     let [e, a, half] = [elevation, azimuth, fov / 2.0].map(f64::to_radians);
     let eye = [e.cos() * a.sin(), e.sin(), -e.cos() * a.cos()].map(|x| distance * x);
     let z = unit(eye.map(|x| -x));
@@ -60,7 +60,7 @@ proptest! {
         // At the poles `look_at` has no answer, and next to them no digits.
         prop_assume!(f64::cos(f64::to_radians(elevation)).abs() > 1e-2);
         let orbit = [distance, elevation, azimuth, fov];
-        let expected = looked_at(vertex, orbit);
+        let expected = view_square(vertex, orbit);
         for (found, expected) in projected(vertex, orbit).into_iter().zip(expected) {
             prop_assert!((found - expected).abs() < 1e-9 * (1.0 + expected.abs()));
         }

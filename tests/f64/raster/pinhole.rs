@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use softrast_raster::{
-    Orbit, Pinhole, PinholeError, Pinholes, project, project_pinhole, turned, vertices,
+    Orbit, Pinhole, PinholeError, Pinholes, project, project_pinhole, rotate_by_tangent, vertices,
 };
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::numbers;
@@ -105,7 +105,7 @@ fn seen(x: Tensor<AA, 1>) -> Tensor<AA, 1> {
     let start = [worked(), Pinhole { translation: [0.1, 0.3, 3.0], ..worked() }];
     let start = Pinholes::<AA>::new(&start, &Default::default());
     let cameras = Pinholes {
-        rotation: turned(part(9, 6).reshape([2, 3]), start.rotation),
+        rotation: rotate_by_tangent(part(9, 6).reshape([2, 3]), start.rotation),
         translation: part(15, 6).reshape([2, 3]),
         intrinsics: part(21, 4).reshape([1, 4]),
         size: start.size,
@@ -178,7 +178,7 @@ proptest! {
         let device = Default::default();
         let identity = Tensor::<B, 2>::eye(3, &device).reshape([1, 3, 3]);
         let tangent = Tensor::<B, 1>::from_data(tangent, &device).reshape([1, 3]);
-        let r = numbers(turned(tangent, identity));
+        let r = numbers(rotate_by_tangent(tangent, identity));
         let rotation = [0, 1, 2].map(|k| [r[3 * k], r[3 * k + 1], r[3 * k + 2]]);
         let camera = Pinhole { rotation, translation, focal, centre, size: size.into() };
         prop_assert_eq!(camera.check(), Ok(()));

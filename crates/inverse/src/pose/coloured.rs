@@ -1,7 +1,7 @@
 use softrast_raster::{RasterBackend, mse_loss};
 use softrast_tensor::{Tensor, tensor};
 
-use super::Coat;
+use super::VertexColours;
 use crate::{PaintedView, Picture, Targets, targets::parts};
 
 /// Weight of the error of colours beside the `IoU` loss. With 5, 10 and 20, colours found 25, 24 and 24 of 28 poses that silhouettes did not
@@ -16,7 +16,7 @@ const SIDES: std::ops::RangeInclusive<usize> = 4..=8;
 /// pictures, or that halved some times.
 #[derive(Debug)]
 pub struct ColouredViews<B: RasterBackend> {
-    coat: Coat<B>,
+    coat: VertexColours<B>,
     /// Red, green and blue over black, `[3 views, size, size]`, and halves of halves of it.
     over_black: Targets<B>,
     /// The part of each pixel whose colour is known, unless that is all of every pixel; `[views, size, size]`.
@@ -28,7 +28,7 @@ pub struct ColouredViews<B: RasterBackend> {
 impl<B: RasterBackend> ColouredViews<B> {
     /// Views that should show these pictures: `over_black` `[views, 3, size, size]`, of which the mesh covers `coverage`
     /// `[views, size, size]`.
-    pub fn new(coat: Coat<B>, over_black: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Self {
+    pub fn new(coat: VertexColours<B>, over_black: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Self {
         let [views, _, size, _] = over_black.dims();
         let mean = coverage.flatten::<2>(1, 2).mean_dim(1).reshape([views]);
         Self {
@@ -41,7 +41,11 @@ impl<B: RasterBackend> ColouredViews<B> {
 
     /// Views that should show these parts of pictures, each given by its left, its top and its extent in pixels, on `size` × `size` pixels.
     /// What lies outside of a picture does not count, nor does an outline whose colours are not known.
-    pub fn of_pictures(coat: Coat<B>, pictures: &[(&PaintedView, [f64; 3])], size: usize) -> Self {
+    pub fn of_pictures(
+        coat: VertexColours<B>,
+        pictures: &[(&PaintedView, [f64; 3])],
+        size: usize,
+    ) -> Self {
         let of = |which: &dyn Fn(&'_ PaintedView) -> &'_ Picture| {
             parts(pictures.iter().map(|&(view, square)| (which(view), square)), size)
         };

@@ -7,14 +7,14 @@ use softrast_raster::{
 use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::{
-    Coat, ColouredViews,
+    ColouredViews, VertexColours,
     shifts::{Stencil, Window},
     target::Target,
 };
 use crate::frame::ball;
 
 /// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
-const GLANCE: usize = Window::SIDE;
+const COARSE_SIDE: usize = Window::SIDE;
 const DIRECTIONS: usize = 160;
 const ROLLS: usize = 16;
 const AT_ONCE: usize = 256;
@@ -59,11 +59,11 @@ impl<'a> Look<'a> {
     fn new(mesh: &'a Mesh, target: &Target<'_>, camera: &'a Pinhole) -> Self {
         let &Target { mask, square, painted, .. } = target;
         let (middle, radius) = ball(mesh);
-        let [levels, covered] = mask.part(square, GLANCE);
+        let [levels, covered] = mask.part(square, COARSE_SIDE);
         let [_, _, white] = mask.square().unwrap_or(square);
         let colours = mesh.colours().zip(painted).map(|(colours, view)| {
-            let coat = Coat::new(colours, mesh.faces().into());
-            ColouredViews::of_pictures(coat, &[(view, square); AT_ONCE], GLANCE)
+            let coat = VertexColours::new(colours, mesh.faces().into());
+            ColouredViews::of_pictures(coat, &[(view, square); AT_ONCE], COARSE_SIDE)
         });
         let corners = vertices(mesh.positions(), &Default::default());
         Self { mesh, corners, middle, radius, camera, square, levels, covered, white, colours }
@@ -71,7 +71,7 @@ impl<'a> Look<'a> {
 
     /// Pixels of the picture along one of the few.
     fn pixel(&self) -> f64 {
-        self.square[2] / GLANCE as f64
+        self.square[2] / COARSE_SIDE as f64
     }
 
     /// Where a place in the square is seen, as x and y at depth 1.
@@ -109,14 +109,15 @@ impl<'a> Look<'a> {
             cameras.to_mut().resize(AT_ONCE, *self.camera);
         }
         let views = cameras.len();
-        let of_views =
-            |image: &[f64]| tensor::<HostBackend, 3>(image.repeat(views), [views, GLANCE, GLANCE]);
-        let [drawn, seen] = self.drawn(&cameras, self.square, GLANCE);
+        let of_views = |image: &[f64]| {
+            tensor::<HostBackend, 3>(image.repeat(views), [views, COARSE_SIDE, COARSE_SIDE])
+        };
+        let [drawn, seen] = self.drawn(&cameras, self.square, COARSE_SIDE);
         // What lies outside of the picture does not count.
         let drawn = drawn * of_views(&self.covered);
         let loss = iou_loss(drawn.clone(), of_views(&self.levels));
         let loss = match &self.colours {
-            Some(colours) => loss + colours.hard_loss(seen, GLANCE),
+            Some(colours) => loss + colours.hard_loss(seen, COARSE_SIDE),
             None => loss,
         };
         [numbers(drawn), numbers(loss)]
@@ -136,7 +137,7 @@ impl<'a> Look<'a> {
         for _ in 0..2 {
             let [drawn, error] = self.judged(&cameras);
             losses = error;
-            for (camera, image) in cameras.iter_mut().zip(drawn.chunks(GLANCE * GLANCE)) {
+            for (camera, image) in cameras.iter_mut().zip(drawn.chunks(COARSE_SIDE * COARSE_SIDE)) {
                 let now = moments(image);
                 let [x, y, z] = camera.seen(self.middle);
                 // Nothing is seen where the mesh is far out: as it was.
@@ -162,7 +163,7 @@ impl<'a> Look<'a> {
         let window = Window::new(&self.levels, &self.covered);
         // In the middle, nearer than where a ball as large as what is left would be.
         let [left, top, extent] = self.square;
-        let ray = self.ray([GLANCE as f64 / 2.0; 2]);
+        let ray = self.ray([COARSE_SIDE as f64 / 2.0; 2]);
         let towards = turned_to(ray);
         let depth = (2.0 * self.radius * self.camera.focal[0] / self.white / 1.3)
             .max(NEAREST * self.radius);
@@ -213,7 +214,7 @@ fn moments(image: &[f64]) -> Moments {
     let sum = |at: fn(usize) -> usize| {
         image.iter().enumerate().map(|(k, level)| level * (at(k) as f64 + 0.5)).sum::<f64>()
     };
-    Moments { area, middle: [sum(|k| k % GLANCE) / area, sum(|k| k / GLANCE) / area] }
+    Moments { area, middle: [sum(|k| k % COARSE_SIDE) / area, sum(|k| k / COARSE_SIDE) / area] }
 }
 
 /// Rotations of a camera around what it looks at: directions spread evenly over the sphere, each with rolls all around.

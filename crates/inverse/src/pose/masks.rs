@@ -3,13 +3,13 @@ use std::sync::Arc;
 use anyhow::Context;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole, turned,
-    vertices,
+    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole,
+    rotate_by_tangent, vertices,
 };
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 
-use super::{Coat, ColouredViews, split_coverage};
+use super::{ColouredViews, VertexColours, split_coverage};
 use crate::{Frame, InverseProblem, PaintedView, Picture, SoftnessAt, SolveConfig, Targets};
 
 /// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
@@ -182,7 +182,7 @@ impl<B: RasterBackend> MaskScene<B> {
         let painted = instances.iter().map(|of| Some((of.painted.as_ref()?, of.square)));
         let painted: Option<Vec<_>> = painted.collect();
         let colours = mesh.colours().zip(painted).map(|(colours, painted)| {
-            let coat = Coat::new(colours, mesh.faces().into());
+            let coat = VertexColours::new(colours, mesh.faces().into());
             ColouredViews::of_pictures(coat, &painted, size)
         });
         Self {
@@ -222,7 +222,7 @@ impl<B: RasterBackend> MaskScene<B> {
         let zoom = self.optimise_fov.then(|| part(6, 1));
         let beside = (self.seen.clone() + part(3, 2) * self.radius.clone()) * depth.clone();
         let Pinholes { rotation, intrinsics, size, .. } = self.cameras.clone();
-        let rotation = turned(part(0, 3), rotation);
+        let rotation = rotate_by_tangent(part(0, 3), rotation);
         let translation = Tensor::cat(vec![beside, depth], 1);
         let intrinsics = match zoom {
             None => intrinsics,

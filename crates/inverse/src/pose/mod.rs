@@ -4,7 +4,6 @@
 //! is elevation 0, azimuth 0 and the target's distance. Instances in a batch are independent, one view each. Source: Wu et al. 2024,
 //! Sec. 5.1; docs/notes.md, Pose.
 
-mod coat;
 mod coloured;
 mod glance;
 mod instance;
@@ -14,11 +13,12 @@ mod scene;
 mod search;
 mod shifts;
 mod target;
+mod vertex_colours;
 
-pub use coat::Coat;
 pub use coloured::{ColouredViews, split_coverage};
 pub use instance::PoseInstance;
 pub use masks::{MaskPose, MaskPoses, MaskScene};
 pub use problem::PoseProblem;
 pub use scene::{PoseScene, nearest_distance};
 pub use search::{FoundPose, PoseSearch};
+pub use vertex_colours::VertexColours;

@@ -21,13 +21,13 @@ const DETAIL: f64 = 1.0 / 20.0;
 /// A mesh whose surface is mostly such detail is looked at as it is.
 const LEAST_AREA: f64 = 0.4;
 /// A pose whose error on few pixels is larger than the least by more than this is given up.
-const HOPEFUL: f64 = 0.08;
+const PROMISING_MARGIN: f64 = 0.08;
 /// Starts that differ by less are one.
 const APART_DEG: f64 = 12.0;
 /// Answers that differ by less are one.
 const ANSWERS_APART_DEG: f64 = 6.0;
 /// Poses are one, however they are turned, if the silhouettes of the mesh from three sides overlap by so much, as those of a vase do.
-const ALIKE: f64 = 0.985;
+const DUPLICATE_IOU: f64 = 0.985;
 /// Pixels a side of these.
 const SIDE_VIEW: usize = 48;
 /// Poses of the first look that are improved on few pixels, a little, and the steps of that.
@@ -37,7 +37,7 @@ const COARSE_SIZE: usize = 48;
 /// Most answers.
 const ANSWERS: usize = 6;
 /// How much less than the best `IoU` a pose may have to count as another answer.
-const NEARLY: f64 = 0.03;
+const BEST_MARGIN: f64 = 0.03;
 
 /// What follows for the poses that were improved a little.
 struct Stages {
@@ -116,7 +116,7 @@ impl PoseSearch {
         camera: &Pinhole,
         started: bool,
     ) -> anyhow::Result<()> {
-        mask.looked_at()?;
+        mask.view_square()?;
         let (middle, radius) = ball(mesh);
         ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
         let [_, _, depth] = camera.seen(middle);
@@ -187,7 +187,7 @@ impl PoseSearch {
         let (mesh, camera) = (&frame.mesh(mesh), frame.camera(camera));
         let starts = match started {
             true => vec![camera],
-            false => self.hopeful::<B>(mesh, target, &camera, method, visit)?,
+            false => self.promising_starts::<B>(mesh, target, &camera, method, visit)?,
         };
         let Stages { coarse: (_, coarse_steps), last, .. } = Stages::of(target.cut);
         let mut begun = if started { 0 } else { STARTS.1 + coarse_steps };
@@ -212,13 +212,13 @@ impl PoseSearch {
         let alike = target.painted.is_none().then_some(&*few);
         let scored = apart(scored.collect(), ANSWERS, ANSWERS_APART_DEG, alike);
         let best = scored.first().context("no pose was tried")?.1;
-        let nearly = scored.into_iter().filter(|(_, loss)| *loss <= best + NEARLY);
+        let nearly = scored.into_iter().filter(|(_, loss)| *loss <= best + BEST_MARGIN);
         let in_world =
             |pose: FoundPose| FoundPose { camera: frame.camera_to_world(&pose.camera), ..pose };
         Ok(nearly.map(|(pose, _)| in_world(pose)).collect())
     }
 
-    /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most hopeful first: at most six, or ten
+    /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most promising first: at most six, or ten
     /// where the picture cuts the object off.
     ///
     /// # Errors
@@ -236,11 +236,11 @@ impl PoseSearch {
         let frame = Frame::of_mesh(mesh);
         let (mesh, camera, target) =
             (frame.mesh(mesh), frame.camera(camera), Target::new(mask, None)?);
-        let starts = self.hopeful::<B>(&mesh, &target, &camera, method, &mut visit)?;
+        let starts = self.promising_starts::<B>(&mesh, &target, &camera, method, &mut visit)?;
         Ok(starts.iter().map(|camera| frame.camera_to_world(camera)).collect())
     }
 
-    fn hopeful<B: RasterBackend>(
+    fn promising_starts<B: RasterBackend>(
         &self,
         mesh: &Mesh,
         target: &Target<'_>,
@@ -267,7 +267,7 @@ impl PoseSearch {
             begun += steps;
         }
         let least = found.first().map_or(0.0, |&(_, loss)| loss);
-        let found = found.into_iter().filter(|&(_, loss)| loss <= least + HOPEFUL);
+        let found = found.into_iter().filter(|&(_, loss)| loss <= least + PROMISING_MARGIN);
         Ok(found.map(|(start, _)| start).collect())
     }
 
@@ -349,7 +349,7 @@ fn apart<P: Copy + Borrow<Pinhole>>(
         }
         let sides = mesh.map(|mesh| from_three_sides(mesh, camera.rotation));
         let alike = |other: &Option<Vec<bool>>| {
-            sides.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| overlap(a, b) >= ALIKE)
+            sides.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| overlap(a, b) >= DUPLICATE_IOU)
         };
         if !kept.iter().any(|(_, other)| alike(other)) {
             kept.push(((pose, loss), sides));

@@ -15,7 +15,7 @@ pub(super) struct Target<'a> {
 
 impl<'a> Target<'a> {
     pub(super) fn new(mask: &'a Picture, painted: Option<&'a PaintedView>) -> anyhow::Result<Self> {
-        let square = mask.looked_at()?;
+        let square = mask.view_square()?;
         Ok(Self { mask, square, cut: !cut_sides(mask).is_empty(), painted })
     }
 

@@ -4,12 +4,12 @@
 use cubecl::prelude::*;
 
 use super::{
-    drawn::{Drawn, Kind},
+    blend_inputs::{BlendInputs, BlendSpec},
     dual::Dual,
+    face_attributes::FaceAttributes,
     gradient::UNITS,
     of_pixel::{OF_PIXEL, OfPixel},
     reach::Reach,
-    shown::Shown,
     tile::TILE,
 };
 
@@ -19,11 +19,11 @@ use super::{
 /// image itself is then only written in a pass of second order.
 #[cube(launch)]
 pub(super) fn blend_pixels(
-    drawn: &Drawn,
+    drawn: &BlendInputs,
     upstream: &Array<f32>,
     pixels: &mut Array<f32>,
     image: &mut Array<f32>,
-    #[comptime] kind: Kind,
+    #[comptime] kind: BlendSpec,
     #[comptime] pull: bool,
 ) {
     let column = CUBE_POS_X * TILE + UNIT_POS_X;
@@ -57,7 +57,7 @@ pub(super) fn blend_pixels(
             let face = 32 * word + bits.trailing_zeros();
             bits &= bits - 1u32;
             if drawn.reaches(view, face, column, row) {
-                let shown = Shown::of(drawn, view, face, kind);
+                let shown = FaceAttributes::of(drawn, view, face, kind);
                 let pair = shown.pair(px, py, drawn, kind);
                 if pair.counts(weights) {
                     let log = pair.log_edge.value + pair.log_depth.value;
@@ -149,12 +149,12 @@ pub(super) fn blend_pixels(
 /// attributes of each.
 #[cube(launch)]
 pub(super) fn blend_faces(
-    drawn: &Drawn,
+    drawn: &BlendInputs,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     gradient: &mut Array<f32>,
     jobs: u32,
-    #[comptime] kind: Kind,
+    #[comptime] kind: BlendSpec,
 ) {
     let job = CUBE_POS;
     if job >= jobs as usize {
@@ -167,7 +167,7 @@ pub(super) fn blend_faces(
     let (frame, weights) = (drawn.frame, drawn.weights);
     let face_count = drawn.of_cells.face_count;
     let (view, face) = (job as u32 / face_count, job as u32 % face_count);
-    let shown = Shown::of(drawn, view, face, kind);
+    let shown = FaceAttributes::of(drawn, view, face, kind);
     let reach = Reach::load(&drawn.reaches, job);
     let mut pixel = UNIT_POS;
     let mut end = 0u32;
@@ -257,12 +257,12 @@ pub(super) fn blend_faces(
 /// [`sum_cubics`](super::table::sum_cubics) does.
 #[cube(launch)]
 pub(super) fn blend_cubics(
-    drawn: &Drawn,
+    drawn: &BlendInputs,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     partial: &mut Array<f32>,
     rows: u32,
-    #[comptime] kind: Kind,
+    #[comptime] kind: BlendSpec,
 ) {
     let (frame, of_cells) = (drawn.frame, drawn.of_cells);
     #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
@@ -288,7 +288,7 @@ pub(super) fn blend_cubics(
                     let face = 32 * word + bits.trailing_zeros();
                     bits &= bits - 1u32;
                     if drawn.reaches(view, face, column, row) {
-                        let shown = Shown::of(drawn, view, face, kind);
+                        let shown = FaceAttributes::of(drawn, view, face, kind);
                         let pair = shown.pair(px, py, drawn, kind);
                         if pair.counts(drawn.weights) {
                             let share = pair.share(of_pixel.log, drawn.weights);

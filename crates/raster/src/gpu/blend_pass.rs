@@ -8,7 +8,7 @@ use softrast_tensor::{
 use super::{
     backend::Wgpu,
     blend::{blend_cubics, blend_faces, blend_pixels, gather_corners},
-    drawn::{DrawnLaunch, Kind, WeightsLaunch},
+    blend_inputs::{BlendInputsLaunch, BlendParamsLaunch, BlendSpec},
     gradient::UNITS,
     of_pixel::OF_PIXEL,
     pass::{Buffer, CUBE, Culled, Partial, Pass, lookup},
@@ -297,8 +297,8 @@ impl<'a> Blend<'a> {
     }
 
     /// What the kernels read.
-    fn drawn(&self, culled: &Culled) -> DrawnLaunch<WgpuRuntime> {
-        DrawnLaunch::new(
+    fn drawn(&self, culled: &Culled) -> BlendInputsLaunch<WgpuRuntime> {
+        BlendInputsLaunch::new(
             culled.corners.clone().into_array_arg(),
             culled.reaches.clone().into_array_arg(),
             culled.cells.clone().into_array_arg(),
@@ -358,9 +358,9 @@ impl<'a> Blend<'a> {
         self.direction.as_ref().unwrap_or(&self.numbers).clone()
     }
 
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> BlendSpec {
         let far_depth = matches!(self.op.depth, DepthGrid::Table(grid) if grid.far > 0);
-        Kind {
+        BlendSpec {
             far_edge: self.op.edge.far > 0,
             far_depth,
             is_line: matches!(self.op.depth, DepthGrid::Line { .. }),
@@ -371,7 +371,7 @@ impl<'a> Blend<'a> {
         }
     }
 
-    fn weights(&self) -> WeightsLaunch<WgpuRuntime> {
+    fn weights(&self) -> BlendParamsLaunch<WgpuRuntime> {
         let op = self.op;
         let (depth, least) = match op.depth {
             DepthGrid::Table(grid) => (grid, 0.0),
@@ -382,7 +382,7 @@ impl<'a> Blend<'a> {
         let [rows, columns] = op.texture.unwrap_or([1, 1]);
         let along =
             if self.pass.second() { 3 * self.pass.views * self.pass.vertex_count } else { 0 };
-        WeightsLaunch::new(
+        BlendParamsLaunch::new(
             lookup(&op.edge),
             lookup(&depth),
             op.edge.rows() as u32,

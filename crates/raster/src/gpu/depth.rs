@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::{
-    drawn::{Drawn, Kind},
+    blend_inputs::{BlendInputs, BlendSpec},
     dual::Dual,
     table::add_powers,
 };
@@ -18,7 +18,7 @@ pub(super) struct ByDepth {
 #[cube]
 impl ByDepth {
     /// What a point at `x`, its nearness less 1, counts.
-    pub(super) fn at(x: Dual, drawn: &Drawn, #[comptime] kind: Kind) -> ByDepth {
+    pub(super) fn at(x: Dual, drawn: &BlendInputs, #[comptime] kind: BlendSpec) -> ByDepth {
         let weights = drawn.weights;
         let zero = Dual::constant(0.0f32);
         let at = 4 * weights.depth_row as usize;
@@ -54,10 +54,10 @@ impl ByDepth {
 pub(super) fn pull_depth(
     x: Dual,
     by_log: Dual,
-    drawn: &Drawn,
+    drawn: &BlendInputs,
     partial: &mut Array<f32>,
     first: u32,
-    #[comptime] kind: Kind,
+    #[comptime] kind: BlendSpec,
 ) {
     let weights = drawn.weights;
     let zero = Dual::constant(0.0f32);

@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::{
-    drawn::{Drawn, Kind},
+    blend_inputs::{BlendInputs, BlendSpec},
     dual::Dual,
 };
 
@@ -21,11 +21,11 @@ pub(super) struct OfPixel {
 impl OfPixel {
     /// Where those of a pixel of a view of the launch begin, and behind them the gradient of the background.
     pub(super) fn at(
-        drawn: &Drawn,
+        drawn: &BlendInputs,
         view: u32,
         row: u32,
         column: u32,
-        #[comptime] kind: Kind,
+        #[comptime] kind: BlendSpec,
     ) -> usize {
         drawn.frame.pixel(drawn.first_view + view, row, column) as usize
             * comptime!(OF_PIXEL + kind.channels + 1)

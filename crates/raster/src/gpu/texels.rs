@@ -6,9 +6,9 @@
 use cubecl::prelude::*;
 
 use super::{
-    drawn::{Drawn, Kind},
+    blend_inputs::{BlendInputs, BlendSpec},
+    face_attributes::FaceAttributes,
     of_pixel::OfPixel,
-    shown::Shown,
     texture::NUMBERS,
     tile::TILE,
 };
@@ -30,11 +30,11 @@ pub(super) const MEASURED: usize = 2;
 /// `pixels` is what [`blend_pixels`](super::blend::blend_pixels) has written.
 #[cube(launch)]
 pub(super) fn sum_texels(
-    drawn: &Drawn,
+    drawn: &BlendInputs,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     sums: &mut Array<Atomic<u32>>,
-    #[comptime] kind: Kind,
+    #[comptime] kind: BlendSpec,
     #[comptime] measure: bool,
 ) {
     let column = CUBE_POS_X * TILE + UNIT_POS_X;
@@ -63,7 +63,7 @@ pub(super) fn sum_texels(
             let face = 32 * word + bits.trailing_zeros();
             bits &= bits - 1u32;
             if drawn.reaches(view, face, column, row) {
-                let shown = Shown::of(drawn, view, face, kind);
+                let shown = FaceAttributes::of(drawn, view, face, kind);
                 let pair = shown.pair(px, py, drawn, kind);
                 if pair.counts(drawn.weights) {
                     let share = pair.share(log, drawn.weights).whole;

@@ -3,13 +3,13 @@
 use cubecl::prelude::*;
 
 use super::{
-    drawn::{Drawn, Kind, Weights},
+    blend_inputs::{BlendInputs, BlendParams, BlendSpec},
     dual::Dual,
 };
-use crate::kernel::blend::OF_TEXEL;
+use crate::kernel::blend::TEXEL_CHANNELS;
 
 /// Numbers of a texel.
-pub(super) const NUMBERS: u32 = OF_TEXEL as u32;
+pub(super) const NUMBERS: u32 = TEXEL_CHANNELS as u32;
 
 /// A place on a texture, between four texels.
 #[derive(CubeType, Clone, Copy)]
@@ -59,7 +59,7 @@ impl Between {
 #[cube]
 impl Sample {
     /// The texture at `u` to the right and `v` up, each from 0 to 1, and again and again beyond.
-    pub(super) fn at(u: Dual, v: Dual, weights: Weights) -> Sample {
+    pub(super) fn at(u: Dual, v: Dual, weights: BlendParams) -> Sample {
         let half = Dual::constant(0.5f32);
         let x = u.scale(f32::cast_from(weights.columns)).sub(half);
         let y = Dual::constant(1.0f32).sub(v).scale(f32::cast_from(weights.rows)).sub(half);
@@ -77,7 +77,12 @@ impl Sample {
     }
 
     /// A channel of the four texels.
-    pub(super) fn texels(self, drawn: &Drawn, channel: usize, #[comptime] kind: Kind) -> Four {
+    pub(super) fn texels(
+        self,
+        drawn: &BlendInputs,
+        channel: usize,
+        #[comptime] kind: BlendSpec,
+    ) -> Four {
         let first = drawn.weights.texture + channel as u32;
         Four {
             a: drawn.number((first + NUMBERS * self.above_left) as usize, kind),
@@ -107,7 +112,7 @@ impl Sample {
     }
 
     /// The derivative of that by u.
-    pub(super) fn by_u(self, four: Four, weights: Weights) -> Dual {
+    pub(super) fn by_u(self, four: Four, weights: BlendParams) -> Dual {
         let above = Dual::constant(1.0f32).sub(self.down);
         let upper = four.b.sub(four.a).mul(above);
         let by_x = upper.add(four.d.sub(four.c).mul(self.down));
@@ -115,7 +120,7 @@ impl Sample {
     }
 
     /// The derivative of that by v.
-    pub(super) fn by_v(self, four: Four, weights: Weights) -> Dual {
+    pub(super) fn by_v(self, four: Four, weights: BlendParams) -> Dual {
         let left = Dual::constant(1.0f32).sub(self.right);
         let on_the_left = four.a.sub(four.c).mul(left);
         let up = on_the_left.add(four.b.sub(four.d).mul(self.right));

@@ -3,14 +3,13 @@
 //! Slow (about 1.3 kB of traffic a pair) and simple; every faster path is tested against it.
 
 mod blend;
-mod step;
 
 use softrast_softness::Softness;
 use softrast_tensor::{Autodiff, Backend, Int, Tensor, TensorData};
 
+pub use crate::tensor_ops::{iou_loss, mse_loss, orbit_matrices, perspective};
 use crate::{ImageSize, NEAR, TConorm};
 pub use blend::blended;
-pub use step::{iou_loss, mse_loss, orbit_matrices, perspective};
 
 /// Squared edge lengths below this (NDC²) count as a point.
 const POINT: f64 = 1e-30;

@@ -1,6 +1,6 @@
 use softrast_inverse::{
     SoftnessAt,
-    pose::{Coat, ColouredViews, PoseInstance, PoseScene, split_coverage},
+    pose::{ColouredViews, PoseInstance, PoseScene, VertexColours, split_coverage},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Orbit, RasterBackend, project, vertices};
@@ -30,7 +30,7 @@ impl<B: RasterBackend> Scene<B> {
         optimise_fov: bool,
     ) -> Self {
         let silhouettes = PoseScene::new(mesh, instances, size, optimise_fov);
-        let coat = Coat::new(colours, mesh.faces().into());
+        let coat = VertexColours::new(colours, mesh.faces().into());
         let device = Default::default();
         let cameras: Vec<Orbit> = instances.iter().map(|instance| instance.target).collect();
         let world = vertices::<B>(mesh.positions(), &device);

@@ -83,7 +83,7 @@ impl Task for Coloured {
     const SCALES: Scales = Pose::SCALES;
 
     /// Poses within 5 degrees end below 0.1, others hardly ever below 0.4.
-    const FITS: f64 = 0.2;
+    const RESTART_ABOVE: f64 = 0.2;
 
     type Args = Args;
     type Pictures = Pictures;

@@ -202,7 +202,7 @@ impl<'a> Cone<'a> {
 
 /// The square of a view that is looked at: left, top and extent in pixels.
 pub(super) fn square(view: &View) -> anyhow::Result<[f64; 3]> {
-    view.mask.looked_at().with_context(|| view.name.clone())
+    view.mask.view_square().with_context(|| view.name.clone())
 }
 
 /// Signed distance to where an image `[SIDE * SIDE]` is one half, negative where it is more, for cells of this width.

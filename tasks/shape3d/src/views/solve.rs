@@ -51,7 +51,7 @@ const CELLS: [usize; 3] = [32, 45, 64];
 /// More cells are worth their time if the mean `IoU` of the hull grows by so much.
 const GROWS: f64 = 0.01;
 /// A mean `IoU` from which a finer mesh is not worth its time.
-const FITS: f64 = 0.995;
+const RESTART_ABOVE: f64 = 0.995;
 
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -141,7 +141,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
         painted.collect::<anyhow::Result<Vec<_>>>()
     };
-    let parts = parted(all, flags.hold_out.unwrap_or(0))?;
+    let parts = split_held_out(all, flags.hold_out.unwrap_or(0))?;
     let [to_paint, to_compare] = [paint(&parts[0])?, paint(&parts[1])?];
     let [train, held_out] = parts;
     let clock = std::time::Instant::now();
@@ -197,7 +197,7 @@ fn stages(given: &Given<'_, Args>, flags: &Views) -> Vec<Stage> {
 }
 
 /// Views to work with, and so many evenly spaced ones that are kept aside.
-fn parted(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
+fn split_held_out(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>; 2]> {
     let count = all.len();
     ensure!(
         count >= 2,
@@ -285,7 +285,7 @@ fn deformed(
             progress.step(done + iterate.step, iterate.loss[0])
         }))?;
         done += config.steps;
-        if 1.0 - best >= FITS {
+        if 1.0 - best >= RESTART_ABOVE {
             break;
         }
     }

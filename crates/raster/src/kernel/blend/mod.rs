@@ -19,13 +19,13 @@ use rayon::prelude::*;
 
 #[cfg(feature = "wgpu")]
 pub(crate) use self::depth::LEAST;
-pub(crate) use self::{depth::DepthGrid, point::AREA, scene::Inputs, texture::OF_TEXEL};
+pub(crate) use self::{depth::DepthGrid, point::AREA, scene::Inputs, texture::TEXEL_CHANNELS};
 use self::{
     planes::Planes,
     reach::Reached,
     scene::{Blend, of_type},
     texture::TexelSums,
-    walk::{Largest, OF_CORNERS, Pull, Sums, Visitor, Walk},
+    walk::{CORNER_NUMBERS, Largest, Pull, Sums, Visitor, Walk},
 };
 use super::{
     bands::View,
@@ -269,7 +269,7 @@ fn gather<T: Real>(
     let mut vertices = vec![zero; 3 * count];
     let entries = inputs.attributes.len() / if inputs.shared { 1 } else { inputs.views };
     let mut attributes = vec![zero; if of_attributes { entries } else { 0 }];
-    let stride = OF_CORNERS + if of_attributes { 3 * numbers } else { 0 };
+    let stride = CORNER_NUMBERS + if of_attributes { 3 * numbers } else { 0 };
     for (band, walked) in walked.into_iter().enumerate() {
         for (&face, own) in view.faces(band).iter().zip(walked.faces.chunks_exact(stride)) {
             for (k, &vertex) in inputs.faces[face as usize].iter().enumerate() {
@@ -282,7 +282,7 @@ fn gather<T: Real>(
                 for (k, &entry) in inputs.entries[face as usize].iter().enumerate() {
                     for number in 0..numbers {
                         attributes[entry as usize * numbers + number] +=
-                            own[OF_CORNERS + 3 * number + k];
+                            own[CORNER_NUMBERS + 3 * number + k];
                     }
                 }
             }
@@ -427,7 +427,7 @@ impl<T: Real> Band<'_, '_, T> {
     ) {
         let zero = <Float<T> as float::Float>::ZERO;
         let numbers = if of_attributes { self.blend.numbers } else { 0 };
-        let stride = OF_CORNERS + 3 * numbers;
+        let stride = CORNER_NUMBERS + 3 * numbers;
         walked.faces = vec![zero; self.of_view.faces(self.band).len() * stride];
         let rows = [self.blend.scene.grid.rows(), self.blend.depth.rows()];
         let mut tables = rows.map(|rows| vec![[zero; 4]; if of_tables { rows } else { 0 }]);
@@ -438,7 +438,7 @@ impl<T: Real> Band<'_, '_, T> {
             faces: &mut walked.faces,
             stride,
             tables: of_tables.then_some(&mut tables),
-            corners: [splat(0.0); OF_CORNERS],
+            corners: [splat(0.0); CORNER_NUMBERS],
             attributes: vec![[splat(0.0); 3]; numbers],
             texels: of_texels.then_some(&mut walked.texels),
         });

@@ -7,7 +7,7 @@ use crate::kernel::{
 };
 
 /// Numbers of a texel in memory; a texture may have fewer channels.
-pub(crate) const OF_TEXEL: usize = 4;
+pub(crate) const TEXEL_CHANNELS: usize = 4;
 
 /// Texels that a gradient has memory for at once.
 const RUN: usize = 64;
@@ -22,7 +22,7 @@ pub(super) struct Texture<'a, T: Real> {
 /// Places on a texture, between four texels: above left, above right, below left and below right of them.
 pub(super) struct Sample<T: Real> {
     rows: [[u32; LANES]; 4],
-    texels: [[T; OF_TEXEL]; 4],
+    texels: [[T; TEXEL_CHANNELS]; 4],
     /// From the left texels to the right ones, and from the upper to the lower ones, in [0, 1].
     right: T,
     down: T,
@@ -46,7 +46,7 @@ impl<T: Real> Texture<'_, T> {
             lanes!(I => belows[I] * row + lefts[I]),
             lanes!(I => belows[I] * row + rights[I]),
         ];
-        let mut texels = [[half; OF_TEXEL]; 4];
+        let mut texels = [[half; TEXEL_CHANNELS]; 4];
         for k in 0..4 {
             let places: Places = T::Lanes::numbered(&rows[k], height * width);
             texels[k] = T::rows(self.texels, &places);
@@ -81,11 +81,11 @@ impl<T: Real> Sample<T> {
 
     /// The channels there.
     #[inline(always)]
-    pub(super) fn channels(&self) -> [T; OF_TEXEL] {
+    pub(super) fn channels(&self) -> [T; TEXEL_CHANNELS] {
         let [s0, s1, s2, s3] = self.shares();
         let [a, b, c, d] = &self.texels;
-        let mut channels = [s0; OF_TEXEL];
-        for k in 0..OF_TEXEL {
+        let mut channels = [s0; TEXEL_CHANNELS];
+        for k in 0..TEXEL_CHANNELS {
             channels[k] = s0 * a[k] + s1 * b[k] + s2 * c[k] + s3 * d[k];
         }
         channels
@@ -93,11 +93,11 @@ impl<T: Real> Sample<T> {
 
     /// `Σ upstream · channels`, and its derivatives by u and v.
     #[inline(always)]
-    pub(super) fn pulled(&self, upstream: [T::Lanes; OF_TEXEL]) -> [T; 3] {
+    pub(super) fn pulled(&self, upstream: [T::Lanes; TEXEL_CHANNELS]) -> [T; 3] {
         let zero = T::constant(splat(0.0));
         let mut sums = [zero; 4];
         for texel in 0..4 {
-            for k in 0..OF_TEXEL {
+            for k in 0..TEXEL_CHANNELS {
                 sums[texel] = sums[texel] + self.texels[texel][k].scale(upstream[k]);
             }
         }
@@ -116,14 +116,14 @@ impl<T: Real> Sample<T> {
     pub(super) fn pull_texels(
         &self,
         share: T,
-        upstream: [T::Lanes; OF_TEXEL],
+        upstream: [T::Lanes; TEXEL_CHANNELS],
         gradient: &mut TexelSums<Float<T>>,
     ) {
         let shares = self.shares();
         for texel in 0..4 {
             let own = share * shares[texel];
-            let mut columns = [[Float::<T>::ZERO; LANES]; OF_TEXEL];
-            for k in 0..OF_TEXEL {
+            let mut columns = [[Float::<T>::ZERO; LANES]; TEXEL_CHANNELS];
+            for k in 0..TEXEL_CHANNELS {
                 columns[k] = own.scale(upstream[k]).output().array();
             }
             for i in 0..LANES {
@@ -136,7 +136,7 @@ impl<T: Real> Sample<T> {
 
 /// A gradient of texels, most of which may be 0.
 pub(super) struct TexelSums<F> {
-    runs: Vec<Option<Box<[[F; OF_TEXEL]; RUN]>>>,
+    runs: Vec<Option<Box<[[F; TEXEL_CHANNELS]; RUN]>>>,
     texels: usize,
 }
 
@@ -148,12 +148,12 @@ impl<F: crate::kernel::Float> TexelSums<F> {
 
     /// Adds to one texel.
     #[inline(always)]
-    fn add(&mut self, texel: u32, numbers: [F; OF_TEXEL]) {
+    fn add(&mut self, texel: u32, numbers: [F; TEXEL_CHANNELS]) {
         let texel = texel as usize;
-        let run =
-            self.runs[texel / RUN].get_or_insert_with(|| Box::new([[F::ZERO; OF_TEXEL]; RUN]));
+        let run = self.runs[texel / RUN]
+            .get_or_insert_with(|| Box::new([[F::ZERO; TEXEL_CHANNELS]; RUN]));
         let sums = &mut run[texel % RUN];
-        for k in 0..OF_TEXEL {
+        for k in 0..TEXEL_CHANNELS {
             sums[k] += numbers[k];
         }
     }
@@ -174,14 +174,14 @@ impl<F: crate::kernel::Float> TexelSums<F> {
 
     /// All of them, `[texels, 4]`.
     pub(super) fn dense(&self) -> Vec<F> {
-        let mut all = Vec::with_capacity(self.runs.len() * RUN * OF_TEXEL);
+        let mut all = Vec::with_capacity(self.runs.len() * RUN * TEXEL_CHANNELS);
         for run in &self.runs {
             match run {
                 Some(sums) => all.extend_from_slice(sums.as_flattened()),
-                None => all.resize(all.len() + RUN * OF_TEXEL, F::ZERO),
+                None => all.resize(all.len() + RUN * TEXEL_CHANNELS, F::ZERO),
             }
         }
-        all.truncate(self.texels * OF_TEXEL);
+        all.truncate(self.texels * TEXEL_CHANNELS);
         all
     }
 }

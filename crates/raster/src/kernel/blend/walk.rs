@@ -8,7 +8,7 @@ use super::{
     planes::Planes,
     point::{Barycentric, Point},
     scene::Blend,
-    texture::{OF_TEXEL, TexelSums},
+    texture::{TEXEL_CHANNELS, TexelSums},
 };
 use crate::kernel::{
     face::Face,
@@ -21,13 +21,13 @@ use crate::kernel::{
 };
 
 /// Numbers of a face that a gradient has beside those of its attributes: x and y of three corners, then their depths.
-pub(super) const OF_CORNERS: usize = 9;
+pub(super) const CORNER_NUMBERS: usize = 9;
 
 /// Stands for the logarithm of a weight of 0.
 const HIDDEN: f64 = -1e30;
 
 /// What the pairs of a face share beside its edges, in all lanes.
-pub(super) struct Shown<T: Real> {
+pub(super) struct FaceAttributes<T: Real> {
     planes: Barycentric<T>,
     /// The corners as they were given, by their places here.
     order: [usize; 3],
@@ -64,7 +64,7 @@ impl<T: Real> Pair<T> {
 
     /// Where a texture is seen, if there is one.
     #[inline(always)]
-    fn place_on_texture(&self, shown: &Shown<T>) -> [T; 2] {
+    fn place_on_texture(&self, shown: &FaceAttributes<T>) -> [T; 2] {
         [self.between(shown.attributes[0]), self.between(shown.attributes[1])]
     }
 }
@@ -73,16 +73,16 @@ impl<T: Real> Pair<T> {
 pub(super) trait Visitor<T: Real> {
     /// Whether the pair at these places of the band counts for nothing.
     #[inline(always)]
-    fn skips(&self, shown: &Shown<T>, at: [u32; 2]) -> bool {
+    fn skips(&self, shown: &FaceAttributes<T>, at: [u32; 2]) -> bool {
         let _ = (shown, at);
         false
     }
 
     /// Takes a pair at these places of the band.
-    fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]);
+    fn pair(&mut self, blend: &Blend<T>, shown: &FaceAttributes<T>, pair: &Pair<T>, at: [u32; 2]);
 
     /// Has taken all pairs, or some of the last, of face `index` of the band.
-    fn face(&mut self, scene: &Scene<T>, index: usize, shown: &Shown<T>) {
+    fn face(&mut self, scene: &Scene<T>, index: usize, shown: &FaceAttributes<T>) {
         let _ = (scene, index, shown);
     }
 }
@@ -104,7 +104,7 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
     fn run(self) {
         let (blend, place) = (self.blend, self.place);
         let mut list = List::new();
-        let mut shown = Shown::new(blend.numbers);
+        let mut shown = FaceAttributes::new(blend.numbers);
         for (k, numbers) in place.view.faces(place.band).chunks(LISTED).enumerate() {
             list.fill(&blend.scene, &place, numbers);
             let mut of = None;
@@ -131,7 +131,7 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
     }
 }
 
-impl<T: Real> Shown<T> {
+impl<T: Real> FaceAttributes<T> {
     /// Room for a face with so many numbers at each corner.
     fn new(numbers: usize) -> Self {
         let one = T::constant(splat(1.0));
@@ -171,7 +171,7 @@ impl<T: Real> Blend<'_, T> {
         &self,
         place: &Place<T>,
         face: Face<T>,
-        shown: &Shown<T>,
+        shown: &FaceAttributes<T>,
         px: T::Lanes,
         py: T::Lanes,
     ) -> Pair<T> {
@@ -221,7 +221,7 @@ pub(super) struct Largest<'a, T: Real> {
 
 impl<T: Real> Visitor<T> for Largest<'_, T> {
     #[inline(always)]
-    fn pair(&mut self, blend: &Blend<T>, _: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+    fn pair(&mut self, blend: &Blend<T>, _: &FaceAttributes<T>, pair: &Pair<T>, at: [u32; 2]) {
         let log = (pair.log_edge + pair.by_depth.log()).value();
         // A face that does not count must make nothing else vanish.
         let some = T::Lanes::splat(blend.counts_from).less(pair.log_edge.value());
@@ -238,7 +238,7 @@ pub(super) struct Sums<'a, T: Real> {
 
 impl<T: Real> Visitor<T> for Sums<'_, T> {
     #[inline(always)]
-    fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+    fn pair(&mut self, blend: &Blend<T>, shown: &FaceAttributes<T>, pair: &Pair<T>, at: [u32; 2]) {
         let [weight, _] = blend.weight(pair, self.largest.groups(0, at).value());
         // Numbers so small that they lose digits take a hundred times as long to multiply.
         let weight = weight.masked(T::Lanes::splat(blend.vanishing).less(weight.value()));
@@ -246,7 +246,7 @@ impl<T: Real> Visitor<T> for Sums<'_, T> {
         if let Some(texture) = &blend.texture {
             let seen = texture.sample(pair.place_on_texture(shown)).channels();
             for channel in 0..blend.channels {
-                self.sums.add(1 + channel, at, weight * seen[channel % OF_TEXEL]);
+                self.sums.add(1 + channel, at, weight * seen[channel % TEXEL_CHANNELS]);
             }
             return;
         }
@@ -264,12 +264,12 @@ pub(super) struct Pull<'a, T: Real> {
     pub(super) pixels: &'a Planes<T>,
     /// A plane for each channel.
     pub(super) upstream: &'a Planes<T>,
-    /// For each face of the band [`OF_CORNERS`] numbers, then three for each number of an attribute if the gradient to the attributes is wanted.
+    /// For each face of the band [`CORNER_NUMBERS`] numbers, then three for each number of an attribute if the gradient to the attributes is wanted.
     pub(super) faces: &'a mut [Float<T>],
     pub(super) stride: usize,
     /// Gradients to the tables of edge and depth, if they are wanted.
     pub(super) tables: Option<&'a mut [Vec<[Float<T>; 4]>; 2]>,
-    pub(super) corners: [T::Lanes; OF_CORNERS],
+    pub(super) corners: [T::Lanes; CORNER_NUMBERS],
     pub(super) attributes: Vec<[T::Lanes; 3]>,
     /// Gradient to the texels, if it is wanted.
     pub(super) texels: Option<&'a mut TexelSums<Float<T>>>,
@@ -295,13 +295,13 @@ fn nowhere<L: Lanes>(mask: L::Mask) -> bool {
 
 impl<T: Real> Visitor<T> for Pull<'_, T> {
     #[inline(always)]
-    fn skips(&self, shown: &Shown<T>, at: [u32; 2]) -> bool {
+    fn skips(&self, shown: &FaceAttributes<T>, at: [u32; 2]) -> bool {
         // Now that the sums are known, what is hidden by nearer faces is known too.
         nowhere::<T::Lanes>(self.pixels.groups(2, at).value().less(shown.log))
     }
 
     #[inline(always)]
-    fn pair(&mut self, blend: &Blend<T>, shown: &Shown<T>, pair: &Pair<T>, at: [u32; 2]) {
+    fn pair(&mut self, blend: &Blend<T>, shown: &FaceAttributes<T>, pair: &Pair<T>, at: [u32; 2]) {
         let log = pair.log_edge.value() + pair.by_depth.log().value();
         let counts = self.pixels.groups(2, at).value().less(log);
         if nowhere::<T::Lanes>(counts) {
@@ -317,9 +317,9 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
         let (here, between);
         if let Some(texture) = &blend.texture {
             let sample = texture.sample(pair.place_on_texture(shown));
-            let mut upstream = [splat(0.0); OF_TEXEL];
+            let mut upstream = [splat(0.0); TEXEL_CHANNELS];
             for channel in 0..blend.channels {
-                upstream[channel % OF_TEXEL] = self.upstream.groups(channel, at).value();
+                upstream[channel % TEXEL_CHANNELS] = self.upstream.groups(channel, at).value();
             }
             let [seen, by_u, by_v] = sample.pulled(upstream);
             let [u, v] = [shown.attributes[0], shown.attributes[1]];
@@ -374,7 +374,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
     }
 
     #[inline(always)]
-    fn face(&mut self, scene: &Scene<T>, index: usize, shown: &Shown<T>) {
+    fn face(&mut self, scene: &Scene<T>, index: usize, shown: &FaceAttributes<T>) {
         // From pixels, with y down, to NDC.
         let [right, down] = [scene.half, -scene.half].map(Float::<T>::from_f64);
         let own = &mut self.faces[index * self.stride..(index + 1) * self.stride];
@@ -384,10 +384,10 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
             own[2 * corner + 1] += self.corners[2 * k + 1].sum() * down;
             own[6 + corner] += self.corners[6 + k].sum();
             for (number, sums) in self.attributes.iter_mut().enumerate() {
-                own[OF_CORNERS + 3 * number + corner] += sums[k].sum();
+                own[CORNER_NUMBERS + 3 * number + corner] += sums[k].sum();
                 sums[k] = splat(0.0);
             }
         }
-        self.corners = [splat(0.0); OF_CORNERS];
+        self.corners = [splat(0.0); CORNER_NUMBERS];
     }
 }

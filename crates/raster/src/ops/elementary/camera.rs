@@ -2,10 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{
-    elementary::{Elementary, Views},
-    number::Number,
-};
+use super::{Elementary, Views, number::Number};
 use crate::{
     NEAR,
     kernel::{Dual, Float},

@@ -4,8 +4,11 @@ use softrast_tensor::{Element, TensorData};
 
 use crate::{
     ProfileSum,
-    fused::{ElementaryOp, Number, dual_upstream, flat, pass::Pass},
     kernel::{self, Float, Inputs, Judged, PixelLoss, rows_of_losses},
+    ops::{
+        elementary::{ElementaryOp, Number, dual_upstream, flat},
+        pass::Pass,
+    },
 };
 
 /// The loss of silhouettes against a target, in one op: its gradient to the vertices is computed along with it.

@@ -3,25 +3,22 @@
 //! Each is written once, for a pass forward and one back. Run over dual numbers, the two give the second order. What a step does
 //! around the rasterizer would else be a hundred small tensor ops, which take longer than the rasterizer.
 
-mod camera;
-mod elementary;
-mod elementary_op;
-mod image;
-mod number;
+pub(crate) mod blend;
+pub(crate) mod elementary;
+pub(crate) mod loss;
 pub(crate) mod pass;
+pub(crate) mod sum;
 
 use softrast_tensor::{Element, TensorData};
 
-pub(crate) use elementary::flat;
-pub use elementary_op::ElementaryOp;
-pub(crate) use elementary_op::dual_upstream;
-pub(crate) use number::Number;
+use blend::SoftBlend;
+pub use elementary::ElementaryOp;
+use elementary::Number;
+use loss::SilhouetteLoss;
 pub use pass::Pass;
+use sum::ProfileSum;
 
-use crate::{
-    ProfileSum, SilhouetteLoss, SoftBlend,
-    kernel::{self, Float, Inputs},
-};
+use crate::kernel::{self, Float, Inputs};
 
 /// An op with derivatives of its own.
 #[derive(Clone, Debug)]

@@ -3,13 +3,16 @@
 use softrast_tensor::{Element, TensorData};
 
 use super::{
+    Elementary,
     camera::{OrbitMatrix, Perspective},
-    elementary::{self, Elementary},
     image::{Coverage, Iou, SquaredError},
     number::Number,
-    pass::Pass,
+    run,
 };
-use crate::kernel::{Dual, Float, Judged};
+use crate::{
+    kernel::{Dual, Float, Judged},
+    ops::pass::Pass,
+};
 
 /// An op that is written for any number.
 #[derive(Clone, Copy, Debug)]
@@ -28,16 +31,16 @@ pub enum ElementaryOp {
 
 impl ElementaryOp {
     /// Runs a pass over `slices` with the shapes `dims`.
-    pub(super) fn run<F>(self, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
+    pub(crate) fn run<F>(self, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
     where
         F: Element + Float + Number<Float = F>,
     {
         match self {
-            Self::OrbitMatrix => elementary::run(&OrbitMatrix, pass, slices, dims),
-            Self::Perspective => elementary::run(&Perspective, pass, slices, dims),
-            Self::Coverage => elementary::run(&Coverage, pass, slices, dims),
-            Self::SquaredError => elementary::run(&SquaredError, pass, slices, dims),
-            Self::Iou => elementary::run(&Iou, pass, slices, dims),
+            Self::OrbitMatrix => run(&OrbitMatrix, pass, slices, dims),
+            Self::Perspective => run(&Perspective, pass, slices, dims),
+            Self::Coverage => run(&Coverage, pass, slices, dims),
+            Self::SquaredError => run(&SquaredError, pass, slices, dims),
+            Self::Iou => run(&Iou, pass, slices, dims),
         }
     }
 }

@@ -3,8 +3,8 @@
 use cubecl::prelude::*;
 
 use super::{
+    blend_inputs::{BlendInputs, BlendParams, BlendSpec},
     depth::{ByDepth, pull_depth},
-    drawn::{Drawn, Kind, Weights},
     dual::{Dual, load},
     pair::{Closest, Face, Place},
     table::add_powers,
@@ -57,7 +57,7 @@ impl Corners {
 
 /// A face with what its pairs share.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Shown {
+pub(super) struct FaceAttributes {
     face: Face,
     /// One over the doubled area, signed; 0 for a face without an inside that counts.
     per_area: Dual,
@@ -110,13 +110,25 @@ pub(super) struct Share {
 }
 
 #[cube]
-impl Shown {
+impl FaceAttributes {
     /// A face of a view of the launch.
-    pub(super) fn of(drawn: &Drawn, view: u32, face: u32, #[comptime] kind: Kind) -> Shown {
+    pub(super) fn of(
+        drawn: &BlendInputs,
+        view: u32,
+        face: u32,
+        #[comptime] kind: BlendSpec,
+    ) -> FaceAttributes {
         let job = (view * drawn.of_cells.face_count + face) as usize;
         let stride = comptime!(if kind.second { 18usize } else { 9usize });
         let first = drawn.weights.attributes + (drawn.first_view + view) * drawn.weights.per_view;
-        Shown::new(&drawn.corners, stride * job, &drawn.entries, face as usize, first, kind)
+        FaceAttributes::new(
+            &drawn.corners,
+            stride * job,
+            &drawn.entries,
+            face as usize,
+            first,
+            kind,
+        )
     }
 
     /// The face whose prepared numbers start at `first` in `corners`; `entries` `[faces, 3]` names the attributes at its corners.
@@ -126,8 +138,8 @@ impl Shown {
         entries: &Array<u32>,
         face: usize,
         first_attribute: u32,
-        #[comptime] kind: Kind,
-    ) -> Shown {
+        #[comptime] kind: BlendSpec,
+    ) -> FaceAttributes {
         let own = Face::new(corners, first, kind.second);
         let depths = first + comptime!(if kind.second { 12usize } else { 6usize });
         let per_depth = Corners {
@@ -142,7 +154,7 @@ impl Shown {
         let divisor = Dual::select(some, area, Dual::constant(1.0f32));
         let per_area = Dual::select(some, divisor.recip(), Dual::constant(0.0f32));
         let numbers = comptime!(kind.numbers() as u32);
-        Shown {
+        FaceAttributes {
             face: own,
             per_area,
             per_depth,
@@ -153,7 +165,12 @@ impl Shown {
     }
 
     /// A number of the attributes at the three corners.
-    pub(super) fn attribute(self, drawn: &Drawn, number: usize, #[comptime] kind: Kind) -> Corners {
+    pub(super) fn attribute(
+        self,
+        drawn: &BlendInputs,
+        number: usize,
+        #[comptime] kind: BlendSpec,
+    ) -> Corners {
         Corners {
             a: drawn.number(self.entry_a as usize + number, kind),
             b: drawn.number(self.entry_b as usize + number, kind),
@@ -162,7 +179,12 @@ impl Shown {
     }
 
     /// Where a pair sees the texture.
-    pub(super) fn sample(self, pair: ColourPair, drawn: &Drawn, #[comptime] kind: Kind) -> Sample {
+    pub(super) fn sample(
+        self,
+        pair: ColourPair,
+        drawn: &BlendInputs,
+        #[comptime] kind: BlendSpec,
+    ) -> Sample {
         let u = pair.weights.mul(self.attribute(drawn, 0usize, kind)).sum();
         let v = pair.weights.mul(self.attribute(drawn, 1usize, kind)).sum();
         Sample::at(u, v, drawn.weights)
@@ -172,10 +194,10 @@ impl Shown {
     pub(super) fn seen(
         self,
         pair: ColourPair,
-        drawn: &Drawn,
+        drawn: &BlendInputs,
         upstream: &Array<f32>,
         first: usize,
-        #[comptime] kind: Kind,
+        #[comptime] kind: BlendSpec,
     ) -> Seen {
         let plane = drawn.plane();
         let zero = Dual::constant(0.0f32);
@@ -228,8 +250,8 @@ impl Shown {
         self,
         px: f32,
         py: f32,
-        drawn: &Drawn,
-        #[comptime] kind: Kind,
+        drawn: &BlendInputs,
+        #[comptime] kind: BlendSpec,
     ) -> ColourPair {
         let weights = drawn.weights;
         let closest = self.face.closest(px, py);
@@ -357,10 +379,10 @@ impl ColourPair {
         self,
         by_edge: Dual,
         by_depth: Dual,
-        drawn: &Drawn,
+        drawn: &BlendInputs,
         partial: &mut Array<f32>,
         own: u32,
-        #[comptime] kind: Kind,
+        #[comptime] kind: BlendSpec,
     ) {
         let edge = self.edge;
         let by_value = Dual::constant(0.0f32).sub(by_edge);
@@ -370,12 +392,12 @@ impl ColourPair {
     }
 
     /// Whether it counts at all, and is above the floor by more than rounding leaves.
-    pub(super) fn counts(self, weights: Weights) -> bool {
+    pub(super) fn counts(self, weights: BlendParams) -> bool {
         self.log_edge.value > weights.counts_from
     }
 
     /// What it counts relative to a weight with this logarithm.
-    pub(super) fn share(self, relative: Dual, weights: Weights) -> Share {
+    pub(super) fn share(self, relative: Dual, weights: BlendParams) -> Share {
         let by_depth = self.log_depth.sub(relative);
         let whole = self.log_edge.add(by_depth).exp();
         let rest = 1.0f32 / (1.0f32 - weights.floor);

@@ -2,10 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{
-    elementary::{Elementary, Views},
-    number::Number,
-};
+use super::{Elementary, Views, number::Number};
 use crate::kernel::{EMPTY, Float};
 
 /// Pixels that one task takes; sums of them are added in order, whatever the number of threads.

@@ -1,8 +1,17 @@
 //! What an op is that is written once for any number, and how its passes run.
 
+mod camera;
+mod image;
+mod number;
+mod op;
+
 use softrast_tensor::{Element, TensorData};
 
-use super::{number::Number, pass::Pass};
+pub(crate) use number::Number;
+pub use op::ElementaryOp;
+pub(crate) use op::dual_upstream;
+
+use super::pass::Pass;
 use crate::kernel::{Dual, Float};
 
 /// An op that is written for any number. `dims` are the shapes of the inputs.

@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-3;
 
 /// The colours of the vertices of a mesh, as cameras at any distance see them.
 #[derive(Debug)]
-pub struct Coat<B: RasterBackend> {
+pub struct VertexColours<B: RasterBackend> {
     colours: Vec<[f64; 3]>,
     attributes: Attributes<B>,
     faces: Arc<[[u32; 3]]>,
@@ -28,7 +28,7 @@ pub struct Coat<B: RasterBackend> {
     renderers: RefCell<BTreeMap<usize, ColourRenderer>>,
 }
 
-impl<B: RasterBackend> Coat<B> {
+impl<B: RasterBackend> VertexColours<B> {
     /// Of faces between vertices of these colours.
     ///
     /// # Panics
@@ -108,11 +108,11 @@ mod tests {
     use super::*;
 
     /// A floor from depth 1 below the picture to depth 3 above it, black at the near end and white at the far one.
-    fn floor() -> (Coat<HostBackend>, Tensor<HostBackend, 3>) {
+    fn floor() -> (VertexColours<HostBackend>, Tensor<HostBackend, 3>) {
         let corners = [-9.0, -1.0, 1.0, 9.0, -1.0, 1.0, 3.0, 1.0, 3.0, -3.0, 1.0, 3.0].to_vec();
         let colours = [[0.0; 3], [0.0; 3], [1.0, 0.5, 0.25], [1.0, 0.5, 0.25]];
         let faces = [[0, 1, 2], [0, 2, 3]];
-        (Coat::new(&colours, faces.into()), tensor(corners, [1, 4, 3]))
+        (VertexColours::new(&colours, faces.into()), tensor(corners, [1, 4, 3]))
     }
 
     #[test]

@@ -4,8 +4,8 @@ use softrast_tensor::{Element, TensorData};
 
 use crate::{
     ImageSize,
-    fused::pass::Pass,
     kernel::{self, Bands, Float, Grid, Inputs, rows_of_bands},
+    ops::pass::Pass,
 };
 
 /// What stays the same over the calls of the op: faces, image size and the places of the knots.

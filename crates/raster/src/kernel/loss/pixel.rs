@@ -1,6 +1,6 @@
 //! Losses of silhouettes pixel by pixel, and what the gradient to the sums of profiles is made of.
 
-use super::{float::Float, lanes::Lanes, real::splat};
+use crate::kernel::{float::Float, lanes::Lanes, real::splat};
 
 /// Keeps the ratio of two empty images defined.
 pub(crate) const EMPTY: f64 = 1e-6;

@@ -1,12 +1,15 @@
 //! Losses of silhouettes and their gradients to the vertices, in one pass over the bands.
 //!
-//! What a pair of pixel and face is to the image is kept for the gradient while it is near the processor, so that nothing is computed
-//! twice.
+//! The forward pass caches what the gradient needs of each pair, so that nothing is computed twice.
+
+mod pixel;
 
 use std::{any::Any, cell::RefCell, ops::Range};
 
 use rayon::prelude::*;
 
+use self::pixel::{Compared, PARTS, overlap_and_union, squared_error};
+pub(crate) use self::pixel::{EMPTY, PixelLoss};
 use super::{
     bands::{Bands, View},
     face::Face,
@@ -14,7 +17,6 @@ use super::{
     lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
     list::{LISTED, List, group, rows_of_bands},
     pair::CornerSums,
-    pixel_loss::{Compared, PARTS, PixelLoss, overlap_and_union, squared_error},
     real::splat,
     scene::{Place, Scene},
     sum::Inputs,

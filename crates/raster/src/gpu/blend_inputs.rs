@@ -12,7 +12,7 @@ use super::{
 
 /// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, background and texture.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
-pub(super) struct Weights {
+pub(super) struct BlendParams {
     /// Cells of the edge softness, mirrored: the inner side is outside a face.
     pub(super) edge: Lookup,
     pub(super) depth: Lookup,
@@ -41,7 +41,7 @@ pub(super) struct Weights {
 
 /// What of the weighting is known when a kernel is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Kind {
+pub(super) struct BlendSpec {
     /// Whether tables have cells that are counted from their far ends.
     pub(super) far_edge: bool,
     pub(super) far_depth: bool,
@@ -56,7 +56,7 @@ pub(super) struct Kind {
     pub(super) second: bool,
 }
 
-impl Kind {
+impl BlendSpec {
     /// Numbers of an attribute.
     pub(super) fn numbers(self) -> usize {
         if self.is_textured { 2 } else { self.channels }
@@ -65,7 +65,7 @@ impl Kind {
 
 /// All of it.
 #[derive(CubeType, CubeLaunch)]
-pub(super) struct Drawn {
+pub(super) struct BlendInputs {
     pub(super) corners: Array<f32>,
     pub(super) reaches: Array<u32>,
     pub(super) cells: Array<u32>,
@@ -75,22 +75,22 @@ pub(super) struct Drawn {
     /// `[faces, 3]`: the attributes at the corners.
     pub(super) entries: Array<u32>,
     pub(super) of_cells: Cells,
-    pub(super) weights: Weights,
+    pub(super) weights: BlendParams,
     pub(super) frame: Frame,
     /// The first view of the launch.
     pub(super) first_view: u32,
 }
 
 #[cube]
-impl Drawn {
+impl BlendInputs {
     /// One of the numbers that all pixels share.
-    pub(super) fn number(&self, at: usize, #[comptime] kind: Kind) -> Dual {
+    pub(super) fn number(&self, at: usize, #[comptime] kind: BlendSpec) -> Dual {
         let along = self.weights.along as usize + at;
         load(&self.numbers, at, &self.direction, along, kind.second)
     }
 
     /// A row of the tables.
-    pub(super) fn cubic(&self, row: u32, #[comptime] kind: Kind) -> Cubic {
+    pub(super) fn cubic(&self, row: u32, #[comptime] kind: BlendSpec) -> Cubic {
         Cubic::new(&self.numbers, row, &self.direction, self.weights.along, kind.second)
     }
 
@@ -106,7 +106,7 @@ impl Drawn {
         view: u32,
         row: u32,
         column: u32,
-        #[comptime] kind: Kind,
+        #[comptime] kind: BlendSpec,
     ) -> usize {
         let plane = self.frame.height * self.frame.width;
         let planes = comptime!(kind.channels as u32 + 1);

@@ -7,11 +7,11 @@ use softrast_tensor::{Element, TensorData};
 
 use crate::{
     ImageSize, NEAR,
-    fused::pass::Pass,
     kernel::{
         Float, Grid,
         blend::{self, DepthGrid, Inputs, Kept},
     },
+    ops::pass::Pass,
     weighting::FARTHEST_SEEN,
 };
 
