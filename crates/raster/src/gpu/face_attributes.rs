@@ -6,7 +6,7 @@ use super::{
     blend_inputs::{BlendInputs, BlendParams, BlendSpec},
     depth::{ByDepth, pull_depth},
     dual::{Dual, load},
-    pair::{Closest, Face, Place},
+    pair::{Closest, Face, Place, Pull},
     table::add_powers,
     texture::{Four, Sample},
 };
@@ -323,8 +323,7 @@ impl FaceAttributes {
             field_y: Dual::select(within, inner_y, slide.mul(edge_y)),
             across_x: slide.mul(closest.dx),
             across_y: slide.mul(closest.dy),
-            pull_x: by_distance2.scale(-2.0f32).mul(closest.dx),
-            pull_y: by_distance2.scale(-2.0f32).mul(closest.dy),
+            pull: Pull::of(by_distance2, closest.dx, closest.dy),
         }
     }
 }
@@ -336,20 +335,19 @@ pub(super) struct Moved {
     field_y: Dual,
     across_x: Dual,
     across_y: Dual,
-    pull_x: Dual,
-    pull_y: Dual,
+    pull: Pull,
 }
 
 #[cube]
 impl Moved {
     /// The gradient to x of the corners.
     pub(super) fn x(self, pair: ColourPair) -> Corners {
-        corners(pair, self.pull_x, self.field_x, self.across_x)
+        corners(pair, self.pull.x, self.field_x, self.across_x)
     }
 
     /// The gradient to y of the corners.
     pub(super) fn y(self, pair: ColourPair) -> Corners {
-        corners(pair, self.pull_y, self.field_y, self.across_y)
+        corners(pair, self.pull.y, self.field_y, self.across_y)
     }
 }
 

@@ -58,9 +58,8 @@ pub(super) fn sum_faces(
         let g = upstream[frame.pixel(view, row, column) as usize];
         let pair = face.pair(frame.column_centre(column), frame.row_centre(row), lookup);
         let cubic = Cubic::new(table, pair.row, direction, table_offset, second);
-        let pull = pair.slope(cubic).scale(-2.0f32 * g);
-        let x = pull.mul(pair.dx);
-        let y = pull.mul(pair.dy);
+        let pull = pair.pull(cubic, g);
+        let (x, y) = (pull.x, pull.y);
         ax += x.mul(pair.weight(0u32)).stored(second);
         ay += y.mul(pair.weight(0u32)).stored(second);
         bx += x.mul(pair.weight(1u32)).stored(second);

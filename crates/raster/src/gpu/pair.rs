@@ -205,6 +205,22 @@ impl Edge {
     }
 }
 
+/// A gradient to x and y.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Pull {
+    pub(super) x: Dual,
+    pub(super) y: Dual,
+}
+
+#[cube]
+impl Pull {
+    /// That to the closest point, from which a pixel lies at `dx`, `dy`, of a function with this derivative by the squared distance.
+    pub(super) fn of(by_distance2: Dual, dx: Dual, dy: Dual) -> Pull {
+        let pull = by_distance2.scale(-2.0f32);
+        Pull { x: pull.mul(dx), y: pull.mul(dy) }
+    }
+}
+
 #[cube]
 impl Closest {
     fn nearer(self, other: Closest) -> Closest {
@@ -277,6 +293,11 @@ impl Pair {
     /// Derivative of the profile by the squared distance.
     pub(super) fn slope(self, cubic: Cubic) -> Dual {
         Place { row: self.row, place: self.place, rate: self.rate }.slope(cubic)
+    }
+
+    /// The gradient to the closest point of so many times the profile.
+    pub(super) fn pull(self, cubic: Cubic, factor: f32) -> Pull {
+        Pull::of(self.slope(cubic).scale(factor), self.dx, self.dy)
     }
 
     /// Barycentric weight of a corner at the closest point.

@@ -23,6 +23,15 @@ pub(crate) struct Closest<T: Real> {
     pub(crate) edges: [Mask<T>; 3],
 }
 
+impl<T: Real> Closest<T> {
+    /// The gradient to the closest point held where it is, of a function with this derivative by the squared distance.
+    #[inline(always)]
+    pub(crate) fn pull(&self, by_distance2: T) -> [T; 2] {
+        let pull = by_distance2.scale(splat(-2.0));
+        [pull * self.dx, pull * self.dy]
+    }
+}
+
 /// Closest boundary points to the pixels at `px`, `py`, by projection onto edges. No inverted matrix, no division:
 /// slivers, points and pixels on an edge all give finite numbers.
 ///

@@ -3,7 +3,11 @@
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, Bool, Int, Tensor, TensorData};
 
-use super::{Scene, between, chunks, corners, edge, lesser, places};
+use super::{
+    Scene, chunks,
+    distance::{Boundary, corners, signed},
+    places,
+};
 use crate::{
     Attributes, Background, NEAR, Weighting,
     kernel::{FAR_AWAY, blend::AREA},
@@ -169,32 +173,9 @@ impl<B: Backend> Points<B> {
             let [x, y] = [x, y].map(|x| x.mask_fill(hidden.clone(), 0.0));
             [x, y, z.mask_fill(hidden.clone(), 1.0)]
         });
-        let [a, b, c] = &corners;
-        let count = pixels.dims()[0];
-        let p = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));
-        let area = super::cross(between(a, b), between(b, c));
-        let orientation = area.sign().detach();
-        let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(from, to)| edge(&p, from, to));
-        let second = bc.distance2.clone().lower(ab.distance2.clone());
-        let nearer = lesser(ab.distance2, bc.distance2);
-        let third = ca.distance2.clone().lower(nearer.clone());
-        let nearest = lesser(nearer, ca.distance2);
-        let sides = [ab.side, bc.side, ca.side].map(|side| side * orientation.clone());
-        let within = |side: &Tensor<B, 3>| side.clone().greater_equal_elem(0.0);
-        let flat = orientation.equal_elem(0.0).expand(nearest.dims());
-        let inside = sides.iter().map(within).reduce(Tensor::bool_and).expect("three sides");
-        let inside = inside.bool_and(flat.bool_not());
-
-        let pick = |a: Tensor<B, 3>, b: Tensor<B, 3>, c: Tensor<B, 3>| {
-            a.mask_where(second.clone(), b).mask_where(third.clone(), c)
-        };
-        let along = pick(ab.along, bc.along, ca.along);
-        let (rest, zero) = (along.clone().neg() + 1.0, along.clone() * 0.0);
-        let on_boundary = [
-            pick(rest.clone(), zero.clone(), along.clone()),
-            pick(along.clone(), rest.clone(), zero.clone()),
-            pick(zero, along, rest),
-        ];
+        let boundary = Boundary::new(&corners, pixels);
+        let on_boundary = boundary.weights();
+        let Boundary { distance2, inside, sides, .. } = boundary;
         let [side_a, side_b, side_c] = sides;
         let area = side_a.clone() + side_b.clone() + side_c.clone();
         let own = inside.clone().bool_and(area.clone().greater_elem(AREA));
@@ -209,7 +190,7 @@ impl<B: Backend> Points<B> {
         let parts = parts.map(|part| part * depths.next().expect("three corners"));
         let [p0, p1, p2] = parts.clone();
         let depth = (p0 + p1 + p2).recip();
-        let distance = super::signed(nearest, inside);
+        let distance = signed(distance2, inside);
         Self { distance, weights: parts.map(|part| part * depth.clone()), depth, hidden }
     }
 }

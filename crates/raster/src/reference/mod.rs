@@ -3,19 +3,17 @@
 //! Slow (about 1.3 kB of traffic a pair) and simple; every faster path is tested against it.
 
 mod blend;
+mod distance;
 
 use softrast_softness::Softness;
-use softrast_tensor::{Autodiff, Backend, Int, Tensor, TensorData};
+use softrast_tensor::{Autodiff, Backend, Tensor, TensorData};
 
 pub use crate::tensor_ops::{iou_loss, mse_loss, orbit_matrices, perspective};
 use crate::{ImageSize, NEAR, TConorm};
 pub use blend::blended;
+use distance::corners;
+pub use distance::signed_distance;
 
-/// Squared edge lengths below this (NDC²) count as a point.
-const POINT: f64 = 1e-30;
-/// Squared distances below this (NDC²) count as 0, with gradient 0 instead of the infinite one of the
-/// square root.
-const ON_EDGE: f64 = 1e-24;
 /// Pixel-face pairs that one chunk of [`sums`] and [`vjp`] may hold.
 const PAIRS: usize = 1 << 18;
 
@@ -26,89 +24,6 @@ pub struct Scene<'a> {
     pub faces: &'a [[u32; 3]],
     /// Height and width of the image in pixels.
     pub size: ImageSize,
-}
-
-/// Signed distances from pixels to faces in NDC, positive inside: `[views, pixels, faces]`.
-///
-/// `vertices` is `[views, vertices, 3]` (x and y in NDC, depth), `pixels` `[pixels, 2]` in NDC.
-/// Inside or outside is told by edge functions, the distance is that to the nearest point of the
-/// boundary. Edges belong to the inside; a face without area has none.
-///
-/// Source: Petersen et al. 2022, computed by projection onto the edges instead of barycentric
-/// coordinates (docs/notes.md, Signed distance).
-///
-/// # Panics
-///
-/// If a face uses a vertex that is not there.
-pub fn signed_distance<B: Backend>(
-    vertices: Tensor<B, 3>,
-    faces: &[[u32; 3]],
-    pixels: Tensor<B, 2>,
-) -> Tensor<B, 3> {
-    let [a, b, c] = corners(vertices, faces);
-    let count = pixels.dims()[0];
-    let p = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));
-    let area = cross(between(&a, &b), between(&b, &c));
-    let orientation = area.sign().detach();
-    let [ab, bc, ca] = [(&a, &b), (&b, &c), (&c, &a)].map(|(from, to)| edge(&p, from, to));
-    let nearest = lesser(lesser(ab.distance2, bc.distance2), ca.distance2);
-    let within = |side: Tensor<B, 3>| (side * orientation.clone()).greater_equal_elem(0.0);
-    let inside = within(ab.side).bool_and(within(bc.side)).bool_and(within(ca.side));
-    let flat = orientation.clone().equal_elem(0.0).expand(nearest.dims());
-    let inside = inside.bool_and(flat.bool_not());
-    signed(nearest, inside)
-}
-
-/// Signed distances of squared ones.
-fn signed<B: Backend>(
-    distance2: Tensor<B, 3>,
-    inside: Tensor<B, 3, softrast_tensor::Bool>,
-) -> Tensor<B, 3> {
-    // Selected by the argument, so that neither the root nor its gradient meets 0.
-    let on_edge = distance2.clone().lower_elem(ON_EDGE);
-    let distance = distance2.mask_fill(on_edge.clone(), 1.0).sqrt().mask_fill(on_edge, 0.0);
-    distance.clone().neg().mask_where(inside, distance)
-}
-
-/// x and y of places, or of the ways between them.
-type Plane<B> = [Tensor<B, 3>; 2];
-
-/// An edge as points see it.
-struct Edge<B: Backend> {
-    /// Squared distance to its closest point.
-    distance2: Tensor<B, 3>,
-    /// Positive on its left: the doubled area of the triangle that it makes with the point.
-    side: Tensor<B, 3>,
-    /// The place of the closest point on it, 0 to 1.
-    along: Tensor<B, 3>,
-}
-
-fn edge<B: Backend>(p: &Plane<B>, start: &[Tensor<B, 3>; 3], end: &[Tensor<B, 3>; 3]) -> Edge<B> {
-    let [ex, ey] = between(start, end);
-    let [wx, wy] = [0, 1].map(|k| p[k].clone() - start[k].clone());
-    let length2 = ex.clone() * ex.clone() + ey.clone() * ey.clone();
-    let point = length2.clone().lower_elem(POINT);
-    let inverse = length2.mask_fill(point.clone(), 1.0).recip().mask_fill(point, 0.0);
-    let along = ((wx.clone() * ex.clone() + wy.clone() * ey.clone()) * inverse).clamp(0.0, 1.0);
-    let dx = wx.clone() - along.clone() * ex.clone();
-    let dy = wy.clone() - along.clone() * ey.clone();
-    let distance2 = dx.clone() * dx + dy.clone() * dy;
-    Edge { distance2, side: cross([ex, ey], [wx, wy]), along }
-}
-
-/// From one corner to another.
-fn between<B: Backend>(start: &[Tensor<B, 3>; 3], end: &[Tensor<B, 3>; 3]) -> Plane<B> {
-    [0, 1].map(|k| end[k].clone() - start[k].clone())
-}
-
-fn cross<B: Backend>([ux, uy]: Plane<B>, [vx, vy]: Plane<B>) -> Tensor<B, 3> {
-    ux * vy - uy * vx
-}
-
-/// The lesser of two numbers; where they are the same, the first with all of the gradient.
-fn lesser<B: Backend>(a: Tensor<B, 3>, b: Tensor<B, 3>) -> Tensor<B, 3> {
-    let less = b.clone().lower(a.clone());
-    a.mask_where(less, b)
 }
 
 /// Sums of `g(s(d))` over the faces of each pixel: `[views, height, width]`, top row first.
@@ -194,18 +109,6 @@ fn hidden<B: Backend>(
 ) -> Tensor<B, 3, softrast_tensor::Bool> {
     let [a, b, c] = corners(vertices, faces).map(|[_, _, depth]| depth.lower_elem(NEAR));
     a.bool_or(b).bool_or(c)
-}
-
-/// Coordinates of the corners, each `[views, 1, faces]`: first the corner, then x, y, depth.
-fn corners<B: Backend>(vertices: Tensor<B, 3>, faces: &[[u32; 3]]) -> [[Tensor<B, 3>; 3]; 3] {
-    let [views, _, _] = vertices.dims();
-    let device = vertices.device();
-    [0, 1, 2].map(|k| {
-        let index: Vec<i64> = faces.iter().map(|face| i64::from(face[k])).collect();
-        let index = Tensor::<B, 1, Int>::from_data(TensorData::new(index, [faces.len()]), &device);
-        let corner = vertices.clone().select(1, index);
-        [0, 1, 2].map(|axis| corner.clone().narrow(2, axis, 1).reshape([views, 1, faces.len()]))
-    })
 }
 
 /// Centres of the given pixels, `[pixels, 2]` in NDC.

@@ -114,8 +114,7 @@ impl<T: Real> Point<T> {
         let field_x = T::choose(self.within, field_x, slide * self.edge_x);
         let field_y = T::choose(self.within, field_y, slide * self.edge_y);
         let (across_x, across_y) = (turned(edges, slide * dx), turned(edges, slide * dy));
-        let pull = by_distance2.scale(splat(-2.0));
-        let (pull_x, pull_y) = (pull * dx, pull * dy);
+        let [pull_x, pull_y] = self.closest.pull(by_distance2);
         let mut corners = [zero; 6];
         for k in 0..3 {
             let (weight, own) = (weights[k], self.barycentric[k]);
