@@ -162,7 +162,7 @@ export class Playground {
     const scene = { triangles, softness: choice, width: this.#width, t_conorm, size: SIZE, grid: GRID };
     await this.engine.ready;
     const { image, gradient } = await this.engine.ask("draw", { scene });
-    const curve = await this.engine.ask("curve", { choice, task: "pose", part: 0, size: SIZE, reach: REACH, count: 241 });
+    const curve = await this.engine.ask("curve", { choice, task: "pose", progress: 0, size: SIZE, reach: REACH, count: 241 });
     this.drawn = { image, gradient, count, curve };
     this.draw();
   }

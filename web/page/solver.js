@@ -31,7 +31,7 @@ export class Solver {
     this.buttons = Object.fromEntries([...section.querySelectorAll("[data-do]")].map((button) => [button.dataset.do, button]));
     this.canvases = (of, is) => (of ? find(`[data-row=${of}] [data-is=${is}]`) : find(`[data-is=${is}]`));
     this.orbit = task === "pose" ? new OrbitView(this.canvases(null, "orbit")) : null;
-    this.part = find("[data-is=part]");
+    this.slider = find("[data-is=progress]");
     const changed = () => this.#changed();
     this.pickers = RUNS.map((run, k) => new SoftnessPicker(find(`[data-softness=${run}]`), k ? "Second softness" : "Softness", names, changed));
     this.draw = scheduled(() => this.#draw());
@@ -48,7 +48,7 @@ export class Solver {
       });
     }
     for (const [name, button] of Object.entries(this.buttons)) button.addEventListener("click", () => this.#do(name));
-    this.part.addEventListener("input", () => this.#curve());
+    this.slider.addEventListener("input", () => this.#curve());
     new ResizeObserver(() => this.draw()).observe(find(".results"));
     this.inputs.gpu.disabled = !names.gpu;
     find("[data-is=noGpu]").hidden = names.gpu;
@@ -348,7 +348,7 @@ export class Solver {
       this.draw();
     }
     const shown = this.runs[0]?.latest;
-    if (shown) this.part.value = shown.part;
+    if (shown) this.slider.value = shown.progress;
     this.#show();
     this.drawLater();
     if (shown && this.state !== "running") this.#curve();
@@ -445,25 +445,25 @@ export class Solver {
     if (this.state === "running") this.#curve();
   }
 
-  /** The curve at the part of the run that the slider shows. */
+  /** The curve at the progress of the run that the slider shows. */
   async #curve() {
     if (this.section.hidden || this.asksCurve) return;
     this.asksCurve = true;
     try {
       await this.engine.ready;
-      const { task, part, inputs } = this;
+      const { task, slider, inputs } = this;
       const size = Number(inputs.size.value);
       const request = { task: this.#kind === "shape" ? "shape2d" : this.#kind, size, reach: REACH, count: 241 };
       const chosen = inputs.compare.checked ? this.pickers : this.pickers.slice(0, 1);
-      const parts = this.runs.map((run) => (this.state === "running" && run.latest ? run.latest.part : Number(part.value)));
-      const found = await Promise.all(chosen.map((picker, k) => this.engine.ask("curve", { ...request, choice: picker.value, part: parts[k] ?? Number(part.value) })));
+      const progresses = this.runs.map((run) => (this.state === "running" && run.latest ? run.latest.progress : Number(slider.value)));
+      const found = await Promise.all(chosen.map((picker, k) => this.engine.ask("curve", { ...request, choice: picker.value, progress: progresses[k] ?? Number(slider.value) })));
       const pixel = 2 / size;
       const curves = found.flatMap(({ curves }, k) => curves.map((values, j) => ({ colour: RUNS[k], values, dash: j ? [5, 4] : [] })));
       softnessChart(this.canvases(null, "curve"), { curves, reach: REACH / pixel });
       found.forEach(({ width, moves, feedback, curves }, k) => {
         const how = feedback ? "Its width follows what the run sees, and a run that is stuck begins again." : moves ? "Its width moves over the run." : "Its width stays.";
         chosen[k].hint.textContent = how + (curves.length > 1 ? " Dashed: what the gradient is taken of." : "");
-        if (k === 0) part.nextElementSibling.textContent = `${(width / pixel).toFixed(2)} px`;
+        if (k === 0) slider.nextElementSibling.textContent = `${(width / pixel).toFixed(2)} px`;
       });
     } catch (error) {
       this.#fail(error);

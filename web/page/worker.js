@@ -52,8 +52,8 @@ const asks = {
   },
 
   /** The curve of a softness. */
-  curve({ choice, task, part, size, reach, count }) {
-    return JSON.parse(softrast.curve(JSON.stringify(choice), task, part, size, reach, count));
+  curve({ choice, task, progress, size, reach, count }) {
+    return JSON.parse(softrast.curve(JSON.stringify(choice), task, progress, size, reach, count));
   },
 
   /** The file of a softness. */

@@ -45,23 +45,23 @@ pub fn names() -> String {
     json!({ "preset": preset, "families": families, "learned": learned }).to_string()
 }
 
-/// The curve of a softness at `part` of its path, on images of `size` pixels, as JSON: `curves` (that of the softness, and of its surrogate
+/// The curve of a softness at `progress` of its path, on images of `size` pixels, as JSON: `curves` (that of the softness, and of its surrogate
 /// if it has one, at `count` distances from `-reach` to `reach` in NDC), `width` in NDC, `scale`, `moves`, `feedback` and `note`.
 #[wasm_bindgen]
 pub fn curve(
     choice: &str,
     task: &str,
-    part: f64,
+    progress: f64,
     size: usize,
     reach: f64,
     count: usize,
 ) -> Result<String, String> {
     let choice: SoftnessChoice = serde_json::from_str(choice).map_err(|e| e.to_string())?;
     let softness = choice.of_task(task).map_err(line)?;
-    let part = part.clamp(0.0, 1.0);
-    let values = curves(&softness, part, size, reach, count);
+    let progress = progress.clamp(0.0, 1.0);
+    let values = curves(&softness, progress, size, reach, count);
     let curves: Vec<&[f32]> = values.chunks(count).collect();
-    let (width, scale) = (softness.width_at(part, size), softness.scale_at(part, size));
+    let (width, scale) = (softness.width_at(progress, size), softness.scale_at(progress, size));
     let told = json!({
         "curves": curves, "width": width, "scale": scale, "moves": !softness.is_constant(),
         "feedback": softness.feedback.is_some(), "family": softness.softness.family, "note": softness.note,

@@ -57,7 +57,7 @@ pub struct Frame {
     /// Steps taken so far.
     pub step: usize,
     /// Where on its path the softness is, 0 to 1.
-    pub part: f64,
+    pub progress: f64,
     /// Its scale, in NDC (NDC² if squared).
     pub scale: f64,
     /// What is lowered.
@@ -85,7 +85,7 @@ impl Frame {
     pub(crate) fn new(iterate: &Iterate, hard: &[f64], theta: Vec<f64>) -> Self {
         Self {
             step: iterate.step,
-            part: iterate.part,
+            progress: iterate.progress,
             scale: iterate.scale,
             loss: iterate.loss[0],
             hard_loss: iterate.hard_loss[0],

@@ -158,11 +158,11 @@ impl SoftnessChoice {
     }
 }
 
-/// Values s(d) of a softness at `part` of its path, 0 to 1, on images of `size` pixels a side: at `count` distances, evenly spaced from
+/// Values s(d) of a softness at `progress` of its path, 0 to 1, on images of `size` pixels a side: at `count` distances, evenly spaced from
 /// `-reach` to `reach` in NDC, `[count]`. Those of its surrogate stand behind them, if it has one.
 pub fn curves(
     softness: &ScheduledSoftness,
-    part: f64,
+    progress: f64,
     size: usize,
     reach: f64,
     count: usize,
@@ -172,8 +172,8 @@ pub fn curves(
     let values = |edge: EdgeSoftness, phi: &[f64]| -> Tensor<Backend, 1> {
         edge.value(vector(phi), vector(&distances))
     };
-    let own = values(softness.softness, &softness.phi_at(part, size));
-    let other = softness.surrogate_at(part, size).map(|of| values(of.softness, &of.phi));
+    let own = values(softness.softness, &softness.phi_at(progress, size));
+    let other = softness.surrogate_at(progress, size).map(|of| values(of.softness, &of.phi));
     [Some(own), other].into_iter().flatten().flat_map(numbers).map(|x| x as f32).collect()
 }
 
@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn a_curve_is_one_half_at_the_edge_and_narrows_with_the_run() {
         let softness = choice("logistic").of_task("pose").unwrap();
-        let [first, last] = [0.0, 1.0].map(|part| curves(&softness, part, 64, 0.1, 21));
+        let [first, last] = [0.0, 1.0].map(|progress| curves(&softness, progress, 64, 0.1, 21));
         assert!((first[10] - 0.5).abs() < 1e-6 && (last[10] - 0.5).abs() < 1e-6);
         assert!(last[11] > first[11] && last[11] > 0.99);
     }

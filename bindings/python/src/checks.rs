@@ -21,11 +21,11 @@ pub(crate) fn check_size(size: [usize; 2]) -> PyResult<()> {
     Err(refused(format!("the image is {size:?}, expected at least one pixel")))
 }
 
-pub(crate) fn check_part(part: f64) -> PyResult<()> {
-    if (0.0..=1.0).contains(&part) {
+pub(crate) fn check_progress(progress: f64) -> PyResult<()> {
+    if (0.0..=1.0).contains(&progress) {
         return Ok(());
     }
-    Err(refused(format!("the part of a run is {part}, expected 0 to 1")))
+    Err(refused(format!("the progress of a run is {progress}, expected 0 to 1")))
 }
 
 /// `name` is that of the argument, `of` that of the softness, which has `expected` parameters.

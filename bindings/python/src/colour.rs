@@ -32,7 +32,7 @@ impl ColourRenderer {
         size: [usize; 2],
         softness: &Softness,
         planes: [f64; 2],
-        part: f64,
+        progress: f64,
         depth: &str,
         depth_scale: f64,
         tolerance: f64,
@@ -51,11 +51,11 @@ impl ColourRenderer {
         }
         if softness.0.surrogate.is_some() {
             return Err(refused(
-                "this softness has a surrogate, which only silhouettes use: take Softness.with_phi(softness.phi_at(part)) for colours",
+                "this softness has a surrogate, which only silhouettes use: take Softness.with_phi(softness.phi_at(progress)) for colours",
             ));
         }
         let depth: DepthSoftness = depth.parse().map_err(refused)?;
-        let phi = softness.parameters_at(part, size[0].min(size[1]))?;
+        let phi = softness.parameters_at(progress, size[0].min(size[1]))?;
         let weighting = Weighting { edge: softness.0.softness, depth, planes };
         let faces = corners(&faces)?;
         let of = || {

@@ -10,7 +10,7 @@ use softrast_softness::{EdgeSoftness, Softness as _};
 use softrast_tensor::{DType, Tensor, TensorData};
 
 use crate::{
-    checks::{check_part, check_phi, check_size, check_tolerance, corners, least},
+    checks::{check_phi, check_progress, check_size, check_tolerance, corners, least},
     guard::{guarded, refused},
     op::Op,
     softness::Softness,
@@ -44,7 +44,7 @@ impl Renderer {
         faces: PyReadonlyArray2<'_, i64>,
         size: [usize; 2],
         softness: &Softness,
-        part: f64,
+        progress: f64,
         tolerance: f64,
         t_conorm: &str,
     ) -> PyResult<Self> {
@@ -53,9 +53,9 @@ impl Renderer {
         check_size(size)?;
         let faces = corners(&faces)?;
         let (least_vertices, count) = (least(&faces), faces.len());
-        check_part(part)?;
+        check_progress(progress)?;
         let rasterizer = Rasterizer { size: ImageSize::from(size), tolerance, t_conorm };
-        let renderer = guarded(py, || softness.0.renderer_at(part, rasterizer, faces))?;
+        let renderer = guarded(py, || softness.0.renderer_at(progress, rasterizer, faces))?;
         Ok(Self { renderer, faces: count, t_conorm, least_vertices, size })
     }
 

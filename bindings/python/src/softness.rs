@@ -6,7 +6,7 @@ use softrast_inverse::ScheduledSoftness;
 use softrast_softness::{EdgeSoftness, Family, Softness as _};
 
 use crate::{
-    checks::{check_part, check_phi},
+    checks::{check_phi, check_progress},
     guard::{guarded, refused},
 };
 
@@ -58,16 +58,16 @@ impl Softness {
         Ok(Self(ScheduledSoftness { phi, schedule, feedback, surrogate, ..self.0.clone() }))
     }
 
-    /// Parameters φ `[P]`, float64, at `part` of a run (0 to 1), on images whose shorter side has `size` pixels. A softness without a
+    /// Parameters φ `[P]`, float64, at `progress` of a run (0 to 1), on images whose shorter side has `size` pixels. A softness without a
     /// schedule has the same all along.
-    #[pyo3(signature = (part=0.0, size=64))]
+    #[pyo3(signature = (progress=0.0, size=64))]
     fn phi_at<'py>(
         &self,
         py: Python<'py>,
-        part: f64,
+        progress: f64,
         size: usize,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(PyArray1::from_vec(py, self.parameters_at(part, size)?))
+        Ok(PyArray1::from_vec(py, self.parameters_at(progress, size)?))
     }
 
     /// The name of the family.
@@ -103,10 +103,10 @@ impl Softness {
 }
 
 impl Softness {
-    /// Parameters at `part` of a run, on images whose shorter side has `size` pixels.
-    pub(crate) fn parameters_at(&self, part: f64, size: usize) -> PyResult<Vec<f64>> {
-        check_part(part)?;
-        Ok(self.0.phi_at(part, size))
+    /// Parameters at `progress` of a run, on images whose shorter side has `size` pixels.
+    pub(crate) fn parameters_at(&self, progress: f64, size: usize) -> PyResult<Vec<f64>> {
+        check_progress(progress)?;
+        Ok(self.0.phi_at(progress, size))
     }
 }
 

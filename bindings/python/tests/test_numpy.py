@@ -85,7 +85,7 @@ def test_a_softness_with_a_surrogate_draws_its_own_image():
     assert softness.has_surrogate and "surrogate" in repr(softness)
     plain = softness.with_phi(softness.phi_at(0.5, 9))
     assert not plain.has_surrogate
-    images = [softrast.silhouette(softrast.Renderer(FACES, 9, kind, part=0.5), CORNERS) for kind in (softness, plain)]
+    images = [softrast.silhouette(softrast.Renderer(FACES, 9, kind, progress=0.5), CORNERS) for kind in (softness, plain)]
     assert np.array_equal(*images)
 
 

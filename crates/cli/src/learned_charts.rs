@@ -45,7 +45,7 @@ pub(crate) fn learned_charts(
             let squared = softness.softness.squared;
             let width = |scale: f64| pixels * if squared { scale.sqrt() } else { scale };
             let scale =
-                |step: usize| [step as f64, width(softness.scale_at(layout.part(step), size))];
+                |step: usize| [step as f64, width(softness.scale_at(layout.progress(step), size))];
             let points = (0..layout.steps().max(1)).map(scale).collect();
             Series { name: name.into(), points, ..Series::default() }
         });

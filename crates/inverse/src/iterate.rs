@@ -17,7 +17,7 @@ pub struct Iterate {
     /// How often a run with feedback was stuck and began again so far.
     pub begun_again: usize,
     /// Where on its path the softness is, 0 to 1.
-    pub part: f64,
+    pub progress: f64,
     /// Scale of the softness, in NDC (NDC² if squared).
     pub scale: f64,
     /// The parameters of the scene, on the CPU, `[N]`.
@@ -71,10 +71,15 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         Self { problem: of, instances: instances.len(), size, renderer, scene, host }
     }
 
-    /// What is seen at `theta` `[N]`, under the softness at a part of its path, 0 to 1; with the image if pictures are wanted.
-    pub(crate) fn seen(&self, part: f64, theta: Tensor<Autodiff<B>, 1>, pictures: bool) -> Seen<B> {
+    /// What is seen at `theta` `[N]`, under the softness at this progress of a run; with the image if pictures are wanted.
+    pub(crate) fn seen(
+        &self,
+        progress: f64,
+        theta: Tensor<Autodiff<B>, 1>,
+        pictures: bool,
+    ) -> Seen<B> {
         let (problem, Self { scene, renderer, .. }) = (self.problem.borrow(), self);
-        let softness = renderer.at_part(part);
+        let softness = renderer.at_progress(progress);
         // Beside the loss, which is the same to the last bit with pictures and without.
         let image = pictures.then(|| problem.image(scene, theta.clone().detach(), &softness));
         let soft = problem.loss_at(scene, theta.clone(), &softness);
@@ -87,7 +92,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
     pub(crate) async fn read(
         &self,
         step: usize,
-        part: f64,
+        progress: f64,
         seen: Seen<B>,
     ) -> anyhow::Result<Iterate> {
         let image = seen.image.map(|image| of_first(image, self.instances));
@@ -108,8 +113,8 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         Ok(Iterate {
             step,
             begun_again: 0,
-            part,
-            scale: self.renderer.scale(part),
+            progress,
+            scale: self.renderer.scale(progress),
             theta,
             loss: loss.iter().collect(),
             soft_loss: soft_loss.iter().collect(),

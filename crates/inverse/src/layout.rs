@@ -78,7 +78,7 @@ impl<S: Softness> PhiLayout<S> {
         let last = knots.max(2) - 1;
         let knot = |k: usize| {
             let step = (steps.saturating_sub(1) * k).div_ceil(last);
-            let scale = start.scale_at(ScaleSchedule::part(step, steps), size);
+            let scale = start.scale_at(ScaleSchedule::progress(step, steps), size);
             (scale - floor).max(ABOVE_FLOOR * scale).ln()
         };
         schedule.knots = (0..knots).map(knot).collect();
@@ -133,9 +133,9 @@ impl<S: Softness> PhiLayout<S> {
         self.size
     }
 
-    /// Which part of a run is over after `step` steps.
-    pub fn part(&self, step: usize) -> f64 {
-        ScaleSchedule::part(step, self.steps)
+    /// The progress of a run after `step` steps, 0 to 1.
+    pub fn progress(&self, step: usize) -> f64 {
+        ScaleSchedule::progress(step, self.steps)
     }
 
     /// Steps with the same number have the same softness.
@@ -193,7 +193,7 @@ impl<S: Softness> PhiLayout<S> {
         let schedule = self.start.schedule.as_ref()?;
         let floor = schedule.floor(self.edge(), self.size);
         let knots = learned.clone().narrow(0, 0, self.knots());
-        Some(ScaleSchedule::scale(&knots, floor, self.part(step)))
+        Some(ScaleSchedule::scale(&knots, floor, self.progress(step)))
     }
 
     fn knots(&self) -> usize {

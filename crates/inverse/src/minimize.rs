@@ -184,13 +184,13 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         }
         let seconds = drawn.map(|drawing| (drawing + clock.elapsed()).as_secs_f64());
         let clock = Instant::now();
-        let seen = self.run.seen(self.place.part, leaf.clone(), self.pictures);
+        let seen = self.run.seen(self.place.progress, leaf.clone(), self.pictures);
         // A GPU has only been asked so far, also for the end of the step before. A browser does not wait for it.
         if cfg!(not(target_family = "wasm")) {
             B::sync(&seen.theta.device())?;
         }
         let (drawing, loss) = (clock.elapsed(), seen.loss.clone());
-        let read = self.run.read(step, self.place.part, seen).await?;
+        let read = self.run.read(step, self.place.progress, seen).await?;
         let iterate = Iterate { seconds, begun_again: self.starts - 1, ..read };
         let hard_loss = iterate.hard_loss[0];
         self.latest = Some(Latest { step, leaf, loss, hard_loss, drawing });
@@ -210,6 +210,6 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Iterator
 
 /// Where a step is taken without feedback.
 fn by_time(rate_end: f64, step: usize, steps: usize) -> Place {
-    let part = ScaleSchedule::part(step, steps);
-    Place { part, rate: rate_end.powf(part), again: false }
+    let progress = ScaleSchedule::progress(step, steps);
+    Place { progress, rate: rate_end.powf(progress), again: false }
 }

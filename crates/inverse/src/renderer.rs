@@ -58,12 +58,12 @@ impl<S: Softness> ScheduledRenderer<S> {
 
     /// The softness at a step of which nothing is differentiated by φ.
     pub fn at<B: RasterBackend>(&self, step: usize) -> SoftnessAt<'_, B, S> {
-        self.at_part(self.layout.part(step))
+        self.at_progress(self.layout.progress(step))
     }
 
-    /// The softness at a part of its path, 0 to 1, of which nothing is differentiated by φ.
-    pub(crate) fn at_part<B: RasterBackend>(&self, part: f64) -> SoftnessAt<'_, B, S> {
-        SoftnessAt { renderer: self, part, prepared: None }
+    /// The softness at this progress of a run, 0 to 1, of which nothing is differentiated by φ.
+    pub(crate) fn at_progress<B: RasterBackend>(&self, progress: f64) -> SoftnessAt<'_, B, S> {
+        SoftnessAt { renderer: self, progress, prepared: None }
     }
 
     /// The softness at a step from what [`ScheduledRenderer::prepared`] gave.
@@ -86,7 +86,7 @@ impl<S: Softness> ScheduledRenderer<S> {
             let parts = [self.layout.phi(phi, step), self.layout.own(phi)];
             return Tensor::cat(parts.into_iter().filter(|part| part.dims() != [0]).collect(), 0);
         }
-        let renderer = self.silhouettes::<B>(self.layout.part(step));
+        let renderer = self.silhouettes::<B>(self.layout.progress(step));
         let own = [Some(&renderer), renderer.surrogate()].into_iter().flatten();
         let phi = [self.layout.phi(phi, step)].into_iter().chain(self.layout.surrogate(phi, step));
         // By the knots of the values: nothing is read from the device.
@@ -111,35 +111,35 @@ impl<S: Softness> ScheduledRenderer<S> {
         &self.layout
     }
 
-    /// Scale of the softness at a part of its path, 0 to 1.
-    pub(crate) fn scale(&self, part: f64) -> f64 {
-        self.values.scale_at(part, self.layout.size())
+    /// Scale of the softness at this progress of a run.
+    pub(crate) fn scale(&self, progress: f64) -> f64 {
+        self.values.scale_at(progress, self.layout.size())
     }
 
     /// Parts of the path with the same number have the same softness.
-    fn place(&self, part: f64) -> u64 {
-        if self.values.is_constant() { 0 } else { part.to_bits() }
+    fn place(&self, progress: f64) -> u64 {
+        if self.values.is_constant() { 0 } else { progress.to_bits() }
     }
 
-    /// Pixels a side of the image at a part of the path, 0 to 1.
-    fn side(&self, part: f64) -> usize {
-        self.resolution.side(self.size, self.values.width_at(part, self.layout.size()))
+    /// Pixels a side of the image at this progress.
+    fn side(&self, progress: f64) -> usize {
+        self.resolution.side(self.size, self.values.width_at(progress, self.layout.size()))
     }
 
-    /// What draws silhouettes at a part of the path.
+    /// What draws silhouettes at this progress.
     ///
     /// # Panics
     ///
     /// If the problem has no faces.
-    fn silhouettes<B: RasterBackend>(&self, part: f64) -> SoftRenderer<S> {
+    fn silhouettes<B: RasterBackend>(&self, progress: f64) -> SoftRenderer<S> {
         let renderer = self.renderer.as_ref().expect("a problem that sees silhouettes has faces");
         let mut placed = self.placed.borrow_mut();
-        let placed = placed.entry(self.place(part)).or_insert_with(|| {
+        let placed = placed.entry(self.place(progress)).or_insert_with(|| {
             let size = self.layout.size();
-            let surrogate = self.values.surrogate_at(part, size).map(|found| found.phi);
-            renderer.with_phi::<B>(self.values.phi_at(part, size), surrogate)
+            let surrogate = self.values.surrogate_at(progress, size).map(|found| found.phi);
+            renderer.with_phi::<B>(self.values.phi_at(progress, size), surrogate)
         });
-        placed.sized(self.side(part))
+        placed.sized(self.side(progress))
     }
 }
 
@@ -148,7 +148,7 @@ impl<S: Softness> ScheduledRenderer<S> {
 pub struct SoftnessAt<'a, B: RasterBackend, S = EdgeSoftness> {
     renderer: &'a ScheduledRenderer<S>,
     /// Part of the path.
-    part: f64,
+    progress: f64,
     /// What was prepared of a vector φ; without it, the renderer's own values count.
     prepared: Option<Tensor<B, 1>>,
 }
@@ -161,7 +161,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     ///
     /// If the problem has no faces.
     pub fn silhouette(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
-        let renderer = self.renderer.silhouettes::<B>(self.part);
+        let renderer = self.renderer.silhouettes::<B>(self.progress);
         let Some(prepared) = &self.prepared else { return renderer.silhouette(vertices) };
         let (seen, table) = (renderer.prepared::<B>(renderer.phi()), prepared.clone());
         let table = table.reshape([-1, 4]);
@@ -185,7 +185,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
             return targets.iou_loss(self.silhouette(vertices));
         }
         let (target, counted) = targets.at(self.side());
-        let renderer = self.renderer.silhouettes::<B>(self.part);
+        let renderer = self.renderer.silhouettes::<B>(self.progress);
         renderer.weighted_iou_loss(vertices, target, counted)
     }
 
@@ -199,13 +199,13 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
             return targets.mse_loss(self.silhouette(vertices));
         }
         let (target, counted) = targets.at(self.side());
-        let renderer = self.renderer.silhouettes::<B>(self.part);
+        let renderer = self.renderer.silhouettes::<B>(self.progress);
         renderer.weighted_mse_loss(vertices, target, counted)
     }
 
     /// Pixels a side of the image.
     pub fn side(&self) -> usize {
-        self.renderer.side(self.part)
+        self.renderer.side(self.progress)
     }
 
     /// Largest error of a pixel by leaving out far faces.
@@ -218,7 +218,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         let ScheduledRenderer { layout, values, .. } = self.renderer;
         let phi = match &self.prepared {
             Some(prepared) => prepared.clone().narrow(0, 0, values.phi.len()),
-            None => vector(&values.phi_at(self.part, layout.size())),
+            None => vector(&values.phi_at(self.progress, layout.size())),
         };
         (layout.edge(), phi)
     }
@@ -270,6 +270,6 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     /// A number for its place on the path, where nothing is differentiated by φ: what follows from the softness alone may be kept as
     /// long as it is the same.
     pub fn fixed_place(&self) -> Option<u64> {
-        self.prepared.is_none().then(|| self.renderer.place(self.part))
+        self.prepared.is_none().then(|| self.renderer.place(self.progress))
     }
 }

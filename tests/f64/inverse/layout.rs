@@ -105,7 +105,7 @@ fn a_learned_vector_comes_back_from_its_file() {
             let file = saved(line, input, &learned, &path);
             let read = method(&file).softness;
             for step in [0, 4, 9] {
-                let phi = read.phi_at(ScaleSchedule::part(step, STEPS), SIZE);
+                let phi = read.phi_at(ScaleSchedule::progress(step, STEPS), SIZE);
                 assert_near(&phi, &phi_at(line, input, &learned, step));
             }
             let surrogate = read.surrogate.as_ref().map_or(&[][..], |other| &other.phi);
@@ -142,7 +142,7 @@ fn a_network_takes_the_place_of_a_symmetric_softness_and_keeps_its_schedule() {
         let [family, network] = both.map(|method| method.softness);
         assert_eq!(network.softness.family, Family::Mlp);
         for step in [0, 9] {
-            let part = ScaleSchedule::part(step, STEPS);
+            let part = ScaleSchedule::progress(step, STEPS);
             let width = family.scale_at(part, SIZE);
             let shown = [&family, &network].map(|of| (of.softness, of.phi_at(part, SIZE)));
             assert!(off(shown, width) < 0.01, "{line}, step {step}");

@@ -32,7 +32,7 @@ class Renderer(_native.Renderer):
     """What a silhouette depends on beside the vertices and φ.
 
     `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. `softness` is a
-    `Softness`, at `part` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
+    `Softness`, at `progress` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
     surrogate. `tolerance` (0 to 1) bounds the error of any pixel. `t_conorm` combines the coverages of faces: "probabilistic",
     "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p".
 
@@ -40,11 +40,11 @@ class Renderer(_native.Renderer):
     """
 
     def __new__(
-        cls, faces: _ArrayLike, size: _Size, softness: Softness, *, part: float = 0.0, tolerance: float = 1e-5,
+        cls, faces: _ArrayLike, size: _Size, softness: Softness, *, progress: float = 0.0, tolerance: float = 1e-5,
         t_conorm: str = "probabilistic",
     ) -> Renderer:
         _shapes.softness(softness)
-        renderer = super().__new__(cls, _shapes.faces(faces), _shapes.size(size), softness, part, tolerance, t_conorm)
+        renderer = super().__new__(cls, _shapes.faces(faces), _shapes.size(size), softness, progress, tolerance, t_conorm)
         renderer._tables = {}
         return renderer
 
@@ -69,7 +69,7 @@ class ColourRenderer(_native.ColourRenderer):
     """What an image in colours depends on beside vertices, attributes, background and φ.
 
     `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. A face weighs what
-    `softness`, a `Softness` at `part` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
+    `softness`, a `Softness` at `progress` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
     of a family, or "depth_mlp". `planes` are a near and a far depth in world units, around the mesh; they do not cut. `depth_scale` is in
     units of the distance between them: with "exp" a face counts e times as much as one that lies so far behind it. `tolerance` (0 to 1)
     bounds the error of any pixel, as a part of the range of what is shown.
@@ -78,13 +78,13 @@ class ColourRenderer(_native.ColourRenderer):
     """
 
     def __new__(
-        cls, faces: _ArrayLike, size: _Size, softness: Softness, planes: _Sequence[float], *, part: float = 0.0, depth: str = "exp",
+        cls, faces: _ArrayLike, size: _Size, softness: Softness, planes: _Sequence[float], *, progress: float = 0.0, depth: str = "exp",
         depth_scale: float = 0.05, tolerance: float = 1e-5,
     ) -> ColourRenderer:
         _shapes.softness(softness)
         planes = _shapes.planes(planes)
         return super().__new__(
-            cls, _shapes.faces(faces), _shapes.size(size), softness, planes, part, depth, depth_scale, tolerance,
+            cls, _shapes.faces(faces), _shapes.size(size), softness, planes, progress, depth, depth_scale, tolerance,
         )
 
 

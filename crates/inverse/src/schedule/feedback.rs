@@ -36,7 +36,7 @@ pub struct Feedback {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// Part of the path, 0 to 1.
-    pub part: f64,
+    pub progress: f64,
     /// What the learning rate is multiplied by.
     pub rate: f64,
     /// Whether the run was stuck, and begins again here.
@@ -50,7 +50,7 @@ pub struct Follower {
     steps: usize,
     /// Steps taken so far.
     step: usize,
-    part: f64,
+    progress: f64,
     seen: Option<Seen>,
 }
 
@@ -104,7 +104,7 @@ impl Feedback {
 
     /// A run of so many steps that begins.
     pub fn follow(&self, steps: usize) -> Follower {
-        Follower { feedback: *self, steps, step: 0, part: 0.0, seen: None }
+        Follower { feedback: *self, steps, step: 0, progress: 0.0, seen: None }
     }
 
     /// If it cannot be followed, says what was found and what was expected.
@@ -134,20 +134,20 @@ impl Follower {
         let shorter = (self.steps as f64 / steps.max(1) as f64).clamp(SHORTEST, 1.0);
         let passage = (passage.exp() * shorter).max(1.0);
         let left = self.steps.saturating_sub(self.step + 1) as f64;
-        let too_large = (stuck + early * (1.0 - self.part)).exp();
+        let too_large = (stuck + early * (1.0 - self.progress)).exp();
         let is_stuck = self.seen.is_some_and(|seen| seen.least > too_large);
         let again = is_stuck && left > room.exp() * passage;
         if again {
-            (self.part, self.seen) = (0.0, None);
+            (self.progress, self.seen) = (0.0, None);
         }
         self.step += 1;
-        let part = (self.part * PLACES).round() / PLACES;
-        let place = Place { part, rate: (rate_end * part).exp() / shorter, again };
+        let progress = (self.progress * PLACES).round() / PLACES;
+        let place = Place { progress, rate: (rate_end * progress).exp() / shorter, again };
         let trend =
             self.seen.map_or(0.0, |seen| ((seen.recent + SMALL) / (seen.earlier + SMALL)).ln());
         // A run always comes to the end of its path.
-        let pace = ((patience * trend).exp() / passage).max((1.0 - self.part) / (left + 1.0));
-        self.part = (self.part + pace).min(1.0);
+        let pace = ((patience * trend).exp() / passage).max((1.0 - self.progress) / (left + 1.0));
+        self.progress = (self.progress + pace).min(1.0);
         place
     }
 }
@@ -165,10 +165,10 @@ mod tests {
     #[test]
     fn a_run_that_fits_goes_to_the_end_and_stays_there() {
         let places = places(Feedback::START, 300, |_| 0.01);
-        assert_eq!(places[0], Place { part: 0.0, rate: 1.0, again: false });
-        assert_eq!(places[299].part, 1.0);
-        assert!(places.windows(2).all(|two| two[0].part <= two[1].part && !two[1].again));
-        let arrived = places.iter().position(|place| place.part >= 1.0).unwrap();
+        assert_eq!(places[0], Place { progress: 0.0, rate: 1.0, again: false });
+        assert_eq!(places[299].progress, 1.0);
+        assert!(places.windows(2).all(|two| two[0].progress <= two[1].progress && !two[1].again));
+        let arrived = places.iter().position(|place| place.progress >= 1.0).unwrap();
         assert!((99..102).contains(&arrived), "{arrived}");
     }
 
@@ -176,14 +176,14 @@ mod tests {
     fn a_run_that_is_stuck_begins_again_as_often_as_there_is_room() {
         let begun = |error: f64| {
             let places = places(Feedback::START, 300, |_| error);
-            assert!(places[299].part > 0.95);
+            assert!(places[299].progress > 0.95);
             let begun = (0..300).filter(|&step| places[step].again).collect::<Vec<_>>();
-            assert!(begun.iter().all(|&step| places[step].part == 0.0));
+            assert!(begun.iter().all(|&step| places[step].progress == 0.0));
             begun
         };
         let (late, early) = (begun(0.051), begun(0.5));
         assert!(late.len() == 2 && (99..103).contains(&late[0]), "{late:?}");
-        // exp(3 (1 - part) - 3) is below a half from a part of 0.23 on.
+        // exp(3 (1 - progress) - 3) is below a half from a progress of 0.23 on.
         assert!(early.len() > 7 && (22..26).contains(&early[0]), "{early:?}");
     }
 
@@ -200,7 +200,8 @@ mod tests {
     fn a_run_waits_while_its_error_falls() {
         let patient = Feedback { patience: 2.0, ..Feedback::START };
         let falls = |step: usize| 0.9_f64.powi(step as i32);
-        let [waits, goes] = [patient, Feedback::START].map(|one| places(one, 300, falls)[60].part);
+        let [waits, goes] =
+            [patient, Feedback::START].map(|one| places(one, 300, falls)[60].progress);
         assert!(waits < 0.5 * goes, "{waits} and {goes}");
     }
 
@@ -211,7 +212,7 @@ mod tests {
             for steps in [1, 2, 300] {
                 for error in [0.0, 1e-300, 0.5, 1e300, f64::NAN, f64::INFINITY] {
                     for place in places(extreme, steps, |_| error) {
-                        assert!((0.0..=1.0).contains(&place.part), "{place:?}");
+                        assert!((0.0..=1.0).contains(&place.progress), "{place:?}");
                         assert!(place.rate.is_finite() && place.rate > 0.0, "{place:?}");
                     }
                 }

@@ -4,7 +4,7 @@ use softrast_tensor::{Backend, Tensor};
 
 use crate::softness_file::stored::LARGEST_LOGARITHM;
 
-/// How wide a softness is in the course of a run: at part t of it, s is seen at `d / scale(t)`.
+/// How wide a softness is in the course of a run: at progress t of it, s is seen at `d / scale(t)`.
 ///
 /// `scale(t) = floor + exp(l(t))`, where `l` joins the knots by straight lines. So the scale stays
 /// above the floor, which is given in pixels because that is what an image can resolve, and its
@@ -28,9 +28,9 @@ const MOST_KNOTS: usize = 16;
 const LARGEST_FLOOR_PX: f64 = 1e6;
 
 impl ScaleSchedule {
-    /// Which part of a run is over at `step` of `steps`, 0 to 1: the last gradient is taken at the
+    /// The progress of a run at `step` of `steps`, 0 to 1: the last gradient is taken at the
     /// end.
-    pub fn part(step: usize, steps: usize) -> f64 {
+    pub fn progress(step: usize, steps: usize) -> f64 {
         let last = steps.saturating_sub(1).max(1);
         step.min(last) as f64 / last as f64
     }
@@ -41,21 +41,21 @@ impl ScaleSchedule {
         if softness.scale_is_squared() { width * width } else { width }
     }
 
-    /// The scale `[1]` at `part` of a run, 0 to 1, for these `knots` `[K]` and `floor`.
+    /// The scale `[1]` at `progress` of a run, 0 to 1, for these `knots` `[K]` and `floor`.
     ///
     /// # Panics
     ///
-    /// If there is no knot, or `part` is not in [0, 1].
-    pub fn scale<B: Backend>(knots: &Tensor<B, 1>, floor: f64, part: f64) -> Tensor<B, 1> {
-        let ([before, after], share) = between(knots.dims()[0], part);
+    /// If there is no knot, or `progress` is not in [0, 1].
+    pub fn scale<B: Backend>(knots: &Tensor<B, 1>, floor: f64, progress: f64) -> Tensor<B, 1> {
+        let ([before, after], share) = between(knots.dims()[0], progress);
         let low = knots.clone().narrow(0, before, 1);
         let high = knots.clone().narrow(0, after, 1);
         (low * (1.0 - share) + high * share).exp() + floor
     }
 
     /// [`ScaleSchedule::scale`] of its own knots above this floor, as a plain number.
-    pub(crate) fn at(&self, floor: f64, part: f64) -> f64 {
-        let ([before, after], share) = between(self.knots.len(), part);
+    pub(crate) fn at(&self, floor: f64, progress: f64) -> f64 {
+        let ([before, after], share) = between(self.knots.len(), progress);
         (self.knots[before] * (1.0 - share) + self.knots[after] * share).exp() + floor
     }
 
@@ -77,11 +77,11 @@ impl ScaleSchedule {
     }
 }
 
-/// The two of `count` knots around `part` of a run, and the share of the second.
-fn between(count: usize, part: f64) -> ([usize; 2], f64) {
+/// The two of `count` knots around `progress` of a run, and the share of the second.
+fn between(count: usize, progress: f64) -> ([usize; 2], f64) {
     assert!(count > 0, "a schedule has at least one knot");
-    assert!((0.0..=1.0).contains(&part), "part {part} of a run is not in [0, 1]");
-    let place = part * (count - 1) as f64;
+    assert!((0.0..=1.0).contains(&progress), "progress {progress} of a run is not in [0, 1]");
+    let place = progress * (count - 1) as f64;
     let before = (place as usize).min(count.saturating_sub(2));
     ([before, (before + 1).min(count - 1)], place - before as f64)
 }
@@ -92,8 +92,8 @@ mod tests {
 
     #[test]
     fn the_last_gradient_of_a_run_is_taken_at_its_end() {
-        let parts = |steps| [0, 1, 9, 10].map(|step| ScaleSchedule::part(step, steps));
-        assert_eq!(parts(10), [0.0, 1.0 / 9.0, 1.0, 1.0]);
-        assert_eq!(ScaleSchedule::part(0, 1), 0.0);
+        let progresses = |steps| [0, 1, 9, 10].map(|step| ScaleSchedule::progress(step, steps));
+        assert_eq!(progresses(10), [0.0, 1.0 / 9.0, 1.0, 1.0]);
+        assert_eq!(ScaleSchedule::progress(0, 1), 0.0);
     }
 }

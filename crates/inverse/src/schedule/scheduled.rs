@@ -159,70 +159,70 @@ impl<S: Softness> ScheduledSoftness<S> {
         self.phi.len() + knots + feedback + self.surrogate.as_ref().map_or(0, |of| of.phi.len())
     }
 
-    /// The scale of the schedule at `part` of a run, 0 to 1, on images of `size` × `size` pixels;
+    /// The scale of the schedule at `progress` of a run, 0 to 1, on images of `size` × `size` pixels;
     /// without a schedule that of the softness. In NDC (NDC² if squared).
     ///
     /// # Panics
     ///
-    /// If `part` is not in [0, 1].
-    pub fn scale_at(&self, part: f64, size: usize) -> f64 {
-        self.factor_at(part, size).unwrap_or_else(|| self.softness.scale(&self.phi))
+    /// If `progress` is not in [0, 1].
+    pub fn scale_at(&self, progress: f64, size: usize) -> f64 {
+        self.factor_at(progress, size).unwrap_or_else(|| self.softness.scale(&self.phi))
     }
 
-    /// The width of the soft edge at `part` of a run, 0 to 1, in NDC, on images of `size` × `size`
+    /// The width of the soft edge at `progress` of a run, 0 to 1, in NDC, on images of `size` × `size`
     /// pixels.
     ///
     /// # Panics
     ///
-    /// If `part` is not in [0, 1].
-    pub fn width_at(&self, part: f64, size: usize) -> f64 {
-        self.softness.width(&self.phi_at(part, size))
+    /// If `progress` is not in [0, 1].
+    pub fn width_at(&self, progress: f64, size: usize) -> f64 {
+        self.softness.width(&self.phi_at(progress, size))
     }
 
-    /// Parameters of the softness at `part` of a run, 0 to 1, on images of `size` × `size` pixels.
+    /// Parameters of the softness at `progress` of a run, 0 to 1, on images of `size` × `size` pixels.
     ///
     /// # Panics
     ///
-    /// If `part` is not in [0, 1].
-    pub fn phi_at(&self, part: f64, size: usize) -> Vec<f64> {
-        scaled(&self.softness, &self.phi, self.factor_at(part, size))
+    /// If `progress` is not in [0, 1].
+    pub fn phi_at(&self, progress: f64, size: usize) -> Vec<f64> {
+        scaled(&self.softness, &self.phi, self.factor_at(progress, size))
     }
 
-    /// The surrogate at `part` of a run, 0 to 1, on images of `size` × `size` pixels.
+    /// The surrogate at `progress` of a run, 0 to 1, on images of `size` × `size` pixels.
     ///
     /// # Panics
     ///
-    /// If `part` is not in [0, 1].
-    pub fn surrogate_at(&self, part: f64, size: usize) -> Option<Surrogate<S>> {
+    /// If `progress` is not in [0, 1].
+    pub fn surrogate_at(&self, progress: f64, size: usize) -> Option<Surrogate<S>> {
         let Surrogate { softness, phi } = self.surrogate.as_ref()?;
-        let phi = scaled(softness, phi, self.factor_at(part, size));
+        let phi = scaled(softness, phi, self.factor_at(progress, size));
         Some(Surrogate { softness: softness.clone(), phi })
     }
 
-    /// A renderer with this softness as it is at `part` of a run, 0 to 1; its surrogate, if it has one, comes along.
+    /// A renderer with this softness as it is at `progress` of a run, 0 to 1; its surrogate, if it has one, comes along.
     ///
     /// # Panics
     ///
-    /// If `faces` or the image is empty, or `part` is not in [0, 1].
+    /// If `faces` or the image is empty, or `progress` is not in [0, 1].
     pub fn renderer_at(
         &self,
-        part: f64,
+        progress: f64,
         rasterizer: Rasterizer,
         faces: Arc<[[u32; 3]]>,
     ) -> SoftRenderer<S> {
         let size = rasterizer.size.shorter();
-        let phi = self.phi_at(part, size);
+        let phi = self.phi_at(progress, size);
         let renderer = SoftRenderer::with_rasterizer(rasterizer, faces, self.softness.clone(), phi);
-        match self.surrogate_at(part, size) {
+        match self.surrogate_at(progress, size) {
             Some(Surrogate { softness, phi }) => renderer.with_surrogate_phi(softness, phi),
             None => renderer,
         }
     }
 
     /// What the schedule multiplies the scale of the parameters by.
-    fn factor_at(&self, part: f64, size: usize) -> Option<f64> {
+    fn factor_at(&self, progress: f64, size: usize) -> Option<f64> {
         let schedule = self.schedule.as_ref()?;
-        Some(schedule.at(schedule.floor(&self.softness, size), part))
+        Some(schedule.at(schedule.floor(&self.softness, size), progress))
     }
 
     /// If it cannot be used, says what was found and what was expected; `name` is what a softness is called.

@@ -6,7 +6,7 @@ use super::{
     blend_inputs::{BlendInputs, BlendParams, BlendSpec},
     depth::{ByDepth, pull_depth},
     dual::{Dual, load},
-    pair::{Closest, Face, Place, Pull},
+    pair::{Closest, Face, Pull, TablePosition},
     table::add_powers,
     texture::{Four, Sample},
 };
@@ -82,7 +82,7 @@ pub(super) struct ColourPair {
     /// Those of the nearest point on the face itself.
     pub(super) weights: Corners,
     /// Where the table by edges is read, the logarithm of the edge softness and its derivative by the squared distance.
-    edge: Place,
+    edge: TablePosition,
     pub(super) log_edge: Dual,
     pub(super) edge_slope: Dual,
     /// The nearness less 1, the logarithm of the weight by depth and its derivative by the nearness.

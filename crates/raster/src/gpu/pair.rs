@@ -35,7 +35,12 @@ pub(super) struct Lookup {
 #[cube]
 impl Lookup {
     /// Where a squared distance lies in the table, on its inner side or not. Without `far` no cell is counted from the far end.
-    pub(super) fn place(self, distance2: Dual, inner: bool, #[comptime] far: bool) -> Place {
+    pub(super) fn place(
+        self,
+        distance2: Dual,
+        inner: bool,
+        #[comptime] far: bool,
+    ) -> TablePosition {
         let inverse = select(inner, self.inverse_inner, self.inverse_outer);
         let y = distance2.scale(inverse);
         let mut position = y.value;
@@ -66,7 +71,7 @@ impl Lookup {
         let place = Dual { value, tangent: y.tangent * rate };
         let place = Dual::select(z < 1.0f32, place, Dual::constant(0.0f32));
         let slope = rate * inverse;
-        Place { row, place, rate: select(slope < STEEPEST, slope, STEEPEST) }
+        TablePosition { row, place, rate: select(slope < STEEPEST, slope, STEEPEST) }
     }
 }
 
@@ -93,7 +98,7 @@ impl Cell {
 
 /// Where a squared distance lies in a table.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct TablePosition {
     /// Row of the table.
     pub(super) row: u32,
     /// Place within the cell, in [0, 1], and its derivative by the squared distance.
@@ -102,7 +107,7 @@ pub(super) struct Place {
 }
 
 #[cube]
-impl Place {
+impl TablePosition {
     /// The value of the table there.
     pub(super) fn value(self, cubic: Cubic) -> Dual {
         let t = self.place;
@@ -287,12 +292,12 @@ impl Face {
 impl Pair {
     /// The profile at this pair.
     pub(super) fn value(self, cubic: Cubic) -> Dual {
-        Place { row: self.row, place: self.place, rate: self.rate }.value(cubic)
+        TablePosition { row: self.row, place: self.place, rate: self.rate }.value(cubic)
     }
 
     /// Derivative of the profile by the squared distance.
     pub(super) fn slope(self, cubic: Cubic) -> Dual {
-        Place { row: self.row, place: self.place, rate: self.rate }.slope(cubic)
+        TablePosition { row: self.row, place: self.place, rate: self.rate }.slope(cubic)
     }
 
     /// The gradient to the closest point of so many times the profile.

@@ -7,7 +7,7 @@ use super::{
     lanes::{GROUP, LANES, Lanes},
     reach::within,
     real::{Float, Real, splat},
-    scene::{Place, Scene},
+    scene::{BandRef, Scene},
 };
 
 /// Faces that are listed together: what is prepared of them stays near the processor.
@@ -88,7 +88,7 @@ impl<T: Real> List<T> {
 
     /// Prepares up to [`LISTED`] faces of a band, given by their numbers, and lists their pixels.
     #[inline(always)]
-    pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &Place<T>, numbers: &[u32]) {
+    pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &BandRef<T>, numbers: &[u32]) {
         let index = <T::Lanes as Lanes>::index;
         let plus = <T::Lanes as Lanes>::plus;
         let four = splat::<T::Lanes>(GROUP as f64);

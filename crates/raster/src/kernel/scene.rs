@@ -36,7 +36,7 @@ pub(crate) struct Scene<'a, T: Real> {
 
 /// Which band of which view.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<'a, T: Real> {
+pub(crate) struct BandRef<'a, T: Real> {
     /// `[3, vertices]`.
     pub(crate) vertices: &'a [Float<T>],
     /// The same, or nothing.
@@ -49,7 +49,7 @@ pub(crate) struct Place<'a, T: Real> {
     pub(crate) first_list: usize,
 }
 
-impl<T: Real> Place<'_, T> {
+impl<T: Real> BandRef<'_, T> {
     /// Prepares up to [`LANES`] faces of the band, given by their numbers; the last one fills them up. Each is seen from the first
     /// column that it reaches, and the first row in this band.
     #[inline(always)]
@@ -160,7 +160,7 @@ impl<'a, T: Real> Scene<'a, T> {
         index: usize,
         views: usize,
         band: usize,
-    ) -> Place<'b, T>
+    ) -> BandRef<'b, T>
     where
         'a: 'b,
     {
@@ -169,7 +169,7 @@ impl<'a, T: Real> Scene<'a, T> {
             &numbers[index * length..(index + 1) * length]
         };
         let [vertices, tangents] = [self.vertices, self.tangents].map(of_view);
-        Place { vertices, tangents, table: self.table, view, band, first_list: 0 }
+        BandRef { vertices, tangents, table: self.table, view, band, first_list: 0 }
     }
 
     /// Adds the gradients to x and y of the three corners of some faces, times a factor, to those of the vertices, `[3, vertices]`.

@@ -141,7 +141,7 @@ pub(crate) struct Lookup<F> {
 }
 
 /// Places of squared distances in a table.
-pub(crate) struct Place<T: Real> {
+pub(crate) struct TablePosition<T: Real> {
     pub(crate) row: Places,
     /// Places within the cells, in [0, 1].
     pub(crate) t: T,
@@ -178,7 +178,11 @@ impl<F: Float> Lookup<F> {
     /// Places of squared distances (not negative; NaN counts as far away) on the inner side where the mask holds. Without
     /// `FAR` none may be counted from the far end.
     #[inline(always)]
-    pub(crate) fn place<T: Real, const FAR: bool>(&self, distance2: T, inside: Mask<T>) -> Place<T>
+    pub(crate) fn place<T: Real, const FAR: bool>(
+        &self,
+        distance2: T,
+        inside: Mask<T>,
+    ) -> TablePosition<T>
     where
         T::Lanes: Lanes<Float = F>,
     {
@@ -226,7 +230,7 @@ impl<F: Float> Lookup<F> {
         if let Some(begun) = begun {
             (moves, rate) = (moves.only(begun), rate.only(begun));
         }
-        Place { row, t: T::new(t, moves), rate }
+        TablePosition { row, t: T::new(t, moves), rate }
     }
 }
 
@@ -239,7 +243,7 @@ mod tests {
     fn place<F: Float>(grid: &Grid, y: F) -> (usize, f64) {
         let inside = [false; LANES];
         let (lookup, y) = (Lookup::new(grid, 1.0), Plain::splat(y));
-        let place: Place<Plain<F>> = match grid.far {
+        let place: TablePosition<Plain<F>> = match grid.far {
             0 => lookup.place::<_, false>(y, inside),
             _ => lookup.place::<_, true>(y, inside),
         };

@@ -6,8 +6,8 @@ use super::{
     list::{AHEAD, Chunk, LISTED, List, group},
     pair::{CornerSums, closest},
     real::{Float, Real, splat},
-    scene::{Place, Scene},
-    table::Place as Cell,
+    scene::{BandRef, Scene},
+    table::TablePosition as Cell,
 };
 
 /// Room for chunks whose geometry is known: a power of two. Visits follow [`AHEAD`] chunks behind: while one waits for the table, the
@@ -88,7 +88,7 @@ impl<T: Real, A: Visitor<T>, B: Visitor<T>> Visitor<T> for (A, B) {
 /// Shows the pairs of a band to a visitor: the number of lists of faces that were visited, counted from the first of the band.
 pub(crate) fn walk<T: Real>(
     scene: &Scene<T>,
-    place: Place<T>,
+    place: BandRef<T>,
     visitor: &mut impl Visitor<T>,
 ) -> usize {
     run::<T::Lanes, _>(Walk { scene, place, visitor })
@@ -97,7 +97,7 @@ pub(crate) fn walk<T: Real>(
 /// A [`walk`], to be compiled for the vectors at hand.
 struct Walk<'a, 's, T: Real, V> {
     scene: &'a Scene<'s, T>,
-    place: Place<'a, T>,
+    place: BandRef<'a, T>,
     visitor: &'a mut V,
 }
 

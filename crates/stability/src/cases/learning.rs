@@ -43,7 +43,7 @@ impl Triangles {
         target: Vec<f64>,
         steps: usize,
     ) -> Self {
-        let scale = |step| softness.scale_at(ScaleSchedule::part(step, steps), SIDE);
+        let scale = |step| softness.scale_at(ScaleSchedule::progress(step, steps), SIDE);
         let phi = softness.phi_at(0.0, SIDE);
         let phi = tensor::<Exact, 1>(phi.clone(), [phi.len()]);
         let silhouette = Rasterizer::new(SIDE).prepare(&flat.faces, softness.softness, &phi);

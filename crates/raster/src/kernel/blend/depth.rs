@@ -3,7 +3,7 @@
 use crate::kernel::{
     lanes::{Lanes, Places},
     real::{Float, Mask, Real, Table, everywhere, splat},
-    table::{Grid, Lookup, Place},
+    table::{Grid, Lookup, TablePosition},
 };
 
 /// Where the logarithm of a weight by depth comes from.
@@ -78,7 +78,7 @@ impl<'a, T: Real> DepthLookup<'a, T> {
         match (&self.lookup, self.grid) {
             (Some(lookup), _) => {
                 let behind = x.value().at_most(zero);
-                let Place { row, t, rate } = lookup.place::<T, true>(x * x, behind);
+                let TablePosition { row, t, rate } = lookup.place::<T, true>(x * x, behind);
                 let [value, slope] = cubic(T::rows(self.table, &row), t);
                 let log = T::constant(zero) - value;
                 let slope = slope.scale(rate) * x.scale(splat(-2.0));

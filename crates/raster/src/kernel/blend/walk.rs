@@ -16,7 +16,7 @@ use crate::kernel::{
     lanes::{Lanes, Places, Work},
     list::{Chunk, LISTED, List},
     real::{Float, Real, everywhere, splat},
-    scene::{Place, Scene},
+    scene::{BandRef, Scene},
     table,
 };
 
@@ -90,7 +90,7 @@ pub(super) trait Visitor<T: Real> {
 /// A walk over the pairs of a band.
 pub(super) struct Walk<'a, 's, T: Real, V> {
     pub(super) blend: &'a Blend<'s, T>,
-    pub(super) place: Place<'a, T>,
+    pub(super) place: BandRef<'a, T>,
     pub(super) view: usize,
     /// Logarithm of the largest weight by depth of each face.
     pub(super) logs: &'a [f32],
@@ -146,7 +146,14 @@ impl<T: Real> FaceAttributes<T> {
 
     /// Takes a face, whose number in the scene is given too.
     #[inline(always)]
-    fn set(&mut self, blend: &Blend<T>, place: &Place<T>, view: usize, face: Face<T>, number: u32) {
+    fn set(
+        &mut self,
+        blend: &Blend<T>,
+        place: &BandRef<T>,
+        view: usize,
+        face: Face<T>,
+        number: u32,
+    ) {
         self.order = face.corners();
         let (corners, entries) =
             (blend.scene.faces[number as usize], blend.entries[number as usize]);
@@ -169,7 +176,7 @@ impl<T: Real> Blend<'_, T> {
     #[inline(always)]
     fn pair(
         &self,
-        place: &Place<T>,
+        place: &BandRef<T>,
         face: Face<T>,
         shown: &FaceAttributes<T>,
         px: T::Lanes,
@@ -187,7 +194,7 @@ impl<T: Real> Blend<'_, T> {
         let pick = <T::Lanes as Lanes>::pick;
         let zero = splat::<T::Lanes>(0.0);
         let outside = zero.less(pick(point.closest.inside, zero, splat(1.0)));
-        let table::Place { row: edge_row, t, rate } =
+        let table::TablePosition { row: edge_row, t, rate } =
             self.scene.lookup.place::<T, true>(point.closest.distance2, outside);
         let [value, slope] = cubic(T::rows(place.table, &edge_row), t);
         let log_edge = T::constant(zero) - value;

@@ -18,7 +18,7 @@ use super::{
     list::{LISTED, List, group, rows_of_bands},
     pair::CornerSums,
     real::splat,
-    scene::{Place, Scene},
+    scene::{BandRef, Scene},
     sum::Inputs,
     walk::{Gradient, Image, Pair, TOGETHER, Visitor, walk},
 };
@@ -187,7 +187,7 @@ impl<L: Lanes> Room<L> {
 /// One band of one view.
 struct Band<'a, 's, L: Lanes> {
     scene: &'a Scene<'s, L>,
-    place: Place<'a, L>,
+    place: BandRef<'a, L>,
     judged: Judged<'a, L::Float>,
     loss: PixelLoss,
     with_gradient: bool,
@@ -229,7 +229,7 @@ impl<L: Lanes> Band<'_, '_, L> {
         let image = Image { image, tail };
         let listed = walk(scene, *place, &mut Keep { image, kept, at, corners });
         if listed * LISTED < place.view.faces(place.band).len() {
-            let place = Place { first_list: listed, ..*place };
+            let place = BandRef { first_list: listed, ..*place };
             walk(scene, place, &mut Image { image: &mut room.image, tail });
         }
         listed
@@ -310,7 +310,7 @@ impl<L: Lanes> Band<'_, '_, L> {
             flush(last, room.corners[last as usize], scene.half, &mut sums, &mut gradients);
         }
         if listed * LISTED < faces {
-            let place = Place { first_list: listed, ..*place };
+            let place = BandRef { first_list: listed, ..*place };
             for (corners, upstream) in gradients.iter_mut().zip(&room.parts) {
                 walk(scene, place, &mut Gradient::new(scene, upstream, corners));
             }
