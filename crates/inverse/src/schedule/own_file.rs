@@ -164,8 +164,10 @@ mod tests {
         assert!(with("[0]", "").ends_with("has 1 parameters, but bent has 2"));
         assert!(with("[-90, 0]", "").contains("phi[0] is the logarithm -90, expected -80 to 80"));
         assert!(with("[0, 1e39]", "").ends_with("expected a number that fits an f32"));
-        let path = r#", "path": {"knots": [-1, -80], "floor_px": 0}"#;
-        assert!(with("[0, 1e5]", path).contains("has a path whose knot -80 makes a parameter"));
+        let schedule = r#", "schedule": {"knots": [-1, -80], "floor_px": 0}"#;
+        assert!(
+            with("[0, 1e5]", schedule).contains("has a schedule whose knot -80 makes a parameter")
+        );
         assert!(with("[0, 0]", r#", "colour": 1"#).contains("unknown field `colour`"));
         let wrong = ScheduledSoftness { phi: vec![0.0, f64::NAN], ..example() };
         assert!(wrong.text("a.json").unwrap_err().to_string().contains("phi[1] is NaN"));

@@ -25,7 +25,7 @@ pub struct Surrogate<S = EdgeSoftness> {
 
 /// A softness with its parameters, and how its scale moves over a run.
 ///
-/// In a JSON file its fields have these names, except for the schedule, which is called `path`. A file of a softness of one's own holds its
+/// In a JSON file its fields have these names; `path` is an older name of `schedule`. A file of a softness of one's own holds its
 /// [`NAME`](crate::NamedSoftness::NAME) in the field `softness`.
 ///
 /// ```
@@ -43,7 +43,7 @@ pub struct ScheduledSoftness<S = EdgeSoftness> {
     /// Its parameters φ, as many as [`Softness::parameters`] says.
     pub phi: Vec<f64>,
     /// How its width moves over a run; a softness without one stays as it is.
-    #[serde(rename = "path", default, skip_serializing_if = "Option::is_none")]
+    #[serde(alias = "path", default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<ScaleSchedule>,
     /// How a run goes along its schedule by what it sees; without it, by time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -245,7 +245,7 @@ impl<S: Softness> ScheduledSoftness<S> {
                 return Err(" has a rate_end beside feedback, which has one of its own".into());
             }
             Some(_) if self.is_constant() => {
-                return Err(" has feedback, which moves along a path, but no path".into());
+                return Err(" has feedback, which moves along a schedule, but no schedule".into());
             }
             Some(feedback) => {
                 feedback.check().map_err(|wrong| format!(" has feedback with {wrong}"))?;
@@ -253,14 +253,14 @@ impl<S: Softness> ScheduledSoftness<S> {
             None => {}
         }
         let Some(schedule) = &self.schedule else { return Ok(()) };
-        schedule.check().map_err(|wrong| format!(" has a path with {wrong}"))?;
+        schedule.check().map_err(|wrong| format!(" has a schedule with {wrong}"))?;
         // Weights of a network are divided by the scale.
         for (softness, phi) in parameters {
             for knot in &schedule.knots {
                 let scaled = softness.with_scale_values(phi, knot.exp());
                 if let Some(wrong) = scaled.into_iter().find(|x| !fits_f32(*x)) {
                     return Err(format!(
-                        " has a path whose knot {knot} makes a parameter {wrong}, expected a number that fits an f32"
+                        " has a schedule whose knot {knot} makes a parameter {wrong}, expected a number that fits an f32"
                     ));
                 }
             }
@@ -365,6 +365,15 @@ mod tests {
     }
 
     #[test]
+    fn a_file_whose_schedule_is_called_path_is_read() {
+        let file = example(Family::Gauss);
+        let text = serde_json::to_string(&file).unwrap();
+        let older = text.replace(r#""schedule":"#, r#""path":"#);
+        assert_ne!(text, older);
+        assert_eq!(serde_json::from_str::<ScheduledSoftness>(&older).unwrap(), file);
+    }
+
+    #[test]
     fn a_cause_is_said_once() {
         let error = ScheduledSoftness::load(Path::new("none.json")).unwrap_err();
         assert!(error.to_string().starts_with("cannot read softness \"none.json\": "), "{error}");
@@ -416,8 +425,8 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_cannot_be_followed_is_refused() {
-        for (path, part) in [
+    fn a_schedule_that_cannot_be_followed_is_refused() {
+        for (schedule, cause) in [
             (r#"{"knots": [], "floor_px": 0}"#, "0 knots, expected 1 to 16"),
             (r#"{"knots": [-1, 99], "floor_px": 0}"#, "a knot of 99, expected -80 to 80"),
             (r#"{"knots": [-1], "floor_px": -1}"#, "a floor of -1 pixels, expected 0 to 1000000"),
@@ -427,9 +436,10 @@ mod tests {
             ),
         ] {
             let softness = r#"{"family": "gauss", "squared": false}"#;
-            let message =
-                error(&format!(r#"{{"softness": {softness}, "phi": [0], "path": {path}}}"#));
-            assert!(message.ends_with(part), "{message}");
+            let message = error(&format!(
+                r#"{{"softness": {softness}, "phi": [0], "schedule": {schedule}}}"#
+            ));
+            assert!(message.ends_with(cause), "{message}");
         }
     }
 
