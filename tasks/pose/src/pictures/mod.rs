@@ -1,0 +1,201 @@
+//! Poses from pictures that the user gives.
+
+mod answer;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use softrast_cli::{Answer, Given, MaskFlags, Variant};
+use softrast_inverse::{
+    Lens, PaintedView, PoseFile, View, cut_sides, faces_across_note, pose::PoseSearch,
+    reading_notes,
+};
+use softrast_lab::Error;
+use softrast_raster::{NEAR, on_backend};
+
+use self::answer::{Framed, POSES, Solved, answer, overlay_names};
+use crate::{Args, Instances, colour::coloured, framing::mesh};
+
+/// Field of view along the shorter side where no camera is given, in degrees.
+const ASSUMED_FOV_DEG: f64 = 45.0;
+
+/// A picture and the camera that took it.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Pictures {
+    /// Mask of the object: the transparency of a picture, or its luminance if all of it is opaque. With --colour the colours count too
+    #[arg(long, value_name = "PICTURE")]
+    pub target: Option<PathBuf>,
+
+    /// Folder of such masks, taken with one camera; a table of all is written
+    #[arg(long, value_name = "DIR", conflicts_with = "target")]
+    pub targets: Option<PathBuf>,
+
+    /// Camera: JSON with fx, fy, cx, cy, width and height, or K, or a transforms.json [default: 45 degrees are assumed]
+    #[arg(long, value_name = "FILE.json")]
+    pub camera: Option<PathBuf>,
+
+    /// Where to start instead of everywhere: JSON with R and t, `transform_matrix`, or a result of this program
+    #[arg(long, value_name = "FILE.json", requires = "target")]
+    pub start: Option<PathBuf>,
+
+    /// How pictures become masks.
+    #[command(flatten)]
+    pub masks: MaskFlags,
+}
+
+impl Pictures {
+    /// Whether there is one.
+    pub(crate) fn asked(&self) -> bool {
+        let Self { target, targets, camera, start, masks } = self;
+        [target, targets, camera, start].into_iter().any(Option::is_some) || masks.asked()
+    }
+
+    fn paths(&self) -> anyhow::Result<Vec<PathBuf>> {
+        if let Some(target) = &self.target {
+            return Ok(vec![target.clone()]);
+        }
+        let Some(folder) = &self.targets else {
+            return Err(Error::usage(
+                "--camera, --start, --invert and --threshold are about a picture: name it with --target, or a folder with --targets",
+            ));
+        };
+        let read = || format!("cannot read the folder {}", folder.display());
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(folder).with_context(read)? {
+            let path = entry.with_context(read)?.path();
+            let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+            let is_picture = ending.is_some_and(|ending| {
+                ["png", "jpg", "jpeg", "gif"].iter().any(|known| ending == *known)
+            });
+            if is_picture {
+                paths.push(path);
+            }
+        }
+        paths.sort();
+        ensure!(
+            !paths.is_empty(),
+            "there is no picture in {}: PNG, JPEG and GIF are looked for",
+            folder.display()
+        );
+        Ok(paths)
+    }
+}
+
+pub(crate) fn solve_pictures(
+    given: &Given<'_, Args>,
+    pictures: &Pictures,
+) -> anyhow::Result<Answer> {
+    let args = given.args;
+    refuse_flags_of_seeds(given)?;
+    let (mesh, mesh_name, frame) = mesh(args)?;
+    if args.colour {
+        coloured(args, &mesh)?;
+    }
+    let (method, backend) = (given.method()?, given.backend()?);
+    let mut search = PoseSearch { optimise_fov: args.optimise_fov, ..PoseSearch::default() };
+    search.learning_rate = given.learning_rate().unwrap_or(search.learning_rate);
+    search.fine_size = given.common.size.unwrap_or(search.fine_size);
+    search.fine_steps = given.common.steps.unwrap_or(search.fine_steps);
+    let lens = pictures.camera.as_ref().map(Lens::load).transpose()?;
+    let start = pictures.start.as_ref().map(PoseFile::load).transpose()?;
+    let paths = pictures.paths()?;
+    // What would fail in the middle fails at once.
+    let mut tasks = Vec::new();
+    for path in paths {
+        let mask = pictures.masks.load(&path)?;
+        let size = mask.whole_size();
+        let lens = lens.clone().unwrap_or_else(|| Lens::of_fov(ASSUMED_FOV_DEG, size));
+        let mut camera = lens.pinhole(size).with_context(|| {
+            let camera = pictures.camera.as_deref().unwrap_or(Path::new("the camera"));
+            format!("{} with {}", camera.display(), path.display())
+        })?;
+        if let Some(start) = &start {
+            (camera.rotation, camera.translation) = (start.rotation, start.translation);
+        }
+        let camera = mask.camera(&camera);
+        PoseSearch::check(&mesh, &mask, &camera, start.is_some())
+            .with_context(|| path.display().to_string())?;
+        let view = View { name: path.display().to_string(), picture: path, mask, camera, off: 0.0 };
+        let painted = args.colour.then(|| PaintedView::load(&view)).transpose()?;
+        tasks.push((view, painted));
+    }
+    let views: Vec<View> = tasks.iter().map(|(view, _)| view.clone()).collect();
+    let notes = start.iter().filter_map(|start| start.note.clone()).chain(reading_notes(&views));
+    let notes: Vec<String> = notes.collect();
+    let single = pictures.target.is_some();
+    let paths: Vec<PathBuf> = tasks.iter().map(|(view, _)| view.picture.clone()).collect();
+    let overlays = overlay_names(&paths, single);
+    let poses = (!single).then_some(POSES);
+    given.will_write(overlays.iter().map(String::as_str).chain(poses), paths)?;
+    let steps = |(view, _): &(View, _)| search.steps(&view.mask, start.is_some());
+    let mut progress = given.progress(tasks.iter().map(steps).sum())?;
+    let (mut solved, mut begun) = (Vec::new(), 0);
+    for task in tasks {
+        let clock = std::time::Instant::now();
+        let (before, (view, painted)) = (begun, task);
+        begun += search.steps(&view.mask, start.is_some());
+        let visit = |step: usize, loss: f64| progress.step(before + step, loss);
+        let (View { name, picture: path, mask, camera, .. }, started) = (view, start.is_some());
+        let poses = on_backend!(backend, B => match &painted {
+            Some(view) => search.run_by_colour::<B>(&mesh, view, started, &method, visit),
+            None => search.run::<B>(&mesh, &mask, &camera, started, &method, visit),
+        });
+        let poses = poses.context(name)?;
+        solved.push(Solved { path, mask, painted, poses, seconds: clock.elapsed().as_secs_f64() });
+    }
+    progress.finish();
+    let best = solved.iter().map(|one| (one.path.display(), one.poses[0].camera));
+    let across = faces_across_note(&mesh, best, NEAR);
+    let mut warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
+    warnings.extend(notes.into_iter().chain(across));
+    let mesh = Framed { mesh, name: mesh_name, frame };
+    answer(&mesh, &solved, &overlays, warnings, single)
+}
+
+/// Flags that say what is drawn as a target.
+fn refuse_flags_of_seeds(given: &Given<'_, Args>) -> anyhow::Result<()> {
+    let (args, common) = (given.args, given.common);
+    let flags = [
+        ("--range", args.range.is_some()),
+        ("--instances", args.instances != Instances::Seeded),
+        ("--starts", args.starts.is_some()),
+        ("--variant", common.variant != Variant::Original),
+        ("--seed", common.seed != 0),
+    ];
+    match flags.iter().find(|(_, given)| *given) {
+        Some((flag, _)) => Err(Error::usage(format!(
+            "{flag} says which target is drawn: leave it out with --target and --targets"
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn warnings(calibrated: bool, optimised: bool, solved: &[Solved]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !calibrated {
+        warnings.push(format!(
+            "no camera was given: a field of view of {ASSUMED_FOV_DEG} degrees along the shorter side {}; --camera FILE.json gives one{}",
+            if optimised { "was the start" } else { "is assumed" },
+            if optimised { "" } else { ", --optimise-fov looks for it" },
+        ));
+    }
+    for Solved { path, mask, poses, .. } in solved {
+        let cut = cut_sides(mask);
+        if !cut.is_empty() {
+            warnings.push(format!(
+                "{}: the mask reaches the {} of the picture, so the object may go on there: only what is in the picture is compared, and \
+                 other poses may fit as well",
+                path.display(),
+                cut.join(" and the ")
+            ));
+        }
+        let iou = poses[0].iou;
+        if iou < 0.8 {
+            warnings.push(format!(
+                "{}: the best pose has an IoU of {iou:.3} only: check that the mesh, the camera and the mask belong together (--invert?)",
+                path.display()
+            ));
+        }
+    }
+    warnings
+}
