@@ -1,9 +1,11 @@
 //! Poses under a softness of one's own. `minimize` judges hard images in f32, as programs do, so this is not tested in f64.
 
 use softrast_inverse::{
-    InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize,
+    InverseProblem, Lens, Method, Picture, PoseProblem, ScheduledSoftness, SolveConfig, minimize,
+    pose::PoseSearch,
 };
-use softrast_tensor::NdArray;
+use softrast_raster::{Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::{Arctan, lopsided_mesh};
 
 #[test]
@@ -24,4 +26,21 @@ fn poses_come_nearer_along_the_schedule_of_an_own_softness_and_of_its_surrogate(
         assert!((wide - 0.05).abs() < 1e-12 && (narrow - 0.002).abs() < 1e-12);
         assert!(last < 0.9 * first, "{first} to {last}");
     }
+}
+
+#[test]
+fn a_camera_is_found_by_a_mask_under_an_own_softness() {
+    let (mesh, size) = (lopsided_mesh(), [48, 64]);
+    let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, size);
+    let device = Default::default();
+    let corners = vertices::<NdArray>(mesh.positions(), &device);
+    let seen = project_pinhole(corners, &Pinholes::new(&[truth], &device));
+    let silhouette: Tensor<NdArray, 3> = hard_silhouette(seen, mesh.faces(), size);
+    let mask = Picture::new(silhouette.into_data().iter().collect(), size[1]);
+    let camera = Lens::of_fov(45.0, mask.size()).pinhole(mask.size()).unwrap();
+    let search = PoseSearch { fine_steps: 30, fine_size: 48, ..PoseSearch::default() };
+    let method = Method::new("arctan", ScheduledSoftness::decay(Arctan, 0.05, 0.002));
+    let found =
+        search.run::<NdArray>(&mesh, &mask, &camera, false, &method, |_, _| Ok(())).unwrap();
+    assert!(found[0].iou > 0.95, "{}", found[0].iou);
 }
