@@ -53,6 +53,9 @@ impl<T: Real> Pair<T> {
 
 /// An operation on the pairs of a band.
 pub(crate) trait Visitor<T: Real> {
+    /// Whether it reads offsets, weights and rates of pairs; else they are not computed, and 0.
+    const MOVES: bool;
+
     /// Whether the chunks of this list are visited; if not, the walk ends before it.
     #[inline(always)]
     fn begins(&mut self, list: &List<T>) -> bool {
@@ -72,6 +75,8 @@ pub(crate) trait Visitor<T: Real> {
 
 /// Two visitors, one after the other.
 impl<T: Real, A: Visitor<T>, B: Visitor<T>> Visitor<T> for (A, B) {
+    const MOVES: bool = A::MOVES || B::MOVES;
+
     #[inline(always)]
     fn pair(&mut self, pair: &Pair<T>) {
         self.0.pair(pair);
@@ -159,9 +164,12 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
             let point = closest::<T, SLIVERS>(list.face(owner), px, py);
             let Cell { row, t, rate } =
                 self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
-            (ring.row[slot], ring.t[slot], ring.rate[slot]) = (row, t, rate);
-            let [_, second, third] = point.weights;
-            (ring.offset[slot], ring.weights[slot]) = ([point.dx, point.dy], [second, third]);
+            (ring.row[slot], ring.t[slot]) = (row, t);
+            if V::MOVES {
+                let [_, second, third] = point.weights;
+                (ring.offset[slot], ring.weights[slot]) = ([point.dx, point.dy], [second, third]);
+                ring.rate[slot] = rate;
+            }
             if ahead < AHEAD {
                 continue;
             }
@@ -173,13 +181,17 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
                 self.visitor.face(first + face, list.face(face));
             }
             last = Some(owner);
-            let (row, t, rate) = (ring.row[slot], ring.t[slot], ring.rate[slot]);
+            let row = ring.row[slot];
+            let (offset, weights, rate) = match V::MOVES {
+                true => (ring.offset[slot], ring.weights[slot], ring.rate[slot]),
+                false => ([zero; 2], [zero; 2], splat(0.0)),
+            };
             self.visitor.pair(&Pair {
                 at: ring.at[slot],
                 face: first + owner,
-                offset: ring.offset[slot],
-                weights: ring.weights[slot],
-                t,
+                offset,
+                weights,
+                t: ring.t[slot],
                 rate,
                 row,
                 cubic: T::rows(self.place.table, &row),
@@ -198,6 +210,8 @@ pub(crate) struct Image<'a, T: Real> {
 }
 
 impl<T: Real> Visitor<T> for Image<'_, T> {
+    const MOVES: bool = false;
+
     #[inline(always)]
     fn pair(&mut self, pair: &Pair<T>) {
         (pair.value() - self.tail).output().add_to_groups(self.image, pair.at);
@@ -223,6 +237,8 @@ impl<'a, T: Real> Gradient<'a, T> {
 }
 
 impl<T: Real> Visitor<T> for Gradient<'_, T> {
+    const MOVES: bool = true;
+
     #[inline(always)]
     fn pair(&mut self, pair: &Pair<T>) {
         let pull = pair.slope(of_pixels::<T>(self.upstream, pair.at));
@@ -256,6 +272,8 @@ impl<'a, T: Real> TableGradient<'a, T> {
 }
 
 impl<T: Real> Visitor<T> for TableGradient<'_, T> {
+    const MOVES: bool = false;
+
     #[inline(always)]
     fn pair(&mut self, pair: &Pair<T>) {
         let one = T::constant(of_pixels::<T>(self.upstream, pair.at));

@@ -343,6 +343,8 @@ struct Keep<'a, L: Lanes> {
 }
 
 impl<L: Lanes> Visitor<L> for Keep<'_, L> {
+    const MOVES: bool = true;
+
     #[inline(always)]
     fn begins(&mut self, list: &List<L>) -> bool {
         self.kept.len() + list.len() <= KEPT
