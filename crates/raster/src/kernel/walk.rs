@@ -53,7 +53,7 @@ impl<T: Real> Pair<T> {
 
 /// An operation on the pairs of a band.
 pub(crate) trait Visitor<T: Real> {
-    /// Whether it reads offsets, weights and rates of pairs; else they are not computed, and 0.
+    /// Whether it reads offsets, weights and rates of pairs, and takes faces; else these are 0, and no face is shown.
     const MOVES: bool;
 
     /// Whether the chunks of this list are visited; if not, the walk ends before it.
@@ -146,6 +146,8 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
     /// Takes the chunks of a list, whose first face is number `first` of the band.
     #[inline(always)]
     fn take<const FAR: bool, const SLIVERS: bool>(&mut self, list: &List<T>, first: usize) {
+        // Copies that nothing can write to: else they are read again for each chunk, since visitors write.
+        let (lookup, table) = (self.scene.lookup, self.place.table);
         let zero = T::constant(splat(0.0));
         let mut ring = Ring {
             at: [[0; 2]; RING],
@@ -162,8 +164,7 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
             (ring.at[slot], ring.owner[slot]) = (at, owner);
             let (px, py) = T::Lanes::pixels(places);
             let point = closest::<T, SLIVERS>(list.face(owner), px, py);
-            let Cell { row, t, rate } =
-                self.scene.lookup.place::<T, FAR>(point.distance2, point.inside);
+            let Cell { row, t, rate } = lookup.place::<T, FAR>(point.distance2, point.inside);
             (ring.row[slot], ring.t[slot]) = (row, t);
             if V::MOVES {
                 let [_, second, third] = point.weights;
@@ -175,13 +176,13 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
             }
             let slot = (ahead - AHEAD) % RING;
             let owner = ring.owner[slot];
-            if let Some(face) = last
+            if V::MOVES
+                && let Some(face) = last
                 && (face != owner || ahead % TOGETHER == 0)
             {
                 self.visitor.face(first + face, list.face(face));
             }
             last = Some(owner);
-            let row = ring.row[slot];
             let (offset, weights, rate) = match V::MOVES {
                 true => (ring.offset[slot], ring.weights[slot], ring.rate[slot]),
                 false => ([zero; 2], [zero; 2], splat(0.0)),
@@ -193,11 +194,13 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
                 weights,
                 t: ring.t[slot],
                 rate,
-                row,
-                cubic: T::rows(self.place.table, &row),
+                row: ring.row[slot],
+                cubic: T::rows(table, &ring.row[slot]),
             });
         }
-        if let Some(face) = last {
+        if V::MOVES
+            && let Some(face) = last
+        {
             self.visitor.face(first + face, list.face(face));
         }
     }
