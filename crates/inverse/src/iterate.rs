@@ -71,7 +71,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         Self { problem: of, instances: instances.len(), size, renderer, scene, host }
     }
 
-    /// What is seen at `theta` `[N]`, under the softness at this progress of a run; with the image if pictures are wanted.
+    /// Losses at `theta` `[N]`, under the softness at this progress of a run; with the image if pictures are wanted.
     pub(crate) fn seen(
         &self,
         progress: f64,

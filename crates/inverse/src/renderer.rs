@@ -24,7 +24,7 @@ pub struct ScheduledRenderer<S = EdgeSoftness> {
     resolution: Resolution,
     /// Renderers of silhouettes, if the problem has any.
     renderer: Option<SoftRenderer<S>>,
-    /// Those that drew so far, by their place on the path, each with its table.
+    /// Renderers of the progresses drawn so far, each with its table.
     placed: RefCell<BTreeMap<u64, SoftRenderer<S>>>,
     /// The latest renderer of colours.
     colours: RefCell<Option<Colours<S>>>,
@@ -126,7 +126,7 @@ impl<S: Softness> ScheduledRenderer<S> {
         self.resolution.side(self.size, self.values.width_at(progress, self.layout.size()))
     }
 
-    /// What draws silhouettes at this progress.
+    /// The renderer of silhouettes at this progress.
     ///
     /// # Panics
     ///

@@ -80,7 +80,7 @@ pub use t_conorm::{TConorm, UnknownTConorm};
 pub use view::view_rotation;
 pub use weighting::Weighting;
 
-/// What renderers are made of, for callers that prepare tables, run ops on slices, or measure them.
+/// Parts of the renderers, for callers that prepare tables, run ops on slices, or measure them.
 pub mod low_level {
     pub use crate::{
         backend::{Call, profile_sum},

@@ -188,7 +188,7 @@ impl<S: Softness> SoftRenderer<S> {
         self.drawn(&silhouette, vertices, table)
     }
 
-    /// The same on images of another size. They share knots and tables.
+    /// This renderer on images of another size. Both share knots and tables.
     ///
     /// # Panics
     ///
@@ -202,7 +202,7 @@ impl<S: Softness> SoftRenderer<S> {
         Self { rasterizer, surrogate, ..self.clone() }
     }
 
-    /// The same under other parameters, of the surrogate too if there is one. It begins with knots that follow from those of this one, and
+    /// This renderer under other parameters, of the surrogate too if there is one. It begins with knots that follow from those of this one, and
     /// has a table of its own.
     ///
     /// # Panics
@@ -351,7 +351,7 @@ impl<S: Softness> SoftRenderer<S> {
 }
 
 impl<S: Softness> Knots<S> {
-    /// Those for parameters `phi`, if their softness is that of these stretched.
+    /// Knots for parameters `phi`, if their softness is that of these stretched.
     fn stretched_to(&self, phi: &[f64]) -> Option<Self> {
         if self.phi == phi {
             return Some(self.clone());

@@ -36,7 +36,7 @@ pub use burn::{
 };
 pub use plain::{numbers, tensor, tensor_on, vector};
 
-/// What an op with a backward pass of its own is registered with.
+/// Types that register an op with a backward pass of its own.
 pub mod autodiff {
     #[doc(no_inline)]
     pub use burn::backend::autodiff::{

@@ -13,7 +13,7 @@ type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
 type Renderer = SoftRenderer<EdgeSoftness>;
-/// Of vertices, a target, and the share of each pixel that counts.
+/// A loss of vertices, a target, and the share of each pixel that counts.
 type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>, Option<Tensor<AA, 3>>) -> Tensor<AA, 1>;
 
 /// In one op, and in two.
@@ -46,7 +46,7 @@ fn by_table(renderer: &Renderer) -> (Silhouette<EdgeSoftness>, Tensor<AA, 2>) {
     (silhouette, table)
 }
 
-/// What counts of a silhouette.
+/// A silhouette times the share of each pixel that counts.
 fn part(
     renderer: &Renderer,
     vertices: Tensor<AA, 3>,

@@ -58,7 +58,7 @@ pub(super) struct Boundary<B: Backend> {
 }
 
 impl<B: Backend> Boundary<B> {
-    /// Of faces with these corners to `pixels` `[pixels, 2]` in NDC.
+    /// Closest points of faces with these corners to `pixels` `[pixels, 2]` in NDC.
     pub(super) fn new([a, b, c]: &[[Tensor<B, 3>; 3]; 3], pixels: Tensor<B, 2>) -> Self {
         let count = pixels.dims()[0];
         let p = [0, 1].map(|axis| pixels.clone().narrow(1, axis, 1).reshape([1, count, 1]));

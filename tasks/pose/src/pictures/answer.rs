@@ -1,4 +1,4 @@
-//! What is said of the poses that were found, and what is written beside it.
+//! The report of the poses found, and the files written with it.
 
 use std::{collections::HashSet, path::PathBuf};
 

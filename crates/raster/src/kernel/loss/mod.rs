@@ -48,7 +48,7 @@ pub(crate) struct Judged<'a, F> {
 }
 
 impl<'a, F> Judged<'a, F> {
-    /// The same of some pixels of a view.
+    /// Both images, cut to some pixels of a view.
     fn part(self, view: usize, pixels: usize, range: Range<usize>) -> Self {
         let of = |image: &'a [F]| {
             let first = if image.len() > pixels { view * pixels } else { 0 };
