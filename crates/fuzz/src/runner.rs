@@ -14,9 +14,12 @@ use std::{
     time::{Duration, Instant},
 };
 
+use cpu_time::ProcessTime;
+
 use crate::{Mutator, Settings, allocator};
 
-/// A reader that takes longer for one input, in each of three tries, hangs.
+/// A reader whose process computes longer for one input, in each of three tries, hangs. Waiting counts only towards `FOR_EVER`: a loaded
+/// machine would give false finds.
 const LONGEST: Duration = Duration::from_secs(1);
 /// One that takes this long will never end: the process ends.
 const FOR_EVER: u64 = 120;
@@ -60,7 +63,7 @@ pub struct Report {
     pub inputs: u64,
     /// Inputs on which a reader panicked.
     pub panics: u64,
-    /// Inputs that took longer than a second, three times.
+    /// Inputs that took more than a second of CPU time, three times.
     pub hangs: u64,
     /// Inputs that took more than 1 GiB.
     pub large: u64,
@@ -199,7 +202,7 @@ impl Reader<'_> {
         Ok(report)
     }
 
-    /// Reads an input; again if it takes long, since other programs may have been at work.
+    /// Reads an input; again if it takes long, since caches may have been cold.
     fn read(&self, input: &[u8]) -> Reading {
         let mut reading = self.read_once(input);
         for _ in 0..2 {
@@ -213,7 +216,7 @@ impl Reader<'_> {
 
     fn read_once(&self, input: &[u8]) -> Reading {
         let before = allocator::begin();
-        let start = Instant::now();
+        let start = ProcessTime::now();
         let ended = panic::catch_unwind(AssertUnwindSafe(|| (self.read)(input)));
         let time = start.elapsed();
         let peak = allocator::peak().saturating_sub(before);
@@ -224,6 +227,7 @@ impl Reader<'_> {
 /// How a reader fared with an input.
 struct Reading {
     panic: Option<String>,
+    /// CPU time of the process.
     time: Duration,
     peak: usize,
 }
