@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use softrast_inverse::{MaskRules, Method, Picture, ScheduledSoftness};
+use anyhow::Context;
+
+use softrast_inverse::{MaskRules, Method, Picture, ScheduledSoftness, find_mask};
 use softrast_lab::{
     Error, Progress, ViewerView, mask_png, parse::share, program::Output, report::Report,
 };
@@ -124,12 +126,34 @@ pub struct MaskFlags {
     /// Take for the mask what is at least so bright, 0 to 1, instead of keeping soft edges
     #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
     pub threshold: Option<f64>,
+
+    /// Take for the mask the pixels of class N: an entry of the palette, or the level as a whole number
+    #[arg(long, value_name = "N", conflicts_with = "threshold")]
+    pub label: Option<u32>,
+
+    /// Folder of masks with the names of the pictures, whatever their endings [default: masks that the camera file names, a folder masks beside the pictures, or the pictures themselves]
+    #[arg(long, value_name = "DIR")]
+    pub masks: Option<PathBuf>,
 }
 
 impl MaskFlags {
     /// Whether the command line says something of masks.
     pub fn asked(&self) -> bool {
-        self.invert || self.threshold.is_some()
+        let Self { invert, threshold, label, masks } = self;
+        *invert || threshold.is_some() || label.is_some() || masks.is_some()
+    }
+
+    /// The file with the mask of a picture in the folder of masks; None if no folder was given.
+    ///
+    /// # Errors
+    ///
+    /// If the folder has none for the picture.
+    pub fn of(&self, picture: &Path) -> anyhow::Result<Option<PathBuf>> {
+        let Some(folder) = &self.masks else { return Ok(None) };
+        let found = find_mask(folder, &picture.to_string_lossy());
+        found.map(Some).with_context(|| {
+            format!("{}: no mask in {} has its name", picture.display(), folder.display())
+        })
     }
 
     /// The mask in a file.
@@ -138,7 +162,8 @@ impl MaskFlags {
     ///
     /// If it is missing, no picture, or has nothing that is half white.
     pub fn load(&self, path: &Path) -> anyhow::Result<Picture> {
-        let rules = MaskRules { invert: self.invert, threshold: self.threshold };
+        let Self { invert, threshold, label, .. } = *self;
+        let rules = MaskRules { invert, threshold, label };
         Picture::load_mask_by(&rules, path)
     }
 }

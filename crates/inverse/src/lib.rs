@@ -30,7 +30,7 @@
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
 
 mod baked;
-mod camera_file;
+mod cameras;
 mod checkpoint;
 mod coloured_pixels;
 mod cut_sides;
@@ -41,7 +41,6 @@ mod iterate;
 mod layout;
 mod learn;
 mod learn_config;
-mod lens;
 mod mask_rules;
 mod method;
 mod minimize;
@@ -52,20 +51,18 @@ mod painted_view;
 mod picture;
 mod picture_file;
 pub mod pose;
-mod pose_file;
 mod problem;
 mod renderer;
 mod resolution;
-mod rotation;
 mod schedule;
 mod softness_file;
 mod surface;
 mod targets;
-mod transforms;
 pub mod triangles;
 mod view;
 
 pub use baked::baked;
+pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
 pub use checkpoint::Checkpoint;
 pub use coloured_pixels::coloured_pixels;
 pub use cut_sides::cut_sides;
@@ -76,7 +73,6 @@ pub use iterate::Iterate;
 pub use layout::PhiLayout;
 pub use learn::{Learning, learn};
 pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
-pub use lens::Lens;
 pub use mask_rules::MaskRules;
 pub use method::Method;
 pub use minimize::{Minimization, minimize};
@@ -87,7 +83,6 @@ pub use painted_view::PaintedView;
 pub use picture::{Picture, save_picture};
 pub use picture_file::PictureFile;
 pub use pose::PoseProblem;
-pub use pose_file::PoseFile;
 pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
@@ -95,7 +90,6 @@ pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, 
 pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
-pub use transforms::{Transforms, load_views};
 pub use view::{
     View, camera_json, faces_across, faces_across_note, mask_iou, reading_notes, silhouette_pixels,
 };

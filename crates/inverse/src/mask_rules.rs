@@ -1,5 +1,7 @@
 use anyhow::{anyhow, ensure};
 
+use crate::picture_file::Pixel;
+
 /// How the levels of a picture become a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaskRules {
@@ -7,6 +9,52 @@ pub struct MaskRules {
     pub invert: bool,
     /// What is at least so bright, from 0 to 1, is the mask; after it is inverted. None keeps soft edges.
     pub threshold: Option<f64>,
+    /// Pixels of the class with this number are the mask: an entry of the palette of a picture, or its level as a whole number.
+    pub label: Option<u32>,
+}
+
+/// Share of the pixels that have a colour, and of those that are not black which are neither white, from which on a picture is no mask.
+const COLOURED: f64 = 0.05;
+const GREY: f64 = 0.5;
+/// What red, green and blue of a colour differ by at least, and what counts as black; white is as far from the other end.
+const COLOUR: f32 = 0.25;
+const BLACK: f32 = 0.1;
+
+/// How many pixels of a picture look like those of a photograph.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Looks {
+    pixels: usize,
+    coloured: usize,
+    grey: usize,
+    black: usize,
+}
+
+impl Looks {
+    /// Takes note of a pixel.
+    pub(crate) fn see(&mut self, [red, green, blue, _]: Pixel) {
+        let (least, most) = (red.min(green).min(blue), red.max(green).max(blue));
+        self.pixels += 1;
+        self.coloured += usize::from(most - least > COLOUR);
+        self.black += usize::from(most <= BLACK);
+        self.grey += usize::from(most > BLACK && least < 1.0 - BLACK);
+    }
+
+    /// An error if most of them do.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
+        let coloured = share(self.coloured, self.pixels);
+        let grey = share(self.grey, self.pixels - self.black);
+        let told = match coloured > COLOURED {
+            true => format!("{:.0} % of its pixels have a colour", 100.0 * coloured),
+            false => format!("{:.0} % of what is not black is grey", 100.0 * grey),
+        };
+        ensure!(
+            coloured <= COLOURED && grey <= GREY,
+            "it looks like a photograph, not like a mask: {told}. Name a folder of masks with --masks, the class with --label N, or take what is \
+             bright with --threshold X"
+        );
+        Ok(())
+    }
 }
 
 /// The levels that a picture has, as far as a mask is told by them.
@@ -142,8 +190,8 @@ mod tests {
         Ok((all.iter().map(|&level| change(level)).collect(), only))
     }
 
-    const PLAIN: MaskRules = MaskRules { invert: false, threshold: None };
-    const INVERTED: MaskRules = MaskRules { invert: true, threshold: None };
+    const PLAIN: MaskRules = MaskRules { invert: false, threshold: None, label: None };
+    const INVERTED: MaskRules = MaskRules { invert: true, ..PLAIN };
 
     #[test]
     fn one_level_above_black_and_nothing_else_is_the_mask() {
@@ -157,6 +205,22 @@ mod tests {
         }
         assert_eq!(mask(PLAIN, &[0.0, 1.0, 0.0]), Ok((vec![0.0, 1.0, 0.0], None)));
         assert_eq!(mask(PLAIN, &[0.0, 0.3, 0.9]), Ok((vec![0.0, 0.3, 0.9], None)));
+    }
+
+    #[test]
+    fn photographs_look_like_none() {
+        let check = |pixels: &[[f32; 3]]| {
+            let mut looks = Looks::default();
+            pixels.iter().for_each(|&[r, g, b]| looks.see([r, g, b, 1.0]));
+            looks.check().map_err(|error| error.to_string())
+        };
+        let (black, white, grey) = ([0.0; 3], [1.0; 3], [0.4; 3]);
+        assert_eq!(check(&[black, white, grey, white, black]), Ok(()));
+        assert_eq!(check(&[black; 9]), Ok(()));
+        assert!(check(&[black, white, grey, grey, grey]).unwrap_err().contains("75 % of what is"));
+        let error = check(&[black, white, [0.9, 0.3, 0.3], black]).unwrap_err();
+        assert!(error.contains("25 % of its pixels have a colour"), "{error}");
+        assert_eq!(error.lines().count(), 1);
     }
 
     #[test]

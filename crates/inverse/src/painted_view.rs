@@ -43,6 +43,10 @@ impl PaintedView {
                 mask.width,
                 mask.height
             );
+            let [red, green, blue, opacity] = match view.distortion {
+                Some(_) => undistorted(view, [red, green, blue, opacity]),
+                None => [red, green, blue, opacity],
+            };
             Ok(Self::new(view.clone(), [red, green, blue], &opacity))
         };
         let painted = of().with_context(|| view.name.clone())?;
@@ -117,6 +121,21 @@ impl PaintedView {
     }
 }
 
+/// Colours and opacity of a picture as a straight lens would have shown them: a colour counts as much as it is opaque.
+fn undistorted(view: &View, [colours @ .., opacity]: [Picture; 4]) -> [Picture; 4] {
+    let width = opacity.size().width;
+    let with = |colour: &Picture, opacity: &Picture, change: fn(f32, f32) -> f32| {
+        let pairs = colour.pixels().iter().zip(opacity.pixels());
+        Picture::new(pairs.map(|(&x, &a)| change(x, a)).collect(), width)
+    };
+    let straight = view.undistorted(opacity.clone());
+    let [red, green, blue] = colours.map(|colour| {
+        let over_black = view.undistorted(with(&colour, &opacity, |x, a| x * a));
+        with(&over_black, &straight, |x, a| if a > 0.0 { x / a } else { 0.0 })
+    });
+    [red, green, blue, straight]
+}
+
 /// White where a mask and all around are at least half white, or where the mask itself is if that is nowhere.
 fn within(mask: &Picture) -> Picture {
     let (levels, width) = (mask.pixels(), mask.size().width);
@@ -145,7 +164,7 @@ mod tests {
         let camera =
             Pinhole { rotation, translation: [0.0; 3], focal: [1.0; 2], centre: [0.0; 2], size };
         let (name, picture) = ("a".into(), "a.png".into());
-        View { name, picture, mask: Picture::new(mask, width), camera, off: 0.0 }
+        View { name, picture, mask: Picture::new(mask, width), camera, distortion: None, off: 0.0 }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-use std::{path::Path, sync::Arc};
+use std::{collections::BTreeSet, path::Path, sync::Arc};
 
 use anyhow::{Context, anyhow, ensure};
 use image::{GrayImage, Luma};
@@ -6,13 +6,15 @@ use softrast_raster::{ImageSize, Pinhole};
 use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
 
 use crate::{
-    MaskRules, PictureFile,
-    mask_rules::Levels,
+    Distortion, MaskRules, PictureFile,
+    mask_rules::{Levels, Looks},
     picture_file::{Pixel, luminance},
 };
 
 /// What is looked at of a mask is this much larger than what is white.
 const MARGIN: f64 = 1.5;
+/// Labels that an error names at most.
+const MOST_CLASSES: usize = 12;
 /// Pixels of a picture at most, 2048 × 2048: of larger ones in files the means over equal rectangles are kept.
 const MOST_PIXELS: usize = 1 << 22;
 
@@ -54,23 +56,53 @@ impl Picture {
     /// The mask that a picture is: its transparency, or where all of it is opaque its luminance.
     ///
     /// Where one level is above 0 and nothing else, as in masks of 0 and 1, that is the mask: it becomes white, and
-    /// [`Picture::only_level`] has it. A threshold takes levels as they are.
+    /// [`Picture::only_level`] has it. A threshold takes levels as they are, and a label the pixels of one class.
     ///
     /// # Errors
     ///
-    /// If no pixel would be half white: with the brightest level, and the threshold that takes it.
+    /// If no pixel would be half white: with the brightest level, and the threshold that takes it. If there is neither transparency nor a
+    /// threshold nor a label, and the picture looks like a photograph.
     pub fn mask_of(file: &PictureFile, rules: &MaskRules) -> anyhow::Result<Self> {
+        if let Some(label) = rules.label {
+            return Self::of_class(file, label, rules.invert);
+        }
         let opaque = file.is_opaque();
         let level = |pixel: Pixel| if opaque { luminance(pixel) } else { pixel[3] };
-        let mut levels = Levels::default();
-        file.each(|pixel| levels.see(level(pixel)));
+        let (mut levels, mut looks) = (Levels::default(), Looks::default());
+        file.each(|pixel| {
+            levels.see(level(pixel));
+            looks.see(pixel);
+        });
         let (change, only_level) = rules.change(&levels).map_err(|wrong| match opaque {
             false if levels.brightest() == 0.0 => {
                 anyhow!("{wrong}: all of it is transparent, so save it without an alpha channel if its colours are the mask")
             }
             _ => wrong,
         })?;
+        if opaque && rules.threshold.is_none() && only_level.is_none() {
+            looks.check()?;
+        }
         Ok(Self { only_level, ..Self::of(file, |pixel| change(level(pixel))) })
+    }
+
+    /// The pixels of a class, or all others.
+    fn of_class(file: &PictureFile, label: u32, invert: bool) -> anyhow::Result<Self> {
+        let mut classes = BTreeSet::new();
+        file.each(|pixel| {
+            if classes.len() < MOST_CLASSES {
+                classes.extend(file.class_of(pixel));
+            }
+        });
+        let mut found = false;
+        file.each(|pixel| found |= file.class_of(pixel) == Some(label));
+        let classes: Vec<String> = classes.iter().map(u32::to_string).collect();
+        ensure!(
+            found,
+            "no pixel has the label {label}: labels of the picture are {}",
+            if classes.is_empty() { "none, it has colours".to_owned() } else { classes.join(", ") }
+        );
+        let level = |pixel| f32::from(u8::from((file.class_of(pixel) == Some(label)) != invert));
+        Ok(Self::of(file, level))
     }
 
     /// The luminance of a picture file; what is transparent is black.
@@ -155,6 +187,36 @@ impl Picture {
     /// All pixels, row by row from the top.
     pub fn pixels(&self) -> &[f32] {
         &self.levels
+    }
+
+    /// As a straight lens would have shown it: `camera` is that of these pixels but for its lens. What lies beyond the picture is as its border.
+    ///
+    /// # Panics
+    ///
+    /// If the camera is for pictures of another size.
+    #[must_use]
+    pub fn undistorted(&self, camera: &Pinhole, distortion: &Distortion) -> Self {
+        assert_eq!(camera.size, self.size(), "the size of the camera's pictures");
+        let levels = distortion.sources(camera).map(|place| self.between(place));
+        Self { levels: levels.collect(), ..self.clone() }
+    }
+
+    /// The level at a place in pixels from the corner of the first: between the middles of four pixels bilinear, beyond the outermost theirs.
+    fn between(&self, place: [f64; 2]) -> f32 {
+        let (width, height) = (self.width, self.levels.len() / self.width);
+        let along = |x: f64, count: usize| {
+            let x = (x - 0.5).max(0.0).min((count - 1) as f64);
+            let first = (x as usize).min(count - 1);
+            (first, (first + 1).min(count - 1), (x - first as f64) as f32)
+        };
+        let ((left, right, across), (top, bottom, down)) =
+            (along(place[0], width), along(place[1], height));
+        let row = |y: usize| {
+            let [a, b] = [left, right].map(|x| self.levels[y * width + x]);
+            a + across * (b - a)
+        };
+        let (above, below) = (row(top), row(bottom));
+        above + down * (below - above)
     }
 
     /// With black for white.

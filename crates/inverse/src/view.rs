@@ -5,14 +5,21 @@ use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
 use softrast_tensor::numbers;
 
-use crate::{Frame, Picture, rotation::SAID};
+use crate::{
+    Distortion, Frame, Picture,
+    cameras::{SAID, rounded_note},
+    colmap_pose, cut_sides,
+};
 
-/// A camera as JSON: R, t, K, width and height, and the orbit if there is one that sees the same.
+/// A camera as JSON: R and t as OpenCV has them, the same from camera to world as nerfstudio has it (`transform_matrix`) and as COLMAP has it
+/// (`colmap`: QW, QX, QY, QZ, TX, TY, TZ), K, width and height, and the orbit if there is one that sees the same.
 pub fn camera_json(camera: &Pinhole) -> Value {
     let ([fx, fy], [cx, cy]) = (camera.focal, camera.centre);
     let mut found = json!({
         "R": camera.rotation,
         "t": camera.translation,
+        "transform_matrix": camera.to_opengl(),
+        "colmap": colmap_pose(camera),
         "K": [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]],
         "width": camera.size.width,
         "height": camera.size.height,
@@ -58,20 +65,40 @@ pub struct View {
     pub name: String,
     /// The file of the picture.
     pub picture: PathBuf,
-    /// Its mask.
+    /// Its mask, undistorted.
     pub mask: Picture,
-    /// Who took it: for the pixels of the mask.
+    /// The camera that took it, for the pixels of the mask.
     pub camera: Pinhole,
+    /// How the lens distorted the picture in its file, if it did.
+    pub distortion: Option<Distortion>,
     /// How far R Rᵀ was from the identity in the file, before it became the nearest rotation.
     pub off: f64,
 }
 
-/// What should be said of views that were read, a line for each kind: masks whose only level was taken for white, and rotations that were
-/// rounded.
+impl View {
+    /// A picture that the camera took, of the size of the mask, without what its lens does to it.
+    #[must_use]
+    pub fn undistorted(&self, picture: Picture) -> Picture {
+        match &self.distortion {
+            Some(distortion) => picture.undistorted(&self.camera, distortion),
+            None => picture,
+        }
+    }
+}
+
+/// What should be said of views that were read, a line for each kind: pictures that were undistorted, masks whose only level was taken for
+/// white, masks that may be inverted, and rotations that were rounded.
 pub fn reading_notes(views: &[View]) -> Vec<String> {
     let masks = views.iter().filter_map(|view| Some((view.mask.only_level()?, &view.name)));
     let masks: Vec<(f64, &String)> = masks.collect();
     let mut notes = Vec::new();
+    let bent = views.iter().filter(|view| view.distortion.is_some()).count();
+    if bent > 0 {
+        notes.push(format!(
+            "the lens distorts {}: pictures and masks were undistorted, and the camera keeps its fx, fy, cx, cy, R and t",
+            if bent == views.len() { "the pictures".to_owned() } else { format!("{bent} of {} pictures", views.len()) }
+        ));
+    }
     if let [(level, name), more @ ..] = &masks[..] {
         let of = match more.len() {
             0 => name.to_string(),
@@ -81,21 +108,21 @@ pub fn reading_notes(views: &[View]) -> Vec<String> {
             "{of}: one level is above black and nothing else, {level:.4} where white is 1: it is taken for the mask"
         ));
     }
+    let inverted: Vec<&View> =
+        views.iter().filter(|view| cut_sides(&view.mask).len() == 4).collect();
+    if let [first, more @ ..] = &inverted[..] {
+        let of = match more.len() {
+            0 => first.name.clone(),
+            more => format!("{} and {more} more", first.name),
+        };
+        notes.push(format!(
+            "{of}: the mask reaches all four sides of the picture: is it inverted (--invert)?"
+        ));
+    }
     let rounded = || views.iter().filter(|view| view.off >= SAID);
     let worst = rounded().max_by(|a, b| a.off.total_cmp(&b.off));
     notes.extend(worst.map(|view| rounded_note(&view.name, view.off, rounded().count())));
     notes
-}
-
-/// That a rotation was rounded, and as many in all.
-pub(crate) fn rounded_note(name: &str, off: f64, count: usize) -> String {
-    let of = match count {
-        1 => "its rotation is".to_owned(),
-        count => format!("its rotation, as those of {} more, is", count - 1),
-    };
-    format!(
-        "{name}: {of} rounded (R Rᵀ is off the identity by {off:.1e}): the nearest rotation is taken"
-    )
 }
 
 /// How many faces of a mesh cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those across
@@ -139,12 +166,19 @@ mod tests {
     }
 
     fn view(name: &str, mask: Picture, off: f64) -> View {
-        View { name: name.to_owned(), picture: name.into(), mask, camera: camera(), off }
+        View {
+            name: name.to_owned(),
+            picture: name.into(),
+            mask,
+            camera: camera(),
+            distortion: None,
+            off,
+        }
     }
 
     #[test]
     fn rounded_rotations_are_one_line_that_names_the_worst() {
-        let mask = || Picture::new(vec![1.0; 12], 4);
+        let mask = || Picture::new([vec![0.0; 5], vec![1.0], vec![0.0; 6]].concat(), 4);
         let views = [view("a", mask(), 1e-9), view("b", mask(), 1e-3), view("c", mask(), 2e-3)];
         let notes = reading_notes(&views);
         assert_eq!(notes.len(), 1, "{notes:?}");
@@ -153,6 +187,14 @@ mod tests {
             "{notes:?}"
         );
         assert!(reading_notes(&views[..1]).is_empty());
+    }
+
+    #[test]
+    fn white_at_all_four_sides_is_told() {
+        let full = |name| view(name, Picture::new(vec![1.0; 12], 4), 0.0);
+        let notes = reading_notes(&[full("a"), full("b")]);
+        assert!(notes.len() == 1 && notes[0].starts_with("a and 1 more: "), "{notes:?}");
+        assert!(notes[0].contains("--invert"), "{notes:?}");
     }
 
     #[test]

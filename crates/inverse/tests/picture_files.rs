@@ -10,7 +10,7 @@ use image::{
 };
 use softrast_inverse::{MaskRules, Picture, PictureFile};
 
-const PLAIN: MaskRules = MaskRules { invert: false, threshold: None };
+const PLAIN: MaskRules = MaskRules { invert: false, threshold: None, label: None };
 
 fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
@@ -235,7 +235,7 @@ fn only_regular_files_are_read() {
             Picture::load_luminance(path).err(),
             softrast_inverse::Lens::load(path).err(),
             softrast_inverse::PoseFile::load(path).err(),
-            softrast_inverse::Transforms::load(path).err(),
+            softrast_inverse::CameraFile::load(path).err(),
         ];
         for error in errors.map(|error| format!("{:#}", error.unwrap())) {
             assert!(error.contains(path) && error.lines().count() == 1, "{error}");

@@ -1,12 +1,13 @@
-//! Makes `data/views/fox`: masks of the fox, the cameras that took them, and the truth.
+//! Makes `data/views/fox`: masks of the fox, the cameras that took them, and the truth; and `data/views/fox_lens`: the same cameras with a lens
+//! that distorts, pictures over a grey wall, masks beside them, and the cameras as nerfstudio and COLMAP write them.
 //!
 //! `cargo run --release -p pose --example make_views`
 
 use std::{fs, path::Path};
 
-use image::{GrayImage, Luma};
-use serde_json::json;
-use softrast_inverse::{camera_json, silhouette_pixels};
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use serde_json::{Value, json};
+use softrast_inverse::{Distortion, camera_json, colmap_pose, silhouette_pixels};
 use softrast_mesh::fox;
 use softrast_raster::Pinhole;
 
@@ -15,40 +16,132 @@ const HEIGHT: usize = 90;
 const WIDTH: usize = 120;
 /// Samples along each side of a pixel.
 const SAMPLES: usize = 4;
+const K: [f64; 6] = [-0.15, 0.04, 0.0, 0.0, 0.0, 0.0];
+const P: [f64; 2] = [0.002, -0.0015];
+/// The lens of `fox_lens`.
+const LENS: Distortion = Distortion::Rational { k: K, p: P };
+/// Colours of the wall and the fox.
+const WALL: [f64; 3] = [0.35; 3];
+const COAT: [f64; 3] = [0.85, 0.45, 0.15];
 
 fn main() -> anyhow::Result<()> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");
-    fs::create_dir_all(folder.join("images"))?;
-    let mesh = fox();
-    let (mut frames, mut truth) = (Vec::new(), Vec::new());
-    for (k, camera) in (0..VIEWS).map(|k| (k, camera(k))) {
-        let fine = [SAMPLES * HEIGHT, SAMPLES * WIDTH];
-        let fine = camera.cropped([0.0; 2], [WIDTH as f64, HEIGHT as f64], fine);
-        let drawn = silhouette_pixels(&mesh, &fine);
-        let covered = |x: usize, y: usize| {
-            let sample = |s: usize| {
-                (SAMPLES * y + s / SAMPLES) * SAMPLES * WIDTH + SAMPLES * x + s % SAMPLES
-            };
-            (0..SAMPLES * SAMPLES).map(|s| drawn[sample(s)]).sum::<f64>()
-                / (SAMPLES * SAMPLES) as f64
-        };
-        let name = format!("images/{k:02}.png");
-        let mask = GrayImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, y| {
-            Luma([(255.0 * covered(x as usize, y as usize)).round() as u8])
+    let views = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views");
+    let cameras: Vec<Pinhole> = (0..VIEWS).map(camera).collect();
+    // R, t, K and the size say it all.
+    let truth = |camera: &Pinhole| {
+        let mut truth = camera_json(camera);
+        truth.as_object_mut().map(|fields| {
+            fields.retain(|name, _| !["transform_matrix", "colmap"].contains(&&**name))
         });
-        mask.save(folder.join(&name))?;
-        frames.push(json!({ "file_path": name, "transform_matrix": camera.to_opengl() }));
-        truth.push(camera_json(&camera));
-    }
-    let [[fx, fy], [cx, cy]] = [camera(0).focal, camera(0).centre];
-    let transforms = json!({
-        "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": WIDTH, "h": HEIGHT, "frames": frames,
-    });
+        truth
+    };
+    let truth: Vec<Value> = cameras.iter().map(truth).collect();
     let truth = json!({ "mesh": "fox", "views": truth });
+    let straight = views.join("fox");
+    fs::create_dir_all(straight.join("images"))?;
+    for (k, camera) in cameras.iter().enumerate() {
+        mask(camera, |place| place).save(straight.join(format!("images/{k:02}.png")))?;
+    }
+    let frame = |(k, camera): (usize, &Pinhole)| json!({ "file_path": format!("images/{k:02}.png"), "transform_matrix": camera.to_opengl() });
+    let mut transforms = intrinsics(&cameras[0]);
+    transforms["frames"] = cameras.iter().enumerate().map(frame).collect();
+    write(&straight, &transforms, &truth)?;
+
+    let bent = views.join("fox_lens");
+    for name in ["images", "masks", "sparse/0"] {
+        fs::create_dir_all(bent.join(name))?;
+    }
+    for (k, camera) in cameras.iter().enumerate() {
+        let mask = mask(camera, |place| unbent(camera, place));
+        let picture = RgbImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, y| {
+            let covered = f64::from(mask.get_pixel(x, y).0[0]) / 255.0;
+            Rgb([0, 1, 2]
+                .map(|c| (255.0 * (WALL[c] + covered * (COAT[c] - WALL[c]))).round() as u8))
+        });
+        mask.save(bent.join(format!("masks/{k:02}.png")))?;
+        picture.save(bent.join(format!("images/{k:02}.png")))?;
+    }
+    let mut transforms = LENS.json();
+    transforms["camera_model"] = "OPENCV".into();
+    for (name, value) in intrinsics(&cameras[0]).as_object().into_iter().flatten() {
+        transforms[name] = value.clone();
+    }
+    let frame = |(k, camera): (usize, &Pinhole)| json!({ "file_path": format!("images/{k:02}.png"), "mask_path": format!("masks/{k:02}.png"), "transform_matrix": camera.to_opengl() });
+    transforms["frames"] = cameras.iter().enumerate().map(frame).collect();
+    write(&bent, &transforms, &truth)?;
+    let (model_cameras, images) = colmap(&cameras);
+    fs::write(bent.join("sparse/0/cameras.bin"), model_cameras)?;
+    fs::write(bent.join("sparse/0/images.bin"), images)?;
+    Ok(())
+}
+
+fn intrinsics(camera: &Pinhole) -> Value {
+    let ([fx, fy], [cx, cy]) = (camera.focal, camera.centre);
+    json!({ "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": WIDTH, "h": HEIGHT })
+}
+
+fn write(folder: &Path, transforms: &Value, truth: &Value) -> anyhow::Result<()> {
     for (name, value) in [("transforms.json", transforms), ("truth.json", truth)] {
-        fs::write(folder.join(name), serde_json::to_string_pretty(&value)? + "\n")?;
+        fs::write(folder.join(name), serde_json::to_string_pretty(value)? + "\n")?;
     }
     Ok(())
+}
+
+/// How much of each pixel the fox covers, where `straight` gives the place in pixels at which a pinhole shows what lies at a place.
+fn mask(camera: &Pinhole, straight: impl Fn([f64; 2]) -> [f64; 2]) -> GrayImage {
+    let [height, width] = [SAMPLES * HEIGHT, SAMPLES * WIDTH];
+    let fine = camera.cropped([0.0; 2], [WIDTH as f64, HEIGHT as f64], [height, width]);
+    let drawn = silhouette_pixels(&fox(), &fine);
+    let sample = |x: usize, y: usize| {
+        let place = [x, y].map(|at| (at as f64 + 0.5) / SAMPLES as f64);
+        let [x, y] = straight(place).map(|at| (at * SAMPLES as f64).floor());
+        let inside = x >= 0.0 && y >= 0.0 && x < width as f64 && y < height as f64;
+        if inside { drawn[y as usize * width + x as usize] } else { 0.0 }
+    };
+    GrayImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, y| {
+        let [x, y] = [x, y].map(|at| at as usize * SAMPLES);
+        let samples = (0..SAMPLES * SAMPLES).map(|s| sample(x + s % SAMPLES, y + s / SAMPLES));
+        let covered = samples.sum::<f64>() / (SAMPLES * SAMPLES) as f64;
+        Luma([(255.0 * covered).round() as u8])
+    })
+}
+
+/// Where a pinhole shows what the lens shows at a place, in pixels.
+fn unbent(camera: &Pinhole, place: [f64; 2]) -> [f64; 2] {
+    let Pinhole { focal, centre, .. } = *camera;
+    let shown = [0, 1].map(|k| (place[k] - centre[k]) / focal[k]);
+    // What the lens adds is nearly the same at a place near by.
+    let ray = (0..60).fold(shown, |ray, _| {
+        let bent = LENS.bend(ray);
+        [0, 1].map(|k| ray[k] + shown[k] - bent[k])
+    });
+    [0, 1].map(|k| focal[k] * ray[k] + centre[k])
+}
+
+/// `cameras.bin` and `images.bin` of a model with one camera.
+fn colmap(cameras: &[Pinhole]) -> (Vec<u8>, Vec<u8>) {
+    const OPENCV: i32 = 4;
+    let ([fx, fy], [cx, cy]) = (cameras[0].focal, cameras[0].centre);
+    let numbers =
+        |numbers: &[f64]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>();
+    let one = [
+        &1u64.to_le_bytes()[..],
+        &1u32.to_le_bytes(),
+        &OPENCV.to_le_bytes(),
+        &(WIDTH as u64).to_le_bytes(),
+        &(HEIGHT as u64).to_le_bytes(),
+        &numbers(&[fx, fy, cx, cy, K[0], K[1], P[0], P[1]]),
+    ];
+    let mut images = (cameras.len() as u64).to_le_bytes().to_vec();
+    for (k, camera) in cameras.iter().enumerate() {
+        images.extend((k as u32 + 1).to_le_bytes());
+        images.extend(numbers(&colmap_pose(camera)));
+        images.extend(1u32.to_le_bytes());
+        images.extend(format!("{k:02}.png\0").bytes());
+        // No points.
+        images.extend(0u64.to_le_bytes());
+    }
+    (one.concat(), images)
 }
 
 /// Cameras all around, none upright, none that looks at the middle, with the principal point off the middle.

@@ -96,7 +96,7 @@ fn a_result_is_a_start_and_a_camera_for_the_mesh_as_it_is_in_its_file() {
     let mesh = path.to_str().unwrap();
     let words = ["--target", &target, "--camera", &camera, "--mesh", mesh, "--size", "64"];
     let moved = run(out.path(), &words).unwrap();
-    let of_file = &moved["camera_in_file"];
+    let of_file = &moved["camera"];
     assert!(angle_deg(of_file, &plain["camera"]) < 3.0, "{moved}");
     // Both see the origin of the fox in one place, three times as far away.
     let seen = |camera: &Value, p: [f64; 3]| {
@@ -141,7 +141,7 @@ fn a_mesh_on_a_map_is_seen_from_where_it_is() {
     for more in [vec!["--raw", "--start", &start, "--steps", "10"], vec!["--size", "64"]] {
         let found = run(out.path(), &[&words[..], &more].concat()).unwrap();
         assert!(found["iou"].as_f64().unwrap() > 0.97, "{more:?}: {found}");
-        let of_file = &found["camera_in_file"];
+        let of_file = &found["camera"];
         assert!(angle_deg(of_file, truth) < 3.0, "{more:?}: {found}");
         let off = (0..3).map(|k| (eye(of_file)[k] - stood[k]).abs()).fold(0.0, f64::max);
         assert!(off < 0.2 * scale, "{more:?}: the camera is {off} away from where it stood");
@@ -313,6 +313,46 @@ fn masks_as_tools_write_them_give_the_pose_of_the_plain_mask() {
     let said = found["warnings"].to_string();
     assert!(said.contains("one level is above black and nothing else, 0.0039"), "{said}");
     assert!(said.contains("its rotation is rounded"), "{said}");
+}
+
+#[test]
+fn a_lens_that_distorts_is_undone_whether_nerfstudio_or_colmap_tells_it() {
+    let out = tempfile::tempdir().unwrap();
+    let lens = |name: &str| fox(&format!("../fox_lens/{name}"));
+    let truth: Value = serde_json::from_slice(&fs::read(lens("truth.json")).unwrap()).unwrap();
+    let start = out.path().join("start.json");
+    fs::write(&start, truth["views"][5].to_string()).unwrap();
+    let (target, masks) = (lens("images/05.png"), lens("masks"));
+    let common = ["--target", &target, "--start", start.to_str().unwrap(), "--steps", "5"];
+    for camera in [
+        &["--camera", &lens("transforms.json")][..],
+        &["--camera", &lens("sparse/0"), "--masks", &masks],
+    ] {
+        let found = run(&out.path().join("results"), &[&common, camera].concat()).unwrap();
+        let off = angle_deg(&found["camera"], &truth["views"][5]);
+        assert!(off < 1.5 && found["iou"].as_f64().unwrap() > 0.97, "{off} degrees off, {found}");
+        assert_eq!(found["undistorted"]["k1"], json!(-0.15));
+        assert!(found["warnings"].to_string().contains("the lens distorts"), "{found}");
+        // The pose in the ways of others is the same.
+        let again = out.path().join("again.json");
+        let frame = json!({ "transform_matrix": found["camera"]["transform_matrix"] });
+        fs::write(&again, frame.to_string()).unwrap();
+        let pose = softrast_inverse::PoseFile::load(&again).unwrap();
+        let pairs = (0..9).map(|k| (k / 3, k % 3));
+        let same = |(i, j): (usize, usize)| {
+            (pose.rotation[i][j] - found["camera"]["R"][i][j].as_f64().unwrap()).abs() < 1e-9
+        };
+        assert!(pairs.into_iter().all(same), "{found}");
+    }
+    // Without coefficients nothing is undone, and a picture without a mask is refused.
+    let plain = out.path().join("camera.json");
+    let k = &truth["views"][5]["K"];
+    fs::write(&plain, json!({ "K": k }).to_string()).unwrap();
+    let words = ["--camera", plain.to_str().unwrap(), "--masks", &masks];
+    let bent = run(&out.path().join("results"), &[&common[..], &words].concat()).unwrap();
+    assert!(bent["undistorted"].is_null());
+    let error = run(&out.path().join("none"), &[&common[..], &words[..2]].concat()).unwrap_err();
+    assert!(error.contains("looks like a photograph"), "{error}");
 }
 
 fn png_of(image: &GrayImage) -> Vec<u8> {

@@ -36,6 +36,37 @@ fn views_that_were_kept_aside_are_met() {
     }
 }
 
+/// The fox through a lens that distorts, opaque pictures and masks apart.
+fn lens(name: &str) -> String {
+    format!("{}_lens/{name}", fox())
+}
+
+#[test]
+fn pictures_of_a_lens_that_distorts_make_a_mesh_and_so_does_a_model_of_colmap() {
+    let out = tempfile::tempdir().unwrap();
+    let with = |views: &str, more: &[&str]| {
+        let words = ["--views", views, "--hold-out", "2", "--steps", "20"];
+        run(out.path(), &[&words, more].concat())
+    };
+    let found = with(&lens(""), &["--colour"]).unwrap();
+    let iou = |found: &Value, name: &str| found[name].as_f64().unwrap();
+    assert!(iou(&found, "train_iou") > 0.95 && iou(&found, "held_out_iou") > 0.93, "{found}");
+    assert!(found["warnings"].to_string().contains("the lens distorts the pictures"), "{found}");
+    // All of the fox has one colour, and the wall is left out.
+    assert!(found["held_out_psnr"].as_f64().unwrap() > 20.0, "{found}");
+    let model = with(&lens("sparse/0"), &[]).unwrap();
+    for name in ["train_iou", "held_out_iou"] {
+        assert!((iou(&found, name) - iou(&model, name)).abs() < 0.01, "{name}: {model}");
+    }
+    // What is no mask is refused, and what is missing is named.
+    let error = with(&lens(""), &["--masks", &lens("images")]).unwrap_err();
+    assert!(error.contains("looks like a photograph") && error.contains("--masks"), "{error}");
+    let error = with(&lens(""), &["--masks", out.path().to_str().unwrap()]).unwrap_err();
+    assert!(error.contains("frame 0 (images/00.png): no mask in"), "{error}");
+    let error = with(out.path().to_str().unwrap(), &[]).unwrap_err();
+    assert!(error.contains("there are no cameras") && error.contains("COLMAP"), "{error}");
+}
+
 #[test]
 fn a_sphere_becomes_the_fox_without_a_hull() {
     let out = tempfile::tempdir().unwrap();
@@ -211,7 +242,7 @@ fn bad_views_are_one_line_that_names_file_and_frame() {
             Box::new(frame(|f| f["transform_matrix"][0][0] = json!(9.0))),
             &["frame 3", "no rotation"],
         ),
-        (Box::new(frame(|f| f["k1"] = json!(0.1))), &["frame 3", "k1", "undistort"]),
+        (Box::new(frame(|f| f["camera_model"] = json!("FOV"))), &["frame 3", "FOV", "undistort"]),
         (Box::new(frame(|f| f["w"] = json!(7))), &["frame 3", "7 x 90", "120 x 90"]),
         (Box::new(|c: &mut Value| c["frames"] = json!([])), &["no frame"]),
         (

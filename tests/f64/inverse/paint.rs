@@ -39,7 +39,14 @@ fn seen(mesh: &Mesh, camera: Pinhole, opaque: bool) -> PaintedView {
     let colours = [red, green, blue].map(straight);
     let mask = picture(covered.clone());
     let opacity = if opaque { picture(vec![1.0; covered.len()]) } else { mask.clone() };
-    let view = View { name: "ball".into(), picture: "none".into(), mask, camera, off: 0.0 };
+    let view = View {
+        name: "ball".into(),
+        picture: "none".into(),
+        mask,
+        camera,
+        distortion: None,
+        off: 0.0,
+    };
     PaintedView::new(view, colours, &opacity)
 }
 

@@ -16,19 +16,25 @@ pub(super) fn find(png: &[u8], kind: [u8; 4]) -> Option<&[u8]> {
     all(png).find(|(found, _)| *found == kind).map(|(_, content)| content)
 }
 
-/// An error if the palette that pixels refer to is none: the decoder counts on one.
-pub(super) fn check_palette(png: &[u8]) -> anyhow::Result<()> {
+/// The palette, where pixels are numbers of its entries.
+///
+/// # Errors
+///
+/// If it is none: the decoder counts on one.
+pub(super) fn palette(png: &[u8]) -> anyhow::Result<Option<Vec<[u8; ENTRY]>>> {
     let head = find(png, *b"IHDR");
     let paletted = head.and_then(|head| head.get(COLOUR_TYPE)) == Some(&PALETTED);
+    let mut first = None;
     for (_, palette) in all(png).filter(|(kind, _)| paletted && kind == b"PLTE") {
-        let entries = palette.len() / ENTRY;
+        let (entries, rest) = palette.as_chunks();
         ensure!(
-            palette.len().is_multiple_of(ENTRY) && (1..=MOST_ENTRIES).contains(&entries),
+            rest.is_empty() && (1..=MOST_ENTRIES).contains(&entries.len()),
             "its palette has {} bytes: a palette has 3 for each of 1 to {MOST_ENTRIES} colours",
             palette.len()
         );
+        first.get_or_insert_with(|| entries.to_vec());
     }
-    Ok(())
+    Ok(first)
 }
 
 /// Kinds and contents of all chunks up to the first that is cut off.

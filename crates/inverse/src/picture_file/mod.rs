@@ -31,6 +31,8 @@ const LONGEST_SIDE: u32 = 65_535;
 pub struct PictureFile {
     image: DynamicImage,
     orientation: Orientation,
+    /// Colours of the classes, where pixels of the file are numbers of them.
+    palette: Option<Vec<[u8; 3]>>,
 }
 
 /// Red, green, blue and opacity of a pixel, from 0 to 1.
@@ -81,6 +83,25 @@ impl PictureFile {
             let pixel = y as usize * size.width + x as usize;
             image::Rgb([0, 1, 2].map(|k| byte(planes[k][pixel])))
         })
+    }
+
+    /// The class of a pixel: its number in the palette, or where there is none its level as a whole number.
+    pub(crate) fn class_of(&self, [red, green, blue, _]: Pixel) -> Option<u32> {
+        let most = match &self.image {
+            DynamicImage::ImageLuma16(_)
+            | DynamicImage::ImageLumaA16(_)
+            | DynamicImage::ImageRgb16(_)
+            | DynamicImage::ImageRgba16(_) => f32::from(u16::MAX),
+            _ => f32::from(u8::MAX),
+        };
+        let colour = [red, green, blue].map(|x| (x * most).round() as u32);
+        match &self.palette {
+            Some(palette) => {
+                let number = palette.iter().position(|entry| entry.map(u32::from) == colour);
+                number.map(|number| number as u32)
+            }
+            None => (colour[0] == colour[1] && colour[1] == colour[2]).then_some(colour[0]),
+        }
     }
 
     /// Whether all pixels are opaque.
@@ -171,9 +192,10 @@ fn decoded(bytes: &[u8]) -> anyhow::Result<PictureFile> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
     let format = reader.format();
     let format = format.context("it is no picture that can be read: PNG, JPEG and GIF are")?;
-    if format == ImageFormat::Png {
-        chunks::check_palette(bytes)?;
-    }
+    let palette = match format {
+        ImageFormat::Png => chunks::palette(bytes)?,
+        _ => None,
+    };
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(MOST_DECODED);
     reader.limits(limits);
@@ -195,5 +217,5 @@ fn decoded(bytes: &[u8]) -> anyhow::Result<PictureFile> {
     };
     let orientation = orientation.map_or_else(Orientation::default, |exif| Orientation::of(&exif));
     let image = DynamicImage::from_decoder(decoder).with_context(broken)?;
-    Ok(PictureFile { image, orientation })
+    Ok(PictureFile { image, orientation, palette })
 }

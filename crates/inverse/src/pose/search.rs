@@ -60,6 +60,11 @@ impl Stages {
     }
 }
 
+/// Poses whose focal length is optimised, the factors from which each begins, and the least depth of the middle of the mesh, in its radii.
+const ZOOMED: usize = 3;
+const ZOOMS: [f64; 3] = [0.65, 1.0, 1.5];
+const NEAREST: f64 = 1.2;
+
 /// How poses are looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseSearch {
@@ -69,7 +74,7 @@ pub struct PoseSearch {
     pub fine_size: usize,
     /// Learning rate on few pixels, in radians; on many it is a third of that.
     pub learning_rate: f64,
-    /// Whether the focal length is optimised too.
+    /// Whether the focal length is optimised too, once poses have been found with the one that is given: of both the better is taken.
     pub optimise_fov: bool,
 }
 
@@ -101,8 +106,8 @@ impl PoseSearch {
     /// Steps that [`PoseSearch::run`] takes for a mask from a start, or from anywhere.
     pub fn steps(&self, mask: &Picture, started: bool) -> usize {
         let Stages { coarse, last, .. } = Stages::of(!cut_sides(mask).is_empty());
-        let fine = if last > 0 { 2 * self.fine_steps } else { self.fine_steps };
-        fine + if started { 0 } else { STARTS.1 + coarse.1 }
+        let fine = 1 + usize::from(last > 0) + usize::from(self.optimise_fov);
+        fine * self.fine_steps + if started { 0 } else { STARTS.1 + coarse.1 }
     }
 
     /// What [`PoseSearch::run`] would refuse at once.
@@ -185,21 +190,29 @@ impl PoseSearch {
         Self::check(mesh, target.mask, camera, started)?;
         let frame = Frame::of_mesh(mesh);
         let (mesh, camera) = (&frame.mesh(mesh), frame.camera(camera));
+        let fixed = Self { optimise_fov: false, ..*self };
         let starts = match started {
             true => vec![camera],
-            false => self.promising_starts::<B>(mesh, target, &camera, method, visit)?,
+            false => fixed.promising_starts::<B>(mesh, target, &camera, method, visit)?,
         };
         let Stages { coarse: (_, coarse_steps), last, .. } = Stages::of(target.cut);
         let mut begun = if started { 0 } else { STARTS.1 + coarse_steps };
         let (poses, fine) = (target.poses(starts, true), self.fine());
-        let mut found = self.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+        let mut found = fixed.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
         if last > 0 {
             begun += self.fine_steps;
             found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
             let best = found.drain(..last.min(found.len())).map(|(camera, _)| camera);
             let poses = target.poses(best.collect::<Vec<_>>(), true);
-            let better = self.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
+            let better = fixed.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
             found.extend(better);
+        }
+        if self.optimise_fov {
+            begun += self.fine_steps;
+            found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+            let best = found.iter().take(ZOOMED).flat_map(|(camera, _)| zoomed(camera));
+            let poses = target.poses(best.collect::<Vec<_>>(), true);
+            found.extend(self.improved::<B>(mesh, poses, method, &fine, begun, visit)?);
         }
         let scored = found.into_iter().map(|(camera, loss)| {
             let iou = mask_iou(&silhouette_pixels(mesh, &camera), target.mask);
@@ -319,6 +332,18 @@ impl PoseSearch {
         })?;
         Ok(best.into_iter().flatten().collect())
     }
+}
+
+/// The camera of a frame of the mesh with other focal lengths, from where the middle of the mesh looks as large.
+fn zoomed(camera: &Pinhole) -> impl Iterator<Item = Pinhole> {
+    let [x, y, depth] = camera.translation;
+    let zooms = ZOOMS.into_iter().filter(move |zoom| zoom * depth > NEAREST);
+    let camera = *camera;
+    zooms.map(move |zoom| Pinhole {
+        focal: camera.focal.map(|focal| zoom * focal),
+        translation: [x, y, zoom * depth],
+        ..camera
+    })
 }
 
 /// A mesh without what cannot be told on few pixels.

@@ -3,8 +3,8 @@
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage};
 use serde_json::json;
 use softrast_inverse::{
-    Lens, MaskRules, Picture, PictureFile, PoseFile, ScheduledSoftness, SoftnessFileError,
-    Transforms,
+    CameraFile, Lens, MaskRules, Picture, PictureFile, PoseFile, ScheduledSoftness,
+    SoftnessFileError,
 };
 
 /// A reader under test. The names of files that were found begin with the `name`.
@@ -26,10 +26,15 @@ pub(crate) fn all() -> Vec<Kind> {
             seeds: lenses,
             read: |bytes| {
                 let read =
-                    Lens::parse(bytes, "a.json").and_then(|lens| lens.pinhole([90, 120].into()));
-                if let Some(camera) = checked(read) {
+                    Lens::parse(bytes, "a.json").and_then(|lens| lens.camera([90, 120].into()));
+                if let Some((camera, distortion)) = checked(read) {
                     let numbers = camera.focal.iter().chain(&camera.centre);
                     assert!(numbers.copied().all(f64::is_finite), "{camera:?}");
+                    if let Some(distortion) = distortion {
+                        let levels = (0..90 * 120).map(|k| (k % 7) as f32 / 7.0).collect();
+                        let picture = Picture::new(levels, 120).undistorted(&camera, &distortion);
+                        assert!(picture.pixels().iter().all(|x| (0.0..1.0).contains(x)));
+                    }
                 }
             },
         },
@@ -49,9 +54,10 @@ pub(crate) fn all() -> Vec<Kind> {
             ending: "json",
             seeds: transforms,
             read: |bytes| {
-                checked(Transforms::parse(bytes, "a.json"));
+                checked(CameraFile::parse(bytes, "a.json"));
             },
         },
+        Kind { name: "colmap", ending: "bin", seeds: models, read: model },
         Kind { name: "softness", ending: "json", seeds: softnesses, read: softness },
     ]
 }
@@ -70,7 +76,9 @@ fn checked<T>(read: anyhow::Result<T>) -> Option<T> {
 fn picture(bytes: &[u8]) {
     let Some(file) = checked(PictureFile::decode(bytes)) else { return };
     assert!(file.size().pixels() > 0);
-    for rules in [MaskRules::default(), MaskRules { invert: true, threshold: Some(0.5) }] {
+    let inverted = MaskRules { invert: true, threshold: Some(0.5), label: None };
+    let class = MaskRules { label: Some(1), ..MaskRules::default() };
+    for rules in [MaskRules::default(), inverted, class] {
         if let Some(mask) = checked(Picture::mask_of(&file, &rules)) {
             assert!(mask.size().pixels() > 0);
         }
@@ -155,6 +163,8 @@ fn lenses() -> Vec<Vec<u8>> {
         json!({ "K": [[90.0, 0.0, 60.0], [0.0, 90.0, 45.0], [0.0, 0.0, 1.0]] }),
         json!({ "camera_angle_x": 0.7 }),
         json!({ "camera": { "fl_x": 90.0, "k1": 0.0 } }),
+        json!({ "fx": 90.0, "k1": -0.2, "k2": 0.1, "p1": 0.01, "camera_model": "OPENCV" }),
+        json!({ "fx": 90.0, "distortion": [0.1, 0.0, 0.0, 0.01], "is_fisheye": true }),
     ])
 }
 
@@ -173,6 +183,57 @@ fn transforms() -> Vec<Vec<u8>> {
         json!({ "camera_angle_x": 0.7, "frames": [frame("./images/r_0"), frame("b.png")] }),
         json!({ "fl_x": 90.0, "w": 120, "h": 90, "frames": [frame("images\\0001.png")] }),
     ])
+}
+
+/// Both files of a model of COLMAP, one behind the other: the cameras end with a line that says so.
+const PARTED: &[u8] = b"\n#parted#\n";
+
+fn models() -> Vec<Vec<u8>> {
+    let texts = [
+        &b"# cameras\n1 OPENCV 120 90 90 91 60 45 -0.1 0.02 0.001 0\n2 PINHOLE 120 90 90 91 60 45\n"[..],
+        b"# images\n1 0.8 0.6 0 0 1 2 3 1 a.png\n1 2 -1\n2 1 0 0 0 0 0 4 2 b c.png\n\n",
+    ];
+    let numbers =
+        |numbers: &[f64]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let cameras = [
+        &1u64.to_le_bytes()[..],
+        &[1, 0, 0, 0, 2, 0, 0, 0],
+        &120u64.to_le_bytes(),
+        &90u64.to_le_bytes(),
+        &numbers(&[90.0, 60.0, 45.0, 0.1]),
+    ]
+    .concat();
+    let images = [
+        &1u64.to_le_bytes()[..],
+        &[1, 0, 0, 0],
+        &numbers(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0]),
+        &[1, 0, 0, 0],
+        b"a.png\0",
+        &1u64.to_le_bytes(),
+        &[0; 24],
+    ]
+    .concat();
+    vec![texts.join(PARTED), [cameras, images].join(PARTED)]
+}
+
+/// Reads both files from a folder, as text and as binary.
+fn model(bytes: &[u8]) {
+    let at = bytes.windows(PARTED.len()).position(|part| part == PARTED);
+    let (cameras, images) = bytes.split_at(at.unwrap_or(bytes.len()));
+    let images = images.get(PARTED.len()..).unwrap_or_default();
+    for ending in ["txt", "bin"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, content) in [("cameras", cameras), ("images", images)] {
+            let path = folder.path().join(format!("{name}.{ending}"));
+            std::fs::write(path, content).expect("a file");
+        }
+        // The folder has another name each time.
+        let name = folder.path().display().to_string();
+        checked(
+            CameraFile::load(&folder)
+                .map_err(|error| anyhow::anyhow!(format!("{error:#}").replace(&name, ""))),
+        );
+    }
 }
 
 fn softnesses() -> Vec<Vec<u8>> {

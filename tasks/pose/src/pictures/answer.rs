@@ -6,8 +6,8 @@ use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, seen_by};
 use softrast_inverse::{
-    Frame, PaintedView, Picture, camera_json, coloured_pixels, cut_sides, pose::FoundPose,
-    silhouette_pixels,
+    Distortion, Frame, PaintedView, Picture, camera_json, coloured_pixels, cut_sides,
+    pose::FoundPose, silhouette_pixels,
 };
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
@@ -35,6 +35,8 @@ pub(super) struct Framed {
 pub(super) struct Solved {
     pub(super) path: PathBuf,
     pub(super) mask: Picture,
+    /// How the lens distorted it, if it did.
+    pub(super) distortion: Option<Distortion>,
     /// Its colours, where they count.
     pub(super) painted: Option<PaintedView>,
     pub(super) poses: Vec<FoundPose>,
@@ -42,9 +44,10 @@ pub(super) struct Solved {
 }
 
 impl Solved {
-    /// A pose with the camera of the picture in its file, which may have more pixels than the mask.
-    fn of_file(&self, pose: &FoundPose) -> FoundPose {
-        FoundPose { camera: self.mask.whole_camera(&pose.camera), ..*pose }
+    /// A pose with the camera of the picture in its file, which may have more pixels than the mask, for the mesh as it is in its file.
+    fn of_file(&self, frame: &Frame, pose: &FoundPose) -> FoundPose {
+        let camera = frame.camera_to_world(&self.mask.whole_camera(&pose.camera));
+        FoundPose { camera, ..*pose }
     }
 }
 
@@ -58,16 +61,16 @@ pub(super) fn answer(
 ) -> anyhow::Result<Answer> {
     let overlays: Vec<RgbImage> =
         solved.iter().map(|one| drawn(&mesh.mesh, one, &one.poses[0])).collect();
-    let page = page(&mesh.mesh, solved, &overlays, &warnings, single)?;
+    let page = page(mesh, solved, &overlays, &warnings, single)?;
     let mut files = Vec::new();
     for (name, overlay) in names.iter().zip(&overlays) {
         files.push((name.clone(), png(overlay)?));
     }
     if !single {
-        files.push((POSES.to_owned(), csv(solved).into_bytes()));
+        files.push((POSES.to_owned(), csv(&mesh.frame, solved).into_bytes()));
     }
     let json = json(mesh, solved, &warnings, single);
-    let output = Output { text: text(&mesh.name, solved, single), json, warnings, partial: None };
+    let output = Output { text: text(mesh, solved, single), json, warnings, partial: None };
     let beside = if single {
         "result.json holds the camera and the alternatives, overlay.png the picture"
     } else {
@@ -97,7 +100,7 @@ pub(super) fn overlay_names(pictures: &[PathBuf], single: bool) -> Vec<String> {
 }
 
 fn page(
-    mesh: &Mesh,
+    Framed { mesh, frame, .. }: &Framed,
     solved: &[Solved],
     overlays: &[RgbImage],
     warnings: &[String],
@@ -126,7 +129,7 @@ fn page(
                 "The colours of the picture that count, over black, and the mesh in its own colours at the answer.",
             );
         }
-        page.table(&of_camera(&one.of_file(&poses[0])));
+        page.table(&of_camera(&one.of_file(frame, &poses[0])));
         if poses.len() > 1 {
             let others = poses[1..].iter().map(|pose| for_page(drawn(mesh, one, pose)));
             let others: Vec<RgbImage> = others.collect();
@@ -155,19 +158,18 @@ fn page(
         page.table(&table);
     }
     page.note(
-        "R and t are as OpenCV has them: a point p is seen at R p + t, with x right, y down and z ahead. They belong to the mesh as it \
-         was taken: centred and with its longest side 2, or with --raw as it stands. result.json also has them for the mesh as it is in \
-         its file (camera_in_file).",
+        "R and t are for the mesh as it is in its file, as OpenCV has them: a point p is seen at R p + t, with x right, y down and z ahead. \
+         result.json also has them as nerfstudio (transform_matrix) and COLMAP (colmap) write them.",
     );
     Ok(page)
 }
 
 fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> Value {
     let Framed { name, frame, .. } = mesh;
-    let posed = |pose: &FoundPose| {
+    let posed = |one: &Solved, pose: &FoundPose| {
         json!({
-            "camera": camera_json(&pose.camera),
-            "camera_in_file": camera_json(&frame.camera_to_world(&pose.camera)),
+            "camera": camera_json(&one.of_file(frame, pose).camera),
+            "camera_normalized": camera_json(&one.mask.whole_camera(&pose.camera)),
             "iou": pose.iou,
             "psnr": pose.psnr,
         })
@@ -175,10 +177,13 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
     let mut results: Vec<Value> = Vec::new();
     for one in solved {
         let Solved { path, mask, poses, seconds, .. } = one;
-        let mut result = posed(&one.of_file(&poses[0]));
+        let mut result = posed(one, &poses[0]);
         result["target"] = shown(path).into();
-        result["alternatives"] = poses[1..].iter().map(|pose| posed(&one.of_file(pose))).collect();
+        result["alternatives"] = poses[1..].iter().map(|pose| posed(one, pose)).collect();
         result["cut_sides"] = json!(cut_sides(mask));
+        if let Some(distortion) = &one.distortion {
+            result["undistorted"] = distortion.json();
+        }
         result["seconds"] = json!(seconds);
         results.push(result);
     }
@@ -232,11 +237,11 @@ fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
     })
 }
 
-fn text(mesh_name: &str, solved: &[Solved], single: bool) -> Vec<String> {
-    let mut text = vec![format!("pose of {mesh_name} from {}", counted(solved.len(), "picture"))];
+fn text(Framed { name, frame, .. }: &Framed, solved: &[Solved], single: bool) -> Vec<String> {
+    let mut text = vec![format!("pose of {name} from {}", counted(solved.len(), "picture"))];
     for one in solved {
         let Solved { path, poses, seconds, .. } = one;
-        let FoundPose { camera, iou, psnr } = &one.of_file(&poses[0]);
+        let FoundPose { camera, iou, psnr } = &one.of_file(frame, &poses[0]);
         let decibels = psnr.map_or_else(String::new, |psnr| format!(", colours {psnr:.1} dB"));
         if !single {
             text.push(line(
@@ -271,13 +276,13 @@ fn text(mesh_name: &str, solved: &[Solved], single: bool) -> Vec<String> {
     text
 }
 
-fn csv(solved: &[Solved]) -> String {
+fn csv(frame: &Frame, solved: &[Solved]) -> String {
     let head = "picture,rank,iou,r11,r12,r13,r21,r22,r23,r31,r32,r33,t1,t2,t3,fx,fy,cx,cy,psnr\n"
         .to_owned();
     solved.iter().fold(head, |text, one| {
         let name = one.path.display().to_string().replace('"', "\"\"");
         one.poses.iter().enumerate().fold(text, |text, (rank, pose)| {
-            let FoundPose { camera, iou, psnr } = &one.of_file(pose);
+            let FoundPose { camera, iou, psnr } = &one.of_file(frame, pose);
             let Pinhole { rotation, translation, focal, centre, .. } = camera;
             let numbers = [&[*iou], rotation.as_flattened(), translation, focal, centre].concat();
             let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();

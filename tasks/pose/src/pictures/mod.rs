@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given, MaskFlags, Variant};
 use softrast_inverse::{
-    Lens, PaintedView, PoseFile, View, cut_sides, faces_across_note, pose::PoseSearch,
+    CameraFile, Lens, PaintedView, PoseFile, View, cut_sides, faces_across_note, pose::PoseSearch,
     reading_notes,
 };
 use softrast_lab::Error;
@@ -22,19 +22,19 @@ const ASSUMED_FOV_DEG: f64 = 45.0;
 /// A picture and the camera that took it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Pictures {
-    /// Mask of the object: the transparency of a picture, or its luminance if all of it is opaque. With --colour the colours count too
+    /// Picture of the object. Its mask is what --masks or --camera names, or its transparency, or its luminance if all of it is opaque. With --colour the colours count too
     #[arg(long, value_name = "PICTURE")]
     pub target: Option<PathBuf>,
 
-    /// Folder of such masks, taken with one camera; a table of all is written
+    /// Folder of such pictures; a table of all is written
     #[arg(long, value_name = "DIR", conflicts_with = "target")]
     pub targets: Option<PathBuf>,
 
-    /// Camera: JSON with fx, fy, cx, cy, width and height, or K, or a transforms.json [default: 45 degrees are assumed]
-    #[arg(long, value_name = "FILE.json")]
+    /// Camera: JSON with fx, fy, cx, cy, width and height, or K. Or cameras of many pictures, where that of the picture is found by its name: transforms.json, or a folder with that or a model of COLMAP [default: 45 degrees are assumed]
+    #[arg(long, value_name = "PATH")]
     pub camera: Option<PathBuf>,
 
-    /// Where to start instead of everywhere: JSON with R and t, `transform_matrix`, or a result of this program
+    /// Where to start instead of everywhere, for the mesh as it is in its file: JSON with R and t, `transform_matrix`, or a result of this program
     #[arg(long, value_name = "FILE.json", requires = "target")]
     pub start: Option<PathBuf>,
 
@@ -56,7 +56,7 @@ impl Pictures {
         }
         let Some(folder) = &self.targets else {
             return Err(Error::usage(
-                "--camera, --start, --invert and --threshold are about a picture: name it with --target, or a folder with --targets",
+                "--camera, --start, --masks, --invert, --threshold and --label are about a picture: name it with --target, or a folder with --targets",
             ));
         };
         let read = || format!("cannot read the folder {}", folder.display());
@@ -87,7 +87,7 @@ pub(crate) fn solve_pictures(
 ) -> anyhow::Result<Answer> {
     let args = given.args;
     refuse_flags_of_seeds(given)?;
-    let (mesh, mesh_name, frame) = mesh(args)?;
+    let (mesh, _, frame) = mesh(args)?;
     if args.colour {
         coloured(args, &mesh)?;
     }
@@ -96,26 +96,40 @@ pub(crate) fn solve_pictures(
     search.learning_rate = given.learning_rate().unwrap_or(search.learning_rate);
     search.fine_size = given.common.size.unwrap_or(search.fine_size);
     search.fine_steps = given.common.steps.unwrap_or(search.fine_steps);
-    let lens = pictures.camera.as_ref().map(Lens::load).transpose()?;
+    let cameras = pictures.camera.as_ref().map(CameraFile::load).transpose()?;
     let start = pictures.start.as_ref().map(PoseFile::load).transpose()?;
     let paths = pictures.paths()?;
     // What would fail in the middle fails at once.
     let mut tasks = Vec::new();
+    let mut reads = cameras.as_ref().map_or(Vec::new(), |cameras| cameras.files().to_vec());
     for path in paths {
-        let mask = pictures.masks.load(&path)?;
+        let named = || cameras.as_ref().and_then(|cameras| cameras.mask_of(&path));
+        let mask_path = pictures.masks.of(&path)?.or_else(named).unwrap_or_else(|| path.clone());
+        let mask = pictures.masks.load(&mask_path)?;
         let size = mask.whole_size();
-        let lens = lens.clone().unwrap_or_else(|| Lens::of_fov(ASSUMED_FOV_DEG, size));
-        let mut camera = lens.pinhole(size).with_context(|| {
-            let camera = pictures.camera.as_deref().unwrap_or(Path::new("the camera"));
-            format!("{} with {}", camera.display(), path.display())
-        })?;
+        let taken = match &cameras {
+            Some(cameras) => cameras.lens_of(&path),
+            None => Ok(Lens::of_fov(ASSUMED_FOV_DEG, size)),
+        };
+        let (mut camera, distortion) =
+            taken.and_then(|lens| lens.camera(size)).with_context(|| {
+                let camera = pictures.camera.as_deref().unwrap_or(Path::new("the camera"));
+                format!("{} with {}", camera.display(), path.display())
+            })?;
         if let Some(start) = &start {
             (camera.rotation, camera.translation) = (start.rotation, start.translation);
+            camera = frame.camera(&camera);
         }
         let camera = mask.camera(&camera);
+        let mask = match &distortion {
+            Some(distortion) => mask.undistorted(&camera, distortion),
+            None => mask,
+        };
         PoseSearch::check(&mesh, &mask, &camera, start.is_some())
             .with_context(|| path.display().to_string())?;
-        let view = View { name: path.display().to_string(), picture: path, mask, camera, off: 0.0 };
+        reads.push(mask_path);
+        let name = path.display().to_string();
+        let view = View { name, picture: path, mask, camera, distortion, off: 0.0 };
         let painted = args.colour.then(|| PaintedView::load(&view)).transpose()?;
         tasks.push((view, painted));
     }
@@ -126,7 +140,8 @@ pub(crate) fn solve_pictures(
     let paths: Vec<PathBuf> = tasks.iter().map(|(view, _)| view.picture.clone()).collect();
     let overlays = overlay_names(&paths, single);
     let poses = (!single).then_some(POSES);
-    given.will_write(overlays.iter().map(String::as_str).chain(poses), paths)?;
+    reads.extend(paths);
+    given.will_write(overlays.iter().map(String::as_str).chain(poses), reads)?;
     let steps = |(view, _): &(View, _)| search.steps(&view.mask, start.is_some());
     let mut progress = given.progress(tasks.iter().map(steps).sum())?;
     let (mut solved, mut begun) = (Vec::new(), 0);
@@ -135,20 +150,23 @@ pub(crate) fn solve_pictures(
         let (before, (view, painted)) = (begun, task);
         begun += search.steps(&view.mask, start.is_some());
         let visit = |step: usize, loss: f64| progress.step(before + step, loss);
-        let (View { name, picture: path, mask, camera, .. }, started) = (view, start.is_some());
+        let (View { name, picture: path, mask, camera, distortion, .. }, started) =
+            (view, start.is_some());
         let poses = on_backend!(backend, B => match &painted {
             Some(view) => search.run_by_colour::<B>(&mesh, view, started, &method, visit),
             None => search.run::<B>(&mesh, &mask, &camera, started, &method, visit),
         });
         let poses = poses.context(name)?;
-        solved.push(Solved { path, mask, painted, poses, seconds: clock.elapsed().as_secs_f64() });
+        let seconds = clock.elapsed().as_secs_f64();
+        solved.push(Solved { path, mask, distortion, painted, poses, seconds });
     }
     progress.finish();
     let best = solved.iter().map(|one| (one.path.display(), one.poses[0].camera));
     let across = faces_across_note(&mesh, best, NEAR);
-    let mut warnings = warnings(lens.is_some(), args.optimise_fov, &solved);
+    let mut warnings = warnings(cameras.is_some(), args.optimise_fov, &solved);
     warnings.extend(notes.into_iter().chain(across));
-    let mesh = Framed { mesh, name: mesh_name, frame };
+    let name = args.mesh.as_ref().map_or("fox".to_owned(), |path| path.display().to_string());
+    let mesh = Framed { mesh, name, frame };
     answer(&mesh, &solved, &overlays, warnings, single)
 }
 

@@ -4,7 +4,7 @@ use anyhow::ensure;
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
-    Method, PaintedView, ScheduledSoftness, SolveConfig, View, baked, load_views, mask_iou,
+    CameraFile, Method, PaintedView, ScheduledSoftness, SolveConfig, View, baked, mask_iou,
     minimize, reading_notes, silhouette_pixels,
 };
 use softrast_lab::{Error, Progress, format::counted};
@@ -56,7 +56,7 @@ const RESTART_ABOVE: f64 = 0.995;
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Views {
-    /// Folder with transforms.json, as instant-ngp and nerfstudio write it, and masks: transparency, or luminance where all is opaque
+    /// Folder with pictures and their cameras: transforms.json (instant-ngp, nerfstudio), a model of COLMAP (also in sparse/0 or colmap), or transforms_train.json. Masks are transparency, files that it names, or those of --masks
     #[arg(long, value_name = "DIR")]
     pub views: Option<PathBuf>,
 
@@ -103,7 +103,7 @@ pub(crate) fn solve_views(
     }
     if flags.views.is_none() && flags.masks.asked() {
         return Some(Err(Error::usage(
-            "--invert and --threshold are about pictures: name a folder of them with --views",
+            "--masks, --invert, --threshold and --label are about pictures: name a folder of them with --views",
         )));
     }
     flags.views.as_ref().map(|folder| solved(given, flags, folder))
@@ -128,8 +128,9 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
             "--detail is about a sphere: with --views it goes with --start sphere",
         ));
     }
-    let reads = RefCell::new(vec![folder.join("transforms.json")]);
-    let all = load_views(folder, |path| {
+    let cameras = CameraFile::load(folder)?;
+    let reads = RefCell::new(cameras.files().to_vec());
+    let all = cameras.views(flags.masks.masks.as_deref(), |path| {
         reads.borrow_mut().push(path.to_owned());
         flags.masks.load(path)
     })?;

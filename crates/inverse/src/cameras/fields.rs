@@ -37,7 +37,7 @@ const LARGEST_FILE: u64 = 1 << 25;
 const FARTHEST: f64 = 1e15;
 
 /// The content of a camera file, with its path as its name.
-pub(crate) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
+pub(super) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
     let name = path.display().to_string();
     let bytes = read_bounded(path, LARGEST_FILE)
         .with_context(|| format!("cannot read the camera file {name}"))?;
@@ -45,7 +45,7 @@ pub(crate) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
 }
 
 /// The content of the camera file `name` as JSON.
-pub(crate) fn json(bytes: &[u8], name: &str) -> anyhow::Result<Value> {
+pub(super) fn json(bytes: &[u8], name: &str) -> anyhow::Result<Value> {
     let text = text(bytes).with_context(|| name.to_owned())?;
     let file: Value = serde_json::from_str(&text).map_err(|error| match not_finite(&text) {
         Some(place) => {
@@ -74,7 +74,7 @@ fn text(bytes: &[u8]) -> anyhow::Result<Cow<'_, str>> {
 }
 
 /// An error if t is no place that can be drawn from.
-pub(crate) fn check_place(translation: [f64; 3]) -> anyhow::Result<()> {
+pub(super) fn check_place(translation: [f64; 3]) -> anyhow::Result<()> {
     let near = translation.iter().all(|x| x.abs() <= FARTHEST);
     ensure!(
         near,
@@ -84,7 +84,7 @@ pub(crate) fn check_place(translation: [f64; 3]) -> anyhow::Result<()> {
 }
 
 /// The fields of an object as a type, or the first that has another one.
-pub(crate) fn typed<T: DeserializeOwned>(object: &Value) -> anyhow::Result<T> {
+pub(super) fn typed<T: DeserializeOwned>(object: &Value) -> anyhow::Result<T> {
     for name in NUMBERS {
         let value = &object[name];
         if !(value.is_null() || value.is_number()) {

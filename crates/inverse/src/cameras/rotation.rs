@@ -46,6 +46,48 @@ pub(crate) fn nearest(r: [[f64; 3]; 3]) -> anyhow::Result<([[f64; 3]; 3], f64)> 
     Ok((polar, off))
 }
 
+/// The rotation of a quaternion `w + x i + y j + z k` of any length but 0.
+///
+/// # Errors
+///
+/// If it has no direction.
+pub(crate) fn of_quaternion(quaternion: [f64; 4]) -> anyhow::Result<[[f64; 3]; 3]> {
+    let length = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
+    ensure!(
+        length.is_normal() && length.recip().is_normal(),
+        "the quaternion {quaternion:?} has no direction"
+    );
+    let [w, x, y, z] = quaternion.map(|number| number / length);
+    Ok([
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ])
+}
+
+/// The quaternion `w + x i + y j + z k` of a rotation, of length 1 and with w at least 0.
+pub(super) fn to_quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
+    // Four times the squares of the parts: the largest is far from 0, and the others follow from sums and differences beside the diagonal.
+    let trace = r[0][0] + r[1][1] + r[2][2];
+    let squares = [
+        1.0 + trace,
+        1.0 - trace + 2.0 * r[0][0],
+        1.0 - trace + 2.0 * r[1][1],
+        1.0 - trace + 2.0 * r[2][2],
+    ];
+    let largest = (1..4).fold(0, |best, k| if squares[k] > squares[best] { k } else { best });
+    let [x, y, z] = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]];
+    let [xy, xz, yz] = [r[0][1] + r[1][0], r[0][2] + r[2][0], r[1][2] + r[2][1]];
+    let products = match largest {
+        0 => [squares[0], x, y, z],
+        1 => [x, squares[1], xy, xz],
+        2 => [y, xy, squares[2], yz],
+        _ => [z, xz, yz, squares[3]],
+    };
+    let length = products.iter().map(|x| x * x).sum::<f64>().sqrt();
+    products.map(|x| if products[0] < 0.0 { -x } else { x } / length)
+}
+
 fn off(product: &[[f64; 3]; 3], diagonal: f64) -> f64 {
     let places = (0..9).map(|k| (k / 3, k % 3));
     let off = |(i, j): (usize, usize)| (product[i][j] - if i == j { diagonal } else { 0.0 }).abs();
@@ -76,6 +118,24 @@ mod tests {
     fn rotation(a: f64, b: f64) -> [[f64; 3]; 3] {
         let ((sa, ca), (sb, cb)) = (a.sin_cos(), b.sin_cos());
         [[ca, -sa * cb, sa * sb], [sa, ca * cb, -ca * sb], [0.0, sb, cb]]
+    }
+
+    #[test]
+    fn a_rotation_comes_back_from_its_quaternion() {
+        for k in 0..400 {
+            // Half turns about the axes among them.
+            let (a, b) = (
+                (k % 20) as f64 * 0.1 * std::f64::consts::PI,
+                (k / 20) as f64 * 0.1 * std::f64::consts::PI,
+            );
+            let r = rotation(a, b);
+            let quaternion = to_quaternion(&r);
+            let back = of_quaternion(quaternion).unwrap();
+            let pairs = back.as_flattened().iter().zip(r.as_flattened());
+            assert!(pairs.into_iter().all(|(x, y)| (x - y).abs() < 1e-12), "{quaternion:?}");
+            assert!(quaternion[0] >= 0.0);
+        }
+        assert_eq!(of_quaternion([0.0; 4]).unwrap_err().to_string().lines().count(), 1);
     }
 
     fn changed(r: [[f64; 3]; 3], change: impl Fn(f64) -> f64) -> [[f64; 3]; 3] {

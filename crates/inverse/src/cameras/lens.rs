@@ -5,14 +5,20 @@ use serde::Deserialize;
 use serde_json::Value;
 use softrast_raster::{ImageSize, Pinhole};
 
-use crate::camera_file::{json, read, typed};
+use super::{
+    Distortion,
+    fields::{json, read, typed},
+};
 
 /// Intrinsics of a camera as files have them.
 ///
 /// Focal lengths as `fl_x` and `fl_y`, as `fx` and `fy`, as the matrix `K`, or as the field of view `camera_angle_x` in radians; `cx` and
 /// `cy`, else those of `K`, else the middle; the size of its pictures as `w` and `h` or `width` and `height`. See [`Pinhole`] for what they
 /// mean.
-#[derive(Clone, Debug, Default, Deserialize)]
+///
+/// A lens may distort: `k1` to `k6`, `p1` and `p2` as OpenCV has them, or as its list `distortion_coefficients`; a fisheye has k1 to k4 and
+/// `is_fisheye`, or a `camera_model` that says so. Names of models are those of COLMAP.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Lens {
     #[serde(alias = "fx")]
     fl_x: Option<f64>,
@@ -30,19 +36,17 @@ pub struct Lens {
     h: Option<f64>,
     camera_model: Option<String>,
     #[serde(flatten)]
-    distortion: Distortion,
+    coefficients: Coefficients,
 }
 
-/// By name, or as the list that OpenCV returns.
-#[derive(Clone, Debug, Default, Deserialize)]
-struct Distortion {
-    #[serde(
-        alias = "dist",
-        alias = "dist_coeffs",
-        alias = "distortion_coefficients",
-        alias = "distortion_params"
-    )]
+/// By name, or as a list.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+struct Coefficients {
+    /// In the order of OpenCV: k1, k2, p1, p2, k3 to k6; those of a fisheye are k1 to k4.
+    #[serde(alias = "dist", alias = "dist_coeffs", alias = "distortion_coefficients")]
     distortion: Option<Value>,
+    /// In the order of nerfstudio: k1 to k4, p1, p2.
+    distortion_params: Option<Value>,
     is_fisheye: Option<bool>,
     k1: Option<f64>,
     k2: Option<f64>,
@@ -54,8 +58,22 @@ struct Distortion {
     p2: Option<f64>,
 }
 
-/// Models of cameras without distortion, or whose distortion is told by coefficients.
-const MODELS: [&str; 4] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL"];
+/// Names of coefficients in the order of OpenCV's list, and in that of nerfstudio's.
+const OPENCV: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
+const NERFSTUDIO: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
+/// Models of cameras that show straight what is straight but for their coefficients, and those of a fisheye.
+const STRAIGHT: [&str; 8] = [
+    "PINHOLE",
+    "SIMPLE_PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "OPENCV",
+    "FULL_OPENCV",
+    "BROWN",
+    "PERSPECTIVE",
+];
+const FISHEYES: [&str; 4] =
+    ["OPENCV_FISHEYE", "FISHEYE", "RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE"];
 /// Focal lengths against the shorter and the longer side of a picture: from a field of view of 179 degrees down to a thousandth of one.
 const FOCAL_LENGTHS: [f64; 2] = [0.01, 1e5];
 /// How far off the principal point may be, in longer sides: a picture may be a small part of a large one.
@@ -88,7 +106,7 @@ impl Lens {
     }
 
     /// What the fields of an object say.
-    pub(crate) fn of(object: &Value) -> anyhow::Result<Self> {
+    pub(super) fn of(object: &Value) -> anyhow::Result<Self> {
         typed(object)
     }
 
@@ -100,15 +118,16 @@ impl Lens {
         Self { fl_x: Some(focal), ..Self::default() }
     }
 
-    /// The camera with this lens for pictures of this size, at the origin, looking along z.
+    /// The camera with this lens for pictures of this size, at the origin, looking along z; and how the lens distorts them, if it does. It sees
+    /// what [`Picture::undistorted`](crate::Picture::undistorted) makes of them.
     ///
     /// # Errors
     ///
-    /// If it is for pictures of another size, contradicts itself, has a skew, a distortion or no focal length, or one that no picture of this
-    /// size is taken with.
-    pub fn pinhole(&self, size: ImageSize) -> anyhow::Result<Pinhole> {
+    /// If it is for pictures of another size, contradicts itself, has a skew or no focal length, one that no picture of this size is taken
+    /// with, or a model that is not known.
+    pub fn camera(&self, size: ImageSize) -> anyhow::Result<(Pinhole, Option<Distortion>)> {
         self.check_size(size)?;
-        self.check_distortion()?;
+        let distortion = self.coefficients.distortion(self.camera_model.as_deref())?;
         let pixels = [size.width as f64, size.height as f64];
         let centre = self.centre();
         let pinhole = Pinhole {
@@ -120,6 +139,21 @@ impl Lens {
         };
         pinhole.check()?;
         check_sense(&pinhole)?;
+        distortion.map_or(Ok(()), |distortion| distortion.check(&pinhole))?;
+        Ok((pinhole, distortion))
+    }
+
+    /// The camera with this lens for pictures that are not distorted; see [`Lens::camera`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Lens::camera`], and if the lens distorts.
+    pub fn pinhole(&self, size: ImageSize) -> anyhow::Result<Pinhole> {
+        let (pinhole, distortion) = self.camera(size)?;
+        ensure!(
+            distortion.is_none(),
+            "the lens distorts: take Lens::camera, and undistort the picture with Picture::undistorted"
+        );
         Ok(pinhole)
     }
 
@@ -184,45 +218,8 @@ impl Lens {
         Ok(())
     }
 
-    fn check_distortion(&self) -> anyhow::Result<()> {
-        let Distortion { distortion, is_fisheye, k1, k2, k3, k4, k5, k6, p1, p2 } =
-            &self.distortion;
-        let numbers = [
-            ("k1", k1),
-            ("k2", k2),
-            ("k3", k3),
-            ("k4", k4),
-            ("k5", k5),
-            ("k6", k6),
-            ("p1", p1),
-            ("p2", p2),
-        ];
-        let number =
-            numbers.into_iter().find_map(|(name, x)| Some((name, x.filter(|&x| x != 0.0)?)));
-        let told = match number {
-            Some((name, x)) => Some(format!("{name} = {x}")),
-            None => {
-                let listed = distortion.as_ref().and_then(not_zero);
-                listed.map(|value| format!("distortion = {value}"))
-            }
-        };
-        let fisheye = is_fisheye.unwrap_or(false).then(|| "is_fisheye".to_owned());
-        if let Some(told) = told.or(fisheye) {
-            bail!(
-                "the lens distorts ({told}), which is not supported: undistort the pictures first, as with colmap image_undistorter or \
-                 OpenCV's cv2.undistort"
-            );
-        }
-        if let Some(model) = self.camera_model.as_deref().filter(|model| !MODELS.contains(model)) {
-            bail!(
-                "the camera model {model} is not supported: undistort the pictures to PINHOLE first, as with colmap image_undistorter"
-            );
-        }
-        Ok(())
-    }
-
     /// The lens of a frame that says so much of its own.
-    pub(crate) fn with(&self, frame: &Self) -> Self {
+    pub(super) fn with(&self, frame: &Self) -> Self {
         // Focal lengths belong together, however they are told.
         let focal = if frame.angle_or_length().is_ok() { frame } else { self };
         let ([cx, cy], [own_cx, own_cy]) = (self.centre(), frame.centre());
@@ -232,7 +229,7 @@ impl Lens {
             w: frame.w.or(self.w),
             h: frame.h.or(self.h),
             camera_model: frame.camera_model.clone().or(self.camera_model.clone()),
-            distortion: frame.distortion.or(&self.distortion),
+            coefficients: frame.coefficients.or(&self.coefficients),
             ..focal.clone()
         }
     }
@@ -258,10 +255,63 @@ fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
     Ok(())
 }
 
-impl Distortion {
+impl Coefficients {
+    /// What they and the name of a model say; None if nothing is distorted.
+    fn distortion(&self, model: Option<&str>) -> anyhow::Result<Option<Distortion>> {
+        let model = model.unwrap_or("OPENCV").to_ascii_uppercase();
+        let fisheye = self.is_fisheye.unwrap_or(false) || FISHEYES.contains(&&*model);
+        ensure!(
+            fisheye || STRAIGHT.contains(&&*model),
+            "the camera model {model} is not supported, but {} and {} are: undistort the pictures, as with colmap image_undistorter",
+            STRAIGHT.join(", "),
+            FISHEYES.join(", ")
+        );
+        let order: &[&str] = if fisheye { &["k1", "k2", "k3", "k4"] } else { &OPENCV };
+        let lists = [(&self.distortion, order), (&self.distortion_params, &NERFSTUDIO[..])];
+        let mut listed = Vec::new();
+        for (list, names) in lists {
+            let Some(list) = list else { continue };
+            let numbers = numbers(list).with_context(|| format!("distortion is {list}"))?;
+            if let Some(x) = numbers.iter().skip(names.len()).find(|&&x| x != 0.0) {
+                bail!(
+                    "the lens has more coefficients than {}, one of them {x}: they are not supported",
+                    names.join(", ")
+                );
+            }
+            listed.extend(names.iter().copied().zip(numbers));
+        }
+        let Self { k1, k2, k3, k4, k5, k6, p1, p2, .. } = *self;
+        let named = [k1, k2, p1, p2, k3, k4, k5, k6];
+        let of = |name: &str, named: Option<f64>| {
+            let listed = || listed.iter().find(|(of, _)| *of == name).map(|&(_, x)| x);
+            named.or_else(listed).unwrap_or(0.0)
+        };
+        let mut all = [0.0; 8];
+        for (k, value) in all.iter_mut().enumerate() {
+            *value = of(OPENCV[k], named[k]);
+        }
+        ensure!(all.iter().all(|x| x.is_finite()), "a coefficient of the lens is not finite");
+        let [k1, k2, p1, p2, k3, k4, k5, k6] = all;
+        if fisheye {
+            ensure!(
+                [p1, p2, k5, k6] == [0.0; 4],
+                "a fisheye has the coefficients k1 to k4 alone, and here are others"
+            );
+            return Ok(Some(Distortion::Fisheye { k: [k1, k2, k3, k4] }));
+        }
+        // nerfstudio has a k4 that multiplies r⁸.
+        ensure!(
+            k4 == 0.0 || self.distortion_params.is_none() || self.k4.is_some(),
+            "distortion_params has a fourth coefficient {k4}, which is not supported"
+        );
+        let bends = all != [0.0; 8];
+        Ok(bends.then_some(Distortion::Rational { k: [k1, k2, k3, k4, k5, k6], p: [p1, p2] }))
+    }
+
     fn or(&self, other: &Self) -> Self {
         Self {
             distortion: self.distortion.clone().or(other.distortion.clone()),
+            distortion_params: self.distortion_params.clone().or(other.distortion_params.clone()),
             is_fisheye: self.is_fisheye.or(other.is_fisheye),
             k1: self.k1.or(other.k1),
             k2: self.k2.or(other.k2),
@@ -272,6 +322,18 @@ impl Distortion {
             p1: self.p1.or(other.p1),
             p2: self.p2.or(other.p2),
         }
+    }
+}
+
+/// The numbers of a list, of lists in a list, or of the `data` of a matrix as OpenCV writes it, in order.
+fn numbers(value: &Value) -> anyhow::Result<Vec<f64>> {
+    match value {
+        Value::Array(values) => {
+            let all = values.iter().map(numbers).collect::<anyhow::Result<Vec<_>>>()?;
+            Ok(all.concat())
+        }
+        Value::Object(fields) => numbers(fields.get("data").context("no data in it")?),
+        other => Ok(vec![other.as_f64().context("that is no list of numbers")?]),
     }
 }
 
@@ -286,16 +348,6 @@ fn focal_of(&[[fx, skew, _], [below, fy, _], last]: &[[f64; 3]; 3]) -> anyhow::R
         "K has a skew of {skew}, which is not supported: rectify the picture"
     );
     Ok([fx, fy])
-}
-
-/// What in a value is not zero, in lists and objects too.
-fn not_zero(value: &Value) -> Option<&Value> {
-    match value {
-        Value::Array(values) => values.iter().find_map(not_zero),
-        Value::Object(fields) => fields.values().find_map(not_zero),
-        Value::Null | Value::Bool(false) => None,
-        other => Some(other).filter(|other| other.as_f64() != Some(0.0)),
-    }
 }
 
 #[cfg(test)]
@@ -340,11 +392,19 @@ mod tests {
             (json!({ "camera_angle_x": 40.0 }), "radians"),
             (json!({ "fx": 500.0, "w": 7 }), "7 x ?"),
             (json!({ "fx": "a" }), "fx is \"a\", not a number"),
-            (json!({ "fx": 500.0, "distortion_params": [0.0, -0.2] }), "distortion = -0.2"),
-            (json!({ "fx": 500.0, "distortion": { "k1": 0.0, "k2": 0.3 } }), "distortion = 0.3"),
-            (json!({ "fx": 500.0, "distortion": "yes" }), "distortion = \"yes\""),
-            (json!({ "fx": 500.0, "is_fisheye": true }), "is_fisheye"),
-            (json!({ "fx": 500.0, "k6": 1.0 }), "k6 = 1"),
+            (json!({ "fx": 500.0, "distortion_params": [0.0, -0.2] }), "the lens distorts"),
+            (json!({ "fx": 500.0, "distortion": "yes" }), "distortion is \"yes\""),
+            (json!({ "fx": 500.0, "distortion": { "k1": 0.0 } }), "no data in it"),
+            (
+                json!({ "fx": 500.0, "distortion": [0, 0, 0, 0, 0, 0, 0, 0, 0.5] }),
+                "one of them 0.5",
+            ),
+            (json!({ "fx": 500.0, "distortion_params": [0, 0, 0, 0.5] }), "fourth coefficient 0.5"),
+            (json!({ "fx": 500.0, "is_fisheye": true, "p1": 1 }), "k1 to k4 alone"),
+            (
+                json!({ "fx": 500.0, "camera_model": "FOV" }),
+                "the camera model FOV is not supported",
+            ),
             (json!({ "K": [[1.0]] }), "K"),
             (json!({ "fx": 5e-324 }), "fx is 5e-324 pixels"),
             (json!({ "fx": 1e300 }), "fx is 1e300 pixels"),
@@ -356,6 +416,44 @@ mod tests {
             let error = pinhole(lens.clone()).unwrap_err();
             assert!(error.contains(part) && error.lines().count() == 1, "{lens}: {error}");
         }
+    }
+
+    #[test]
+    fn distortions_are_told_in_many_ways() {
+        let found = |lens: Value| {
+            let found = Lens::of(&lens).and_then(|lens| lens.camera(SIZE));
+            found.map(|(_, distortion)| distortion).map_err(|error| format!("{error:#}"))
+        };
+        let rational = |k: [f64; 6], p: [f64; 2]| Ok(Some(Distortion::Rational { k, p }));
+        let phone = rational([0.1, 0.2, 0.3, 0.0, 0.0, 0.0], [0.4, 0.5]);
+        for lens in [
+            json!({ "fx": 9, "k1": 0.1, "k2": 0.2, "k3": 0.3, "p1": 0.4, "p2": 0.5 }),
+            json!({ "fx": 9, "distortion": [[0.1, 0.2, 0.4, 0.5, 0.3]] }),
+            json!({ "fx": 9, "distortion_coefficients": { "rows": 1, "data": [0.1, 0.2, 0.4, 0.5, 0.3] } }),
+            json!({ "fx": 9, "distortion_params": [0.1, 0.2, 0.3, 0, 0.4, 0.5], "camera_model": "OPENCV" }),
+        ] {
+            assert_eq!(found(lens.clone()), phone, "{lens}");
+        }
+        let whole =
+            json!({ "fx": 9, "dist": [1, 2, 3, 4, 5, 6, 7, 8], "camera_model": "FULL_OPENCV" });
+        assert_eq!(found(whole), rational([1.0, 2.0, 5.0, 6.0, 7.0, 8.0], [3.0, 4.0]));
+        let fisheye = Ok(Some(Distortion::Fisheye { k: [0.1, 0.2, 0.0, 0.0] }));
+        for lens in [
+            json!({ "fx": 9, "camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k2": 0.2 }),
+            json!({ "fx": 9, "is_fisheye": true, "distortion": [0.1, 0.2, 0, 0] }),
+        ] {
+            assert_eq!(found(lens.clone()), fisheye, "{lens}");
+        }
+        // No coefficient at all is a pinhole, unless the lens is a fisheye.
+        for lens in [
+            json!({ "fx": 9, "k1": 0, "p2": 0.0, "camera_model": "SIMPLE_RADIAL" }),
+            json!({ "fx": 9, "distortion": [0, 0, 0, 0, 0], "camera_model": "perspective" }),
+            json!({ "fx": 9 }),
+        ] {
+            assert_eq!(found(lens.clone()), Ok(None), "{lens}");
+        }
+        let still = json!({ "fx": 9, "camera_model": "OPENCV_FISHEYE" });
+        assert_eq!(found(still), Ok(Some(Distortion::Fisheye { k: [0.0; 4] })));
     }
 
     #[test]

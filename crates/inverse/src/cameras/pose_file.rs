@@ -4,10 +4,9 @@ use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
 use softrast_raster::Pinhole;
 
-use crate::{
-    camera_file::{check_place, json, read, typed},
+use super::{
+    fields::{check_place, json, read, typed},
     rotation::{SAID, nearest},
-    view::rounded_note,
 };
 
 /// Where a camera stands and how it is turned, as a file has it.
@@ -47,7 +46,9 @@ impl PoseFile {
             transform_matrix: Option<Vec<Vec<f64>>>,
         }
         let file = json(bytes, name)?;
-        let object = if file["camera"].is_object() { &file["camera"] } else { &file };
+        // Results of version 0.1 have the camera for the mesh in its file apart.
+        let inside = ["camera_in_file", "camera"].into_iter().find(|name| file[name].is_object());
+        let object = inside.map_or(&file, |name| &file[name]);
         let camera = || {
             let pose: Pose = typed(object)?;
             match (pose.rotation, pose.t, pose.transform_matrix) {
@@ -67,6 +68,17 @@ impl PoseFile {
         let note = (off >= SAID).then(|| rounded_note(name, off, 1));
         Ok(Self { rotation: camera.rotation, translation: camera.translation, note })
     }
+}
+
+/// That a rotation was rounded, and as many in all.
+pub(crate) fn rounded_note(name: &str, off: f64, count: usize) -> String {
+    let of = match count {
+        1 => "its rotation is".to_owned(),
+        count => format!("its rotation, as those of {} more, is", count - 1),
+    };
+    format!(
+        "{name}: {of} rounded (R Rᵀ is off the identity by {off:.1e}): the nearest rotation is taken"
+    )
 }
 
 fn checked(camera: Pinhole, off: f64) -> anyhow::Result<(Pinhole, f64)> {
