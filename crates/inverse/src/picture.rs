@@ -483,7 +483,7 @@ mod tests {
         let levels = [0.0, 1.0, 0.2, 0.4];
         let image = Tensor::<NdArray, 1>::from_floats(levels, &Default::default());
         save_picture(image.reshape([1, 2, 2]), &path).unwrap();
-        assert_close(&Picture::load_mask(&path).unwrap().levels(2), &levels);
+        assert_close(&Picture::load_luminance(&path).unwrap().levels(2), &levels);
     }
 
     #[test]

@@ -59,7 +59,8 @@ fn png(size: [u32; 2], [bits, kind]: [u8; 2], chunks: &[u8], rows: &[u8]) -> Vec
 
 #[test]
 fn pictures_are_turned_as_their_exif_data_ask_for_all_eight_values() {
-    let in_file = GrayImage::from_fn(48, 32, |x, y| Luma([(4 * x + y) as u8]));
+    let level = |x: u32, y: u32| if x < 16 { (10 * x + 2 * y) as u8 } else { 255 };
+    let in_file = GrayImage::from_fn(48, 32, |x, y| Luma([level(x, y)]));
     let (jpeg, png) =
         (encoded(in_file.clone(), ImageFormat::Jpeg), encoded(in_file, ImageFormat::Png));
     for orientation in 1..=8 {

@@ -45,6 +45,7 @@ fn inputs(folder: &Path) {
         "masks/a.png.png",
         "given/a.png",
         "given/overlay-a.png",
+        "given/overlay.png",
     ] {
         mask.save(path(name)).unwrap();
     }
@@ -63,6 +64,11 @@ const LINES: &[(&str, &str)] = &[
     ),
     ("--mesh mesh.obj --targets masks --out .", ""),
     ("--mesh mesh.obj --targets given --out given", "overlay-a.png is an input of this run"),
+    (
+        "--mesh mesh.obj --target given/overlay.png --masks made --out made",
+        "overlay.png is an input of this run",
+    ),
+    ("--mesh mesh.obj --target mask.png --masks masks --out .", "no mask in masks has its name"),
     ("--mesh mesh.obj --target mask.png --camera camera.json --start camera.json --out .", ""),
     (
         "--mesh mesh.obj --target mask.png --camera found/result.json --out found",

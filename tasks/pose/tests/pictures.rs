@@ -170,12 +170,12 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
     let full = of(picture(folder.path(), "full.png", |_, _| 255));
     let camera = json!({ "fx": 50.0, "width": 40, "height": 30 });
     let wrong_size = write("size.json", json!({ "fx": 50.0, "width": 80, "height": 60 }));
-    let distorted = write("lens.json", json!({ "fx": 50.0, "k1": 0.1 }));
-    let fisheye = write("fish.json", json!({ "fx": 50.0, "camera_model": "OPENCV_FISHEYE" }));
+    let distorted = write("lens.json", json!({ "fx": 50.0, "camera_model": "FOV" }));
+    let fisheye = write("fish.json", json!({ "fx": 50.0, "camera_model": "THIN_PRISM_FISHEYE" }));
     let no_focal = write("none.json", json!({ "cx": 20.0 }));
     let skewed = write("skew.json", json!({ "K": [[50, 3, 20], [0, 50, 15], [0, 0, 1]] }));
     let turned_k = write("k.json", json!({ "K": [[50, 0, 0], [0, 50, 0], [20, 15, 1]] }));
-    let listed = write("cv.json", json!({ "fx": 50.0, "dist": [[0.0, -0.2, 0.0, 0.0, 0.0]] }));
+    let listed = write("cv.json", json!({ "fx": 50.0, "dist": [[-20.0, 0.0, 0.0, 0.0, 0.0]] }));
     let text = write("text.json", json!({ "fx": "50" }));
     let not_a_number = of(folder.path().join("nan.json"));
     fs::write(&not_a_number, r#"{"fx": 50.0, "cx": NaN}"#).unwrap();
@@ -205,13 +205,13 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         ),
         (
             vec!["--target", &disc, "--camera", &distorted],
-            vec!["lens.json", "k1 = 0.1", "undistort"],
+            vec!["lens.json", "the camera model FOV", "undistort"],
         ),
-        (vec!["--target", &disc, "--camera", &fisheye], vec!["OPENCV_FISHEYE", "undistort"]),
+        (vec!["--target", &disc, "--camera", &fisheye], vec!["THIN_PRISM_FISHEYE", "undistort"]),
         (vec!["--target", &disc, "--camera", &no_focal], vec!["none.json", "no focal length"]),
         (vec!["--target", &disc, "--camera", &skewed], vec!["skew.json", "skew of 3"]),
         (vec!["--target", &disc, "--camera", &turned_k], vec!["k.json", "transposed"]),
-        (vec!["--target", &disc, "--camera", &listed], vec!["cv.json", "distortion = -0.2"]),
+        (vec!["--target", &disc, "--camera", &listed], vec!["cv.json", "fold the picture"]),
         (
             vec!["--target", &disc, "--camera", &text],
             vec!["text.json", "fx is \"50\", not a number"],

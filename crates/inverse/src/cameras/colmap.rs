@@ -9,8 +9,13 @@ use std::{
 use anyhow::{Context, bail, ensure};
 use serde_json::{Map, Value};
 use softrast_mesh::open_regular;
+use softrast_raster::Pinhole;
 
-use super::{Frame, Lens, rotation::of_quaternion};
+use super::{
+    Lens,
+    frame::Frame,
+    rotation::{of_quaternion, to_quaternion},
+};
 
 /// Bytes of a line with a camera or an image at most.
 const LONGEST_LINE: u64 = 1 << 16;
@@ -35,6 +40,12 @@ const MODELS: [(&str, &[&str]); 11] = [
 
 /// Cameras of a model by their numbers, in the order of the file.
 pub(super) type Lenses = Vec<(u32, Lens)>;
+
+/// The pose of a camera as COLMAP writes it: the quaternion w, x, y, z of R, and t.
+pub fn colmap_pose(camera: &Pinhole) -> [f64; 7] {
+    let ([w, x, y, z], [tx, ty, tz]) = (to_quaternion(&camera.rotation), camera.translation);
+    [w, x, y, z, tx, ty, tz]
+}
 
 /// Whether a folder has cameras of a model.
 pub(super) fn is_in(folder: &Path) -> bool {
@@ -197,7 +208,8 @@ pub(super) fn binary_frames(
 /// The lens of a model with these parameters.
 fn lens(model: &str, [width, height]: [f64; 2], parameters: &[f64]) -> anyhow::Result<Lens> {
     let known = MODELS.iter().find(|(name, _)| *name == model);
-    let (_, names) = known.with_context(|| format!("the camera model {model} is not known"))?;
+    let (_, names) =
+        known.with_context(|| format!("the camera model {} is not known", model.escape_debug()))?;
     ensure!(
         names.len() == parameters.len(),
         "{model} has {} parameters, and here are {}",

@@ -262,7 +262,8 @@ impl Coefficients {
         let fisheye = self.is_fisheye.unwrap_or(false) || FISHEYES.contains(&&*model);
         ensure!(
             fisheye || STRAIGHT.contains(&&*model),
-            "the camera model {model} is not supported, but {} and {} are: undistort the pictures, as with colmap image_undistorter",
+            "the camera model {} is not supported, but {} and {} are: undistort the pictures, as with colmap image_undistorter",
+            model.escape_debug(),
             STRAIGHT.join(", "),
             FISHEYES.join(", ")
         );

@@ -6,9 +6,9 @@ use serde_json::Value;
 use softrast_raster::Pinhole;
 
 use super::{
-    Frame, Lens,
+    Lens,
     fields::{json, typed},
-    frame_place,
+    frame::{Frame, frame_place},
     pose_file::camera_to_world,
 };
 

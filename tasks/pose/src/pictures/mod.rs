@@ -31,7 +31,7 @@ pub struct Pictures {
     pub targets: Option<PathBuf>,
 
     /// Camera: JSON with fx, fy, cx, cy, width and height, or K. Or cameras of many pictures, where that of the picture is found by its name: transforms.json, or a folder with that or a model of COLMAP [default: 45 degrees are assumed]
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
 
     /// Where to start instead of everywhere, for the mesh as it is in its file: JSON with R and t, `transform_matrix`, or a result of this program
