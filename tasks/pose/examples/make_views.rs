@@ -30,9 +30,9 @@ fn main() -> anyhow::Result<()> {
     // R, t, K and the size say it all.
     let truth = |camera: &Pinhole| {
         let mut truth = camera_json(camera);
-        truth.as_object_mut().map(|fields| {
-            fields.retain(|name, _| !["transform_matrix", "colmap"].contains(&&**name))
-        });
+        if let Some(fields) = truth.as_object_mut() {
+            fields.retain(|name, _| !["transform_matrix", "colmap"].contains(&&**name));
+        }
         truth
     };
     let truth: Vec<Value> = cameras.iter().map(truth).collect();

@@ -56,7 +56,7 @@ const RESTART_ABOVE: f64 = 0.995;
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Views {
-    /// Folder with pictures and their cameras: transforms.json (instant-ngp, nerfstudio), a model of COLMAP (also in sparse/0 or colmap), or transforms_train.json. Masks are transparency, files that it names, or those of --masks
+    /// Folder with pictures and their cameras: transforms.json (instant-ngp, nerfstudio), a model of COLMAP (also in sparse/0 or colmap), or `transforms_train.json`. Masks are transparency, files that it names, or those of --masks
     #[arg(long, value_name = "DIR")]
     pub views: Option<PathBuf>,
 
