@@ -6,6 +6,8 @@ use softrast_raster::Pinhole;
 const RADII: usize = 2000;
 /// A lens that folds its picture nearer to the middle than this share of the shorter side is none.
 const LEAST_UNFOLDED: f64 = 0.25;
+/// A lens that shows a corner so many times as far from the middle as a pinhole does is none.
+const MOST_STRETCHED: f64 = 10.0;
 
 /// How a lens bends what a pinhole sees straight, as OpenCV has it.
 ///
@@ -83,16 +85,20 @@ impl Distortion {
         folds.map_or(most, |step| radius(step - 1))
     }
 
-    /// An error if no lens takes pictures like this: it would fold them near their middle.
+    /// An error if no lens takes pictures like this: it would fold them near their middle, or stretch them.
     pub(super) fn check(&self, camera: &Pinhole) -> anyhow::Result<()> {
         let most = farthest(camera);
         let unfolded = self.unfolded(most);
-        let shown =
-            unfolded * self.ratio(unfolded * unfolded) * camera.focal[0].min(camera.focal[1]);
+        let ratio = self.ratio(unfolded * unfolded);
+        let shown = unfolded * ratio * camera.focal[0].min(camera.focal[1]);
         let least = LEAST_UNFOLDED * camera.size.shorter() as f64;
         ensure!(
             unfolded >= most || shown >= least,
             "the coefficients of the lens fold the picture {shown:.1} pixels from its middle: no lens does that, so check their order and sign"
+        );
+        ensure!(
+            ratio <= MOST_STRETCHED,
+            "the coefficients of the lens stretch the picture {ratio:.1e} times: no lens does that, so check their order"
         );
         Ok(())
     }
@@ -187,7 +193,11 @@ mod tests {
         let farthest = far.fold(0.0, f64::max);
         assert!((farthest - 2.0 / 27f64.sqrt()).abs() < 1e-6, "{farthest}");
         assert!(folding.check(&camera).is_ok() && PHONE.check(&camera).is_ok());
-        let broken = Distortion::Rational { k: [f64::MAX, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
-        assert!(broken.check(&camera).unwrap_err().to_string().contains("0.0 pixels"));
+        let broken = |k1: f64| {
+            let lens = Distortion::Rational { k: [k1, 0.0, 0.0, 0.0, 0.0, 0.0], p: [0.0; 2] };
+            lens.check(&camera).unwrap_err().to_string()
+        };
+        assert!(broken(f64::MAX).contains("stretch") && broken(100.0).contains("stretch"));
+        assert!(broken(-f64::MAX).contains("fold") && broken(-100.0).contains("fold"));
     }
 }
