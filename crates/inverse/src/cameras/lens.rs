@@ -428,32 +428,32 @@ mod tests {
         let rational = |k: [f64; 6], p: [f64; 2]| Ok(Some(Distortion::Rational { k, p }));
         let phone = rational([0.1, 0.2, 0.3, 0.0, 0.0, 0.0], [0.4, 0.5]);
         for lens in [
-            json!({ "fx": 9, "k1": 0.1, "k2": 0.2, "k3": 0.3, "p1": 0.4, "p2": 0.5 }),
-            json!({ "fx": 9, "distortion": [[0.1, 0.2, 0.4, 0.5, 0.3]] }),
-            json!({ "fx": 9, "distortion_coefficients": { "rows": 1, "data": [0.1, 0.2, 0.4, 0.5, 0.3] } }),
-            json!({ "fx": 9, "distortion_params": [0.1, 0.2, 0.3, 0, 0.4, 0.5], "camera_model": "OPENCV" }),
+            json!({ "fx": 900, "k1": 0.1, "k2": 0.2, "k3": 0.3, "p1": 0.4, "p2": 0.5 }),
+            json!({ "fx": 900, "distortion": [[0.1, 0.2, 0.4, 0.5, 0.3]] }),
+            json!({ "fx": 900, "distortion_coefficients": { "rows": 1, "data": [0.1, 0.2, 0.4, 0.5, 0.3] } }),
+            json!({ "fx": 900, "distortion_params": [0.1, 0.2, 0.3, 0, 0.4, 0.5], "camera_model": "OPENCV" }),
         ] {
             assert_eq!(found(lens.clone()), phone, "{lens}");
         }
         let whole =
-            json!({ "fx": 9, "dist": [1, 2, 3, 4, 5, 6, 7, 8], "camera_model": "FULL_OPENCV" });
+            json!({ "fx": 900, "dist": [1, 2, 3, 4, 5, 6, 7, 8], "camera_model": "FULL_OPENCV" });
         assert_eq!(found(whole), rational([1.0, 2.0, 5.0, 6.0, 7.0, 8.0], [3.0, 4.0]));
         let fisheye = Ok(Some(Distortion::Fisheye { k: [0.1, 0.2, 0.0, 0.0] }));
         for lens in [
-            json!({ "fx": 9, "camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k2": 0.2 }),
-            json!({ "fx": 9, "is_fisheye": true, "distortion": [0.1, 0.2, 0, 0] }),
+            json!({ "fx": 900, "camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k2": 0.2 }),
+            json!({ "fx": 900, "is_fisheye": true, "distortion": [0.1, 0.2, 0, 0] }),
         ] {
             assert_eq!(found(lens.clone()), fisheye, "{lens}");
         }
         // No coefficient at all is a pinhole, unless the lens is a fisheye.
         for lens in [
-            json!({ "fx": 9, "k1": 0, "p2": 0.0, "camera_model": "SIMPLE_RADIAL" }),
-            json!({ "fx": 9, "distortion": [0, 0, 0, 0, 0], "camera_model": "perspective" }),
-            json!({ "fx": 9 }),
+            json!({ "fx": 900, "k1": 0, "p2": 0.0, "camera_model": "SIMPLE_RADIAL" }),
+            json!({ "fx": 900, "distortion": [0, 0, 0, 0, 0], "camera_model": "perspective" }),
+            json!({ "fx": 900 }),
         ] {
             assert_eq!(found(lens.clone()), Ok(None), "{lens}");
         }
-        let still = json!({ "fx": 9, "camera_model": "OPENCV_FISHEYE" });
+        let still = json!({ "fx": 900, "camera_model": "OPENCV_FISHEYE" });
         assert_eq!(found(still), Ok(Some(Distortion::Fisheye { k: [0.0; 4] })));
     }
 
