@@ -13,7 +13,7 @@ use softrast_raster::Pinhole;
 
 use super::{
     Lens,
-    frame::Frame,
+    frame::{Frame, short},
     rotation::{of_quaternion, to_quaternion},
 };
 
@@ -209,7 +209,7 @@ pub(super) fn binary_frames(
 fn lens(model: &str, [width, height]: [f64; 2], parameters: &[f64]) -> anyhow::Result<Lens> {
     let known = MODELS.iter().find(|(name, _)| *name == model);
     let (_, names) =
-        known.with_context(|| format!("the camera model {} is not known", model.escape_debug()))?;
+        known.with_context(|| format!("the camera model {} is not known", short(model)))?;
     ensure!(
         names.len() == parameters.len(),
         "{model} has {} parameters, and here are {}",
@@ -244,7 +244,7 @@ fn frame(
             off: 0.0,
         })
     };
-    of().with_context(|| picture.escape_debug().to_string())
+    of().with_context(|| short(picture))
 }
 
 /// A binary file, whose numbers have their lowest byte first.

@@ -8,6 +8,7 @@ use softrast_raster::{ImageSize, Pinhole};
 use super::{
     Distortion,
     fields::{json, read, typed},
+    frame::short,
 };
 
 /// Intrinsics of a camera as files have them.
@@ -263,7 +264,7 @@ impl Coefficients {
         ensure!(
             fisheye || STRAIGHT.contains(&&*model),
             "the camera model {} is not supported, but {} and {} are: undistort the pictures, as with colmap image_undistorter",
-            model.escape_debug(),
+            short(&model),
             STRAIGHT.join(", "),
             FISHEYES.join(", ")
         );
