@@ -13,7 +13,8 @@ use softrast_raster::Pinhole;
 
 use super::{
     Lens,
-    frame::{Frame, short},
+    fields::short,
+    frame::Frame,
     rotation::{of_quaternion, to_quaternion},
 };
 

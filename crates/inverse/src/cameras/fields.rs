@@ -31,10 +31,19 @@ const NUMBERS: [&str; 20] = [
     "p2",
 ];
 
+/// Letters of a name that an error shows.
+const LONGEST_NAME: usize = 200;
 /// Bytes of a camera file at most: 100,000 frames have fewer.
 const LARGEST_FILE: u64 = 1 << 25;
 /// Positions in world units beyond this do not fit the floats that draw.
 const FARTHEST: f64 = 1e15;
+
+/// A name of a file for an error: on one line, and not longer than a person reads.
+pub(super) fn short(name: &str) -> String {
+    let mut letters = name.chars().map(|letter| if letter.is_control() { ' ' } else { letter });
+    let start: String = letters.by_ref().take(LONGEST_NAME).collect();
+    if letters.next().is_some() { format!("{start}…") } else { start }
+}
 
 /// The content of a camera file, with its path as its name.
 pub(super) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {

@@ -1,7 +1,4 @@
-use super::Lens;
-
-/// Letters of a name that an error shows.
-const LONGEST_NAME: usize = 200;
+use super::{Lens, fields::short};
 
 /// A frame: names of its files, its lens, its pose from world to camera, and how far off its rotation was.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,11 +14,4 @@ pub(super) struct Frame {
 /// Where an error is: the frame of a file.
 pub(super) fn frame_place(file: &str, k: usize, picture: &str) -> String {
     format!("{file}: frame {k} ({})", short(picture))
-}
-
-/// A name of a file for an error: on one line, and not longer than a person reads.
-pub(super) fn short(name: &str) -> String {
-    let mut letters = name.chars().map(|letter| if letter.is_control() { ' ' } else { letter });
-    let start: String = letters.by_ref().take(LONGEST_NAME).collect();
-    if letters.next().is_some() { format!("{start}…") } else { start }
 }

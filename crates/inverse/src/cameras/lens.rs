@@ -7,8 +7,7 @@ use softrast_raster::{ImageSize, Pinhole};
 
 use super::{
     Distortion,
-    fields::{json, read, typed},
-    frame::short,
+    fields::{json, read, short, typed},
 };
 
 /// Intrinsics of a camera as files have them.
