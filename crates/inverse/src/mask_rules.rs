@@ -16,7 +16,7 @@ pub struct MaskRules {
 /// Share of the pixels that have a colour, and of those that are not black which are neither white, from which on a picture is no mask.
 const COLOURED: f64 = 0.05;
 const GREY: f64 = 0.5;
-/// What red, green and blue of a colour differ by at least, and what counts as black; white is as far from the other end.
+/// Least difference between red, green and blue of a colour, and the level up to which a pixel is black; from 1 less that level on it is white.
 const COLOUR: f32 = 0.25;
 const BLACK: f32 = 0.1;
 

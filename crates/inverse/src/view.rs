@@ -86,7 +86,7 @@ impl View {
     }
 }
 
-/// What should be said of views that were read, a line for each kind: pictures that were undistorted, masks whose only level was taken for
+/// Notes for the user on views that were read, a line for each kind: pictures that were undistorted, masks whose only level was taken for
 /// white, masks that may be inverted, and rotations that were rounded.
 pub fn reading_notes(views: &[View]) -> Vec<String> {
     let masks = views.iter().filter_map(|view| Some((view.mask.only_level()?, &view.name)));

@@ -53,7 +53,7 @@ pub(super) fn is_in(folder: &Path) -> bool {
     ["cameras.bin", "cameras.txt"].iter().any(|name| folder.join(name).is_file())
 }
 
-/// What a folder with a model has.
+/// Cameras and images of a folder.
 pub(super) struct Model {
     pub(super) lenses: Lenses,
     /// None if there is no file of images.
@@ -294,7 +294,7 @@ mod tests {
         lenses.iter().map(|(number, lens)| (*number, lens)).collect()
     }
 
-    /// The same as binary files.
+    /// `CAMERAS` and `IMAGES` as binary files.
     fn binary() -> [Vec<u8>; 2] {
         let mut cameras = 2u64.to_le_bytes().to_vec();
         for (number, model, size, parameters) in [

@@ -147,7 +147,7 @@ impl Lens {
     ///
     /// # Errors
     ///
-    /// Those of [`Lens::camera`], and if the lens distorts.
+    /// If the lens distorts, or for the reasons of [`Lens::camera`].
     pub fn pinhole(&self, size: ImageSize) -> anyhow::Result<Pinhole> {
         let (pinhole, distortion) = self.camera(size)?;
         ensure!(
@@ -256,7 +256,7 @@ fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
 }
 
 impl Coefficients {
-    /// What they and the name of a model say; None if nothing is distorted.
+    /// The distortion by these coefficients under a model of this name; None if there is none.
     fn distortion(&self, model: Option<&str>) -> anyhow::Result<Option<Distortion>> {
         let model = model.unwrap_or("OPENCV").to_ascii_uppercase();
         let fisheye = self.is_fisheye.unwrap_or(false) || FISHEYES.contains(&&*model);
