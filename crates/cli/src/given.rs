@@ -6,7 +6,10 @@ use anyhow::Context;
 
 use softrast_inverse::{MaskRules, Method, Picture, ScheduledSoftness, find_mask};
 use softrast_lab::{
-    Error, Progress, ViewerView, mask_png, parse::share, program::Output, report::Report,
+    Error, Progress, ViewerView, mask_png,
+    parse::share,
+    program::Output,
+    report::{Beside, Report},
 };
 use softrast_raster::{BackendChoice, Pinhole};
 
@@ -35,8 +38,8 @@ pub struct Answer {
     pub output: Output,
     /// Names and contents of files beside the page.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What they are, in a line.
-    pub beside: String,
+    /// Those of them that a person opens, and what they hold.
+    pub beside: Vec<Beside>,
 }
 
 impl<A> Given<'_, A> {

@@ -5,7 +5,7 @@ use softrast_lab::{
     Inputs, OutputFolder, Progress, Runner, Store, Work,
     format::line,
     program::{Output, say},
-    report::Report,
+    report::{Beside, Report},
     shown,
 };
 
@@ -70,13 +70,13 @@ impl Session {
         Ok(Output { json, text, partial, ..Output::default() })
     }
 
-    /// Writes the page, and the JSON if it has a `file` of its own, beside what `folder` holds, and says where they are. `beside` says
-    /// what lies beside the page.
+    /// Writes the page, and the JSON if it has a `file` of its own, beside what `folder` holds, and says where they are. `beside` are the
+    /// files to which the page links.
     pub(crate) fn finish(
         &self,
         mut folder: OutputFolder,
         page: Report,
-        beside: &str,
+        beside: &[Beside],
         file: Option<&str>,
         mut output: Output,
     ) -> anyhow::Result<Output> {

@@ -3,7 +3,10 @@
 use std::fmt::Write;
 
 use softrast_cli::Variant;
-use softrast_lab::{machine, report::Report};
+use softrast_lab::{
+    machine,
+    report::{Beside, Report},
+};
 
 use crate::{
     Measured, Record,
@@ -105,9 +108,11 @@ pub(crate) fn html(
         report.heading("Who is fast how often");
         report.chart(&chart.plot.svg()?, &chart.caption);
     }
-    let beside = "runs.jsonl with every run, cells.csv with the numbers behind the tables, results with those of all runs, the charts as SVG \
-                  and their points as CSV";
-    Ok(report.finish(command, beside))
+    let beside = [
+        Beside::new("runs.jsonl", "every run"),
+        Beside::new("cells.csv", "the numbers behind the tables"),
+    ];
+    Ok(report.finish(command, &beside))
 }
 
 #[cfg(test)]

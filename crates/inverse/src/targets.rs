@@ -90,6 +90,19 @@ impl<B: RasterBackend> Targets<B> {
         mse_loss(image, target)
     }
 
+    /// What counts of an image `[views, size, size]` less the target, averaged down to `side` × `side` pixels: `[views, side, side]`.
+    ///
+    /// # Panics
+    ///
+    /// If the image has another size than all targets, or `side` is none of its halves.
+    pub fn differences(&self, image: Tensor<B, 3>, side: usize) -> Tensor<B, 3> {
+        let (mut image, mut target) = self.judged(image);
+        while image.dims()[1] > side {
+            (image, target) = (halved(image), halved(target));
+        }
+        image - target
+    }
+
     fn judged(&self, image: Tensor<B, 3>) -> (Tensor<B, 3>, Tensor<B, 3>) {
         match self.at(image.dims()[1]) {
             (target, Some(counted)) => (image * counted, target),

@@ -8,7 +8,7 @@ use softrast_tensor::numbers;
 use crate::{
     Distortion, Frame, Picture,
     cameras::{SAID, rounded_note},
-    colmap_pose, cut_sides,
+    colmap_pose, cut_sides, mask_parts,
 };
 
 /// A camera as JSON: R and t as OpenCV has them, the same from camera to world as nerfstudio has it (`transform_matrix`) and as COLMAP has it
@@ -87,7 +87,7 @@ impl View {
 }
 
 /// Notes for the user on views that were read, a line for each kind: pictures that were undistorted, masks whose only level was taken for
-/// white, masks that may be inverted, and rotations that were rounded.
+/// white, masks that may be inverted or show several objects, and rotations that were rounded.
 pub fn reading_notes(views: &[View]) -> Vec<String> {
     let masks = views.iter().filter_map(|view| Some((view.mask.only_level()?, &view.name)));
     let masks: Vec<(f64, &String)> = masks.collect();
@@ -99,30 +99,36 @@ pub fn reading_notes(views: &[View]) -> Vec<String> {
             if bent == views.len() { "the pictures".to_owned() } else { format!("{bent} of {} pictures", views.len()) }
         ));
     }
-    if let [(level, name), more @ ..] = &masks[..] {
-        let of = match more.len() {
-            0 => name.to_string(),
-            more => format!("{name} and {more} more"),
-        };
+    if let Some(&(level, _)) = masks.first() {
+        let of = first_and_more(masks.iter().map(|(_, name)| *name));
         notes.push(format!(
             "{of}: one level is above black and nothing else, {level:.4} where white is 1: it is taken for the mask"
         ));
     }
-    let inverted: Vec<&View> =
-        views.iter().filter(|view| cut_sides(&view.mask).len() == 4).collect();
-    if let [first, more @ ..] = &inverted[..] {
-        let of = match more.len() {
-            0 => first.name.clone(),
-            more => format!("{} and {more} more", first.name),
-        };
-        notes.push(format!(
-            "{of}: the mask reaches all four sides of the picture: is it inverted (--invert)?"
-        ));
-    }
+    let named = |which: &dyn Fn(&Picture) -> bool| {
+        let named: Vec<&String> =
+            views.iter().filter(|view| which(&view.mask)).map(|view| &view.name).collect();
+        (!named.is_empty()).then(|| first_and_more(named.into_iter()))
+    };
+    notes.extend(named(&|mask| cut_sides(mask).len() == 4).map(|of| {
+        format!("{of}: the mask reaches all four sides of the picture: is it inverted (--invert)?")
+    }));
+    notes.extend(named(&|mask| mask_parts(mask) > 1).map(|of| {
+        format!(
+            "{of}: the mask has several large parts: if they are several objects, keep one of them (--label N, if each has a class)"
+        )
+    }));
     let rounded = || views.iter().filter(|view| view.off >= SAID);
     let worst = rounded().max_by(|a, b| a.off.total_cmp(&b.off));
     notes.extend(worst.map(|view| rounded_note(&view.name, view.off, rounded().count())));
     notes
+}
+
+/// The first of some names, and how many more there are.
+fn first_and_more<'a>(mut names: impl ExactSizeIterator<Item = &'a String>) -> String {
+    let more = names.len().saturating_sub(1);
+    let first = names.next().map_or("", String::as_str);
+    if more == 0 { first.to_owned() } else { format!("{first} and {more} more") }
 }
 
 /// How many faces of a mesh cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those across

@@ -13,6 +13,8 @@ pub(crate) struct ErrorSummary {
     /// Mean after the last step.
     #[serde(rename = "final")]
     pub(crate) last: f64,
+    /// Mean over the runs at the step that each returns.
+    pub(crate) returned: f64,
     /// Mean over the runs of the best over all steps.
     pub(crate) best: f64,
     /// 95 % interval of the mean of `last`.
@@ -32,8 +34,15 @@ pub(crate) fn errors_of(metrics: &[Metric]) -> impl Iterator<Item = (usize, Metr
 }
 
 impl ErrorSummary {
-    /// Of the metric at `place`.
-    pub(crate) fn new(metric: Metric, place: usize, runs: &[Run], many: bool) -> Self {
+    /// The error of the metric at `place`, where the metric at `score` decides which step of a run is returned.
+    pub(crate) fn new(
+        metric: Metric,
+        [place, score]: [usize; 2],
+        runs: &[Run],
+        many: bool,
+    ) -> Self {
+        let returned = runs.iter().filter_map(|run| Some(run.returned(score)?.values[place]));
+        let returned = mean(&returned.collect::<Vec<_>>());
         let each = |pick: fn(&[f64]) -> f64| -> Vec<f64> {
             let curve = |run: &Run| run.curve.iter().map(|p| p.values[place]).collect::<Vec<_>>();
             runs.iter().map(|run| pick(&curve(run))).collect()
@@ -47,6 +56,7 @@ impl ErrorSummary {
             metric,
             initial: mean(&each(|curve| curve[0])),
             last: mean(&last),
+            returned,
             best: mean(&each(best)),
             ci95: many.then(|| mean_interval(&last)),
             per_run: many.then_some(last),

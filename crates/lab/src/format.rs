@@ -28,6 +28,15 @@ pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
+/// How a silhouette with this intersection over union suits its mask, as a verb: `fits`, `fits in part` or `does not fit`.
+pub fn fit(iou: f64) -> &'static str {
+    match iou {
+        0.95.. => "fits",
+        0.8.. => "fits in part",
+        _ => "does not fit",
+    }
+}
+
 /// A line for a terminal: what it is about, and that.
 pub fn line(name: &str, text: &str) -> String {
     format!("  {name:<22} {text}")

@@ -1,9 +1,9 @@
 use serde_json::{Map, Value, json};
 
 use crate::{
-    Experiment, Run,
+    Experiment, Role, Run,
     error_summary::{ErrorSummary, errors_of, nested},
-    wilson_interval,
+    place, wilson_interval,
 };
 
 /// The errors of some runs, and how many succeeded.
@@ -34,9 +34,10 @@ impl Outcome {
                 run.seed
             );
         }
-        let errors = errors_of(experiment.metrics());
+        let score = place(experiment.metrics(), Role::Score);
+        let of = |(k, metric)| ErrorSummary::new(metric, [k, score], runs, many);
         Ok(Self {
-            errors: errors.map(|(k, metric)| ErrorSummary::new(metric, k, runs, many)).collect(),
+            errors: errors_of(experiment.metrics()).map(of).collect(),
             successes: [runs.iter().filter(|run| run.success).count(), runs.len()],
             many,
         })

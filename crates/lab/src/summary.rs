@@ -147,10 +147,10 @@ impl Summary {
 
     fn table(&self) -> Table {
         let interval = self.outcome.many.then_some("95 % interval of the end");
-        let head = ["Error", "Start", "End", "Best"].into_iter().chain(interval);
+        let head = ["Error", "Start", "Returned", "End"].into_iter().chain(interval);
         let mut table = Table::new(head);
         for error in &self.outcome.errors {
-            let numbers = [error.initial, error.last, error.best].map(short);
+            let numbers = [error.initial, error.returned, error.last].map(short);
             let interval =
                 error.ci95.map(|[low, high]| format!("{} to {}", short(low), short(high)));
             table.push([error.metric.title()].into_iter().chain(numbers).chain(interval));
@@ -171,14 +171,14 @@ impl Summary {
         let means =
             if self.outcome.successes[1] > 1 { " All are means over the runs." } else { "" };
         report.note(&format!(
-            "The lower the better{gains}; \"best\" is over all steps, for each by itself.{means} {}.",
+            "The lower the better{gains}; \"returned\" is at the step that is returned.{means} {}.",
             self.time()
         ));
         if let Some(against) = &self.against {
             against.section(report);
         }
         if self.outcome.many {
-            report.details("Every run at its end", &self.each_run(runs));
+            report.folded("Every run at its end", |report| report.table(&self.each_run(runs)));
         }
     }
 

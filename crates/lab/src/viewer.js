@@ -9,6 +9,7 @@
   const HINT = "Drag to turn, wheel or two fingers to zoom, Shift and drag to pan, double click to reset. " +
     "Keys: arrows, + and −, Shift with arrows, 0.";
   const FREE_FIELD_OF_VIEW = 35 * Math.PI / 180;
+  const AXES = [["x", [1, 0, 0]], ["−x", [-1, 0, 0]], ["y", [0, 1, 0]], ["−y", [0, -1, 0]], ["z", [0, 0, 1]], ["−z", [0, 0, -1]]];
   const CORNER = 9; // numbers of a corner: position, normal, colour
   const LINE_ENDS = 20; // of the frustum of one camera
 
@@ -225,6 +226,10 @@
       this.build(box);
       this.listen();
       this.reset();
+      if (data.opens !== undefined) {
+        this.select.value = data.opens;
+        this.enter(this.views[data.opens]);
+      }
       new ResizeObserver(() => this.schedule()).observe(this.stage);
       painter.viewers.push(this);
     }
@@ -243,11 +248,14 @@
       this.select = element("select", {}, new Option("Free", -1), ...this.views.map((view, k) => new Option(view.name, k)));
       this.cameras = element("input", { type: "checkbox", checked: true });
       this.colours = element("input", { type: "checkbox", checked: true });
+      this.above = element("select", {}, new Option(this.views.length ? "as in the views" : "y", -1),
+        ...AXES.map(([name], k) => new Option(name, k)));
       this.button = element("button", { type: "button" }, "Reset");
       const labels = [element("label", {}, "View ", this.select), element("label", {}, this.cameras, "Cameras")];
       const paint = element("label", {}, this.colours, "Colours");
       const controls = element("div", { className: "viewer-controls" },
-        ...(this.views.length ? labels : []), ...(this.coloured ? [paint] : []), this.button);
+        ...(this.views.length ? labels : []), ...(this.coloured ? [paint] : []),
+        element("label", {}, "Up ", this.above), this.button);
       this.note = element("p", { className: "note" });
       this.note.setAttribute("aria-live", "polite");
       picture.replaceWith(this.stage, controls, this.note);
@@ -282,6 +290,7 @@
       select.addEventListener("change", () => (select.value < 0 ? this.leave() : this.enter(this.views[select.value])));
       for (const box of [this.cameras, this.colours]) box.addEventListener("change", () => this.schedule());
       this.button.addEventListener("click", () => this.reset());
+      this.above.addEventListener("change", () => this.reset());
     }
 
     wheel(event) {
@@ -303,8 +312,9 @@
       event.preventDefault();
     }
 
-    /** World direction that is up in most views; +y without views. */
+    /** World direction that is up: as it was chosen, or as in most views; +y without views. */
     up() {
+      if (this.above.value >= 0) return AXES[this.above.value][1];
       const ups = this.views.map((view) => times(-1, view.rotation[1]));
       const all = ups.reduce(sum, [0, 0, 0]);
       return Math.hypot(...all) > 0.1 * ups.length ? unit(all) : ups[0] ?? [0, 1, 0];

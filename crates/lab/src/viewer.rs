@@ -23,6 +23,9 @@ pub struct Viewer {
     pub colours: Option<Vec<[f64; 3]>>,
     /// In the order in which the page offers them; there may be none.
     pub views: Vec<ViewerView>,
+    /// The view through which the page opens, with the outline of its mask; none shows the mesh from beside the cameras.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub opens: Option<usize>,
 }
 
 /// A pinhole camera with the mask that the mesh should fill in it.
@@ -156,7 +159,7 @@ mod tests {
         };
         let positions = vec![[0.1, -2.0, 3e4], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let faces = vec![[0, 1, 2], [2, 1, 0]];
-        Viewer { positions, faces, colours: None, views: vec![view] }
+        Viewer { positions, faces, colours: None, views: vec![view], opens: Some(0) }
     }
 
     fn page(viewers: &[Viewer]) -> String {
@@ -164,7 +167,7 @@ mod tests {
         for viewer in viewers {
             report.viewer(viewer, b"PNG", "A <mesh>");
         }
-        report.finish("c", "b")
+        report.finish("c", &[])
     }
 
     fn data(page: &str) -> Vec<Value> {

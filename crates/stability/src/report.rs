@@ -2,7 +2,7 @@ use softrast_cli::method_colour;
 use softrast_lab::{
     format::short_or_none,
     plot::{Axis, Plot, Series},
-    report::{Report, Table},
+    report::{Beside, Report, Table},
 };
 
 use crate::{LevelOutcome, Matrix, Outcome, Row};
@@ -35,9 +35,11 @@ pub(crate) fn html(matrix: &Matrix, command: &str) -> anyhow::Result<String> {
             let (plot, caption) = chart(row);
             report.chart(&plot.svg()?, caption);
         }
-        report.details("Measured numbers: median (worst), share", &levels(matrix, row));
+        report.folded("Measured numbers: median (worst), share", |report| {
+            report.table(&levels(matrix, row));
+        });
     }
-    Ok(report.finish(command, "stability.json holds every level of every case"))
+    Ok(report.finish(command, &[Beside::new("stability.json", "every level of every case")]))
 }
 
 /// The matrix for a terminal.

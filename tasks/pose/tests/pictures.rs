@@ -500,7 +500,7 @@ fn a_ball_is_found_by_its_colours() {
     let off = angle_deg(&found["camera"], &truth);
     assert!(off < 4.0 && found["psnr"].as_f64().unwrap() > 25.0, "{off} degrees off, {found}");
     let page = fs::read_to_string(out.path().join("report.html")).unwrap();
-    assert!(page.contains("its own colours at the answer"), "the colours are not shown");
+    assert!(page.contains("The mesh in its own colours"), "the colours are not shown");
     // By its silhouette alone it may be anywhere.
     let found = run(out.path(), &words).unwrap();
     assert!(angle_deg(&found["camera"], &truth) > 10.0 && found["psnr"].is_null(), "{found}");

@@ -1,7 +1,7 @@
 use softrast_lab::{
     mean,
     plot::{Axis, Plot, Series},
-    report::{Report, Table},
+    report::{Beside, Report, Table},
 };
 
 use crate::{Epoch, Header, Time, score::with_mean};
@@ -41,7 +41,11 @@ pub(crate) fn html(
             ),
         );
     }
-    Ok(report.finish(command, "checkpoint.bin, history.json and a contact sheet of every epoch"))
+    let beside = [
+        Beside::new("history.json", "scores and times of every epoch"),
+        Beside::new("checkpoint.bin", "the network, to go on from with --resume"),
+    ];
+    Ok(report.finish(command, &beside))
 }
 
 fn scores(header: &Header, sphere: &[f64]) -> Table {

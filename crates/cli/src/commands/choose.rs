@@ -6,7 +6,7 @@ use softrast_lab::{
     format::{counted, exact, line},
     halving::TRAINING_SEED,
     program::Output,
-    report::Report,
+    report::{Beside, Report},
     seeds,
     select::{Budget, Candidate, Selection, chosen_flags, price, section},
 };
@@ -75,8 +75,8 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
     report.paragraph(&format!("{head}."));
     section(&found.stages, &mut report);
     let output = Output { json, text, warnings, partial: None };
-    let beside = "choose.json holds all errors";
-    session.finish(folder, report, beside, Some(CHOICE), output)
+    let beside = [Beside::new(CHOICE, "all errors")];
+    session.finish(folder, report, &beside, Some(CHOICE), output)
 }
 
 /// What `--softness auto` stands for.

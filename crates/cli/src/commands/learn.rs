@@ -14,7 +14,7 @@ use softrast_lab::{
     peak_rss_mib,
     plot::{Axis, Plot, Series},
     program::{Output, say},
-    report::Report,
+    report::{Beside, Report},
     shown, write_atomically,
 };
 use softrast_meta::{Best, Ranks, Record};
@@ -158,9 +158,13 @@ fn write<T: Task>(
     if let [Some(config), Some(settings)] = settings {
         settings_section(&mut report, [config, settings]);
     }
-    let beside = "learn.json holds the result, learn.jsonl every outer step; softness.json is for --softness of any task";
+    let beside = [
+        Beside::new(RESULT, "the result"),
+        Beside::new("learn.jsonl", "a line for every outer step"),
+        Beside::new("softness.json", "the softness, for --softness of any task"),
+    ];
     let output = Output { json: result, text, warnings: warnings(learning), partial };
-    session.finish(folder, report, beside, Some(RESULT), output)
+    session.finish(folder, report, &beside, Some(RESULT), output)
 }
 
 /// Takes outer steps until learning has finished, or the user stops it: then true.

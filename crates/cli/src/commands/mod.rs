@@ -7,11 +7,20 @@ mod runs;
 pub(crate) mod search;
 
 use serde_json::{Map, Value};
-use softrast_lab::report::{Report, Table};
+use softrast_lab::{
+    format::short,
+    report::{Report, Table},
+};
 
 /// A setting in words, and its value.
 fn in_words((key, value): (&String, &Value)) -> [String; 2] {
-    [key.replace('_', " "), value.as_str().map_or_else(|| value.to_string(), str::to_owned)]
+    let text = match value {
+        Value::String(text) => text.clone(),
+        // All digits are in the JSON beside the page.
+        Value::Number(number) if number.is_f64() => short(number.as_f64().unwrap_or(f64::NAN)),
+        other => other.to_string(),
+    };
+    [key.replace('_', " "), text]
 }
 
 /// Every choice behind the numbers, as a section of a page.

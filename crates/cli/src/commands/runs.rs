@@ -6,10 +6,13 @@ use softrast_lab::{
     halving::Halving,
     headline,
     program::Output,
-    report::Report,
+    report::{Beside, Report},
 };
 
-use super::settings_section;
+use super::{
+    search::{TRIED, TRIED_TABLE},
+    settings_section,
+};
 use crate::{
     Task, TaskExperiment,
     diagnostics::diagnostics,
@@ -76,9 +79,14 @@ pub(super) fn write<T: Task>(
     text.extend(summary.text(success));
     let (warnings, partial) = (summary.warnings.clone(), summary.partial.map(|p| p.of("runs")));
     let output = Output { json: json.into(), text, warnings, partial };
-    let tried = search.map_or("", |_| ", search.json and search.csv every setting tried");
-    let beside = format!(
-        "result.json holds all results, curve.csv every error of every run after every step{tried}"
+    let mut beside = vec![
+        Beside::new(RESULT, "all results and settings"),
+        Beside::new("curve.csv", "every error of every run after every step"),
+    ];
+    beside.extend(
+        search.into_iter().flat_map(|_| {
+            [TRIED, TRIED_TABLE].map(|file| Beside::new(file, "every setting tried"))
+        }),
     );
     session.finish(folder, page, &beside, Some(RESULT), output)
 }

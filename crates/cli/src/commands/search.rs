@@ -5,7 +5,7 @@ use softrast_lab::{
     format::exact,
     halving::{Halving, SearchAxis, SearchSpace, Setting, TRAINING_SEED, rounded},
     program::Output,
-    report::Report,
+    report::{Beside, Report},
     seeds, was_interrupted,
 };
 
@@ -22,8 +22,8 @@ use crate::{
 };
 
 /// Every setting tried, as JSON and as a table.
-const TRIED: &str = "search.json";
-const TRIED_TABLE: &str = "search.csv";
+pub(super) const TRIED: &str = "search.json";
+pub(super) const TRIED_TABLE: &str = "search.csv";
 /// Half a decade.
 const RATIO: f64 = 3.162_277_660_168_379_5;
 /// Most steps from the last scale of the default decay to its first.
@@ -120,7 +120,7 @@ fn stopped_early<T: Task>(
     session.finish(
         folder,
         report,
-        "search.json and search.csv hold every setting tried",
+        &[TRIED, TRIED_TABLE].map(|file| Beside::new(file, "every setting tried")),
         None,
         output,
     )

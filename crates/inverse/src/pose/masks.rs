@@ -200,6 +200,11 @@ impl<B: RasterBackend> MaskScene<B> {
         }
     }
 
+    /// What counts of an image `[views, size, size]` less the mask, on `side` × `side` pixels: `[views, side, side]`.
+    pub(super) fn differences(&self, image: Tensor<B, 3>, side: usize) -> Tensor<B, 3> {
+        self.targets.differences(image, side)
+    }
+
     /// Views, and numbers of θ for each.
     fn shape(&self) -> [usize; 2] {
         [self.depth.dims()[0], if self.optimise_fov { 7 } else { 6 }]

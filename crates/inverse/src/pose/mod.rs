@@ -7,6 +7,7 @@
 mod coloured;
 mod glance;
 mod instance;
+mod least_squares;
 mod masks;
 mod problem;
 mod scene;

@@ -8,6 +8,7 @@ use softrast_tensor::{numbers, tensor};
 
 use super::{
     glance::glance,
+    least_squares::least_squares,
     masks::{MaskPose, MaskPoses},
     target::Target,
 };
@@ -60,8 +61,11 @@ impl Stages {
     }
 }
 
-/// Poses whose focal length is optimised, the factors from which each begins, and the least depth of the middle of the mesh, in its radii.
-const ZOOMED: usize = 3;
+/// Poses that are brought to their least squares.
+const SHARPENED: usize = 3;
+/// What the last stage counts for in steps, where the focal length is given.
+const SHARPENING_STEPS: usize = 16;
+/// Factors of the focal length from which the best pose begins where it is optimised (with colours the best few), and the least depth of the middle of the mesh, in its radii.
 const ZOOMS: [f64; 3] = [0.65, 1.0, 1.5];
 const NEAREST: f64 = 1.2;
 
@@ -80,7 +84,7 @@ pub struct PoseSearch {
 
 impl Default for PoseSearch {
     fn default() -> Self {
-        Self { fine_steps: 80, fine_size: 128, learning_rate: 0.03, optimise_fov: false }
+        Self { fine_steps: 20, fine_size: 128, learning_rate: 0.03, optimise_fov: false }
     }
 }
 
@@ -96,6 +100,13 @@ pub struct FoundPose {
     pub psnr: Option<f64>,
 }
 
+impl FoundPose {
+    /// Angle between the rotations of this pose and another, in degrees.
+    pub fn angle_deg(&self, other: &Self) -> f64 {
+        angle_deg(&self.camera, &other.camera)
+    }
+}
+
 impl Borrow<Pinhole> for FoundPose {
     fn borrow(&self) -> &Pinhole {
         &self.camera
@@ -103,11 +114,22 @@ impl Borrow<Pinhole> for FoundPose {
 }
 
 impl PoseSearch {
+    /// The usual search by colours: only silhouettes are brought to their least squares, so it takes four times the steps on many pixels.
+    pub fn by_colour() -> Self {
+        Self { fine_steps: 80, ..Self::default() }
+    }
+
     /// Steps that [`PoseSearch::run`] takes for a mask from a start, or from anywhere.
     pub fn steps(&self, mask: &Picture, started: bool) -> usize {
         let Stages { coarse, last, .. } = Stages::of(!cut_sides(mask).is_empty());
-        let fine = 1 + usize::from(last > 0) + usize::from(self.optimise_fov);
-        fine * self.fine_steps + if started { 0 } else { STARTS.1 + coarse.1 }
+        let fine = (1 + usize::from(last > 0)) * self.fine_steps + self.sharpening_steps();
+        fine + if started { 0 } else { STARTS.1 + coarse.1 }
+    }
+
+    /// What the last stage counts for: with masks poses are brought to their least squares, with colours and an optimised focal length they
+    /// are improved once more.
+    fn sharpening_steps(&self) -> usize {
+        if self.optimise_fov { self.fine_steps } else { SHARPENING_STEPS }
     }
 
     /// What [`PoseSearch::run`] would refuse at once.
@@ -207,10 +229,15 @@ impl PoseSearch {
             let better = fixed.improved::<B>(mesh, poses, method, &fine, begun, visit)?;
             found.extend(better);
         }
-        if self.optimise_fov {
+        found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        if target.painted.is_none() {
             begun += self.fine_steps;
-            found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-            let best = found.iter().take(ZOOMED).flat_map(|(camera, _)| zoomed(camera));
+            let steps = self.sharpening_steps();
+            let visit = |share: f64| visit(begun + (share * steps as f64) as usize, found[0].1);
+            found = self.sharpened(mesh, target, &found, visit)?;
+        } else if self.optimise_fov {
+            begun += self.fine_steps;
+            let best = found.iter().take(SHARPENED).flat_map(|(camera, _)| zoomed(camera));
             let poses = target.poses(best.collect::<Vec<_>>(), true);
             found.extend(self.improved::<B>(mesh, poses, method, &fine, begun, visit)?);
         }
@@ -282,6 +309,35 @@ impl PoseSearch {
         let least = found.first().map_or(0.0, |&(_, loss)| loss);
         let found = found.into_iter().filter(|&(_, loss)| loss <= least + PROMISING_MARGIN);
         Ok(found.map(|(start, _)| start).collect())
+    }
+
+    /// These poses, the first of them brought to their least squares: with the focal length that they have or, beside all of them as they are,
+    /// with an optimised one. `visit` sees the share that is done.
+    fn sharpened(
+        &self,
+        mesh: &Mesh,
+        target: &Target<'_>,
+        found: &[(Pinhole, f64)],
+        mut visit: impl FnMut(f64) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
+        let (best, others) = found.split_at(SHARPENED.min(found.len()));
+        let best = best.iter().map(|(camera, _)| *camera);
+        let starts: Vec<Pinhole> = match self.optimise_fov {
+            true => zoomed(&found[0].0).chain(best.skip(1)).collect(),
+            false => best.collect(),
+        };
+        let count = starts.len() as f64;
+        let sharp = target.poses(starts, false).into_iter().enumerate().map(|(k, pose)| {
+            let visit = || visit(k as f64 / count);
+            least_squares(mesh, &pose, self.optimise_fov, self.fine_size, visit)
+        });
+        let sharp = sharp.collect::<anyhow::Result<Vec<_>>>()?;
+        if !self.optimise_fov {
+            return Ok([&sharp, others].concat());
+        }
+        // Of one pose with several focal lengths, squares tell the best.
+        let sharp = apart(sharp, ANSWERS, ANSWERS_APART_DEG, None);
+        Ok([found, &sharp].concat())
     }
 
     /// Poses with the error of their hard image on few pixels: with colours, if they are asked for.
@@ -407,7 +463,7 @@ fn overlap(a: &[bool], b: &[bool]) -> f64 {
 }
 
 /// Angle between the rotations of two cameras.
-fn angle_deg(a: &Pinhole, b: &Pinhole) -> f64 {
+pub(super) fn angle_deg(a: &Pinhole, b: &Pinhole) -> f64 {
     let trace: f64 =
         a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(x, y)| x * y).sum();
     ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()

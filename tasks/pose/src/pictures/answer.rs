@@ -1,6 +1,9 @@
 //! The report of the poses found, and the files written with it.
 
-use std::{collections::HashSet, path::PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use image::RgbImage;
 use serde_json::{Value, json};
@@ -11,10 +14,10 @@ use softrast_inverse::{
 };
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
-    format::{counted, line},
+    format::{counted, fit, line, short},
     overlay, png,
     program::Output,
-    report::{Report, Table},
+    report::{Beside, Labelled, Report, Table},
     rgb_from_planes, shown,
 };
 use softrast_mesh::Mesh;
@@ -72,11 +75,14 @@ pub(super) fn answer(
     let json = json(mesh, solved, &warnings, single);
     let output = Output { text: text(mesh, solved, single), json, warnings, partial: None };
     let beside = if single {
-        "result.json holds the camera and the alternatives, overlay.png the picture"
+        ["the camera and the alternatives", "the mask with the silhouette"]
     } else {
-        "result.json holds all cameras and alternatives, poses.csv a line for each picture"
+        ["all cameras and alternatives", "a line for each pose"]
     };
-    Ok(Answer { page, output, files, beside: beside.to_owned() })
+    let second = if single { names[0].as_str() } else { POSES };
+    let beside = ["result.json", second].into_iter().zip(beside);
+    let beside = beside.map(|(file, holds)| Beside::new(file, holds)).collect();
+    Ok(Answer { page, output, files, beside })
 }
 
 /// A line for each pose of many pictures.
@@ -100,68 +106,136 @@ pub(super) fn overlay_names(pictures: &[PathBuf], single: bool) -> Vec<String> {
 }
 
 fn page(
-    Framed { mesh, frame, .. }: &Framed,
+    mesh: &Framed,
     solved: &[Solved],
     overlays: &[RgbImage],
     warnings: &[String],
     single: bool,
 ) -> anyhow::Result<Report> {
     let mut page = Report::new("pose", "The camera from which a mesh has the silhouette of a mask");
+    page.verdict(&verdict(solved, single));
     page.warnings(warnings);
     let small: Vec<RgbImage> = overlays.iter().map(|overlay| for_page(overlay.clone())).collect();
     let first = &small[..SHOWN.min(small.len())];
     page.viewer(
-        &viewer(mesh, solved)?,
+        &viewer(&mesh.mesh, solved, single)?,
         &png(&contact_sheet(first, 4.min(first.len())))?,
-        "The mesh and the cameras that were found. A view shows it with the outline of its mask.",
+        "The mesh, and the cameras that were found. Choose a view to look through its camera, with the outline of the mask.",
     );
-    let mut table = Table::new(["picture", "IoU", "other poses", "their IoU", "seconds"]);
-    for (one, overlay) in solved.iter().zip(&small) {
-        let Solved { path, poses, seconds, .. } = one;
-        page.heading(&path.display().to_string());
-        page.picture(
-            &png(overlay)?,
-            "The mask in grey with the silhouette of the answer over it: orange where only the mask is, blue where only the silhouette is.",
+    if single {
+        section(&mut page, mesh, &solved[0], &small[0])?;
+    } else {
+        let pictures = solved.iter().zip(&small).map(|(one, overlay)| {
+            let label = format!("{}: IoU {:.4}", name(&one.path), one.poses[0].iou);
+            Ok(Labelled { picture: png(overlay)?, label })
+        });
+        page.gallery(&pictures.collect::<anyhow::Result<Vec<_>>>()?, OVERLAY);
+        page.table(&table(solved));
+        for (one, overlay) in solved.iter().zip(&small) {
+            let mut filled = Ok(());
+            page.folded(&format!("{}: the camera", name(&one.path)), |page| {
+                filled = section(page, mesh, one, overlay);
+            });
+            filled?;
+        }
+    }
+    page.note(
+        "R and t are for the mesh as it is in its file, as OpenCV has them: a point p is seen at R p + t, with x right, y down and z ahead.",
+    );
+    Ok(page)
+}
+
+const OVERLAY: &str = "The silhouette of the mesh over the mask: grey where both are, orange where only the mask is, blue where only the silhouette is.";
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Whether the poses fit, in a sentence or two.
+fn verdict(solved: &[Solved], single: bool) -> String {
+    let best = |one: &Solved| one.poses[0].iou;
+    if let (true, [one]) = (single, solved) {
+        let fits = format!("The pose {} the mask (IoU {:.4}).", fit(best(one)), best(one));
+        let others = match one.poses.len() - 1 {
+            0 => "No other pose fits nearly as well.".to_owned(),
+            1 => "Another pose fits nearly as well.".to_owned(),
+            others => format!("{others} other poses fit nearly as well."),
+        };
+        return format!("{fits} {others}");
+    }
+    let fitting = solved.iter().filter(|one| fit(best(one)) == fit(1.0)).count();
+    let mean = solved.iter().map(best).sum::<f64>() / solved.len() as f64;
+    format!(
+        "The pose fits the mask in {fitting} of {} pictures (mean IoU {mean:.4}).",
+        solved.len()
+    )
+}
+
+/// The pose of a picture, with what can be looked at and copied.
+fn section(
+    page: &mut Report,
+    mesh: &Framed,
+    one: &Solved,
+    overlay: &RgbImage,
+) -> anyhow::Result<()> {
+    let Framed { mesh, frame, .. } = mesh;
+    let best = one.of_file(frame, &one.poses[0]);
+    let label = format!("{}: IoU {:.4}", name(&one.path), best.iou);
+    let mut pictures = vec![Labelled { picture: png(overlay)?, label }];
+    if let Some(images) = beside(mesh, one) {
+        for (image, label) in
+            images.into_iter().zip(["The picture, over black", "The mesh in its own colours"])
+        {
+            pictures.push(Labelled { picture: png(&image)?, label: label.to_owned() });
+        }
+    }
+    page.gallery(&pictures, OVERLAY);
+    page.table(&of_camera(&best, frame));
+    let json = camera_json(&best.camera);
+    let compact = json!({ "R": json["R"], "t": json["t"], "K": json["K"], "width": json["width"], "height": json["height"] });
+    page.copyable("OpenCV: R, t and K", &compact.to_string());
+    let framed =
+        json!({ "file_path": name(&one.path), "transform_matrix": json["transform_matrix"] });
+    page.copyable("nerfstudio: a frame of transforms.json", &framed.to_string());
+    let numbers = json["colmap"].as_array().into_iter().flatten().map(Value::to_string);
+    let numbers: Vec<String> = numbers.collect();
+    page.copyable(
+        "COLMAP: a line of images.txt",
+        &format!("1 {} 1 {}", numbers.join(" "), name(&one.path)),
+    );
+    let others = one.poses[1..].iter().enumerate().map(|(k, pose)| {
+        let turned = pose.angle_deg(&one.poses[0]);
+        let label =
+            format!("Alternative {}: IoU {:.4}, turned by {turned:.0} degrees", k + 1, pose.iou);
+        Ok(Labelled { picture: png(&for_page(drawn(mesh, one, pose)))?, label })
+    });
+    let others = others.collect::<anyhow::Result<Vec<_>>>()?;
+    if !others.is_empty() {
+        page.gallery(
+            &others,
+            match one.painted {
+                Some(_) => "Other poses that fit nearly as well.",
+                None => "Other poses that fit nearly as well: a silhouette does not tell them apart. A symmetric mesh has such poses.",
+            },
         );
-        if let Some(pair) = beside(mesh, one)? {
-            page.picture(
-                &png(&pair)?,
-                "The colours of the picture that count, over black, and the mesh in its own colours at the answer.",
-            );
-        }
-        page.table(&of_camera(&one.of_file(frame, &poses[0])));
-        if poses.len() > 1 {
-            let others = poses[1..].iter().map(|pose| for_page(drawn(mesh, one, pose)));
-            let others: Vec<RgbImage> = others.collect();
-            page.picture(
-                &png(&contact_sheet(&others, 3.min(others.len())))?,
-                match one.painted {
-                    Some(_) => "Other poses that fit nearly as well.",
-                    None => {
-                        "Other poses that fit nearly as well: a silhouette does not tell them apart."
-                    }
-                },
-            );
-        }
+    }
+    Ok(())
+}
+
+fn table(solved: &[Solved]) -> Table {
+    let mut table = Table::new(["picture", "IoU", "other poses", "their IoU", "seconds"]);
+    for Solved { path, poses, seconds, .. } in solved {
         let others: Vec<String> =
             poses[1..].iter().map(|pose| format!("{:.4}", pose.iou)).collect();
         table.push([
             path.display().to_string(),
             format!("{:.4}", poses[0].iou),
-            (poses.len() - 1).to_string(),
+            others.len().to_string(),
             others.join(", "),
             format!("{seconds:.1}"),
         ]);
     }
-    if !single {
-        page.heading("All pictures");
-        page.table(&table);
-    }
-    page.note(
-        "R and t are for the mesh as it is in its file, as OpenCV has them: a point p is seen at R p + t, with x right, y down and z ahead. \
-         result.json also has them as nerfstudio (transform_matrix) and COLMAP (colmap) write them.",
-    );
-    Ok(page)
+    table
 }
 
 fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> Value {
@@ -205,20 +279,19 @@ fn drawn(mesh: &Mesh, one: &Solved, pose: &FoundPose) -> RgbImage {
 }
 
 /// The colours of a picture, and those of the mesh at the answer.
-fn beside(mesh: &Mesh, one: &Solved) -> anyhow::Result<Option<RgbImage>> {
-    let Some(view) = &one.painted else { return Ok(None) };
+fn beside(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
+    let view = one.painted.as_ref()?;
     let camera = &one.poses[0].camera;
     let picture = view.over_black.iter().flat_map(|channel| channel.pixels());
     let [red, green, blue, _] = coloured_pixels(mesh, camera);
     let planes = [picture.map(|&x| f64::from(x)).collect(), [red, green, blue].concat()];
-    let images = planes.map(|planes: Vec<f64>| {
+    Some(planes.map(|planes: Vec<f64>| {
         for_page(rgb_from_planes(&planes, camera.size.width, camera.size.height))
-    });
-    Ok(Some(contact_sheet(&images, 2)))
+    }))
 }
 
-/// The mesh with all poses that were found.
-fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
+/// The mesh with all poses that were found, seen first through the only one.
+fn viewer(mesh: &Mesh, solved: &[Solved], single: bool) -> anyhow::Result<Viewer> {
     // A page keeps coordinates in 32 bits.
     let frame = Frame::of_mesh(mesh);
     let views = solved.iter().flat_map(|Solved { path, mask, poses, .. }| {
@@ -234,6 +307,7 @@ fn viewer(mesh: &Mesh, solved: &[Solved]) -> anyhow::Result<Viewer> {
         faces: mesh.faces().to_vec(),
         colours: mesh.colours().map(<[_]>::to_vec),
         views: views.collect::<anyhow::Result<_>>()?,
+        opens: single.then_some(0),
     })
 }
 
@@ -292,17 +366,23 @@ fn csv(frame: &Frame, solved: &[Solved]) -> String {
     })
 }
 
-fn of_camera(pose: &FoundPose) -> Table {
+fn of_camera(pose: &FoundPose, frame: &Frame) -> Table {
     let camera = &pose.camera;
     let row =
         |values: &[f64]| values.iter().map(|x| format!("{x:.5}")).collect::<Vec<_>>().join(", ");
-    let mut pairs = vec![["IoU".to_owned(), format!("{:.4}", pose.iou)]];
-    pairs.extend(pose.psnr.map(|psnr| ["colours, PSNR".to_owned(), format!("{psnr:.1} dB")]));
+    let mut pairs = Vec::new();
+    pairs.extend(pose.psnr.map(|psnr| ["Colours, PSNR".to_owned(), format!("{psnr:.1} dB")]));
     for (k, values) in camera.rotation.iter().enumerate() {
         pairs.push([format!("R, row {}", k + 1), row(values)]);
     }
     pairs.push(["t".to_owned(), row(&camera.translation)]);
-    pairs.push(["fx, fy, cx, cy".to_owned(), row(&[camera.focal, camera.centre].concat())]);
+    pairs.push(["Camera stands at".to_owned(), row(&camera.eye())]);
+    let distance = camera.seen(frame.middle).iter().map(|x| x * x).sum::<f64>().sqrt();
+    pairs.push(["Distance to the middle of the mesh".to_owned(), short(distance)]);
+    pairs.push([
+        "fx, fy, cx, cy in pixels".to_owned(),
+        row(&[camera.focal, camera.centre].concat()),
+    ]);
     Table::pairs(pairs)
 }
 

@@ -92,7 +92,8 @@ pub(crate) fn solve_pictures(
         coloured(args, &mesh)?;
     }
     let (method, backend) = (given.method()?, given.backend()?);
-    let mut search = PoseSearch { optimise_fov: args.optimise_fov, ..PoseSearch::default() };
+    let usual = if args.colour { PoseSearch::by_colour() } else { PoseSearch::default() };
+    let mut search = PoseSearch { optimise_fov: args.optimise_fov, ..usual };
     search.learning_rate = given.learning_rate().unwrap_or(search.learning_rate);
     search.fine_size = given.common.size.unwrap_or(search.fine_size);
     search.fine_steps = given.common.steps.unwrap_or(search.fine_steps);

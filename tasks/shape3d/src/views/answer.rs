@@ -2,19 +2,20 @@
 
 use std::path::PathBuf;
 
+use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, seen_by};
 use softrast_inverse::{Frame, View, faces_across_note};
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
-    format::{counted, line},
+    format::{counted, fit, line},
     overlay, png,
     program::Output,
-    report::{Report, Table},
+    report::{Beside, Labelled, Report, Table},
 };
 use softrast_mesh::Mesh;
 
-use super::painted::{self, Colours};
+use super::painted::Colours;
 use crate::Args;
 
 /// Files of every result, and those of one in colour.
@@ -38,6 +39,29 @@ pub(super) struct Scored {
     /// If colours were asked for.
     pub(super) colours: Option<Colours>,
     pub(super) held_out: bool,
+}
+
+impl Scored {
+    fn psnr(&self) -> Option<f64> {
+        self.colours.as_ref()?.psnr
+    }
+
+    /// In words.
+    fn scores(&self) -> String {
+        let psnr = self.psnr().map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
+        format!("IoU {:.4}{psnr}{}", self.iou, if self.held_out { ", held out" } else { "" })
+    }
+
+    /// The silhouette over the mask.
+    fn overlay(&self) -> RgbImage {
+        let View { mask, camera, .. } = &self.view;
+        for_page(overlay(&self.silhouette, mask.pixels(), camera.size.width))
+    }
+
+    /// Picture and result in colour.
+    fn pair(&self) -> Option<[RgbImage; 2]> {
+        Some(self.colours.as_ref()?.pair(self.view.camera.size))
+    }
 }
 
 /// The mean of a score of the views that were kept aside, or of the others.
@@ -65,12 +89,11 @@ pub(super) fn answer(
     notes: Vec<String>,
     seconds: f64,
 ) -> anyhow::Result<Answer> {
-    let psnr = |one: &Scored| one.colours.as_ref()?.psnr;
     let iou = |one: &Scored| Some(one.iou);
     let summary = Summary {
         train: mean(scored, false, iou).unwrap_or(f64::NAN),
         held_out: mean(scored, true, iou),
-        psnr: [false, true].map(|held_out| mean(scored, held_out, psnr)),
+        psnr: [false, true].map(|held_out| mean(scored, held_out, Scored::psnr)),
         path: given.folder().join(MESHES[0]),
         seconds,
     };
@@ -90,19 +113,14 @@ pub(super) fn answer(
             summary.train
         ));
     }
-    let sheet: Vec<_> = shown(scored)
-        .map(|one| overlay(&one.silhouette, one.view.mask.pixels(), one.view.camera.size.width))
-        .map(for_page)
-        .collect();
+    let sheet: Vec<RgbImage> = shown(scored).map(Scored::overlay).collect();
     let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
-    let coloured =
-        shown(scored).filter_map(|one| Some((one.colours.as_ref()?, one.view.camera.size)));
-    let colours = painted::sheet(coloured).map(|sheet| png(&sheet));
-    let colours = colours.transpose()?;
+    let pairs: Vec<RgbImage> = shown(scored).filter_map(Scored::pair).flatten().collect();
+    let colours = (!pairs.is_empty()).then(|| png(&contact_sheet(&pairs, 4))).transpose()?;
     let text = text(mesh, scored, &summary);
-    let page = page(mesh, scored, &warnings, &text[1..], &picture, colours.as_deref())?;
+    let page = page(mesh, scored, &summary, &warnings, &picture, colours.as_deref())?;
     let json = json(mesh, scored, &summary, &warnings);
-    let mut beside = "mesh.obj, mesh.ply and mesh.glb are the mesh, result.json holds the scores, views.png the picture".to_owned();
+    let mut beside = Vec::new();
     let mut files = vec![
         (MESHES[0].to_owned(), mesh.to_obj().into_bytes()),
         (MESHES[1].to_owned(), mesh.to_ply()),
@@ -111,12 +129,15 @@ pub(super) fn answer(
     ];
     if let Some(colours) = colours {
         files.push((IN_COLOUR[0].to_owned(), colours));
-        beside += ", colours.png the same in colour";
     }
     if let Some(textured) = textured {
         files.push((IN_COLOUR[1].to_owned(), textured.to_glb()));
-        beside += ", textured.glb the mesh with its colours as a texture";
+        let holds = "the mesh with its colours as a texture, for viewers and engines";
+        beside.push(Beside::new(IN_COLOUR[1], holds));
     }
+    let holds = ["the mesh as text", "the mesh for mesh tools", "the mesh for viewers and engines"];
+    beside.extend(MESHES.into_iter().zip(holds).map(|(file, holds)| Beside::new(file, holds)));
+    beside.push(Beside::new("result.json", "the scores of every view"));
     let output = Output { text, json, warnings, partial: None };
     Ok(Answer { page, output, files, beside })
 }
@@ -142,12 +163,28 @@ fn text(mesh: &Mesh, scored: &[Scored], summary: &Summary) -> Vec<String> {
     scores.chain(rest).chain(glb).chain([seconds]).collect()
 }
 
+/// Whether the mesh fits, in a sentence or two.
+fn verdict(mesh: &Mesh, summary: &Summary) -> String {
+    let Summary { train, held_out, psnr, seconds, .. } = summary;
+    let aside = held_out.map_or_else(String::new, |iou| format!(", {iou:.4} in views held out"));
+    let colours = match psnr {
+        [Some(psnr), None] => format!(" Its colours have a PSNR of {psnr:.1} dB."),
+        [_, Some(psnr)] => format!(" Its colours have a PSNR of {psnr:.1} dB in views held out."),
+        [None, None] => String::new(),
+    };
+    let (vertices, faces) = (mesh.positions().len(), mesh.faces().len());
+    format!(
+        "The mesh {} the masks (IoU {train:.4}{aside}).{colours} {vertices} vertices, {faces} faces, {seconds:.1} s.",
+        fit(*train)
+    )
+}
+
 fn page(
     mesh: &Mesh,
     scored: &[Scored],
+    summary: &Summary,
     warnings: &[String],
-    text: &[String],
-    picture: &[u8],
+    sheet: &[u8],
     colours: Option<&[u8]>,
 ) -> anyhow::Result<Report> {
     let about = match colours {
@@ -155,48 +192,75 @@ fn page(
         None => "A mesh that has the silhouettes of given masks",
     };
     let mut page = Report::new("shape3d", about);
+    page.verdict(&verdict(mesh, summary));
     page.warnings(warnings);
-    let psnr = |one: &Scored| one.colours.as_ref().and_then(|colours| colours.psnr);
     // A page keeps coordinates in 32 bits.
     let frame = Frame::of_mesh(mesh);
     let views = scored.iter().map(|one| {
-        let Scored { view, iou, held_out, .. } = one;
-        let psnr = psnr(one).map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
-        let note = format!("IoU {iou:.4}{psnr}{}", if *held_out { ", kept aside" } else { "" });
-        seen_by(view.name.clone(), &frame.camera(&view.camera), &view.mask, note)
+        seen_by(
+            one.view.name.clone(),
+            &frame.camera(&one.view.camera),
+            &one.view.mask,
+            one.scores(),
+        )
     });
     let viewer = Viewer {
         positions: mesh.positions().iter().map(|&p| frame.point(p)).collect(),
         faces: mesh.faces().to_vec(),
         colours: mesh.colours().map(<[_]>::to_vec),
         views: views.collect::<anyhow::Result<_>>()?,
+        opens: None,
     };
     page.viewer(
         &viewer,
-        colours.unwrap_or(picture),
-        "The mesh and the cameras. A view shows it with the outline of its mask.",
+        colours.unwrap_or(sheet),
+        "The mesh and the cameras. Choose a view to look through its camera, with the outline of the mask.",
     );
-    if let Some(colours) = colours {
-        page.picture(colours, painted::CAPTION);
-    }
-    page.picture(
-        picture,
-        "Masks with the silhouettes of the result over them: grey where both are, orange where only the mask is, blue where only the \
-         silhouette is. Views that were kept aside come first.",
-    );
-    text.iter().for_each(|line| page.paragraph(line));
     page.heading("Views");
-    let head =
-        ["view", "IoU"].into_iter().chain(colours.map(|_| "PSNR in dB")).chain(["kept aside"]);
-    let mut table = Table::new(head);
-    for one in scored {
-        let aside = if one.held_out { "yes" } else { "" };
-        let row = [one.view.name.clone(), format!("{:.4}", one.iou)];
-        let psnr = colours.map(|_| psnr(one).map(|x| format!("{x:.2}")).unwrap_or_default());
-        table.push(row.into_iter().chain(psnr).chain([aside.to_owned()]));
+    let (mut overlays, mut pairs) = (Vec::new(), Vec::new());
+    for one in shown(scored) {
+        let label = format!("{}: {}", one.view.name, one.scores());
+        overlays.push(Labelled { picture: png(&one.overlay())?, label });
+        for (image, what) in one.pair().into_iter().flatten().zip(["photograph", "mesh"]) {
+            let label = format!("{}: {what}", one.view.name);
+            pairs.push(Labelled { picture: png(&image)?, label });
+        }
     }
-    page.table(&table);
+    let which = match overlays.len() == scored.len() {
+        true => String::new(),
+        false => format!(" {} of {} views are shown.", overlays.len(), scored.len()),
+    };
+    if !pairs.is_empty() {
+        page.gallery(
+            &pairs,
+            &format!("Each photograph where its mask is, and the mesh from there.{which}"),
+        );
+    }
+    page.gallery(
+        &overlays,
+        &format!(
+            "The silhouette of the mesh over each mask: grey where both are, orange where only the mask is, blue where only the silhouette \
+             is.{which}"
+        ),
+    );
+    page.table(&table(scored, colours.is_some()));
     Ok(page)
+}
+
+/// Held-out views first, as their pictures.
+fn table(scored: &[Scored], in_colour: bool) -> Table {
+    let any_held_out = scored.iter().any(|one| one.held_out);
+    let head = ["view", "IoU"].into_iter().chain(in_colour.then_some("PSNR in dB"));
+    let mut table = Table::new(head.chain(any_held_out.then_some("held out")));
+    let [aside, fitted] =
+        [true, false].map(|aside| scored.iter().filter(move |one| one.held_out == aside));
+    for one in aside.chain(fitted) {
+        let row = [one.view.name.clone(), format!("{:.4}", one.iou)];
+        let psnr = in_colour.then(|| one.psnr().map(|x| format!("{x:.2}")).unwrap_or_default());
+        let aside = any_held_out.then(|| if one.held_out { "yes" } else { "" }.to_owned());
+        table.push(row.into_iter().chain(psnr).chain(aside));
+    }
+    table
 }
 
 fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) -> Value {
@@ -219,7 +283,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
     if mesh.colours().is_some() {
         (json["train_psnr"], json["held_out_psnr"]) = (json!(psnr[0]), json!(psnr[1]));
         for (view, one) in json["views"].as_array_mut().into_iter().flatten().zip(scored) {
-            view["psnr"] = json!(one.colours.as_ref().and_then(|colours| colours.psnr));
+            view["psnr"] = json!(one.psnr());
         }
     }
     json

@@ -3,7 +3,7 @@
 use image::RgbImage;
 use softrast_cli::Given;
 use softrast_inverse::{PaintedView, SolveConfig, coloured_pixels, paint};
-use softrast_lab::{contact_sheet, for_page, rgb_from_planes};
+use softrast_lab::{for_page, rgb_from_planes};
 use softrast_mesh::Mesh;
 use softrast_raster::ImageSize;
 
@@ -14,10 +14,6 @@ const STEPS: usize = 60;
 const LEARNING_RATE: f64 = 0.05;
 /// Pixels a side. With 192 instead of 128 spot gains 0.1 dB.
 const SIZE: usize = 128;
-
-/// What the picture of [`sheet`] shows.
-pub(super) const CAPTION: &str = "In colour, over black: each picture where its mask is, and to the right of it the result from there. Views \
-                                  that were kept aside come first.";
 
 /// What a view shows in colour, and the result from there.
 pub(super) struct Colours {
@@ -35,6 +31,12 @@ impl Colours {
         let picture = picture.map(|&x| f64::from(x)).collect();
         let [red, green, blue, _] = drawn;
         Self { psnr, planes: [picture, [red, green, blue].concat()] }
+    }
+
+    /// The picture and the result, for a page.
+    pub(super) fn pair(&self, size: ImageSize) -> [RgbImage; 2] {
+        let image = |planes: &Vec<f64>| rgb_from_planes(planes, size.width, size.height);
+        self.planes.each_ref().map(|planes| for_page(image(planes)))
     }
 }
 
@@ -56,14 +58,4 @@ pub(super) fn painted(
     visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
 ) -> anyhow::Result<Mesh> {
     paint(mesh, views, &config(given), visit)
-}
-
-/// Pictures and results side by side, two pairs in a row; none without colours.
-pub(super) fn sheet<'a>(views: impl Iterator<Item = (&'a Colours, ImageSize)>) -> Option<RgbImage> {
-    let pair = |(colours, size): (&'a Colours, ImageSize)| {
-        let image = |planes| for_page(rgb_from_planes(planes, size.width, size.height));
-        colours.planes.each_ref().map(|planes| image(planes))
-    };
-    let images: Vec<RgbImage> = views.flat_map(pair).collect();
-    (!images.is_empty()).then(|| contact_sheet(&images, 4))
 }

@@ -1,0 +1,54 @@
+//! Poses of masks whose focal length nobody knows, and the page that shows one.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+use softrast_test_kit::Program;
+
+fn fox(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");
+    folder.join(name).to_str().unwrap().to_owned()
+}
+
+#[test]
+fn an_unknown_focal_length_is_found_to_five_percent_and_the_fit_is_never_worse() {
+    let out = tempfile::tempdir().unwrap();
+    let solved = |words: &[&str]| {
+        let program = Program::new(env!("CARGO_BIN_EXE_pose"));
+        program.run_words(out.path(), &[&["solve"], words].concat()).unwrap()
+    };
+    let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
+    let of = |camera: &Value| camera["K"][0][0].as_f64().unwrap();
+    for view in [3, 4] {
+        let target = fox(&format!("images/{view:02}.png"));
+        let assumed = solved(&["--target", &target]);
+        let found = solved(&["--target", &target, "--optimise-fov"]);
+        let iou = |result: &Value| result["iou"].as_f64().unwrap();
+        assert!(iou(&found) >= iou(&assumed), "{} after {}", iou(&found), iou(&assumed));
+        let ratio = of(&found["camera"]) / of(&truth["views"][view]);
+        assert!((ratio - 1.0).abs() < 0.05 && iou(&found) > 0.97, "view {view}: {ratio}, {found}");
+    }
+}
+
+#[test]
+fn the_page_has_the_verdict_first_and_the_camera_in_three_forms() {
+    let out = tempfile::tempdir().unwrap();
+    let (target, camera) = (fox("images/04.png"), fox("transforms.json"));
+    let program = Program::new(env!("CARGO_BIN_EXE_pose"));
+    let words = ["solve", "--target", &target, "--camera", &camera, "--size", "64"];
+    let found = program.run_words(out.path(), &words).unwrap();
+    let page = fs::read_to_string(out.path().join("report.html")).unwrap();
+    let verdict = format!("The pose fits the mask (IoU {:.4}).", found["iou"].as_f64().unwrap());
+    let (at, viewer) = (page.find(&verdict).unwrap(), page.find("<div class=\"viewer\">").unwrap());
+    assert!(at < viewer && page.contains("\"opens\":0"), "the page does not open with the answer");
+    for label in ["OpenCV: R, t and K", "nerfstudio: a frame", "COLMAP: a line of images.txt"] {
+        assert!(page.contains(label), "{label}");
+    }
+    let turn = found["camera"]["colmap"][0].to_string();
+    assert!(page.contains(&format!("1 {turn} ")), "the line of COLMAP has another pose");
+    for file in ["result.json", "overlay.png"] {
+        assert!(page.contains(&format!("<a href=\"{file}\">")) && out.path().join(file).exists());
+    }
+}
