@@ -62,6 +62,11 @@ async function iou(page, index) {
 async function turns(file) {
   const { browser, page, wrong } = await open(file, WEBGL);
   await page.locator(".viewer-stage").first().scrollIntoViewIfNeeded();
+  const opens = await page.evaluate(() => JSON.parse(document.querySelector(".viewer script").textContent).opens ?? -1);
+  assert.equal(Number(await page.locator(".viewer select").first().inputValue()), opens, "the view that the page opens through");
+  await drawn(page);
+  assert.equal(await page.locator(".viewer-stage canvas").nth(1).isVisible(), opens >= 0, "its outline");
+  await page.getByRole("button", { name: "Reset" }).click();
   const start = await pixels(page);
   const box = await page.locator(".viewer canvas").first().boundingBox();
   const middle = [box.x + box.width / 2, box.y + box.height / 2];
@@ -80,11 +85,18 @@ async function turns(file) {
   assert.ok(await pixels(page) !== zoomed, "keys turn");
   await page.getByRole("button", { name: "Reset" }).click();
   assert.ok(await pixels(page) === start, "Reset brings the start back");
+  // A viewer leaves the wheel to a page that is being scrolled, as a click on what is not in view does.
+  await page.waitForTimeout(300);
   await page.mouse.move(...middle);
   await page.mouse.wheel(0, 2000);
   const far = await pixels(page);
   await page.getByRole("checkbox", { name: "Cameras" }).uncheck();
   assert.ok(await pixels(page) !== far, "cameras can be hidden");
+
+  await page.getByLabel("Up").selectOption({ label: "−y" });
+  const hanging = await pixels(page);
+  assert.ok(hanging !== start && hanging !== far, "another axis may be up");
+  await page.getByLabel("Up").selectOption({ index: 0 });
 
   const colours = page.getByRole("checkbox", { name: "Colours" });
   const painted = await page.evaluate(() => Boolean(JSON.parse(document.querySelector(".viewer script").textContent).colours));

@@ -144,7 +144,7 @@ pub fn warnings(json: &Value) -> String {
 /// If one is, or is missing.
 pub fn assert_finite(json: &Value) {
     for error in ["image_error", "parameter_error"] {
-        for key in ["initial", "final", "best"] {
+        for key in ["initial", "returned", "final", "best"] {
             assert!(json[error][key].as_f64().is_some_and(f64::is_finite), "{error} {key}: {json}");
         }
     }

@@ -87,12 +87,12 @@ impl<B: RasterBackend> Run for MaskRun<B> {
     }
 
     fn prepare(&mut self, told: &mut dyn FnMut(f64)) -> anyhow::Result<()> {
-        let search = PoseSearch { fine_steps: 0, ..PoseSearch::default() };
+        let search = PoseSearch::default();
         // A softness with feedback solves one instance at a time; here there are many, and only coarse.
         let mut method = self.method.clone();
         method.softness.feedback = None;
         told(0.0);
-        let steps = search.steps(&self.mask, false) as f64;
+        let steps = PoseSearch::steps_of_starts(&self.mask) as f64;
         let starts = search.starts::<Backend>(
             &self.mesh,
             &self.mask,

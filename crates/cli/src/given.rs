@@ -38,7 +38,7 @@ pub struct Answer {
     pub output: Output,
     /// Names and contents of files beside the page.
     pub files: Vec<(String, Vec<u8>)>,
-    /// Those of them that a person opens, and what they hold.
+    /// Files that the page links to.
     pub beside: Vec<Beside>,
 }
 

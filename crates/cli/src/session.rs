@@ -102,3 +102,6 @@ pub(crate) const OF_RUN: [&str; 4] = ["before_after.png", "animation.gif", "curv
 pub(crate) const OF_RUNS: &str = "convergence.csv";
 pub(crate) const OF_OTHERS: &str = "against_curve.csv";
 pub(crate) const DRAWING: &str = "result.svg";
+/// Every setting that a search tried, as JSON and as a table.
+pub(crate) const TRIED: &str = "search.json";
+pub(crate) const TRIED_TABLE: &str = "search.csv";

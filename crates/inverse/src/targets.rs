@@ -90,7 +90,7 @@ impl<B: RasterBackend> Targets<B> {
         mse_loss(image, target)
     }
 
-    /// What counts of an image `[views, size, size]` less the target, averaged down to `side` × `side` pixels: `[views, side, side]`.
+    /// The difference of an image `[views, size, size]` and the target where it counts, averaged down to `side` × `side` pixels: `[views, side, side]`.
     ///
     /// # Panics
     ///

@@ -77,3 +77,19 @@ pub(crate) fn nested<'a>(objects: impl Iterator<Item = (&'a Metric, Value)>) -> 
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Point, Role};
+
+    #[test]
+    fn an_error_is_returned_where_the_score_is_least() {
+        let values = [[0.5, 1.0], [0.1, 2.0], [0.3, 0.5]];
+        let point = |(step, values): (usize, &[f64; 2])| Point { step, values: values.to_vec() };
+        let run = Run { curve: values.iter().enumerate().map(point).collect(), ..Run::default() };
+        let metric = Metric { key: "angle", name: "angle", unit: "degrees", role: Role::Error };
+        let error = ErrorSummary::new(metric, [1, 0], &[run], false);
+        assert_eq!([error.initial, error.returned, error.last, error.best], [1.0, 2.0, 0.5, 0.5]);
+    }
+}

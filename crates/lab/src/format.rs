@@ -28,11 +28,14 @@ pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
-/// How a silhouette with this intersection over union suits its mask, as a verb: `fits`, `fits in part` or `does not fit`.
+/// Intersection over union from which on a silhouette fits its mask.
+pub const FITS: f64 = 0.95;
+
+/// Whether a silhouette with this intersection over union fits its mask, in words: `fits`, `partly fits` or `does not fit`.
 pub fn fit(iou: f64) -> &'static str {
     match iou {
-        0.95.. => "fits",
-        0.8.. => "fits in part",
+        FITS.. => "fits",
+        0.8.. => "partly fits",
         _ => "does not fit",
     }
 }

@@ -9,14 +9,11 @@ use softrast_lab::{
     report::{Beside, Report},
 };
 
-use super::{
-    search::{TRIED, TRIED_TABLE},
-    settings_section,
-};
+use super::settings_section;
 use crate::{
     Task, TaskExperiment,
     diagnostics::diagnostics,
-    session::{DRAWING, OF_OTHERS, OF_RUNS, RESULT, Session},
+    session::{DRAWING, OF_OTHERS, OF_RUNS, RESULT, Session, TRIED, TRIED_TABLE},
 };
 
 /// An experiment and what it came to.

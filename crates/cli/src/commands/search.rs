@@ -17,13 +17,10 @@ use super::{
 use crate::{
     MethodArgs, Purpose, Schedule, SoftnessChoice, Task, TaskExperiment, Variant,
     command_line::{Search, Shared},
-    session::Session,
+    session::{Session, TRIED, TRIED_TABLE},
     task::HARD,
 };
 
-/// Every setting tried, as JSON and as a table.
-pub(super) const TRIED: &str = "search.json";
-pub(super) const TRIED_TABLE: &str = "search.csv";
 /// Half a decade.
 const RATIO: f64 = 3.162_277_660_168_379_5;
 /// Most steps from the last scale of the default decay to its first.

@@ -5,45 +5,49 @@
 
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole};
-use softrast_tensor::{numbers, tensor};
+use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::masks::{MaskPose, MaskPoses, MaskScene};
 use crate::InverseProblem;
 
 /// Pixels a side that are drawn for each pixel that is compared.
 const SAMPLES: usize = 4;
+/// Most pixels a side that are compared, which bounds memory: 14 images of 1024 × 1024 pixels are drawn.
+const MOST: usize = 256;
 /// Most steps.
 const STEPS: usize = 12;
 /// A step that gains less than this share of the error is the last.
 const LEAST_GAIN: f64 = 1e-3;
 /// Dampings of a step, all of which are tried; with 0 it is that of Gauss and Newton.
 const DAMPINGS: [f64; 4] = [0.0, 0.03, 0.3, 3.0];
+/// Least square of what a number of θ does, by damping, against the mean of all, for a move of a pixel: one that does nothing stays.
+const LEAST_SQUARE: f64 = 1e-2;
 /// How far a number of θ moves for a difference, in pixels that are compared: differences over less would see single pixels that are drawn.
 const PIXELS: f64 = 1.0;
 /// A longer lens moves what is seen by so many times less than a turn does.
 const OF_ZOOM: f64 = 0.25;
 
 /// The pose near this one from which the silhouette of the mesh differs least from the mask, with the focal length or without, and the mean
-/// squared difference over `size` × `size` pixels. It is the pose itself where none near it is better. `visit` is called at each step; an
-/// error of it ends the search.
+/// squared difference over `size` × `size` pixels (256 × 256 at most). It is the pose itself where none near it is better. `visit` sees the share
+/// that is done at each step; an error of it ends the search.
 pub(super) fn least_squares(
     mesh: &Mesh,
     pose: &MaskPose,
     optimise_fov: bool,
     size: usize,
-    mut visit: impl FnMut() -> anyhow::Result<()>,
+    mut visit: impl FnMut(f64) -> anyhow::Result<()>,
 ) -> anyhow::Result<(Pinhole, f64)> {
-    let views = Views::new(mesh, pose, optimise_fov, size);
+    let views = Views::new(mesh, pose, optimise_fov, size.min(MOST));
     let mut theta = vec![0.0; views.moves.len()];
     let mut now = views.differences(&[theta.clone()]).swap_remove(0);
-    for _ in 0..STEPS {
-        visit()?;
+    for step in 0..STEPS {
+        visit(step as f64 / STEPS as f64)?;
         let Some((better, differences)) = views.step(&theta, &now) else { break };
         let (error, least) = (squares(&now), squares(&differences));
         if least.is_nan() || least >= error {
             break;
         }
-        (theta, now) = (better, differences);
+        (theta, now) = (views.held(&better), differences);
         if error - least < LEAST_GAIN * error {
             break;
         }
@@ -82,13 +86,24 @@ impl Views {
         all.take(self.instances.len()).flatten().collect()
     }
 
+    /// These numbers as a tensor of all views, within what is allowed.
+    fn allowed(&self, thetas: &[Vec<f64>]) -> Tensor<HostBackend, 1> {
+        let theta = self.theta(thetas);
+        let length = theta.len();
+        self.problem.allowed(&self.scene, tensor(theta, [length]))
+    }
+
+    /// θ within what is allowed.
+    fn held(&self, theta: &[f64]) -> Vec<f64> {
+        let mut all = numbers(self.allowed(&[theta.to_vec()]));
+        all.truncate(theta.len());
+        all
+    }
+
     /// The differences of image and mask at each of these.
     fn differences(&self, thetas: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let Self { problem, scene, size, .. } = self;
-        let theta = self.theta(thetas);
-        let length = theta.len();
-        let theta = problem.allowed(scene, tensor(theta, [length]));
-        let image = problem.hard_image(scene, theta);
+        let image = problem.hard_image(scene, self.allowed(thetas));
         let all = numbers(scene.differences(image.squeeze_dim(1), *size));
         all.chunks(size * size).take(thetas.len()).map(<[f64]>::to_vec).collect()
     }
@@ -111,9 +126,14 @@ impl Views {
         let normal: Vec<Vec<f64>> =
             slopes.iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect();
         let down: Vec<f64> = slopes.iter().map(|slope| -dot(slope, now)).collect();
+        let of_pixel = |k: usize| normal[k][k] * self.moves[k].powi(2);
+        let mean = (0..count).map(of_pixel).sum::<f64>() / count as f64;
         let stepped = |damping: f64| {
             let mut damped = normal.clone();
-            (0..count).for_each(|k| damped[k][k] *= 1.0 + damping);
+            for k in 0..count {
+                let least = LEAST_SQUARE * mean / self.moves[k].powi(2);
+                damped[k][k] += damping * normal[k][k].max(least);
+            }
             let step = solved(damped, down.clone())?;
             Some(theta.iter().zip(step).map(|(at, step)| at + step).collect())
         };
@@ -127,10 +147,7 @@ impl Views {
     }
 
     fn camera(&self, theta: &[f64]) -> Pinhole {
-        let theta = self.theta(&[theta.to_vec()]);
-        let length = theta.len();
-        let theta = self.problem.allowed(&self.scene, tensor(theta, [length]));
-        self.scene.found(theta, &self.instances[..1])[0]
+        self.scene.found(self.allowed(&[theta.to_vec()]), &self.instances[..1])[0]
     }
 }
 
@@ -191,7 +208,7 @@ mod tests {
     fn found(pose: &MaskPose, optimise_fov: bool) -> (Pinhole, [f64; 2]) {
         let views = Views::new(&fox(), pose, optimise_fov, 64);
         let before = views.differences(&[vec![0.0; views.moves.len()]]);
-        let (camera, after) = least_squares(&fox(), pose, optimise_fov, 64, || Ok(())).unwrap();
+        let (camera, after) = least_squares(&fox(), pose, optimise_fov, 64, |_| Ok(())).unwrap();
         (camera, [after, squares(&before[0]) / before[0].len() as f64])
     }
 
@@ -232,6 +249,19 @@ mod tests {
         let beside = Pinhole { translation: [50.0, 0.0, 3.2], ..camera(0.0, 0.0) };
         let (stays, [after, before]) = found(&start(&mask, beside), true);
         assert_eq!((stays, after), (beside, before));
+    }
+
+    #[test]
+    fn a_number_that_changes_nothing_does_not_stop_the_others() {
+        // Nobody can tell the focal length of a lens of a tenth of a degree: zoom and depth together change nothing.
+        let orbit =
+            Orbit { distance: 1800.0, elevation_deg: 10.0, azimuth_deg: 40.0, fov_deg: 0.1 };
+        let truth = Pinhole::of_orbit(&orbit, SIDE);
+        let near =
+            Pinhole::of_orbit(&Orbit { elevation_deg: 13.0, azimuth_deg: 36.0, ..orbit }, SIDE);
+        let (found, [after, before]) = found(&start(&seen(&truth), near), true);
+        let off = crate::pose::search::angle_deg(&found, &truth);
+        assert!(off < 1.0 && after < 0.1 * before, "{off} degrees, {before} to {after}");
     }
 
     #[test]

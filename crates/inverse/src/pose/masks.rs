@@ -200,7 +200,7 @@ impl<B: RasterBackend> MaskScene<B> {
         }
     }
 
-    /// What counts of an image `[views, size, size]` less the mask, on `side` × `side` pixels: `[views, side, side]`.
+    /// The difference of an image `[views, size, size]` and the mask where it counts, on `side` × `side` pixels: `[views, side, side]`.
     pub(super) fn differences(&self, image: Tensor<B, 3>, side: usize) -> Tensor<B, 3> {
         self.targets.differences(image, side)
     }

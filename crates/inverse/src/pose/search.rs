@@ -63,7 +63,7 @@ impl Stages {
 
 /// Poses that are brought to their least squares.
 const SHARPENED: usize = 3;
-/// What the last stage counts for in steps, where the focal length is given.
+/// Steps that the last stage counts as.
 const SHARPENING_STEPS: usize = 16;
 /// Factors of the focal length from which the best pose begins where it is optimised (with colours the best few), and the least depth of the middle of the mesh, in its radii.
 const ZOOMS: [f64; 3] = [0.65, 1.0, 1.5];
@@ -119,17 +119,22 @@ impl PoseSearch {
         Self { fine_steps: 80, ..Self::default() }
     }
 
-    /// Steps that [`PoseSearch::run`] takes for a mask from a start, or from anywhere.
-    pub fn steps(&self, mask: &Picture, started: bool) -> usize {
-        let Stages { coarse, last, .. } = Stages::of(!cut_sides(mask).is_empty());
-        let fine = (1 + usize::from(last > 0)) * self.fine_steps + self.sharpening_steps();
-        fine + if started { 0 } else { STARTS.1 + coarse.1 }
+    /// Steps that [`PoseSearch::run`] takes for a mask, or [`PoseSearch::run_by_colour`] for a picture that is `painted` too, from a start
+    /// or from anywhere.
+    pub fn steps(&self, mask: &Picture, painted: Option<&PaintedView>, started: bool) -> usize {
+        let Stages { last, .. } = Stages::of(!cut_sides(mask).is_empty());
+        let fine = (1 + usize::from(last > 0)) * self.fine_steps;
+        let last = match painted {
+            None => SHARPENING_STEPS,
+            Some(_) if self.optimise_fov => self.fine_steps,
+            Some(_) => 0,
+        };
+        fine + last + if started { 0 } else { Self::steps_of_starts(mask) }
     }
 
-    /// What the last stage counts for: with masks poses are brought to their least squares, with colours and an optimised focal length they
-    /// are improved once more.
-    fn sharpening_steps(&self) -> usize {
-        if self.optimise_fov { self.fine_steps } else { SHARPENING_STEPS }
+    /// Steps that [`PoseSearch::starts`] takes for a mask.
+    pub fn steps_of_starts(mask: &Picture) -> usize {
+        STARTS.1 + Stages::of(!cut_sides(mask).is_empty()).coarse.1
     }
 
     /// What [`PoseSearch::run`] would refuse at once.
@@ -232,8 +237,9 @@ impl PoseSearch {
         found.sort_by(|(_, a), (_, b)| a.total_cmp(b));
         if target.painted.is_none() {
             begun += self.fine_steps;
-            let steps = self.sharpening_steps();
-            let visit = |share: f64| visit(begun + (share * steps as f64) as usize, found[0].1);
+            let loss = found.first().context("no pose was tried")?.1;
+            let visit =
+                |share: f64| visit(begun + (share * SHARPENING_STEPS as f64).ceil() as usize, loss);
             found = self.sharpened(mesh, target, &found, visit)?;
         } else if self.optimise_fov {
             begun += self.fine_steps;
@@ -311,8 +317,8 @@ impl PoseSearch {
         Ok(found.map(|(start, _)| start).collect())
     }
 
-    /// These poses, the first of them brought to their least squares: with the focal length that they have or, beside all of them as they are,
-    /// with an optimised one. `visit` sees the share that is done.
+    /// These poses, the first few at their least squares: with the focal length that they have and, if it is optimised, with any. `visit` sees
+    /// the share that is done.
     fn sharpened(
         &self,
         mesh: &Mesh,
@@ -321,23 +327,24 @@ impl PoseSearch {
         mut visit: impl FnMut(f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
         let (best, others) = found.split_at(SHARPENED.min(found.len()));
-        let best = best.iter().map(|(camera, _)| *camera);
-        let starts: Vec<Pinhole> = match self.optimise_fov {
-            true => zoomed(&found[0].0).chain(best.skip(1)).collect(),
-            false => best.collect(),
+        let best: Vec<Pinhole> = best.iter().map(|(camera, _)| *camera).collect();
+        let zoomed = best.first().into_iter().flat_map(zoomed).chain(best.iter().skip(1).copied());
+        let zoomed: Vec<Pinhole> = zoomed.filter(|_| self.optimise_fov).collect();
+        let count = (best.len() + zoomed.len()) as f64;
+        let mut done = 0.0;
+        let mut sharp = |starts: Vec<Pinhole>, optimise_fov: bool| {
+            let poses = target.poses(starts, false).into_iter().map(|pose| {
+                let visit = |share: f64| visit((done + share) / count);
+                let sharp = least_squares(mesh, &pose, optimise_fov, self.fine_size, visit)?;
+                done += 1.0;
+                anyhow::Ok(sharp)
+            });
+            poses.collect::<anyhow::Result<Vec<_>>>()
         };
-        let count = starts.len() as f64;
-        let sharp = target.poses(starts, false).into_iter().enumerate().map(|(k, pose)| {
-            let visit = || visit(k as f64 / count);
-            least_squares(mesh, &pose, self.optimise_fov, self.fine_size, visit)
-        });
-        let sharp = sharp.collect::<anyhow::Result<Vec<_>>>()?;
-        if !self.optimise_fov {
-            return Ok([&sharp, others].concat());
-        }
-        // Of one pose with several focal lengths, squares tell the best.
-        let sharp = apart(sharp, ANSWERS, ANSWERS_APART_DEG, None);
-        Ok([found, &sharp].concat())
+        let (fixed, free) = (sharp(best, false)?, sharp(zoomed, true)?);
+        // Squares choose among several focal lengths of one pose: an IoU counts whole pixels.
+        let free = apart(free, ANSWERS, ANSWERS_APART_DEG, None);
+        Ok([&fixed, others, &free].concat())
     }
 
     /// Poses with the error of their hard image on few pixels: with colours, if they are asked for.

@@ -1,9 +1,9 @@
 //! Pages of HTML that need no other file, and tables for them and for Markdown.
 
+mod html;
 mod table;
 
-use base64::{Engine, engine::general_purpose::STANDARD};
-
+pub(crate) use self::html::{escape, image};
 pub use self::table::Table;
 
 /// What a page with a viewer needs.
@@ -49,7 +49,7 @@ impl Report {
         Self { title: escape(title), about: escape(about), body: String::new(), has_viewer: false }
     }
 
-    /// What came out, in a sentence or two, at the top of the page.
+    /// The result in a sentence or two, at the top of the page.
     pub fn verdict(&mut self, text: &str) {
         self.add(format!("<p class=\"verdict\">{}</p>", escape(text)));
     }
@@ -98,7 +98,7 @@ impl Report {
         self.add(table.html());
     }
 
-    /// What `fill` adds, folded away.
+    /// A section that `fill` adds, folded away.
     pub fn folded(&mut self, summary: &str, fill: impl FnOnce(&mut Self)) {
         self.add(format!("<details>\n<summary>{}</summary>", escape(summary)));
         fill(self);
@@ -177,19 +177,6 @@ impl Report {
 }
 
 const STYLE: &str = include_str!("page.css");
-
-/// A picture, PNG or GIF, as an element. The caption stands for it to those who cannot see it.
-pub(crate) fn image(bytes: &[u8], caption: &str) -> String {
-    let kind = if bytes.starts_with(b"GIF") { "gif" } else { "png" };
-    let (data, caption) = (STANDARD.encode(bytes), escape(caption));
-    format!("<img alt=\"{caption}\" src=\"data:image/{kind};base64,{data}\">")
-}
-
-/// Text as HTML.
-pub(crate) fn escape(text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('<', "&lt;");
-    text.replace('>', "&gt;").replace('"', "&quot;")
-}
 
 #[cfg(test)]
 mod tests {

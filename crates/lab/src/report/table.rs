@@ -1,6 +1,6 @@
 use std::fmt::Write;
 
-use super::escape;
+use super::html::escape;
 
 /// Rows of text under a head. `**` at both ends of a cell means bold.
 #[derive(Clone, Debug, Default)]

@@ -14,7 +14,7 @@ use softrast_inverse::{
 };
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
-    format::{counted, fit, line, short},
+    format::{FITS, counted, fit, line, short},
     overlay, png,
     program::Output,
     report::{Beside, Labelled, Report, Table},
@@ -32,6 +32,8 @@ pub(super) struct Framed {
     pub(super) name: String,
     /// In which it is looked for, of its file.
     pub(super) frame: Frame,
+    /// Whether one pose was given to start from, and no other tried.
+    pub(super) started: bool,
 }
 
 /// A mask and what was found for it, the best first.
@@ -113,7 +115,7 @@ fn page(
     single: bool,
 ) -> anyhow::Result<Report> {
     let mut page = Report::new("pose", "The camera from which a mesh has the silhouette of a mask");
-    page.verdict(&verdict(solved, single));
+    page.verdict(&verdict(mesh, solved, single));
     page.warnings(warnings);
     let small: Vec<RgbImage> = overlays.iter().map(|overlay| for_page(overlay.clone())).collect();
     let first = &small[..SHOWN.min(small.len())];
@@ -152,18 +154,19 @@ fn name(path: &Path) -> String {
 }
 
 /// Whether the poses fit, in a sentence or two.
-fn verdict(solved: &[Solved], single: bool) -> String {
+fn verdict(mesh: &Framed, solved: &[Solved], single: bool) -> String {
     let best = |one: &Solved| one.poses[0].iou;
     if let (true, [one]) = (single, solved) {
         let fits = format!("The pose {} the mask (IoU {:.4}).", fit(best(one)), best(one));
         let others = match one.poses.len() - 1 {
+            _ if mesh.started => "Only the given start was refined.".to_owned(),
             0 => "No other pose fits nearly as well.".to_owned(),
             1 => "Another pose fits nearly as well.".to_owned(),
             others => format!("{others} other poses fit nearly as well."),
         };
         return format!("{fits} {others}");
     }
-    let fitting = solved.iter().filter(|one| fit(best(one)) == fit(1.0)).count();
+    let fitting = solved.iter().filter(|one| best(one) >= FITS).count();
     let mean = solved.iter().map(best).sum::<f64>() / solved.len() as f64;
     format!(
         "The pose fits the mask in {fitting} of {} pictures (mean IoU {mean:.4}).",
@@ -191,18 +194,9 @@ fn section(
     }
     page.gallery(&pictures, OVERLAY);
     page.table(&of_camera(&best, frame));
-    let json = camera_json(&best.camera);
-    let compact = json!({ "R": json["R"], "t": json["t"], "K": json["K"], "width": json["width"], "height": json["height"] });
-    page.copyable("OpenCV: R, t and K", &compact.to_string());
-    let framed =
-        json!({ "file_path": name(&one.path), "transform_matrix": json["transform_matrix"] });
-    page.copyable("nerfstudio: a frame of transforms.json", &framed.to_string());
-    let numbers = json["colmap"].as_array().into_iter().flatten().map(Value::to_string);
-    let numbers: Vec<String> = numbers.collect();
-    page.copyable(
-        "COLMAP: a line of images.txt",
-        &format!("1 {} 1 {}", numbers.join(" "), name(&one.path)),
-    );
+    for (label, text) in in_other_forms(&best.camera, &name(&one.path)) {
+        page.copyable(label, &text);
+    }
     let others = one.poses[1..].iter().enumerate().map(|(k, pose)| {
         let turned = pose.angle_deg(&one.poses[0]);
         let label =
@@ -220,6 +214,28 @@ fn section(
         );
     }
     Ok(())
+}
+
+/// A camera in the forms of other programs, each with a label.
+fn in_other_forms(camera: &Pinhole, name: &str) -> [(&'static str, String); 3] {
+    let json = camera_json(camera);
+    let ([fx, fy], [cx, cy]) = (camera.focal, camera.centre);
+    let (w, h) = (camera.size.width, camera.size.height);
+    // OpenCV has (0, 0) in the middle of the first pixel.
+    let k = [[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]];
+    let opencv = json!({ "R": json["R"], "t": json["t"], "K": k });
+    let frame = json!({
+        "file_path": name, "fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": w, "h": h,
+        "transform_matrix": json["transform_matrix"],
+    });
+    let numbers = json["colmap"].as_array().into_iter().flatten().map(Value::to_string);
+    let numbers = numbers.collect::<Vec<_>>().join(" ");
+    let colmap = format!("1 PINHOLE {w} {h} {fx} {fy} {cx} {cy}\n\n1 {numbers} 1 {name}\n");
+    [
+        ("OpenCV: R, t and K (the middle of the first pixel is (0, 0))", opencv.to_string()),
+        ("nerfstudio: a frame of transforms.json", frame.to_string()),
+        ("COLMAP: a line of cameras.txt and one of images.txt, with 1 for both numbers", colmap),
+    ]
 }
 
 fn table(solved: &[Solved]) -> Table {

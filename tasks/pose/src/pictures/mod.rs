@@ -143,13 +143,16 @@ pub(crate) fn solve_pictures(
     let poses = (!single).then_some(POSES);
     reads.extend(paths);
     given.will_write(overlays.iter().map(String::as_str).chain(poses), reads)?;
-    let steps = |(view, _): &(View, _)| search.steps(&view.mask, start.is_some());
+    let steps = |(view, painted): &(View, Option<PaintedView>)| {
+        search.steps(&view.mask, painted.as_ref(), start.is_some())
+    };
     let mut progress = given.progress(tasks.iter().map(steps).sum())?;
     let (mut solved, mut begun) = (Vec::new(), 0);
     for task in tasks {
         let clock = std::time::Instant::now();
-        let (before, (view, painted)) = (begun, task);
-        begun += search.steps(&view.mask, start.is_some());
+        let before = begun;
+        begun += steps(&task);
+        let (view, painted) = task;
         let visit = |step: usize, loss: f64| progress.step(before + step, loss);
         let (View { name, picture: path, mask, camera, distortion, .. }, started) =
             (view, start.is_some());
@@ -167,7 +170,7 @@ pub(crate) fn solve_pictures(
     let mut warnings = warnings(cameras.is_some(), args.optimise_fov, &solved);
     warnings.extend(notes.into_iter().chain(across));
     let name = args.mesh.as_ref().map_or("fox".to_owned(), |path| path.display().to_string());
-    let mesh = Framed { mesh, name, frame };
+    let mesh = Framed { mesh, name, frame, started: start.is_some() };
     answer(&mesh, &solved, &overlays, warnings, single)
 }
 

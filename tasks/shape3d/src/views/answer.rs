@@ -31,7 +31,7 @@ pub(super) fn names(in_colour: bool) -> impl Iterator<Item = &'static str> {
 /// Views that a picture of the result shows.
 const SHOWN: usize = 12;
 
-/// A view, how well the result fits it, and whether it was kept aside.
+/// A view, how well the result fits it, and whether it was held out.
 pub(super) struct Scored {
     pub(super) view: View,
     pub(super) silhouette: Vec<f64>,
@@ -64,7 +64,7 @@ impl Scored {
     }
 }
 
-/// The mean of a score of the views that were kept aside, or of the others.
+/// The mean of a score of the views that were held out, or of the others.
 fn mean(scored: &[Scored], held_out: bool, score: impl Fn(&Scored) -> Option<f64>) -> Option<f64> {
     let of: Vec<f64> =
         scored.iter().filter(|one| one.held_out == held_out).filter_map(score).collect();
@@ -289,7 +289,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
     json
 }
 
-/// Those kept aside, then others evenly spaced.
+/// Those held out, then others evenly spaced.
 fn shown(scored: &[Scored]) -> impl Iterator<Item = &Scored> {
     let aside = scored.iter().filter(|one| one.held_out);
     let train: Vec<&Scored> = scored.iter().filter(|one| !one.held_out).collect();
