@@ -6,7 +6,7 @@ mod table;
 pub(crate) use self::html::{escape, image};
 pub use self::table::Table;
 
-/// What a page with a viewer needs.
+/// Style and script of a page with a viewer.
 pub(crate) const VIEWER: [&str; 2] = [include_str!("../viewer.css"), include_str!("../viewer.js")];
 
 /// A picture, PNG or GIF, with a few words on what it is.
@@ -23,7 +23,7 @@ pub struct Labelled {
 pub struct Beside {
     /// Its name.
     pub file: String,
-    /// What it holds, in a few words.
+    /// Its content, in a few words.
     pub holds: String,
 }
 

@@ -289,7 +289,7 @@ fn json(mesh: &Mesh, scored: &[Scored], summary: &Summary, warnings: &[String]) 
     json
 }
 
-/// Those held out, then others evenly spaced.
+/// Views held out, then others evenly spaced.
 fn shown(scored: &[Scored]) -> impl Iterator<Item = &Scored> {
     let aside = scored.iter().filter(|one| one.held_out);
     let train: Vec<&Scored> = scored.iter().filter(|one| !one.held_out).collect();
