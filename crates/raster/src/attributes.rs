@@ -1,8 +1,7 @@
 use std::sync::Arc;
 
+use softrast_kernel::blend::TEXEL_CHANNELS;
 use softrast_tensor::{Backend, Tensor};
-
-use crate::kernel::blend::TEXEL_CHANNELS;
 
 /// What faces show: numbers at their corners, as many channels as you like, interpolated between them in perspective.
 ///

@@ -1,5 +1,6 @@
 //! Fused ops as a burn backend extension: each with its gradient and the gradient of that.
 
+use softrast_kernel::{Kernels as _, PixelLoss};
 use softrast_tensor::{
     Autodiff, Backend, DType, Element, FloatTensor, Shape, Slice, Tensor, TensorData,
     TensorMetadata, TensorPrimitive,
@@ -9,8 +10,7 @@ use softrast_tensor::{
 
 use crate::{
     ProfileSum, SilhouetteLoss,
-    kernel::PixelLoss,
-    ops::{ElementaryOp, FusedOp, HostFloat, Pass},
+    ops::{ElementaryOp, FusedOp, Numbers, Pass},
 };
 
 fn slice<F: Element>(data: &TensorData) -> &[F] {
@@ -67,7 +67,7 @@ fn numbers<'a, B: RasterBackend, F: Element>(
 }
 
 /// Runs a pass over tensors of one float type on the host.
-fn on_host<B: RasterBackend, F: HostFloat>(
+fn on_host<B: RasterBackend, F: Numbers>(
     op: &FusedOp,
     pass: &Pass,
     tensors: Vec<FloatTensor<B>>,

@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use softrast_kernel::blend::TEXEL_CHANNELS;
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness};
 use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 
@@ -8,7 +9,6 @@ use crate::{
     backend::{fused, primitive},
     cache::Cache,
     curve::precise,
-    kernel::blend::TEXEL_CHANNELS,
     log_curve::{DepthCurve, LogCurve, Precision},
     ops::FusedOp,
     ops::blend::SoftBlend,

@@ -1,7 +1,8 @@
 use rayon::prelude::*;
+use softrast_kernel::inside_spans;
 use softrast_tensor::{Backend, Tensor, TensorData};
 
-use crate::{ImageSize, NEAR, kernel::inside_spans};
+use crate::{ImageSize, NEAR};
 
 /// Hard silhouettes: 1 where the centre of a pixel lies in a face (edges included), else 0.
 ///
@@ -92,47 +93,4 @@ fn covered(vertices: &[f64], views: usize, faces: &[[u32; 3]], size: ImageSize) 
         }
     });
     image
-}
-
-#[cfg(test)]
-mod tests {
-    use softrast_tensor::NdArray;
-
-    use super::*;
-
-    #[test]
-    fn of_faces_that_cut_one_another_each_is_seen_where_it_is_nearer() {
-        // A flat one at depth 2, and one whose depth goes from 1 at x = -1 to 4 at x = 1: one over it is 1/2 at x = 1/3.
-        let vertices = [
-            [-9.0, -9.0, 2.0],
-            [9.0, -9.0, 2.0],
-            [0.0, 9.0, 2.0],
-            [-1.0, -1.0, 1.0],
-            [1.0, -1.0, 4.0],
-            [1.0, 1.0, 4.0],
-            [-1.0, 1.0, 1.0],
-        ];
-        let vertices = Tensor::<NdArray, 2>::from_floats(vertices, &Default::default());
-        let faces = [[0, 1, 2], [3, 4, 5], [3, 5, 6]];
-        let row = &nearest_faces(vertices.clone(), &faces, 6)[12..18];
-        assert_eq!(row[..2], [Some(2); 2], "above the diagonal");
-        assert_eq!(row[4..], [Some(0); 2]);
-        assert!(row[2..4].iter().all(|face| matches!(face, Some(1 | 2))), "{row:?}");
-        let away = nearest_faces(vertices + 50.0, &faces, 6);
-        assert_eq!(away, [None; 36]);
-    }
-
-    #[test]
-    fn of_equally_near_faces_the_first_is_seen_and_flat_ones_never() {
-        let vertices = [
-            [-9.0, -9.0, 2.0],
-            [9.0, -9.0, 2.0],
-            [0.0, 9.0, 2.0],
-            [0.0, 9.0, 1.0],
-            [0.0, -9.0, 1.0],
-        ];
-        let vertices = Tensor::<NdArray, 2>::from_floats(vertices, &Default::default());
-        let faces = [[3, 4, 4], [2, 1, 0], [0, 1, 2]];
-        assert_eq!(nearest_faces(vertices, &faces, 3), [Some(1); 9]);
-    }
 }

@@ -34,8 +34,6 @@ mod curve;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod hard;
-mod image_size;
-mod kernel;
 mod limits;
 mod log_curve;
 mod loss;
@@ -65,7 +63,6 @@ pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use gpu::adapter_name;
 pub use hard::{hard_silhouette, nearest_faces};
-pub use image_size::ImageSize;
 pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use no_adapter::NoAdapter;
@@ -73,6 +70,7 @@ pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, rotate_by_tangent};
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use soft_renderer::SoftRenderer;
+pub use softrast_kernel::ImageSize;
 /// For [`on_backend!`].
 #[doc(hidden)]
 pub use softrast_tensor as tensor;

@@ -1,13 +1,13 @@
+use softrast_kernel::{
+    Grid,
+    blend::{DepthGrid, NOTHING},
+};
 use softrast_softness::{
     DepthSoftness, EdgeSoftness, Family, Mirrored, Softness, settled_beyond, support,
 };
 use softrast_tensor::{Backend, DType, Tensor, numbers};
 
-use crate::{
-    curve::{CubicCurve, FAR, precise, rounding, settled_until},
-    kernel::{Grid, blend::DepthGrid},
-    weighting::NOTHING,
-};
+use crate::curve::{CubicCurve, FAR, precise, rounding, settled_until};
 
 /// Stands for an infinite distance; its square fits an f32.
 const LIMIT: f64 = 1e18;

@@ -1,9 +1,9 @@
+use softrast_kernel::PixelLoss;
 use softrast_tensor::{Backend, Tensor};
 
 use crate::{
     RasterBackend,
     backend::{elementary, primitive},
-    kernel::PixelLoss,
     ops::ElementaryOp,
     tensor_ops,
 };
@@ -42,22 +42,20 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
     }
 }
 
-impl PixelLoss {
-    /// The loss of each view, where a share of each pixel of the image counts, or all of it.
-    pub(crate) fn of_images<B: RasterBackend>(
-        self,
-        image: Tensor<B, 3>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        let image = match counted {
-            Some(counted) => image * counted,
-            None => image,
-        };
-        match self {
-            Self::SquaredError => mse_loss(image, target),
-            Self::Iou => iou_loss(image, target),
-        }
+/// The loss of each view, where a share of each pixel of the image counts, or all of it.
+pub(crate) fn loss_of_images<B: RasterBackend>(
+    loss: PixelLoss,
+    image: Tensor<B, 3>,
+    target: Tensor<B, 3>,
+    counted: Option<Tensor<B, 3>>,
+) -> Tensor<B, 1> {
+    let image = match counted {
+        Some(counted) => image * counted,
+        None => image,
+    };
+    match loss {
+        PixelLoss::SquaredError => mse_loss(image, target),
+        PixelLoss::Iou => iou_loss(image, target),
     }
 }
 

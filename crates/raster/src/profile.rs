@@ -1,3 +1,4 @@
+use softrast_kernel::Grid;
 use softrast_softness::{Softness, support};
 use softrast_tensor::{Backend, DType, Element, Tensor, numbers};
 
@@ -6,7 +7,6 @@ use crate::{
     curve::{
         BEYOND, CubicCurve, FAR, FARTHEST_DRAWN, SIGNS, precise, rounding, settled_until, worse,
     },
-    kernel::Grid,
 };
 
 /// Where coverage is begun to be asked how fast it rises with the sum.

@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use softrast_kernel::PixelLoss;
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, Tensor, TensorData};
 
@@ -7,7 +8,7 @@ use crate::{
     HostBackend, ImageSize, NEAR, Profile, ProfileSum, RasterBackend, TConorm,
     backend::{elementary, pairs, primitive, silhouette_loss, straight_through_sum},
     curve::precise,
-    kernel::PixelLoss,
+    loss::loss_of_images,
     ops::{ElementaryOp, FusedOp},
     profile_sum,
 };
@@ -170,7 +171,8 @@ impl<S: Softness> Silhouette<S> {
         let (table, target) = (table.detach(), target.detach());
         let counted = counted.map(Tensor::detach);
         if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
-            return loss.of_images(self.coverage_by_table(vertices, table), target, counted);
+            let coverage = self.coverage_by_table(vertices, table);
+            return loss_of_images(loss, coverage, target, counted);
         }
         silhouette_loss(&self.op, loss, vertices, table, target, counted)
     }

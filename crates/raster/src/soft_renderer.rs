@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
+use softrast_kernel::PixelLoss;
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
 
 use crate::{
     HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, cache::Cache,
-    kernel::PixelLoss,
+    loss::loss_of_images,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -312,7 +313,7 @@ impl<S: Softness> SoftRenderer<S> {
     ) -> Tensor<B, 1> {
         if self.surrogate.is_some() {
             let counted = counted.map(Tensor::detach);
-            return loss.of_images(self.silhouette(vertices), target.detach(), counted);
+            return loss_of_images(loss, self.silhouette(vertices), target.detach(), counted);
         }
         let (silhouette, table) = self.own_table(&vertices);
         silhouette.loss(loss, vertices, table, target, counted)

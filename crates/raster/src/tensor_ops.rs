@@ -1,10 +1,10 @@
 //! What a step does around the sums: cameras and losses, in tensor ops. A GPU runs these.
 
+use softrast_kernel::EMPTY;
 use softrast_tensor::{Backend, Tensor};
 
 use crate::{
     NEAR, RasterBackend,
-    kernel::EMPTY,
     limits::FARTHEST,
     small_product,
     view::{focal, view_rotation},

@@ -6,9 +6,6 @@ use crate::HostBackend;
 /// Depths beyond this, in world units, are not drawn in colour: one over the square of a depth fits an f32.
 pub(crate) const FARTHEST_SEEN: f64 = 1e15;
 
-/// Above its floor by no more than this part of it, an edge softness is 0: rounding leaves as much.
-pub(crate) const NOTHING: f64 = 1e-4;
-
 /// How much faces count at a pixel: `w = s(d) b(z)`, of the signed distance d in NDC and the depth z of the point of the face that is
 /// nearest to the pixel.
 ///
@@ -47,9 +44,4 @@ pub(crate) fn floor(edge: &impl Softness) -> f64 {
     let limit = edge.log_value(phi, vector::<HostBackend>(&[-1e18]));
     let limit = f64::from(limit.into_scalar());
     if (limit - OPAQUE.ln()).abs() < 1e-3 { OPAQUE } else { 0.0 }
-}
-
-/// The logarithm of an edge softness from which on it counts, above its floor by more than rounding leaves; minus infinity without a floor.
-pub(crate) fn counts_from(floor: f64) -> f64 {
-    (floor / (1.0 - NOTHING)).ln()
 }

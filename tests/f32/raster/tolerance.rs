@@ -1,5 +1,6 @@
 //! No pixel is off by more than is stated, but for the rounding of f32.
 
+use rayon::prelude::*;
 use softrast_raster::{SoftRenderer, TConorm};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::NdArray;
@@ -37,7 +38,8 @@ fn every_number_of_a_table_fits_the_float_type() {
         "dombi:8",
         "schweizer_sklar:-4",
     ];
-    for (family, squared) in Family::ALL.into_iter().flat_map(|it| [(it, false), (it, true)]) {
+    let families = Family::ALL.into_par_iter().flat_map(|it| [(it, false), (it, true)]);
+    families.for_each(|(family, squared)| {
         let softness = EdgeSoftness { family, squared };
         for t_conorm in t_conorms.map(|name| name.parse::<TConorm>().expect("a T-conorm")) {
             for (scale, tolerance) in [(1e-6, 1e-7), (1e-2, 1e-2), (0.1, 1e-8), (10.0, 1e-5)] {
@@ -56,5 +58,5 @@ fn every_number_of_a_table_fits_the_float_type() {
                 );
             }
         }
-    }
+    });
 }

@@ -5,6 +5,7 @@ mod camera;
 mod colour;
 mod elementary;
 mod fused;
+mod hard;
 mod images;
 mod losses;
 mod pinhole;

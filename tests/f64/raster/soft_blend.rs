@@ -80,8 +80,23 @@ impl<S: Softness> Case<S> {
         inputs.into_iter().chain(texels).map(|x| vector(x)).collect()
     }
 
+    fn renderer(&self) -> ColourRenderer<S> {
+        let (faces, weighting) = (self.faces.clone(), self.weighting.clone());
+        ColourRenderer::with_weighting(faces, SIZE, weighting, self.phi.clone())
+            .with_tolerance(self.tolerance)
+    }
+
     /// The image `[1, channels + 1, height, width]` by the kernel or by the reference.
     fn image<T: RasterBackend>(&self, inputs: Inputs<T>, by_kernel: bool) -> Tensor<T, 4> {
+        self.image_by(inputs, by_kernel.then(|| self.renderer()).as_ref())
+    }
+
+    /// The same by a renderer, or by the reference.
+    fn image_by<T: RasterBackend>(
+        &self,
+        inputs: Inputs<T>,
+        renderer: Option<&ColourRenderer<S>>,
+    ) -> Tensor<T, 4> {
         let mut inputs = inputs.into_iter();
         let mut next = || inputs.next().expect("an input");
         let [vertices, attributes, edge, depth, background] = [(); 5].map(|()| next());
@@ -96,11 +111,8 @@ impl<S: Softness> Case<S> {
             colour: background.clone().narrow(0, 0, self.channels),
             log_weight: background.narrow(0, self.channels, 1),
         };
-        if by_kernel {
-            let (faces, weighting) = (self.faces.clone(), self.weighting.clone());
-            ColourRenderer::with_weighting(faces, SIZE, weighting, self.phi.clone())
-                .with_tolerance(self.tolerance)
-                .image_with(vertices, &attributes, [&edge, &depth], &background)
+        if let Some(renderer) = renderer {
+            renderer.image_with(vertices, &attributes, [&edge, &depth], &background)
         } else {
             let scene = Scene { faces: &self.faces, size: SIZE.into() };
             let phi = [edge, depth];
@@ -342,8 +354,9 @@ fn gradients_match_central_differences() {
         }
         case.tolerance = 1e-11;
         let weights = tensor::<A, 4>(&wave(4 * PIXELS, 0.37), [1, 4, SIZE[0], SIZE[1]]);
+        let renderer = case.renderer();
         let value = |inputs: Inputs<A>| {
-            let image = case.image(inputs, true);
+            let image = case.image_by(inputs, Some(&renderer));
             (image.clone() * image * weights.clone()).sum()
         };
         let leaves: Inputs<A> = case.inputs().into_iter().map(Tensor::require_grad).collect();

@@ -1,6 +1,6 @@
 //! How many knots a curve needs, and where.
 
-use crate::kernel::Grid;
+use softrast_kernel::Grid;
 
 /// Octaves of the squared distance that a table may resolve, and cells in an octave (as a power of
 /// two) that it may use, coarsest first.

@@ -4,9 +4,9 @@ mod knots;
 mod precise;
 mod settled;
 
+use softrast_kernel::Grid;
 use softrast_tensor::{Backend, DType, Tensor, TensorData, numbers};
 
-use crate::kernel::Grid;
 pub(crate) use knots::FAR;
 use knots::{EVERYWHERE, NARROWEST, Reached, refined};
 pub(crate) use precise::{precise, rounding};

@@ -1,5 +1,9 @@
 //! One call of the op of colours: which kernels run over which buffers.
 
+use softrast_kernel::{
+    Grid,
+    blend::{DepthGrid, LEAST, counts_from},
+};
 use softrast_tensor::{
     DType, FloatTensorOps, Slice, TensorMetadata,
     wgpu::{WgpuRuntime, cubecl::prelude::*, into_contiguous},
@@ -16,14 +20,7 @@ use super::{
     tile::TILE,
     topology::{OnDevice, Topology},
 };
-use crate::{
-    ImageSize, ProfileSum, SoftBlend,
-    kernel::{
-        Grid,
-        blend::{DepthGrid, LEAST},
-    },
-    weighting::{FARTHEST_SEEN, counts_from},
-};
+use crate::{ImageSize, ProfileSum, SoftBlend, weighting::FARTHEST_SEEN};
 
 /// Stands for no limit.
 const LOWEST: f32 = -1e30;

@@ -1,4 +1,4 @@
-//! How much a point counts by its depth, as `kernel/blend/depth.rs` has it.
+//! How much a point counts by its depth, as `blend/depth.rs` of `kernel` has it.
 
 use cubecl::prelude::*;
 

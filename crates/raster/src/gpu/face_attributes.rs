@@ -1,4 +1,4 @@
-//! The arithmetic of one pixel and one face in colour, as `kernel/blend/{point,walk}.rs` have it.
+//! The arithmetic of one pixel and one face in colour, as `blend/{point,walk}.rs` of `kernel` have it.
 
 use cubecl::prelude::*;
 
@@ -10,7 +10,7 @@ use super::{
     table::add_powers,
     texture::{Four, Sample},
 };
-use crate::kernel::blend::AREA;
+use softrast_kernel::blend::AREA;
 
 /// [`AREA`] in the floats of kernels.
 #[allow(clippy::cast_possible_truncation)]
@@ -297,7 +297,7 @@ impl FaceAttributes {
     }
 
     /// Gradient to x and y of a corner, of a function with these derivatives by the squared distance and by the barycentric weights; see
-    /// `kernel/blend/point.rs`.
+    /// `blend/point.rs` of `kernel`.
     pub(super) fn pulled(self, pair: ColourPair, by_distance2: Dual, by_weights: Corners) -> Moved {
         let zero = Dual::constant(0.0f32);
         let (w0, w1, w2) = (by_weights.a, by_weights.b, by_weights.c);

@@ -1,6 +1,6 @@
 //! The fused op on the GPU: `CubeCL` kernels over the tensors of the wgpu backend, in f32.
 //!
-//! The same sums as in `kernel`, in another order of loops. Culling gives every cell of the image a
+//! The same sums as in `softrast-kernel`, in another order of loops. Culling gives every cell of the image a
 //! bit for each face; the image is a walk of one unit a pixel over the faces of its cell, and so is
 //! the gradient of the table; the gradient to the vertices is gathered, first per face over its
 //! pixels and then per vertex over its faces. They read nothing back. Every sum of floats has

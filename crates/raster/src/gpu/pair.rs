@@ -1,4 +1,4 @@
-//! The arithmetic of one pixel and one face, as `kernel/{face,pair,table}.rs` have it.
+//! The arithmetic of one pixel and one face, as `{face,pair,table}.rs` of `kernel` have it.
 
 use cubecl::prelude::*;
 
@@ -12,7 +12,7 @@ const STEEPEST: f32 = 1e30;
 const MANTISSA: u32 = 23;
 const BIAS: u32 = 127;
 
-/// Where the cells of a profile table lie: a [`Grid`](crate::kernel::Grid) prepared for look-ups.
+/// Where the cells of a profile table lie: a [`Grid`](softrast_kernel::Grid) prepared for look-ups.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
 pub(super) struct Lookup {
     /// From squared distances to what places are read from, without its start.

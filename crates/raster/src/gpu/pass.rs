@@ -1,5 +1,6 @@
 //! One call of the op: which kernels run over which buffers.
 
+use softrast_kernel::Grid;
 use softrast_tensor::{
     DType, TensorMetadata,
     wgpu::{
@@ -20,7 +21,8 @@ use super::{
     tile::TILE,
     topology::OnDevice,
 };
-use crate::{ImageSize, ProfileSum, kernel::Grid};
+
+use crate::{ImageSize, ProfileSum};
 
 pub(super) type Buffer = CubeTensor<WgpuRuntime>;
 

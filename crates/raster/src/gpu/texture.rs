@@ -1,4 +1,4 @@
-//! A texture, sampled between its texels at the points of faces, as `kernel/blend/texture.rs` has it.
+//! A texture, sampled between its texels at the points of faces, as `blend/texture.rs` of `kernel` has it.
 
 use cubecl::prelude::*;
 
@@ -6,7 +6,7 @@ use super::{
     blend_inputs::{BlendInputs, BlendParams, BlendSpec},
     dual::Dual,
 };
-use crate::kernel::blend::TEXEL_CHANNELS;
+use softrast_kernel::blend::TEXEL_CHANNELS;
 
 /// Numbers of a texel.
 pub(super) const NUMBERS: u32 = TEXEL_CHANNELS as u32;

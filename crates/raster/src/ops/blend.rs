@@ -3,17 +3,13 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
+use softrast_kernel::{
+    Grid, Kernels,
+    blend::{DepthGrid, Inputs, Kept},
+};
 use softrast_tensor::{Element, TensorData};
 
-use crate::{
-    ImageSize, NEAR,
-    kernel::{
-        Float, Grid,
-        blend::{self, DepthGrid, Inputs, Kept},
-    },
-    ops::pass::Pass,
-    weighting::FARTHEST_SEEN,
-};
+use crate::{ImageSize, NEAR, ops::pass::Pass, weighting::FARTHEST_SEEN};
 
 /// What stays the same over the calls of the op: faces, image size, the places of the knots, and what may be left out.
 #[derive(Clone, Debug)]
@@ -45,7 +41,7 @@ impl SoftBlend {
     /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, numbers]`, `tables` `[rows, 4]`,
     /// `background` `[channels + 1]` and, if there is one, a texture `[texels, 4]`, to an image `[views, channels + 1, height, width]`, top
     /// row first.
-    pub(crate) fn run<F: Float + Element>(
+    pub(crate) fn run<F: Kernels + Element>(
         &self,
         pass: &Pass,
         slices: &[&[F]],
@@ -75,7 +71,7 @@ impl SoftBlend {
         };
         let own = OnceLock::new();
         let kept = self.kept.as_deref().unwrap_or(&own);
-        let kept = kept.get_or_init(|| Box::new(Kept::new(&inputs, self.kept.is_some())));
+        let kept = kept.get_or_init(|| Box::new(F::kept(&inputs, self.kept.is_some())));
         let kept: &Kept<F> = kept.downcast_ref().expect("passes over the same inputs");
         // Of each input, the texture being the last of five.
         let five = |flags: &[bool]| {
@@ -85,14 +81,14 @@ impl SoftBlend {
         let values = match pass {
             Pass::Forward => {
                 let shape = [views, channels + 1, self.size.height, self.size.width];
-                return TensorData::new(blend::forward(&inputs, kept), shape);
+                return TensorData::new(F::blend(&inputs, kept), shape);
             }
-            Pass::Vjp { wanted } => blend::vjp(&inputs, kept, slices[count], five(wanted)),
+            Pass::Vjp { wanted } => F::blend_vjp(&inputs, kept, slices[count], five(wanted)),
             Pass::VjpOfVjp { along, wanted } => {
                 let [a, b, c, d, e] = five(wanted);
                 let wanted = [a, b, c, d, e, wanted[count]];
                 let [upstream, direction] = [slices[count], slices[count + 1]];
-                blend::vjp_of_vjp(&inputs, kept, upstream, direction, five(along), wanted)
+                F::blend_vjp_of_vjp(&inputs, kept, upstream, direction, five(along), wanted)
             }
         };
         let length = values.len();

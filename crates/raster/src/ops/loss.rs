@@ -1,10 +1,10 @@
 use std::sync::{Arc, OnceLock};
 
+use softrast_kernel::{Bands, Inputs, Judged, Kernels, PixelLoss, rows_of_losses};
 use softrast_tensor::{Element, TensorData};
 
 use crate::{
     ProfileSum,
-    kernel::{self, Float, Inputs, Judged, PixelLoss, rows_of_losses},
     ops::{
         elementary::{ElementaryOp, Number, dual_upstream, flat},
         pass::Pass,
@@ -31,7 +31,7 @@ impl SilhouetteLoss {
 
     /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[rows, 4]`, a `target` and, if the op is weighted, the share of each pixel
     /// that counts, both `[1 or views, height, width]`, to losses `[views]`. Only the vertices have a gradient.
-    pub(crate) fn run<F: Float + Element + Number<Float = F>>(
+    pub(crate) fn run<F: Kernels + Element + Number<Float = F>>(
         &self,
         pass: &Pass,
         slices: &[&[F]],
@@ -44,8 +44,8 @@ impl SilhouetteLoss {
         let rows = rows_of_losses(views, self.sum.size);
         let inputs = Inputs { rows, ..self.sum.inputs(views, vertices, table) };
         let own = OnceLock::new();
-        let bands = self.sum.kept.as_deref().unwrap_or(&own).get_or_init(|| inputs.bands());
-        let losses = |gradient| kernel::losses(&inputs, bands, judged, self.loss, gradient);
+        let bands = self.sum.kept.as_deref().unwrap_or(&own).get_or_init(|| F::bands(&inputs));
+        let losses = |gradient| F::losses(&inputs, bands, judged, self.loss, gradient);
         let own_gradient = OnceLock::new();
         let gradient = || {
             let kept = self.kept.as_deref().unwrap_or(&own_gradient);
@@ -97,15 +97,15 @@ impl SilhouetteLoss {
     }
 
     /// The derivative of the gradient `Σ upstream · loss` along a direction of the vertices.
-    fn along<F: Float + Element + Number<Float = F>>(
+    fn along<F: Kernels + Element + Number<Float = F>>(
         &self,
         inputs: &Inputs<F>,
-        bands: &kernel::Bands,
+        bands: &Bands,
         judged: Judged<F>,
         [upstream, direction]: [&[F]; 2],
         dims: &[Vec<usize>],
     ) -> Vec<F> {
-        let sums = kernel::forward(inputs, bands);
+        let sums = F::sums(inputs, bands);
         let image = vec![dims[0][0], self.sum.size.height, self.sum.size.width];
         let shapes = [image, dims[2].clone()];
         let loss = match self.loss {
@@ -116,10 +116,10 @@ impl SilhouetteLoss {
         let still = vec![F::ZERO; sums.len()];
         let [by_sums, _] = dual_upstream(loss, [&sums, &still], judged, upstream, &shapes);
         let (along, wanted) = ([true, false], [true, false, true]);
-        let pulled = kernel::vjp_of_vjp(inputs, bands, &by_sums, direction, along, wanted);
+        let pulled = F::sums_vjp_of_vjp(inputs, bands, &by_sums, direction, along, wanted);
         let (curved, moved) = pulled.split_at(inputs.vertices.len());
         let [_, change] = dual_upstream(loss, [&sums, moved], judged, upstream, &shapes);
-        let rest = kernel::vjp(inputs, bands, &change, [true, false]);
+        let rest = F::sums_vjp(inputs, bands, &change, [true, false]);
         curved.iter().zip(rest).map(|(&a, b)| a + b).collect()
     }
 }

@@ -9,6 +9,7 @@ pub(crate) mod loss;
 pub(crate) mod pass;
 pub(crate) mod sum;
 
+use softrast_kernel::Kernels;
 use softrast_tensor::{Element, TensorData};
 
 use blend::SoftBlend;
@@ -17,8 +18,6 @@ use elementary::Number;
 use loss::SilhouetteLoss;
 pub use pass::Pass;
 use sum::ProfileSum;
-
-use crate::kernel::{self, Float, Inputs};
 
 /// An op with derivatives of its own.
 #[derive(Clone, Debug)]
@@ -58,21 +57,9 @@ impl FusedOp {
     }
 }
 
-/// Floats of the ops that run on the host.
-pub(crate) trait HostFloat: Numbers + Float + Number<Float = Self> {
-    /// Number of pixel-face pairs that a walk visits.
-    fn pairs(inputs: &Inputs<Self>) -> usize;
-}
-
 macro_rules! host_float {
     ($float:ty) => {
-        // Functions that are not generic, so that the kernels are compiled here and not again in every crate that draws.
-        impl HostFloat for $float {
-            fn pairs(inputs: &Inputs<Self>) -> usize {
-                kernel::pairs(inputs)
-            }
-        }
-
+        // A function that is not generic, so that the ops are compiled here and not again in every crate that draws.
         impl Numbers for $float {
             fn run_pass(
                 op: &FusedOp,
@@ -91,7 +78,7 @@ host_float!(f64);
 
 fn run<F>(op: &FusedOp, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
 where
-    F: Numbers + Float + Number<Float = F>,
+    F: Numbers + Kernels + Number<Float = F>,
 {
     match op {
         FusedOp::ProfileSum(op) => op.run(pass, slices, dims),

@@ -1,12 +1,9 @@
 use std::sync::{Arc, OnceLock};
 
+use softrast_kernel::{Bands, Grid, Inputs, Kernels, rows_of_bands};
 use softrast_tensor::{Element, TensorData};
 
-use crate::{
-    ImageSize,
-    kernel::{self, Bands, Float, Grid, Inputs, rows_of_bands},
-    ops::pass::Pass,
-};
+use crate::{ImageSize, ops::pass::Pass};
 
 /// What stays the same over the calls of the op: faces, image size and the places of the knots.
 #[derive(Clone, Debug)]
@@ -48,7 +45,7 @@ impl ProfileSum {
 
     /// A pass over `vertices` `[views, 3, vertices]` (x and y in NDC, depth in world units) and a `table` `[rows, 4]`, to sums
     /// `[views, height, width]`, top row first.
-    pub(crate) fn run<F: Float + Element>(
+    pub(crate) fn run<F: Kernels + Element>(
         &self,
         pass: &Pass,
         slices: &[&[F]],
@@ -57,19 +54,19 @@ impl ProfileSum {
         let views = dims[0][0];
         let inputs = self.inputs(views, slices[0], slices[1]);
         let own = OnceLock::new();
-        let bands = self.kept.as_deref().unwrap_or(&own).get_or_init(|| inputs.bands());
+        let bands = self.kept.as_deref().unwrap_or(&own).get_or_init(|| F::bands(&inputs));
         let values = match pass {
             Pass::Forward => {
                 return TensorData::new(
-                    kernel::forward(&inputs, bands),
+                    F::sums(&inputs, bands),
                     [views, self.size.height, self.size.width],
                 );
             }
-            Pass::Vjp { wanted } => kernel::vjp(&inputs, bands, slices[2], [wanted[0], wanted[1]]),
+            Pass::Vjp { wanted } => F::sums_vjp(&inputs, bands, slices[2], [wanted[0], wanted[1]]),
             Pass::VjpOfVjp { along, wanted } => {
                 let wanted = [wanted[0], wanted[1], wanted[2]];
                 let along = [along[0], along[1]];
-                kernel::vjp_of_vjp(&inputs, bands, slices[2], slices[3], along, wanted)
+                F::sums_vjp_of_vjp(&inputs, bands, slices[2], slices[3], along, wanted)
             }
         };
         let length = values.len();

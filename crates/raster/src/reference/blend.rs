@@ -1,5 +1,9 @@
 //! Colours of whole meshes, in tensor ops.
 
+use softrast_kernel::{
+    FAR_AWAY,
+    blend::{AREA, counts_from},
+};
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, Bool, Int, Tensor, TensorData};
 
@@ -8,10 +12,10 @@ use super::{
     distance::{Boundary, corners, signed},
     places,
 };
+
 use crate::{
     Attributes, Background, NEAR, Weighting,
-    kernel::{FAR_AWAY, blend::AREA},
-    weighting::{FARTHEST_SEEN, counts_from, floor},
+    weighting::{FARTHEST_SEEN, floor},
 };
 
 /// Stands for the logarithm of a weight of 0.

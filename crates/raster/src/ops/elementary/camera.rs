@@ -3,11 +3,9 @@
 use rayon::prelude::*;
 
 use super::{Elementary, Views, number::Number};
-use crate::{
-    NEAR,
-    kernel::{Dual, Float},
-    limits::FARTHEST,
-};
+use softrast_kernel::{Dual, Float};
+
+use crate::{NEAR, limits::FARTHEST};
 
 /// Orbits `[views, 4]` to matrices `[views, 3, 4]`; see [`crate::project`].
 #[derive(Clone, Copy, Debug)]

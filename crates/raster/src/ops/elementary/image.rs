@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Elementary, Views, number::Number};
-use crate::kernel::{EMPTY, Float};
+use softrast_kernel::{EMPTY, Float};
 
 /// Pixels that one task takes; sums of them are added in order, whatever the number of threads.
 const PIXELS: usize = 8192;

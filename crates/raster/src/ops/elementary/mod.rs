@@ -5,6 +5,7 @@ mod image;
 mod number;
 mod op;
 
+use softrast_kernel::{Dual, Float};
 use softrast_tensor::{Element, TensorData};
 
 pub(crate) use number::Number;
@@ -12,7 +13,6 @@ pub use op::ElementaryOp;
 pub(crate) use op::dual_upstream;
 
 use super::pass::Pass;
-use crate::kernel::{Dual, Float};
 
 /// An op that is written for any number. `dims` are the shapes of the inputs.
 pub(super) trait Elementary: Sync {

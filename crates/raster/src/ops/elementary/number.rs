@@ -1,6 +1,6 @@
 use std::ops::{Add, Mul, Sub};
 
-use crate::kernel::{Dual, Float};
+use softrast_kernel::{Dual, Float};
 
 /// A number that the small ops compute with: a float, or one with its derivative along a direction.
 pub(crate) trait Number:

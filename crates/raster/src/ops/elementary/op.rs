@@ -1,5 +1,6 @@
 //! The ops that are written for any number.
 
+use softrast_kernel::{Dual, Float, Judged};
 use softrast_tensor::{Element, TensorData};
 
 use super::{
@@ -9,10 +10,8 @@ use super::{
     number::Number,
     run,
 };
-use crate::{
-    kernel::{Dual, Float, Judged},
-    ops::pass::Pass,
-};
+
+use crate::ops::pass::Pass;
 
 /// An op that is written for any number.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,134 @@
+//! The point of a face nearest to a pixel, and what moves it.
+
+use crate::{
+    face::Face,
+    lanes::Lanes,
+    pair::{Closest, closest},
+    real::{Float, Mask, Real, splat},
+};
+
+/// Faces whose doubled area (NDC²) is no more than this have no inside that counts: their points are those of their boundary. No pixel's
+/// centre lies in such a face but by chance, and dividing by its area would leave the range of f32.
+pub const AREA: f64 = 1e-15;
+
+/// Barycentric weights on the screen of a face: `constant + x px + y py` each, in all lanes.
+pub(super) struct Barycentric<T: Real> {
+    constant: [T; 3],
+    x: [T; 3],
+    y: [T; 3],
+    /// Whether the area is large enough to divide by.
+    some: bool,
+}
+
+impl<T: Real> Barycentric<T> {
+    /// Of a face without an inside.
+    pub(super) fn nothing() -> Self {
+        let zero = [T::constant(splat(0.0)); 3];
+        Self { constant: zero, x: zero, y: zero, some: false }
+    }
+
+    /// `least_area` is [`AREA`] in pixels.
+    #[inline(always)]
+    pub(super) fn new(face: Face<T>, least_area: Float<T>) -> Self {
+        let zero = T::constant(splat(0.0));
+        let (mut constant, mut x, mut y) = ([zero; 3], [zero; 3], [zero; 3]);
+        let mut area = zero;
+        for k in 0..3 {
+            // The doubled area of pixel and edge, which lies across from corner k + 2.
+            let edge = face.edge(k);
+            let corner = (k + 2) % 3;
+            constant[corner] = edge.to_y * edge.x - edge.to_x * edge.y;
+            (x[corner], y[corner]) = (zero - edge.to_y, edge.to_x);
+            area = area + constant[corner];
+        }
+        let some = area.value().array()[0] > least_area;
+        let one = T::constant(splat(1.0));
+        let per_area = if some { area } else { one }.inverse();
+        for k in 0..3 {
+            (constant[k], x[k], y[k]) = (constant[k] * per_area, x[k] * per_area, y[k] * per_area);
+        }
+        Self { constant, x, y, some }
+    }
+}
+
+/// Nearest points of a face to eight pixels: the pixels themselves where they lie in it, else the closest points of its boundary.
+pub(super) struct Point<T: Real> {
+    pub(super) closest: Closest<T>,
+    /// Barycentric weights of the nearest point of the face, on the screen.
+    pub(super) barycentric: [T; 3],
+    /// Where the nearest point is the pixel itself.
+    within: Mask<T>,
+    /// The edge of the closest point, and one over its squared length.
+    edge_x: T,
+    edge_y: T,
+    inverse: T,
+}
+
+impl<T: Real> Point<T> {
+    /// Nearest points to the pixels at `px`, `py`, from the origin of the face.
+    #[inline(always)]
+    pub(super) fn new(face: Face<T>, planes: &Barycentric<T>, px: T::Lanes, py: T::Lanes) -> Self {
+        let closest = match face.is_sliver() {
+            true => closest::<T, true>(face, px, py),
+            false => closest::<T, false>(face, px, py),
+        };
+        let limit = splat::<T::Lanes>(if planes.some { 1.0 } else { 0.0 });
+        let one = splat::<T::Lanes>(1.0).only(closest.inside);
+        let within = splat::<T::Lanes>(0.5).less(one.min(limit));
+        let mut barycentric = closest.weights;
+        for k in 0..3 {
+            let own = planes.constant[k] + planes.x[k].scale(px) + planes.y[k].scale(py);
+            barycentric[k] = T::choose(within, own, barycentric[k]);
+        }
+        let edge = face.chosen_by(closest.edges);
+        let (edge_x, edge_y, inverse) = (edge.to_x, edge.to_y, edge.inverse);
+        Self { closest, barycentric, within, edge_x, edge_y, inverse }
+    }
+
+    /// Gradient to x and y of the three corners in pixels, of a function with these derivatives by the squared distance and by the
+    /// barycentric weights.
+    ///
+    /// The closest point of the boundary is where it is closest, so the squared distance moves as though the point stayed on its edge
+    /// where it is. A pixel `p = Σ λₖ aₖ` stays while corner m moves by δ, and with it all that lies at p by `λₘ δ`; so `λₖ` changes by
+    /// `-λₘ ∇λₖ · δ`. A point of an edge e, at the place t, moves along by `(δ · d + ..) / |e|²`, d being from it to the pixel.
+    #[inline(always)]
+    pub(super) fn pulled(
+        &self,
+        planes: &Barycentric<T>,
+        by_distance2: T,
+        by_weights: [T; 3],
+    ) -> [T; 6] {
+        let zero = T::constant(splat(0.0));
+        let [w0, w1, w2] = by_weights;
+        let Closest { dx, dy, along, weights, edges, .. } = self.closest;
+        let [on_first, on_second, on_third] = edges;
+        // Of the pixel itself.
+        let field_x = w0 * planes.x[0] + w1 * planes.x[1] + w2 * planes.x[2];
+        let field_y = w0 * planes.y[0] + w1 * planes.y[1] + w2 * planes.y[2];
+        // Of a point of an edge that is not held at one of its ends.
+        let slide = (w1 - w0).masked(on_first) + (w2 - w1).masked(on_second);
+        let slide = slide + (w0 - w2).masked(on_third);
+        let free = slide.masked(splat::<T::Lanes>(0.0).less(along.value()));
+        let free = free.masked(along.value().less(splat(1.0)));
+        let slide = T::choose(self.within, zero, free) * self.inverse;
+        let field_x = T::choose(self.within, field_x, slide * self.edge_x);
+        let field_y = T::choose(self.within, field_y, slide * self.edge_y);
+        let (across_x, across_y) = (turned(edges, slide * dx), turned(edges, slide * dy));
+        let [pull_x, pull_y] = self.closest.pull(by_distance2);
+        let mut corners = [zero; 6];
+        for k in 0..3 {
+            let (weight, own) = (weights[k], self.barycentric[k]);
+            corners[2 * k] = pull_x * weight - field_x * own + across_x[k];
+            corners[2 * k + 1] = pull_y * weight - field_y * own + across_y[k];
+        }
+        corners
+    }
+}
+
+/// What pushes the first corner of an edge one way and its second the other does to the corners. A function, since closures have not the
+/// features of their callers.
+#[inline(always)]
+fn turned<T: Real>([first, second, third]: [Mask<T>; 3], push: T) -> [T; 3] {
+    let (first, second, third) = (push.masked(first), push.masked(second), push.masked(third));
+    [third - first, first - second, second - third]
+}

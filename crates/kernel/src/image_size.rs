@@ -1,0 +1,49 @@
+/// Height and width of an image in pixels.
+///
+/// NDC are the same along both axes: the shorter side of the image is [-1, 1], the longer one reaches farther, its middle at 0. One pixel
+/// is `2 / shorter` wide and high.
+///
+/// A number stands for a square, `[height, width]` for any other image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageSize {
+    /// Rows.
+    pub height: usize,
+    /// Columns.
+    pub width: usize,
+}
+
+impl ImageSize {
+    /// The lesser of height and width.
+    pub fn shorter(self) -> usize {
+        self.height.min(self.width)
+    }
+
+    /// Number of pixels.
+    pub fn pixels(self) -> usize {
+        self.height * self.width
+    }
+
+    /// Centre of a column in NDC.
+    #[inline]
+    pub fn column_centre(self, column: usize) -> f64 {
+        (2.0 * column as f64 + 1.0 - self.width as f64) / self.shorter() as f64
+    }
+
+    /// Centre of a row in NDC; the first is at the top.
+    #[inline]
+    pub fn row_centre(self, row: usize) -> f64 {
+        (self.height as f64 - 1.0 - 2.0 * row as f64) / self.shorter() as f64
+    }
+}
+
+impl From<usize> for ImageSize {
+    fn from(side: usize) -> Self {
+        Self { height: side, width: side }
+    }
+}
+
+impl From<[usize; 2]> for ImageSize {
+    fn from([height, width]: [usize; 2]) -> Self {
+        Self { height, width }
+    }
+}

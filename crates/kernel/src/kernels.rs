@@ -1,0 +1,152 @@
+use crate::{
+    Bands, Float, Inputs, Judged, PixelLoss,
+    blend::{self, Kept},
+    loss, pairs, sum,
+};
+
+/// Floats that passes run on: `f32` and `f64`.
+pub trait Kernels: Float {
+    /// The lists of the faces that reach each band of rows: they serve all passes over the same vertices.
+    fn bands(inputs: &Inputs<Self>) -> Bands;
+
+    /// Sums of the profile, `[views, height, width]`. `bands` are those of these inputs.
+    fn sums(inputs: &Inputs<Self>, bands: &Bands) -> Vec<Self>;
+
+    /// Gradients of `Σ upstream · sums` to vertices and table, as they are wanted, flat and in this order.
+    fn sums_vjp(
+        inputs: &Inputs<Self>,
+        bands: &Bands,
+        upstream: &[Self],
+        wanted: [bool; 2],
+    ) -> Vec<Self>;
+
+    /// Pullback of `direction` (like the result of [`Kernels::sums_vjp`], which consists of what is `along`) through it: gradients to
+    /// vertices, tables and upstream, as they are wanted, flat and in this order.
+    fn sums_vjp_of_vjp(
+        inputs: &Inputs<Self>,
+        bands: &Bands,
+        upstream: &[Self],
+        direction: &[Self],
+        along: [bool; 2],
+        wanted: [bool; 3],
+    ) -> Vec<Self>;
+
+    /// Losses `[views]`, and the gradient of each to its vertices, `[views, 3, vertices]`, if it is wanted: else it is 0.
+    fn losses(
+        inputs: &Inputs<Self>,
+        bands: &Bands,
+        judged: Judged<Self>,
+        loss: PixelLoss,
+        with_gradient: bool,
+    ) -> [Vec<Self>; 2];
+
+    /// Number of pixel-face pairs over all views that one pass visits; the table is not read.
+    fn pairs(inputs: &Inputs<Self>) -> usize;
+
+    /// What passes in colour over these inputs share. `sums`: whether those of the image are kept, a number for each channel of each
+    /// pixel and two more.
+    fn kept(inputs: &blend::Inputs<Self>, sums: bool) -> Kept<Self>;
+
+    /// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` is of these inputs.
+    fn blend(inputs: &blend::Inputs<Self>, kept: &Kept<Self>) -> Vec<Self>;
+
+    /// Gradients of `Σ upstream · image` to vertices, attributes, tables, background and texture, as they are wanted, flat and in this
+    /// order.
+    fn blend_vjp(
+        inputs: &blend::Inputs<Self>,
+        kept: &Kept<Self>,
+        upstream: &[Self],
+        wanted: [bool; 5],
+    ) -> Vec<Self>;
+
+    /// Pullback of `direction` (like the result of [`Kernels::blend_vjp`], which consists of what is `along`) through it: gradients to the
+    /// inputs and to the upstream, as they are wanted, flat and in this order.
+    fn blend_vjp_of_vjp(
+        inputs: &blend::Inputs<Self>,
+        kept: &Kept<Self>,
+        upstream: &[Self],
+        direction: &[Self],
+        along: [bool; 5],
+        wanted: [bool; 6],
+    ) -> Vec<Self>;
+}
+
+macro_rules! kernels {
+    ($float:ty) => {
+        // Functions that are not generic, so that they are compiled here and not again in every crate that draws.
+        impl Kernels for $float {
+            fn bands(inputs: &Inputs<Self>) -> Bands {
+                inputs.bands()
+            }
+
+            fn sums(inputs: &Inputs<Self>, bands: &Bands) -> Vec<Self> {
+                sum::forward(inputs, bands)
+            }
+
+            fn sums_vjp(
+                inputs: &Inputs<Self>,
+                bands: &Bands,
+                upstream: &[Self],
+                wanted: [bool; 2],
+            ) -> Vec<Self> {
+                sum::vjp(inputs, bands, upstream, wanted)
+            }
+
+            fn sums_vjp_of_vjp(
+                inputs: &Inputs<Self>,
+                bands: &Bands,
+                upstream: &[Self],
+                direction: &[Self],
+                along: [bool; 2],
+                wanted: [bool; 3],
+            ) -> Vec<Self> {
+                sum::vjp_of_vjp(inputs, bands, upstream, direction, along, wanted)
+            }
+
+            fn losses(
+                inputs: &Inputs<Self>,
+                bands: &Bands,
+                judged: Judged<Self>,
+                loss: PixelLoss,
+                with_gradient: bool,
+            ) -> [Vec<Self>; 2] {
+                loss::losses(inputs, bands, judged, loss, with_gradient)
+            }
+
+            fn pairs(inputs: &Inputs<Self>) -> usize {
+                pairs::pairs(inputs)
+            }
+
+            fn kept(inputs: &blend::Inputs<Self>, sums: bool) -> Kept<Self> {
+                Kept::new(inputs, sums)
+            }
+
+            fn blend(inputs: &blend::Inputs<Self>, kept: &Kept<Self>) -> Vec<Self> {
+                blend::forward(inputs, kept)
+            }
+
+            fn blend_vjp(
+                inputs: &blend::Inputs<Self>,
+                kept: &Kept<Self>,
+                upstream: &[Self],
+                wanted: [bool; 5],
+            ) -> Vec<Self> {
+                blend::vjp(inputs, kept, upstream, wanted)
+            }
+
+            fn blend_vjp_of_vjp(
+                inputs: &blend::Inputs<Self>,
+                kept: &Kept<Self>,
+                upstream: &[Self],
+                direction: &[Self],
+                along: [bool; 5],
+                wanted: [bool; 6],
+            ) -> Vec<Self> {
+                blend::vjp_of_vjp(inputs, kept, upstream, direction, along, wanted)
+            }
+        }
+    };
+}
+
+kernels!(f32);
+kernels!(f64);

@@ -1,0 +1,285 @@
+//! Floats, and eight of them that are computed together.
+//!
+//! Every operation is one that all machines round alike, and none is contracted. So explicit vectors (`x86`, `wasm`) and plain arrays
+//! ([`Plain`]) give the same bits.
+//!
+//! Loops run over numbers of lanes: an iterator's closure is a function without the features of its caller, and is not turned
+//! into vectors.
+#![allow(clippy::needless_range_loop, clippy::assign_op_pattern)]
+
+pub(super) mod plain;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub(super) mod wasm;
+#[cfg(target_arch = "x86_64")]
+pub(super) mod x86;
+
+use std::{
+    fmt::Debug,
+    ops::{Add, AddAssign, Div, Mul, Neg, Sub},
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+pub(crate) use plain::Plain;
+
+/// Numbers in a vector.
+pub(crate) const LANES: usize = 8;
+/// Neighbours of a row that always come together: half a vector.
+pub(crate) const GROUP: usize = LANES / 2;
+
+/// An array of what an expression says of each lane. Written out, since a compiler takes ten times as long over so many little loops.
+#[cfg(not(target_family = "wasm"))]
+macro_rules! lanes {
+    ($i:ident => $value:expr) => {
+        lanes!(@ $i => $value, 0 1 2 3 4 5 6 7)
+    };
+    (@ $i:ident => $value:expr, $($lane:literal)*) => {
+        [$({
+            const $i: usize = $lane;
+            $value
+        }),*]
+    };
+}
+/// The same, in the fewest bytes: a page has to be loaded.
+#[cfg(target_family = "wasm")]
+macro_rules! lanes {
+    ($i:ident => $value:expr) => {{
+        #[allow(non_snake_case)]
+        let lanes: [_; LANES] = std::array::from_fn(|$i| $value);
+        lanes
+    }};
+}
+pub(crate) use lanes;
+
+/// `f32` or `f64`, with the view of their bits that the profile table is indexed by.
+pub trait Float:
+    Copy
+    + Send
+    + Sync
+    + 'static
+    + PartialOrd
+    + Default
+    + Debug
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+{
+    /// 0.
+    const ZERO: Self;
+    /// 1.
+    const ONE: Self;
+    /// Nearest float.
+    fn from_f64(value: f64) -> Self;
+    /// A whole number.
+    fn of_whole(value: i32) -> Self;
+    /// To double precision.
+    fn to_f64(self) -> f64;
+    /// Where `self`, at least `2^-octaves`, lies among cells of which each octave holds `2^bits`, from there on:
+    /// the cell's index, the place in it from 0 to 1, and the inverse of its width. Infinity and NaN lie in one of more than
+    /// `octaves << bits`.
+    fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self);
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// Nearest integer, for numbers in [0, 2^22].
+    fn nearest(self) -> i32;
+    /// Nearest integer as a float, for numbers in [0, 2^22].
+    fn rounded(self) -> Self;
+    /// `e` to this power, to 2 units in the last place.
+    fn exp(self) -> Self;
+    /// Natural logarithm.
+    fn ln(self) -> Self;
+    /// Sine and cosine of an angle in radians.
+    fn sin_cos(self) -> (Self, Self);
+}
+
+/// Floats of which a machine may have vectors.
+pub(crate) trait Vectors: Float {
+    /// The best vectors of a machine that has them; see [`has_vectors`].
+    type Best: Lanes<Float = Self>;
+}
+
+/// A vector of [`LANES`] floats.
+pub(crate) trait Lanes:
+    Copy
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + AddAssign
+    + 'static
+{
+    /// One of the numbers.
+    type Float: Float;
+    /// Whether something holds, lane by lane.
+    type Mask: Copy;
+    /// Whole numbers.
+    type Index: Copy;
+    /// Which of three numbers each lane takes.
+    type Which: Copy;
+    /// Whether this needs AVX2.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+    const NEEDS_AVX2: bool;
+    /// Whether what uses this is compiled for machines with AVX2 as well.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+    const GAINS_AVX2: bool;
+
+    /// The same number in all lanes.
+    fn splat(value: Self::Float) -> Self;
+    /// The numbers of an array.
+    fn of(values: &[Self::Float; LANES]) -> Self;
+    /// The numbers as an array.
+    fn array(self) -> [Self::Float; LANES];
+    /// Two groups of neighbours.
+    fn of_groups(low: &[Self::Float; GROUP], high: &[Self::Float; GROUP]) -> Self;
+    /// Adds the first half to one group of numbers, then the second to another or the same.
+    fn add_to_groups(self, numbers: &mut [Self::Float], at: [u32; 2]);
+
+    /// `1 / self`.
+    fn recip(self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+    /// `e` to this power; see [`Float::exp`].
+    #[inline(always)]
+    fn exp(self) -> Self {
+        let numbers = self.array();
+        Self::of(&lanes!(I => Float::exp(numbers[I])))
+    }
+    /// Natural logarithm.
+    #[inline(always)]
+    fn ln(self) -> Self {
+        let numbers = self.array();
+        Self::of(&lanes!(I => Float::ln(numbers[I])))
+    }
+    /// `-self`.
+    fn neg(self) -> Self;
+    /// `self` where it is less, else `other`.
+    fn min(self, other: Self) -> Self;
+    /// `self` where it is greater, else `other`.
+    fn max(self, other: Self) -> Self;
+    /// Where `self < other`.
+    fn less(self, other: Self) -> Self::Mask;
+    /// Where `self <= other`.
+    fn at_most(self, other: Self) -> Self::Mask;
+    /// `yes` where the mask holds, else `no`.
+    fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// `self` where the mask holds, else 0.
+    fn only(self, mask: Self::Mask) -> Self;
+    /// The third where the second mask holds, else the second where the first does, else the first.
+    fn which(second: Self::Mask, third: Self::Mask) -> Self::Which;
+    /// Where that is the first, the second and the third.
+    fn where_each(second: Self::Mask, third: Self::Mask) -> [Self::Mask; 3];
+    /// One of the first three numbers for each lane.
+    fn chosen(numbers: &[Self::Float; 4], which: Self::Which) -> Self;
+    /// Writes three columns and zeros as rows, one for each lane.
+    fn to_rows(columns: [Self; 3], to: &mut [[Self::Float; 4]; LANES]);
+    /// A mask as bits, the first lane lowest.
+    fn bits(mask: Self::Mask) -> u32;
+    /// The sum of all lanes, halves first.
+    fn sum(self) -> Self::Float;
+    /// Nearest whole numbers, for numbers in [0, 2^22].
+    fn nearest(self) -> Self::Index;
+    /// Nearest whole numbers as floats, for numbers in [0, 2^22].
+    fn rounded(self) -> Self;
+    /// Writes the lanes where the mask holds one behind the other, and says how many there are. What stands behind them is overwritten.
+    fn pack(keep: Self::Mask, numbers: [Self::Index; 2], to: [&mut [u32; LANES]; 2]) -> usize;
+    /// Places of the pixels of two groups from the origin of their face, from those of the first pixels: column, and row times 2^24.
+    fn pixels(places: &[u32; 2]) -> (Self, Self);
+
+    /// See [`Float::cell`].
+    fn cell(self, octaves: u32, bits: u32) -> (Self::Index, Self, Self);
+    /// The same whole number in all lanes.
+    fn index(value: i32) -> Self::Index;
+    /// The whole numbers of an array.
+    fn indices(values: &[i32; LANES]) -> Self::Index;
+    /// Whole numbers as an array.
+    fn index_array(index: Self::Index) -> [i32; LANES];
+    /// Sums and differences of whole numbers.
+    fn plus(a: Self::Index, b: Self::Index) -> Self::Index;
+    /// `a - b`.
+    fn minus(a: Self::Index, b: Self::Index) -> Self::Index;
+    /// `yes` where the mask holds, else `no`.
+    fn pick_index(mask: Self::Mask, yes: Self::Index, no: Self::Index) -> Self::Index;
+    /// Places in a table of two sides with so many cells each, and a tail behind the last of each; where the mask holds on its second
+    /// side. Cells beyond the last are the tail.
+    fn places(cell: Self::Index, cells: i32, second: Self::Mask) -> Places;
+    /// Rows of a table of `count`, by their numbers.
+    fn numbered(rows: &[u32; LANES], count: usize) -> Places;
+    /// The rows of a table at some places, column by column.
+    fn rows(table: &[[Self::Float; 4]], at: &Places) -> [Self; 4];
+    /// Adds to the rows of a table at some places, lane by lane.
+    fn add_to_rows(table: &mut [[Self::Float; 4]], at: &Places, columns: [Self; 4]);
+}
+
+/// Something that is computed with vectors, and compiled for the machines that have better ones.
+pub(crate) trait Work {
+    /// What comes of it.
+    type Output;
+    /// Does it. To be inlined, like all that it calls.
+    fn run(self) -> Self::Output;
+}
+
+/// Does some work with vectors `L`, compiled for AVX2 where they gain from it and this machine has it. Products and sums are
+/// never contracted, so that the bits are the same.
+pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<W: Work>(work: W) -> W::Output {
+            work.run()
+        }
+        if L::NEEDS_AVX2 {
+            // SAFETY: the feature was detected before there were such vectors.
+            #[allow(unsafe_code)]
+            return unsafe { avx2(work) };
+        }
+        if L::GAINS_AVX2 && has_vectors() {
+            // SAFETY: the feature was just detected.
+            #[allow(unsafe_code)]
+            return unsafe { avx2(work) };
+        }
+    }
+    work.run()
+}
+
+static PORTABLE: AtomicBool = AtomicBool::new(false);
+
+/// Whether passes use the vectors of this machine where it has better ones than arrays, as they do at first; in the whole process. The bits are
+/// the same, which is what tests ask.
+pub fn use_vectors(yes: bool) {
+    PORTABLE.store(!yes, Ordering::Relaxed);
+}
+
+/// Whether this machine has vectors that are better than arrays: AVX2, which is asked for at run time, or those of WebAssembly, for which
+/// all of a program is compiled or nothing.
+pub(crate) fn has_vectors() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    let has_them = is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    let has_them = cfg!(all(target_arch = "wasm32", target_feature = "simd128"));
+    has_them && !PORTABLE.load(Ordering::Relaxed)
+}
+
+/// Rows of a table, one for each lane.
+#[derive(Clone, Copy)]
+pub(crate) struct Places {
+    /// Each below `rows`; of vectors as explicit as in `x86`, bytes from the first row.
+    at: [u32; LANES],
+    /// What the table has at least.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+    rows: usize,
+}
+
+impl Places {
+    /// Numbers of the rows, in plain arrays.
+    #[cfg(test)]
+    pub(crate) fn numbers<L: Lanes>(&self) -> [usize; LANES] {
+        assert!(!L::NEEDS_AVX2, "vectors have places of their own");
+        self.at.map(|at| at as usize)
+    }
+
+    /// The first row of a table with one row or more.
+    pub(crate) const FIRST: Self = Self { at: [0; LANES], rows: 1 };
+}

@@ -1,0 +1,189 @@
+//! The pixels that faces may reach, as a list of chunks that a walk takes one after the other.
+#![allow(clippy::needless_range_loop)]
+
+use super::{
+    face::{Face, Faces},
+    float::Float as _,
+    lanes::{GROUP, LANES, Lanes},
+    reach::within,
+    real::{Float, Real, splat},
+    scene::{BandRef, Scene},
+};
+
+/// Faces that are listed together: what is prepared of them stays near the processor.
+pub(crate) const LISTED: usize = 64;
+/// Chunks behind the last on which nothing depends.
+pub(crate) const AHEAD: usize = 4;
+/// Groups behind those of a face that are written without asking.
+const MORE: usize = 2 * LANES + 2 * AHEAD;
+/// Most rows of a band.
+const MOST_ROWS: usize = 64;
+/// Fewer of them for fewer views than this, so that there are bands for all threads.
+const FEW_VIEWS: usize = 4;
+
+/// Rows of a band. Bits must not depend on the number of threads, so neither may this.
+pub fn rows_of_bands(views: usize) -> usize {
+    if views < FEW_VIEWS { MOST_ROWS / 2 } else { MOST_ROWS }
+}
+
+/// Some faces of a band and their pixels: groups of neighbours of a row, two groups of one face in a chunk.
+pub(crate) struct List<T: Real> {
+    blocks: [Faces<T>; LISTED / LANES],
+    /// Whether some of them are slivers.
+    pub(crate) slivers: bool,
+    /// Where the first pixel of each group lies, from the origin of its face: column, and row times 2^24. There is more room than groups.
+    places: Vec<u32>,
+    /// Its position in the band.
+    at: Vec<u32>,
+    /// Which face of the list it belongs to.
+    owners: Vec<u8>,
+    chunks: usize,
+}
+
+/// Two groups of a list.
+#[derive(Clone, Copy)]
+pub(crate) struct Chunk<'a> {
+    pub(crate) places: &'a [u32; 2],
+    pub(crate) at: [u32; 2],
+    pub(crate) owner: usize,
+}
+
+impl<T: Real> List<T> {
+    pub(crate) fn new() -> Self {
+        let blocks = [Faces::nothing(); LISTED / LANES];
+        let (places, at, owners) = (Vec::new(), Vec::new(), Vec::new());
+        Self { blocks, slivers: false, places, at, owners, chunks: 0 }
+    }
+
+    /// A face of the list.
+    #[inline(always)]
+    pub(crate) fn face(&self, owner: usize) -> Face<'_, T> {
+        self.blocks[owner / LANES % (LISTED / LANES)].face(owner)
+    }
+
+    /// Its chunks, those of a face one behind the other, and then so `many` of [`AHEAD`] on which nothing depends.
+    #[inline(always)]
+    pub(crate) fn chunks(&self, many: usize) -> impl Iterator<Item = Chunk<'_>> {
+        let count = self.chunks + many;
+        let places = &self.places.as_chunks().0[..count];
+        let at = &self.at.as_chunks::<2>().0[..count];
+        let owners = &self.owners.as_chunks::<2>().0[..count];
+        let groups = places.iter().zip(at.iter().zip(owners));
+        groups.map(|(places, (&at, owners))| Chunk { places, at, owner: owners[0] as usize })
+    }
+
+    /// How many chunks it has.
+    pub(crate) fn len(&self) -> usize {
+        self.chunks
+    }
+
+    /// Makes room for so many groups.
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self, groups: usize) {
+        self.places.resize(2 * groups, 0);
+        self.at.resize(2 * groups, 0);
+        self.owners.resize(2 * groups, 0);
+    }
+
+    /// Prepares up to [`LISTED`] faces of a band, given by their numbers, and lists their pixels.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &BandRef<T>, numbers: &[u32]) {
+        let index = <T::Lanes as Lanes>::index;
+        let plus = <T::Lanes as Lanes>::plus;
+        let four = splat::<T::Lanes>(GROUP as f64);
+        let band = scene.band_rows(place.band);
+        let stride = scene.stride();
+        let nowhere = (band.len() * stride) as u32;
+        let (mut rows_apart, mut rows_below) = ([0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            rows_apart[lane] = (lane * stride) as i32;
+            rows_below[lane] = (lane << 24) as i32;
+        }
+        let rows_apart = T::Lanes::indices(&rows_apart);
+        let rows_below = T::Lanes::indices(&rows_below);
+        self.slivers = false;
+        let mut listed = 0;
+        for (block, numbers) in numbers.chunks(LANES).enumerate() {
+            let faces = &mut self.blocks[block % (LISTED / LANES)];
+            let spans = place.faces(scene, numbers, faces);
+            self.slivers |= faces.any_sliver(numbers.len());
+            for (lane, &number) in numbers.iter().enumerate() {
+                let owner = (block * LANES + lane) as u8;
+                let reach = place.view.reaches[number as usize];
+                let rows = within(band.clone(), reach);
+                let columns = reach.right - reach.left;
+                let most = rows.len() * (columns as usize).div_ceil(GROUP);
+                if self.at.len() < listed + most + MORE {
+                    self.grow(listed + most + MORE);
+                }
+                let room = self.at.len();
+                let (places, ats) = (&mut self.places[..room], &mut self.at[..room]);
+                let owners = &mut self.owners[..room];
+                let width = T::Lanes::splat(Float::<T>::of_whole(columns as i32));
+                let height = T::Lanes::splat(Float::<T>::of_whole(rows.len() as i32));
+                let mut corner = ((rows.start - band.start) * stride) as i32 + reach.left as i32;
+                let (mut y, mut row) = (rows_from_origin::<T::Lanes>(), 0);
+                while row < rows.len() {
+                    let [mut x, end] = spans.columns(lane, y, width);
+                    let end = end.only(y.less(height));
+                    let start = x.nearest();
+                    let mut at = plus(plus(index(corner), rows_apart), start);
+                    let mut from_origin = plus(plus(index((row << 24) as i32), rows_below), start);
+                    loop {
+                        // Most rows have one group or two, and nobody can foresee which.
+                        for _ in 0..2 {
+                            *eight(owners, listed) = [owner; LANES];
+                            let to = [eight(places, listed), eight(ats, listed)];
+                            listed += T::Lanes::pack(x.less(end), [from_origin, at], to);
+                            x += four;
+                            at = plus(at, index(GROUP as i32));
+                            from_origin = plus(from_origin, index(GROUP as i32));
+                        }
+                        if T::Lanes::bits(x.less(end)) == 0 {
+                            break;
+                        }
+                    }
+                    row += LANES;
+                    y += splat(LANES as f64);
+                    corner += (LANES * stride) as i32;
+                }
+                // An odd group is joined by one on which nothing depends. Written always, since nobody can foresee whether it counts.
+                (places[listed], ats[listed]) = (0, nowhere);
+                listed += listed % 2;
+            }
+        }
+        if self.at.len() < listed + MORE {
+            self.grow(listed + MORE);
+        }
+        let last = listed..listed + 2 * AHEAD;
+        self.places[last.clone()].fill(0);
+        self.at[last.clone()].fill(nowhere);
+        self.owners[last].fill(numbers.len().saturating_sub(1) as u8);
+        self.chunks = listed / 2;
+    }
+}
+
+/// A group of pixels.
+#[inline(always)]
+pub(crate) fn group<F>(numbers: &[F], at: u32) -> &[F; GROUP] {
+    numbers[at as usize..at as usize + GROUP].try_into().expect("a group of pixels")
+}
+
+/// Room for [`LANES`] numbers.
+#[inline(always)]
+fn eight<F>(numbers: &mut [F], at: usize) -> &mut [F; LANES] {
+    (&mut numbers[at..at + LANES]).try_into().expect("as many numbers as lanes")
+}
+
+/// Rows from the first one, one for each lane.
+#[inline(always)]
+pub(crate) fn rows_from_origin<L: Lanes>() -> L {
+    let number = L::Float::from_f64;
+    let rows = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+    let mut lanes = [L::Float::ZERO; LANES];
+    for lane in 0..LANES {
+        lanes[lane] = number(rows[lane]);
+    }
+    L::of(&lanes)
+}

@@ -1,0 +1,259 @@
+//! `S = Σ profile(d)` over the faces of a pixel, its gradient, and the gradient of that.
+
+use rayon::prelude::*;
+
+use super::{
+    bands::{Bands, View},
+    float::{Float, Vectors},
+    lanes::{Plain, has_vectors},
+    real::{self, Dual, Real, Table},
+    scene::Scene,
+    table::Grid,
+    walk::{Gradient, Image, TableGradient, walk},
+};
+use crate::ImageSize;
+
+/// What sums of a profile are taken over, in one float type.
+#[derive(Clone, Copy)]
+pub struct Inputs<'a, F> {
+    /// `[views, 3, vertices]`: x and y in NDC, depth in world units.
+    pub vertices: &'a [F],
+    /// `[grid.rows(), 4]`: the profile as cubics, constant first, in the place of the squared distance within its cell.
+    pub table: &'a [F],
+    /// Vertices of each face.
+    pub faces: &'a [[u32; 3]],
+    /// Where the cells of the table lie.
+    pub grid: Grid,
+    /// Height and width of the image.
+    pub size: ImageSize,
+    /// Depth below which a vertex counts as behind the camera: its faces are not drawn.
+    pub near: f64,
+    /// Number of views.
+    pub views: usize,
+    /// Rows of a band, a power of two: [`rows_of_bands`](crate::rows_of_bands), or for losses [`rows_of_losses`](crate::rows_of_losses).
+    pub rows: usize,
+}
+
+impl<F> Inputs<'_, F> {
+    pub(crate) fn bands(&self) -> Bands
+    where
+        F: Vectors,
+    {
+        let per_view = self.vertices.len() / 3 / self.views.max(1);
+        let Self { vertices, faces, size, rows, near, .. } = *self;
+        Bands::new(vertices, per_view, faces, size, rows, near, self.grid.outer)
+    }
+
+    /// What a walk over these inputs reads; `tangents` are those of vertices and table, or nothing.
+    pub(crate) fn scene<'s, T>(&'s self, tangents: [&'s [F]; 2]) -> Scene<'s, T>
+    where
+        T: Real,
+        T::Lanes: super::lanes::Lanes<Float = F>,
+    {
+        let table = Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
+        let Self { vertices, faces, grid, size, rows, .. } = *self;
+        Scene::new([vertices, tangents[0]], faces, table, grid, size, rows)
+    }
+}
+
+/// See [`Kernels::sums`](crate::Kernels::sums).
+pub(crate) fn forward<F: Vectors>(inputs: &Inputs<F>, bands: &Bands) -> Vec<F> {
+    if has_vectors() {
+        image::<F::Best>(&inputs.scene([&[]; 2]), bands)
+    } else {
+        image::<Plain<F>>(&inputs.scene([&[]; 2]), bands)
+    }
+}
+
+/// See [`Kernels::sums_vjp`](crate::Kernels::sums_vjp).
+pub(crate) fn vjp<F: Vectors>(
+    inputs: &Inputs<F>,
+    bands: &Bands,
+    upstream: &[F],
+    wanted: [bool; 2],
+) -> Vec<F> {
+    let wanted = [wanted[0], wanted[1], false];
+    if has_vectors() {
+        gradient::<F::Best>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
+    } else {
+        gradient::<Plain<F>>(&inputs.scene([&[]; 2]), bands, upstream, wanted)
+    }
+}
+
+/// See [`Kernels::sums_vjp_of_vjp`](crate::Kernels::sums_vjp_of_vjp).
+///
+/// The Hessian is symmetric, so the first two are the derivative of the gradient along the
+/// direction, and the third is the derivative of the image along it: one walk with dual numbers.
+pub(crate) fn vjp_of_vjp<F: Vectors>(
+    inputs: &Inputs<F>,
+    bands: &Bands,
+    upstream: &[F],
+    direction: &[F],
+    along: [bool; 2],
+    wanted: [bool; 3],
+) -> Vec<F> {
+    let nothing = |length: usize| vec![F::ZERO; length];
+    let (count, rows) = (inputs.vertices.len(), inputs.table.len());
+    let still =
+        [nothing(if along[0] { 0 } else { count }), nothing(if along[1] { 0 } else { rows })];
+    let (to_vertices, to_table) = direction.split_at(if along[0] { count } else { 0 });
+    let tangents = [
+        if along[0] { to_vertices } else { &still[0] },
+        if along[1] { to_table } else { &still[1] },
+    ];
+    if has_vectors() {
+        gradient::<Dual<F::Best>>(&inputs.scene(tangents), bands, upstream, wanted)
+    } else {
+        gradient::<Dual<Plain<F>>>(&inputs.scene(tangents), bands, upstream, wanted)
+    }
+}
+
+/// Runs the image part of a walk over all bands; `[views, height, width]`.
+fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<real::Float<T>> {
+    let views = bands.views.len();
+    let pixels = scene.size.pixels();
+    let mut image = vec![real::Float::<T>::ZERO; views * pixels];
+    image.par_chunks_mut(pixels).zip(&bands.views).enumerate().for_each(
+        |(index, (image, view))| {
+            image.par_chunks_mut(scene.rows * scene.size.width).enumerate().for_each(
+                |(band, image)| {
+                    let place = scene.place(view, index, views, band);
+                    let mut padded = vec![place.empty(&scene.grid); scene.band_length(band)];
+                    let tail = place.tail(&scene.grid);
+                    walk(scene, place, &mut Image { image: &mut padded, tail });
+                    trim(&padded, image, scene);
+                },
+            );
+        },
+    );
+    image
+}
+
+/// Rows of a band as they stand in the image.
+fn trim<T: Real>(padded: &[real::Float<T>], image: &mut [real::Float<T>], scene: &Scene<T>) {
+    let width = scene.size.width;
+    for (row, padded) in image.chunks_exact_mut(width).zip(padded.chunks(scene.stride())) {
+        row.copy_from_slice(&padded[..width]);
+    }
+}
+
+/// Rows of the image as they stand in a band, followed by zeros.
+fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, band: usize) -> Vec<real::Float<T>> {
+    let mut padded = vec![real::Float::<T>::ZERO; scene.band_length(band)];
+    let width = scene.size.width;
+    for (padded, row) in padded.chunks_mut(scene.stride()).zip(rows.chunks(width)) {
+        padded[..width].copy_from_slice(row);
+    }
+    padded
+}
+
+/// Results of a band: for each face the gradient to x and y of its three corners, that to the table, and rows of the image.
+struct Walked<F> {
+    corners: Vec<[F; 6]>,
+    table: Vec<[F; 4]>,
+    image: Vec<F>,
+}
+
+/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and table, and the sums, as they are wanted, flat
+/// and in this order. The third row of each view's vertices is 0, because a silhouette does not see
+/// depth. Of dual numbers all that comes back are tangents.
+fn gradient<T: Real>(
+    scene: &Scene<T>,
+    bands: &Bands,
+    upstream: &[real::Float<T>],
+    [wrt_vertices, wrt_table, with_image]: [bool; 3],
+) -> Vec<real::Float<T>> {
+    let zero = real::Float::<T>::ZERO;
+    let views = bands.views.len();
+    let (pixels, width) = (scene.size.pixels(), scene.size.width);
+    let table_rows = if wrt_table { scene.grid.rows() } else { 0 };
+    let in_band = |index: usize, band: usize| {
+        let view = &bands.views[index];
+        let rows = scene.band_rows(band);
+        let place = scene.place(view, index, views, band);
+        // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
+        let length = if T::DUAL { scene.band_length(band) } else { 0 };
+        let mut walked = Walked {
+            corners: vec![[zero; 6]; view.faces(band).len()],
+            table: vec![[zero; 4]; table_rows],
+            image: vec![place.empty(&scene.grid); length],
+        };
+        let of_band = index * pixels + rows.start * width..index * pixels + rows.end * width;
+        let upstream = &pad(&upstream[of_band], scene, band);
+        let gradient = Gradient::new(scene, upstream, &mut walked.corners);
+        let image = Image { image: &mut walked.image, tail: place.tail(&scene.grid) };
+        let table = TableGradient::new(upstream, &mut walked.table);
+        let tail = scene.grid.tail();
+        match (T::DUAL, wrt_table) {
+            (false, false) => {
+                walk(scene, place, &mut { gradient });
+            }
+            (true, false) => {
+                walk(scene, place, &mut (image, gradient));
+            }
+            (false, true) => {
+                let mut both = (gradient, table);
+                walk(scene, place, &mut both);
+                both.1.finish(tail);
+            }
+            (true, true) => {
+                let mut all = ((image, gradient), table);
+                walk(scene, place, &mut all);
+                all.1.finish(tail);
+            }
+        }
+        walked
+    };
+    let count = scene.vertices.len();
+    let mut vertices = vec![zero; count];
+    let per_view: Vec<_> = vertices
+        .par_chunks_mut((count / views.max(1)).max(1))
+        .enumerate()
+        .map(|(index, total)| {
+            let walked: Vec<_> =
+                (0..bands.count).into_par_iter().map(|band| in_band(index, band)).collect();
+            let upstream = &upstream[index * pixels..(index + 1) * pixels];
+            gather(scene, &bands.views[index], upstream, walked, total)
+        })
+        .collect();
+    let mut table = vec![[zero; 4]; table_rows];
+    for (part, _) in &per_view {
+        for (total, part) in table.iter_mut().zip(part) {
+            total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
+        }
+    }
+    let mut flat = if wrt_vertices { vertices } else { Vec::new() };
+    flat.extend_from_slice(table.as_flattened());
+    if with_image {
+        per_view.iter().for_each(|(_, image)| flat.extend_from_slice(image));
+    }
+    flat
+}
+
+/// Adds up the bands of a view in their order: corners to `vertices`, tables, image rows.
+fn gather<T: Real>(
+    scene: &Scene<T>,
+    view: &View,
+    upstream: &[real::Float<T>],
+    walked: Vec<Walked<real::Float<T>>>,
+    vertices: &mut [real::Float<T>],
+) -> (Vec<[real::Float<T>; 4]>, Vec<real::Float<T>>) {
+    let zero = real::Float::<T>::ZERO;
+    let mut table = vec![[zero; 4]; walked.first().map_or(0, |band| band.table.len())];
+    let mut image = Vec::with_capacity(walked.iter().map(|band| band.image.len()).sum());
+    for (band, walked) in walked.into_iter().enumerate() {
+        scene.gather(view.faces(band), &walked.corners, real::Float::<T>::ONE, vertices);
+        for (total, part) in table.iter_mut().zip(&walked.table) {
+            total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
+        }
+        for row in walked.image.chunks_exact(scene.stride()) {
+            image.extend_from_slice(&row[..scene.size.width]);
+        }
+    }
+    // The upstream has no tangent.
+    if !table.is_empty() && !T::DUAL {
+        let sum = upstream.iter().fold(zero, |sum, &g| sum + g);
+        table[scene.grid.tail()][0] += real::Float::<T>::from_f64(view.drawn as f64) * sum;
+    }
+    (table, image)
+}

@@ -1,0 +1,107 @@
+//! Every instruction set that walks are compiled for gives the same bits.
+
+use softrast_kernel::{
+    Grid, ImageSize, Kernels,
+    blend::{DepthGrid, Inputs},
+};
+
+use crate::assert_same_with_and_without_vectors;
+
+const VERTICES: usize = 40;
+const FACES: u32 = 50;
+const CHANNELS: usize = 2;
+
+/// All that the three passes give, over random triangles, some of them points or without area.
+fn passes<F: Kernels>(
+    views: usize,
+    log_weight: f64,
+    floor: f64,
+    depth: DepthGrid,
+    texture_size: Option<[usize; 2]>,
+) -> Vec<F> {
+    let edge = Grid { outer: 0.2, inner: 0.3, from: [0.0; 2], octaves: 12, far: 5, bits: 2 };
+    let wave = |k: usize, step: f64| (step * k as f64).sin();
+    let numbers = |count: usize, step: f64| -> Vec<F> {
+        (0..count).map(|k| F::from_f64(wave(k, step))).collect()
+    };
+    let coordinate = |k: usize| {
+        let depth = k % (3 * VERTICES) >= 2 * VERTICES;
+        wave(k, 1.7) + if depth { 2.5 } else { 0.0 }
+    };
+    let vertices: Vec<F> = (0..3 * VERTICES * views).map(|k| F::from_f64(coordinate(k))).collect();
+    let attributes = numbers(VERTICES * CHANNELS, 0.9);
+    let texture = numbers(texture_size.map_or(0, |[height, width]| 4 * height * width), 1.1);
+    let tables = numbers(4 * (edge.rows() + depth.rows()), 0.7);
+    let background = [0.1, 0.2, log_weight].map(F::from_f64);
+    let corner = |k: u32| k % VERTICES as u32;
+    let face = |f: u32| match (f % 7, f % 11) {
+        (0, _) => [corner(f), corner(f + 1), corner(f)],
+        (_, 0) => [corner(f); 3],
+        _ => [corner(f), corner(7 * f + 3), corner(11 * f + 8)],
+    };
+    let faces: Vec<_> = (0..FACES).map(face).collect();
+    let size = ImageSize::from([37, 50]);
+    let inputs = Inputs {
+        vertices: &vertices,
+        attributes: &attributes,
+        tables: &tables,
+        background: &background,
+        texture: &texture,
+        texture_size,
+        faces: &faces,
+        entries: &faces,
+        edge,
+        depth,
+        floor,
+        planes: [1.0, 4.0],
+        size,
+        near: 0.01,
+        far: 1e15,
+        tolerance: 1e-3,
+        views,
+        shared: true,
+    };
+    let upstream = numbers(views * (CHANNELS + 1) * size.pixels(), 0.3);
+    let lengths = [&vertices, &attributes, &tables, &texture].map(Vec::len);
+    let direction = numbers(lengths.iter().sum::<usize>() + background.len(), 2.3);
+    let kept = &F::kept(&inputs, false);
+    let mut all = F::blend(&inputs, kept);
+    all.extend(F::blend_vjp(&inputs, kept, &upstream, [true; 5]));
+    all.extend(F::blend_vjp(&inputs, kept, &upstream, [true, false, false, false, false]));
+    all.extend(F::blend_vjp_of_vjp(&inputs, kept, &upstream, &direction, [true; 5], [true; 6]));
+    // The sums of an image serve the gradient as well.
+    let kept = &F::kept(&inputs, true);
+    let again =
+        [F::blend(&inputs, kept), F::blend_vjp(&inputs, kept, &upstream, [true; 5])].concat();
+    assert!(format!("{again:?}") == format!("{:?}", &all[..again.len()]));
+    all
+}
+
+fn assert_same_bits<F: Kernels>() {
+    let table = DepthGrid::Table(Grid {
+        outer: 1e-3,
+        inner: 2.0,
+        from: [0.0; 2],
+        octaves: 10,
+        far: 0,
+        bits: 2,
+    });
+    let line = DepthGrid::Line { floor: 1e-7 };
+    // A background that weighs little asks for the largest weight of each pixel.
+    for (views, log_weight, floor, depth, texture) in [
+        (1, -2.0, 0.0, table, None),
+        (4, -1.0, 1e-7, line, None),
+        (3, -700.0, 1e-7, table, None),
+        (3, -1.0, 0.0, DepthGrid::Exponential, None),
+        (2, -2.0, 0.0, table, Some([9, 13])),
+    ] {
+        let passes = || passes::<F>(views, log_weight, floor, depth, texture);
+        assert_same_with_and_without_vectors(&format!("{views} views"), passes);
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    assert_same_bits::<f32>();
+    assert_same_bits::<f64>();
+}

@@ -1,0 +1,75 @@
+//! Every instruction set that walks are compiled for gives the same bits.
+
+use softrast_kernel::{Grid, ImageSize, Inputs, Judged, Kernels, PixelLoss};
+
+use crate::assert_same_with_and_without_vectors;
+
+const VERTICES: usize = 60;
+const FACES: u32 = 90;
+
+/// All that the three passes give, over random triangles of all kinds, some of them slivers, points or without area.
+fn passes<F: Kernels>(size: [usize; 2], views: usize, far: u32) -> Vec<F> {
+    let grid = Grid { outer: 0.3, inner: 0.2, from: [0.0; 2], octaves: 12, far, bits: 2 };
+    let wave = |k: usize, step: f64| (step * k as f64).sin();
+    let numbers = |count: usize, step: f64| -> Vec<F> {
+        (0..count).map(|k| F::from_f64(wave(k, step))).collect()
+    };
+    let vertex = |k: usize| if k % (3 * VERTICES) < 2 * VERTICES { wave(k, 1.7) } else { 2.0 };
+    let vertices: Vec<F> = (0..3 * VERTICES * views).map(|k| F::from_f64(vertex(k))).collect();
+    let table = numbers(4 * grid.rows(), 0.7);
+    let size = ImageSize::from(size);
+    let corner = |k: u32| k % VERTICES as u32;
+    // Every seventh face is a line, every eleventh a point.
+    let face = |f: u32| match (f % 7, f % 11) {
+        (0, _) => [corner(f), corner(f + 1), corner(f)],
+        (_, 0) => [corner(f); 3],
+        _ => [corner(f), corner(7 * f + 3), corner(11 * f + 8)],
+    };
+    let faces: Vec<_> = (0..FACES).map(face).collect();
+    let inputs = Inputs {
+        vertices: &vertices,
+        table: &table,
+        faces: &faces,
+        grid,
+        size,
+        near: 0.01,
+        views,
+        rows: 32,
+    };
+    let upstream = numbers(views * size.pixels(), 0.3);
+    let direction = numbers(vertices.len() + table.len(), 2.3);
+    let bands = &F::bands(&inputs);
+    let mut all = F::sums(&inputs, bands);
+    all.extend(F::sums_vjp(&inputs, bands, &upstream, [true, false]));
+    all.extend(F::sums_vjp(&inputs, bands, &upstream, [true; 2]));
+    all.extend(F::sums_vjp_of_vjp(&inputs, bands, &upstream, &direction, [true; 2], [true; 3]));
+    let along = &direction[..vertices.len()];
+    let (along_vertices, wanted) = ([true, false], [true, false, true]);
+    all.extend(F::sums_vjp_of_vjp(&inputs, bands, &upstream, along, along_vertices, wanted));
+    // Sums as small as those of a softness, whose exponentials are finite.
+    let small: Vec<F> = table.iter().map(|&x| x * F::from_f64(0.01)).collect();
+    let inputs = Inputs { table: &small, ..inputs };
+    for loss in [PixelLoss::SquaredError, PixelLoss::Iou] {
+        let target: Vec<F> = upstream.iter().map(|&x| x * x).collect();
+        for counted in [None, Some(&target[..])] {
+            let judged = Judged { target: &target, counted };
+            all.extend(F::losses(&inputs, bands, judged, loss, true).concat());
+        }
+    }
+    all
+}
+
+fn assert_same_bits<F: Kernels>() {
+    for (size, views) in [([50, 50], 1), ([33, 41], 5), ([100, 70], 3)] {
+        for far in [0, 9] {
+            let name = format!("{size:?} px, {views} views, {far}");
+            assert_same_with_and_without_vectors(&name, || passes::<F>(size, views, far));
+        }
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    assert_same_bits::<f32>();
+    assert_same_bits::<f64>();
+}
