@@ -14,7 +14,7 @@ pub struct Loaded {
     pub faces: usize,
 }
 
-/// The mesh in the `bytes` of a file of this name: OBJ, PLY, STL or GLB.
+/// The mesh in the `bytes` of a file of this name: OBJ, PLY, STL, OFF, GLB or glTF.
 ///
 /// # Errors
 ///

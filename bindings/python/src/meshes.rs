@@ -12,7 +12,7 @@ use crate::guard::{guarded, refused};
 type Parts<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, Option<Bound<'py, PyArray2<f64>>>);
 
-/// Reads OBJ, PLY, STL or GLB: positions, faces, and colours or None.
+/// Reads OBJ, PLY, STL, OFF, GLB or glTF: positions, faces, and colours or None.
 #[pyfunction]
 pub(crate) fn load_mesh(py: Python<'_>, path: PathBuf) -> PyResult<Parts<'_>> {
     parts(py, &guarded(py, || Mesh::load(path))?.map_err(refused)?)

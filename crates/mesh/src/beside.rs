@@ -19,16 +19,44 @@ pub(crate) fn beside(folder: &Path, name: &str) -> PathBuf {
 }
 
 /// Largest file that is read, in bytes: the longest that a GLB file can say.
-const MOST_BYTES: u64 = u32::MAX as u64;
+pub(crate) const MOST_BYTES: u64 = u32::MAX as u64;
 
 /// The content of a regular file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     read_bounded(path, MOST_BYTES).map_err(|reason| MeshError::Read { path: path.into(), reason })
 }
 
+/// Where the file lies that a URI in a file in `folder` names: `%20` stands for a blank, but not all programs know.
+pub(crate) fn beside_uri(folder: &Path, uri: &str) -> PathBuf {
+    let plain = beside(folder, uri);
+    if plain.exists() { plain } else { beside(folder, &decoded(uri)) }
+}
+
+/// A text without its escapes: `%` and two hexadecimal digits stand for a byte.
+fn decoded(uri: &str) -> String {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let Some((&first, after)) = rest.split_first() {
+        let digits = after.get(..2).filter(|digits| digits.iter().all(u8::is_ascii_hexdigit));
+        let byte =
+            digits.and_then(|digits| u8::from_str_radix(str::from_utf8(digits).ok()?, 16).ok());
+        let (byte, after) = match byte {
+            Some(byte) if first == b'%' => (byte, &after[2..]),
+            _ => (first, after),
+        };
+        bytes.push(byte);
+        rest = after;
+    }
+    String::from_utf8(bytes).unwrap_or_else(|_| uri.to_owned())
+}
+
 /// The content of the picture that a file in `folder` calls `name`.
 pub(crate) fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, MeshError> {
-    let path = beside(folder, name);
+    picture_at(beside(folder, name))
+}
+
+/// The content of the picture at `path`.
+pub(crate) fn picture_at(path: PathBuf) -> Result<Vec<u8>, MeshError> {
     let content = read(&path)?;
     if media_type(&content).is_none() {
         let reason = io::Error::other("it is neither a PNG nor a JPEG file");
@@ -40,6 +68,20 @@ pub(crate) fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, MeshError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn escapes_of_a_uri_are_bytes_and_lead_nowhere_else() {
+        for (uri, expected) in [
+            ("my%20mesh.bin", "in/my mesh.bin"),
+            ("%C3%A4.bin", "in/ä.bin"),
+            ("50%.bin", "in/50%.bin"),
+            ("%FF.bin", "in/%FF.bin"),
+            ("%2e%2e%2fa.bin", "in/a.bin"),
+            ("%2", "in/%2"),
+        ] {
+            assert_eq!(beside_uri(Path::new("in"), uri), Path::new(expected), "{uri}");
+        }
+    }
 
     #[test]
     fn no_name_leads_out_of_the_folder() {

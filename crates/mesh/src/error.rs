@@ -5,8 +5,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::format::ending;
-
 /// Largest coordinate of a texture, in either direction. Much farther out floats of 32 bits would not tell the texels of a picture apart.
 pub(crate) const FARTHEST: f64 = 1e4;
 
@@ -33,9 +31,8 @@ pub enum MeshError {
     },
     /// The file's name has no ending of a format that is read.
     #[error(
-        "{}: {}meshes are read from files that end in .obj, .ply, .stl or .glb",
-        file(name),
-        advice(name)
+        "{}: meshes are read from files that end in .obj, .ply, .stl, .off, .glb or .gltf",
+        file(name)
     )]
     UnknownFormat {
         /// Name of the file.
@@ -137,12 +134,6 @@ pub enum MeshError {
         /// How many vertices there are.
         vertices: usize,
     },
-}
-
-/// What to do with the file `name`, if its format has a sibling that is read.
-fn advice(name: &str) -> &'static str {
-    let gltf = ending(Path::new(name)).is_some_and(|ending| ending == "gltf");
-    if gltf { "export it as one .glb file: " } else { "" }
 }
 
 /// What is wrong at one place of a file.

@@ -8,6 +8,8 @@ pub(crate) enum Format {
     Ply,
     Stl,
     Glb,
+    Gltf,
+    Off,
 }
 
 impl Format {
@@ -17,6 +19,8 @@ impl Format {
             "ply" => Some(Self::Ply),
             "stl" => Some(Self::Stl),
             "glb" => Some(Self::Glb),
+            "gltf" => Some(Self::Gltf),
+            "off" => Some(Self::Off),
             _ => None,
         }
     }

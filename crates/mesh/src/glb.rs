@@ -1,7 +1,7 @@
-//! A GLB file: binary glTF 2.0, of which the geometry, colours and a texture are read.
+//! A GLB or glTF file: glTF 2.0, of which the geometry, colours and a texture are read.
 
 use std::{
-    collections::{HashMap, HashSet, hash_map::Entry},
+    collections::{HashMap, hash_map::Entry},
     path::Path,
 };
 
@@ -11,8 +11,9 @@ use crate::{
     Fault,
     colours::{Beyond, Colours},
     error::{Place, Trouble, shown},
+    glb_parts::{Room, at, factor, primitives, shared, surface_of},
     glb_texture::Unwrapped,
-    gltf::{Attributes, Gltf, Node, Primitive, number},
+    gltf::{Gltf, Node, Primitive, number},
     mesh::finite,
     parts::Parts,
     placement::Placement,
@@ -21,12 +22,6 @@ use crate::{
 pub(crate) const MAGIC: &[u8] = b"glTF";
 pub(crate) const JSON: &[u8] = b"JSON";
 pub(crate) const BIN: &[u8] = b"BIN\0";
-
-/// A small file can place a mesh many times over. It may have this many vertices and as many faces in the end, or twice its bytes, which is more
-/// than any file needs that places each of its meshes once. Vertices with colours count twice, and so do faces with a texture.
-const MOST_PLACED: u64 = 20_000_000;
-/// Placed parts of meshes, also empty ones.
-const MOST_PARTS: u64 = 1_000_000;
 
 /// These extensions are read as far as this reader goes.
 const READ: [&str; 3] =
@@ -47,27 +42,49 @@ const HARMLESS: [&str; 8] = [
 /// The colour of what has none beside what has one.
 const WHITE: [f64; 3] = [1.0; 3];
 
-const NO_FACES: Trouble =
-    Trouble::NoFaces("a GLB file has them in meshes of triangles at the nodes of its scene");
+const NO_FACES: Trouble = Trouble::NoFaces(
+    "a GLB or glTF file has them in meshes of triangles at the nodes of its scene",
+);
 
-/// The mesh in `bytes`; see [`crate::Mesh::parse`]. With the `folder` of the file also its texture.
-pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Trouble> {
+/// The mesh in `bytes` of a GLB file; see [`crate::Mesh::parse`]. With the `folder` of the file also buffers beside it, and its texture
+/// if that is wanted.
+pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>, textured: bool) -> Result<Parts, Trouble> {
     let (json, bin) = chunks(bytes)?;
-    let gltf = Gltf::read(json, bin)?;
+    let gltf = Gltf::read(json, bin, folder)?;
+    scene(&gltf, bytes.len(), folder.filter(|_| textured))
+}
+
+/// The same of a glTF file: JSON alone.
+pub(crate) fn parse_text(
+    bytes: &[u8],
+    folder: Option<&Path>,
+    textured: bool,
+) -> Result<Parts, Trouble> {
+    let json = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if json.starts_with(MAGIC) {
+        return Err(Trouble::part("header", "it is a GLB file: let its name end in .glb"));
+    }
+    let gltf = Gltf::read(json, None, folder)?;
+    scene(&gltf, bytes.len(), folder.filter(|_| textured))
+}
+
+/// The mesh of a file of `length` bytes. With the `folder` of the file also its texture.
+fn scene(gltf: &Gltf, length: usize, folder: Option<&Path>) -> Result<Parts, Trouble> {
+    let length = length + gltf.length_beside;
     let mut warnings = Vec::from_iter(required(&gltf.extensions_required)?);
 
     let mut room = Room::default();
     let mut prices = vec![None; gltf.meshes.len()];
-    walk(&gltf, |mesh, _| room.take(&gltf, mesh, &mut prices))?;
-    let (positions, faces) = room.checked(bytes.len(), folder.is_some())?;
+    walk(gltf, |mesh, _| room.take(gltf, mesh, &mut prices))?;
+    let (positions, faces) = room.checked(length, folder.is_some())?;
     let mut parts = Parts::default();
     parts.positions.reserve_exact(positions);
     parts.faces.reserve_exact(faces);
 
-    let unwrapped = folder.map(|_| Ok(Unwrapped::new(bytes.len())));
+    let unwrapped = folder.map(|_| Ok(Unwrapped::new(length)));
     let most = [positions, faces];
-    let mut surface = Surface { gltf: &gltf, parts, most, colours: Ok(()), unwrapped };
-    walk(&gltf, |mesh, placement| surface.add(mesh, placement))?;
+    let mut surface = Surface { gltf, parts, most, colours: Ok(()), unwrapped };
+    walk(gltf, |mesh, placement| surface.add(mesh, placement))?;
     let Surface { mut parts, colours, unwrapped, .. } = surface;
     if parts.faces.is_empty() {
         return Err(NO_FACES);
@@ -81,7 +98,7 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
     }
     warnings.append(&mut parts.warnings);
     parts.texture = match (folder, unwrapped) {
-        (Some(folder), Some(Ok(unwrapped))) => unwrapped.texture(&gltf, folder, &mut warnings),
+        (Some(folder), Some(Ok(unwrapped))) => unwrapped.texture(gltf, folder, &mut warnings),
         (_, Some(Err(trouble))) => {
             warnings.push(trouble);
             None
@@ -93,7 +110,7 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
 
 /// An error if an extension is required that may change where the triangles are; a warning if another one that is not read is.
 fn required(extensions: &[String]) -> Result<Option<Trouble>, Trouble> {
-    let wrong = |reason| Trouble::part("JSON chunk", reason);
+    let wrong = |reason| Trouble::part("JSON", reason);
     let is_read = |name: &&String| READ.contains(&name.as_str());
     for extension in extensions {
         let name = shown(extension);
@@ -218,119 +235,6 @@ fn walk(
     Ok(())
 }
 
-/// The parts of a mesh.
-fn primitives<'a>(gltf: &'a Gltf, mesh: usize) -> Result<&'a [Primitive], Trouble> {
-    let missing = || Trouble::part(format!("mesh {mesh}"), "there is none");
-    Ok(&gltf.meshes.get(mesh).ok_or_else(missing)?.primitives)
-}
-
-/// Puts a part of a mesh before the place of a trouble.
-fn at(mesh: usize, primitive: usize) -> impl Fn(Trouble) -> Trouble {
-    move |trouble| {
-        let here = format!("mesh {mesh}, primitive {primitive}");
-        match trouble {
-            Trouble::Part(part, why) if part.is_empty() => Trouble::Part(here, why),
-            Trouble::Part(part, why) => Trouble::Part(format!("{here}, {part}"), why),
-            other => other,
-        }
-    }
-}
-
-/// The accessor of the positions of a part, if it is a surface.
-fn surface_of(primitive: &Primitive) -> Result<Option<usize>, Trouble> {
-    match (primitive.mode, primitive.attributes.position) {
-        (0..4, _) | (4..7, None) => Ok(None),
-        (4..7, Some(accessor)) => Ok(Some(accessor)),
-        (mode, _) => Err(Trouble::part("", format!("{mode} is not a mode of glTF"))),
-    }
-}
-
-/// Parts of other materials often use the same vertices: those with one accessor of positions and one of colours do.
-type Shared = (usize, Option<u64>);
-
-fn shared(accessor: usize, primitive: &Primitive) -> Shared {
-    (accessor, primitive.attributes.colour.as_u64())
-}
-
-/// The numbers of parts, vertices and faces that are placed.
-#[derive(Clone, Copy, Default)]
-struct Room {
-    parts: u64,
-    vertices: u64,
-    faces: u64,
-    has_colours: bool,
-    has_coordinates: bool,
-}
-
-impl Room {
-    /// Adds a mesh once more.
-    fn take(
-        &mut self,
-        gltf: &Gltf,
-        mesh: usize,
-        prices: &mut [Option<Self>],
-    ) -> Result<(), Trouble> {
-        let price = match prices.get(mesh) {
-            Some(&Some(price)) => price,
-            _ => Self::of(gltf, mesh)?,
-        };
-        prices[mesh] = Some(price);
-        self.parts = self.parts.saturating_add(price.parts);
-        self.vertices = self.vertices.saturating_add(price.vertices);
-        self.faces = self.faces.saturating_add(price.faces);
-        self.has_colours |= price.has_colours;
-        self.has_coordinates |= price.has_coordinates;
-        Ok(())
-    }
-
-    /// A mesh whose bytes are all there.
-    fn of(gltf: &Gltf, mesh: usize) -> Result<Self, Trouble> {
-        let primitives = primitives(gltf, mesh)?;
-        let mut room = Self { parts: primitives.len() as u64, ..Self::default() };
-        let mut seen = HashSet::new();
-        for (number, primitive) in primitives.iter().enumerate() {
-            let mut count = || {
-                let Some(accessor) = surface_of(primitive)? else { return Ok((0, 0)) };
-                let vertices = gltf.sure_positions(accessor)?;
-                let corners = primitive.indices.map_or(Ok(vertices), |it| gltf.sure_indices(it))?;
-                let is_new = seen.insert(shared(accessor, primitive));
-                let faces =
-                    if primitive.mode == 4 { corners / 3 } else { corners.saturating_sub(2) };
-                Ok((if is_new { vertices } else { 0 }, faces))
-            };
-            let (vertices, faces) = count().map_err(at(mesh, number))?;
-            room.vertices = room.vertices.saturating_add(vertices as u64);
-            room.faces = room.faces.saturating_add(faces as u64);
-            let Attributes { colour, coordinates, more_coordinates, .. } = &primitive.attributes;
-            room.has_colours |= !colour.is_null();
-            room.has_coordinates |= !coordinates.is_null() || !more_coordinates.is_null();
-        }
-        Ok(room)
-    }
-
-    /// The numbers of vertices and faces, unless they are too many for a file of this length.
-    fn checked(self, length: usize, textured: bool) -> Result<(usize, usize), Trouble> {
-        let Self { parts, vertices, faces, .. } = self;
-        let wrong = |reason| Err(Trouble::part("scene", reason));
-        if parts > MOST_PARTS {
-            return wrong(format!(
-                "its nodes place {parts} parts of meshes, more than {MOST_PARTS}"
-            ));
-        }
-        let most = MOST_PLACED.max(2 * length as u64).min(u64::from(u32::MAX));
-        let of_vertex = 1 + u64::from(self.has_colours);
-        let of_face = 1 + u64::from(self.has_coordinates && textured);
-        if vertices > most / of_vertex || faces > most / of_face {
-            return wrong(format!(
-                "its nodes place {vertices} vertices and {faces} faces, more than {MOST_PLACED} with those of colours and textures counted \
-                 twice: export fewer copies"
-            ));
-        }
-        // No more than 2³² of either have been let in.
-        Ok((vertices as usize, faces as usize))
-    }
-}
-
 /// The parts placed so far.
 struct Surface<'a> {
     gltf: &'a Gltf<'a>,
@@ -352,12 +256,12 @@ impl Surface<'_> {
             let at = at(mesh, number);
             let Some(accessor) = surface_of(primitive).map_err(&at)? else { continue };
             let vertices = self.gltf.count(accessor).map_err(&at)?;
-            let first = match firsts.entry(shared(accessor, primitive)) {
+            let first = match firsts.entry(shared(self.gltf, accessor, primitive)) {
                 Entry::Occupied(first) => *first.get(),
                 Entry::Vacant(entry) => {
                     let first = *entry.insert(self.parts.positions.len());
                     self.add_vertices(accessor, placement).map_err(&at)?;
-                    self.add_colours(&primitive.attributes.colour, first, &at);
+                    self.add_colours(primitive, first, &at);
                     first
                 }
             };
@@ -416,17 +320,30 @@ impl Surface<'_> {
     }
 
     /// Adds the colours of all vertices after the `first`, or gives up those of the whole file.
-    fn add_colours(&mut self, accessor: &Value, first: usize, at: impl Fn(Trouble) -> Trouble) {
-        if accessor.is_null() || self.colours.is_err() {
+    fn add_colours(
+        &mut self,
+        primitive: &Primitive,
+        first: usize,
+        at: impl Fn(Trouble) -> Trouble,
+    ) {
+        let (accessor, factor) = (&primitive.attributes.colour, factor(self.gltf, primitive));
+        if self.colours.is_err() || accessor.is_null() && factor == WHITE {
             return;
         }
-        match self.settled_colours(accessor, self.parts.positions.len() - first) {
+        let vertices = self.parts.positions.len() - first;
+        let own = match accessor.is_null() {
+            true => Ok((vec![WHITE; vertices], None)),
+            false => self.settled_colours(accessor, vertices),
+        };
+        match own {
             Ok((linear, warning)) => {
                 let [vertices, _] = self.most;
                 let colours =
                     self.parts.colours.get_or_insert_with(|| Vec::with_capacity(vertices));
                 colours.resize(first, WHITE);
-                colours.extend(linear.into_iter().map(|colour| colour.map(from_linear)));
+                let shown =
+                    |colour: [f64; 3]| [0, 1, 2].map(|k| from_linear(colour[k] * factor[k]));
+                colours.extend(linear.into_iter().map(shown));
                 if self.parts.warnings.is_empty() {
                     self.parts.warnings.extend(warning.map(at));
                 }

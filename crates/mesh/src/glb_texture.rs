@@ -9,9 +9,10 @@ use serde_json::Value;
 
 use crate::{
     Texture,
-    beside::picture,
+    beside::{beside_uri, picture_at},
     error::{FARTHEST, Trouble, shown},
-    gltf::{Gltf, Primitive, data, number},
+    gltf::{Gltf, Primitive, entry, number},
+    gltf_buffers::data,
     texture::{is_near, media_type},
 };
 
@@ -152,10 +153,6 @@ fn base_colour(gltf: &Gltf, primitive: &Primitive) -> Result<(Option<usize>, u64
     Ok((Some(image), shown["texCoord"].as_u64().unwrap_or(0)))
 }
 
-fn entry<'a>(list: &'a Value, of: &Value) -> &'a Value {
-    number(of).and_then(|number| list.get(number)).unwrap_or(&Value::Null)
-}
-
 /// The content of the file that an image is.
 fn content(gltf: &Gltf, folder: &Path, image: usize) -> Result<Vec<u8>, Trouble> {
     let wrong = |reason: &str| Err(Trouble::part(format!("image {image}"), reason));
@@ -164,7 +161,7 @@ fn content(gltf: &Gltf, folder: &Path, image: usize) -> Result<Vec<u8>, Trouble>
         (Value::String(uri), _) => match data(uri) {
             Some(Some(content)) => content,
             Some(None) => return wrong(&format!("its data URI is not base64: {}", shown(uri))),
-            None => return picture(folder, uri).map_err(Trouble::OtherFile),
+            None => return picture_at(beside_uri(folder, uri)).map_err(Trouble::OtherFile),
         },
         (_, Some(view)) => match gltf.view(view) {
             Ok((_, Some(bytes))) => bytes.to_vec(),

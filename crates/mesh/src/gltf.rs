@@ -1,18 +1,17 @@
-//! What a GLB file says of its geometry: the JSON of glTF 2.0, and the numbers it refers to.
+//! What a glTF or GLB file says of its geometry: the JSON of glTF 2.0, and the numbers it refers to.
 //!
 //! Read by code of our own: the crate for it panics on some lengths and strides that the format
 //! forbids, and refuses whole files for materials that it does not know.
 
-use std::borrow::Cow;
+use std::path::Path;
 
-use base64::{
-    Engine, alphabet,
-    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
-};
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::error::Trouble;
+use crate::{
+    error::Trouble,
+    gltf_buffers::{Content, Files, data},
+};
 
 /// Everything else in the JSON is skipped.
 #[derive(Default, Deserialize)]
@@ -20,7 +19,13 @@ use crate::error::Trouble;
 pub(crate) struct Gltf<'a> {
     /// The content of each buffer, or the reason why there is none.
     #[serde(skip)]
-    contents: Vec<Result<Cow<'a, [u8]>, &'static str>>,
+    contents: Vec<Result<Content<'a>, String>>,
+    /// Bytes in all buffers, of those that are the same once.
+    #[serde(skip)]
+    length: usize,
+    /// Those of them that lie in other files.
+    #[serde(skip)]
+    pub(crate) length_beside: usize,
     pub(crate) scene: Option<usize>,
     pub(crate) scenes: Vec<Scene>,
     pub(crate) nodes: Vec<Node>,
@@ -138,19 +143,9 @@ pub(crate) fn number(value: &Value) -> Option<usize> {
     value.as_u64().and_then(|number| usize::try_from(number).ok())
 }
 
-/// The bytes in a data URI, `None` if it is not coded in base 64; `None` for other URIs.
-pub(crate) fn data(uri: &str) -> Option<Option<Vec<u8>>> {
-    const LENIENT: GeneralPurpose = GeneralPurpose::new(
-        &alphabet::STANDARD,
-        GeneralPurposeConfig::new()
-            .with_decode_padding_mode(DecodePaddingMode::Indifferent)
-            .with_decode_allow_trailing_bits(true),
-    );
-    let (_, coded) = match uri.strip_prefix("data:")?.split_once(";base64,") {
-        Some(parts) => parts,
-        None => return Some(None),
-    };
-    Some(LENIENT.decode(coded).ok())
+/// The entry of a list that a number names; nothing where there is none.
+pub(crate) fn entry<'a>(list: &'a Value, of: &Value) -> &'a Value {
+    number(of).and_then(|number| list.get(number)).unwrap_or(&Value::Null)
 }
 
 /// The types that glTF numbers from 5120.
@@ -207,21 +202,28 @@ impl Component {
 }
 
 impl<'a> Gltf<'a> {
-    /// The content of a JSON chunk; `bin` is the binary chunk.
-    pub(crate) fn read(json: &[u8], bin: Option<&'a [u8]>) -> Result<Self, Trouble> {
+    /// The content of the JSON; `bin` is the binary chunk. With the `folder` of the file also buffers beside it.
+    pub(crate) fn read(
+        json: &[u8],
+        bin: Option<&'a [u8]>,
+        folder: Option<&Path>,
+    ) -> Result<Self, Trouble> {
         let mut gltf: Self = serde_json::from_slice(json)
-            .map_err(|reason| Trouble::part("JSON chunk", reason.to_string()))?;
+            .map_err(|reason| Trouble::part("JSON", reason.to_string()))?;
+        let mut files = Files::default();
         let content = |(number, buffer): (usize, Buffer)| match (buffer.uri, bin) {
             (Some(uri), _) => match data(&uri) {
-                Some(Some(bytes)) => Ok(Cow::Owned(bytes)),
-                Some(None) => Err("is a data URI that is not base64"),
-                None => Err("lies outside of the binary chunk: export it as one .glb file"),
+                Some(Some(bytes)) => Ok(Content::Own(bytes.into())),
+                Some(None) => Err("is a data URI that is not base64".to_owned()),
+                None => files.read(folder, &uri).map(Content::Own),
             },
-            (None, Some(bin)) if number == 0 => Ok(Cow::Borrowed(bin)),
-            (None, _) => Err("has no binary chunk: export it without compression"),
+            (None, Some(bin)) if number == 0 => Ok(Content::Chunk(bin)),
+            (None, _) => Err("has no binary chunk: export it without compression".to_owned()),
         };
         let buffers = std::mem::take(&mut gltf.buffers);
         gltf.contents = buffers.into_iter().enumerate().map(content).collect();
+        gltf.length_beside = files.length;
+        gltf.length = bin.map_or(0, <[u8]>::len) + json.len() + files.length;
         Ok(gltf)
     }
 
@@ -291,6 +293,7 @@ impl<'a> Gltf<'a> {
         let content = content.ok_or_else(|| format!("there is no buffer {}", view.buffer))?;
         let content =
             content.as_ref().map_err(|reason| format!("buffer {} {reason}", view.buffer))?;
+        let content = content.bytes();
         let end = view.byte_offset.checked_add(view.byte_length);
         Ok((view, end.and_then(|end| content.get(view.byte_offset..end))))
     }
@@ -325,17 +328,12 @@ impl<'a> Gltf<'a> {
         match accessor.buffer_view {
             Some(view) => Ok(Some(Source { view, offset: accessor.byte_offset, component })),
             // Such entries take no bytes, so their number could be anything.
-            None if accessor.sparse.is_some() && count <= self.length() => Ok(None),
+            None if accessor.sparse.is_some() && count <= self.length => Ok(None),
             None => {
                 let reason = "no bytes for them: export it without compression";
                 Err(format!("{count} entries, but {reason}"))
             }
         }
-    }
-
-    /// Bytes in all buffers.
-    fn length(&self) -> usize {
-        self.contents.iter().flatten().map(|content| content.len()).sum()
     }
 
     /// The entries of an accessor of vertex indices.

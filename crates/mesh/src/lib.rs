@@ -1,4 +1,4 @@
-//! Triangle meshes for softrast: a careful reader of OBJ, PLY, STL and GLB, a
+//! Triangle meshes for softrast: a careful reader of OBJ, PLY, STL, OFF, GLB and glTF, a
 //! writer of all but STL, and small generators.
 //!
 //! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
@@ -26,14 +26,17 @@ mod error;
 mod format;
 mod fox;
 mod glb;
+mod glb_parts;
 mod glb_texture;
 mod glb_writer;
 mod gltf;
+mod gltf_buffers;
 mod icosphere;
 mod mesh;
 mod normalized;
 mod obj;
 mod obj_texture;
+mod off;
 mod parts;
 mod placement;
 mod ply;

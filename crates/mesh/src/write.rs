@@ -62,7 +62,9 @@ impl Mesh {
             Some(Format::Obj) => self.to_obj().into_bytes(),
             Some(Format::Ply) => self.to_ply(),
             Some(Format::Glb) => self.to_glb(),
-            Some(Format::Stl) | None => return Err(MeshError::NotWritten { path: path.into() }),
+            Some(Format::Stl | Format::Off | Format::Gltf) | None => {
+                return Err(MeshError::NotWritten { path: path.into() });
+            }
         };
         write(path, &bytes).map_err(|reason| MeshError::Write { path: path.into(), reason })
     }

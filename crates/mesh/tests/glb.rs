@@ -286,6 +286,94 @@ fn buffers_may_be_data_uris_with_or_without_a_binary_chunk() {
 }
 
 #[test]
+fn factors_of_materials_multiply_the_linear_colours_of_their_parts() {
+    let (mut json, bin) = coloured(5121, "VEC4", &[0, 255, 255, 255].repeat(4));
+    let material = |factor: Value| json!({"pbrMetallicRoughness": {"baseColorFactor": factor}});
+    json["materials"] = json!([
+        material(json!([0.5, 1.0, 0.0, 1.0])),
+        material(json!([0.5, 2.0, 0.0, 1.0])),
+        {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0, 0.5, 1, 1]}}},
+    ]);
+    let part = json["meshes"][0]["primitives"][0].clone();
+    let with = |material: usize, coloured: bool| {
+        let mut part = part.clone();
+        part["material"] = json!(material);
+        if !coloured {
+            part["attributes"].as_object_mut().unwrap().remove("COLOR_0");
+        }
+        part
+    };
+    // Half of the light is this bright on a screen.
+    let half = 0.735_356_983_052_449_2;
+    for (parts, expected) in [
+        (vec![with(0, true)], vec![[0.0, 1.0, 0.0]]),
+        (vec![with(0, false)], vec![[half, 1.0, 0.0]]),
+        // What is no factor counts as 1.
+        (vec![with(1, true)], vec![[0.0, 1.0, 1.0]]),
+        (vec![with(2, false), with(9, false)], vec![[0.0, half, 1.0], [1.0; 3]]),
+    ] {
+        json["meshes"][0]["primitives"] = json!(parts);
+        let mesh = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap();
+        let colours = mesh.colours().unwrap();
+        assert_eq!(colours.len(), 4 * expected.len());
+        for (colours, expected) in colours.chunks(4).zip(expected) {
+            for (found, wanted) in colours.as_flattened().iter().zip(expected.iter().cycle()) {
+                assert!((found - wanted).abs() < 1e-12, "{colours:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_gltf_file_has_its_buffers_inside_or_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (mut json, bin) = bytes();
+    let expected = [[0, 1, 2], [0, 2, 3]];
+    std::fs::write(at("my buffer.bin"), &bin).unwrap();
+    let whole = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap();
+    for uri in ["my%20buffer.bin", "my buffer.bin", "./my buffer.bin", "../far/my%20buffer.bin"] {
+        json["buffers"][0]["uri"] = json!(uri);
+        // Some programs begin with a mark of the order of bytes.
+        std::fs::write(at("a.gltf"), format!("\u{feff}{json}")).unwrap();
+        let mesh = Mesh::load(at("a.gltf")).unwrap();
+        assert_eq!((mesh.faces(), mesh.positions()), (&expected[..], whole.positions()), "{uri}");
+        assert_eq!(Mesh::load_textured(at("a.gltf")).unwrap().0.faces(), expected);
+        std::fs::write(at("a.glb"), glb(&json, &[])).unwrap();
+        assert_eq!(Mesh::load(at("a.glb")).unwrap().faces(), expected);
+    }
+    let message = |file: &str| Mesh::parse(file.as_bytes(), "a.gltf").unwrap_err().to_string();
+    let place = "node 0, mesh 0, primitive 0, accessor 0";
+    let alone =
+        format!("a.gltf: {place}: buffer 0 lies in another file: export it as one .glb file");
+    assert_eq!(message(&json.to_string()), alone);
+    assert_eq!(message("glTF"), "a.gltf: header: it is a GLB file: let its name end in .glb");
+    for (uri, start) in [("none.bin", "none.bin, which cannot be read: "), (".", "")] {
+        json["buffers"][0]["uri"] = json!(uri);
+        std::fs::write(at("a.gltf"), json.to_string()).unwrap();
+        let message = Mesh::load(at("a.gltf")).unwrap_err().to_string();
+        assert!(message.contains(&format!("{place}: buffer 0 lies in ")), "{message}");
+        assert!(message.contains(start) && message.lines().count() == 1, "{message}");
+    }
+}
+
+/// Many buffers may name one file, and then claim as many zeros as the file has bytes, and no more.
+#[test]
+fn buffers_that_share_a_file_take_its_bytes_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut json, bin) = bytes();
+    std::fs::write(folder.path().join("a.bin"), &bin).unwrap();
+    json["buffers"] = (0..1000).map(|_| json!({"uri": "a.bin"})).collect();
+    json["accessors"][0] = json!({
+        "componentType": 5126, "count": 40_000, "type": "VEC3",
+        "sparse": {"count": 0, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0}},
+    });
+    std::fs::write(folder.path().join("a.gltf"), json.to_string()).unwrap();
+    let message = Mesh::load(folder.path().join("a.gltf")).unwrap_err().to_string();
+    assert!(message.contains("40000 entries, but no bytes for them"), "{message}");
+}
+
+#[test]
 fn more_sparse_entries_than_entries_are_one_line() {
     let (mut json, bin) = bytes();
     json["accessors"][0]["sparse"] = json!({
@@ -316,15 +404,15 @@ fn bad_files_are_one_line_that_names_the_place() {
         (huge_chunk, "chunk 0: the file ends before it is complete"),
         (
             with(|j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"])),
-            "JSON chunk: compressed by KHR_draco_mesh_compression: export it without compression",
+            "JSON: compressed by KHR_draco_mesh_compression: export it without compression",
         ),
         (
             with(|j| j["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"])),
-            "JSON chunk: needs the extension EXT_mesh_gpu_instancing, which is not read",
+            "JSON: needs the extension EXT_mesh_gpu_instancing, which is not read",
         ),
         (
             with(|j| j["buffers"][0]["uri"] = json!("a.bin")),
-            "node 0, mesh 0, primitive 0, accessor 0: buffer 0 lies outside of the binary chunk: export it as one .glb file",
+            "node 0, mesh 0, primitive 0, accessor 0: buffer 0 lies in another file: export it as one .glb file",
         ),
         (
             with(|j| j["nodes"][0]["children"] = json!([0])),

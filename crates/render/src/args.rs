@@ -10,7 +10,7 @@ use softrast_softness::Family;
 #[derive(Debug, Parser)]
 #[command(name = "render", version, allow_negative_numbers = true)]
 pub(crate) struct Args {
-    /// Mesh to draw: OBJ, PLY, STL or GLB
+    /// Mesh to draw: OBJ, PLY, STL, OFF, GLB or glTF
     #[arg(value_name = "MESH")]
     pub(crate) mesh: PathBuf,
 

@@ -2,7 +2,7 @@
 //!
 //! This crate re-exports the libraries of the project under short names; each can be used alone:
 //!
-//! - [`mesh`]: triangle meshes, a careful reader of OBJ, PLY, STL and GLB, generators;
+//! - [`mesh`]: triangle meshes, a careful reader of OBJ, PLY, STL, OFF, GLB and glTF, generators;
 //! - [`softness`]: soft step functions as burn tensor ops;
 //! - [`raster`]: cameras, silhouettes, colours, losses, exact to second order;
 //! - [`meta`]: optimisers and inner loops that can be differentiated;

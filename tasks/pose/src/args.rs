@@ -6,7 +6,7 @@ use softrast_cli::EXPERIMENTS;
 /// Flags that only POSE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh to view (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
+    /// Mesh to view (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
     #[arg(long, value_name = "FILE", display_order = 0)]
     pub mesh: Option<PathBuf>,
 

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 /// Flags that only 3D SHAPE has.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Mesh whose silhouettes are the target (OBJ, PLY, STL or GLB), centred and with the longest side of its box scaled to 1 [default: our airplane, or chair]
+    /// Mesh whose silhouettes are the target (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side of its box scaled to 1 [default: our airplane, or chair]
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
 
@@ -11,7 +11,7 @@ pub struct Args {
     #[arg(long, requires = "mesh")]
     pub raw: bool,
 
-    /// Mesh that is deformed (OBJ, PLY, STL or GLB), centred and with the longest side scaled to 1 [default: a sphere]
+    /// Mesh that is deformed (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side scaled to 1 [default: a sphere]
     #[arg(long, value_name = "FILE", conflicts_with = "detail")]
     pub template: Option<PathBuf>,
 

@@ -89,7 +89,7 @@ class ColourRenderer(_native.ColourRenderer):
 
 
 def load_mesh(path: _Path) -> _Mesh:
-    """Reads OBJ, PLY, STL or GLB: positions `[V, 3]` (float64), faces `[F, 3]` (int64), and colours `[V, 3]` in [0, 1] or None."""
+    """Reads OBJ, PLY, STL, OFF, GLB or glTF: positions `[V, 3]` (float64), faces `[F, 3]` (int64), and colours `[V, 3]` in [0, 1] or None."""
     return _native.load_mesh(path)
 
 

@@ -7,6 +7,8 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use softrast_mesh::read_bounded;
 
+use super::calibration;
+
 /// Fields that hold one number.
 const NUMBERS: [&str; 20] = [
     "fl_x",
@@ -53,17 +55,18 @@ pub(super) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
     Ok((bytes, name))
 }
 
-/// The content of the camera file `name` as JSON.
+/// The content of the camera file `name` as JSON, also of a calibration in YAML.
 pub(super) fn json(bytes: &[u8], name: &str) -> anyhow::Result<Value> {
     let text = text(bytes).with_context(|| name.to_owned())?;
-    let file: Value = serde_json::from_str(&text).map_err(|error| match not_finite(&text) {
+    let parsed = serde_json::from_str(&text).or_else(|error| calibration::yaml(&text).ok_or(error));
+    let file: Value = parsed.map_err(|error| match not_finite(&text) {
         Some(place) => {
             anyhow!("{name}: {place} is NaN or infinite: calibrate anew, or leave its frame out")
         }
         None => anyhow!("{name}: {error}"),
     })?;
     ensure!(file.is_object(), "{name}: it has no fields of a camera: a JSON object is expected");
-    Ok(file)
+    calibration::as_lens(file).with_context(|| name.to_owned())
 }
 
 /// A text in UTF-8, with or without a byte order mark, or in UTF-16 with one, as shells of Windows write it.

@@ -16,6 +16,9 @@ use super::{
 /// `cy`, else those of `K`, else the middle; the size of its pictures as `w` and `h` or `width` and `height`. See [`Pinhole`] for what they
 /// mean.
 ///
+/// A calibration of OpenCV or ROS is one too, in JSON or YAML: `camera_matrix` is its K, from the middle of the first pixel, beside
+/// `distortion_coefficients`, `image_width`, `image_height` and `distortion_model`.
+///
 /// A lens may distort: `k1` to `k6`, `p1` and `p2` as OpenCV has them, or as its list `distortion_coefficients`; a fisheye has k1 to k4 and
 /// `is_fisheye`, or a `camera_model` that says so. Names of models are those of COLMAP.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]

@@ -1,5 +1,6 @@
 //! Files of cameras: a lens, a pose, and the frames of many pictures.
 
+mod calibration;
 mod camera_file;
 mod colmap;
 mod distortion;

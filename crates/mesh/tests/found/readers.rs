@@ -19,6 +19,7 @@ pub(crate) fn all() -> Vec<Kind> {
         Kind { name: "obj", ending: "obj", seeds: objs, read: |bytes, _| parsed(bytes, "a.obj") },
         Kind { name: "stl", ending: "stl", seeds: stls, read: |bytes, _| parsed(bytes, "a.stl") },
         Kind { name: "ply", ending: "ply", seeds: plys, read: |bytes, _| parsed(bytes, "a.ply") },
+        Kind { name: "off", ending: "off", seeds: offs, read: |bytes, _| parsed(bytes, "a.off") },
         Kind { name: "glb", ending: "glb", seeds: glbs, read: |bytes, _| parsed(bytes, "a.glb") },
         Kind {
             name: "gltf",
@@ -34,6 +35,7 @@ pub(crate) fn all() -> Vec<Kind> {
             seeds: jsons,
             read: |bytes, folder| loaded(&glb(bytes, &bin()), folder, "a.glb"),
         },
+        Kind { name: "gltf-file", ending: "gltf", seeds: gltf_files, read: gltf_file },
     ]
 }
 
@@ -200,6 +202,33 @@ fn bin() -> Vec<u8> {
     bin.extend([0, 255, 51, 255].repeat(4));
     bin.extend(b"\x89PNG\r\n\x1a\n");
     bin
+}
+
+fn offs() -> Vec<Vec<u8>> {
+    let plain =
+        "OFF\n# made by hand\n4 2 0\n0 0 0\n1 0 0\n1 1 .5\n0 1 0\n3 0 1 2\n4 0 1 2 3 1 0 0\n";
+    let joined = "OFF4 1 5\n0 0 0\n1 0 0\n1 1 1e0\n0 1 0\n4 3 2 1 0";
+    let coloured =
+        "CNOFF 3 1 0\n0 0 0 0 0 1 255 0 0 255\n1 0 0 0 0 1 0 .5 0 1\n0 1 0 0 0 1 0 0 7\n3 0 1 2\n";
+    vec![plain.into(), joined.into(), coloured.into()]
+}
+
+/// Files whose buffer lies beside them.
+fn gltf_files() -> Vec<Vec<u8>> {
+    let beside = |json: Vec<u8>| {
+        let mut json: Value = serde_json::from_slice(&json).expect("JSON");
+        json["buffers"] = json!([{"byteLength": 112, "uri": "a%20b.bin"}, {"uri": "a.png"}]);
+        json.to_string().into_bytes()
+    };
+    jsons().into_iter().map(beside).collect()
+}
+
+fn gltf_file(bytes: &[u8], folder: &Path) {
+    beside(folder);
+    if !folder.join("a b.bin").exists() {
+        fs::write(folder.join("a b.bin"), bin()).expect("a file in the folder");
+    }
+    loaded(bytes, folder, "a.gltf");
 }
 
 fn jsons() -> Vec<Vec<u8>> {

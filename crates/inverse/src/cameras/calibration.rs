@@ -1,0 +1,183 @@
+//! Calibrations as OpenCV and ROS write them, in JSON or in YAML, in the fields of a [`Lens`](super::Lens).
+//!
+//! YAML is read by code of our own: what OpenCV writes begins with a line that YAML does not allow.
+
+use anyhow::ensure;
+use serde_json::{Map, Value, json};
+
+const MATRICES: [&str; 3] = ["camera_matrix", "cameraMatrix", "mtx"];
+const COEFFICIENTS: [&str; 5] =
+    ["distortion_coefficients", "dist_coeffs", "distCoeffs", "dist_coeff", "dist"];
+const WIDTHS: [&str; 3] = ["image_width", "width", "w"];
+const HEIGHTS: [&str; 3] = ["image_height", "height", "h"];
+const SIZES: [&str; 3] = ["image_size", "img_size", "imageSize"];
+const MODELS: [&str; 3] = ["distortion_model", "camera_model", "model"];
+const FISHEYES: [&str; 4] = ["equidistant", "fisheye", "kannala_brandt", "OPENCV_FISHEYE"];
+
+/// The camera in a file with a `camera_matrix` in the fields of a lens; other files as they are.
+///
+/// OpenCV counts pixels from the middle of the first one, which lies half a pixel from the border.
+pub(super) fn as_lens(file: Value) -> anyhow::Result<Value> {
+    let first = |names: &[&str]| {
+        names.iter().map(|name| &file[*name]).find(|value| !value.is_null()).cloned()
+    };
+    let Some(matrix) = first(&MATRICES) else { return Ok(file) };
+    let entries: Vec<f64> = numbers(&matrix).iter().filter_map(Value::as_f64).collect();
+    ensure!(
+        entries.len() == 9,
+        "camera_matrix has {} numbers: three rows of three are expected",
+        entries.len()
+    );
+    let [fx, skew, cx, _, fy, cy, ..] = entries[..] else { unreachable!("nine numbers") };
+    let mut lens = file.as_object().cloned().unwrap_or_default();
+    for name in [&MATRICES[..], &COEFFICIENTS, &WIDTHS, &HEIGHTS, &SIZES, &MODELS].concat() {
+        lens.remove(name);
+    }
+    lens.insert("K".into(), json!([[fx, skew, cx + 0.5], [0, fy, cy + 0.5], [0, 0, 1]]));
+    let size = first(&SIZES).map(|size| numbers(&size)).unwrap_or_default();
+    let sides = [("w", &WIDTHS, size.first()), ("h", &HEIGHTS, size.get(1))];
+    for (name, names, of_size) in sides {
+        if let Some(side) = first(names).or(of_size.cloned()) {
+            lens.insert(name.into(), side);
+        }
+    }
+    if let Some(coefficients) = first(&COEFFICIENTS) {
+        lens.insert("distortion".into(), numbers(&coefficients).into());
+    }
+    let model = first(&MODELS);
+    if let Some(model) = model.as_ref().and_then(Value::as_str) {
+        let is_fisheye = FISHEYES.iter().any(|name| model.eq_ignore_ascii_case(name));
+        lens.insert("is_fisheye".into(), is_fisheye.into());
+    }
+    Ok(lens.into())
+}
+
+/// The numbers of a matrix: its rows, or the list `data` of OpenCV's.
+fn numbers(matrix: &Value) -> Vec<Value> {
+    match matrix {
+        Value::Array(rows) => rows.iter().flat_map(numbers).collect(),
+        Value::Object(fields) => fields.get("data").map(numbers).unwrap_or_default(),
+        number => vec![number.clone()],
+    }
+}
+
+/// The fields of a calibration in YAML, None for what is none: numbers, words, and the numbers of matrices.
+pub(super) fn yaml(text: &str) -> Option<Value> {
+    let mut fields = Map::new();
+    for name in [&MATRICES[..], &COEFFICIENTS, &WIDTHS, &HEIGHTS, &SIZES, &MODELS].concat() {
+        let Some(own) = own(text, name) else { continue };
+        let first = own.lines().next().unwrap_or_default().trim();
+        let value = match first.is_empty() || first.starts_with("!!") {
+            // A matrix on the lines below.
+            true => list(own.split_once("data:")?.1)?,
+            false if first.starts_with('[') => list(own)?,
+            false => scalar(first),
+        };
+        fields.insert(name.to_owned(), value);
+    }
+    let is_calibration = MATRICES.iter().any(|name| fields.contains_key(*name));
+    is_calibration.then_some(fields.into())
+}
+
+/// What follows a name up to the next one, which begins a line.
+fn own<'a>(text: &'a str, name: &str) -> Option<&'a str> {
+    let mut start = 0;
+    let mut found = None;
+    for line in text.split_inclusive('\n') {
+        let begins = line.starts_with(|letter: char| letter.is_ascii_alphabetic());
+        match found {
+            Some(from) if begins => return Some(&text[from..start]),
+            None => {
+                let rest = line.strip_prefix(name).and_then(|rest| rest.strip_prefix(':'));
+                found = rest.map(|rest| start + line.len() - rest.len());
+            }
+            _ => {}
+        }
+        start += line.len();
+    }
+    found.map(|from| &text[from..])
+}
+
+/// The numbers between brackets, of all rows.
+fn list(text: &str) -> Option<Value> {
+    let start = text.find('[')?;
+    let mut depth = 0;
+    let end = text[start..].find(|letter| {
+        depth += i32::from(letter == '[') - i32::from(letter == ']');
+        depth == 0
+    })?;
+    let words = text[start..start + end]
+        .split(|letter: char| "[],".contains(letter) || letter.is_whitespace());
+    Some(words.filter(|word| !word.is_empty()).map(scalar).collect())
+}
+
+/// A number, or a word. OpenCV writes `640.` and `.5`, which JSON does not know.
+fn scalar(word: &str) -> Value {
+    let word = word.trim_matches(['"', '\'']);
+    match word.parse::<f64>() {
+        Ok(number) if number.fract() == 0.0 && number.abs() < 1e9 => json!(number as i64),
+        Ok(number) => json!(number),
+        Err(_) => json!(word),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use softrast_raster::ImageSize;
+
+    use crate::Lens;
+
+    const OPENCV: &str = "%YAML:1.0\n---\ncalibration_time: \"Fri\"\nimage_width: 640\nimage_height: 480\n\
+        camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 5.0e+02, 0., 319.5, 0.,\n       510., 239.5, 0., 0., 1. ]\n\
+        distortion_coefficients: !!opencv-matrix\n   rows: 5\n   cols: 1\n   dt: d\n   data: [ -.25, .125, 0., 0., 0. ]\navg_error: .3\n";
+    const ROS: &str = "image_width: 640\nimage_height: 480\ncamera_name: narrow\ncamera_matrix:\n  rows: 3\n  cols: 3\n  \
+        data: [500, 0, 319.5, 0, 510, 239.5, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  \
+        data: [-0.25, 0.125, 0, 0, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+    const SCRIPT: &str = "camera_matrix: [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5],\n  [0.0, 0.0, 1.0]]\ndist_coeff: [[-0.25, 0.125, 0.0, 0.0, 0.0]]\n";
+    const JSON: &str = r#"{"camera_matrix": {"rows": 3, "cols": 3, "data": [500, 0, 319.5, 0, 510, 239.5, 0, 0, 1]},
+        "distortion_coefficients": {"data": [-0.25, 0.125, 0, 0, 0]}, "image_width": 640, "image_height": 480}"#;
+    const LISTS: &str = r#"{"mtx": [[500, 0, 319.5], [0, 510, 239.5], [0, 0, 1]], "dist": [[-0.25, 0.125, 0, 0, 0]], "img_size": [640, 480]}"#;
+
+    #[test]
+    fn all_forms_of_a_calibration_are_one_lens() {
+        let size = ImageSize::from([480, 640]);
+        let lens = Lens::parse(
+            br#"{"fx": 500, "fy": 510, "cx": 320, "cy": 240, "k1": -0.25, "k2": 0.125}"#,
+            "a.json",
+        );
+        let expected = lens.and_then(|lens| lens.camera(size)).unwrap();
+        assert!(expected.1.is_some());
+        for text in [OPENCV, ROS, SCRIPT, JSON, LISTS] {
+            for text in [text.to_owned(), text.replace('\n', "\r\n")] {
+                let lens = Lens::parse(text.as_bytes(), "calibration.yaml").unwrap();
+                assert_eq!(lens.camera(size).unwrap(), expected, "{text}");
+            }
+        }
+        let other = Lens::parse(OPENCV.as_bytes(), "a.yml").unwrap();
+        assert!(other.camera(ImageSize::from([48, 64])).is_err());
+        let fisheye =
+            ROS.replace("plumb_bob", "equidistant").replace("0, 0, 0]\nrect", "0, 0]\nrect");
+        let (_, distortion) =
+            Lens::parse(fisheye.as_bytes(), "a.yaml").unwrap().camera(size).unwrap();
+        assert_ne!(distortion, expected.1);
+    }
+
+    #[test]
+    fn what_is_no_calibration_is_one_line() {
+        for (text, message) in [
+            (
+                "camera_matrix: [[1, 0], [0, 1]]\n",
+                "a.yaml: camera_matrix has 4 numbers: three rows of three are expected",
+            ),
+            (
+                "camera_matrix: [500, 0, x, 0, 510, 239, 0, 0, 1]\n",
+                "a.yaml: camera_matrix has 8 numbers: three rows of three are expected",
+            ),
+            ("hello: 1\n", "a.yaml: expected value at line 1 column 1"),
+            ("camera_matrix: [500, 0", "a.yaml: expected value at line 1 column 1"),
+        ] {
+            let error = format!("{:#}", Lens::parse(text.as_bytes(), "a.yaml").unwrap_err());
+            assert_eq!(error, message);
+        }
+    }
+}

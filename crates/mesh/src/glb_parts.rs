@@ -1,0 +1,145 @@
+//! The parts of the meshes of a glTF file: which are surfaces, what they share, and how much room they take.
+
+use std::collections::HashSet;
+
+use crate::{
+    error::Trouble,
+    gltf::{Attributes, Gltf, Primitive, entry},
+};
+
+/// A small file can place a mesh many times over. It may have this many vertices and as many faces in the end, or twice its bytes, which is more
+/// than any file needs that places each of its meshes once. Vertices with colours count twice, and so do faces with a texture.
+const MOST_PLACED: u64 = 20_000_000;
+/// Placed parts of meshes, also empty ones.
+const MOST_PARTS: u64 = 1_000_000;
+
+/// The parts of a mesh.
+pub(crate) fn primitives<'a>(gltf: &'a Gltf, mesh: usize) -> Result<&'a [Primitive], Trouble> {
+    let missing = || Trouble::part(format!("mesh {mesh}"), "there is none");
+    Ok(&gltf.meshes.get(mesh).ok_or_else(missing)?.primitives)
+}
+
+/// Puts a part of a mesh before the place of a trouble.
+pub(crate) fn at(mesh: usize, primitive: usize) -> impl Fn(Trouble) -> Trouble {
+    move |trouble| {
+        let here = format!("mesh {mesh}, primitive {primitive}");
+        match trouble {
+            Trouble::Part(part, why) if part.is_empty() => Trouble::Part(here, why),
+            Trouble::Part(part, why) => Trouble::Part(format!("{here}, {part}"), why),
+            other => other,
+        }
+    }
+}
+
+/// The accessor of the positions of a part, if it is a surface.
+pub(crate) fn surface_of(primitive: &Primitive) -> Result<Option<usize>, Trouble> {
+    match (primitive.mode, primitive.attributes.position) {
+        (0..4, _) | (4..7, None) => Ok(None),
+        (4..7, Some(accessor)) => Ok(Some(accessor)),
+        (mode, _) => Err(Trouble::part("", format!("{mode} is not a mode of glTF"))),
+    }
+}
+
+/// Parts of other materials often use the same vertices: those with one accessor of positions, one of colours and one factor do.
+pub(crate) type Shared = (usize, Option<u64>, [u64; 3]);
+
+pub(crate) fn shared(gltf: &Gltf, accessor: usize, primitive: &Primitive) -> Shared {
+    let factor = factor(gltf, primitive).map(f64::to_bits);
+    (accessor, primitive.attributes.colour.as_u64(), factor)
+}
+
+/// What multiplies the linear colours of a part: the factor of its material, 1 if it has none that can be read.
+///
+/// Source: glTF 2.0 specification, Sec. 3.9.2; `KHR_materials_pbrSpecularGlossiness`, which comes first where it is.
+pub(crate) fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
+    let material = entry(&gltf.materials, &primitive.material);
+    let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
+    let factor = match glossy.is_null() {
+        true => &material["pbrMetallicRoughness"]["baseColorFactor"],
+        false => &glossy["diffuseFactor"],
+    };
+    let channel = |k: usize| factor[k].as_f64().filter(|x| (0.0..=1.0).contains(x));
+    match [0, 1, 2].map(channel) {
+        [Some(red), Some(green), Some(blue)] => [red, green, blue],
+        _ => [1.0; 3],
+    }
+}
+
+/// The numbers of parts, vertices and faces that are placed.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Room {
+    parts: u64,
+    vertices: u64,
+    faces: u64,
+    has_colours: bool,
+    has_coordinates: bool,
+}
+
+impl Room {
+    /// Adds a mesh once more.
+    pub(crate) fn take(
+        &mut self,
+        gltf: &Gltf,
+        mesh: usize,
+        prices: &mut [Option<Self>],
+    ) -> Result<(), Trouble> {
+        let price = match prices.get(mesh) {
+            Some(&Some(price)) => price,
+            _ => Self::of(gltf, mesh)?,
+        };
+        prices[mesh] = Some(price);
+        self.parts = self.parts.saturating_add(price.parts);
+        self.vertices = self.vertices.saturating_add(price.vertices);
+        self.faces = self.faces.saturating_add(price.faces);
+        self.has_colours |= price.has_colours;
+        self.has_coordinates |= price.has_coordinates;
+        Ok(())
+    }
+
+    /// A mesh whose bytes are all there.
+    fn of(gltf: &Gltf, mesh: usize) -> Result<Self, Trouble> {
+        let primitives = primitives(gltf, mesh)?;
+        let mut room = Self { parts: primitives.len() as u64, ..Self::default() };
+        let mut seen = HashSet::new();
+        for (number, primitive) in primitives.iter().enumerate() {
+            let mut count = || {
+                let Some(accessor) = surface_of(primitive)? else { return Ok((0, 0)) };
+                let vertices = gltf.sure_positions(accessor)?;
+                let corners = primitive.indices.map_or(Ok(vertices), |it| gltf.sure_indices(it))?;
+                let is_new = seen.insert(shared(gltf, accessor, primitive));
+                let faces =
+                    if primitive.mode == 4 { corners / 3 } else { corners.saturating_sub(2) };
+                Ok((if is_new { vertices } else { 0 }, faces))
+            };
+            let (vertices, faces) = count().map_err(at(mesh, number))?;
+            room.vertices = room.vertices.saturating_add(vertices as u64);
+            room.faces = room.faces.saturating_add(faces as u64);
+            let Attributes { colour, coordinates, more_coordinates, .. } = &primitive.attributes;
+            room.has_colours |= !colour.is_null() || factor(gltf, primitive) != [1.0; 3];
+            room.has_coordinates |= !coordinates.is_null() || !more_coordinates.is_null();
+        }
+        Ok(room)
+    }
+
+    /// The numbers of vertices and faces, unless they are too many for a file of this length.
+    pub(crate) fn checked(self, length: usize, textured: bool) -> Result<(usize, usize), Trouble> {
+        let Self { parts, vertices, faces, .. } = self;
+        let wrong = |reason| Err(Trouble::part("scene", reason));
+        if parts > MOST_PARTS {
+            return wrong(format!(
+                "its nodes place {parts} parts of meshes, more than {MOST_PARTS}"
+            ));
+        }
+        let most = MOST_PLACED.max(2 * length as u64).min(u64::from(u32::MAX));
+        let of_vertex = 1 + u64::from(self.has_colours);
+        let of_face = 1 + u64::from(self.has_coordinates && textured);
+        if vertices > most / of_vertex || faces > most / of_face {
+            return wrong(format!(
+                "its nodes place {vertices} vertices and {faces} faces, more than {MOST_PLACED} with those of colours and textures counted \
+                 twice: export fewer copies"
+            ));
+        }
+        // No more than 2³² of either have been let in.
+        Ok((vertices as usize, faces as usize))
+    }
+}
