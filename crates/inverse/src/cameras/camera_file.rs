@@ -32,6 +32,7 @@ pub struct CameraFile {
     frames: Vec<Frame>,
     /// Where names of pictures may begin.
     roots: Vec<PathBuf>,
+    note: Option<String>,
 }
 
 impl CameraFile {
@@ -84,7 +85,7 @@ impl CameraFile {
         // A model stands beside its pictures, or in a folder or two beside them.
         let above = folder.ancestors().take(4).map(Path::to_owned);
         let roots = above.flat_map(|above| [above.join("images"), above]).collect();
-        Ok(Self { name, files, lenses, frames, roots })
+        Ok(Self { name, files, lenses, frames, roots, note: None })
     }
 
     /// The cameras in the content of a JSON file called `name`.
@@ -94,17 +95,22 @@ impl CameraFile {
     /// If it is no JSON, tells no focal length and has no frames, or has a frame without a file or with a pose that is none.
     pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
         let file = fields::json(bytes, name)?;
-        let (lens, frames) = match file["frames"].is_null() {
+        let (lens, frames, note) = match file["frames"].is_null() {
             false => transforms::parse(bytes, name)?,
-            true => (Lens::parse(bytes, name)?, Vec::new()),
+            true => (Lens::parse(bytes, name)?, Vec::new(), None),
         };
         let (files, roots) = (Vec::new(), Vec::new());
-        Ok(Self { name: name.to_owned(), files, lenses: vec![lens], frames, roots })
+        Ok(Self { name: name.to_owned(), files, lenses: vec![lens], frames, roots, note })
     }
 
     /// The files that were read.
     pub fn files(&self) -> &[PathBuf] {
         &self.files
+    }
+
+    /// What is to be known of the world of the frames, in one line: a `transforms.json` may say that it was turned or scaled (`applied_transform`).
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
     }
 
     /// The mask that a frame names for its picture, or that lies in a folder `masks` beside it; None if there is no such frame or mask.

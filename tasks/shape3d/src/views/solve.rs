@@ -136,7 +136,8 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     })?;
     let pictures = all.iter().map(|view| view.picture.clone());
     given.will_write(names(flags.colour), reads.into_inner().into_iter().chain(pictures))?;
-    let notes = reading_notes(&all);
+    let note = cameras.note().map(str::to_owned);
+    let notes: Vec<String> = note.into_iter().chain(reading_notes(&all)).collect();
     // What is wrong with a picture is said before the work.
     let paint = |views: &[View]| {
         let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
