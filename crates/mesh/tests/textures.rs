@@ -492,7 +492,7 @@ fn a_required_extension_that_is_not_read_is_a_warning_or_an_error() {
         let (mesh, warning) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
         assert_eq!(mesh.texture().unwrap().picture(), Some(PNG));
         let expected = format!(
-            "a.glb: JSON chunk: needs the extension {name}, which is not read: the mesh may look different"
+            "a.glb: JSON: needs the extension {name}, which is not read: the mesh may look different"
         );
         assert_eq!(warning, Some(expected));
     }
@@ -504,7 +504,7 @@ fn a_required_extension_that_is_not_read_is_a_warning_or_an_error() {
     ] {
         let error = Mesh::parse(&requiring(&["KHR_materials_unlit", name]), "a.glb").unwrap_err();
         let message = error.to_string();
-        assert!(message.starts_with("a.glb: JSON chunk: ") && message.contains(name), "{message}");
+        assert!(message.starts_with("a.glb: JSON: ") && message.contains(name), "{message}");
     }
 }
 
