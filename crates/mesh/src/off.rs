@@ -27,7 +27,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
         lines.next().ok_or_else(place)
     };
     let mut positions = Vec::new();
-    let mut colours = Colours::new([1.0; 3], Beyond::LeftOut);
+    let mut channels = Vec::new();
     for vertex in 0..vertices {
         let line = next("vertex", vertex)?;
         let numbers: Vec<Result<f64, Fault>> = line.words().take(skipped + 3).map(number).collect();
@@ -43,7 +43,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
                 Some(Ok(number)) => *number,
                 _ => f64::NAN,
             };
-            colours.push([0, 1, 2].map(channel), || Place::Line(line.line));
+            channels.push((line.line, [0, 1, 2].map(channel)));
         }
     }
     let mut polygons = Polygons::default();
@@ -52,8 +52,19 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
         corners(&line, vertices, &mut polygons).map_err(|fault| Trouble::Line(line.line, fault))?;
     }
     let faces = polygons.faces(&polygons.cut(&positions)?);
-    let (colours, warning) = if coloured { colours.settled() } else { (None, None) };
+    let (colours, warning) = if coloured { settled(&channels) } else { (None, None) };
     Ok(Parts { positions, faces, colours, warnings: Vec::from_iter(warning), ..Parts::default() })
+}
+
+/// The colours of vertices and a warning if they are not as the lines have them: from 0 to 1, or whole numbers to 255.
+fn settled(channels: &[(usize, [f64; 3])]) -> (Option<Vec<[f64; 3]>>, Option<Trouble>) {
+    let mut all = channels.iter().flat_map(|(_, channels)| channels);
+    let levels = all.clone().all(|x| x.fract() == 0.0) && all.any(|&x| x > 1.0);
+    let mut colours = Colours::new([if levels { 255.0 } else { 1.0 }; 3], Beyond::LeftOut);
+    for &(line, channels) in channels {
+        colours.push(channels, || Place::Line(line));
+    }
+    colours.settled()
 }
 
 /// What the first lines say.

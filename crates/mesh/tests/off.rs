@@ -34,6 +34,13 @@ fn colours_stand_behind_positions_and_normals() {
         "CNOFF\n3 1 0\n0 0 0 0 0 1 255 0 0 255\n1 0 0 0 0 1 0 51 0 255\n0 1 0 0 0 1 0 0 255 255\n{faces}"
     );
     assert_eq!(mesh(&levels).colours().unwrap()[1], [0.0, 0.2, 0.0]);
+    // Levels are as usual as shares, so neither is worth a warning.
+    let folder = tempfile::tempdir().unwrap();
+    for (file, warnings) in [(&levels, 0), (&shares, 0), (&shares.replace(".5", "700"), 1)] {
+        let path = folder.path().join("a.off");
+        std::fs::write(&path, file).unwrap();
+        assert_eq!(Mesh::load_textured(&path).unwrap().1.len(), warnings, "{file}");
+    }
 }
 
 #[test]
