@@ -5,7 +5,7 @@ import * as link from "./link.js";
 import { Playground } from "./play.js";
 import { Solver } from "./solver.js";
 
-const MESHES = /\.(obj|ply|stl|glb)$/i;
+const MESHES = /\.(obj|ply|stl|off|glb|gltf)$/i;
 const TABS = ["pose", "shape", "play"];
 
 const error = document.querySelector("#error");
@@ -58,7 +58,7 @@ function drops() {
     const pictures = files.filter((file) => file.type.startsWith("image/"));
     const tab = current === "play" ? null : current === "shape" && meshes.length ? null : current;
     if (!tab) return say("This tab takes no such file: meshes and masks go to Find a camera, pictures to Cover a picture.");
-    if (!meshes.length && !pictures.length) return say(`${files[0]?.name ?? "this"} is neither a mesh (OBJ, PLY, STL, GLB) nor a picture`);
+    if (!meshes.length && !pictures.length) return say(`${files[0]?.name ?? "this"} is neither a mesh (OBJ, PLY, STL, OFF, GLB, glTF) nor a picture`);
     for (const file of meshes.slice(0, 1)) await tabs[tab].open(file, "mesh");
     for (const file of pictures.slice(0, 1)) await tabs[tab].open(file, "picture");
   });

@@ -47,6 +47,7 @@ impl Inputs {
         let named = match path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase) {
             Some(ending) if ending == "obj" => of_obj(path, folder),
             Some(ending) if ending == "glb" => of_glb(path),
+            Some(ending) if ending == "gltf" => of_json(&fs::read(path).unwrap_or_default()),
             _ => Vec::new(),
         };
         // The last part alone too: readers look there for what is outside of the folder.
@@ -137,11 +138,30 @@ fn of_glb(path: &Path) -> Vec<String> {
     let bytes = fs::read(path).unwrap_or_default();
     let length = bytes.get(12..16).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes);
     let end = length.map_or(0, |length| 20_usize.saturating_add(length as usize));
-    let json: Option<Value> = bytes.get(20..end).and_then(|text| serde_json::from_slice(text).ok());
-    let Some(json) = json else { return Vec::new() };
+    of_json(bytes.get(20..end).unwrap_or_default())
+}
+
+/// The files that the JSON of a glTF file names, as it is written and with `%20` as a blank.
+fn of_json(text: &[u8]) -> Vec<String> {
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    let Ok(json) = serde_json::from_slice::<Value>(text) else { return Vec::new() };
     let lists = ["images", "buffers"].map(|key| json[key].as_array().cloned().unwrap_or_default());
     let named = lists.iter().flatten().filter_map(|one| one["uri"].as_str());
-    named.filter(|uri| !uri.starts_with("data:")).map(str::to_owned).collect()
+    let named = named.filter(|uri| !uri.starts_with("data:"));
+    named.flat_map(|uri| [uri.to_owned(), decoded(uri)]).collect()
+}
+
+/// A text whose escapes, `%` and two hexadecimal digits, stand for bytes.
+fn decoded(uri: &str) -> String {
+    let mut parts = uri.split('%');
+    let mut bytes = parts.next().unwrap_or_default().as_bytes().to_vec();
+    for part in parts {
+        match part.get(..2).and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
+            Some(byte) => bytes.extend([&[byte], &part.as_bytes()[2..]].concat()),
+            None => bytes.extend([b"%", part.as_bytes()].concat()),
+        }
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 #[cfg(test)]

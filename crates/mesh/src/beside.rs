@@ -13,7 +13,7 @@ use crate::{MeshError, bounded::read_bounded, texture::media_type};
 /// the machine on which a mesh was made does no harm.
 pub(crate) fn beside(folder: &Path, name: &str) -> PathBuf {
     let parts: Vec<&str> = name.split(['/', '\\']).filter(|part| *part != ".").collect();
-    let inside = |part: &&str| !(part.is_empty() || part.ends_with(':') || **part == *"..");
+    let inside = |part: &&str| !(part.is_empty() || part.contains(':') || **part == *"..");
     let kept = if parts.iter().all(inside) { &parts[..] } else { &parts[parts.len() - 1..] };
     folder.join(kept.iter().filter(|part| inside(part)).collect::<PathBuf>())
 }

@@ -11,7 +11,7 @@ use crate::{
     Fault,
     colours::{Beyond, Colours},
     error::{Place, Trouble, shown},
-    glb_parts::{Room, at, factor, primitives, shared, surface_of},
+    glb_parts::{Room, at, factors, primitives, shared, surface_of},
     glb_texture::Unwrapped,
     gltf::{Gltf, Node, Primitive, number},
     mesh::finite,
@@ -252,16 +252,18 @@ impl Surface<'_> {
     /// Adds a mesh.
     fn add(&mut self, mesh: usize, placement: &Placement) -> Result<(), Trouble> {
         let mut firsts = HashMap::new();
-        for (number, primitive) in primitives(self.gltf, mesh)?.iter().enumerate() {
+        let primitives = primitives(self.gltf, mesh)?;
+        let factors = factors(self.gltf, primitives);
+        for (number, primitive) in primitives.iter().enumerate() {
             let at = at(mesh, number);
             let Some(accessor) = surface_of(primitive).map_err(&at)? else { continue };
             let vertices = self.gltf.count(accessor).map_err(&at)?;
-            let first = match firsts.entry(shared(self.gltf, accessor, primitive)) {
+            let first = match firsts.entry(shared(accessor, primitive)) {
                 Entry::Occupied(first) => *first.get(),
                 Entry::Vacant(entry) => {
                     let first = *entry.insert(self.parts.positions.len());
                     self.add_vertices(accessor, placement).map_err(&at)?;
-                    self.add_colours(primitive, first, &at);
+                    self.add_colours(&primitive.attributes.colour, factors[number], first, &at);
                     first
                 }
             };
@@ -322,11 +324,11 @@ impl Surface<'_> {
     /// Adds the colours of all vertices after the `first`, or gives up those of the whole file.
     fn add_colours(
         &mut self,
-        primitive: &Primitive,
+        accessor: &Value,
+        factor: [f64; 3],
         first: usize,
         at: impl Fn(Trouble) -> Trouble,
     ) {
-        let (accessor, factor) = (&primitive.attributes.colour, factor(self.gltf, primitive));
         if self.colours.is_err() || accessor.is_null() && factor == WHITE {
             return;
         }

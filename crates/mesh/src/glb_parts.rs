@@ -1,6 +1,6 @@
 //! The parts of the meshes of a glTF file: which are surfaces, what they share, and how much room they take.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use crate::{
     error::Trouble,
@@ -40,22 +40,42 @@ pub(crate) fn surface_of(primitive: &Primitive) -> Result<Option<usize>, Trouble
     }
 }
 
-/// Parts of other materials often use the same vertices: those with one accessor of positions, one of colours and one factor do.
-pub(crate) type Shared = (usize, Option<u64>, [u64; 3]);
+/// Parts of other materials often use the same vertices: those with one accessor of positions and one of colours do.
+pub(crate) type Shared = (usize, Option<u64>);
 
-pub(crate) fn shared(gltf: &Gltf, accessor: usize, primitive: &Primitive) -> Shared {
-    let factor = factor(gltf, primitive).map(f64::to_bits);
-    (accessor, primitive.attributes.colour.as_u64(), factor)
+pub(crate) fn shared(accessor: usize, primitive: &Primitive) -> Shared {
+    (accessor, primitive.attributes.colour.as_u64())
 }
 
-/// What multiplies the linear colours of a part: the factor of its material, 1 if it has none that can be read.
+/// What multiplies the linear colours of each part of a mesh. It is 1 where parts of other factors use the same vertices, which have one colour
+/// each.
+pub(crate) fn factors(gltf: &Gltf, primitives: &[Primitive]) -> Vec<[f64; 3]> {
+    let mut of_vertices = HashMap::new();
+    let key = |primitive: &Primitive| Some(shared(primitive.attributes.position?, primitive));
+    for primitive in primitives {
+        let Some(key) = key(primitive) else { continue };
+        let own = factor(gltf, primitive);
+        let known = of_vertices.entry(key).or_insert(own);
+        if *known != own {
+            *known = [1.0; 3];
+        }
+    }
+    let known = |primitive| key(primitive).and_then(|key| of_vertices.get(&key).copied());
+    primitives.iter().map(|primitive| known(primitive).unwrap_or([1.0; 3])).collect()
+}
+
+/// The factor of the material of a part: 1 if it has none that can be read, or a picture, which counts in place of colours.
 ///
 /// Source: glTF 2.0 specification, Sec. 3.9.2; `KHR_materials_pbrSpecularGlossiness`, which comes first where it is.
-pub(crate) fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
+fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
     let material = entry(&gltf.materials, &primitive.material);
     let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
+    let rough = &material["pbrMetallicRoughness"];
+    if !glossy["diffuseTexture"].is_null() || !rough["baseColorTexture"].is_null() {
+        return [1.0; 3];
+    }
     let factor = match glossy.is_null() {
-        true => &material["pbrMetallicRoughness"]["baseColorFactor"],
+        true => &rough["baseColorFactor"],
         false => &glossy["diffuseFactor"],
     };
     let channel = |k: usize| factor[k].as_f64().filter(|x| (0.0..=1.0).contains(x));
@@ -100,13 +120,13 @@ impl Room {
     fn of(gltf: &Gltf, mesh: usize) -> Result<Self, Trouble> {
         let primitives = primitives(gltf, mesh)?;
         let mut room = Self { parts: primitives.len() as u64, ..Self::default() };
-        let mut seen = HashSet::new();
+        let (mut seen, factors) = (HashSet::new(), factors(gltf, primitives));
         for (number, primitive) in primitives.iter().enumerate() {
             let mut count = || {
                 let Some(accessor) = surface_of(primitive)? else { return Ok((0, 0)) };
                 let vertices = gltf.sure_positions(accessor)?;
                 let corners = primitive.indices.map_or(Ok(vertices), |it| gltf.sure_indices(it))?;
-                let is_new = seen.insert(shared(gltf, accessor, primitive));
+                let is_new = seen.insert(shared(accessor, primitive));
                 let faces =
                     if primitive.mode == 4 { corners / 3 } else { corners.saturating_sub(2) };
                 Ok((if is_new { vertices } else { 0 }, faces))
@@ -115,7 +135,7 @@ impl Room {
             room.vertices = room.vertices.saturating_add(vertices as u64);
             room.faces = room.faces.saturating_add(faces as u64);
             let Attributes { colour, coordinates, more_coordinates, .. } = &primitive.attributes;
-            room.has_colours |= !colour.is_null() || factor(gltf, primitive) != [1.0; 3];
+            room.has_colours |= !colour.is_null() || factors[number] != [1.0; 3];
             room.has_coordinates |= !coordinates.is_null() || !more_coordinates.is_null();
         }
         Ok(room)

@@ -1,5 +1,5 @@
 //! Triangle meshes for softrast: a careful reader of OBJ, PLY, STL, OFF, GLB and glTF, a
-//! writer of all but STL, and small generators.
+//! writer of OBJ, PLY and GLB, and small generators.
 //!
 //! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
 //! has at least one face; it may have colours and a [`Texture`]. Whatever breaks these rules is a [`MeshError`] of one line that names

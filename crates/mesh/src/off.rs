@@ -87,11 +87,12 @@ impl Header {
         if words.get(1).is_some_and(|word| word.eq_ignore_ascii_case("binary")) {
             return Err(wrong(first.line, "binary OFF files are not read: export it as text"));
         }
-        let (normals, colours) = match kind.strip_prefix("ST").unwrap_or(kind) {
-            "" => (false, false),
-            "C" => (false, true),
-            "N" => (true, false),
-            "CN" | "NC" => (true, true),
+        let kind = kind.strip_prefix("ST").or(kind.strip_suffix("ST")).unwrap_or(kind);
+        // Some programs write NC for colours that stand before the normal.
+        let (skipped, coloured) = match kind {
+            "" | "N" => (3, false),
+            "C" | "NC" => (3, true),
+            "CN" => (6, true),
             _ => {
                 let reason =
                     format!("{:?} is not read: only three dimensions are", shown(words[0]));
@@ -115,12 +116,7 @@ impl Header {
         };
         let mut counts = words.iter().map(|word| word.parse::<u32>().ok().map(|n| n as usize));
         match (counts.next().flatten(), counts.next().flatten()) {
-            (Some(vertices), Some(faces)) => Ok(Self {
-                coloured: colours,
-                skipped: if normals { 6 } else { 3 },
-                vertices,
-                faces,
-            }),
+            (Some(vertices), Some(faces)) => Ok(Self { coloured, skipped, vertices, faces }),
             _ => Err(wrong(line, "it should say how many vertices and faces there are")),
         }
     }

@@ -79,9 +79,9 @@ impl Mesh {
     ///   colours.
     /// - PLY: the properties `red`, `green` and `blue` of the vertices, all three: whole numbers up to
     ///   255 (to 65535 as `ushort`), or floats from 0 to 1.
-    /// - OFF: the last three or four numbers of a vertex in a `COFF` file, from 0 to 1 or to 255.
+    /// - OFF: the numbers behind the position, and the normal of a `CNOFF` file, of a vertex in a `COFF` file, from 0 to 1 or to 255.
     /// - GLB and glTF: `COLOR_0` times the factor of the material (`baseColorFactor`, or `diffuseFactor` of
-    ///   `KHR_materials_pbrSpecularGlossiness`). These numbers are linear, so they are converted; transparency is ignored. Where only some parts
+    ///   `KHR_materials_pbrSpecularGlossiness`), unless it shows a picture or parts with other factors use the same vertices. These numbers are linear, so they are converted; transparency is ignored. Where only some parts
     ///   have colours, the others are white, which is what leaving them out means there.
     ///
     /// Files have other colours too, and a mesh is worth having without. Roundings, less than 0.004 beyond 0 and 1, are clamped. Numbers from

@@ -310,7 +310,9 @@ fn factors_of_materials_multiply_the_linear_colours_of_their_parts() {
         (vec![with(0, false)], vec![[half, 1.0, 0.0]]),
         // What is no factor counts as 1.
         (vec![with(1, true)], vec![[0.0, 1.0, 1.0]]),
-        (vec![with(2, false), with(9, false)], vec![[0.0, half, 1.0], [1.0; 3]]),
+        (vec![with(2, false)], vec![[0.0, half, 1.0]]),
+        // The same vertices with two factors have none; with colours of their own they are others.
+        (vec![with(2, false), with(0, false), with(0, true)], vec![[1.0; 3], [0.0, 1.0, 0.0]]),
     ] {
         json["meshes"][0]["primitives"] = json!(parts);
         let mesh = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap();
