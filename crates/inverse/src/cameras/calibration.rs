@@ -2,7 +2,7 @@
 //!
 //! YAML is read by code of our own: what OpenCV writes begins with a line that YAML does not allow.
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use serde_json::{Map, Value, json};
 
 const MATRICES: [&str; 3] = ["camera_matrix", "cameraMatrix", "mtx"];
@@ -11,8 +11,13 @@ const COEFFICIENTS: [&str; 5] =
 const WIDTHS: [&str; 3] = ["image_width", "width", "w"];
 const HEIGHTS: [&str; 3] = ["image_height", "height", "h"];
 const SIZES: [&str; 3] = ["image_size", "img_size", "imageSize"];
-const MODELS: [&str; 3] = ["distortion_model", "camera_model", "model"];
-const FISHEYES: [&str; 4] = ["equidistant", "fisheye", "kannala_brandt", "OPENCV_FISHEYE"];
+const MODELS: [&str; 2] = ["distortion_model", "camera_model"];
+const FISHEYES: [&str; 2] = ["is_fisheye", "fisheye_model"];
+/// Other names of what a [`Lens`](super::Lens) knows as OPENCV and as OPENCV_FISHEYE.
+const OPENCV: [&str; 3] = ["plumb_bob", "rational_polynomial", "radtan"];
+const FISHEYE: [&str; 3] = ["equidistant", "kannala_brandt", "kannala_brandt4"];
+/// Coefficients by name.
+const OWN: [&str; 9] = ["distortion", "k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
 /// The camera in a file with a `camera_matrix` in the fields of a lens; other files as they are.
 ///
@@ -28,12 +33,22 @@ pub(super) fn as_lens(file: Value) -> anyhow::Result<Value> {
         "camera_matrix has {} numbers: three rows of three are expected",
         entries.len()
     );
-    let [fx, skew, cx, _, fy, cy, ..] = entries[..] else { unreachable!("nine numbers") };
+    let beside = ["K", "cx", "cy"].into_iter().find(|name| !file[*name].is_null());
+    if let Some(name) = beside {
+        bail!("camera_matrix and {name} say the same: leave one of them out");
+    }
+    let rows = [0, 1, 2].map(|row| {
+        let half = if row < 2 { 0.5 } else { 0.0 };
+        let entry = |column: usize| entries[3 * row + column];
+        [entry(0), entry(1), entry(2) + half]
+    });
     let mut lens = file.as_object().cloned().unwrap_or_default();
-    for name in [&MATRICES[..], &COEFFICIENTS, &WIDTHS, &HEIGHTS, &SIZES, &MODELS].concat() {
+    for name in
+        [&MATRICES[..], &COEFFICIENTS, &WIDTHS, &HEIGHTS, &SIZES, &MODELS, &FISHEYES].concat()
+    {
         lens.remove(name);
     }
-    lens.insert("K".into(), json!([[fx, skew, cx + 0.5], [0, fy, cy + 0.5], [0, 0, 1]]));
+    lens.insert("K".into(), json!(rows));
     let size = first(&SIZES).map(|size| numbers(&size)).unwrap_or_default();
     let sides = [("w", &WIDTHS, size.first()), ("h", &HEIGHTS, size.get(1))];
     for (name, names, of_size) in sides {
@@ -44,10 +59,21 @@ pub(super) fn as_lens(file: Value) -> anyhow::Result<Value> {
     if let Some(coefficients) = first(&COEFFICIENTS) {
         lens.insert("distortion".into(), numbers(&coefficients).into());
     }
-    let model = first(&MODELS);
-    if let Some(model) = model.as_ref().and_then(Value::as_str) {
-        let is_fisheye = FISHEYES.iter().any(|name| model.eq_ignore_ascii_case(name));
-        lens.insert("is_fisheye".into(), is_fisheye.into());
+    if let Some(model) = first(&MODELS).as_ref().and_then(Value::as_str) {
+        let is = |names: &[&str]| names.iter().any(|name| model.eq_ignore_ascii_case(name));
+        let known = if is(&OPENCV) {
+            "OPENCV"
+        } else if is(&FISHEYE) {
+            "OPENCV_FISHEYE"
+        } else {
+            model
+        };
+        lens.insert("camera_model".into(), known.into());
+    }
+    if let Some(fisheye) = first(&FISHEYES) {
+        // OpenCV writes 0 and 1.
+        let is_fisheye = fisheye.as_bool().or(fisheye.as_f64().map(|number| number != 0.0));
+        lens.insert("is_fisheye".into(), is_fisheye.unwrap_or(fisheye == "true").into());
     }
     Ok(lens.into())
 }
@@ -63,15 +89,19 @@ fn numbers(matrix: &Value) -> Vec<Value> {
 
 /// The fields of a calibration in YAML, None for what is none: numbers, words, and the numbers of matrices.
 pub(super) fn yaml(text: &str) -> Option<Value> {
+    // Without comments.
+    let text: Vec<&str> =
+        text.lines().map(|line| line.split(" #").next().unwrap_or(line)).collect();
+    let text = text.join("\n");
     let mut fields = Map::new();
-    for name in [&MATRICES[..], &COEFFICIENTS, &WIDTHS, &HEIGHTS, &SIZES, &MODELS].concat() {
-        let Some(own) = own(text, name) else { continue };
+    let names = [&MATRICES[..], &COEFFICIENTS, &WIDTHS, &HEIGHTS, &SIZES, &MODELS, &FISHEYES, &OWN];
+    for name in names.concat() {
+        let Some(own) = own(&text, name) else { continue };
         let first = own.lines().next().unwrap_or_default().trim();
-        let value = match first.is_empty() || first.starts_with("!!") {
+        let value = match first.chars().next() {
             // A matrix on the lines below.
-            true => list(own.split_once("data:")?.1)?,
-            false if first.starts_with('[') => list(own)?,
-            false => scalar(first),
+            None | Some('!' | '[' | '{') => list(own)?,
+            Some(_) => scalar(first),
         };
         fields.insert(name.to_owned(), value);
     }
@@ -98,8 +128,14 @@ fn own<'a>(text: &'a str, name: &str) -> Option<&'a str> {
     found.map(|from| &text[from..])
 }
 
-/// The numbers between brackets, of all rows.
+/// The numbers of a list: those of all rows between brackets, behind `data` if it has rows and columns; or those of lines that begin with `-`.
 fn list(text: &str) -> Option<Value> {
+    let text = text.split_once("data:").map_or(text, |(_, data)| data);
+    if !text.contains('[') {
+        let items = text.lines().filter(|line| line.trim_start().starts_with('-'));
+        let words = items.filter_map(|line| line.rsplit("- ").next()).map(str::trim);
+        return Some(words.filter(|word| !word.is_empty()).map(scalar).collect());
+    }
     let start = text.find('[')?;
     let mut depth = 0;
     let end = text[start..].find(|letter| {
@@ -134,6 +170,10 @@ mod tests {
         data: [500, 0, 319.5, 0, 510, 239.5, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  \
         data: [-0.25, 0.125, 0, 0, 0]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
     const SCRIPT: &str = "camera_matrix: [[500.0, 0.0, 319.5], [0.0, 510.0, 239.5],\n  [0.0, 0.0, 1.0]]\ndist_coeff: [[-0.25, 0.125, 0.0, 0.0, 0.0]]\n";
+    const BLOCKS: &str = "camera_matrix:\n- - 500.0\n  - 0.0\n  - 319.5\n- - 0.0\n  - 510.0\n  - 239.5\n- - 0.0\n  - 0.0\n  - 1.0\n\
+        dist_coeff:\n- - -0.25\n  - 0.125\n  - 0.0\n  - 0.0\n  - 0.0\n";
+    const COMMENTS: &str = "camera_matrix:\n  [500, 0, 319.5, 0, 510, 239.5, 0, 0, 1] # 9\nimage_width: 640 # px\nk1: -0.25\nk2: 0.125\n\
+        distortion_model: plumb_bob # not a fisheye\nfisheye_model: 0\n";
     const JSON: &str = r#"{"camera_matrix": {"rows": 3, "cols": 3, "data": [500, 0, 319.5, 0, 510, 239.5, 0, 0, 1]},
         "distortion_coefficients": {"data": [-0.25, 0.125, 0, 0, 0]}, "image_width": 640, "image_height": 480}"#;
     const LISTS: &str = r#"{"mtx": [[500, 0, 319.5], [0, 510, 239.5], [0, 0, 1]], "dist": [[-0.25, 0.125, 0, 0, 0]], "img_size": [640, 480]}"#;
@@ -147,7 +187,7 @@ mod tests {
         );
         let expected = lens.and_then(|lens| lens.camera(size)).unwrap();
         assert!(expected.1.is_some());
-        for text in [OPENCV, ROS, SCRIPT, JSON, LISTS] {
+        for text in [OPENCV, ROS, SCRIPT, BLOCKS, COMMENTS, JSON, LISTS] {
             for text in [text.to_owned(), text.replace('\n', "\r\n")] {
                 let lens = Lens::parse(text.as_bytes(), "calibration.yaml").unwrap();
                 assert_eq!(lens.camera(size).unwrap(), expected, "{text}");
@@ -160,6 +200,11 @@ mod tests {
         let (_, distortion) =
             Lens::parse(fisheye.as_bytes(), "a.yaml").unwrap().camera(size).unwrap();
         assert_ne!(distortion, expected.1);
+        let of_opencv = OPENCV
+            .replace("avg_error", "fisheye_model: 1\navg_error")
+            .replace("0., 0., 0. ]", "0., 0. ]");
+        let (_, same) = Lens::parse(of_opencv.as_bytes(), "a.yaml").unwrap().camera(size).unwrap();
+        assert_eq!(same, distortion);
     }
 
     #[test]
@@ -179,5 +224,14 @@ mod tests {
             let error = format!("{:#}", Lens::parse(text.as_bytes(), "a.yaml").unwrap_err());
             assert_eq!(error, message);
         }
+        let twice = JSON.replacen('{', r#"{"cx": 320, "#, 1);
+        let error = format!("{:#}", Lens::parse(twice.as_bytes(), "a.json").unwrap_err());
+        assert_eq!(error, "a.json: camera_matrix and cx say the same: leave one of them out");
+        let size = ImageSize::from([480, 640]);
+        let refused = |text: &str| {
+            Lens::parse(text.as_bytes(), "a.yaml").and_then(|lens| lens.camera(size)).is_err()
+        };
+        assert!(refused(&ROS.replace("plumb_bob", "thin_prism")));
+        assert!(refused("camera_matrix: [500, 0, 0, 0, 510, 0, 319.5, 239.5, 1]\n"), "transposed");
     }
 }
