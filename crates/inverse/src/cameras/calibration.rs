@@ -13,7 +13,7 @@ const HEIGHTS: [&str; 3] = ["image_height", "height", "h"];
 const SIZES: [&str; 3] = ["image_size", "img_size", "imageSize"];
 const MODELS: [&str; 2] = ["distortion_model", "camera_model"];
 const FISHEYES: [&str; 2] = ["is_fisheye", "fisheye_model"];
-/// Other names of what a [`Lens`](super::Lens) knows as OPENCV and as OPENCV_FISHEYE.
+/// Other names of what a [`Lens`](super::Lens) knows as `OPENCV` and as `OPENCV_FISHEYE`.
 const OPENCV: [&str; 3] = ["plumb_bob", "rational_polynomial", "radtan"];
 const FISHEYE: [&str; 3] = ["equidistant", "kannala_brandt", "kannala_brandt4"];
 /// Coefficients by name.
