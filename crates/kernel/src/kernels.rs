@@ -43,7 +43,7 @@ pub trait Kernels: Float {
     /// Number of pixel-face pairs over all views that one pass visits; the table is not read.
     fn pairs(inputs: &Inputs<Self>) -> usize;
 
-    /// What passes in colour over these inputs share. `sums`: whether those of the image are kept, a number for each channel of each
+    /// Prepares the data that passes in colour over these inputs share. `sums`: whether those of the image are kept, a number for each channel of each
     /// pixel and two more.
     fn kept(inputs: &blend::Inputs<Self>, sums: bool) -> Kept<Self>;
 

@@ -1,6 +1,6 @@
 //! Soft rasterization of triangles on the CPU, over slices of `f32` or `f64`: no tensor in sight.
 //!
-//! Two ops: [`Inputs`] says what sums of a profile of the distance are taken over (silhouettes), [`blend::Inputs`] what means of colours.
+//! Two ops: sums of a profile of the distance over [`Inputs`] (silhouettes), and means of colours over [`blend::Inputs`].
 //! [`Kernels`] runs their passes: the result, its gradient, and the gradient of that. `softrast-raster` makes ops of tensors of them.
 //!
 //! One traversal serves every pass. A view is cut into bands of rows; each band lists the faces

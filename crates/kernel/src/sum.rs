@@ -13,7 +13,7 @@ use super::{
 };
 use crate::ImageSize;
 
-/// What sums of a profile are taken over, in one float type.
+/// The inputs of sums of a profile, in one float type.
 #[derive(Clone, Copy)]
 pub struct Inputs<'a, F> {
     /// `[views, 3, vertices]`: x and y in NDC, depth in world units.

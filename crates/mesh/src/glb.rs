@@ -54,7 +54,7 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>, textured: bool) -> Resu
     scene(&gltf, bytes.len(), folder.filter(|_| textured))
 }
 
-/// The same of a glTF file: JSON alone.
+/// The mesh in `bytes` of a glTF file, which is JSON alone; otherwise as [`parse`].
 pub(crate) fn parse_text(
     bytes: &[u8],
     folder: Option<&Path>,

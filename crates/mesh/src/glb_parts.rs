@@ -47,7 +47,7 @@ pub(crate) fn shared(accessor: usize, primitive: &Primitive) -> Shared {
     (accessor, primitive.attributes.colour.as_u64())
 }
 
-/// What multiplies the linear colours of each part of a mesh. It is 1 where parts of other factors use the same vertices, which have one colour
+/// Factors that multiply the linear colours of each part of a mesh. It is 1 where parts of other factors use the same vertices, which have one colour
 /// each.
 pub(crate) fn factors(gltf: &Gltf, primitives: &[Primitive]) -> Vec<[f64; 3]> {
     let mut of_vertices = HashMap::new();

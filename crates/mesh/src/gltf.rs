@@ -1,4 +1,4 @@
-//! What a glTF or GLB file says of its geometry: the JSON of glTF 2.0, and the numbers it refers to.
+//! The geometry of a glTF or GLB file: the JSON of glTF 2.0, and the numbers it refers to.
 //!
 //! Read by code of our own: the crate for it panics on some lengths and strides that the format
 //! forbids, and refuses whole files for materials that it does not know.
@@ -23,7 +23,7 @@ pub(crate) struct Gltf<'a> {
     /// Bytes in all buffers, of those that are the same once.
     #[serde(skip)]
     length: usize,
-    /// Those of them that lie in other files.
+    /// Bytes in buffers that lie in other files.
     #[serde(skip)]
     pub(crate) length_beside: usize,
     pub(crate) scene: Option<usize>,

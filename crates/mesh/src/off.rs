@@ -67,7 +67,7 @@ fn settled(channels: &[(usize, [f64; 3])]) -> (Option<Vec<[f64; 3]>>, Option<Tro
     colours.settled()
 }
 
-/// What the first lines say.
+/// The first lines: the kind of file and its counts.
 struct Header {
     /// Whether vertices have colours, and how many numbers stand before these.
     coloured: bool,

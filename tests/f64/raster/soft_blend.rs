@@ -91,7 +91,7 @@ impl<S: Softness> Case<S> {
         self.image_by(inputs, by_kernel.then(|| self.renderer()).as_ref())
     }
 
-    /// The same by a renderer, or by the reference.
+    /// The image by a renderer that is there already, or by the reference.
     fn image_by<T: RasterBackend>(
         &self,
         inputs: Inputs<T>,

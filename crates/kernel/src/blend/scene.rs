@@ -25,7 +25,7 @@ pub fn counts_from(floor: f64) -> f64 {
 /// Weights below these, relative to what weights of a pixel are relative to, are 0: far less than the range leaves of a sum.
 const VANISHING: [f64; 2] = [1e-36, 1e-300];
 
-/// What means of colours are taken over, in one float type.
+/// The inputs of means of colours, in one float type.
 #[derive(Clone, Copy)]
 pub struct Inputs<'a, F> {
     /// `[views, 3, vertices]`: x and y in NDC, depth.

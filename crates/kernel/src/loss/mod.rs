@@ -42,7 +42,7 @@ pub fn rows_of_losses(views: usize, size: ImageSize) -> usize {
 /// Images that silhouettes are compared with, each `[1 or views, height, width]`.
 #[derive(Clone, Copy)]
 pub struct Judged<'a, F> {
-    /// What coverage is compared with.
+    /// The image that coverage is compared with.
     pub target: &'a [F],
     /// The share of each pixel that counts, unless all do: coverage is multiplied by it.
     pub counted: Option<&'a [F]>,
