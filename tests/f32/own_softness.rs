@@ -1,12 +1,12 @@
 //! Poses under a softness of one's own. `minimize` judges hard images in f32, as programs do, so this is not tested in f64.
 
 use softrast_inverse::{
-    InverseProblem, Lens, Method, Picture, PoseProblem, ScheduledSoftness, SolveConfig, minimize,
-    pose::PoseSearch,
+    InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize, pose::PoseSearch,
 };
 use softrast_raster::{Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
 use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::{Arctan, lopsided_mesh};
+use softrast_views::{Lens, Picture};
 
 #[test]
 fn poses_come_nearer_along_the_schedule_of_an_own_softness_and_of_its_surrogate() {

@@ -1,11 +1,12 @@
 use anyhow::Context;
 use softrast_inverse::{
-    InverseProblem, Lens, Method, Minimization, Picture, SolveConfig,
+    InverseProblem, Method, Minimization, SolveConfig,
     pose::{MaskPose, MaskPoses, PoseSearch},
 };
 use softrast_mesh::Mesh;
 use softrast_raster::{Pinhole, RasterBackend};
 use softrast_tensor::numbers;
+use softrast_views::{Lens, Picture};
 
 use crate::{Backend, CameraView, Coming, Frame, Run, Settings};
 

@@ -1,4 +1,4 @@
-use softrast_inverse::Picture;
+use softrast_views::Picture;
 
 /// The mask in a picture of `[height, width, 4]` bytes, red, green, blue and opacity: its transparency, or where all of it is opaque its
 /// luminance.

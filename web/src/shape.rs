@@ -1,12 +1,13 @@
 use std::sync::Arc;
 
 use softrast_inverse::{
-    InverseProblem, Minimization, Picture, SoftnessAt, SolveConfig,
+    InverseProblem, Minimization, SoftnessAt, SolveConfig,
     triangles::{Instance, Scene},
 };
 use softrast_raster::RasterBackend;
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
+use softrast_views::Picture;
 
 use crate::{Coming, Frame, Run, Settings};
 

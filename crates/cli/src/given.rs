@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-use softrast_inverse::{MaskRules, Method, Picture, ScheduledSoftness, find_mask};
+use softrast_inverse::{Method, ScheduledSoftness};
 use softrast_lab::{
     Error, Progress, ViewerView, mask_png,
     parse::share,
@@ -12,6 +12,7 @@ use softrast_lab::{
     report::{Beside, Report},
 };
 use softrast_raster::{BackendChoice, Pinhole};
+use softrast_views::{MaskRules, Picture, find_mask};
 
 use crate::{
     Common, MethodArgs, Scales, SoftnessChoice, backend,

@@ -30,71 +30,53 @@
 compile_error!("softrast-inverse needs a backend: turn on one of the features ndarray, flex, wgpu");
 
 mod baked;
-mod cameras;
 mod checkpoint;
-mod coloured_pixels;
-mod cut_sides;
 mod distilled_mlp;
-mod frame;
 mod instances;
 mod iterate;
 mod layout;
 mod learn;
 mod learn_config;
-mod mask_parts;
-mod mask_rules;
 mod method;
 mod minimize;
 mod objectives;
 mod paint;
 mod paint_targets;
-mod painted_view;
-mod picture;
-mod picture_file;
 pub mod pose;
 mod problem;
 mod renderer;
 mod resolution;
+mod save_picture;
 mod schedule;
+mod silhouette_pixels;
 mod softness_file;
 mod surface;
 mod targets;
 pub mod triangles;
-mod view;
 
 pub use baked::baked;
-pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
 pub use checkpoint::Checkpoint;
-pub use coloured_pixels::coloured_pixels;
-pub use cut_sides::cut_sides;
 pub use distilled_mlp::{distilled_mlp, mlp_like};
-pub use frame::Frame;
 pub use instances::Instances;
 pub use iterate::Iterate;
 pub use layout::PhiLayout;
 pub use learn::{Learning, learn};
 pub use learn_config::{Input, LearnConfig, OuterLoss, SIGMA};
-pub use mask_parts::mask_parts;
-pub use mask_rules::MaskRules;
 pub use method::Method;
 pub use minimize::{Minimization, minimize};
 pub use objectives::{Inner, Outer};
 pub use paint::paint;
 pub use paint_targets::PaintTargets;
-pub use painted_view::PaintedView;
-pub use picture::{Picture, save_picture};
-pub use picture_file::PictureFile;
 pub use pose::PoseProblem;
 pub use problem::{InverseProblem, SolveConfig};
 pub use renderer::{ScheduledRenderer, SoftnessAt};
 pub use resolution::Resolution;
+pub use save_picture::save_picture;
 pub use schedule::{Feedback, Follower, Place, ScaleSchedule, ScheduledSoftness, Surrogate};
+pub use silhouette_pixels::silhouette_pixels;
 pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
-pub use view::{
-    View, camera_json, faces_across, faces_across_note, mask_iou, reading_notes, silhouette_pixels,
-};
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -10,7 +10,8 @@ use softrast_raster::{
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
-use crate::{Frame, PaintTargets, PaintedView, SolveConfig, Surface};
+use crate::{PaintTargets, SolveConfig, Surface};
+use softrast_views::{Frame, PaintedView};
 
 type B = Autodiff<HostBackend>;
 

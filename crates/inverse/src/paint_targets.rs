@@ -1,6 +1,6 @@
 use softrast_tensor::{Backend, Tensor, tensor};
 
-use crate::PaintedView;
+use softrast_views::PaintedView;
 
 /// Views in which fewer pixels count than this, where the loss is about 0 whatever is drawn, are no reason to divide by 0.
 const LEAST_PIXELS: f64 = 1e-6;

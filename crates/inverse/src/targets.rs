@@ -3,7 +3,8 @@ use std::sync::Arc;
 use softrast_raster::{RasterBackend, iou_loss, mse_loss};
 use softrast_tensor::{Backend, Tensor, tensor};
 
-use crate::{Picture, Resolution};
+use crate::Resolution;
+use softrast_views::Picture;
 
 /// A target image at every size that a run may draw at: its own and, averaged over areas, each
 /// half of the one before as long as that is a whole number.

@@ -1,12 +1,9 @@
-use std::io;
+use std::{io, iter};
 
 use anyhow::Context;
 use base64::{Engine, engine::general_purpose::STANDARD};
-use image::{
-    Delay, DynamicImage, Frame, GrayImage, Luma, Rgb, RgbImage,
-    codecs::gif::{GifEncoder, Repeat},
-    imageops,
-};
+use gif::{Encoder, EncodingError, Frame, Repeat};
+use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 
 use crate::Pictures;
@@ -114,10 +111,8 @@ pub struct Encoded {
 
 /// Small pictures are enlarged to at least these widths, in pixels: in the row of four, and in the animation.
 const WIDTHS: [u32; 2] = [256, 192];
-const FRAME_MS: u32 = 80;
-const LAST_FRAME_MS: u32 = 2000;
-/// Quality of the palette, 1 best to 30 fastest. Up to 256 colours are kept exactly in any case.
-const SPEED: i32 = 10;
+/// How long frames are shown, and the last of them, in hundredths of a second.
+const DELAYS: [u16; 2] = [8, 200];
 
 impl Encoded {
     /// Encodes the pictures of a run.
@@ -127,7 +122,9 @@ impl Encoded {
     /// If an encoder fails.
     pub fn new(pictures: &Pictures) -> anyhow::Result<Self> {
         let Pictures { target, start, result, frames, drawing } = pictures;
-        let before_after = row(&[target, start, result, &difference(target, result)], WIDTHS[0]);
+        let difference = difference(target, result);
+        let four = [target.clone(), start.clone(), result.clone(), difference];
+        let before_after = row(&four, WIDTHS[0]);
         let animation = gif(target, frames).context("cannot encode an animation")?;
         let before_after = png(&before_after)?;
         Ok(Self { before_after, animation, drawing: drawing.clone() })
@@ -182,33 +179,61 @@ fn reduced(image: DynamicImage) -> DynamicImage {
 }
 
 /// An endless GIF: the target on the left, the frames on the right.
-fn gif(target: &RgbImage, frames: &[RgbImage]) -> image::ImageResult<Vec<u8>> {
+fn gif(target: &RgbImage, frames: &[RgbImage]) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = GifEncoder::new_with_speed(&mut bytes, SPEED);
+    let [columns, rows] = stretched(target, 2, WIDTHS[1]);
+    let [width, height] = [&columns, &rows].map(|places| places.len() as u16);
+    let mut encoder = Encoder::new(&mut bytes, width, height, &[])?;
     encoder.set_repeat(Repeat::Infinite)?;
     for (k, frame) in frames.iter().enumerate() {
-        let ms = if k + 1 == frames.len() { LAST_FRAME_MS } else { FRAME_MS };
-        let delay = Delay::from_numer_denom_ms(ms, 1);
-        let rgba = DynamicImage::from(row(&[target, frame], WIDTHS[1])).into_rgba8();
-        encoder.encode_frame(Frame::from_parts(rgba, 0, 0, delay))?;
+        // The palette is found on the small picture, which has every colour of the large one.
+        let small = contact_sheet(&[target.clone(), frame.clone()], 2);
+        let small = Frame::from_rgb(small.width() as u16, small.height() as u16, &small);
+        let at = |x: u32, y: u32| small.buffer[y as usize * usize::from(small.width) + x as usize];
+        let large = rows.iter().flat_map(|&y| columns.iter().map(move |&x| at(x, y)));
+        let delay = DELAYS[usize::from(k + 1 == frames.len())];
+        let large = Frame { width, height, delay, buffer: large.collect(), ..small.clone() };
+        encoder.write_frame(&large)?;
     }
     drop(encoder);
     Ok(bytes)
 }
 
-/// Images in one row; small ones enlarged so that their pixels show.
-fn row(images: &[&RgbImage], width_at_least: u32) -> RgbImage {
-    let cells: Vec<_> = images.iter().map(|image| enlarged(image, width_at_least)).collect();
-    contact_sheet(&cells, cells.len())
+/// Images of one size in one row; small ones enlarged so that their pixels show.
+fn row(images: &[RgbImage], width_at_least: u32) -> RgbImage {
+    let small = contact_sheet(images, images.len());
+    let [columns, rows] = stretched(&images[0], images.len(), width_at_least);
+    RgbImage::from_fn(columns.len() as u32, rows.len() as u32, |x, y| {
+        *small.get_pixel(columns[x as usize], rows[y as usize])
+    })
 }
 
-/// Repeats pixels, by the smallest whole factor that reaches the width and leaves both sides within twice that.
+/// Column and row in a contact sheet of so many images of one size in a row, for each column and row of the same sheet with enlarged images.
+fn stretched(image: &RgbImage, images: usize, width_at_least: u32) -> [Vec<u32>; 2] {
+    let factor = factor(image, width_at_least);
+    [(image.width(), images as u32), (image.height(), 1)].map(|(side, cells)| {
+        let pitch = side + SEPARATOR;
+        let times = |at: u32| if at % pitch < SEPARATOR { 1 } else { factor };
+        (0..cells * pitch + SEPARATOR)
+            .flat_map(|at| iter::repeat_n(at, times(at) as usize))
+            .collect()
+    })
+}
+
+/// Repeats pixels.
 fn enlarged(image: &RgbImage, width_at_least: u32) -> RgbImage {
+    let factor = factor(image, width_at_least);
+    let (width, height) = image.dimensions();
+    RgbImage::from_fn(width * factor, height * factor, |x, y| {
+        *image.get_pixel(x / factor, y / factor)
+    })
+}
+
+/// The smallest whole factor that reaches the width and leaves both sides within twice that.
+fn factor(image: &RgbImage, width_at_least: u32) -> u32 {
     let longest = image.width().max(image.height()).max(1);
     let room = 2 * width_at_least / longest;
-    let factor = width_at_least.div_ceil(image.width().max(1)).min(room).max(1);
-    let size = (image.width() * factor, image.height() * factor);
-    imageops::resize(image, size.0, size.1, imageops::FilterType::Nearest)
+    width_at_least.div_ceil(image.width().max(1)).min(room).max(1)
 }
 
 mod as_base64 {
@@ -323,7 +348,7 @@ mod tests {
 
     #[test]
     fn a_row_enlarges_by_whole_factors() {
-        let row = row(&[&plain(3, 3, 0), &plain(3, 3, 0)], 10);
+        let row = row(&[plain(3, 3, 0), plain(3, 3, 0)], 10);
         assert_eq!(row.dimensions(), (2 * 12 + 3 * SEPARATOR, 12 + 2 * SEPARATOR));
     }
 }

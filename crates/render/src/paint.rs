@@ -4,11 +4,11 @@ use std::{fmt, sync::Arc};
 
 use anyhow::{Context, bail};
 use image::RgbImage;
-use softrast_inverse::PictureFile;
 use softrast_lab::Error;
 use softrast_mesh::{Mesh, MeshError, Texture};
 use softrast_raster::Attributes;
 use softrast_tensor::{Backend, Tensor, TensorData, tensor};
+use softrast_views::PictureFile;
 
 use crate::args::Args;
 

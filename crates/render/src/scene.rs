@@ -2,12 +2,13 @@ use std::{path::Path, sync::Arc};
 
 use anyhow::Context;
 use image::{GrayImage, imageops};
-use softrast_inverse::{NameOrFile, Picture, ScheduledSoftness, faces_across_note};
+use softrast_inverse::{NameOrFile, ScheduledSoftness};
 use softrast_lab::Error;
 use softrast_mesh::Mesh;
 use softrast_raster::{ImageSize, NEAR, Orbit, Pinhole, TConorm};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{Backend, Tensor, tensor, vector};
+use softrast_views::{Picture, faces_across_note};
 
 use crate::{
     args::{Args, Target},

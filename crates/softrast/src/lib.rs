@@ -7,7 +7,8 @@
 //! - [`raster`]: cameras, silhouettes, colours, losses, exact to second order;
 //! - [`meta`]: optimisers and inner loops that can be differentiated;
 //! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them;
-//!   softnesses over a run, and their files.
+//!   softnesses over a run, and their files;
+//! - [`views`]: pictures, masks and cameras of nerfstudio, COLMAP and OpenCV, and the visual hull.
 //!
 //! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other releases of burn do not fit. The Cargo features
 //! `ndarray` (default), `flex` and `wgpu` choose the backend.
@@ -40,6 +41,8 @@ pub use softrast_raster as raster;
 pub use softrast_softness as softness;
 #[doc(inline)]
 pub use softrast_tensor as tensor;
+#[doc(inline)]
+pub use softrast_views as views;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

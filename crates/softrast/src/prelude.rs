@@ -1,8 +1,8 @@
 //! What most programs need, for `use softrast::prelude::*`.
 
 pub use softrast_inverse::{
-    InverseProblem, Iterate, LearnConfig, Lens, Method, Minimization, NamedSoftness, Picture,
-    PoseProblem, ScheduledSoftness, SoftnessAt, SolveConfig, learn, load_views, minimize,
+    InverseProblem, Iterate, LearnConfig, Method, Minimization, NamedSoftness, PoseProblem,
+    ScheduledSoftness, SoftnessAt, SolveConfig, learn, minimize,
     pose::{FoundPose, PoseSearch},
     save_picture,
 };
@@ -14,3 +14,4 @@ pub use softrast_raster::{
 };
 pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 pub use softrast_tensor::{Backend, Tensor};
+pub use softrast_views::{Lens, Picture, load_views};

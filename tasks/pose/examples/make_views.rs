@@ -7,9 +7,10 @@ use std::{fs, path::Path};
 
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
-use softrast_inverse::{Distortion, camera_json, colmap_pose, silhouette_pixels};
+use softrast_inverse::silhouette_pixels;
 use softrast_mesh::fox;
 use softrast_raster::Pinhole;
+use softrast_views::{Distortion, camera_json, colmap_pose};
 
 const VIEWS: usize = 12;
 const HEIGHT: usize = 90;

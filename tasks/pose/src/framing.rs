@@ -1,5 +1,5 @@
-use softrast_inverse::Frame;
 use softrast_mesh::{Mesh, fox, painted_fox};
+use softrast_views::Frame;
 
 use crate::{Args, Instances};
 

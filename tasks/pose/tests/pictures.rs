@@ -9,10 +9,11 @@ use std::{
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use serde_json::{Value, json};
-use softrast_inverse::{camera_json, coloured_pixels, silhouette_pixels};
+use softrast_inverse::silhouette_pixels;
 use softrast_mesh::icosphere;
 use softrast_raster::Pinhole;
 use softrast_test_kit::Program;
+use softrast_views::{camera_json, coloured_pixels};
 
 /// Runs `pose solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
@@ -337,7 +338,7 @@ fn a_lens_that_distorts_is_undone_whether_nerfstudio_or_colmap_tells_it() {
         let again = out.path().join("again.json");
         let frame = json!({ "transform_matrix": found["camera"]["transform_matrix"] });
         fs::write(&again, frame.to_string()).unwrap();
-        let pose = softrast_inverse::PoseFile::load(&again).unwrap();
+        let pose = softrast_views::PoseFile::load(&again).unwrap();
         let pairs = (0..9).map(|k| (k / 3, k % 3));
         let same = |(i, j): (usize, usize)| {
             (pose.rotation[i][j] - found["camera"]["R"][i][j].as_f64().unwrap()).abs() < 1e-9

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use softrast_cli::Variant;
-use softrast_inverse::Picture;
+use softrast_views::Picture;
 
 use crate::Logo;
 

@@ -1,6 +1,5 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
-
-use crate::nearest::Nearest;
+use softrast_kernel::Nearest;
 
 /// Points on either surface.
 const POINTS: usize = 10_000;

@@ -20,7 +20,6 @@
 mod args;
 mod chamfer;
 mod instance;
-mod nearest;
 mod paper;
 mod scene;
 mod task;

@@ -6,10 +6,10 @@ use std::{fs, path::Path};
 
 use image::{Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::{Value, json};
-use softrast_inverse::coloured_pixels;
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::{Orbit, Pinhole};
 use softrast_test_kit::Program;
+use softrast_views::coloured_pixels;
 
 /// Runs `shape3d solve` with results in `out`: its JSON, or its error line.
 fn run(out: &Path, words: &[&str]) -> Result<Value, String> {

@@ -1,6 +1,4 @@
-use softrast_inverse::{
-    PaintTargets, PaintedView, Picture, SolveConfig, View, coloured_pixels, paint,
-};
+use softrast_inverse::{PaintTargets, SolveConfig, paint};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_meta::Objective;
 use softrast_raster::{
@@ -8,6 +6,7 @@ use softrast_raster::{
 };
 use softrast_softness::Family;
 use softrast_tensor::Tensor;
+use softrast_views::{PaintedView, Picture, View, coloured_pixels};
 
 use crate::differences::check_gradient;
 

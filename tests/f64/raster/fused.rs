@@ -13,7 +13,7 @@ type B = NdArray<f64>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
-const SIZE: usize = 12;
+const SIZE: usize = 8;
 
 fn fused<T: RasterBackend>(
     faces: &Arc<[[u32; 3]]>,

@@ -2,7 +2,8 @@ use softrast_raster::{RasterBackend, mse_loss};
 use softrast_tensor::{Tensor, tensor};
 
 use super::VertexColours;
-use crate::{PaintedView, Picture, Targets, targets::parts};
+use crate::{Targets, targets::parts};
+use softrast_views::{PaintedView, Picture};
 
 /// Weight of the error of colours beside the `IoU` loss. With 5, 10 and 20, colours found 25, 24 and 24 of 28 poses that silhouettes did not
 /// (docs/notes.md, Pose by colour).

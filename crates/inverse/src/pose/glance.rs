@@ -11,7 +11,7 @@ use super::{
     shifts::{Stencil, Window},
     target::Target,
 };
-use crate::frame::ball;
+use softrast_views::ball;
 
 /// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
 const COARSE_SIDE: usize = Window::SIDE;

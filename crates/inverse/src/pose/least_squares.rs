@@ -183,9 +183,10 @@ fn solved(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Picture, silhouette_pixels};
+    use crate::silhouette_pixels;
     use softrast_mesh::fox;
     use softrast_raster::Orbit;
+    use softrast_views::Picture;
 
     const SIDE: usize = 128;
 

@@ -10,7 +10,8 @@ use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 
 use super::{ColouredViews, VertexColours, split_coverage};
-use crate::{Frame, InverseProblem, PaintedView, Picture, SoftnessAt, SolveConfig, Targets};
+use crate::{InverseProblem, SoftnessAt, SolveConfig, Targets};
+use softrast_views::{Frame, PaintedView, Picture};
 
 /// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
 const CLEARANCE: f64 = 1.05;

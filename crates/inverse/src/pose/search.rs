@@ -12,10 +12,8 @@ use super::{
     masks::{MaskPose, MaskPoses},
     target::Target,
 };
-use crate::{
-    Frame, InverseProblem, Iterate, Method, PaintedView, Picture, SolveConfig, coloured_pixels,
-    cut_sides, frame::ball, mask_iou, minimize, silhouette_pixels,
-};
+use crate::{InverseProblem, Iterate, Method, SolveConfig, minimize, silhouette_pixels};
+use softrast_views::{Frame, PaintedView, Picture, ball, coloured_pixels, cut_sides, mask_iou};
 
 /// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about a pixel and a half.
 const DETAIL: f64 = 1.0 / 20.0;

@@ -1,7 +1,7 @@
 use softrast_raster::Pinhole;
 
 use super::masks::MaskPose;
-use crate::{PaintedView, Picture, cut_sides};
+use softrast_views::{PaintedView, Picture, cut_sides};
 
 /// What a pose is told by: a mask, its square that is looked at, and colours if they tell it too.
 #[derive(Clone, Copy)]

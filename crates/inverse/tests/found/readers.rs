@@ -2,10 +2,8 @@
 
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage};
 use serde_json::json;
-use softrast_inverse::{
-    CameraFile, Lens, MaskRules, Picture, PictureFile, PoseFile, ScheduledSoftness,
-    SoftnessFileError,
-};
+use softrast_inverse::{ScheduledSoftness, SoftnessFileError};
+use softrast_views::{CameraFile, Lens, MaskRules, Picture, PictureFile, PoseFile};
 
 /// A reader under test. The names of files that were found begin with the `name`.
 pub(crate) struct Kind {

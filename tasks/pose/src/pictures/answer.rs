@@ -8,10 +8,7 @@ use std::{
 use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, seen_by};
-use softrast_inverse::{
-    Distortion, Frame, PaintedView, Picture, camera_json, coloured_pixels, cut_sides,
-    pose::FoundPose, silhouette_pixels,
-};
+use softrast_inverse::{pose::FoundPose, silhouette_pixels};
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
     format::{FITS, counted, fit, line, short},
@@ -22,6 +19,9 @@ use softrast_lab::{
 };
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
+use softrast_views::{
+    Distortion, Frame, PaintedView, Picture, camera_json, coloured_pixels, cut_sides,
+};
 
 /// Answers that a picture of many shows.
 const SHOWN: usize = 12;

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given, MaskFlags, Variant};
-use softrast_inverse::{
-    CameraFile, Lens, PaintedView, PoseFile, View, cut_sides, faces_across_note, pose::PoseSearch,
-    reading_notes,
-};
+use softrast_inverse::pose::PoseSearch;
 use softrast_lab::Error;
 use softrast_raster::{NEAR, on_backend};
+use softrast_views::{
+    CameraFile, Lens, PaintedView, PoseFile, View, cut_sides, faces_across_note, reading_notes,
+};
 
 use self::answer::{Framed, POSES, Solved, answer, overlay_names};
 use crate::{Args, Instances, colour::coloured, framing::mesh};

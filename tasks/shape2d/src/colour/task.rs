@@ -6,11 +6,12 @@ use softrast_cli::{
     Common, Description, Detail, EdgeChoice, Ended, Entry, Measures, MethodArgs, NoArgs, Scales,
     Schedule, Task, Variant,
 };
-use softrast_inverse::{InverseProblem, Iterate, Picture, SoftnessAt, SolveConfig};
+use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig};
 use softrast_lab::rgb_from_planes;
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
+use softrast_views::Picture;
 
 use crate::{
     Args, Shape2d,

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, seen_by};
-use softrast_inverse::{Frame, View, faces_across_note};
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
     format::{counted, fit, line},
@@ -14,6 +13,7 @@ use softrast_lab::{
     report::{Beside, Labelled, Report, Table},
 };
 use softrast_mesh::Mesh;
+use softrast_views::{Frame, View, faces_across_note};
 
 use super::painted::Colours;
 use crate::Args;
@@ -81,6 +81,25 @@ struct Summary {
     seconds: f64,
 }
 
+/// Pictures of the views that are shown, in their order, and the sheets of them as PNG.
+struct Pictures {
+    overlays: Vec<RgbImage>,
+    pairs: Vec<[RgbImage; 2]>,
+    views: Vec<u8>,
+    colours: Option<Vec<u8>>,
+}
+
+impl Pictures {
+    fn new(scored: &[Scored]) -> anyhow::Result<Self> {
+        let overlays: Vec<RgbImage> = shown(scored).map(Scored::overlay).collect();
+        let pairs: Vec<[RgbImage; 2]> = shown(scored).filter_map(Scored::pair).collect();
+        let views = png(&contact_sheet(&overlays, 4.min(overlays.len())))?;
+        let colours = || png(&contact_sheet(pairs.as_flattened(), 4));
+        let colours = (!pairs.is_empty()).then(colours).transpose()?;
+        Ok(Self { overlays, pairs, views, colours })
+    }
+}
+
 pub(super) fn answer(
     given: &Given<'_, Args>,
     mesh: &Mesh,
@@ -113,21 +132,18 @@ pub(super) fn answer(
             summary.train
         ));
     }
-    let sheet: Vec<RgbImage> = shown(scored).map(Scored::overlay).collect();
-    let picture = png(&contact_sheet(&sheet, 4.min(sheet.len())))?;
-    let pairs: Vec<RgbImage> = shown(scored).filter_map(Scored::pair).flatten().collect();
-    let colours = (!pairs.is_empty()).then(|| png(&contact_sheet(&pairs, 4))).transpose()?;
+    let pictures = Pictures::new(scored)?;
     let text = text(mesh, scored, &summary);
-    let page = page(mesh, scored, &summary, &warnings, &picture, colours.as_deref())?;
+    let page = page(mesh, scored, &summary, &warnings, &pictures)?;
     let json = json(mesh, scored, &summary, &warnings);
     let mut beside = Vec::new();
     let mut files = vec![
         (MESHES[0].to_owned(), mesh.to_obj().into_bytes()),
         (MESHES[1].to_owned(), mesh.to_ply()),
         (MESHES[2].to_owned(), mesh.to_glb()),
-        (VIEWS.to_owned(), picture),
+        (VIEWS.to_owned(), pictures.views),
     ];
-    if let Some(colours) = colours {
+    if let Some(colours) = pictures.colours {
         files.push((IN_COLOUR[0].to_owned(), colours));
     }
     if let Some(textured) = textured {
@@ -184,10 +200,9 @@ fn page(
     scored: &[Scored],
     summary: &Summary,
     warnings: &[String],
-    sheet: &[u8],
-    colours: Option<&[u8]>,
+    pictures: &Pictures,
 ) -> anyhow::Result<Report> {
-    let about = match colours {
+    let about = match pictures.colours {
         Some(_) => "A mesh that has the silhouettes and colours of given pictures",
         None => "A mesh that has the silhouettes of given masks",
     };
@@ -213,17 +228,19 @@ fn page(
     };
     page.viewer(
         &viewer,
-        colours.unwrap_or(sheet),
+        pictures.colours.as_ref().unwrap_or(&pictures.views),
         "The mesh and the cameras. Choose a view to look through its camera, with the outline of the mask.",
     );
     page.heading("Views");
     let (mut overlays, mut pairs) = (Vec::new(), Vec::new());
-    for one in shown(scored) {
+    for (one, overlay) in shown(scored).zip(&pictures.overlays) {
         let label = format!("{}: {}", one.view.name, one.scores());
-        overlays.push(Labelled { picture: png(&one.overlay())?, label });
-        for (image, what) in one.pair().into_iter().flatten().zip(["photograph", "mesh"]) {
+        overlays.push(Labelled { picture: png(overlay)?, label });
+    }
+    for (one, pair) in shown(scored).zip(&pictures.pairs) {
+        for (image, what) in pair.iter().zip(["photograph", "mesh"]) {
             let label = format!("{}: {what}", one.view.name);
-            pairs.push(Labelled { picture: png(&image)?, label });
+            pairs.push(Labelled { picture: png(image)?, label });
         }
     }
     let which = match overlays.len() == scored.len() {
@@ -243,7 +260,7 @@ fn page(
              is.{which}"
         ),
     );
-    page.table(&table(scored, colours.is_some()));
+    page.table(&table(scored, pictures.colours.is_some()));
     Ok(page)
 }
 

@@ -1,7 +1,6 @@
 //! A mesh from pictures that the user gives.
 
 mod answer;
-mod hull;
 mod painted;
 mod problem;
 mod solve;

@@ -2,10 +2,11 @@
 
 use image::RgbImage;
 use softrast_cli::Given;
-use softrast_inverse::{PaintedView, SolveConfig, coloured_pixels, paint};
+use softrast_inverse::{SolveConfig, paint};
 use softrast_lab::{for_page, rgb_from_planes};
 use softrast_mesh::Mesh;
 use softrast_raster::ImageSize;
+use softrast_views::{PaintedView, coloured_pixels};
 
 use crate::Args;
 

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use anyhow::ensure;
-use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Surface, Targets, View};
+use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Surface, Targets};
 use softrast_mesh::{Edges, Mesh, MeshError};
 use softrast_meta::Adam;
 use softrast_raster::{
@@ -9,8 +9,7 @@ use softrast_raster::{
 };
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
-
-use super::hull::square;
+use softrast_views::View;
 
 /// Weights of the bending of the surface, for each vertex: Laplacian and flatness. As the task has them for its 642 vertices, and a
 /// seventh of that: on spot from 20 views, the mean `IoU` on 4 others is 0.981 with a tenth, 0.979 with a third, 0.976 with all. Spot is
@@ -34,7 +33,7 @@ pub(super) struct FromViews {
 
 impl FromViews {
     pub(super) fn new(start: Mesh, views: Arc<[View]>, smooth: f64) -> anyhow::Result<Self> {
-        let squares = views.iter().map(square).collect::<anyhow::Result<_>>()?;
+        let squares = views.iter().map(View::square).collect::<anyhow::Result<_>>()?;
         let [low, high] = start.bounds();
         let reach = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max) / 2.0;
         ensure!(reach > 0.0, "the mesh to deform has no extent: all its vertices are in one place");

@@ -4,17 +4,18 @@ use anyhow::ensure;
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
-    CameraFile, Method, PaintedView, ScheduledSoftness, SolveConfig, View, baked, mask_iou,
-    minimize, reading_notes, silhouette_pixels,
+    Method, ScheduledSoftness, SolveConfig, baked, minimize, silhouette_pixels,
 };
 use softrast_lab::{Error, Progress, format::counted};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_raster::on_backend;
 use softrast_softness::{EdgeSoftness, Family};
+use softrast_views::{
+    CameraFile, PaintedView, View, frame_of_masks, mask_iou, reading_notes, visual_hull,
+};
 
 use super::{
     answer::{Scored, answer, names},
-    hull::{frame, hull},
     painted::{self, Colours},
     problem::FromViews,
 };
@@ -154,7 +155,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let mut mesh = match &args.mesh {
         Some(path) => Mesh::load(path)?,
         None => {
-            let frame = frame(&train)?;
+            let frame = frame_of_masks(&train)?;
             let framed = |view: &View| View { camera: frame.camera(&view.camera), ..view.clone() };
             let views: Vec<View> = train.iter().map(framed).collect();
             let start = start(given, flags, &views)?;
@@ -232,7 +233,7 @@ fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Resu
 /// The visual hull in as few cells as show what the masks show.
 fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
     let with = |cells: usize| {
-        let hull = hull(views, cells)?;
+        let hull = visual_hull(views, cells)?;
         let iou = |view: &View| mask_iou(&silhouette_pixels(&hull, &view.camera), &view.mask);
         let mean = views.iter().map(iou).sum::<f64>() / views.len() as f64;
         anyhow::Ok((hull, mean))

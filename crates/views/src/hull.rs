@@ -3,9 +3,10 @@
 //! Source: Laurentini 1994.
 
 use anyhow::{Context, ensure};
-use softrast_inverse::{Frame, View, cut_sides};
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
+
+use crate::{Frame, View, cut_sides};
 
 /// Pixels a side of what is looked at of each mask.
 const SIDE: usize = 128;
@@ -29,7 +30,7 @@ struct Cone<'a> {
 /// # Errors
 ///
 /// If a mask is empty or full, the cameras do not look at one thing, or no solid has these masks.
-pub(super) fn hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
+pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
     let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
     let (centre, reach) = region(&cones)?;
     let field =
@@ -101,7 +102,7 @@ fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
 /// # Errors
 ///
 /// If a mask is empty or full, or the cameras do not look at one thing.
-pub(super) fn frame(views: &[View]) -> anyhow::Result<Frame> {
+pub fn frame_of_masks(views: &[View]) -> anyhow::Result<Frame> {
     let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
     let (middle, unit) = region(&cones)?;
     Ok(Frame { middle, unit })
@@ -155,7 +156,7 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
 
 impl<'a> Cone<'a> {
     fn new(view: &'a View) -> anyhow::Result<Self> {
-        let square = square(view)?;
+        let square = view.square()?;
         let [_, _, white] = view.mask.square().unwrap_or(square);
         let mask = view.mask.despeckled();
         let [levels, _] = mask.part(square, SIDE);
@@ -198,11 +199,6 @@ impl<'a> Cone<'a> {
         let [fx, fy] = camera.focal;
         ((1.0 - v) * upper + v * lower + off) * depth * 2.0 / (fx + fy)
     }
-}
-
-/// The square of a view that is looked at: left, top and extent in pixels.
-pub(super) fn square(view: &View) -> anyhow::Result<[f64; 3]> {
-    view.mask.view_square().with_context(|| view.name.clone())
 }
 
 /// Signed distance to where an image `[SIDE * SIDE]` is one half, negative where it is more, for cells of this width.

@@ -1,3 +1,6 @@
+use std::ops::Range;
+
+use rayon::prelude::*;
 use softrast_mesh::Mesh;
 use softrast_raster::{NEAR, Pinhole};
 
@@ -5,6 +8,8 @@ use crate::Frame;
 
 /// Samples along each side of a pixel, where there are not too many of them.
 const SAMPLES: usize = 4;
+/// Rows of samples that are drawn together.
+const BAND: usize = 64;
 /// Samples of an image at most, at 32 bytes each. Larger pictures have fewer in a pixel, but one.
 const MOST_SAMPLES: usize = 1 << 24;
 
@@ -21,23 +26,27 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * height];
     let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
     let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
-    for face in mesh.faces() {
-        let corners = face.map(|v| {
-            let [x, y, z] = seen[v as usize];
-            // The middle of the first sample is (0, 0).
-            [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
-        });
-        let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
-        samples(corners, near, [width, height], |x, y, depth, weights| {
-            let sample = &mut nearest[y * width + x];
-            if depth < sample[0] {
-                let [r, g, b] = [0, 1, 2].map(|k| {
-                    (0..3).map(|corner| weights[corner] * colours[corner][k]).sum::<f64>()
-                });
-                *sample = [depth, r, g, b];
-            }
-        });
-    }
+    nearest.par_chunks_mut(BAND * width).enumerate().for_each(|(band, nearest)| {
+        let first = band * BAND;
+        for face in mesh.faces() {
+            let corners = face.map(|v| {
+                let [x, y, z] = seen[v as usize];
+                // The middle of the first sample is (0, 0).
+                [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
+            });
+            let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
+            let rows = first..(first + BAND).min(height);
+            samples(corners, near, width, rows, |x, y, depth, weights| {
+                let sample = &mut nearest[(y - first) * width + x];
+                if depth < sample[0] {
+                    let [r, g, b] = [0, 1, 2].map(|k| {
+                        (0..3).map(|corner| weights[corner] * colours[corner][k]).sum::<f64>()
+                    });
+                    *sample = [depth, r, g, b];
+                }
+            });
+        }
+    });
     let share = 1.0 / (each * each) as f64;
     let mut image = [(); 4].map(|()| vec![0.0; pixels]);
     for (k, [depth, r, g, b]) in nearest.into_iter().enumerate().filter(|(_, s)| s[0].is_finite()) {
@@ -50,13 +59,14 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     image
 }
 
-/// Shows each sample inside of a triangle to `show`: its column and row, its depth, and the weights of the corners in space.
+/// Shows each sample of some rows inside of a triangle to `show`: its column and row, its depth, and the weights of the corners in space.
 ///
 /// Corners are columns and rows in samples, and depths; a face with one below `near` is not shown.
 fn samples(
     corners: [[f64; 3]; 3],
     near: f64,
-    [width, height]: [usize; 2],
+    width: usize,
+    rows: Range<usize>,
     mut show: impl FnMut(usize, usize, f64, [f64; 3]),
 ) {
     let [a, b, c] = corners;
@@ -68,16 +78,17 @@ fn samples(
     if !(in_front && area != 0.0 && area.is_finite()) {
         return;
     }
-    let range = |axis: usize, count: usize| {
+    let range = |axis: usize, within: Range<usize>| {
         let [low, high] =
             corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| {
                 [low.min(p[axis]), high.max(p[axis])]
             });
         // A cast holds what is too large, and makes 0 of what is below 0.
-        (low.ceil().max(0.0) as usize)..((high.floor() + 1.0).max(0.0) as usize).min(count)
+        let (first, end) = (low.ceil().max(0.0) as usize, (high.floor() + 1.0).max(0.0) as usize);
+        first.max(within.start)..end.min(within.end)
     };
-    let columns = range(0, width);
-    for row in range(1, height) {
+    let columns = range(0, 0..width);
+    for row in range(1, rows) {
         for column in columns.clone() {
             let (x, y) = (column as f64, row as f64);
             let on_screen = [side(b, c, x, y), side(c, a, x, y), side(a, b, x, y)];

@@ -8,7 +8,7 @@ use image::{
     DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, RgbImage,
     metadata::Orientation,
 };
-use softrast_inverse::{MaskRules, Picture, PictureFile};
+use softrast_views::{MaskRules, Picture, PictureFile};
 
 const PLAIN: MaskRules = MaskRules { invert: false, threshold: None, label: None };
 
@@ -213,7 +213,7 @@ fn a_large_picture_is_reduced_and_its_camera_with_it() {
     assert!((mean - 0.25).abs() < 1e-6, "{mean}");
     assert_eq!([picture.pixels()[0], picture.pixels()[size.pixels() - size.width]], [0.0, 1.0]);
     let lens =
-        softrast_inverse::Lens::parse(br#"{"fx": 4000, "cx": 2000, "w": 5000, "h": 1500}"#, "a")
+        softrast_views::Lens::parse(br#"{"fx": 4000, "cx": 2000, "w": 5000, "h": 1500}"#, "a")
             .unwrap();
     let camera = lens.pinhole(whole).unwrap();
     let reduced = picture.camera(&camera);
@@ -234,9 +234,9 @@ fn only_regular_files_are_read() {
         let errors = [
             Picture::load_mask(path).err(),
             Picture::load_luminance(path).err(),
-            softrast_inverse::Lens::load(path).err(),
-            softrast_inverse::PoseFile::load(path).err(),
-            softrast_inverse::CameraFile::load(path).err(),
+            softrast_views::Lens::load(path).err(),
+            softrast_views::PoseFile::load(path).err(),
+            softrast_views::CameraFile::load(path).err(),
         ];
         for error in errors.map(|error| format!("{:#}", error.unwrap())) {
             assert!(error.contains(path) && error.lines().count() == 1, "{error}");
@@ -245,5 +245,5 @@ fn only_regular_files_are_read() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("transforms.json")).unwrap();
     let load = |path: &Path| Picture::load_mask(path);
-    assert!(softrast_inverse::load_views(folder.path(), load).is_err());
+    assert!(softrast_views::load_views(folder.path(), load).is_err());
 }

@@ -8,7 +8,7 @@ const SMALL: usize = 5;
 /// How many parts of a mask, of pixels that share sides, are at least a fifth as large as the largest. 0 if nothing is white.
 ///
 /// ```
-/// use softrast_inverse::{Picture, mask_parts};
+/// use softrast_views::{Picture, mask_parts};
 ///
 /// let mask = Picture::new([[1.0, 1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0]].concat(), 4);
 /// assert_eq!(mask_parts(&mask), 2);

@@ -11,7 +11,7 @@ const LEAST_DEPTH: f64 = 1e-2;
 /// neither their rotation nor what is where in an image.
 ///
 /// ```
-/// use softrast_inverse::Frame;
+/// use softrast_views::Frame;
 /// use softrast_mesh::icosphere;
 /// use softrast_raster::Pinhole;
 ///
@@ -96,7 +96,7 @@ impl Frame {
 }
 
 /// The middle of the box of a mesh, and the distance of its farthest vertex from there.
-pub(crate) fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
+pub fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
     let [low, high] = mesh.bounds();
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
     let distance = |p: [f64; 3]| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>().sqrt();
@@ -104,7 +104,7 @@ pub(crate) fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
 }
 
 /// The least depth before a camera, or a hundredth of the largest if that is more; 1 if nothing is before it.
-pub(crate) fn unit_of_depths(depths: impl Iterator<Item = f64>) -> f64 {
+fn unit_of_depths(depths: impl Iterator<Item = f64>) -> f64 {
     let before = depths.filter(|&depth| depth > 0.0);
     let [least, largest] = before.fold([f64::INFINITY, 0.0], |[least, largest], depth| {
         [depth.min(least), depth.max(largest)]

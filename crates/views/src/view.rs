@@ -1,12 +1,12 @@
 use std::{fmt::Display, path::PathBuf};
 
+use anyhow::Context;
 use serde_json::{Value, json};
 use softrast_mesh::Mesh;
-use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project_pinhole, vertices};
-use softrast_tensor::numbers;
+use softrast_raster::Pinhole;
 
 use crate::{
-    Distortion, Frame, Picture,
+    Distortion, Picture,
     cameras::{SAID, rounded_note},
     colmap_pose, cut_sides, mask_parts,
 };
@@ -33,16 +33,6 @@ pub fn camera_json(camera: &Pinhole) -> Value {
         });
     }
     found
-}
-
-/// The hard silhouette that a camera sees of a mesh: its pixels, row by row from the top. Mesh and camera may be anywhere, in any unit.
-pub fn silhouette_pixels(mesh: &Mesh, camera: &Pinhole) -> Vec<f64> {
-    let device = Default::default();
-    let frame = Frame::of_cameras(mesh, [camera]);
-    let positions: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| frame.point(p)).collect();
-    let corners = vertices::<HostBackend>(&positions, &device);
-    let seen = project_pinhole(corners, &Pinholes::new(&[frame.camera(camera)], &device));
-    numbers(hard_silhouette(seen, mesh.faces(), camera.size))
 }
 
 /// Overlap over union of a silhouette and a mask with as many pixels; a pixel of the mask is in from one half on. 1 if both are empty.
@@ -83,6 +73,15 @@ impl View {
             Some(distortion) => picture.undistorted(&self.camera, distortion),
             None => picture,
         }
+    }
+
+    /// The square of the mask that is looked at: its left, its top and its extent in pixels. See [`Picture::view_square`].
+    ///
+    /// # Errors
+    ///
+    /// If nothing or all of the mask is white, with the name of the view.
+    pub fn square(&self) -> anyhow::Result<[f64; 3]> {
+        self.mask.view_square().with_context(|| self.name.clone())
     }
 }
 

@@ -6,7 +6,7 @@ use crate::Picture;
 /// known of it. Specks do not count.
 ///
 /// ```
-/// use softrast_inverse::{Picture, cut_sides};
+/// use softrast_views::{Picture, cut_sides};
 ///
 /// let mask = Picture::new([[0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.0; 4], [0.0; 4]].concat(), 4);
 /// assert_eq!(cut_sides(&mask), ["top", "right"]);

@@ -10,7 +10,7 @@ const GROUP: usize = 8;
 ///
 /// The middle point of a range splits it along one axis: those before it are not beyond it, those
 /// after it are not before it. Source: Bentley 1975.
-pub(crate) struct Nearest {
+pub struct Nearest {
     /// Neighbours in this order are neighbours in space, by and large.
     points: Vec<[f64; 3]>,
     /// Axis of the split at each point that splits.
@@ -22,20 +22,21 @@ pub(crate) struct Nearest {
 type Bounds = [[f64; 3]; 2];
 
 impl Nearest {
-    pub(crate) fn new(mut points: Vec<[f64; 3]>) -> Self {
+    /// Sorts the points.
+    pub fn new(mut points: Vec<[f64; 3]>) -> Self {
         let mut axes = vec![0; points.len()];
         split(&mut points, &mut axes);
         let bounds = bounds(&points);
         Self { points, axes, bounds }
     }
 
-    /// Mean over these points of the squared distance to the nearest of others; infinite if there
-    /// is no other.
-    pub(crate) fn mean_squared_distance(&self, others: &Self) -> f64 {
+    /// Mean over these points of the squared distance to the nearest of others, in the square of their unit: 0 if there are none of these,
+    /// infinite if there is no other.
+    pub fn mean_squared_distance(&self, others: &Self) -> f64 {
         // Collected, then summed in order: the sum does not depend on the number of threads.
         let groups = self.points.par_chunks(GROUP);
         let squared: Vec<f64> = groups.map(|group| others.sum_of_squares(group)).collect();
-        squared.iter().sum::<f64>() / self.points.len() as f64
+        squared.iter().sum::<f64>() / self.points.len().max(1) as f64
     }
 
     /// Sum over a few points of the squared distance to the nearest of these.
@@ -167,6 +168,9 @@ mod tests {
             }
             let mean = all.iter().map(squared).sum::<f64>() / all.len() as f64;
             assert_eq!(Nearest::new(all).mean_squared_distance(&tree), mean);
+            let none = Nearest::new(Vec::new());
+            assert_eq!(none.mean_squared_distance(&tree), 0.0);
+            assert_eq!(tree.mean_squared_distance(&none), f64::INFINITY);
         }
     }
 }

@@ -1,9 +1,8 @@
 use std::{collections::BTreeSet, path::Path, sync::Arc};
 
 use anyhow::{Context, anyhow, ensure};
-use image::{GrayImage, Luma};
 use softrast_raster::{ImageSize, Pinhole};
-use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
+use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use crate::{
     Distortion, MaskRules, PictureFile,
@@ -327,25 +326,6 @@ impl Picture {
     }
 }
 
-/// Writes the views of an `image` `[views, height, width]` side by side into a gray PNG: 0 is black, 1 is white, what lies outside is
-/// clamped.
-///
-/// # Errors
-///
-/// If the file cannot be written, or the image is empty.
-pub fn save_picture<B: Backend>(image: Tensor<B, 3>, path: impl AsRef<Path>) -> anyhow::Result<()> {
-    let path = path.as_ref();
-    let [views, height, width] = image.dims();
-    ensure!(views * height * width > 0, "an empty image cannot be written to {}", path.display());
-    let row = image.swap_dims(0, 1).reshape([height, views * width]);
-    let levels = numbers(row);
-    let picture = GrayImage::from_fn((views * width) as u32, height as u32, |x, y| {
-        let level = levels[y as usize * views * width + x as usize];
-        Luma([(level.clamp(0.0, 1.0) * 255.0).round() as u8])
-    });
-    picture.save(path).with_context(|| format!("cannot write the picture {}", path.display()))
-}
-
 /// The camera of a picture that is enlarged or reduced.
 fn resized(camera: &Pinhole, from: ImageSize, to: ImageSize) -> Pinhole {
     camera.cropped([0.0; 2], [from.width as f64, from.height as f64], to)
@@ -392,8 +372,7 @@ fn shares(count: usize, from: f64, cell: f64, cells: usize) -> Vec<Shares> {
 
 #[cfg(test)]
 mod tests {
-    use image::{DynamicImage, LumaA, Rgba};
-    use softrast_tensor::NdArray;
+    use image::{DynamicImage, GrayImage, Luma, LumaA, Rgba};
 
     use super::*;
 
@@ -474,16 +453,6 @@ mod tests {
         };
         assert_eq!(mask([[0, 255], [255, 0]]), [1.0, 0.0]);
         assert_eq!(mask([[0, 255], [255, 255]]), [0.0, 1.0]);
-    }
-
-    #[test]
-    fn what_is_written_comes_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.png");
-        let levels = [0.0, 1.0, 0.2, 0.4];
-        let image = Tensor::<NdArray, 1>::from_floats(levels, &Default::default());
-        save_picture(image.reshape([1, 2, 2]), &path).unwrap();
-        assert_close(&Picture::load_luminance(&path).unwrap().levels(2), &levels);
     }
 
     #[test]

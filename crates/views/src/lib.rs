@@ -1,0 +1,48 @@
+//! Pictures, masks and cameras as files have them, and what follows from them without a gradient.
+//!
+//! A [`Picture`] is a mask or a channel of a picture file, read by [`MaskRules`]. A [`CameraFile`] holds the cameras of many pictures, as
+//! nerfstudio, COLMAP or OpenCV write them; a [`Lens`] and a [`PoseFile`] are the two halves of one. [`load_views`] reads pictures with their
+//! cameras, each a [`View`]. [`visual_hull`] is the solid that their masks leave, [`coloured_pixels`] what a camera sees of a mesh.
+//!
+//! ```
+//! use softrast_mesh::icosphere;
+//! use softrast_raster::Pinhole;
+//! use softrast_views::{Picture, coloured_pixels, mask_iou};
+//!
+//! let camera = Pinhole::look_at([0.0, 0.0, 4.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 64);
+//! let [.., covered] = coloured_pixels(&icosphere(2), &camera);
+//! let mask = Picture::new(covered.iter().map(|&part| part as f32).collect(), 64);
+//! assert_eq!(mask_iou(&covered, &mask), 1.0);
+//! ```
+
+#[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
+compile_error!("softrast-views needs a backend: turn on one of the features ndarray, flex, wgpu");
+
+mod cameras;
+mod coloured_pixels;
+mod cut_sides;
+mod frame;
+mod hull;
+mod mask_parts;
+mod mask_rules;
+mod painted_view;
+mod picture;
+mod picture_file;
+mod view;
+
+pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
+pub use coloured_pixels::coloured_pixels;
+pub use cut_sides::cut_sides;
+pub use frame::{Frame, ball};
+pub use hull::{frame_of_masks, visual_hull};
+pub use mask_parts::mask_parts;
+pub use mask_rules::MaskRules;
+pub use painted_view::PaintedView;
+pub use picture::Picture;
+pub use picture_file::PictureFile;
+pub use view::{View, camera_json, faces_across, faces_across_note, mask_iou, reading_notes};
+
+/// Compiles and runs the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
