@@ -240,5 +240,13 @@ mod tests {
         assert!(!inputs.holds(&path("b.png")));
         inputs.add(&path("b.glb"));
         assert!(inputs.holds(&path("b.png")));
+        let json =
+            r#"{"images":[{"uri":"my%20c.png"}],"buffers":[{"uri":"c.bin"},{"uri":"data:,"}]}"#;
+        for (name, text) in [("c.gltf", json), ("c.bin", ""), ("my c.png", "")] {
+            fs::write(path(name), text).unwrap();
+        }
+        assert!(!inputs.holds(&path("c.bin")) && !inputs.holds(&path("my c.png")));
+        inputs.add(&path("c.gltf"));
+        assert!(inputs.holds(&path("c.bin")) && inputs.holds(&path("my c.png")));
     }
 }

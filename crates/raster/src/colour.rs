@@ -1,4 +1,4 @@
-use softrast_tensor::{Backend, Tensor};
+use softrast_tensor::{Backend, Bool, Tensor, TensorData, numbers};
 
 /// What a face shares a pixel with where it covers it little: the colour behind all faces.
 #[derive(Clone, Debug)]
@@ -82,32 +82,33 @@ pub fn hard_colour<B: Backend>(
     let [channels] = background.dims();
     assert_eq!(depth.dims(), [views, faces], "shape of the depths");
     assert_eq!(colour.dims(), [views, faces, channels, pixels], "shape of the colours");
-    let nearest = nearest_face(distance, depth);
-    let seen = nearest.clone().greater_equal_elem(0);
-    let index = nearest.clamp_min(0).reshape([views, 1, 1, pixels]);
-    let front = colour.gather(1, index.expand([views, 1, channels, pixels]));
+    let device = colour.device();
+    let nearest = nearest_faces(distance, depth);
+    // One place in all colours for each number of the image: many times faster to gather on the CPU than along an axis.
+    let place = |k: usize| {
+        let (view, channel, pixel) = (k / pixels / channels, k / pixels % channels, k % pixels);
+        let face = nearest[view * pixels + pixel].unwrap_or(0);
+        (((view * faces + face) * channels + channel) * pixels + pixel) as i64
+    };
+    let places: Vec<i64> = (0..views * channels * pixels).map(place).collect();
+    let places = TensorData::new(places, [views * channels * pixels]);
+    let front = colour.flatten::<1>(0, 3).select(0, Tensor::from_data(places, &device));
+    let seen: Vec<bool> = nearest.iter().map(Option::is_some).collect();
+    let seen = Tensor::<B, 3, Bool>::from_data(TensorData::new(seen, [views, 1, pixels]), &device);
     let behind = background.reshape([1, channels, 1]).expand([views, channels, pixels]);
     let seen = seen.expand([views, channels, pixels]);
     behind.mask_where(seen, front.reshape([views, channels, pixels])).detach()
 }
 
-/// The nearest face that covers each pixel, `[views, 1, pixels]`; -1 where there is none.
-fn nearest_face<B: Backend>(
-    distance: Tensor<B, 3>,
-    depth: Tensor<B, 2>,
-) -> Tensor<B, 3, softrast_tensor::Int> {
+/// The nearest face that covers each pixel of each view.
+fn nearest_faces<B: Backend>(distance: Tensor<B, 3>, depth: Tensor<B, 2>) -> Vec<Option<usize>> {
     let [views, faces, pixels] = distance.dims();
-    let device = distance.device();
-    let [distance, depth]: [Vec<f64>; 2] =
-        [distance.into_data(), depth.into_data()].map(|data| data.iter().collect());
-    let mut nearest = Vec::with_capacity(views * pixels);
-    for view in 0..views {
-        for pixel in 0..pixels {
-            let covers = |face: &usize| distance[(view * faces + face) * pixels + pixel] >= 0.0;
-            let at = |face: usize| depth[view * faces + face];
-            let front = (0..faces).filter(covers).reduce(|a, b| if at(b) < at(a) { b } else { a });
-            nearest.push(front.map_or(-1, |face| face as i64));
-        }
-    }
-    Tensor::from_data(softrast_tensor::TensorData::new(nearest, [views, 1, pixels]), &device)
+    let [distance, depth] = [numbers(distance), numbers(depth)];
+    let nearest = |view: usize, pixel: usize| {
+        let covers = |face: &usize| distance[(view * faces + face) * pixels + pixel] >= 0.0;
+        let at = |face: usize| depth[view * faces + face];
+        (0..faces).filter(covers).reduce(|a, b| if at(b) < at(a) { b } else { a })
+    };
+    let nearest = &nearest;
+    (0..views).flat_map(|view| (0..pixels).map(move |pixel| nearest(view, pixel))).collect()
 }

@@ -17,6 +17,23 @@ use kept::{OCTAHEDRON, Program, SOFTNESS};
 const RENDER: Program =
     Program { path: env!("CARGO_BIN_EXE_render"), inputs, short: "--size 8 --repeat 1" };
 
+/// A triangle with a texture, in the words of a glTF file: its numbers are in `scene.bin`, its picture in `skin two.png`.
+const SCENE: &str = r#"{
+    "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "material": 0 }] }],
+    "materials": [{ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
+    "textures": [{ "source": 0 }], "images": [{ "uri": "skin%20two.png" }],
+    "accessors": [
+        { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" },
+        { "bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2" }
+    ],
+    "bufferViews": [
+        { "buffer": 0, "byteOffset": 0, "byteLength": 36 },
+        { "buffer": 0, "byteOffset": 36, "byteLength": 24 }
+    ],
+    "buffers": [{ "uri": "scene.bin", "byteLength": 60 }]
+}"#;
+
 fn inputs(folder: &Path) {
     let path = |name: &str| folder.join(name);
     let textured = "mtllib skin.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n";
@@ -26,11 +43,14 @@ fn inputs(folder: &Path) {
         ("textured.obj", textured),
         ("skin.mtl", "newmtl a\nmap_Kd skin.png\n"),
         ("notes.txt", "mine"),
+        ("scene.gltf", SCENE),
     ] {
         fs::write(path(name), text).unwrap();
     }
+    let numbers = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+    fs::write(path("scene.bin"), numbers.map(f32::to_le_bytes).concat()).unwrap();
     let picture = GrayImage::from_fn(8, 8, |x, _| Luma([30 * x as u8]));
-    for name in ["skin.png", "other.png", "target.png", "photo.jpg"] {
+    for name in ["skin.png", "other.png", "target.png", "photo.jpg", "skin two.png"] {
         picture.save(path(name)).unwrap();
     }
     #[cfg(unix)]
@@ -59,6 +79,9 @@ const LINES: &[(&str, &str)] = &[
     ),
     ("textured.obj --colour --out skin.png", "skin.png is an input of this run"),
     ("textured.obj --colour --out skin.mtl", "skin.mtl is an input of this run"),
+    ("scene.gltf --colour --out new.png", ""),
+    ("scene.gltf --colour --out scene.bin", "scene.bin is an input of this run"),
+    ("scene.gltf --colour --out 'skin_two.png'", "skin two.png is an input of this run"),
     #[cfg(unix)]
     ("mesh.obj --out link.png", "link.png is an input of this run"),
     #[cfg(unix)]

@@ -35,14 +35,14 @@ pub fn camera_json(camera: &Pinhole) -> Value {
     found
 }
 
-/// Overlap over union of a silhouette and a mask with as many pixels; a pixel of the mask is in from one half on. 1 if both are empty.
+/// Overlap over union of a silhouette and a mask with as many pixels; a pixel is in from one half on. 1 if both are empty.
 ///
 /// # Panics
 ///
 /// If they have not as many pixels.
 pub fn mask_iou(silhouette: &[f64], mask: &Picture) -> f64 {
     assert_eq!(silhouette.len(), mask.pixels().len(), "pixels of the silhouette and the mask");
-    let pairs = || silhouette.iter().zip(mask.pixels()).map(|(&a, &b)| (a > 0.5, b >= 0.5));
+    let pairs = || silhouette.iter().zip(mask.pixels()).map(|(&a, &b)| (a >= 0.5, b >= 0.5));
     let both = pairs().filter(|&(a, b)| a && b).count();
     let either = pairs().filter(|&(a, b)| a || b).count();
     if either == 0 { 1.0 } else { both as f64 / either as f64 }

@@ -88,11 +88,11 @@ impl CameraFile {
         Ok(Self { name, files, lenses, frames, roots, note: None })
     }
 
-    /// The cameras in the content of a JSON file called `name`.
+    /// The cameras in the content of a file called `name`: JSON, or a calibration of OpenCV or ROS in YAML.
     ///
     /// # Errors
     ///
-    /// If it is no JSON, tells no focal length and has no frames, or has a frame without a file or with a pose that is none.
+    /// If it is neither, tells no focal length and has no frames, or has a frame without a file or with a pose that is none.
     pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
         let file = fields::json(bytes, name)?;
         let (lens, frames, note) = match file["frames"].is_null() {

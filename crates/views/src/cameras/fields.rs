@@ -1,4 +1,4 @@
-//! JSON files of cameras: what is wrong in them is said with its place.
+//! Fields of camera files: what is wrong in them is said with its place.
 
 use std::{borrow::Cow, path::Path};
 

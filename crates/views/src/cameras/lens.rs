@@ -85,11 +85,11 @@ const FARTHEST_CENTRE: f64 = 1e5;
 const ROUNDED: f64 = 1e-6;
 
 impl Lens {
-    /// What a camera file says of it; a `transforms.json` is one, and so is a result of ours.
+    /// What a camera file says of it: a `transforms.json`, a calibration of OpenCV or ROS in YAML or JSON, or a result of ours.
     ///
     /// # Errors
     ///
-    /// If the file is missing, is no JSON, has a field of another type, or tells no focal length.
+    /// If the file is missing, is neither JSON nor such YAML, has a field of another type, or tells no focal length.
     pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let (bytes, name) = read(path.as_ref())?;
         Self::parse(&bytes, &name)
