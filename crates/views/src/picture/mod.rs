@@ -1,0 +1,135 @@
+mod part;
+mod read;
+
+use std::sync::Arc;
+
+use softrast_raster::{ImageSize, Pinhole};
+
+use crate::Distortion;
+
+/// A gray picture of any size: a target for silhouettes. Copies share their pixels.
+///
+/// A picture of more than 4,194,304 pixels in a file, as 2048 × 2048, is reduced to that many or a few less when it is read. [`Picture::size`] is the
+/// size of its pixels then, [`Picture::whole_size`] that of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// From 0 to 1, row by row from the top.
+    levels: Arc<[f32]>,
+    width: usize,
+    /// Size of the picture in the file, before it was reduced.
+    whole: ImageSize,
+    /// The level of the file that was taken for white, where it had just one above 0.
+    only_level: Option<f32>,
+}
+
+impl Picture {
+    /// A picture of these levels from 0 to 1, row by row from the top.
+    ///
+    /// # Panics
+    ///
+    /// If there are no levels, or no whole rows of this width.
+    pub fn new(levels: Vec<f32>, width: usize) -> Self {
+        let count = levels.len();
+        assert!(
+            count > 0 && width > 0 && count.is_multiple_of(width),
+            "{count} levels, {width} a row"
+        );
+        let whole = [count / width, width].into();
+        Self { levels: levels.into(), width, whole, only_level: None }
+    }
+
+    /// Height and width in pixels.
+    pub fn size(&self) -> ImageSize {
+        [self.levels.len() / self.width, self.width].into()
+    }
+
+    /// Height and width of the picture in its file, turned as the file asks for: those that a camera of the picture has.
+    pub fn whole_size(&self) -> ImageSize {
+        self.whole
+    }
+
+    /// The level from 0 to 1 that stood for white in the file of a mask, where it was the only one above 0 and less than 1.
+    pub fn only_level(&self) -> Option<f64> {
+        self.only_level.map(f64::from)
+    }
+
+    /// A camera of the picture in the file as one of these pixels.
+    pub fn camera(&self, of_whole: &Pinhole) -> Pinhole {
+        resized(of_whole, self.whole, self.size())
+    }
+
+    /// A camera of these pixels as one of the picture in the file.
+    pub fn whole_camera(&self, camera: &Pinhole) -> Pinhole {
+        resized(camera, self.size(), self.whole)
+    }
+
+    /// All pixels, row by row from the top.
+    pub fn pixels(&self) -> &[f32] {
+        &self.levels
+    }
+
+    /// As a straight lens would have shown it: `camera` is that of these pixels but for its lens. What lies beyond the picture is as its border.
+    ///
+    /// # Panics
+    ///
+    /// If the camera is for pictures of another size.
+    #[must_use]
+    pub fn undistorted(&self, camera: &Pinhole, distortion: &Distortion) -> Self {
+        assert_eq!(camera.size, self.size(), "the size of the camera's pictures");
+        let levels = distortion.sources(camera).map(|place| self.between(place));
+        Self { levels: levels.collect(), ..self.clone() }
+    }
+
+    /// The level at a place in pixels from the corner of the first: between the middles of four pixels bilinear, beyond the outermost theirs.
+    fn between(&self, place: [f64; 2]) -> f32 {
+        let (width, height) = (self.width, self.levels.len() / self.width);
+        let along = |x: f64, count: usize| {
+            let x = (x - 0.5).max(0.0).min((count - 1) as f64);
+            let first = (x as usize).min(count - 1);
+            (first, (first + 1).min(count - 1), (x - first as f64) as f32)
+        };
+        let ((left, right, across), (top, bottom, down)) =
+            (along(place[0], width), along(place[1], height));
+        let row = |y: usize| {
+            let [a, b] = [left, right].map(|x| self.levels[y * width + x]);
+            a + across * (b - a)
+        };
+        let (above, below) = (row(top), row(bottom));
+        above + down * (below - above)
+    }
+
+    /// With black for white.
+    #[must_use]
+    pub fn inverted(self) -> Self {
+        Self { levels: self.levels.iter().map(|level| 1.0 - level).collect(), ..self }
+    }
+
+    /// White from this level on, black below.
+    #[must_use]
+    pub fn thresholded(self, level: f64) -> Self {
+        let levels =
+            self.levels.iter().map(|&x| f32::from(u8::from(f64::from(x) >= level))).collect();
+        Self { levels, ..self }
+    }
+
+    /// Without specks: a pixel that is white or black among mostly others becomes as they are.
+    #[must_use]
+    pub fn despeckled(&self) -> Self {
+        let (width, height) = (self.width, self.levels.len() / self.width);
+        let majority = |k: usize| {
+            let (x, y) = (k % width, k / width);
+            let around = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+            let all = around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x));
+            let (sum, count) =
+                all.fold((0.0, 0.0), |(sum, count), k| (sum + self.levels[k], count + 1.0));
+            let most = sum >= 0.5 * count;
+            if (self.levels[k] >= 0.5) == most { self.levels[k] } else { f32::from(u8::from(most)) }
+        };
+        Self { levels: (0..self.levels.len()).map(majority).collect(), ..self.clone() }
+    }
+}
+
+/// The camera of a picture that is enlarged or reduced.
+fn resized(camera: &Pinhole, from: ImageSize, to: ImageSize) -> Pinhole {
+    camera.cropped([0.0; 2], [from.width as f64, from.height as f64], to)
+}

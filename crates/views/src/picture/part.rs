@@ -1,0 +1,181 @@
+//! Parts of a picture on other pixels, each the mean over its area.
+
+use anyhow::{Context, ensure};
+use softrast_tensor::{Backend, Tensor, tensor_on};
+
+use super::Picture;
+
+/// What is looked at of a mask is this much larger than what is white.
+const MARGIN: f64 = 1.5;
+
+impl Picture {
+    /// The least square around all that is at least half white, in the middle of it: its left, its top and its extent in pixels. None if
+    /// there is nothing.
+    ///
+    /// A pixel counts if most of the nine around it are white too, unless none is like that: specks do not.
+    pub fn square(&self) -> Option<[f64; 3]> {
+        let height = self.levels.len() / self.width;
+        let white = |x: usize, y: usize| {
+            x < self.width && y < height && self.levels[y * self.width + x] >= 0.5
+        };
+        let firmly = |[x, y]: &[usize; 2]| {
+            let around = (0..9).map(|k| ((x + k % 3).wrapping_sub(1), (y + k / 3).wrapping_sub(1)));
+            around.filter(|&(x, y)| white(x, y)).count() >= 5
+        };
+        let all = || {
+            let pixels = (0..self.levels.len()).map(|k| [k % self.width, k / self.width]);
+            pixels.filter(|&[x, y]| white(x, y))
+        };
+        let [low, high] = bounds(all().filter(firmly)).or_else(|| bounds(all()))?;
+        let extent = [0, 1].map(|k| (high[k] - low[k] + 1) as f64);
+        let longest = extent[0].max(extent[1]);
+        let corner = [0, 1].map(|k| low[k] as f64 + (extent[k] - longest) / 2.0);
+        Some([corner[0], corner[1], longest])
+    }
+
+    /// The square of a mask that is looked at, one and a half times as large as [`Picture::square`]: its left, its top and its extent in
+    /// pixels.
+    ///
+    /// # Errors
+    ///
+    /// If nothing or all of the mask is white.
+    pub fn view_square(&self) -> anyhow::Result<[f64; 3]> {
+        let [left, top, extent] =
+            self.square().context("the mask is empty: no pixel is half white or more")?;
+        ensure!(
+            self.levels.iter().any(|&level| level < 0.5),
+            "the mask is full: all pixels are white, and there is no outline to fit"
+        );
+        let margin = (MARGIN - 1.0) / 2.0 * extent;
+        Ok([left - margin, top - margin, MARGIN * extent])
+    }
+
+    /// A square of it, given by its left, its top and its extent in pixels, on `side` × `side` pixels: the mean of the picture over the
+    /// area of each, black outside, and how much of each the picture covers.
+    pub fn part(&self, [left, top, extent]: [f64; 3], side: usize) -> [Vec<f64>; 2] {
+        let (height, cell) = (self.levels.len() / self.width, extent / side as f64);
+        let columns = shares(self.width, left, cell, side);
+        let rows = shares(height, top, cell, side);
+        let mean = |level: &dyn Fn(usize) -> f64| means(&columns, &rows, self.width, level);
+        [mean(&|at| f64::from(self.levels[at])), mean(&|_| 1.0)]
+    }
+
+    /// The image `[size * size]`, top row first, 0 black to 1 white.
+    ///
+    /// The longer side of a picture takes up the whole image; the rest is black. Each pixel is the mean of the picture over its area.
+    pub fn levels(&self, size: usize) -> Vec<f64> {
+        let (width, height) = (self.width as f64, (self.levels.len() / self.width) as f64);
+        let longest = width.max(height);
+        let (left, top) = ((width - longest) / 2.0, (height - longest) / 2.0);
+        let [levels, _] = self.part([left, top, longest], size);
+        levels
+    }
+
+    /// The same as a tensor, `[1, size, size]`.
+    pub fn tensor<B: Backend>(&self, size: usize, device: &B::Device) -> Tensor<B, 3> {
+        tensor_on(self.levels(size), [1, size, size], device)
+    }
+}
+
+/// Least and largest of places, along each axis.
+fn bounds(mut places: impl Iterator<Item = [usize; 2]>) -> Option<[[usize; 2]; 2]> {
+    let first = places.next()?;
+    Some(places.fold([first; 2], |[low, high], at| {
+        [[0, 1].map(|k| low[k].min(at[k])), [0, 1].map(|k| high[k].max(at[k]))]
+    }))
+}
+
+/// Means over cells, row by row, of what a picture of this width has at each place.
+fn means(
+    columns: &[Shares],
+    rows: &[Shares],
+    width: usize,
+    level: impl Fn(usize) -> f64,
+) -> Vec<f64> {
+    let cells = rows.iter().flat_map(|row| columns.iter().map(move |column| (row, column)));
+    let mean = |(row, column): (&Shares, &Shares)| {
+        let along = |&(y, share): &(usize, f64)| {
+            share * column.iter().map(|&(x, part)| part * level(y * width + x)).sum::<f64>()
+        };
+        row.iter().map(along).sum()
+    };
+    cells.map(mean).collect()
+}
+
+/// Which picture elements a cell holds, and what share of it they fill.
+type Shares = Vec<(usize, f64)>;
+
+/// The shares of cells of this length, of which the first begins at `from`, in `count` picture elements of length 1 from 0 on.
+fn shares(count: usize, from: f64, cell: f64, cells: usize) -> Vec<Shares> {
+    let of_cell = |k: usize| {
+        let (from, to) = (from + k as f64 * cell, from + (k + 1) as f64 * cell);
+        let (first, last) = (from.max(0.0) as usize, (to.max(0.0).ceil() as usize).min(count));
+        let share = |x: usize| ((x + 1) as f64).min(to) - (x as f64).max(from);
+        (first..last).map(|x| (x, share(x) / cell)).filter(|&(_, share)| share > 0.0).collect()
+    };
+    (0..cells).map(of_cell).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_close(found: &[f64], expected: &[f64]) {
+        let close = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7);
+        assert!(close && found.len() == expected.len(), "{found:?}");
+    }
+
+    #[test]
+    fn smaller_is_the_mean_and_larger_repeats() {
+        let picture = Picture::new(vec![0.0, 1.0, 1.0, 0.0], 2);
+        assert_close(&picture.levels(1), &[0.5]);
+        assert_close(&picture.levels(2), &[0.0, 1.0, 1.0, 0.0]);
+        let middle = 0.5;
+        let expected = [0.0, middle, 1.0, middle, middle, middle, 1.0, middle, 0.0];
+        assert_close(&picture.levels(3), &expected);
+    }
+
+    #[test]
+    fn a_wide_picture_has_black_above_and_below() {
+        let picture = Picture::new(vec![1.0; 8], 4);
+        let expected: Vec<f64> =
+            (0..16).map(|k| f64::from(u8::from((4..12).contains(&k)))).collect();
+        assert_close(&picture.levels(4), &expected);
+    }
+
+    #[test]
+    fn a_part_is_black_where_it_leaves_the_picture_and_says_how_much_of_it_does() {
+        let picture = Picture::new(vec![0.0, 0.0, 0.0, 1.0, 1.0, 0.0], 3);
+        assert_eq!(picture.square(), Some([0.0, 0.5, 2.0]));
+        let [levels, covered] = picture.part([0.0, 0.5, 2.0], 2);
+        assert_close(&levels, &[0.5, 0.5, 0.5, 0.5]);
+        assert_close(&covered, &[1.0, 1.0, 0.5, 0.5]);
+        let speckled = |k: usize| {
+            let (x, y) = (k % 9, k / 9);
+            f32::from(u8::from(x * y == 36 || (x > 1 && x < 5 && y < 5)))
+        };
+        let speckled = Picture::new((0..81).map(speckled).collect(), 9);
+        assert_eq!(speckled.square(), Some([1.0, 0.0, 5.0]));
+        assert_eq!(picture.clone().thresholded(2.0).square(), None);
+        assert!(
+            picture
+                .clone()
+                .thresholded(2.0)
+                .view_square()
+                .unwrap_err()
+                .to_string()
+                .contains("empty")
+        );
+        assert!(
+            picture
+                .clone()
+                .thresholded(0.0)
+                .view_square()
+                .unwrap_err()
+                .to_string()
+                .contains("full")
+        );
+        assert_eq!(picture.view_square().unwrap(), [-0.5, 0.0, 3.0]);
+        assert_eq!(picture.inverted().square(), Some([0.0, -0.5, 3.0]));
+    }
+}
