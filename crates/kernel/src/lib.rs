@@ -2,6 +2,7 @@
 //!
 //! Two ops: sums of a profile of the distance over [`Inputs`] (silhouettes), and means of colours over [`blend::Inputs`].
 //! [`Kernels`] runs their passes: the result, its gradient, and the gradient of that. `softrast-raster` makes ops of tensors of them.
+//! [`Nearest`] measures how far sets of points are from one another.
 //!
 //! One traversal serves every pass. A view is cut into bands of rows; each band lists the faces
 //! whose support reaches it and walks their pixels in blocks of a row. Bands are independent, so

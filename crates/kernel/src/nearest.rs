@@ -22,7 +22,7 @@ pub struct Nearest {
 type Bounds = [[f64; 3]; 2];
 
 impl Nearest {
-    /// Sorts the points.
+    /// The tree of these points `[x, y, z]`, finite, in any one unit; there may be none.
     pub fn new(mut points: Vec<[f64; 3]>) -> Self {
         let mut axes = vec![0; points.len()];
         split(&mut points, &mut axes);

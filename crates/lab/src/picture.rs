@@ -2,7 +2,7 @@ use std::{io, iter};
 
 use anyhow::Context;
 use base64::{Engine, engine::general_purpose::STANDARD};
-use gif::{Encoder, EncodingError, Frame, Repeat};
+use gif::{Encoder, Frame, Repeat};
 use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 
@@ -111,6 +111,8 @@ pub struct Encoded {
 
 /// Small pictures are enlarged to at least these widths, in pixels: in the row of four, and in the animation.
 const WIDTHS: [u32; 2] = [256, 192];
+/// Quality of a palette, 1 best to 30 fastest, for pictures that are not enlarged. Up to 256 colours are kept exactly in any case.
+const SPEED: u32 = 10;
 /// How long frames are shown, and the last of them, in hundredths of a second.
 const DELAYS: [u16; 2] = [8, 200];
 
@@ -119,7 +121,11 @@ impl Encoded {
     ///
     /// # Errors
     ///
-    /// If an encoder fails.
+    /// If an encoder fails, or a side of the animation has more than 65,535 pixels.
+    ///
+    /// # Panics
+    ///
+    /// If the pictures have different sizes.
     pub fn new(pictures: &Pictures) -> anyhow::Result<Self> {
         let Pictures { target, start, result, frames, drawing } = pictures;
         let difference = difference(target, result);
@@ -179,21 +185,35 @@ fn reduced(image: DynamicImage) -> DynamicImage {
 }
 
 /// An endless GIF: the target on the left, the frames on the right.
-fn gif(target: &RgbImage, frames: &[RgbImage]) -> Result<Vec<u8>, EncodingError> {
+fn gif(target: &RgbImage, frames: &[RgbImage]) -> anyhow::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let [columns, rows] = stretched(target, 2, WIDTHS[1]);
-    let [width, height] = [&columns, &rows].map(|places| places.len() as u16);
+    let side = |length: usize| {
+        u16::try_from(length)
+            .with_context(|| format!("{length} pixels a side are too many for a GIF"))
+    };
+    let (width, height) = (side(columns.len())?, side(rows.len())?);
+    // As many samples for the palette as the enlarged picture has.
+    let speed = (SPEED / factor(target, WIDTHS[1]).pow(2)).max(1);
     let mut encoder = Encoder::new(&mut bytes, width, height, &[])?;
     encoder.set_repeat(Repeat::Infinite)?;
     for (k, frame) in frames.iter().enumerate() {
         // The palette is found on the small picture, which has every colour of the large one.
-        let small = contact_sheet(&[target.clone(), frame.clone()], 2);
-        let small = Frame::from_rgb(small.width() as u16, small.height() as u16, &small);
-        let at = |x: u32, y: u32| small.buffer[y as usize * usize::from(small.width) + x as usize];
-        let large = rows.iter().flat_map(|&y| columns.iter().map(move |&x| at(x, y)));
+        let small = sheet(&[target.clone(), frame.clone()]);
+        let (small_width, small_height) = (small.width() as u16, small.height() as u16);
+        let small = Frame::from_rgb_speed(small_width, small_height, &small, speed as i32);
+        let at = |x: u32, y: u32| small.buffer[y as usize * usize::from(small_width) + x as usize];
+        let buffer = rows.iter().flat_map(|&y| columns.iter().map(move |&x| at(x, y))).collect();
         let delay = DELAYS[usize::from(k + 1 == frames.len())];
-        let large = Frame { width, height, delay, buffer: large.collect(), ..small.clone() };
-        encoder.write_frame(&large)?;
+        let palette = small.palette;
+        encoder.write_frame(&Frame {
+            width,
+            height,
+            delay,
+            palette,
+            buffer,
+            ..Frame::default()
+        })?;
     }
     drop(encoder);
     Ok(bytes)
@@ -201,14 +221,21 @@ fn gif(target: &RgbImage, frames: &[RgbImage]) -> Result<Vec<u8>, EncodingError>
 
 /// Images of one size in one row; small ones enlarged so that their pixels show.
 fn row(images: &[RgbImage], width_at_least: u32) -> RgbImage {
-    let small = contact_sheet(images, images.len());
+    let small = sheet(images);
     let [columns, rows] = stretched(&images[0], images.len(), width_at_least);
     RgbImage::from_fn(columns.len() as u32, rows.len() as u32, |x, y| {
         *small.get_pixel(columns[x as usize], rows[y as usize])
     })
 }
 
-/// Column and row in a contact sheet of so many images of one size in a row, for each column and row of the same sheet with enlarged images.
+/// Images of one size in one row.
+fn sheet(images: &[RgbImage]) -> RgbImage {
+    let same = images.iter().all(|image| image.dimensions() == images[0].dimensions());
+    assert!(same, "pictures of a run have one size");
+    contact_sheet(images, images.len())
+}
+
+/// Column and row in a [`sheet`] of `images` pictures, for each column and row of the same sheet with enlarged images.
 fn stretched(image: &RgbImage, images: usize, width_at_least: u32) -> [Vec<u32>; 2] {
     let factor = factor(image, width_at_least);
     [(image.width(), images as u32), (image.height(), 1)].map(|(side, cells)| {
@@ -343,6 +370,29 @@ mod tests {
         assert_eq!(at(SEPARATOR + 2, second.1), WHITE.0, "beside a smaller image");
         for line in [0, second.0 - 1, sheet.width() - 1] {
             assert_eq!(at(line, SEPARATOR), SEPARATOR_COLOUR.0);
+        }
+    }
+
+    #[test]
+    fn an_animation_shows_target_and_frame_enlarged() {
+        let few = RgbImage::from_fn(5, 4, |x, y| Rgb([(50 * x) as u8, (60 * y) as u8, 9]));
+        // More colours than a palette has.
+        let many = RgbImage::from_fn(24, 16, |x, y| Rgb([(10 * x) as u8, (15 * y) as u8, 99]));
+        for (target, most) in [(few, 0), (many, 24)] {
+            let frame = difference(&target, &plain(target.width(), target.height(), 200));
+            let bytes = gif(&target, &[target.clone(), frame.clone()]).unwrap();
+            let decoder = image::codecs::gif::GifDecoder::new(io::Cursor::new(bytes)).unwrap();
+            let found = image::AnimationDecoder::into_frames(decoder).collect_frames().unwrap();
+            let delays: Vec<_> = found.iter().map(|it| it.delay().numer_denom_ms()).collect();
+            assert_eq!(delays, [(80, 1), (2000, 1)]);
+            for (found, shown) in found.iter().zip([&target, &frame]) {
+                let expected = row(&[target.clone(), shown.clone()], WIDTHS[1]);
+                assert_eq!(found.buffer().dimensions(), expected.dimensions());
+                for (found, expected) in found.buffer().pixels().zip(expected.pixels()) {
+                    let off = (0..3).map(|k| found.0[k].abs_diff(expected.0[k])).max();
+                    assert!(off <= Some(most), "{found:?} in place of {expected:?}");
+                }
+            }
         }
     }
 

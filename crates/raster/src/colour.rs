@@ -84,7 +84,7 @@ pub fn hard_colour<B: Backend>(
     assert_eq!(colour.dims(), [views, faces, channels, pixels], "shape of the colours");
     let device = colour.device();
     let nearest = nearest_faces(distance, depth);
-    // One place in all colours for each number of the image: many times faster to gather on the CPU than along an axis.
+    // One place in all colours for each number of the image: many times faster to gather on the CPU than along an axis. A GPU is sent more.
     let place = |k: usize| {
         let (view, channel, pixel) = (k / pixels / channels, k / pixels % channels, k % pixels);
         let face = nearest[view * pixels + pixel].unwrap_or(0);

@@ -26,7 +26,7 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * height];
     let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
     let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
-    nearest.par_chunks_mut(BAND * width).enumerate().for_each(|(band, nearest)| {
+    nearest.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, nearest)| {
         let first = band * BAND;
         for face in mesh.faces() {
             let corners = face.map(|v| {

@@ -36,7 +36,7 @@ impl Frame {
     /// The frame in which the middle of the box around a mesh is the origin, and its farthest vertex from there has distance 1. Vertices
     /// without a face do not count. A mesh without extent has unit 1.
     pub fn of_mesh(mesh: &Mesh) -> Self {
-        let (middle, radius) = ball(mesh);
+        let (middle, radius) = bounding_ball(mesh);
         Self { middle, unit: if radius > 0.0 { radius } else { 1.0 } }
     }
 
@@ -95,8 +95,9 @@ impl Frame {
     }
 }
 
-/// The middle of the box of a mesh, and the distance of its farthest vertex from there.
-pub fn ball(mesh: &Mesh) -> ([f64; 3], f64) {
+/// The middle of the box around a mesh, and the distance of its farthest vertex from there, in the unit of the mesh. Vertices without a face
+/// do not count.
+pub fn bounding_ball(mesh: &Mesh) -> ([f64; 3], f64) {
     let [low, high] = mesh.bounds();
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
     let distance = |p: [f64; 3]| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f64>().sqrt();

@@ -25,11 +25,12 @@ struct Cone<'a> {
     cut: bool,
 }
 
-/// The visual hull of the masks as a mesh, with so many cells along its longest side.
+/// The visual hull of the masks as a mesh in world units of the cameras: closed, counterclockwise from outside, without parts of fewer faces
+/// than a fiftieth of the largest. A box around the hull has `cells` cells, at least one, along its longest side.
 ///
 /// # Errors
 ///
-/// If a mask is empty or full, the cameras do not look at one thing, or no solid has these masks.
+/// The errors of [`frame_of_masks`]; and if no solid has these masks.
 pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
     let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
     let (centre, reach) = region(&cones)?;
@@ -48,11 +49,11 @@ pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
     });
     ensure!(
         low[0] <= high[0],
-        "no solid has these masks: check that cameras and pictures belong together (--invert?), or begin with --start sphere"
+        "no solid has these masks: cameras and pictures do not belong together, or masks are inverted"
     );
     let (low, high) = (low.map(|x| x - step), high.map(|x| x + step));
     let hull = Mesh::of_solid([low, high], cells, field);
-    without_specks(hull.context("the visual hull is no mesh; begin with --start sphere")?)
+    without_specks(hull.context("the visual hull is no mesh")?)
 }
 
 /// Without the parts of fewer faces than a fiftieth of the largest: what few views happen to leave between their cones.
@@ -97,11 +98,13 @@ fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
 }
 
 /// The frame in which the ball of radius 1 around the origin holds what the masks show: its middle is nearest to the lines of sight through
-/// the middle of the masks, those that a picture cuts off left out unless most are. So place and size come from the pictures, whatever the units and the origin of the cameras.
+/// the middle of the masks, those that a picture cuts off left out unless most are. So place and size come from the pictures, whatever the
+/// units and the origin of the cameras.
 ///
 /// # Errors
 ///
-/// If a mask is empty or full, or the cameras do not look at one thing.
+/// If there is no view, a mask is empty or full, the cameras do not look at one thing from two directions at least, or a camera is inside
+/// the object or has it behind it: with the name of the view.
 pub fn frame_of_masks(views: &[View]) -> anyhow::Result<Frame> {
     let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
     let (middle, unit) = region(&cones)?;
@@ -279,6 +282,49 @@ mod tests {
         for (k, found) in signed_distance(&levels, 2.0).into_iter().enumerate() {
             assert!((found - 2.0 * (far(k) - 30.0)).abs() < 1.2, "{k}: {found}");
         }
+    }
+
+    #[test]
+    fn a_ball_is_found_from_its_silhouettes() {
+        let ball = softrast_mesh::icosphere(2);
+        let centre = [4e5, 2.0, -7.0];
+        let place = |p: &[f64; 3]| [0, 1, 2].map(|k| centre[k] + 3.0 * p[k]);
+        let ball = ball.with_positions(ball.positions().iter().map(place).collect()).unwrap();
+        let view = |(k, away): (usize, [f64; 3])| {
+            let eye = [0, 1, 2].map(|k| centre[k] + 12.0 * away[k]);
+            let camera = Pinhole::look_at(eye, centre, [0.1, 1.0, 0.2], 40.0, 96);
+            let [.., covered] = crate::coloured_pixels(&ball, &camera);
+            let mask = covered.iter().map(|&part| part as f32).collect();
+            let mask = crate::Picture::new(mask, 96);
+            View {
+                name: k.to_string(),
+                picture: "a".into(),
+                mask,
+                camera,
+                distortion: None,
+                off: 0.0,
+            }
+        };
+        let away = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [0.0, 0.6, -0.8]];
+        let views: Vec<View> = away.into_iter().enumerate().map(view).collect();
+        let frame = frame_of_masks(&views).unwrap();
+        assert!((0..3).all(|k| (frame.middle[k] - centre[k]).abs() < 0.1), "{frame:?}");
+        assert!((3.0..5.0).contains(&frame.unit), "{frame:?}");
+        let [low, high] = visual_hull(&views, 40).unwrap().bounds();
+        for k in 0..3 {
+            // The hull holds the ball, but for part of a cell, and four views leave a little more.
+            assert!((2.8..4.0).contains(&(high[k] - centre[k])), "{high:?}");
+            assert!((2.8..4.0).contains(&(centre[k] - low[k])), "{low:?}");
+        }
+        let said = |views: &[View]| visual_hull(views, 40).unwrap_err().to_string();
+        assert_eq!(said(&[]), "there is no view");
+        let of = |level: f32| {
+            let mut views = views.clone();
+            views[1].mask = crate::Picture::new(vec![level; 96 * 96], 96);
+            format!("{:#}", visual_hull(&views, 40).unwrap_err())
+        };
+        assert!(of(0.0).starts_with("1: the mask is empty"), "{}", of(0.0));
+        assert!(of(1.0).starts_with("1: the mask is full"), "{}", of(1.0));
     }
 
     #[test]

@@ -195,6 +195,14 @@ mod tests {
     }
 
     #[test]
+    fn a_pixel_of_one_half_is_in() {
+        let mask = Picture::new(vec![1.0, 0.5, 0.49, 0.0], 2);
+        assert_eq!(mask_iou(&[0.5, 0.5, 0.49, 0.0], &mask), 1.0);
+        assert_eq!(mask_iou(&[0.5, 0.49, 0.5, 0.0], &mask), 1.0 / 3.0);
+        assert_eq!(mask_iou(&[0.0; 4], &Picture::new(vec![0.0; 4], 2)), 1.0);
+    }
+
+    #[test]
     fn white_at_all_four_sides_is_told() {
         let full = |name| view(name, Picture::new(vec![1.0; 12], 4), 0.0);
         let notes = reading_notes(&[full("a"), full("b")]);

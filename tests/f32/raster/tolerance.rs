@@ -39,14 +39,15 @@ fn every_number_of_a_table_fits_the_float_type() {
         "schweizer_sklar:-4",
     ];
     let t_conorms = t_conorms.map(|name| name.parse::<TConorm>().expect("a T-conorm"));
-    let settings = [(1e-6, 1e-7), (1e-2, 1e-2), (0.1, 1e-8), (10.0, 1e-5)];
+    let steepest = (1e-6, 1e-7);
+    let others = [(1e-2, 1e-2), (0.1, 1e-8), (10.0, 1e-5)];
     let families = Family::ALL.into_par_iter().enumerate();
     families.flat_map(|(at, it)| [(at, it, false), (at + 1, it, true)]).for_each(
         |(at, family, squared)| {
             let softness = EdgeSoftness { family, squared };
             for (beside, t_conorm) in t_conorms.into_iter().enumerate() {
-                // Two of the four settings, another two under the next T-conorm: each softness meets all, and so does each T-conorm.
-                for (scale, tolerance) in settings.into_iter().skip((at + beside) % 2).step_by(2) {
+                // The steepest always, and one of the others in turn: each softness meets all, and so does each T-conorm.
+                for (scale, tolerance) in [steepest, others[(at + beside) % others.len()]] {
                     let renderer = SoftRenderer::new(&[[0, 1, 2]], 8, softness, scale)
                         .with_tolerance(tolerance)
                         .with_t_conorm(t_conorm);

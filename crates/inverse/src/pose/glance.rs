@@ -11,7 +11,7 @@ use super::{
     shifts::{Stencil, Window},
     target::Target,
 };
-use softrast_views::ball;
+use softrast_views::bounding_ball;
 
 /// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
 const COARSE_SIDE: usize = Window::SIDE;
@@ -58,7 +58,7 @@ struct Look<'a> {
 impl<'a> Look<'a> {
     fn new(mesh: &'a Mesh, target: &Target<'_>, camera: &'a Pinhole) -> Self {
         let &Target { mask, square, painted, .. } = target;
-        let (middle, radius) = ball(mesh);
+        let (middle, radius) = bounding_ball(mesh);
         let [levels, covered] = mask.part(square, COARSE_SIDE);
         let [_, _, white] = mask.square().unwrap_or(square);
         let colours = mesh.colours().zip(painted).map(|(colours, view)| {

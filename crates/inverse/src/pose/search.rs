@@ -13,7 +13,9 @@ use super::{
     target::Target,
 };
 use crate::{InverseProblem, Iterate, Method, SolveConfig, minimize, silhouette_pixels};
-use softrast_views::{Frame, PaintedView, Picture, ball, coloured_pixels, cut_sides, mask_iou};
+use softrast_views::{
+    Frame, PaintedView, Picture, bounding_ball, coloured_pixels, cut_sides, mask_iou,
+};
 
 /// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about a pixel and a half.
 const DETAIL: f64 = 1.0 / 20.0;
@@ -147,7 +149,7 @@ impl PoseSearch {
         started: bool,
     ) -> anyhow::Result<()> {
         mask.view_square()?;
-        let (middle, radius) = ball(mesh);
+        let (middle, radius) = bounding_ball(mesh);
         ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
         let [_, _, depth] = camera.seen(middle);
         ensure!(
@@ -409,7 +411,7 @@ fn zoomed(camera: &Pinhole) -> impl Iterator<Item = Pinhole> {
 
 /// A mesh without what cannot be told on few pixels.
 fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
-    let (_, radius) = ball(mesh);
+    let (_, radius) = bounding_ball(mesh);
     let merged = mesh.clustered(DETAIL * 2.0 * radius);
     let merged = merged.filter(|few| few.area() > LEAST_AREA * mesh.area());
     merged.map_or(Cow::Borrowed(mesh), Cow::Owned)
@@ -446,7 +448,7 @@ fn apart<P: Copy + Borrow<Pinhole>>(
 
 /// Silhouettes of a turned mesh along each of its axes then: from the camera, from beside and from above.
 fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
-    let (middle, radius) = ball(mesh);
+    let (middle, radius) = bounding_ball(mesh);
     let positions = mesh.positions().iter().map(|p| {
         let p = [0, 1, 2].map(|k| (p[k] - middle[k]) / radius);
         rotation.map(|row| (0..3).map(|k| row[k] * p[k]).sum::<f64>())

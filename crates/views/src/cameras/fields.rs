@@ -1,4 +1,4 @@
-//! Fields of camera files: what is wrong in them is said with its place.
+//! Fields of camera files. An error names the file and the field.
 
 use std::{borrow::Cow, path::Path};
 

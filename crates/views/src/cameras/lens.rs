@@ -85,7 +85,7 @@ const FARTHEST_CENTRE: f64 = 1e5;
 const ROUNDED: f64 = 1e-6;
 
 impl Lens {
-    /// What a camera file says of it: a `transforms.json`, a calibration of OpenCV or ROS in YAML or JSON, or a result of ours.
+    /// The lens that a camera file describes: a `transforms.json`, a calibration of OpenCV or ROS in YAML or JSON, or a result of ours.
     ///
     /// # Errors
     ///

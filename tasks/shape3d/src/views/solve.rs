@@ -1,6 +1,6 @@
 use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
-use anyhow::ensure;
+use anyhow::{anyhow, ensure};
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
 use softrast_inverse::{
@@ -217,7 +217,7 @@ fn split_held_out(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>;
     Ok([train, aside].map(|part| part.into_iter().map(|(_, view)| view).collect()))
 }
 
-/// The mesh that is deformed, for views of a [`frame`].
+/// The mesh that is deformed, for views of a frame.
 fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Result<Mesh> {
     let placed = |mesh: Mesh, size: f64| {
         let place = |p: &[f64; 3]| p.map(|x| size * x);
@@ -233,7 +233,9 @@ fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Resu
 /// The visual hull in as few cells as show what the masks show.
 fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
     let with = |cells: usize| {
-        let hull = visual_hull(views, cells)?;
+        let hull = visual_hull(views, cells);
+        let hull =
+            hull.map_err(|why| anyhow!("{why:#} (--invert?); --start sphere needs no hull"))?;
         let iou = |view: &View| mask_iou(&silhouette_pixels(&hull, &view.camera), &view.mask);
         let mean = views.iter().map(iou).sum::<f64>() / views.len() as f64;
         anyhow::Ok((hull, mean))
@@ -249,7 +251,7 @@ fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
     Ok(mesh)
 }
 
-/// The start after all stages, for views of a [`frame`]: of each the best by its hard images.
+/// The start after all stages, for views of a frame: of each the best by its hard images.
 fn deformed(
     given: &Given<'_, Args>,
     flags: &Views,
