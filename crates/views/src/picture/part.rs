@@ -5,7 +5,7 @@ use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use super::Picture;
 
-/// What is looked at of a mask is this much larger than what is white.
+/// The square that is looked at is this much larger than the white part of a mask.
 const MARGIN: f64 = 1.5;
 
 impl Picture {
@@ -71,7 +71,7 @@ impl Picture {
         levels
     }
 
-    /// The same as a tensor, `[1, size, size]`.
+    /// [`Picture::levels`] as a tensor `[1, size, size]`.
     pub fn tensor<B: Backend>(&self, size: usize, device: &B::Device) -> Tensor<B, 3> {
         tensor_on(self.levels(size), [1, size, size], device)
     }
