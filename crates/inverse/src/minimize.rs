@@ -137,7 +137,8 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
             return (0, None);
         };
         let theta = self.theta.clone();
-        let gradient = leaf.grad(&loss.sum().backward()).unwrap_or_else(|| theta.zeros_like());
+        // Backward from all losses at once is backward from their sum.
+        let gradient = leaf.grad(&loss.backward()).unwrap_or_else(|| theta.zeros_like());
         let learning_rate = self.place.rate * self.config.learning_rate;
         let optimizer = Adam { learning_rate, ..self.optimizer };
         let (theta, state) = optimizer.step(theta, gradient, self.state.clone());

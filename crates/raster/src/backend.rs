@@ -33,7 +33,7 @@ pub trait RasterBackend: Backend {
         None
     }
 
-    /// Runs a pass of an op. Backends whose tensors do not lie on the host run [`FusedOp::ProfileSum`] and [`FusedOp::SoftBlend`] only. WebAssembly has f32 alone, so that a page
+    /// Runs a pass of an op. Backends whose tensors do not lie on the host run all but [`FusedOp::SilhouetteLoss`]. WebAssembly has f32 alone, so that a page
     /// is smaller to load.
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
         match tensors[0].dtype() {
@@ -216,7 +216,7 @@ pub(crate) fn silhouette_loss<B: RasterBackend>(
     fused(&FusedOp::SilhouetteLoss(op), inputs)
 }
 
-/// The result of an op that is written for any number. Only where tensors lie on the host.
+/// The result of an op that is written for any number.
 pub(crate) fn elementary<B: RasterBackend, const D: usize>(
     op: ElementaryOp,
     inputs: Vec<FloatTensor<B>>,

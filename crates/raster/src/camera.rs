@@ -4,7 +4,6 @@ use crate::{
     RasterBackend,
     backend::{elementary, primitive},
     ops::ElementaryOp,
-    tensor_ops,
 };
 
 /// A line of sight, or an up across it, that is not longer than this has no direction, in world units.
@@ -95,10 +94,7 @@ pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tenso
 pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     let [_, four] = orbits.dims();
     assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", orbits.dims());
-    let matrices = match B::ON_HOST {
-        true => elementary(ElementaryOp::OrbitMatrix, vec![primitive(orbits)]),
-        false => tensor_ops::orbit_matrices(orbits),
-    };
+    let matrices = elementary(ElementaryOp::OrbitMatrix, vec![primitive(orbits)]);
     perspective(vertices, matrices)
 }
 
@@ -109,9 +105,6 @@ pub(crate) fn perspective<B: RasterBackend>(
 ) -> Tensor<B, 3> {
     let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
     assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
-    if !B::ON_HOST {
-        return tensor_ops::perspective(vertices, matrices);
-    }
     // The rasterizer wants one row for each axis, and turning them back is free.
     let inputs = vec![primitive(vertices), primitive(matrices)];
     elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2)

@@ -48,7 +48,6 @@ mod silhouette;
 mod small_product;
 mod soft_renderer;
 mod t_conorm;
-mod tensor_ops;
 mod view;
 mod weighting;
 

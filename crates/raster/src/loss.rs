@@ -5,7 +5,6 @@ use crate::{
     RasterBackend,
     backend::{elementary, primitive},
     ops::ElementaryOp,
-    tensor_ops,
 };
 
 /// `1 - |p ∩ t| / |p ∪ t|` of each view, soft: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
@@ -20,10 +19,7 @@ use crate::{
 ///
 /// Source: docs/notes.md, Losses and errors.
 pub fn iou_loss<B: RasterBackend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> Tensor<B, 1> {
-    match B::ON_HOST {
-        true => compared(ElementaryOp::Iou, image, target),
-        false => tensor_ops::iou_loss(image, target),
-    }
+    compared(ElementaryOp::Iou, image, target)
 }
 
 /// Mean squared difference of each view: `[views, height, width]`, or with channels `[views, channels, height, width]`, to `[views]`. One of
@@ -36,10 +32,7 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
     image: Tensor<B, D>,
     target: Tensor<B, D>,
 ) -> Tensor<B, 1> {
-    match B::ON_HOST {
-        true => compared(ElementaryOp::SquaredError, image, target),
-        false => tensor_ops::mse_loss(image, target),
-    }
+    compared(ElementaryOp::SquaredError, image, target)
 }
 
 /// The loss of each view, where a share of each pixel of the image counts, or all of it.

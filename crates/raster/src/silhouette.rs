@@ -76,9 +76,12 @@ impl Rasterizer {
             grid: profile.grid(),
             size: self.size,
             near: NEAR,
+            like_depths: t_conorm.is_like_depths(),
             kept: None,
             #[cfg(feature = "wgpu")]
             topology: Default::default(),
+            #[cfg(feature = "wgpu")]
+            prepared: None,
         };
         Silhouette { softness, profile, op }
     }
@@ -270,9 +273,7 @@ impl<S: Softness> Silhouette<S> {
 /// Coverage of sums, in one op for the T-conorm that most use.
 fn covered<B: RasterBackend>(t_conorm: TConorm, sums: Tensor<B, 3>) -> Tensor<B, 3> {
     match t_conorm {
-        TConorm::Probabilistic if B::ON_HOST => {
-            elementary(ElementaryOp::Coverage, vec![primitive(sums)])
-        }
+        TConorm::Probabilistic => elementary(ElementaryOp::Coverage, vec![primitive(sums)]),
         _ => t_conorm.coverage(sums),
     }
 }

@@ -102,6 +102,18 @@ impl TConorm {
         }
     }
 
+    /// Whether `g(s)` is the optical depth of s or close to it: then it grows as slowly as that beside 1, and beside 0 it is no less than a tenth
+    /// of s. Others may be powers of s, whose size floats can tell and a fixed unit cannot.
+    pub(crate) fn is_like_depths(self) -> bool {
+        match self {
+            Self::Probabilistic | Self::Einstein => true,
+            Self::Hamacher(p) | Self::Frank(p) => p >= 0.1,
+            Self::Yager(_) | Self::AczelAlsina(_) | Self::Dombi(_) | Self::SchweizerSklar(_) => {
+                false
+            }
+        }
+    }
+
     /// `g(s(x))` and its derivative by x, both shaped like `x`.
     ///
     /// Written with the optical depth and the hazard of the softness, which keep their digits where

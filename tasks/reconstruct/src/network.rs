@@ -135,18 +135,14 @@ pub fn convolved<B: Backend>(layer: &Conv2d<B>, pictures: Tensor<B, 4>) -> Tenso
     let reach = PADDING * 2 / STRIDE;
     let padded = pictures.pad((PADDING, PADDING, PADDING, PADDING), 0.0);
     let split = [count, channels, rows + reach, STRIDE, columns + reach, STRIDE];
-    let padded = padded.reshape(split);
-    let quarter = |y: usize, x: usize| {
-        let quarter = padded.clone().narrow(3, y, 1).narrow(5, x, 1);
-        quarter.reshape([count, channels, rows + reach, columns + reach])
-    };
-    let quarters = [[quarter(0, 0), quarter(0, 1)], [quarter(1, 0), quarter(1, 1)]];
+    let quarters = padded.reshape(split).permute([3, 5, 0, 1, 2, 4]);
+    let quarters =
+        quarters.reshape([STRIDE * STRIDE * count, channels, rows + reach, columns + reach]);
     let pixel = |y: usize, x: usize| {
-        let quarter = quarters[y % STRIDE][x % STRIDE].clone();
+        let first = count * (STRIDE * (y % STRIDE) + x % STRIDE);
         let [down, right] = [y / STRIDE, x / STRIDE];
-        let seen =
-            quarter.slice([0..count, 0..channels, down..down + rows, right..right + columns]);
-        seen.reshape([count, channels, rows * columns])
+        let within = [first..first + count, 0..channels, down..down + rows, right..right + columns];
+        quarters.clone().slice(within).reshape([count, channels, rows * columns])
     };
     let windows = (0..WINDOW).flat_map(|y| (0..WINDOW).map(move |x| (y, x)));
     let windows = Tensor::cat(windows.map(|(y, x)| pixel(y, x)).collect(), 1);

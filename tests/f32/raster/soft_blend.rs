@@ -42,10 +42,18 @@ fn image(corners: &[[f64; 3]], colours: &[f64], look: Look) -> Vec<f64> {
 /// [`image`], no channel of which is farther than `bound` from the same image in f64.
 fn image_as_in_f64(corners: &[[f64; 3]], colours: &[f64], look: Look, bound: f64) {
     // Both begin with the same numbers.
-    let corners: Vec<_> =
-        corners.iter().map(|corner| corner.map(|x| f64::from(x as f32))).collect();
+    let corners = in_f32(corners);
     let expected = drawn::<NdArray<f64>>(&corners, colours, look);
-    for (k, (found, expected)) in image(&corners, colours, look).iter().zip(expected).enumerate() {
+    assert_as_in_f64(&image(&corners, colours, look), &expected, look, bound);
+}
+
+/// Corners that f32 holds.
+fn in_f32(corners: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    corners.iter().map(|corner| corner.map(|x| f64::from(x as f32))).collect()
+}
+
+fn assert_as_in_f64(found: &[f64], expected: &[f64], look: Look, bound: f64) {
+    for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
         assert!((found - expected).abs() <= bound, "{k}: {found} instead of {expected}, {look:?}");
     }
 }
@@ -59,16 +67,32 @@ fn drawn<B: RasterBackend>(corners: &[[f64; 3]], colours: &[f64], look: Look) ->
 where
     Autodiff<B>: RasterBackend,
 {
-    let faces: Arc<[[u32; 3]]> =
-        (0..colours.len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    drawn_by::<B>(&renderer(colours.len(), look), corners, colours, look.log_weight)
+}
+
+/// What draws so many faces.
+fn renderer(faces: usize, look: Look) -> ColourRenderer {
+    let faces: Arc<[[u32; 3]]> = (0..faces as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
     let weighting = Weighting { edge: look.edge, depth: look.depth, planes: look.planes };
     let phi = [look.edge.default_phi(look.scale), look.depth.default_phi(look.depth_scale)];
-    let renderer = ColourRenderer::with_weighting(faces, SIZE, weighting, phi.clone());
+    ColourRenderer::with_weighting(faces, SIZE, weighting, phi)
+}
+
+fn drawn_by<B: RasterBackend>(
+    renderer: &ColourRenderer,
+    corners: &[[f64; 3]],
+    colours: &[f64],
+    log_weight: f64,
+) -> Vec<f64>
+where
+    Autodiff<B>: RasterBackend,
+{
+    let phi = renderer.phi().clone();
     let vertices =
         tensor::<Autodiff<B>, 3>(corners.as_flattened(), [1, corners.len(), 3]).require_grad();
     let values = tensor::<Autodiff<B>, 3>(colours, [1, colours.len(), 1]).require_grad();
     let [edge, depth] = phi.map(|phi| tensor::<Autodiff<B>, 1>(&phi, [phi.len()]).require_grad());
-    let log_weight = tensor::<Autodiff<B>, 1>(&[look.log_weight], [1]).require_grad();
+    let log_weight = tensor::<Autodiff<B>, 1>(&[log_weight], [1]).require_grad();
     let background = Background { colour: tensor(&[0.0], [1]), log_weight: log_weight.clone() };
     let attributes = Attributes::of_faces(values.clone());
     let image = renderer.image_with(vertices.clone(), &attributes, [&edge, &depth], &background);
@@ -203,13 +227,18 @@ fn faces_of_all_kinds_are_drawn_under_every_softness() {
     ];
     for family in Family::ALL {
         for scale in [1e-9, 1e-3, 0.1, 1e3] {
-            let edge = EdgeSoftness { family, squared: false };
+            let look = Look { edge: EdgeSoftness { family, squared: false }, scale, ..SOFT };
+            // Each chooses its knots once, for all weights.
+            let [of_all, of_sound, exact] = [7, 5, 5].map(|count| renderer(count, look));
             for log_weight in [0.0, -10.0, -1000.0] {
-                let look = Look { edge, scale, log_weight, ..SOFT };
-                image(&faces.concat(), &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], look);
+                let colours = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
+                drawn_by::<B>(&of_all, &faces.concat(), &colours, log_weight);
                 // Without those whose distances f32 cannot hold.
-                let sound = [faces[0], faces[1], faces[2], faces[5], faces[6]];
-                image_as_in_f64(&sound.concat(), &[0.1, 0.2, 0.3, 0.6, 0.7], look, 1e-4);
+                let sound = [faces[0], faces[1], faces[2], faces[5], faces[6]].concat();
+                let (sound, colours) = (in_f32(&sound), [0.1, 0.2, 0.3, 0.6, 0.7]);
+                let found = drawn_by::<B>(&of_sound, &sound, &colours, log_weight);
+                let expected = drawn_by::<NdArray<f64>>(&exact, &sound, &colours, log_weight);
+                assert_as_in_f64(&found, &expected, look, 1e-4);
             }
         }
     }

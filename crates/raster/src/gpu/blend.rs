@@ -1,109 +1,210 @@
-//! Colours of faces that share pixels: the image, one unit a pixel, and its gradient, gathered per face over its pixels and then per vertex
-//! over its corners.
+//! Colours of faces that share pixels, face by face: the largest weight of each pixel, sums relative to it, and their gradient, gathered per
+//! face over its pixels.
 
 use cubecl::prelude::*;
 
 use super::{
     blend_inputs::{BlendInputs, BlendSpec},
-    dual::Dual,
+    dual::{Dual, load},
     face_attributes::FaceAttributes,
-    gradient::UNITS,
     of_pixel::{OF_PIXEL, OfPixel},
-    reach::Reach,
-    tile::TILE,
+    parts::SLOTS,
+    table::UNITS as WALKERS,
+    whole::{self, MARKS, NEGATIVE, SIZE, add_relative, mark},
 };
+
+/// Units of a cube, which share a part of a face.
+pub(super) const UNITS: u32 = 32;
+
+/// Numbers of a pixel that are added up: how much the faces count, and that times each channel, with their derivatives in a pass of second
+/// order.
+pub(super) fn summed(kind: BlendSpec) -> usize {
+    (kind.channels + 1) * if kind.second { 2 } else { 1 }
+}
+
+/// Finds the largest weight of a face at each pixel of the launch: of its [`MARKS`] the first becomes that of its logarithm, which is ordered
+/// as these are.
+#[cube(launch)]
+pub(super) fn find_largest(
+    drawn: &BlendInputs,
+    marks: &mut Array<Atomic<u32>>,
+    #[comptime] kind: BlendSpec,
+) {
+    let part = drawn.part(CUBE_POS as u32);
+    let (view, face) = (part.job / drawn.face_count, part.job % drawn.face_count);
+    let shown = FaceAttributes::of(drawn, view, face, kind);
+    let mut pixel = part.start + UNIT_POS;
+    while pixel < part.end {
+        let (column, row) = (part.column(pixel), part.row(pixel));
+        let px = drawn.frame.column_centre(column);
+        let py = drawn.frame.row_centre(row);
+        let pair = shown.pair(px, py, drawn, kind);
+        if pair.counts(drawn.weights) {
+            let bits = u32::reinterpret(pair.log_edge.value + pair.log_depth.value);
+            let ordered = select(bits > SIZE, u32::MAX - bits, bits + NEGATIVE);
+            let at = MARKS * drawn.frame.pixel(view, row, column);
+            marks[at as usize].fetch_max(ordered);
+        }
+        pixel += UNITS;
+    }
+}
+
+/// The logarithm of the largest weight at a pixel of the launch, where the background has this one.
+#[cube]
+fn largest(mark: u32, behind: f32) -> f32 {
+    let positive = mark >= NEGATIVE;
+    let bits = select(positive, mark - NEGATIVE, u32::MAX - mark);
+    let log = f32::reinterpret(select(mark == 0u32, 0u32, bits));
+    select(mark == 0u32 || log < behind, behind, log)
+}
+
+/// Adds up what faces are to each pixel of the launch, relative to the largest weight there: [`summed`] whole numbers of two words. With
+/// `measure` it only finds the largest size of a term of each pixel, the second of its [`MARKS`].
+#[cube(launch)]
+pub(super) fn add_shares(
+    drawn: &BlendInputs,
+    marks: &mut Array<Atomic<u32>>,
+    sums: &mut Array<Atomic<u32>>,
+    #[comptime] kind: BlendSpec,
+    #[comptime] measure: bool,
+) {
+    let part = drawn.part(CUBE_POS as u32);
+    let (view, face) = (part.job / drawn.face_count, part.job % drawn.face_count);
+    let shown = FaceAttributes::of(drawn, view, face, kind);
+    let channels = comptime!(kind.channels);
+    let weights = drawn.weights;
+    let behind = drawn.number(weights.background as usize + channels, kind).value;
+    let mut terms = Array::<f32>::new(comptime!(summed(kind)));
+    let mut pixel = part.start + UNIT_POS;
+    while pixel < part.end {
+        let (column, row) = (part.column(pixel), part.row(pixel));
+        let px = drawn.frame.column_centre(column);
+        let py = drawn.frame.row_centre(row);
+        let pair = shown.pair(px, py, drawn, kind);
+        if pair.counts(weights) {
+            let of_pixel = drawn.frame.pixel(view, row, column);
+            let at = (MARKS * of_pixel) as usize;
+            let log = largest(marks[at].load(), behind);
+            let share = pair.share(Dual::constant(log), weights).whole;
+            store(&mut terms, 0usize, share, kind);
+            if kind.is_textured {
+                let sample = shown.sample(pair, drawn, kind);
+                for channel in 0..channels {
+                    let own = sample.texels(drawn, channel, kind);
+                    store(&mut terms, channel + 1, share.mul(sample.between(own)), kind);
+                }
+            } else {
+                for channel in 0..channels {
+                    let own = shown.attribute(drawn, channel, kind);
+                    store(&mut terms, channel + 1, share.mul(pair.weights.mul(own).sum()), kind);
+                }
+            }
+            if measure {
+                let mut most = 0u32;
+                for k in 0..comptime!(summed(kind)) {
+                    let size = mark(terms[k]);
+                    most = select(size > most, size, most);
+                }
+                marks[at + 1].fetch_max(most);
+            } else {
+                let size = marks[at + 1].load();
+                let first = of_pixel as usize * comptime!(summed(kind));
+                for k in 0..comptime!(summed(kind)) {
+                    add_relative(sums, 2 * (first + k), terms[k], size, drawn.face_count);
+                }
+            }
+        }
+        pixel += UNITS;
+    }
+}
+
+/// Keeps a number among those of a pixel, with its derivative in a pass of second order.
+#[cube]
+fn store(terms: &mut Array<f32>, number: usize, term: Dual, #[comptime] kind: BlendSpec) {
+    if kind.second {
+        terms[2 * number] = term.value;
+        terms[2 * number + 1] = term.tangent;
+    } else {
+        terms[number] = term.value;
+    }
+}
+
+/// A number that was added up.
+#[cube]
+fn total(
+    sums: &Array<u32>,
+    of_pixel: usize,
+    number: usize,
+    size: u32,
+    face_count: u32,
+    #[comptime] kind: BlendSpec,
+) -> Dual {
+    let first = of_pixel * comptime!(summed(kind));
+    if kind.second {
+        let at = 2 * (first + 2 * number);
+        Dual {
+            value: whole::relative_sum(sums, at, size, face_count),
+            tangent: whole::relative_sum(sums, at + 2, size, face_count),
+        }
+    } else {
+        Dual::constant(whole::relative_sum(sums, 2 * (first + number), size, face_count))
+    }
+}
+
+/// What [`finish_pixels`] reads beside the numbers that all pixels share.
+#[derive(CubeType, CubeLaunch)]
+pub(super) struct Added {
+    marks: Array<u32>,
+    sums: Array<u32>,
+    /// Where the background begins in the numbers, and their derivatives in the direction.
+    background: u32,
+    along: u32,
+    face_count: u32,
+    first_view: u32,
+    /// Pixels of a view, and of all views of the launch.
+    plane: u32,
+    pixels: u32,
+}
 
 /// Writes each pixel of the image, `[views, channels + 1, height, width]`, or in a pass of second order its derivative.
 ///
 /// With `pull` it also writes to `pixels`, for each pixel, [`OF_PIXEL`] numbers and the gradient of the background, `channels + 1` numbers; the
 /// image itself is then only written in a pass of second order.
 #[cube(launch)]
-pub(super) fn blend_pixels(
-    drawn: &BlendInputs,
+#[allow(clippy::too_many_arguments)]
+pub(super) fn finish_pixels(
+    added: &Added,
+    numbers: &Array<f32>,
+    direction: &Array<f32>,
     upstream: &Array<f32>,
     pixels: &mut Array<f32>,
     image: &mut Array<f32>,
     #[comptime] kind: BlendSpec,
     #[comptime] pull: bool,
 ) {
-    let column = CUBE_POS_X * TILE + UNIT_POS_X;
-    let row = CUBE_POS_Y * TILE + UNIT_POS_Y;
-    let view = CUBE_POS_Z;
-    let (frame, weights, of_cells) = (drawn.frame, drawn.weights, drawn.of_cells);
-    if column >= frame.width || row >= frame.height {
+    let own = ABSOLUTE_POS as u32;
+    if own >= added.pixels {
         terminate!();
     }
     let channels = comptime!(kind.channels);
     let second = comptime!(kind.second);
-    let px = frame.column_centre(column);
-    let py = frame.row_centre(row);
-    let background = weights.background as usize;
-    let log_behind = drawn.number(background + channels, kind);
-
-    // Sums of weights relative to the largest so far, and of weights times channels.
-    let mut largest = log_behind.value;
-    let mut total = 0.0f32;
-    let mut total_tangent = 0.0f32;
-    let mut values = Array::<f32>::new(channels);
-    let mut tangents = Array::<f32>::new(channels);
-    for channel in 0..channels {
-        values[channel] = 0.0f32;
-        tangents[channel] = 0.0f32;
-    }
-    let first_word = of_cells.first_word(view, column, row);
-    for word in 0..of_cells.words {
-        let mut bits = drawn.cells[(first_word + word) as usize];
-        while bits != 0 {
-            let face = 32 * word + bits.trailing_zeros();
-            bits &= bits - 1u32;
-            if drawn.reaches(view, face, column, row) {
-                let shown = FaceAttributes::of(drawn, view, face, kind);
-                let pair = shown.pair(px, py, drawn, kind);
-                if pair.counts(weights) {
-                    let log = pair.log_edge.value + pair.log_depth.value;
-                    if log > largest {
-                        let shrunk = f32::exp(largest - log);
-                        total *= shrunk;
-                        total_tangent *= shrunk;
-                        for channel in 0..channels {
-                            values[channel] = values[channel] * shrunk;
-                            tangents[channel] = tangents[channel] * shrunk;
-                        }
-                        largest = log;
-                    }
-                    let share = pair.share(Dual::constant(largest), weights).whole;
-                    total += share.value;
-                    total_tangent += share.tangent;
-                    if kind.is_textured {
-                        let sample = shown.sample(pair, drawn, kind);
-                        for channel in 0..channels {
-                            let own = sample.texels(drawn, channel, kind);
-                            let seen = share.mul(sample.between(own));
-                            values[channel] = values[channel] + seen.value;
-                            tangents[channel] = tangents[channel] + seen.tangent;
-                        }
-                    } else {
-                        for channel in 0..channels {
-                            let own = shown.attribute(drawn, channel, kind);
-                            let seen = share.mul(pair.weights.mul(own).sum());
-                            values[channel] = values[channel] + seen.value;
-                            tangents[channel] = tangents[channel] + seen.tangent;
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    let total = Dual { value: total, tangent: total_tangent };
+    let (background, along) = (added.background as usize, added.along as usize);
+    let at = background + channels;
+    let log_behind = load(numbers, at, direction, along + at, second);
+    let of_pixel = own as usize;
+    let largest = largest(added.marks[(MARKS * own) as usize], log_behind.value);
+    let size = added.marks[(MARKS * own) as usize + 1];
+    let sum = total(&added.sums, of_pixel, 0usize, size, added.face_count, kind);
     let behind = log_behind.sub(Dual::constant(largest)).exp();
-    let whole_weight = total.add(behind);
+    let whole_weight = sum.add(behind);
     let per_total = whole_weight.recip();
-    let covered = total.mul(per_total);
+    let covered = sum.mul(per_total);
     let rest = behind.mul(per_total);
-    let first = drawn.in_image(view, row, column, kind);
-    let step = drawn.plane();
-    let own = OfPixel::at(drawn, view, row, column, kind);
+    let step = added.plane as usize;
+    let view = (added.first_view + own / added.plane) as usize;
+    let first = view * (channels + 1) * step + (own % added.plane) as usize;
+    let written =
+        (view * step + (own % added.plane) as usize) * comptime!(OF_PIXEL + kind.channels + 1);
     let mut of_share = 0.0f32;
     if pull {
         of_share = upstream[first + channels * step];
@@ -114,8 +215,9 @@ pub(super) fn blend_pixels(
     let mut alone = 0.0f32;
     let mut alone_tangent = 0.0f32;
     for channel in 0..channels {
-        let colour = drawn.number(background + channel, kind);
-        let sum = Dual { value: values[channel], tangent: tangents[channel] };
+        let at = background + channel;
+        let colour = load(numbers, at, direction, along + at, second);
+        let sum = total(&added.sums, of_pixel, channel + 1, size, added.face_count, kind);
         let seen = sum.mul(per_total).add(rest.mul(colour));
         if comptime!(!pull || kind.second) {
             image[first + channel * step] = seen.stored(second);
@@ -126,7 +228,7 @@ pub(super) fn blend_pixels(
             whole_tangent += seen.tangent * u;
             alone += colour.value * u;
             alone_tangent += colour.tangent * u;
-            pixels[own + OF_PIXEL + channel] = rest.scale(u).stored(second);
+            pixels[written + OF_PIXEL + channel] = rest.scale(u).stored(second);
         }
     }
     if comptime!(!pull || kind.second) {
@@ -137,27 +239,26 @@ pub(super) fn blend_pixels(
         let alone = Dual { value: alone, tangent: alone_tangent };
         let log = whole_weight.ln().add(Dual::constant(largest));
         let draw = whole.sub(Dual::constant(of_share));
-        pixels[own] = log.value;
-        pixels[own + 1] = log.tangent;
-        pixels[own + 2] = draw.value;
-        pixels[own + 3] = draw.tangent;
-        pixels[own + OF_PIXEL + channels] = rest.mul(alone.sub(whole)).stored(second);
+        pixels[written] = log.value;
+        pixels[written + 1] = log.tangent;
+        pixels[written + 2] = draw.value;
+        pixels[written + 3] = draw.tangent;
+        pixels[written + OF_PIXEL + channels] = rest.mul(alone.sub(whole)).stored(second);
     }
 }
 
-/// Writes the gradient of each face, one cube a face, as `[views, faces, 9 + 3 numbers]`: x, y and depth of each of its corners, then the
-/// attributes of each.
+/// Writes the gradient of each face, and behind those of faces those of parts, a cube each, as `[views · faces + slots, 9 + 3 numbers]`: x, y and
+/// depth of each corner, then the attributes of each.
 #[cube(launch)]
 pub(super) fn blend_faces(
     drawn: &BlendInputs,
     upstream: &Array<f32>,
     pixels: &Array<f32>,
     gradient: &mut Array<f32>,
-    jobs: u32,
     #[comptime] kind: BlendSpec,
 ) {
-    let job = CUBE_POS;
-    if job >= jobs as usize {
+    let group = CUBE_POS;
+    if group >= (drawn.views * drawn.face_count + SLOTS) as usize {
         terminate!();
     }
     let channels = comptime!(kind.channels);
@@ -165,24 +266,16 @@ pub(super) fn blend_faces(
     let count = comptime!(9 + 3 * kind.numbers());
     let units = comptime!(UNITS as usize);
     let (frame, weights) = (drawn.frame, drawn.weights);
-    let face_count = drawn.of_cells.face_count;
-    let (view, face) = (job as u32 / face_count, job as u32 % face_count);
+    let part = drawn.part(group as u32);
+    let (view, face) = (part.job / drawn.face_count, part.job % drawn.face_count);
     let shown = FaceAttributes::of(drawn, view, face, kind);
-    let reach = Reach::load(&drawn.reaches, job);
-    let mut pixel = UNIT_POS;
-    let mut end = 0u32;
-    let mut width = 1u32;
-    if reach.left < reach.right {
-        width = reach.right - reach.left;
-        end = width * (reach.bottom - reach.top);
-    }
+    let mut pixel = part.start + UNIT_POS;
     let mut sums = Array::<f32>::new(count);
     for k in 0..count {
         sums[k] = 0.0f32;
     }
-    while pixel < end {
-        let column = reach.left + pixel % width;
-        let row = reach.top + pixel / width;
+    while pixel < part.end {
+        let (column, row) = (part.column(pixel), part.row(pixel));
         let first = drawn.in_image(view, row, column, kind);
         let px = frame.column_centre(column);
         let py = frame.row_centre(row);
@@ -248,12 +341,12 @@ pub(super) fn blend_faces(
         for unit in 0..units {
             sum += shares[number * units + unit];
         }
-        gradient[count * job + number] = sum;
+        gradient[count * group + number] = sum;
         number += units;
     }
 }
 
-/// Adds the gradient of both tables, every unit to tables of its own over the pixels that it walks, `[units, rows, 4]`, as
+/// Adds the gradient of both tables, every unit to tables of its own over the pairs that it takes, `[units, rows, 4]`, as
 /// [`sum_cubics`](super::table::sum_cubics) does.
 #[cube(launch)]
 pub(super) fn blend_cubics(
@@ -264,88 +357,62 @@ pub(super) fn blend_cubics(
     rows: u32,
     #[comptime] kind: BlendSpec,
 ) {
-    let (frame, of_cells) = (drawn.frame, drawn.of_cells);
-    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
-    let across = (frame.width + TILE - 1u32) / TILE;
-    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
-    let down = (frame.height + TILE - 1u32) / TILE;
-    let tiles = of_cells.views * across * down;
     let table = ABSOLUTE_POS as u32 * rows * 4u32;
-    let mut tile = CUBE_POS as u32;
-    while tile < tiles {
-        let column = tile % across * TILE + UNIT_POS_X;
-        let row = tile / across % down * TILE + UNIT_POS_Y;
-        let view = tile / (across * down);
-        if column < frame.width && row < frame.height {
-            let px = frame.column_centre(column);
-            let py = frame.row_centre(row);
-            let first = drawn.in_image(view, row, column, kind);
-            let of_pixel = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind));
-            let first_word = of_cells.first_word(view, column, row);
-            for word in 0..of_cells.words {
-                let mut bits = drawn.cells[(first_word + word) as usize];
-                while bits != 0 {
-                    let face = 32 * word + bits.trailing_zeros();
-                    bits &= bits - 1u32;
-                    if drawn.reaches(view, face, column, row) {
-                        let shown = FaceAttributes::of(drawn, view, face, kind);
-                        let pair = shown.pair(px, py, drawn, kind);
-                        if pair.counts(drawn.weights) {
-                            let share = pair.share(of_pixel.log, drawn.weights);
-                            let seen = shown.seen(pair, drawn, upstream, first, kind);
-                            let pulled = seen.here.sub(of_pixel.draw);
-                            let (by_edge, by_depth) =
-                                (share.of_edge.mul(pulled), share.whole.mul(pulled));
-                            pair.pull_tables(by_edge, by_depth, drawn, partial, table, kind);
-                        }
-                    }
-                }
+    let groups = drawn.views * drawn.face_count + SLOTS;
+    let mut group = CUBE_POS as u32;
+    while group < groups {
+        let part = drawn.part(group);
+        let (view, face) = (part.job / drawn.face_count, part.job % drawn.face_count);
+        let shown = FaceAttributes::of(drawn, view, face, kind);
+        let mut pixel = part.start + UNIT_POS;
+        while pixel < part.end {
+            let (column, row) = (part.column(pixel), part.row(pixel));
+            let px = drawn.frame.column_centre(column);
+            let py = drawn.frame.row_centre(row);
+            let pair = shown.pair(px, py, drawn, kind);
+            if pair.counts(drawn.weights) {
+                let first = drawn.in_image(view, row, column, kind);
+                let of_pixel = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind));
+                let share = pair.share(of_pixel.log, drawn.weights);
+                let seen = shown.seen(pair, drawn, upstream, first, kind);
+                let pulled = seen.here.sub(of_pixel.draw);
+                let (by_edge, by_depth) = (share.of_edge.mul(pulled), share.whole.mul(pulled));
+                pair.pull_tables(by_edge, by_depth, drawn, partial, table, kind);
             }
+            pixel += WALKERS;
         }
-        tile += CUBE_COUNT as u32;
+        group += CUBE_COUNT as u32;
     }
 }
 
-/// Adds up `count` numbers of the corners of each vertex into `gradient`, one unit for each number of a vertex: `[views, count, vertices]`, or
-/// with `by_vertex` `[views, vertices, count]`.
-///
-/// `of_faces` is `[views, faces, stride]`, with the numbers of the three corners from `first` on; `corners` are those of the vertices, as
-/// [`sum_vertices`](super::gradient::sum_vertices) has them.
+/// Adds up the gradient of the background over the pixels that each cube takes, `[cubes, channels + 1]`.
 #[cube(launch)]
-#[allow(clippy::too_many_arguments)]
-pub(super) fn gather_corners(
-    of_faces: &Array<f32>,
-    corners: &Array<u32>,
-    gradient: &mut Array<f32>,
-    vertex_count: u32,
-    face_count: u32,
-    jobs: u32,
-    first_view: u32,
-    stride: u32,
-    first: u32,
+pub(super) fn sum_background(
+    pixels: &Array<f32>,
+    partial: &mut Array<f32>,
     count: u32,
-    #[comptime] by_vertex: bool,
+    #[comptime] kind: BlendSpec,
 ) {
-    let job = ABSOLUTE_POS as u32;
-    if job >= jobs {
-        terminate!();
+    let numbers = comptime!(kind.channels + 1);
+    let mut shares = SharedMemory::<f32>::new(comptime!((kind.channels + 1) * WALKERS as usize));
+    for number in 0..numbers {
+        let mut sum = 0.0f32;
+        let mut pixel = ABSOLUTE_POS as u32;
+        while pixel < count {
+            let at = pixel as usize * comptime!(OF_PIXEL + kind.channels + 1);
+            sum += pixels[at + OF_PIXEL + number];
+            pixel += CUBE_COUNT as u32 * WALKERS;
+        }
+        shares[number * comptime!(WALKERS as usize) + UNIT_POS as usize] = sum;
     }
-    let number = job % count;
-    let vertex = job / count % vertex_count;
-    let view = job / (count * vertex_count);
-    let mut sum = 0.0f32;
-    let start = corners[vertex as usize];
-    let end = corners[vertex as usize + 1];
-    for place in start..end {
-        let corner = corners[(vertex_count + 1u32 + place) as usize];
-        let face = view * face_count + corner / 3u32;
-        sum += of_faces[(face * stride + first + count * (corner % 3u32) + number) as usize];
+    sync_cube();
+    let mut number = UNIT_POS as usize;
+    while number < numbers {
+        let mut sum = 0.0f32;
+        for unit in 0..comptime!(WALKERS as usize) {
+            sum += shares[number * comptime!(WALKERS as usize) + unit];
+        }
+        partial[CUBE_POS * numbers + number] = sum;
+        number += comptime!(WALKERS as usize);
     }
-    let view = first_view + view;
-    let at = if by_vertex {
-        (view * vertex_count + vertex) * count + number
-    } else {
-        (view * count + number) * vertex_count + vertex
-    };
-    gradient[at as usize] = sum;
 }

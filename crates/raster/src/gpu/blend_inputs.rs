@@ -3,11 +3,10 @@
 use cubecl::prelude::*;
 
 use super::{
-    cells::Cells,
     dual::{Dual, load},
     frame::Frame,
     pair::{Cubic, Lookup},
-    reach::Reach,
+    parts::Part,
 };
 
 /// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, background and texture.
@@ -68,17 +67,18 @@ impl BlendSpec {
 pub(super) struct BlendInputs {
     pub(super) corners: Array<f32>,
     pub(super) reaches: Array<u32>,
-    pub(super) cells: Array<u32>,
+    pub(super) slots: Array<u32>,
     /// What all pixels share, and its derivatives behind those of the vertices.
     numbers: Array<f32>,
     direction: Array<f32>,
     /// `[faces, 3]`: the attributes at the corners.
     pub(super) entries: Array<u32>,
-    pub(super) of_cells: Cells,
     pub(super) weights: BlendParams,
     pub(super) frame: Frame,
-    /// The first view of the launch.
+    pub(super) face_count: u32,
+    /// The views of the launch.
     pub(super) first_view: u32,
+    pub(super) views: u32,
 }
 
 #[cube]
@@ -94,10 +94,9 @@ impl BlendInputs {
         Cubic::new(&self.numbers, row, &self.direction, self.weights.along, kind.second)
     }
 
-    /// Whether a face of a view of the launch reaches a pixel.
-    pub(super) fn reaches(&self, view: u32, face: u32, column: u32, row: u32) -> bool {
-        let job = (view * self.of_cells.face_count + face) as usize;
-        Reach::load(&self.reaches, job).holds(column, row)
+    /// The part of a face that a group of units takes.
+    pub(super) fn part(&self, group: u32) -> Part {
+        Part::of(group, &self.reaches, &self.slots, self.views, self.views * self.face_count)
     }
 
     /// Where the first channel of a pixel of a view of the launch stands in an image of all views.

@@ -11,16 +11,21 @@ use softrast_tensor::{
 
 use super::{
     backend::Wgpu,
-    blend::{blend_cubics, blend_faces, blend_pixels, gather_corners},
+    blend::{
+        self, AddedLaunch, add_shares, blend_cubics, blend_faces, find_largest, finish_pixels,
+        sum_background, summed,
+    },
     blend_inputs::{BlendInputsLaunch, BlendParamsLaunch, BlendSpec},
-    gradient::UNITS,
     of_pixel::OF_PIXEL,
-    pass::{Buffer, CUBE, Culled, Partial, Pass, lookup},
+    parts::SLOTS,
+    pass::{CUBE, Partial, Pass, lookup},
+    prepared::{Buffer, Prepared},
+    table::{self, sum_tables},
     texels::{MEASURED, sum_texels, texel_floats},
-    tile::TILE,
     topology::{OnDevice, Topology},
+    whole::MARKS,
 };
-use crate::{ImageSize, ProfileSum, SoftBlend, weighting::FARTHEST_SEEN};
+use crate::{ProfileSum, SoftBlend, weighting::FARTHEST_SEEN};
 
 /// Stands for no limit.
 const LOWEST: f32 = -1e30;
@@ -67,8 +72,10 @@ pub(super) fn culling(op: &SoftBlend) -> ProfileSum {
         grid: Grid { outer: op.edge.inner, from: [op.edge.from[1]; 2], ..op.edge },
         size: op.size,
         near: crate::NEAR,
+        like_depths: false,
         kept: None,
         topology: op.topology.clone(),
+        prepared: None,
     }
 }
 
@@ -108,7 +115,8 @@ impl<'a> Blend<'a> {
             into_contiguous(Wgpu::float_cat(parts, 0))
         });
         let pass = Pass::new(culling, vertices, numbers, direction.clone());
-        let pass = pass.with_depths(FARTHEST_SEEN as f32);
+        let numbers_of_pixel = if direction.is_some() { 2 } else { 1 } * (channels + 1);
+        let pass = pass.with_depths(FARTHEST_SEEN as f32, numbers_of_pixel);
         let device = pass.vertices.device.clone();
         let same = entry_count == pass.vertex_count && op.entries == op.faces;
         let entries = match same {
@@ -124,8 +132,8 @@ impl<'a> Blend<'a> {
     pub(super) fn image(&self) -> Buffer {
         let image = self.pass.buffer(self.image_length(), DType::F32);
         let unused = self.pass.buffer(1, DType::F32);
-        for culled in self.pass.culled() {
-            self.write_pixels(&culled, &self.numbers, &unused, &image, false);
+        for faces in self.pass.prepared() {
+            self.write_pixels(&faces, &self.numbers, &unused, &image, false);
         }
         image
     }
@@ -143,26 +151,27 @@ impl<'a> Blend<'a> {
         let vertices = buffer(3 * views * self.pass.vertex_count);
         let attributes = buffer(numbers * views * self.entry_count);
         let rows = self.op.edge.rows() + self.op.depth.rows();
-        let partial = of_tables.then(|| self.pass.partial(views, rows));
+        let partial = of_tables.then(|| self.pass.partial(rows));
         let texels = of_texels.then(|| self.no_texels());
-        for culled in self.pass.culled() {
-            self.write_pixels(&culled, &upstream, &pixels, &image, true);
-            let of_faces = self.write_faces(&culled, &upstream, &pixels);
-            let corners = &self.pass.topology.corners;
-            let counts = [self.pass.vertex_count, 0, 3];
-            self.gather(&culled, &of_faces, corners, &vertices, counts, false);
-            let counts = [self.entry_count, 9, numbers];
-            self.gather(&culled, &of_faces, &self.entries.corners, &attributes, counts, true);
+        let stride = self.of_face();
+        for faces in self.pass.prepared() {
+            self.write_pixels(&faces, &upstream, &pixels, &image, true);
+            let of_faces = self.write_faces(&faces, &upstream, &pixels);
+            let corners = (&self.pass.topology.corners, self.pass.vertex_count);
+            self.pass.gather(&faces, &of_faces, corners, &vertices, [stride, 0, 3, 3], false);
+            let corners = (&self.entries.corners, self.entry_count);
+            let entries = [stride, 9, numbers, numbers];
+            self.pass.gather(&faces, &of_faces, corners, &attributes, entries, true);
             if let Some(partial) = &partial {
-                self.add_cubics(&culled, &upstream, &pixels, partial, rows);
+                self.add_cubics(&faces, &upstream, &pixels, partial, rows);
             }
             if let Some(texels) = &texels {
-                self.add_texels(&culled, &upstream, &pixels, texels, true);
+                self.add_texels(&faces, &upstream, &pixels, texels, true);
             }
         }
         if let Some(texels) = &texels {
-            for culled in self.pass.culled() {
-                self.add_texels(&culled, &upstream, &pixels, texels, false);
+            for faces in self.pass.prepared() {
+                self.add_texels(&faces, &upstream, &pixels, texels, false);
             }
         }
         let tables = partial.map(|partial| {
@@ -171,10 +180,6 @@ impl<'a> Blend<'a> {
             tables
         });
         let texture = texels.map(|texels| self.floats(texels));
-        let behind = Wgpu::float_reshape(pixels, [self.pass.pixels(), of_pixel].into());
-        let all = Slice::from(0..self.pass.pixels());
-        let behind = Wgpu::float_slice(behind, &[all, Slice::from(OF_PIXEL..of_pixel)]);
-        let background = Wgpu::float_reshape(Wgpu::float_sum_dim(behind, 0), [channels + 1].into());
         let entries = numbers * self.entry_count;
         let attributes = match self.shared {
             true => {
@@ -183,7 +188,35 @@ impl<'a> Blend<'a> {
             }
             false => attributes,
         };
+        let background = self.background(pixels);
         Gradient { vertices, attributes, tables, background, texture, image }
+    }
+
+    /// The gradient of the background, added up over all pixels.
+    fn background(&self, pixels: Buffer) -> Buffer {
+        let (count, numbers) = (self.pass.pixels(), self.channels + 1);
+        let cubes = count.div_ceil(16 * table::UNITS as usize).clamp(1, 256);
+        let [partial, out] = [cubes * numbers, numbers].map(|n| self.pass.buffer(n, DType::F32));
+        sum_background::launch(
+            &self.pass.client,
+            CubeCount::Static(cubes as u32, 1, 1),
+            CubeDim::new_1d(table::UNITS),
+            pixels.into_array_arg(),
+            partial.clone().into_array_arg(),
+            count as u32,
+            self.kind(),
+        );
+        sum_tables::launch(
+            &self.pass.client,
+            self.pass.cubes(numbers, CUBE),
+            CubeDim::new_1d(CUBE),
+            partial.into_array_arg(),
+            out.clone().into_array_arg(),
+            cubes as u32,
+            numbers as u32,
+            0,
+        );
+        out
     }
 
     /// Numbers of the image of all views.
@@ -191,39 +224,77 @@ impl<'a> Blend<'a> {
         self.pass.pixels() * (self.channels + 1)
     }
 
+    /// Draws some views: writes to `image`, and with `pull` what gradients need to `pixels`.
     fn write_pixels(
         &self,
-        culled: &Culled,
+        faces: &Prepared,
         upstream: &Buffer,
         pixels: &Buffer,
         image: &Buffer,
         pull: bool,
     ) {
-        blend_pixels::launch(
-            &self.pass.client,
-            self.tiles(culled),
-            CubeDim::new_2d(TILE, TILE),
-            self.drawn(culled),
+        let (client, kind) = (&self.pass.client, self.kind());
+        let plane = self.op.size.pixels();
+        let count = faces.views * plane;
+        let marks = self.pass.buffer(MARKS as usize * count, DType::U32);
+        let sums = self.pass.buffer(2 * summed(kind) * count, DType::U32);
+        let unused = self.pass.buffer(1, DType::U32);
+        self.pass.zero([
+            (&unused, 0),
+            (&marks, MARKS as usize * count),
+            (&sums, 2 * summed(kind) * count),
+        ]);
+        let (cubes, cube) = (self.parts(faces), CubeDim::new_1d(blend::UNITS));
+        let (drawn, written) = (self.drawn(faces), marks.clone().into_array_arg());
+        find_largest::launch(client, cubes.clone(), cube, drawn, written, kind);
+        for measure in [true, false] {
+            add_shares::launch(
+                client,
+                cubes.clone(),
+                cube,
+                self.drawn(faces),
+                marks.clone().into_array_arg(),
+                sums.clone().into_array_arg(),
+                kind,
+                measure,
+            );
+        }
+        let added = AddedLaunch::new(
+            marks.into_array_arg(),
+            sums.into_array_arg(),
+            self.starts[1] as u32,
+            self.along() as u32,
+            self.op.faces.len() as u32,
+            faces.first_view as u32,
+            plane as u32,
+            count as u32,
+        );
+        finish_pixels::launch(
+            client,
+            self.pass.cubes(count, CUBE),
+            CubeDim::new_1d(CUBE),
+            added,
+            self.numbers.clone().into_array_arg(),
+            self.direction().into_array_arg(),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             image.clone().into_array_arg(),
-            self.kind(),
+            kind,
             pull,
         );
     }
 
-    fn write_faces(&self, culled: &Culled, upstream: &Buffer, pixels: &Buffer) -> Buffer {
-        let jobs = culled.views * self.op.faces.len();
-        let of_faces = self.pass.buffer(self.of_face() * jobs, DType::F32);
+    fn write_faces(&self, faces: &Prepared, upstream: &Buffer, pixels: &Buffer) -> Buffer {
+        let groups = faces.views * self.op.faces.len() + SLOTS as usize;
+        let of_faces = self.pass.buffer(self.of_face() * groups, DType::F32);
         blend_faces::launch(
             &self.pass.client,
-            self.pass.cubes(jobs * UNITS as usize, UNITS),
-            CubeDim::new_1d(UNITS),
-            self.drawn(culled),
+            self.parts(faces),
+            CubeDim::new_1d(blend::UNITS),
+            self.drawn(faces),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             of_faces.clone().into_array_arg(),
-            jobs as u32,
             self.kind(),
         );
         of_faces
@@ -232,7 +303,7 @@ impl<'a> Blend<'a> {
     /// Adds the gradient of both tables, of so many `rows` together, to `partial`.
     fn add_cubics(
         &self,
-        culled: &Culled,
+        faces: &Prepared,
         upstream: &Buffer,
         pixels: &Buffer,
         partial: &Partial,
@@ -241,8 +312,8 @@ impl<'a> Blend<'a> {
         blend_cubics::launch(
             &self.pass.client,
             CubeCount::Static(partial.cubes as u32, 1, 1),
-            CubeDim::new_2d(TILE, TILE),
-            self.drawn(culled),
+            CubeDim::new_1d(table::UNITS),
+            self.drawn(faces),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             partial.tables.clone().into_array_arg(),
@@ -260,7 +331,7 @@ impl<'a> Blend<'a> {
     /// Finds the largest size of a term with `measure`, else adds up all.
     fn add_texels(
         &self,
-        culled: &Culled,
+        faces: &Prepared,
         upstream: &Buffer,
         pixels: &Buffer,
         texels: &Texels,
@@ -268,9 +339,9 @@ impl<'a> Blend<'a> {
     ) {
         sum_texels::launch(
             &self.pass.client,
-            self.tiles(culled),
-            CubeDim::new_2d(TILE, TILE),
-            self.drawn(culled),
+            self.parts(faces),
+            CubeDim::new_1d(blend::UNITS),
+            self.drawn(faces),
             upstream.clone().into_array_arg(),
             pixels.clone().into_array_arg(),
             texels.sums.clone().into_array_arg(),
@@ -294,55 +365,26 @@ impl<'a> Blend<'a> {
     }
 
     /// What the kernels read.
-    fn drawn(&self, culled: &Culled) -> BlendInputsLaunch<WgpuRuntime> {
+    fn drawn(&self, faces: &Prepared) -> BlendInputsLaunch<WgpuRuntime> {
         BlendInputsLaunch::new(
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            culled.cells.clone().into_array_arg(),
+            faces.corners.clone().into_array_arg(),
+            faces.reaches.clone().into_array_arg(),
+            faces.slots.clone().into_array_arg(),
             self.numbers.clone().into_array_arg(),
             self.direction().into_array_arg(),
             self.entries.faces.clone().into_array_arg(),
-            self.pass.cells(culled),
             self.weights(),
             self.pass.frame(),
-            culled.first_view as u32,
+            self.op.faces.len() as u32,
+            faces.first_view as u32,
+            faces.views as u32,
         )
     }
 
-    /// A cube for each tile of the image.
-    fn tiles(&self, culled: &Culled) -> CubeCount {
-        let ImageSize { height, width } = self.op.size;
-        let [across, down] = [width, height].map(|side| side.div_ceil(TILE as usize) as u32);
-        CubeCount::Static(across, down, culled.views as u32)
-    }
-
-    /// Adds up the corners of each of `count` vertices or entries: `of_each` numbers, which stand from `first` on in those of a face.
-    fn gather(
-        &self,
-        culled: &Culled,
-        of_faces: &Buffer,
-        corners: &Buffer,
-        gradient: &Buffer,
-        [count, first, of_each]: [usize; 3],
-        by_vertex: bool,
-    ) {
-        let jobs = culled.views * count * of_each;
-        gather_corners::launch(
-            &self.pass.client,
-            self.pass.cubes(jobs, CUBE),
-            CubeDim::new_1d(CUBE),
-            of_faces.clone().into_array_arg(),
-            corners.clone().into_array_arg(),
-            gradient.clone().into_array_arg(),
-            count as u32,
-            self.op.faces.len() as u32,
-            jobs as u32,
-            culled.first_view as u32,
-            self.of_face() as u32,
-            first as u32,
-            of_each as u32,
-            by_vertex,
-        );
+    /// A cube for each part of a face.
+    fn parts(&self, faces: &Prepared) -> CubeCount {
+        let groups = faces.views * self.op.faces.len() + SLOTS as usize;
+        self.pass.cubes(groups * blend::UNITS as usize, blend::UNITS)
     }
 
     /// Numbers of a face in a gradient.
@@ -353,6 +395,11 @@ impl<'a> Blend<'a> {
     /// The direction; any buffer where there is none, as nothing then reads it.
     fn direction(&self) -> Buffer {
         self.direction.as_ref().unwrap_or(&self.numbers).clone()
+    }
+
+    /// Where the derivatives of the numbers begin in the direction.
+    fn along(&self) -> usize {
+        if self.pass.second() { 3 * self.pass.views * self.pass.vertex_count } else { 0 }
     }
 
     fn kind(&self) -> BlendSpec {
@@ -377,8 +424,6 @@ impl<'a> Blend<'a> {
         };
         let [near, far] = op.planes;
         let [rows, columns] = op.texture.unwrap_or([1, 1]);
-        let along =
-            if self.pass.second() { 3 * self.pass.views * self.pass.vertex_count } else { 0 };
         BlendParamsLaunch::new(
             lookup(&op.edge),
             lookup(&depth),
@@ -389,7 +434,7 @@ impl<'a> Blend<'a> {
             rows as u32,
             columns as u32,
             if self.shared { 0 } else { (self.kind().numbers() * self.entry_count) as u32 },
-            along as u32,
+            self.along() as u32,
             near as f32,
             (far - near).recip() as f32,
             op.floor as f32,

@@ -118,7 +118,7 @@ impl FaceAttributes {
         face: u32,
         #[comptime] kind: BlendSpec,
     ) -> FaceAttributes {
-        let job = (view * drawn.of_cells.face_count + face) as usize;
+        let job = (view * drawn.face_count + face) as usize;
         let stride = comptime!(if kind.second { 18usize } else { 9usize });
         let first = drawn.weights.attributes + (drawn.first_view + view) * drawn.weights.per_view;
         FaceAttributes::new(

@@ -6,19 +6,21 @@ use cubecl::prelude::*;
 use super::{
     frame::Frame,
     pair::{Cubic, Face, Lookup},
+    parts::{Part, first_slot, is_cut, parts},
     reach::Reach,
 };
 
-/// Units that share a face.
-pub(super) const UNITS: u32 = 32;
+/// Units of a cube.
+pub(super) const UNITS: u32 = 64;
 
-/// Writes the gradient of each face to x and y of its three corners, one cube a face: `gradient`
-/// becomes `[views, faces, 6]`.
+/// Writes the gradient of each face to x and y of its three corners, and behind those of faces those of parts: `gradient` becomes
+/// `[views · faces + slots, 6]`. `lanes` units share a part.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn sum_faces(
     corners: &Array<f32>,
     reaches: &Array<u32>,
+    slots: &Array<u32>,
     table: &Array<f32>,
     direction: &Array<f32>,
     upstream: &Array<f32>,
@@ -26,35 +28,27 @@ pub(super) fn sum_faces(
     lookup: Lookup,
     frame: Frame,
     face_count: u32,
-    jobs: u32,
+    views: u32,
+    groups: u32,
     table_offset: u32,
     first_view: u32,
+    #[comptime] lanes: u32,
     #[comptime] second: bool,
 ) {
-    let job = CUBE_POS;
-    if job >= jobs as usize {
-        terminate!();
-    }
-    let view = job as u32 / face_count + first_view;
-    let reach = Reach::load(reaches, job);
+    let jobs = views * face_count;
+    let part = Part::of(ABSOLUTE_POS as u32 / lanes, reaches, slots, views, jobs);
+    let view = part.job / face_count + first_view;
     let stride = comptime!(if second { 12usize } else { 6usize });
-    let face = Face::new(corners, stride * job, second);
+    let face = Face::new(corners, stride * part.job as usize, second);
     let mut ax = 0.0f32;
     let mut ay = 0.0f32;
     let mut bx = 0.0f32;
     let mut by = 0.0f32;
     let mut cx = 0.0f32;
     let mut cy = 0.0f32;
-    let mut pixel = UNIT_POS;
-    let mut end = 0u32;
-    let mut width = 1u32;
-    if reach.left < reach.right {
-        width = reach.right - reach.left;
-        end = width * (reach.bottom - reach.top);
-    }
-    while pixel < end {
-        let column = reach.left + pixel % width;
-        let row = reach.top + pixel / width;
+    let mut pixel = part.start + UNIT_POS % lanes;
+    while pixel < part.end {
+        let (column, row) = (part.column(pixel), part.row(pixel));
         let g = upstream[frame.pixel(view, row, column) as usize];
         let pair = face.pair(frame.column_centre(column), frame.row_centre(row), lookup);
         let cubic = Cubic::new(table, pair.row, direction, table_offset, second);
@@ -66,9 +60,9 @@ pub(super) fn sum_faces(
         by += y.mul(pair.weight(1u32)).stored(second);
         cx += x.mul(pair.weight(2u32)).stored(second);
         cy += y.mul(pair.weight(2u32)).stored(second);
-        pixel += UNITS;
+        pixel += lanes;
     }
-    // One corner coordinate after the other: unit k adds up coordinate k.
+    // The units of a part add up one corner coordinate after the other.
     let mut shares = SharedMemory::<f32>::new(comptime!(6 * UNITS as usize));
     let at = UNIT_POS as usize;
     shares[at] = ax;
@@ -78,47 +72,78 @@ pub(super) fn sum_faces(
     shares[at + comptime!(4 * UNITS as usize)] = cx;
     shares[at + comptime!(5 * UNITS as usize)] = cy;
     sync_cube();
-    if UNIT_POS < 6 {
+    let per_cube = comptime!(UNITS / lanes);
+    let mut number = UNIT_POS;
+    while number < comptime!(6 * UNITS / lanes) {
+        let own = number % per_cube;
+        let coordinate = number / per_cube;
+        let group = CUBE_POS as u32 * per_cube + own;
+        let first = coordinate * UNITS + own * lanes;
         let mut sum = 0.0f32;
-        for unit in 0..UNITS {
-            sum += shares[(UNIT_POS * UNITS + unit) as usize];
+        for lane in 0..lanes {
+            sum += shares[(first + lane) as usize];
         }
-        gradient[6 * job + UNIT_POS as usize] = sum;
+        if group < groups {
+            gradient[(6 * group + coordinate) as usize] = sum;
+        }
+        number += UNITS;
     }
 }
 
-/// Adds up the corners of each vertex into `gradient` `[views, 3, vertices]`, one unit a vertex.
+/// Adds up `count` numbers of the corners of each vertex into `gradient`, one unit for each of its `rows` numbers, of which those behind are 0:
+/// `[views, rows, vertices]`, or with `by_vertex` `[views, vertices, rows]`.
 ///
-/// `corners` starts with the place of each vertex's first corner, `[vertices + 1]`; the corners
-/// follow, each as `3 * face + corner`. The depth gets 0: a silhouette does not see it.
+/// `of_faces` is `[views · faces + slots, stride]`, with the numbers of the three corners from `first` on. `corners` starts with the place of
+/// each vertex's first corner, `[vertices + 1]`; the corners follow, each as `3 * face + corner`.
 #[cube(launch)]
-pub(super) fn sum_vertices(
+#[allow(clippy::too_many_arguments)]
+pub(super) fn gather_corners(
     of_faces: &Array<f32>,
     corners: &Array<u32>,
+    reaches: &Array<u32>,
+    slots: &Array<u32>,
     gradient: &mut Array<f32>,
     vertex_count: u32,
     face_count: u32,
-    jobs: u32,
+    views: u32,
     first_view: u32,
+    stride: u32,
+    first: u32,
+    count: u32,
+    rows: u32,
+    #[comptime] by_vertex: bool,
 ) {
-    let job = ABSOLUTE_POS as u32;
-    if job >= jobs {
+    let own = ABSOLUTE_POS as u32;
+    if own >= views * vertex_count * rows {
         terminate!();
     }
-    let vertex = job % vertex_count;
-    let view = job / vertex_count;
-    let mut x = 0.0f32;
-    let mut y = 0.0f32;
+    let number = own % rows;
+    let vertex = own / rows % vertex_count;
+    let view = own / (rows * vertex_count);
+    let mut sum = 0.0f32;
     let start = corners[vertex as usize];
-    let end = corners[vertex as usize + 1];
+    let end = select(number < count, corners[vertex as usize + 1], start);
     for place in start..end {
         let corner = corners[(vertex_count + 1u32 + place) as usize];
-        let at = (6u32 * view * face_count + 2u32 * corner) as usize;
-        x += of_faces[at];
-        y += of_faces[at + 1];
+        let job = view * face_count + corner / 3u32;
+        let at = first + count * (corner % 3u32) + number;
+        let pixels = Reach::load(reaches, job as usize).pixels();
+        let mut part = job;
+        let mut end = job + 1u32;
+        if is_cut(pixels, slots) {
+            part = views * face_count + slots[first_slot(job, views)];
+            end = part + parts(pixels);
+        }
+        while part < end {
+            sum += of_faces[(stride * part + at) as usize];
+            part += 1u32;
+        }
     }
-    let at = (3u32 * (first_view + view) * vertex_count + vertex) as usize;
-    gradient[at] = x;
-    gradient[at + vertex_count as usize] = y;
-    gradient[at + 2 * vertex_count as usize] = 0.0f32;
+    let view = first_view + view;
+    let at = if by_vertex {
+        (view * vertex_count + vertex) * rows + number
+    } else {
+        (view * rows + number) * vertex_count + vertex
+    };
+    gradient[at as usize] = sum;
 }

@@ -1,10 +1,10 @@
 //! The fused op on the GPU: `CubeCL` kernels over the tensors of the wgpu backend, in f32.
 //!
-//! The same sums as in `softrast-kernel`, in another order of loops. Culling gives every cell of the image a
-//! bit for each face; the image is a walk of one unit a pixel over the faces of its cell, and so is
-//! the gradient of the table; the gradient to the vertices is gathered, first per face over its
-//! pixels and then per vertex over its faces. They read nothing back. Every sum of floats has
-//! one order; the gradient of a texture is added up in whole numbers by atomic operations, where the order does not matter. The second order is the same kernels over dual numbers.
+//! The same sums as in `softrast-kernel`, in another order of loops: everything goes face by face. A few units share a face and add its terms to
+//! the pixels of its bounding box, as whole numbers, by atomic operations, whose order does not matter; so no pixel has to know which faces reach
+//! it, and nothing is culled, sorted or read back. Gradients to vertices are gathered, first per face over its pixels, then per vertex over its
+//! faces. Cameras and losses are kernels too, so that a step launches fewer than twenty. The same numbers come out at every call. The second
+//! order is the same kernels over dual numbers.
 
 #[cfg(not(target_family = "wasm"))]
 mod adapter;
@@ -12,32 +12,40 @@ mod backend;
 mod blend;
 mod blend_inputs;
 mod blend_pass;
-mod cells;
+mod camera;
 mod depth;
 mod dual;
+mod elementary;
 mod face_attributes;
+mod flat;
 mod frame;
 mod gradient;
-mod image;
+mod losses;
 mod of_pixel;
 mod pair;
+mod parts;
 mod pass;
+mod prepare;
+mod prepared;
 mod reach;
+mod splat;
 mod table;
 mod texels;
 mod texture;
-mod tile;
 mod topology;
+mod whole;
 
 #[cfg(not(target_family = "wasm"))]
 pub use adapter::adapter_name;
 pub use backend::Wgpu;
+pub(crate) use prepared::Kept;
 pub(crate) use topology::Topology;
 
-use softrast_tensor::{FloatDType, FloatTensor, FloatTensorOps, Slice, TensorMetadata};
+use softrast_tensor::{FloatTensor, FloatTensorOps, TensorMetadata};
 
 use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
 use blend_pass::{Blend, culling};
+use flat::{length, parts, whole_direction};
 use pass::Pass as Kernels;
 
 impl RasterBackend for Wgpu {
@@ -47,9 +55,8 @@ impl RasterBackend for Wgpu {
         let op = match op {
             FusedOp::ProfileSum(op) => op,
             FusedOp::SoftBlend(op) => return blended(op, pass, tensors),
-            FusedOp::Elementary(_) | FusedOp::SilhouetteLoss(_) => {
-                panic!("on a GPU {op:?} is made of other ops")
-            }
+            FusedOp::Elementary(op) => return elementary::run(*op, pass, tensors),
+            FusedOp::SilhouetteLoss(_) => panic!("on a GPU {op:?} is made of other ops"),
         };
         let mut tensors = tensors.into_iter();
         let mut next = || tensors.next().expect("all inputs of the pass");
@@ -61,15 +68,18 @@ impl RasterBackend for Wgpu {
                 Self::float_reshape(Kernels::new(op, vertices, table, None).sums(), shape.into())
             }
             Pass::Vjp { wanted } => {
-                let flat = Kernels::new(op, vertices, table, None).gradient(next(), wanted[1]);
-                parts(flat, &[coordinates, coefficients], wanted)
+                let kernels = Kernels::new(op, vertices, table, None);
+                if !wanted[1] {
+                    return kernels.to_vertices(next());
+                }
+                parts(kernels.gradient(next()), &[coordinates, coefficients], wanted)
             }
             Pass::VjpOfVjp { along, wanted } => {
                 let (upstream, direction) = (next(), next());
-                let direction = whole(direction, &[coordinates, coefficients], along);
+                let direction = whole_direction(direction, &[coordinates, coefficients], along);
                 let pixels = length(&upstream);
                 let kernels = Kernels::new(op, vertices, table, Some(direction));
-                let flat = kernels.gradient(upstream, true);
+                let flat = kernels.gradient(upstream);
                 parts(flat, &[coordinates, coefficients, pixels], wanted)
             }
         }
@@ -93,7 +103,7 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
         Pass::Vjp { wanted } => (None, wanted, next()),
         Pass::VjpOfVjp { along, wanted } => {
             let upstream = next();
-            (Some(whole(next(), &lengths, along)), wanted, upstream)
+            (Some(whole_direction(next(), &lengths, along)), wanted, upstream)
         }
     };
     let of_texels = op.texture.is_some() && wanted[4];
@@ -107,41 +117,4 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
     parts.push(Some(found.image));
     let parts = parts.into_iter().zip(wanted).filter(|&(_, &wanted)| wanted);
     Wgpu::float_cat(parts.filter_map(|(part, _)| part).collect(), 0)
-}
-
-fn length(tensor: &FloatTensor<Wgpu>) -> usize {
-    tensor.shape().num_elements()
-}
-
-/// Those parts of a flat tensor that are wanted, flat.
-fn parts(flat: FloatTensor<Wgpu>, lengths: &[usize], wanted: &[bool]) -> FloatTensor<Wgpu> {
-    if wanted.iter().all(|&wanted| wanted) {
-        return flat;
-    }
-    let mut start = 0;
-    let mut chosen = Vec::new();
-    for (&length, &wanted) in lengths.iter().zip(wanted) {
-        if wanted {
-            chosen.push(Wgpu::float_slice(flat.clone(), &[Slice::from(start..start + length)]));
-        }
-        start += length;
-    }
-    if chosen.len() == 1 { chosen.remove(0) } else { Wgpu::float_cat(chosen, 0) }
-}
-
-/// The inverse: zeros where a part is missing.
-fn whole(flat: FloatTensor<Wgpu>, lengths: &[usize], there: &[bool]) -> FloatTensor<Wgpu> {
-    if there.iter().all(|&there| there) {
-        return flat;
-    }
-    let device = Wgpu::float_device(&flat);
-    let mut start = 0;
-    let part = |(&length, &there): (&usize, &bool)| {
-        if !there {
-            return Wgpu::float_zeros([length].into(), &device, FloatDType::F32);
-        }
-        start += length;
-        Wgpu::float_slice(flat.clone(), &[Slice::from(start - length..start)])
-    };
-    Wgpu::float_cat(lengths.iter().zip(there).map(part).collect(), 0)
 }

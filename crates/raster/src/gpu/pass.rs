@@ -11,23 +11,26 @@ use softrast_tensor::{
 };
 
 use super::{
-    cells::{CellsLaunch, fill_cells},
     frame::FrameLaunch,
-    gradient::{UNITS, sum_faces, sum_vertices},
-    image::sum_pixels,
+    gradient::{UNITS, gather_corners, sum_faces},
     pair::LookupLaunch,
-    reach::{count_drawn, prepare},
-    table::{sum_cubics, sum_tables},
-    tile::TILE,
+    parts::{self, SLOTS},
+    prepare::{PREPARED, prepare},
+    prepared::{Buffer, Kept, Prepared},
+    splat::{CLEARED, Terms, clear, settle, splat},
+    table::{self, sum_cubics, sum_tables},
     topology::OnDevice,
+    whole::zero,
 };
 
 use crate::{ImageSize, ProfileSum};
 
-pub(super) type Buffer = CubeTensor<WgpuRuntime>;
-
 /// Largest buffer of a pass's own, in bytes: half of what every adapter can bind (128 MiB).
 const BUFFER: usize = 64 << 20;
+/// Pixels for each face, from which on more units share one.
+const MANY_PIXELS: usize = 32;
+/// Bytes of a number that is added up.
+const WORDS: usize = 8;
 /// All tables of [`sum_cubics`] together, in bytes.
 const TABLES: usize = 32 << 20;
 /// Units of a cube where they do not share anything.
@@ -39,29 +42,28 @@ pub(super) struct Pass<'a> {
     pub(super) client: ComputeClient<WgpuRuntime>,
     /// `[views, 3, vertices]`.
     pub(super) vertices: Buffer,
-    /// `[rows, 4]`, or `[views, rows, 4]`.
+    /// `[rows, 4]`.
     table: Buffer,
-    /// Whether each view has a table of its own.
     /// Derivatives of both, flat and in this order, in a pass of second order.
     direction: Option<Buffer>,
     pub(super) topology: OnDevice,
     pub(super) views: usize,
     pub(super) vertex_count: usize,
-    /// Width and height of a cell in pixels.
-    side: usize,
     /// Whether what is prepared of faces has their depths.
     depths: bool,
+    /// Bytes of what is added up of a pixel.
+    of_pixel: usize,
     /// Faces beyond this depth are not drawn.
     far: f32,
 }
 
-/// Some of the views, culled.
-pub(super) struct Culled {
-    pub(super) first_view: usize,
-    pub(super) views: usize,
-    pub(super) corners: Buffer,
-    pub(super) reaches: Buffer,
-    pub(super) cells: Buffer,
+/// Sums of pixels in the making.
+struct Splatted {
+    /// Two words of each pixel.
+    words: Buffer,
+    /// Of all pixels, or of each.
+    scale: Buffer,
+    terms: Terms,
 }
 
 /// Tables of the units that add up the gradient to one.
@@ -85,11 +87,6 @@ impl<'a> Pass<'a> {
         let (client, device) = (vertices.client.clone(), vertices.device.clone());
         let (views, vertex_count) = (vertices.shape()[0], vertices.shape()[2]);
         let topology = op.topology.on(&op.faces, vertex_count, &client, &device);
-        let mut side = TILE as usize;
-        while op.size.height.div_ceil(side) * op.size.width.div_ceil(side) * words(op) * 4 > BUFFER
-        {
-            side *= 2;
-        }
         Self {
             op,
             client,
@@ -99,62 +96,67 @@ impl<'a> Pass<'a> {
             topology,
             views,
             vertex_count,
-            side,
             depths: false,
+            of_pixel: 2 * WORDS,
             far: f32::INFINITY,
         }
     }
 
-    /// With the depths of faces, none of which is drawn beyond `far`.
-    pub(super) fn with_depths(self, far: f32) -> Self {
-        Self { depths: true, far, ..self }
+    /// With the depths of faces, none of which is drawn beyond `far`, where so many numbers of a pixel are added up.
+    pub(super) fn with_depths(self, far: f32, numbers: usize) -> Self {
+        Self { depths: true, far, of_pixel: numbers * WORDS, ..self }
     }
 
     /// Sums of the profile, flat: `[views * height * width]`.
     pub(super) fn sums(&self) -> Buffer {
         let sums = self.buffer(self.pixels(), DType::F32);
-        for culled in self.culled() {
-            self.write_sums(&culled, &sums, 0);
+        for [first, views] in self.parts() {
+            let slots = self.buffer(parts::words(views, views * self.op.faces.len()), DType::U32);
+            let splatted = self.cleared(views, Some(&slots));
+            let faces = self.prepare(first, views, slots);
+            if let Some(kept) = self.kept() {
+                kept.set(faces.clone());
+            }
+            self.splat(&faces, splatted, &sums, 0);
         }
         sums
     }
 
-    /// Gradient of `Σ upstream · sums` to vertices and table, flat. In a pass of second order its
-    /// derivative, and behind it that of the sums.
-    pub(super) fn gradient(&self, upstream: Buffer, wrt_table: bool) -> Buffer {
+    /// Gradient of `Σ upstream · sums` to the vertices alone, flat.
+    pub(super) fn to_vertices(&self, upstream: Buffer) -> Buffer {
         let upstream = into_contiguous(upstream);
-        let coordinates = 3 * self.views * self.vertex_count;
-        let coefficients = 4 * self.rows();
-        let sums = if self.second() { self.pixels() } else { 0 };
-        let length = coordinates + coefficients + sums;
-        // Where the table has no part, its gradient stays 0.
-        let gradient = if wrt_table && self.vertex_count > 0 {
-            self.buffer(length, DType::F32)
-        } else {
-            self.zeros(length, DType::F32)
-        };
-        let partial = wrt_table.then(|| self.partial(self.views, self.rows()));
-        for culled in self.culled() {
-            self.write_corners(&culled, &upstream, &gradient);
-            if let Some(partial) = &partial {
-                self.add_cubics(&culled, &upstream, partial);
-            }
-            if self.second() {
-                self.write_sums(&culled, &gradient, coordinates + coefficients);
-            }
-        }
-        if let Some(partial) = partial {
-            self.add_up(partial, &gradient, coordinates);
+        let gradient = self.buffer(3 * self.views * self.vertex_count, DType::F32);
+        for faces in self.prepared() {
+            self.write_corners(&faces, &upstream, &gradient);
         }
         gradient
     }
 
-    /// Tables of so many rows for units that walk over some views.
-    pub(super) fn partial(&self, views: usize, rows: usize) -> Partial {
-        let ImageSize { height, width } = self.op.size;
-        let tiles = views * height.div_ceil(TILE as usize) * width.div_ceil(TILE as usize);
-        let (cube, coefficients) = ((TILE * TILE) as usize, 4 * rows);
-        let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, tiles.max(1));
+    /// Gradient of `Σ upstream · sums` to vertices and table, flat. In a pass of second order its
+    /// derivative, and behind it that of the sums.
+    pub(super) fn gradient(&self, upstream: Buffer) -> Buffer {
+        let upstream = into_contiguous(upstream);
+        let coordinates = 3 * self.views * self.vertex_count;
+        let coefficients = 4 * self.rows();
+        let sums = if self.second() { self.pixels() } else { 0 };
+        let gradient = self.buffer(coordinates + coefficients + sums, DType::F32);
+        let partial = self.partial(self.rows());
+        for faces in self.prepared() {
+            self.write_corners(&faces, &upstream, &gradient);
+            self.add_cubics(&faces, &upstream, &partial);
+            if self.second() {
+                let splatted = self.cleared(faces.views, None);
+                self.splat(&faces, splatted, &gradient, coordinates + coefficients);
+            }
+        }
+        self.add_up(partial, &gradient, coordinates);
+        gradient
+    }
+
+    /// Tables of so many rows for units that walk over parts of faces.
+    pub(super) fn partial(&self, rows: usize) -> Partial {
+        let (cube, coefficients) = (table::UNITS as usize, 4 * rows);
+        let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, 4096);
         let units = cubes * cube;
         let tables = self.zeros(units * coefficients, DType::F32);
         Partial { cubes, units, coefficients, tables }
@@ -175,104 +177,179 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// The views in parts whose buffers all fit, culled one after the other.
-    pub(super) fn culled(&self) -> impl Iterator<Item = Culled> {
+    /// The views in parts whose buffers all fit, prepared one after the other.
+    pub(super) fn prepared(&self) -> impl Iterator<Item = Prepared> {
         let faces = self.op.faces.len();
-        let largest = (4 * self.stride() * faces).max(4 * self.cells_per_view() * words(self.op));
-        // A launch counts at most 65535 cubes along an axis.
-        let step = (BUFFER / largest).clamp(1, 65535);
-        (0..self.views).step_by(step).map(move |first| {
-            let views = step.min(self.views - first);
-            self.cull(first, views)
+        self.parts().map(move |[first, views]| {
+            if let Some(kept) = self.kept().and_then(Kept::get) {
+                return kept.clone();
+            }
+            let slots = self.zeros(parts::words(views, views * faces), DType::U32);
+            self.prepare(first, views, slots)
         })
     }
 
-    fn cull(&self, first_view: usize, views: usize) -> Culled {
+    /// First view and number of views of each part.
+    fn parts(&self) -> impl Iterator<Item = [usize; 2]> {
+        let of_faces = 4 * self.stride() * self.op.faces.len();
+        let of_view = of_faces.max(self.of_pixel * self.op.size.pixels());
+        // A launch counts at most 65535 cubes along an axis.
+        let step = (BUFFER / of_view.max(1)).clamp(1, 65535);
+        let views = self.views;
+        (0..views).step_by(step).map(move |first| [first, step.min(views - first)])
+    }
+
+    /// Where faces are kept for other passes: not those of some views alone, nor with what only this pass wants of them.
+    fn kept(&self) -> Option<&Kept> {
+        let whole = self.parts().count() == 1 && !self.second() && !self.depths;
+        self.op.prepared.as_ref().filter(|_| whole)
+    }
+
+    /// Prepares the faces of some views. The first words of `slots` are 0.
+    fn prepare(&self, first_view: usize, views: usize, slots: Buffer) -> Prepared {
         let faces = self.op.faces.len();
         let jobs = views * faces;
         let corners = self.buffer(self.stride() * jobs, DType::F32);
-        let reaches = self.buffer(4 * jobs + views, DType::U32);
+        let reaches = self.buffer(4 * jobs, DType::U32);
         prepare::launch(
             &self.client,
-            self.cubes(jobs, CUBE),
-            CubeDim::new_1d(CUBE),
+            CubeCount::Static(faces.div_ceil(PREPARED as usize) as u32, views as u32, 1),
+            CubeDim::new_1d(PREPARED),
             self.vertices.clone().into_array_arg(),
             self.direction().into_array_arg(),
             self.topology.faces.clone().into_array_arg(),
             corners.clone().into_array_arg(),
             reaches.clone().into_array_arg(),
+            slots.clone().into_array_arg(),
             self.frame(),
             first_view as u32,
+            views as u32,
             self.vertex_count as u32,
             faces as u32,
-            jobs as u32,
             (self.op.near as f32).to_bits(),
             self.far.to_bits(),
             self.op.grid.outer as f32,
             self.depths,
             self.second(),
         );
-        count_drawn::launch(
-            &self.client,
-            CubeCount::Static(views as u32, 1, 1),
-            CubeDim::new_1d(CUBE),
-            reaches.clone().into_array_arg(),
-            faces as u32,
-            CUBE,
-        );
-        let words = views * self.cells_per_view() * words(self.op);
-        let cells = self.buffer(words, DType::U32);
-        fill_cells::launch(
-            &self.client,
-            self.cubes(words, CUBE),
-            CubeDim::new_1d(CUBE),
-            reaches.clone().into_array_arg(),
-            cells.clone().into_array_arg(),
-            faces as u32,
-            self::words(self.op) as u32,
-            self.per_row() as u32,
-            self.per_column() as u32,
-            self.side as u32,
-            words as u32,
-        );
-        Culled { first_view, views, corners, reaches, cells }
+        Prepared { first_view, views, corners, reaches, slots }
     }
 
-    /// Writes the sums of the views to `out`, all views being at `offset`.
-    fn write_sums(&self, culled: &Culled, out: &Buffer, offset: usize) {
-        let ImageSize { height, width } = self.op.size;
-        let [across, down] = [width, height].map(|side| side.div_ceil(TILE as usize) as u32);
-        sum_pixels::launch(
+    /// Zeros to which terms of the pixels of some views are added, and in the first words of `slots`; how they are added, and by what.
+    fn cleared(&self, views: usize, slots: Option<&Buffer>) -> Splatted {
+        let pixels = views * self.op.size.pixels();
+        let words = self.buffer(2 * pixels, DType::U32);
+        let header = if slots.is_some() { 1 + views } else { 0 };
+        let slots = slots.cloned().unwrap_or_else(|| self.buffer(1, DType::U32));
+        if self.op.like_depths && !self.second() {
+            let scale = self.buffer(2, DType::U32);
+            clear::launch(
+                &self.client,
+                self.cubes(2 * pixels, CLEARED),
+                CubeDim::new_1d(CLEARED),
+                self.table.clone().into_array_arg(),
+                slots.clone().into_array_arg(),
+                words.clone().into_array_arg(),
+                scale.clone().into_array_arg(),
+                header as u32,
+                2 * pixels as u32,
+                self.rows() as u32,
+                self.op.faces.len() as u32,
+            );
+            return Splatted { words, scale, terms: Terms::Scaled };
+        }
+        let scale = self.buffer(pixels, DType::U32);
+        self.zero([(&slots, header), (&scale, pixels), (&words, 2 * pixels)]);
+        Splatted { words, scale, terms: Terms::Relative }
+    }
+
+    /// Writes zeros to the first words of three buffers.
+    pub(super) fn zero(&self, buffers: [(&Buffer, usize); 3]) {
+        let [(a, of_a), (b, of_b), (c, of_c)] = buffers;
+        zero::launch(
             &self.client,
-            CubeCount::Static(across, down, culled.views as u32),
-            CubeDim::new_2d(TILE, TILE),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            culled.cells.clone().into_array_arg(),
+            self.cubes(of_a.max(of_b).max(of_c), CUBE),
+            CubeDim::new_1d(CUBE),
+            a.clone().into_array_arg(),
+            b.clone().into_array_arg(),
+            c.clone().into_array_arg(),
+            of_a as u32,
+            of_b as u32,
+            of_c as u32,
+        );
+    }
+
+    /// Writes the sums of some views to `out`, all views being at `offset`; in a pass of second order their derivatives.
+    fn splat(&self, faces: &Prepared, splatted: Splatted, out: &Buffer, offset: usize) {
+        let Prepared { first_view, views, corners, reaches, slots } = faces;
+        let Splatted { words, scale, terms } = splatted;
+        let (face_count, lanes) = (self.op.faces.len(), self.lanes());
+        let add = |terms: Terms| {
+            splat::launch(
+                &self.client,
+                self.cubes((views * face_count + SLOTS as usize) * lanes as usize, UNITS),
+                CubeDim::new_1d(UNITS),
+                corners.clone().into_array_arg(),
+                reaches.clone().into_array_arg(),
+                slots.clone().into_array_arg(),
+                self.table.clone().into_array_arg(),
+                self.direction().into_array_arg(),
+                scale.clone().into_array_arg(),
+                words.clone().into_array_arg(),
+                self.lookup(),
+                self.frame(),
+                face_count as u32,
+                *views as u32,
+                self.table_offset(),
+                lanes,
+                terms,
+                self.second(),
+            );
+        };
+        if terms == Terms::Relative {
+            add(Terms::Measured);
+        }
+        add(terms);
+        let pixels = self.op.size.pixels();
+        settle::launch(
+            &self.client,
+            self.cubes(views * pixels, CUBE),
+            CubeDim::new_1d(CUBE),
+            words.clone().into_array_arg(),
+            slots.clone().into_array_arg(),
             self.table.clone().into_array_arg(),
             self.direction().into_array_arg(),
+            scale.clone().into_array_arg(),
             out.clone().into_array_arg(),
-            self.cells(culled),
             self.lookup(),
-            self.frame(),
+            face_count as u32,
+            pixels as u32,
+            (offset + first_view * pixels) as u32,
+            (views * pixels) as u32,
             self.table_offset(),
-            culled.first_view as u32,
-            offset as u32,
+            terms,
             self.second(),
         );
     }
 
+    /// Units that share a face, or a part of one.
+    fn lanes(&self) -> u32 {
+        if self.op.size.pixels() > MANY_PIXELS * self.op.faces.len() { 32 } else { 8 }
+    }
+
     /// Writes the gradient to the vertices of the views to the start of `out`.
-    fn write_corners(&self, culled: &Culled, upstream: &Buffer, out: &Buffer) {
-        let faces = self.op.faces.len();
-        let jobs = culled.views * faces;
-        let of_faces = self.buffer(6 * jobs, DType::F32);
+    fn write_corners(&self, prepared: &Prepared, upstream: &Buffer, out: &Buffer) {
+        let Prepared { first_view, views, corners, reaches, slots } = prepared;
+        let (faces, lanes) = (self.op.faces.len(), self.lanes());
+        let groups = views * faces + SLOTS as usize;
+        let of_faces = self.buffer(6 * groups, DType::F32);
         sum_faces::launch(
             &self.client,
-            self.cubes(jobs * UNITS as usize, UNITS),
+            self.cubes(groups * lanes as usize, UNITS),
             CubeDim::new_1d(UNITS),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
+            corners.clone().into_array_arg(),
+            reaches.clone().into_array_arg(),
+            slots.clone().into_array_arg(),
             self.table.clone().into_array_arg(),
             self.direction().into_array_arg(),
             upstream.clone().into_array_arg(),
@@ -280,41 +357,65 @@ impl<'a> Pass<'a> {
             self.lookup(),
             self.frame(),
             faces as u32,
-            jobs as u32,
+            *views as u32,
+            groups as u32,
             self.table_offset(),
-            culled.first_view as u32,
+            *first_view as u32,
+            lanes,
             self.second(),
         );
-        let jobs = culled.views * self.vertex_count;
-        sum_vertices::launch(
+        let corners = (&self.topology.corners, self.vertex_count);
+        self.gather(prepared, &of_faces, corners, out, [6, 0, 2, 3], false);
+    }
+
+    /// Adds up the corners of each vertex or entry: a `count` of numbers, which stand from `first` on in the `stride` of a face, as the first of
+    /// its `rows`.
+    pub(super) fn gather(
+        &self,
+        prepared: &Prepared,
+        of_faces: &Buffer,
+        (corners, vertices): (&Buffer, usize),
+        gradient: &Buffer,
+        [stride, first, count, rows]: [usize; 4],
+        by_vertex: bool,
+    ) {
+        gather_corners::launch(
             &self.client,
-            self.cubes(jobs, CUBE),
+            self.cubes(prepared.views * vertices * rows, CUBE),
             CubeDim::new_1d(CUBE),
-            of_faces.into_array_arg(),
-            self.topology.corners.clone().into_array_arg(),
-            out.clone().into_array_arg(),
-            self.vertex_count as u32,
-            faces as u32,
-            jobs as u32,
-            culled.first_view as u32,
+            of_faces.clone().into_array_arg(),
+            corners.clone().into_array_arg(),
+            prepared.reaches.clone().into_array_arg(),
+            prepared.slots.clone().into_array_arg(),
+            gradient.clone().into_array_arg(),
+            vertices as u32,
+            self.op.faces.len() as u32,
+            prepared.views as u32,
+            prepared.first_view as u32,
+            stride as u32,
+            first as u32,
+            count as u32,
+            rows as u32,
+            by_vertex,
         );
     }
 
-    /// Adds the gradient to the table of the culled views to `partial`.
-    fn add_cubics(&self, culled: &Culled, upstream: &Buffer, partial: &Partial) {
+    /// Adds the gradient to the table of some views to `partial`.
+    fn add_cubics(&self, faces: &Prepared, upstream: &Buffer, partial: &Partial) {
         sum_cubics::launch(
             &self.client,
             CubeCount::Static(partial.cubes as u32, 1, 1),
-            CubeDim::new_2d(TILE, TILE),
-            culled.corners.clone().into_array_arg(),
-            culled.reaches.clone().into_array_arg(),
-            culled.cells.clone().into_array_arg(),
+            CubeDim::new_1d(table::UNITS),
+            faces.corners.clone().into_array_arg(),
+            faces.reaches.clone().into_array_arg(),
+            faces.slots.clone().into_array_arg(),
             upstream.clone().into_array_arg(),
             partial.tables.clone().into_array_arg(),
-            self.cells(culled),
             self.lookup(),
             self.frame(),
-            culled.first_view as u32,
+            self.op.faces.len() as u32,
+            faces.views as u32,
+            faces.first_view as u32,
             self.second(),
         );
     }
@@ -352,34 +453,9 @@ impl<'a> Pass<'a> {
         self.op.grid.rows()
     }
 
-    /// Cells in a row of the image.
-    fn per_row(&self) -> usize {
-        self.op.size.width.div_ceil(self.side)
-    }
-
-    /// Cells in a column of the image.
-    fn per_column(&self) -> usize {
-        self.op.size.height.div_ceil(self.side)
-    }
-
-    fn cells_per_view(&self) -> usize {
-        self.per_row() * self.per_column()
-    }
-
     pub(super) fn frame(&self) -> FrameLaunch<WgpuRuntime> {
         let ImageSize { height, width } = self.op.size;
         FrameLaunch::new(height as u32, width as u32, height.min(width) as u32)
-    }
-
-    pub(super) fn cells(&self, culled: &Culled) -> CellsLaunch<WgpuRuntime> {
-        CellsLaunch::new(
-            self.side as u32,
-            self.per_row() as u32,
-            self.per_column() as u32,
-            words(self.op) as u32,
-            self.op.faces.len() as u32,
-            culled.views as u32,
-        )
     }
 
     fn lookup(&self) -> LookupLaunch<WgpuRuntime> {
@@ -420,9 +496,4 @@ pub(super) fn lookup(grid: &Grid) -> LookupLaunch<WgpuRuntime> {
         end as f32,
         grid.cells() as u32,
     )
-}
-
-/// Words that hold a bit for each face.
-fn words(op: &ProfileSum) -> usize {
-    op.faces.len().div_ceil(32)
 }

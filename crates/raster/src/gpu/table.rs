@@ -3,72 +3,67 @@
 use cubecl::prelude::*;
 
 use super::{
-    cells::Cells,
     dual::Dual,
     frame::Frame,
     pair::{Face, Lookup},
-    reach::Reach,
-    tile::TILE,
+    parts::{Part, SLOTS},
 };
 
-/// Adds the gradient of the table, every unit to a table of its own over the pixels that it walks:
+/// Units of a cube, which share a part of a face.
+pub(super) const UNITS: u32 = 64;
+
+/// Adds the gradient of the table, every unit to a table of its own over the pairs that it takes:
 /// there is no order of units on which a sum could depend. `partial` is `[units, rows, 4]`.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn sum_cubics(
     corners: &Array<f32>,
     reaches: &Array<u32>,
-    cells: &Array<u32>,
+    slots: &Array<u32>,
     upstream: &Array<f32>,
     partial: &mut Array<f32>,
-    of_cells: Cells,
     lookup: Lookup,
     frame: Frame,
+    face_count: u32,
+    views: u32,
     first_view: u32,
     #[comptime] second: bool,
 ) {
-    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
-    let across = (frame.width + TILE - 1u32) / TILE;
-    #[allow(clippy::manual_div_ceil, reason = "a shader has no other")]
-    let down = (frame.height + TILE - 1u32) / TILE;
-    let tiles = of_cells.views * across * down;
+    let jobs = views * face_count;
     let rows = 2u32 * (lookup.cells + 1u32);
     let own = ABSOLUTE_POS as u32 * rows * 4u32;
+    let tail = (own + 4u32 * lookup.cells) as usize;
     let stride = comptime!(if second { 12usize } else { 6usize });
-    let mut tile = CUBE_POS as u32;
-    while tile < tiles {
-        let column = tile % across * TILE + UNIT_POS_X;
-        let row = tile / across % down * TILE + UNIT_POS_Y;
-        let view = tile / (across * down);
-        if column < frame.width && row < frame.height {
-            let px = frame.column_centre(column);
-            let py = frame.row_centre(row);
-            let g = upstream[frame.pixel(first_view + view, row, column) as usize];
-            let first_word = of_cells.first_word(view, column, row);
-            // Every pair that is not in the tail replaces one.
-            let mut in_tail = of_cells.drawn(reaches, view);
-            for word in 0..of_cells.words {
-                let mut bits = cells[(first_word + word) as usize];
-                while bits != 0 {
-                    let face = 32 * word + bits.trailing_zeros();
-                    bits &= bits - 1u32;
-                    let face = (view * of_cells.face_count + face) as usize;
-                    if Reach::load(reaches, face).holds(column, row) {
-                        let pair = Face::new(corners, stride * face, second).pair(px, py, lookup);
-                        if pair.row != lookup.cells {
-                            in_tail -= 1u32;
-                            let g = Dual::constant(g);
-                            add_powers(partial, own + 4u32 * pair.row, pair.place, g, second);
-                        }
-                    }
-                }
+    let groups = jobs + SLOTS;
+    let mut group = CUBE_POS as u32;
+    while group < groups {
+        let part = Part::of(group, reaches, slots, views, jobs);
+        let view = part.job / face_count + first_view;
+        let face = Face::new(corners, stride * part.job as usize, second);
+        let mut pixel = part.start + UNIT_POS;
+        while pixel < part.end {
+            let (column, row) = (part.column(pixel), part.row(pixel));
+            let g = upstream[frame.pixel(view, row, column) as usize];
+            let pair = face.pair(frame.column_centre(column), frame.row_centre(row), lookup);
+            // A pair that is not in the tail replaces one that would be.
+            if pair.row != lookup.cells {
+                add_powers(partial, own + 4u32 * pair.row, pair.place, Dual::constant(g), second);
+                partial[tail] = partial[tail] - Dual::constant(g).stored(second);
             }
-            if !second {
-                let tail = (own + 4u32 * lookup.cells) as usize;
-                partial[tail] = partial[tail] + g * f32::cast_from(in_tail);
-            }
+            pixel += UNITS;
         }
-        tile += CUBE_COUNT as u32;
+        group += CUBE_COUNT as u32;
+    }
+    if !second {
+        // All faces are in the tail of pixels that they do not reach.
+        let per_view = frame.height * frame.width;
+        let mut pixel = ABSOLUTE_POS as u32;
+        while pixel < views * per_view {
+            let drawn = f32::cast_from(slots[(1u32 + pixel / per_view) as usize]);
+            let g = upstream[(first_view * per_view + pixel) as usize];
+            partial[tail] = partial[tail] + g * drawn;
+            pixel += UNITS * CUBE_COUNT as u32;
+        }
     }
 }
 

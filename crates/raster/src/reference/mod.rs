@@ -4,15 +4,16 @@
 
 mod blend;
 mod distance;
+mod elementary;
 
 use softrast_softness::Softness;
 use softrast_tensor::{Autodiff, Backend, Tensor, TensorData};
 
-pub use crate::tensor_ops::{iou_loss, mse_loss, orbit_matrices, perspective};
 use crate::{ImageSize, NEAR, TConorm};
 pub use blend::blended;
 use distance::corners;
 pub use distance::signed_distance;
+pub use elementary::{iou_loss, mse_loss, orbit_matrices, perspective};
 
 /// Pixel-face pairs that one chunk of [`sums`] and [`vjp`] may hold.
 const PAIRS: usize = 1 << 18;

@@ -4,7 +4,9 @@
 //! there is none.
 
 mod colours;
+mod launches;
 mod products;
+mod small_ops;
 #[path = "../triangles/mod.rs"]
 mod triangles;
 mod workloads;
@@ -13,7 +15,9 @@ use std::sync::Arc;
 
 use products::{Path, Products, Scene, tensor};
 use softrast_mesh::{Mesh, fox, icosphere};
-use softrast_raster::{ImageSize, Wgpu, adapter_name, low_level::Rasterizer, project};
+use softrast_raster::{
+    ImageSize, RasterBackend, TConorm, Wgpu, adapter_name, low_level::Rasterizer, project,
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{DType, NdArray, Tensor};
 
@@ -111,10 +115,13 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
     let azimuths = [4.1, 108.3, 211.9];
     let [low, high] = [[20, 43], [51, 30]]
         .map(|size| seen(&icosphere(2), (17.3, &azimuths), size, squared, 1e-3));
+    // Faces that reach more pixels than a part has.
+    let cut = seen(&icosphere(0), (17.3, &[4.1]), 150, squared, 1e-2);
     let scenes = [
         ("a sphere", sphere),
         ("a fox", fox),
         ("a tail", tail),
+        ("faces in parts", cut),
         ("a low image", low),
         ("a high image", high),
     ];
@@ -155,9 +162,72 @@ fn the_same_numbers_come_out_every_time() {
         return;
     }
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
-    let scene = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
-    let [first, second] = [(); 2].map(|()| Products::new::<Wgpu>(&scene, DType::F32, Path::Fused));
-    assert_eq!(first, second);
+    let sphere = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
+    let cut = Scene { size: 150.into(), ..random(softness, 0.05) };
+    for scene in [sphere, cut] {
+        let products = || Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
+        assert_eq!(products(), products());
+    }
+}
+
+/// Coverage of a scene under a T-conorm.
+fn coverage<T: RasterBackend>(scene: &Scene, t_conorm: TConorm, dtype: DType) -> Vec<f64> {
+    let Scene { views, size, softness, .. } = *scene;
+    let phi = softness.default_phi(scene.scale);
+    let exact = tensor::<NdArray<f64>, 1>(&phi, [phi.len()], DType::F64);
+    let rasterizer = Rasterizer { tolerance: 1e-7, t_conorm, ..Rasterizer::new(size) };
+    let silhouette = rasterizer.prepare(&scene.faces, softness, &exact);
+    let table: Vec<f64> = silhouette.table_data(&phi).iter().collect();
+    let count = scene.vertices.len() / 3 / views;
+    let vertices = tensor::<T, 3>(&scene.vertices, [views, count, 3], dtype);
+    let table = tensor::<T, 2>(&table, [table.len() / 4, 4], dtype);
+    products::numbers(silhouette.coverage_by_table(vertices, table))
+}
+
+#[test]
+fn every_t_conorm_gives_the_same_image_as_on_the_cpu() {
+    if !adapter() {
+        return;
+    }
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let scene = seen(&icosphere(2), (17.3, &[4.1, 108.3]), 40, softness, 0.03);
+    let t_conorms = [
+        TConorm::Probabilistic,
+        TConorm::Einstein,
+        TConorm::Hamacher(0.1),
+        TConorm::Hamacher(7.0),
+        TConorm::Frank(0.1),
+        TConorm::Frank(9.0),
+        TConorm::Yager(4.0),
+        TConorm::AczelAlsina(2.0),
+        TConorm::Dombi(2.0),
+        TConorm::SchweizerSklar(-2.0),
+    ];
+    for t_conorm in t_conorms {
+        let expected = coverage::<NdArray<f64>>(&scene, t_conorm, DType::F64);
+        let found = coverage::<Wgpu>(&scene, t_conorm, DType::F32);
+        let off = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        println!("{t_conorm}: {off:.1e}");
+        assert!(off <= 1e-5, "{t_conorm}: a pixel is off by {off:e}");
+    }
+}
+
+#[test]
+fn more_large_faces_than_can_be_cut_are_drawn_whole() {
+    if !adapter() {
+        return;
+    }
+    // A stack of one triangle: two parts of each would take more slots than there are.
+    let (count, softness) = (2100, EdgeSoftness { family: Family::Logistic, squared: false });
+    let corners = [[-1.9, -0.9, 2.0], [1.9, -0.9, 2.0], [0.0, 0.9, 2.0]].concat();
+    let faces: Arc<[[u32; 3]]> = vec![[0, 1, 2]; count].into();
+    let scene =
+        Scene { vertices: corners, views: 1, faces, size: 100.into(), softness, scale: 0.02 };
+    let expected = coverage::<NdArray<f64>>(&scene, TConorm::Probabilistic, DType::F64);
+    let found = coverage::<Wgpu>(&scene, TConorm::Probabilistic, DType::F32);
+    for (pixel, (found, expected)) in found.iter().zip(&expected).enumerate() {
+        assert!((found - expected).abs() <= 1e-5, "pixel {pixel}: {found}, not {expected}");
+    }
 }
 
 #[test]

@@ -29,6 +29,11 @@ pub enum ElementaryOp {
 }
 
 impl ElementaryOp {
+    #[cfg(feature = "wgpu")]
+    pub(crate) fn is_iou(self) -> bool {
+        matches!(self, Self::Iou)
+    }
+
     /// Runs a pass over `slices` with the shapes `dims`.
     pub(crate) fn run<F>(self, pass: &Pass, slices: &[&[F]], dims: &[Vec<usize>]) -> TensorData
     where

@@ -1,4 +1,4 @@
-//! What a step does around the sums: cameras and losses, in tensor ops. A GPU runs these.
+//! Cameras and losses in tensor ops: what the small ops are tested against.
 
 use softrast_kernel::EMPTY;
 use softrast_tensor::{Backend, Tensor};

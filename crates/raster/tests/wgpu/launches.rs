@@ -1,0 +1,99 @@
+//! How many kernels a step launches, as the log of `CubeCL` counts them: each takes microseconds of the host, however little it does.
+
+use std::{fs, process::Command};
+
+use softrast_mesh::icosphere;
+use softrast_raster::{Orbit, RasterBackend, SoftRenderer, Wgpu, project, vertices};
+use softrast_softness::{EdgeSoftness, Family};
+use softrast_tensor::{Autodiff, Tensor};
+
+use crate::adapter;
+
+/// Says in the child how many steps to take.
+const STEPS: &str = "SOFTRAST_STEPS";
+
+/// Losses of three views of a ball, and what they are differentiated by.
+fn step<T: RasterBackend>(
+    renderer: &SoftRenderer<EdgeSoftness>,
+    target: Tensor<Autodiff<T>, 3>,
+    pose: bool,
+) {
+    let device = Default::default();
+    let ball = icosphere(2);
+    let points = vertices::<Autodiff<T>>(ball.positions(), &device);
+    let orbit =
+        |azimuth_deg| Orbit { distance: 2.7, elevation_deg: 17.0, azimuth_deg, fov_deg: 60.0 };
+    let orbits = Orbit::tensors::<Autodiff<T>>(&[4.0, 108.0, 211.0].map(orbit), &device);
+    let (points, orbits) =
+        if pose { (points, orbits.require_grad()) } else { (points.require_grad(), orbits) };
+    let seen = project(points.clone(), orbits.clone());
+    let loss = match pose {
+        true => renderer.iou_loss(seen, target),
+        false => renderer.mse_loss(seen, target),
+    };
+    // That of a sum of them.
+    let gradients = loss.backward();
+    let _ = match pose {
+        true => orbits.grad(&gradients).expect("a gradient").into_data(),
+        false => points.grad(&gradients).expect("a gradient").into_data(),
+    };
+}
+
+fn take_steps(pose: bool) {
+    let steps: usize = std::env::var(STEPS).ok().and_then(|steps| steps.parse().ok()).unwrap_or(0);
+    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let renderer = SoftRenderer::new(icosphere(2).faces(), 64, softness, 1e-3);
+    let target = Tensor::zeros([3, 64, 64], &Default::default());
+    for _ in 0..steps {
+        step::<Wgpu>(&renderer, target.clone(), pose);
+    }
+}
+
+#[test]
+#[ignore = "run by another test, with a log of its own"]
+fn steps_of_a_shape() {
+    take_steps(false);
+}
+
+#[test]
+#[ignore = "run by another test, with a log of its own"]
+fn steps_of_a_pose() {
+    take_steps(true);
+}
+
+/// Kernels that a process launches which takes so many steps, with their names.
+fn launched(name: &str, steps: usize) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("log");
+    let test = format!("launches::{name}");
+    let run = Command::new(std::env::current_exe().expect("this test"))
+        .args(["--exact", &test, "--ignored", "--nocapture"])
+        .env("CUBECL_DEBUG_LOG", &log)
+        .env(STEPS, steps.to_string())
+        .output()
+        .expect("the test runs again");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stdout));
+    let text = fs::read_to_string(&log).expect("a log");
+    text.lines().filter(|line| line.starts_with("| ")).map(str::to_owned).collect()
+}
+
+fn assert_few(name: &str, most: usize) {
+    if !adapter() {
+        return;
+    }
+    let [once, twice] = [1, 2].map(|steps| launched(name, steps));
+    let found = twice.len() - once.len();
+    println!("{name}: {found} launches a step\n{}", twice[once.len()..].join("\n"));
+    assert!(found > 0, "the log names no kernel");
+    assert!(found <= most, "{name}: {found} launches a step");
+}
+
+#[test]
+fn a_step_of_a_shape_launches_few_kernels() {
+    assert_few("steps_of_a_shape", 15);
+}
+
+#[test]
+fn a_step_of_a_pose_launches_few_kernels() {
+    assert_few("steps_of_a_pose", 17);
+}
