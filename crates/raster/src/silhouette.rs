@@ -76,12 +76,9 @@ impl Rasterizer {
             grid: profile.grid(),
             size: self.size,
             near: NEAR,
-            like_depths: t_conorm.is_like_depths(),
             kept: None,
             #[cfg(feature = "wgpu")]
-            topology: Default::default(),
-            #[cfg(feature = "wgpu")]
-            prepared: None,
+            on_gpu: crate::gpu::SumOnGpu::new(t_conorm.is_like_depths()),
         };
         Silhouette { softness, profile, op }
     }

@@ -104,6 +104,7 @@ impl TConorm {
 
     /// Whether `g(s)` is the optical depth of s or close to it: then it grows as slowly as that beside 1, and beside 0 it is no less than a tenth
     /// of s. Others may be powers of s, whose size floats can tell and a fixed unit cannot.
+    #[cfg(feature = "wgpu")]
     pub(crate) fn is_like_depths(self) -> bool {
         match self {
             Self::Probabilistic | Self::Einstein => true,

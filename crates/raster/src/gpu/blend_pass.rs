@@ -19,7 +19,7 @@ use super::{
     of_pixel::OF_PIXEL,
     parts::SLOTS,
     pass::{CUBE, Partial, Pass, lookup},
-    prepared::{Buffer, Prepared},
+    prepared::{Buffer, Prepared, SumOnGpu},
     table::{self, sum_tables},
     texels::{MEASURED, sum_texels, texel_floats},
     topology::{OnDevice, Topology},
@@ -72,10 +72,8 @@ pub(super) fn culling(op: &SoftBlend) -> ProfileSum {
         grid: Grid { outer: op.edge.inner, from: [op.edge.from[1]; 2], ..op.edge },
         size: op.size,
         near: crate::NEAR,
-        like_depths: false,
         kept: None,
-        topology: op.topology.clone(),
-        prepared: None,
+        on_gpu: SumOnGpu { topology: op.topology.clone(), ..SumOnGpu::new(false) },
     }
 }
 

@@ -38,7 +38,7 @@ mod whole;
 #[cfg(not(target_family = "wasm"))]
 pub use adapter::adapter_name;
 pub use backend::Wgpu;
-pub(crate) use prepared::Kept;
+pub(crate) use prepared::SumOnGpu;
 pub(crate) use topology::Topology;
 
 use softrast_tensor::{FloatTensor, FloatTensorOps, TensorMetadata};

@@ -86,7 +86,7 @@ impl<'a> Pass<'a> {
         assert_eq!(vertices.dtype(), DType::F32, "profile_sum on the GPU works in f32");
         let (client, device) = (vertices.client.clone(), vertices.device.clone());
         let (views, vertex_count) = (vertices.shape()[0], vertices.shape()[2]);
-        let topology = op.topology.on(&op.faces, vertex_count, &client, &device);
+        let topology = op.on_gpu.topology.on(&op.faces, vertex_count, &client, &device);
         Self {
             op,
             client,
@@ -202,7 +202,7 @@ impl<'a> Pass<'a> {
     /// Where faces are kept for other passes: not those of some views alone, nor with what only this pass wants of them.
     fn kept(&self) -> Option<&Kept> {
         let whole = self.parts().count() == 1 && !self.second() && !self.depths;
-        self.op.prepared.as_ref().filter(|_| whole)
+        self.op.on_gpu.kept.as_ref().filter(|_| whole)
     }
 
     /// Prepares the faces of some views. The first words of `slots` are 0.
@@ -241,7 +241,7 @@ impl<'a> Pass<'a> {
         let words = self.buffer(2 * pixels, DType::U32);
         let header = if slots.is_some() { 1 + views } else { 0 };
         let slots = slots.cloned().unwrap_or_else(|| self.buffer(1, DType::U32));
-        if self.op.like_depths && !self.second() {
+        if self.op.on_gpu.like_depths && !self.second() {
             let scale = self.buffer(2, DType::U32);
             clear::launch(
                 &self.client,

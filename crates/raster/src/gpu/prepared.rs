@@ -5,11 +5,34 @@ use std::{
 
 use softrast_tensor::wgpu::{CubeTensor, WgpuRuntime};
 
+use super::topology::Topology;
+
 pub(super) type Buffer = CubeTensor<WgpuRuntime>;
+
+/// What an op of sums has beside its inputs on a GPU.
+#[derive(Clone, Debug)]
+pub(crate) struct SumOnGpu {
+    pub(super) topology: Topology,
+    /// Of an op that is recorded.
+    pub(super) kept: Option<Kept>,
+    /// Whether terms are like optical depths: none that counts is lost beside the largest in a sum of whole numbers.
+    pub(super) like_depths: bool,
+}
+
+impl SumOnGpu {
+    pub(crate) fn new(like_depths: bool) -> Self {
+        Self { topology: Topology::default(), kept: None, like_depths }
+    }
+
+    /// The same of one call whose passes share what they find out.
+    pub(crate) fn keeping(&self) -> Self {
+        Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
+    }
+}
 
 /// What a pass forward leaves to the passes back: the faces of all views, if their buffers fit. 44 bytes for each.
 #[derive(Clone, Default)]
-pub(crate) struct Kept(Arc<OnceLock<Prepared>>);
+pub(super) struct Kept(Arc<OnceLock<Prepared>>);
 
 impl fmt::Debug for Kept {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

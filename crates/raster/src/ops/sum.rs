@@ -12,16 +12,11 @@ pub struct ProfileSum {
     pub(crate) grid: Grid,
     pub(crate) size: ImageSize,
     pub(crate) near: f64,
-    /// Whether terms are like optical depths: none that counts is lost beside the largest in a sum of whole numbers.
-    pub(crate) like_depths: bool,
     /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows. 20 bytes for each face of
     /// each view.
     pub(crate) kept: Option<Arc<OnceLock<Bands>>>,
     #[cfg(feature = "wgpu")]
-    pub(crate) topology: crate::gpu::Topology,
-    /// The same of an op that is recorded on a GPU: what faces reach.
-    #[cfg(feature = "wgpu")]
-    pub(crate) prepared: Option<crate::gpu::Kept>,
+    pub(crate) on_gpu: crate::gpu::SumOnGpu,
 }
 
 impl ProfileSum {
@@ -30,7 +25,7 @@ impl ProfileSum {
         Self {
             kept: Some(self.kept.clone().unwrap_or_default()),
             #[cfg(feature = "wgpu")]
-            prepared: Some(self.prepared.clone().unwrap_or_default()),
+            on_gpu: self.on_gpu.keeping(),
             ..self.clone()
         }
     }
