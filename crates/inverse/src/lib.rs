@@ -53,6 +53,7 @@ mod softness_file;
 mod surface;
 mod targets;
 pub mod triangles;
+mod vertex_model;
 
 pub use baked::baked;
 pub use checkpoint::Checkpoint;
@@ -77,6 +78,7 @@ pub use silhouette_pixels::silhouette_pixels;
 pub use softness_file::{DepthSoftnessFile, NameOrFile, NamedSoftness, SoftnessFileError};
 pub use surface::Surface;
 pub use targets::Targets;
+pub use vertex_model::VertexModel;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

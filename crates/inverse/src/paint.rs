@@ -4,8 +4,7 @@ use anyhow::{Context, ensure};
 use softrast_mesh::{Edges, Mesh};
 use softrast_meta::{Adam, InnerLoop, descend};
 use softrast_raster::{
-    Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Weighting, project_pinhole,
-    vertices,
+    Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Weighting, project, vertices,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
@@ -63,7 +62,7 @@ pub fn paint(
     let cameras: Vec<Pinhole> = cameras.iter().map(|camera| frame.camera(camera)).collect();
     let device = Default::default();
     let corners = vertices::<HostBackend>(framed.positions(), &device);
-    let seen = project_pinhole(corners, &Pinholes::new(&cameras, &device));
+    let seen = project(corners, Pinholes::new(&cameras, &device));
     let renderer = renderer(&framed, &faces, size, numbers(seen.clone().narrow(2, 2, 1)))?;
     let background = renderer.background::<B>(&[0.0; 3], &device);
     let surface = Surface::<B>::new(&Edges::new(&faces), count);
@@ -73,7 +72,8 @@ pub fn paint(
     let gradient = |step: usize, theta: &Tensor<HostBackend, 1>| {
         let leaf = Tensor::<B, 1>::from_inner(theta.clone()).require_grad();
         let colours: Tensor<B, 2> = leaf.clone().reshape([3, count]);
-        let attributes = Attributes::new(colours.clone().transpose().unsqueeze(), faces.clone());
+        let colours: Tensor<_, 3> = colours.transpose().unsqueeze();
+        let attributes = Attributes::new(colours.clone(), faces.clone());
         let image = renderer.image(Tensor::from_inner(seen.clone()), &attributes, &background);
         let off = targets.loss(image);
         visit(step, numbers(off.clone().inner())[0])?;

@@ -1,20 +1,18 @@
-use softrast_mesh::Edges;
+use softrast_mesh::{Edges, Mesh};
 use softrast_raster::{edge_length, flatness, normal_consistency};
 use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData, tensor};
 
-/// The connections of a surface, for losses that keep it smooth. Each takes `vertices` `[3, vertices]` in world units and gives `[1]`.
-///
-/// Coordinates come with the axes first: so they are many times faster to gather on the CPU than rows of three.
+/// The connections of a surface, for losses that keep it smooth. Each takes `vertices` `[1, vertices, 3]` in world units, as
+/// [`project`](softrast_raster::project) does, and gives `[1]`.
 ///
 /// ```
-/// use softrast_tensor::{NdArray, Tensor};
+/// use softrast_tensor::NdArray;
 /// use softrast_inverse::Surface;
-/// use softrast_mesh::{Edges, icosphere};
+/// use softrast_mesh::icosphere;
 ///
 /// let sphere = icosphere(1);
-/// let surface = Surface::<NdArray>::new(&Edges::new(sphere.faces()), sphere.positions().len());
+/// let surface = Surface::<NdArray>::of(&sphere);
 /// let vertices = softrast_raster::vertices(sphere.positions(), &Default::default());
-/// let vertices: Tensor<NdArray, 2> = vertices.squeeze_dim::<2>(0).transpose();
 /// let bend = surface.normal_consistency(vertices.clone()).into_scalar();
 /// assert!((0.0..0.2).contains(&bend));
 /// let stretched = surface.edge_length(vertices, 0.5).into_scalar();
@@ -36,6 +34,11 @@ pub struct Surface<B: Backend> {
 }
 
 impl<B: Backend> Surface<B> {
+    /// That of a mesh.
+    pub fn of(mesh: &Mesh) -> Self {
+        Self::new(&Edges::new(mesh.faces()), mesh.positions().len())
+    }
+
     /// Of as many `vertices`, joined by these edges.
     pub fn new(edges: &Edges, vertices: usize) -> Self {
         let forth = edges.ends.iter().copied();
@@ -63,7 +66,8 @@ impl<B: Backend> Surface<B> {
     /// `Σ |v - mean of the neighbours of v|²`.
     ///
     /// A vertex without neighbours, which cannot be seen, does not count. Source: docs/notes.md, Losses and errors.
-    pub fn laplacian(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
+    pub fn laplacian(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
+        let vertices = by_axis(vertices);
         let neighbours = vertices.clone().gather(1, self.to.clone());
         let sums =
             vertices.zeros_like().scatter(1, self.from.clone(), neighbours, IndexingUpdateOp::Add);
@@ -72,29 +76,34 @@ impl<B: Backend> Surface<B> {
     }
 
     /// [`flatness`]; 0 where no two faces share an edge.
-    pub fn flatness(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
+    pub fn flatness(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         gathered(vertices, self.hinges.as_ref(), flatness)
     }
 
     /// [`normal_consistency`]; 0 where no two faces share an edge.
-    pub fn normal_consistency(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
+    pub fn normal_consistency(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         gathered(vertices, self.hinges.as_ref(), normal_consistency)
     }
 
     /// [`edge_length`] around this `length` in world units; 0 where there is no edge.
-    pub fn edge_length(&self, vertices: Tensor<B, 2>, length: f64) -> Tensor<B, 1> {
+    pub fn edge_length(&self, vertices: Tensor<B, 3>, length: f64) -> Tensor<B, 1> {
         gathered(vertices, self.ends.as_ref(), |ends| edge_length(ends, length))
     }
 }
 
+/// `[3, vertices]`: many times faster to gather on the CPU than rows of three.
+fn by_axis<B: Backend>(vertices: Tensor<B, 3>) -> Tensor<B, 2> {
+    vertices.squeeze_dim::<2>(0).transpose()
+}
+
 /// A loss of some vertices, or 0 of none.
 fn gathered<B: Backend>(
-    vertices: Tensor<B, 2>,
+    vertices: Tensor<B, 3>,
     numbers: Option<&Tensor<B, 2, Int>>,
     loss: impl Fn(Tensor<B, 3>) -> Tensor<B, 1>,
 ) -> Tensor<B, 1> {
     match numbers {
-        Some(numbers) => loss(vertices.gather(1, numbers.clone()).unsqueeze()),
+        Some(numbers) => loss(by_axis(vertices).gather(1, numbers.clone()).unsqueeze()),
         None => vertices.sum() * 0.0,
     }
 }

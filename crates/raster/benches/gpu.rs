@@ -3,6 +3,7 @@
 //! ```text
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu              # a table
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- --json    # and a line of JSON
+//! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- W1        # what has W1 in its name
 //! ```
 //!
 //! A step is all that an optimisation does but its update: projection, image, mean squared difference to a disk (of colours to black), gradient to
@@ -47,19 +48,24 @@ fn main() {
     let million = Workload::new("", &icosphere(8), &[30.0], 1024);
     let million = Workload { width: HALF_A_PIXEL, ..million };
     let million = named("W5 (sphere of 1,310,720 faces, 1024 px, half a pixel)", million);
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let filter = words.iter().find(|word| !word.starts_with("--"));
+    let wanted = |workload: &Workload| filter.is_none_or(|part| workload.name.contains(part));
     let silhouettes = [Workload::w1(), Workload::w2(), large, million];
     let colours = named("W3 (W2 in colours)", Workload::w2());
     println!("{:<56} {:>10} {:>10}", "a step, ms (median)", "GPU", "CPU");
     let mut rows = Vec::new();
-    for workload in &silhouettes {
+    for workload in silhouettes.iter().filter(|workload| wanted(workload)) {
         let gpu = median(|| silhouette::<Wgpu>(workload));
         let cpu = median(|| silhouette::<NdArray<f32>>(workload));
         rows.push(shown(&workload.name, [gpu, cpu]));
     }
-    let gpu = median(|| coloured::<Wgpu>(&colours));
-    let cpu = median(|| coloured::<NdArray<f32>>(&colours));
-    rows.push(shown(&colours.name, [gpu, cpu]));
-    if std::env::args().any(|word| word == "--json") {
+    if wanted(&colours) {
+        let gpu = median(|| coloured::<Wgpu>(&colours));
+        let cpu = median(|| coloured::<NdArray<f32>>(&colours));
+        rows.push(shown(&colours.name, [gpu, cpu]));
+    }
+    if words.iter().any(|word| word == "--json") {
         println!("[{}]", rows.join(","));
     }
 }

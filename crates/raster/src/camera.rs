@@ -1,11 +1,5 @@
 use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
 
-use crate::{
-    RasterBackend,
-    backend::{elementary, primitive},
-    ops::ElementaryOp,
-};
-
 /// A line of sight, or an up across it, that is not longer than this has no direction, in world units.
 const SHORTEST: f64 = 1e-12;
 
@@ -33,7 +27,7 @@ pub struct Orbit {
 }
 
 impl Orbit {
-    /// The numbers as [`project`] takes them, `[1, 4]`.
+    /// The numbers as [`project`](crate::project) takes them, `[1, 4]`.
     pub fn tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 2> {
         Self::tensors(std::slice::from_ref(self), device)
     }
@@ -69,45 +63,9 @@ impl Orbit {
     }
 }
 
-/// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: the vertices of a mesh, for [`project`].
+/// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: the vertices of a mesh, for [`project`](crate::project).
 pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tensor<B, 3> {
     tensor_on(positions.concat(), [1, positions.len(), 3], device)
-}
-
-/// Perspective projection by cameras that orbit the origin.
-///
-/// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates.
-/// `orbits` `[views, 4]` holds for each view the distance in world units, then elevation, azimuth
-/// and the whole field of view in degrees, as [`Orbit::tensor`] makes it. The result is `[views,
-/// vertices, 3]`: x and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera depth in world
-/// units.
-///
-/// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
-/// vertex nearer than [`NEAR`](crate::NEAR) is projected as though it were that near, so that nothing divides
-/// by zero; the rasterizer does not draw its faces, by their depth.
-///
-/// Source: docs/notes.md, Camera.
-///
-/// # Panics
-///
-/// If the shapes do not fit.
-pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, orbits: Tensor<B, 2>) -> Tensor<B, 3> {
-    let [_, four] = orbits.dims();
-    assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", orbits.dims());
-    let matrices = elementary(ElementaryOp::OrbitMatrix, vec![primitive(orbits)]);
-    perspective(vertices, matrices)
-}
-
-/// What cameras with these matrices `[views, 3, 4]` see: two rows give x and y times the depth, the third gives the depth.
-pub(crate) fn perspective<B: RasterBackend>(
-    vertices: Tensor<B, 3>,
-    matrices: Tensor<B, 3>,
-) -> Tensor<B, 3> {
-    let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
-    assert!(three == 3 && (held == views || held == 1), "vertices {:?}", vertices.dims());
-    // The rasterizer wants one row for each axis, and turning them back is free.
-    let inputs = vec![primitive(vertices), primitive(matrices)];
-    elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2)
 }
 
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -6,6 +6,7 @@ use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 
 use crate::{
     Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
+    Width,
     backend::{fused, primitive},
     cache::Cache,
     curve::precise,
@@ -83,22 +84,22 @@ impl ColourRenderer {
 
 impl<S: Softness> ColourRenderer<S> {
     /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under an edge
-    /// softness of this `scale` in NDC and, between the depths `planes` of nearness 1 and 0 (ascending, world units), the reversed
+    /// softness of this [`Width`] (a number is its scale) and, between the depths `planes` of nearness 1 and 0 (ascending, world units), the reversed
     /// exponential as depth softness: a face counts e times as much as one that lies [`DEPTH_SCALE`](ColourRenderer::DEPTH_SCALE) of the distance
     /// between the planes behind it, as in `SoftRas` and PyTorch3D.
     ///
     /// # Panics
     ///
-    /// If `faces` or the image is empty, `scale` is not positive, or the planes do not ascend.
+    /// If `faces` or the image is empty, the width is not positive, or the planes do not ascend.
     pub fn new(
         faces: &[[u32; 3]],
         size: impl Into<ImageSize>,
         edge: S,
-        scale: f64,
+        width: impl Into<Width>,
         planes: [f64; 2],
     ) -> Self {
-        let depth = DepthSoftness::Family(Family::Exp);
-        let phi = [edge.default_phi(scale), depth.default_phi(ColourRenderer::DEPTH_SCALE)];
+        let (depth, size) = (DepthSoftness::Family(Family::Exp), size.into());
+        let phi = [width.into().phi(&edge, size), depth.default_phi(ColourRenderer::DEPTH_SCALE)];
         let weighting = Weighting { edge, depth, planes };
         Self::with_weighting(faces.into(), size, weighting, phi)
     }

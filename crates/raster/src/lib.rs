@@ -42,6 +42,7 @@ mod ops;
 mod picture_loss;
 mod pinhole;
 mod profile;
+mod project;
 pub mod reference;
 mod shading;
 mod silhouette;
@@ -50,11 +51,12 @@ mod soft_renderer;
 mod t_conorm;
 mod view;
 mod weighting;
+mod width;
 
 pub use attributes::Attributes;
 pub use backend::RasterBackend;
 pub use backend_choice::{BackendChoice, HostBackend, NoBackend};
-pub use camera::{Orbit, project, vertices};
+pub use camera::{Orbit, vertices};
 pub use colour::{Background, blend, hard_colour, nearness};
 pub use colour_renderer::ColourRenderer;
 #[cfg(feature = "wgpu")]
@@ -66,7 +68,8 @@ pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use no_adapter::NoAdapter;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
-pub use pinhole::{Pinhole, PinholeError, Pinholes, project_pinhole, rotate_by_tangent};
+pub use pinhole::{Pinhole, PinholeError, Pinholes, rotate_by_tangent};
+pub use project::{Cameras, project};
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use soft_renderer::SoftRenderer;
 pub use softrast_kernel::ImageSize;
@@ -76,6 +79,7 @@ pub use softrast_tensor as tensor;
 pub use t_conorm::{TConorm, UnknownTConorm};
 pub use view::view_rotation;
 pub use weighting::Weighting;
+pub use width::{Width, WidthPath};
 
 /// Parts of the renderers, for callers that prepare tables, run ops on slices, or measure them.
 pub mod low_level {

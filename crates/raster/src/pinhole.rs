@@ -1,8 +1,8 @@
 use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use crate::{
-    ImageSize, Orbit, RasterBackend,
-    camera::{cross, dot, perspective, unit},
+    Cameras, ImageSize, Orbit, RasterBackend,
+    camera::{cross, dot, unit},
     small_product,
     view::sin_cos,
 };
@@ -20,12 +20,12 @@ const ROUNDED: f64 = 1e-3;
 ///
 /// ```
 /// # use softrast_tensor::NdArray;
-/// use softrast_raster::{Pinhole, Pinholes, project_pinhole, vertices};
+/// use softrast_raster::{Pinhole, Pinholes, project, vertices};
 ///
 /// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, [150, 200]);
 /// let device = Default::default();
 /// let corners = vertices::<NdArray>(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], &device);
-/// let seen = project_pinhole(corners, &Pinholes::new(&[camera], &device)); // [1, 2, 3]
+/// let seen = project(corners, Pinholes::new(&[camera], &device)); // [1, 2, 3]
 /// let x: Vec<f32> = seen.into_data().to_vec().unwrap();
 /// assert!(x[0].abs() < 1e-6 && x[3] > 0.0, "the origin is in the middle, +x to the right");
 /// ```
@@ -283,8 +283,9 @@ impl<B: Backend> Pinholes<B> {
             size,
         }
     }
+}
 
-    /// What projects: `[views, 3, 4]`, two rows give x and y in NDC times the depth, the third gives the depth.
+impl<B: RasterBackend> Cameras<B> for Pinholes<B> {
     fn matrices(&self) -> Tensor<B, 3> {
         let Self { rotation, translation, intrinsics, size } = self;
         let [views, ..] = rotation.dims();
@@ -309,22 +310,6 @@ impl<B: Backend> Pinholes<B> {
             + ahead.clone() * ndc.narrow(1, 2, 2);
         Tensor::cat(vec![seen, ahead], 1)
     }
-}
-
-/// Perspective projection by pinhole cameras.
-///
-/// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates. The result is `[views, vertices, 3]`: x
-/// and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera depth in world units. What is far away or near
-/// the camera is held as with [`project`](crate::project).
-///
-/// # Panics
-///
-/// If the shapes do not fit.
-pub fn project_pinhole<B: RasterBackend>(
-    vertices: Tensor<B, 3>,
-    cameras: &Pinholes<B>,
-) -> Tensor<B, 3> {
-    perspective(vertices, cameras.matrices())
 }
 
 /// Rotations `[views, 3, 3]` turned further: `exp([w]×) R`, by the angle |w| in radians around the axis w in camera axes.

@@ -5,7 +5,7 @@ use softrast_softness::Softness;
 use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
 
 use crate::{
-    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, cache::Cache,
+    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, Width, cache::Cache,
     loss::loss_of_images,
 };
 
@@ -53,14 +53,20 @@ struct Knots<S> {
 
 impl<S: Softness> SoftRenderer<S> {
     /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under a softness
-    /// of this `scale` (NDC, or NDC² if squared; one pixel is 2 over the shorter side), the probabilistic sum and [`Rasterizer::TOLERANCE`].
+    /// of this [`Width`] (a number is its scale), the probabilistic sum and [`Rasterizer::TOLERANCE`].
     ///
     /// # Panics
     ///
-    /// If `faces` or the image is empty, or `scale` is not positive.
-    pub fn new(faces: &[[u32; 3]], size: impl Into<ImageSize>, softness: S, scale: f64) -> Self {
-        let phi = softness.default_phi(scale);
-        Self::with_rasterizer(Rasterizer::new(size), faces.into(), softness, phi)
+    /// If `faces` or the image is empty, or the width is not positive.
+    pub fn new(
+        faces: &[[u32; 3]],
+        size: impl Into<ImageSize>,
+        softness: S,
+        width: impl Into<Width>,
+    ) -> Self {
+        let rasterizer = Rasterizer::new(size);
+        let phi = width.into().phi(&softness, rasterizer.size);
+        Self::with_rasterizer(rasterizer, faces.into(), softness, phi)
     }
 
     /// The same from parts: `phi` `[parameters]` are the parameters of the softness.
@@ -92,15 +98,15 @@ impl<S: Softness> SoftRenderer<S> {
         self.changed(|rasterizer| rasterizer.t_conorm = t_conorm)
     }
 
-    /// With another softness in the backward pass, at this `scale`: a sharp image with a wide gradient. What comes back is not the
+    /// With another softness in the backward pass, of this [`Width`]: a sharp image with a wide gradient. What comes back is not the
     /// derivative of the image; see [`Silhouette::coverage_with_surrogate`].
     ///
     /// # Panics
     ///
-    /// If `scale` is not positive.
+    /// If the width is not positive.
     #[must_use]
-    pub fn with_surrogate(self, softness: S, scale: f64) -> Self {
-        let phi = softness.default_phi(scale);
+    pub fn with_surrogate(self, softness: S, width: impl Into<Width>) -> Self {
+        let phi = width.into().phi(&softness, self.rasterizer.size);
         self.with_surrogate_phi(softness, phi)
     }
 
@@ -152,6 +158,25 @@ impl<S: Softness> SoftRenderer<S> {
         self.prepared::<B>(&self.phi).profile().error()
     }
 
+    /// The distance from a face up to which it is drawn, in NDC: beyond, its softness is below what the tolerance lets be left out.
+    ///
+    /// The image is 2 wide, so a heavy tail may have every face drawn at every pixel, which takes its time. A larger tolerance, or a softness
+    /// that ends sooner, is then the remedy:
+    ///
+    /// ```
+    /// use softrast_tensor::NdArray;
+    /// use softrast_raster::SoftRenderer;
+    /// use softrast_softness::Family;
+    ///
+    /// let reach = |family| SoftRenderer::new(&[[0, 1, 2]], 64, family, 0.01).reach::<NdArray>();
+    /// assert!(reach(Family::Cauchy) > 2.0 && reach(Family::Gauss) < 0.1);
+    /// let looser = SoftRenderer::new(&[[0, 1, 2]], 64, Family::Cauchy, 0.01).with_tolerance(1e-2);
+    /// assert!(looser.reach::<NdArray>() < 2.0);
+    /// ```
+    pub fn reach<B: RasterBackend>(&self) -> f64 {
+        self.prepared::<B>(&self.phi).profile().grid().outer
+    }
+
     /// Draws with these parameters from now on.
     ///
     /// # Panics
@@ -160,6 +185,15 @@ impl<S: Softness> SoftRenderer<S> {
     pub fn set_phi(&mut self, phi: Vec<f64>) {
         check(&self.softness, &phi);
         self.phi = phi;
+    }
+
+    /// Draws edges of this width from now on; what else the parameters of the softness say becomes what it is by default.
+    ///
+    /// # Panics
+    ///
+    /// If the width is not positive.
+    pub fn set_width(&mut self, width: impl Into<Width>) {
+        self.phi = width.into().phi(&self.softness, self.rasterizer.size);
     }
 
     /// Coverage `[views, height, width]` in [0, 1], top row first, under the renderer's own parameters.

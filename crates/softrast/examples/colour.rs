@@ -4,6 +4,7 @@
 
 use softrast::{
     mesh::fox,
+    meta::{Adam, Optimizer},
     prelude::*,
     tensor::{Autodiff, NdArray},
 };

@@ -4,6 +4,7 @@
 
 use softrast::{
     mesh::{fox, icosphere},
+    meta::{Adam, Optimizer},
     prelude::*,
     tensor::{Autodiff, NdArray},
 };

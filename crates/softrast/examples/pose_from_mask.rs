@@ -10,7 +10,7 @@ fn main() -> anyhow::Result<()> {
     // A mask, here drawn from a known place. Of your own: Picture::load_mask("mask.png")?
     let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, [90, 120]);
     let corners = vertices::<NdArray>(mesh.positions(), &device);
-    let seen = project_pinhole(corners, &Pinholes::new(&[truth], &device));
+    let seen = project(corners, Pinholes::new(&[truth], &device));
     let file = std::env::temp_dir().join(format!("softrast-mask-{}.png", std::process::id()));
     save_picture(hard_silhouette(seen, mesh.faces(), [90, 120]), &file)?;
     let mask = Picture::load_mask(&file)?;

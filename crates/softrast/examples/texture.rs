@@ -3,6 +3,7 @@
 //! `cargo run --release -p softrast --example texture`
 
 use softrast::{
+    meta::{Adam, Optimizer},
     prelude::*,
     raster::*,
     tensor::{Autodiff, NdArray},

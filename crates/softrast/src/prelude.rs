@@ -2,16 +2,17 @@
 
 pub use softrast_inverse::{
     InverseProblem, Iterate, LearnConfig, Method, Minimization, NamedSoftness, PoseProblem,
-    ScheduledSoftness, SoftnessAt, SolveConfig, learn, minimize,
+    ScheduledSoftness, SoftnessAt, SolveConfig, Surface, VertexModel, learn, minimize,
     pose::{FoundPose, PoseSearch},
     save_picture,
 };
 pub use softrast_mesh::{Mesh, MeshError};
-pub use softrast_meta::{Adam, MetaGradient, Optimizer};
+pub use softrast_meta::MetaGradient;
 pub use softrast_raster::{
-    Attributes, Background, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, SoftRenderer,
-    TConorm, Weighting, hard_silhouette, iou_loss, mse_loss, project, project_pinhole, vertices,
+    Attributes, Background, Cameras, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend,
+    SoftRenderer, TConorm, Weighting, Width, hard_silhouette, iou_loss, mse_loss, project,
+    vertices,
 };
 pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 pub use softrast_tensor::{Backend, Tensor};
-pub use softrast_views::{Lens, Picture, load_views};
+pub use softrast_views::{Lens, Picture, Views, load_views};

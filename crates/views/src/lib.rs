@@ -2,7 +2,7 @@
 //!
 //! A [`Picture`] is a mask or a channel of a picture file, read by [`MaskRules`]. A [`CameraFile`] holds the cameras of many pictures, as
 //! nerfstudio, COLMAP or OpenCV write them; a [`Lens`] and a [`PoseFile`] are the two halves of one. [`load_views`] reads pictures with their
-//! cameras, each a [`View`]. [`visual_hull`] is the solid that their masks leave, [`coloured_pixels`] what a camera sees of a mesh.
+//! cameras, each a [`View`]; [`Views`] are tensors of them. [`visual_hull`] is the solid that their masks leave, [`coloured_pixels`] what a camera sees of a mesh.
 //!
 //! ```
 //! use softrast_mesh::icosphere;
@@ -29,6 +29,7 @@ mod painted_view;
 mod picture;
 mod picture_file;
 mod view;
+mod views;
 
 pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
 pub use coloured_pixels::coloured_pixels;
@@ -41,6 +42,7 @@ pub use painted_view::PaintedView;
 pub use picture::Picture;
 pub use picture_file::PictureFile;
 pub use view::{View, camera_json, faces_across, faces_across_note, mask_iou, reading_notes};
+pub use views::Views;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

@@ -117,7 +117,7 @@ impl<B: RasterBackend> Scene<B> {
     /// What keeps the surface of `vertices` `[vertices, 3]` smooth: 0.03 times the Laplacian loss
     /// and 0.0003 times the flatness loss, `[1]`. Second derivatives are finite everywhere.
     pub fn smoothness_loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
-        let vertices = vertices.transpose();
+        let vertices: Tensor<B, 3> = vertices.unsqueeze();
         let laplacian = self.surface.laplacian(vertices.clone());
         laplacian * LAPLACIAN + self.surface.flatness(vertices) * FLATNESS
     }

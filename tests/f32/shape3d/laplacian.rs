@@ -7,7 +7,7 @@ use softrast_tests::tensor;
 
 fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {
     let surface = Surface::<NdArray>::new(&Edges::new(faces), vertices.len());
-    surface.laplacian(tensor(&vertices.concat(), [vertices.len(), 3]).transpose()).into_scalar()
+    surface.laplacian(tensor(&vertices.concat(), [1, vertices.len(), 3])).into_scalar()
 }
 
 #[test]

@@ -2,7 +2,7 @@ use softrast_inverse::{PaintTargets, SolveConfig, paint};
 use softrast_mesh::{Mesh, icosphere};
 use softrast_meta::Objective;
 use softrast_raster::{
-    Attributes, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, project_pinhole, vertices,
+    Attributes, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend, project, vertices,
 };
 use softrast_softness::Family;
 use softrast_tensor::Tensor;
@@ -121,7 +121,7 @@ impl<B: RasterBackend> Objective<B> for Painted {
             .map(|(v, [x, y, extent])| v.view.camera.cropped([*x, *y], [*extent; 2], SIZE))
             .collect();
         let moved = vertices::<B>(self.mesh.positions(), &device) + part(3 * count);
-        let seen = project_pinhole(moved, &Pinholes::new(&cameras, &device));
+        let seen = project(moved, Pinholes::new(&cameras, &device));
         let renderer =
             ColourRenderer::new(self.mesh.faces(), SIZE, Family::Logistic, 0.05, [1.5, 4.5]);
         let renderer = renderer.with_tolerance(1e-9);

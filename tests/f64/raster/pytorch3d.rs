@@ -4,7 +4,7 @@
 //! Source: Liu et al. 2019, Eq. 1 and its aggregate function for silhouettes, as in `sigmoid_alpha_blend` of `PyTorch3D`.
 
 use softrast_mesh::{Mesh, icosphere};
-use softrast_raster::{Orbit, Pinhole, Pinholes, SoftRenderer, project, project_pinhole, vertices};
+use softrast_raster::{Orbit, Pinhole, Pinholes, SoftRenderer, project, vertices};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
@@ -111,7 +111,7 @@ fn a_silhouette_with_the_translated_scale_and_camera_is_that_of_pytorch3d() {
     let ((r, t), device) = (view(), Default::default());
     let camera = Pinhole::from_pytorch3d(&r, t, [focal(); 2], [0.0; 2], SIZE);
     let corners = vertices::<B>(mesh.positions(), &device);
-    let seen = project_pinhole(corners, &Pinholes::new(&[camera], &device));
+    let seen = project(corners, Pinholes::new(&[camera], &device));
     assert_same(&ours(&mesh, seen), &theirs);
 }
 

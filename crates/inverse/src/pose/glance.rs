@@ -2,7 +2,7 @@ use std::borrow::Cow;
 
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, hard_silhouette, iou_loss, project_pinhole, vertices,
+    HostBackend, Pinhole, Pinholes, hard_silhouette, iou_loss, project, vertices,
 };
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -97,7 +97,7 @@ impl<'a> Look<'a> {
     ) -> [Tensor<HostBackend, 3>; 2] {
         let cropped = cameras.iter().map(|of| of.cropped([left, top], [extent; 2], side));
         let cropped = Pinholes::new(&cropped.collect::<Vec<_>>(), &Default::default());
-        let seen = project_pinhole(self.corners.clone(), &cropped);
+        let seen = project(self.corners.clone(), &cropped);
         [hard_silhouette(seen.clone(), self.mesh.faces(), side), seen]
     }
 

@@ -3,8 +3,8 @@ use std::sync::Arc;
 use anyhow::Context;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole,
-    rotate_by_tangent, vertices,
+    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project, rotate_by_tangent,
+    vertices,
 };
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
@@ -241,7 +241,7 @@ impl<B: RasterBackend> MaskScene<B> {
     }
 
     fn project(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        project_pinhole(self.vertices.clone(), &self.cameras(theta))
+        project(self.vertices.clone(), self.cameras(theta))
     }
 
     /// The mesh stays in front of the camera, and nothing grows without end.

@@ -4,9 +4,7 @@ use anyhow::ensure;
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Surface, Targets};
 use softrast_mesh::{Edges, Mesh, MeshError};
 use softrast_meta::Adam;
-use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project_pinhole,
-};
+use softrast_raster::{HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 use softrast_views::View;
@@ -105,7 +103,7 @@ impl InverseProblem for FromViews {
         scene: &Scene<B>,
         theta: Tensor<B, 1>,
     ) -> Option<Tensor<B, 1>> {
-        let vertices = scene.vertices(theta).transpose() * (0.5 / self.reach);
+        let vertices: Tensor<B, 3> = scene.vertices(theta).unsqueeze() * (0.5 / self.reach);
         let count = self.start.positions().len() as f64;
         let laplacian = scene.surface.laplacian(vertices.clone()) * (LAPLACIAN * count);
         Some((laplacian + scene.surface.flatness(vertices) * (FLATNESS * count)) * self.smooth)
@@ -153,6 +151,6 @@ impl<B: RasterBackend> Scene<B> {
     }
 
     fn project(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
-        project_pinhole(self.vertices(theta).unsqueeze(), &self.cameras)
+        project(self.vertices(theta).unsqueeze(), &self.cameras)
     }
 }

@@ -1,0 +1,76 @@
+use softrast_tensor::Tensor;
+
+use crate::{
+    RasterBackend,
+    backend::{elementary, primitive},
+    ops::ElementaryOp,
+};
+
+/// Cameras that [`project`] takes, one for each view.
+///
+/// Orbits `[views, 4]` are some, each with the distance in world units, then elevation, azimuth and the whole field of view in degrees, as
+/// [`Orbit::tensor`](crate::Orbit::tensor) makes them; so are [`Pinholes`](crate::Pinholes), and matrices `[views, 3, 4]` of one's own. Gradients reach the
+/// tensors that they consist of.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` are no cameras on the backend `{B}`",
+    note = "`project` takes orbits `[views, 4]`, `Pinholes`, or matrices `[views, 3, 4]`, as tensors of the backend of the vertices"
+)]
+pub trait Cameras<B: RasterBackend> {
+    /// The matrix of each view, `[views, 3, 4]`: two rows give x and y in NDC times the depth, the third gives the depth.
+    fn matrices(&self) -> Tensor<B, 3>;
+}
+
+impl<B: RasterBackend> Cameras<B> for Tensor<B, 2> {
+    fn matrices(&self) -> Tensor<B, 3> {
+        let [_, four] = self.dims();
+        assert_eq!(four, 4, "orbits must be [views, 4], found {:?}", self.dims());
+        elementary(ElementaryOp::OrbitMatrix, vec![primitive(self.clone())])
+    }
+}
+
+impl<B: RasterBackend> Cameras<B> for Tensor<B, 3> {
+    fn matrices(&self) -> Tensor<B, 3> {
+        let [_, rows, columns] = self.dims();
+        assert_eq!(
+            [rows, columns],
+            [3, 4],
+            "matrices must be [views, 3, 4], found {:?}",
+            self.dims()
+        );
+        self.clone()
+    }
+}
+
+impl<B: RasterBackend, C: Cameras<B>> Cameras<B> for &C {
+    fn matrices(&self) -> Tensor<B, 3> {
+        C::matrices(self)
+    }
+}
+
+/// Perspective projection.
+///
+/// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates, `cameras` those of each view; see [`Cameras`].
+/// The result is `[views, vertices, 3]`: x and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera depth in world
+/// units.
+///
+/// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
+/// vertex nearer than [`NEAR`](crate::NEAR) is projected as though it were that near, so that nothing divides
+/// by zero; the rasterizer does not draw its faces, by their depth.
+///
+/// Source: docs/notes.md, Camera.
+///
+/// # Panics
+///
+/// If the shapes do not fit.
+pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, cameras: impl Cameras<B>) -> Tensor<B, 3> {
+    let matrices = cameras.matrices();
+    let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
+    assert!(
+        three == 3 && (held == views || held == 1),
+        "vertices of {views} views must be [{views}, vertices, 3] or [1, vertices, 3], found {:?}",
+        vertices.dims()
+    );
+    // The rasterizer wants one row for each axis, and turning them back is free.
+    let inputs = vec![primitive(vertices), primitive(matrices)];
+    elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2)
+}
