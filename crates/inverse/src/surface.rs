@@ -3,7 +3,7 @@ use softrast_raster::{edge_length, flatness, normal_consistency};
 use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData, tensor};
 
 /// The connections of a surface, for losses that keep it smooth. Each takes `vertices` `[1, vertices, 3]` in world units, as
-/// [`project`](softrast_raster::project) does, and gives `[1]`.
+/// [`project`](softrast_raster::project) does, and gives `[1]`; other shapes panic.
 ///
 /// ```
 /// use softrast_tensor::NdArray;
@@ -34,7 +34,7 @@ pub struct Surface<B: Backend> {
 }
 
 impl<B: Backend> Surface<B> {
-    /// That of a mesh.
+    /// The surface of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         Self::new(&Edges::new(mesh.faces()), mesh.positions().len())
     }
@@ -93,6 +93,12 @@ impl<B: Backend> Surface<B> {
 
 /// `[3, vertices]`: many times faster to gather on the CPU than rows of three.
 fn by_axis<B: Backend>(vertices: Tensor<B, 3>) -> Tensor<B, 2> {
+    let [sets, _, three] = vertices.dims();
+    assert!(
+        sets == 1 && three == 3,
+        "a surface has vertices [1, vertices, 3], found {:?}",
+        vertices.dims()
+    );
     vertices.squeeze_dim::<2>(0).transpose()
 }
 

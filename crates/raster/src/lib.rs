@@ -79,7 +79,7 @@ pub use softrast_tensor as tensor;
 pub use t_conorm::{TConorm, UnknownTConorm};
 pub use view::view_rotation;
 pub use weighting::Weighting;
-pub use width::{Width, WidthPath};
+pub use width::{Width, WidthSchedule};
 
 /// Parts of the renderers, for callers that prepare tables, run ops on slices, or measure them.
 pub mod low_level {

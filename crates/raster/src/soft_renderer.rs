@@ -187,7 +187,8 @@ impl<S: Softness> SoftRenderer<S> {
         self.phi = phi;
     }
 
-    /// Draws edges of this width from now on; what else the parameters of the softness say becomes what it is by default.
+    /// Draws under the default parameters of a softness of this width from now on. Other parameters, of a network for example, are lost: move
+    /// the scale of such a softness by [`set_phi`](Self::set_phi).
     ///
     /// # Panics
     ///

@@ -20,11 +20,13 @@ pub fn view_rotation<B: RasterBackend>(
     elevation: Tensor<B, 1>,
     azimuth: Tensor<B, 1>,
 ) -> Tensor<B, 3> {
+    // Which way is up: constant on either side of the pole, so it has no gradient. In f32 the cosine at a pole has any sign.
+    let past = elevation.clone().detach() + 90.0;
+    let past = past.clone() - (past * (1.0 / 360.0)).floor() * 360.0;
+    let roll = past.clone().ones_like().mask_fill(past.clone().greater_elem(180.0), -1.0);
+    let roll = roll.mask_fill(past.greater_equal_elem(360.0), 1.0);
     let [sin_e, cos_e] = sin_cos(radians(elevation));
     let [sin_a, cos_a] = sin_cos(radians(azimuth));
-    // Which way is up: constant on either side of the pole, so it has no gradient.
-    let sign = cos_e.clone().sign();
-    let roll = sign.clone().mask_fill(sign.equal_elem(0.0), 1.0);
     let zero = cos_a.clone() * 0.0;
     let rows = vec![
         cos_a.clone() * roll.clone(),

@@ -36,8 +36,8 @@ impl Width {
     /// assert_eq!(narrowing.at(0.5), Width::pixels(2.0));
     /// ```
     #[must_use]
-    pub fn to(self, end: f64) -> WidthPath {
-        WidthPath { start: self, end }
+    pub fn to(self, end: f64) -> WidthSchedule {
+        WidthSchedule { start: self, end }
     }
 
     /// Parameters of a softness that is this wide on images of `size`.
@@ -63,12 +63,12 @@ impl From<f64> for Width {
 
 /// A width over a run; see [`Width::to`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WidthPath {
+pub struct WidthSchedule {
     start: Width,
     end: f64,
 }
 
-impl WidthPath {
+impl WidthSchedule {
     /// The width at this progress of the run.
     ///
     /// # Panics

@@ -23,7 +23,7 @@ fn main() -> anyhow::Result<()> {
     let mut renderer = SoftRenderer::new(sphere.faces(), views.size(), Family::Gauss, 0.01);
     let mut adam = AdamConfig::new().init();
     for step in 0..200 {
-        renderer.set_width(narrowing.at(f64::from(step) / 200.0));
+        renderer.set_width(narrowing.at(f64::from(step) / 199.0));
         let image = renderer.silhouette(project(shape.vertices(), &cameras));
         let loss = iou_loss(image, masks.clone()).mean();
         let smooth = surface.laplacian(shape.vertices()) * 0.01;

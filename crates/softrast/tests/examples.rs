@@ -17,7 +17,7 @@ fn runs(example: &str) -> String {
     runs_on(example, &[]).0
 }
 
-/// What an example says, and the folder that it ran in.
+/// The output of an example, and the folder that it ran in.
 fn runs_on(example: &str, words: &[&str]) -> (String, tempfile::TempDir) {
     let program = folder().join(format!("{example}{}", env::consts::EXE_SUFFIX));
     let elsewhere = tempfile::tempdir().expect("a temporary folder");

@@ -28,7 +28,7 @@ impl Views {
     ///
     /// # Errors
     ///
-    /// Those of [`load_views`] and [`Views::new`].
+    /// See [`load_views`] and [`Views::new`].
     pub fn load(folder: impl AsRef<Path>) -> anyhow::Result<Self> {
         Self::new(load_views(folder, |path| Picture::load_mask(path))?)
     }
@@ -37,12 +37,22 @@ impl Views {
     ///
     /// # Errors
     ///
-    /// If there is none, or masks differ in size: one line that names two of them.
+    /// If there is none, masks differ in size, or a mask is not of the size of its camera's image: one line that names them.
     pub fn new(views: Vec<View>) -> anyhow::Result<Self> {
         ensure!(!views.is_empty(), "there are no views");
         let first = &views[0];
         for view in &views {
             let (size, other) = (view.camera.size, first.camera.size);
+            let mask = view.mask.size();
+            ensure!(
+                mask == size,
+                "{}: the mask is {} x {}, the picture of its camera {} x {}",
+                view.name,
+                mask.width,
+                mask.height,
+                size.width,
+                size.height
+            );
             ensure!(
                 size == other,
                 "views of one size are needed, but {} is {} x {} and {} is {} x {} (width x height): scale or crop the pictures, or draw each view by \

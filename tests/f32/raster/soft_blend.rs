@@ -70,7 +70,7 @@ where
     drawn_by::<B>(&renderer(colours.len(), look), corners, colours, look.log_weight)
 }
 
-/// What draws so many faces.
+/// A renderer of so many faces.
 fn renderer(faces: usize, look: Look) -> ColourRenderer {
     let faces: Arc<[[u32; 3]]> = (0..faces as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
     let weighting = Weighting { edge: look.edge, depth: look.depth, planes: look.planes };

@@ -8,13 +8,16 @@ use super::{
     dual::{Dual, load},
     face_attributes::FaceAttributes,
     of_pixel::{OF_PIXEL, OfPixel},
-    parts::SLOTS,
+    parts::{Part, SLOTS},
     table::UNITS as WALKERS,
-    whole::{self, MARKS, NEGATIVE, SIZE, add_relative, mark},
+    whole::{self, INFINITE, MARKS, NEGATIVE, SIZE, add_relative, mark, or_nan},
 };
 
 /// Units of a cube, which share a part of a face.
 pub(super) const UNITS: u32 = 32;
+
+/// The bits of 1.
+const ONE: u32 = 0x3f80_0000;
 
 /// Numbers of a pixel that are added up: how much the faces count, and that times each channel, with their derivatives in a pass of second
 /// order.
@@ -58,8 +61,9 @@ fn largest(mark: u32, behind: f32) -> f32 {
     select(mark == 0u32 || log < behind, behind, log)
 }
 
-/// Adds up what faces are to each pixel of the launch, relative to the largest weight there: [`summed`] whole numbers of two words. With
-/// `measure` it only finds the largest size of a term of each pixel, the second of its [`MARKS`].
+/// Adds up the shares of faces at each pixel of the launch, relative to the largest weight there, and what they show: [`summed`] whole numbers of
+/// two words. With `measure` it only finds the largest sizes at each pixel of what a face shows and of a derivative: the second and third of
+/// its [`MARKS`]. A share is at most 1.
 #[cube(launch)]
 pub(super) fn add_shares(
     drawn: &BlendInputs,
@@ -100,22 +104,40 @@ pub(super) fn add_shares(
                 }
             }
             if measure {
-                let mut most = 0u32;
+                // A share that is no number makes all that is shown none.
+                let share = mark(terms[0]);
+                let mut shown = select(share < INFINITE, 0u32, share);
+                let mut moved = 0u32;
                 for k in 0..comptime!(summed(kind)) {
                     let size = mark(terms[k]);
-                    most = select(size > most, size, most);
+                    if is_moved(k, kind) {
+                        moved = select(size > moved, size, moved);
+                    } else if k > 0 {
+                        shown = select(size > shown, size, shown);
+                    }
                 }
-                marks[at + 1].fetch_max(most);
+                marks[at + 1].fetch_max(shown);
+                if kind.second {
+                    marks[at + 2].fetch_max(moved);
+                }
             } else {
-                let size = marks[at + 1].load();
+                let shown = marks[at + 1].load();
+                let moved = marks[at + 2].load();
                 let first = of_pixel as usize * comptime!(summed(kind));
                 for k in 0..comptime!(summed(kind)) {
-                    add_relative(sums, 2 * (first + k), terms[k], size, drawn.face_count);
+                    let of_term = select(k == 0, ONE, select(is_moved(k, kind), moved, shown));
+                    add_relative(sums, 2 * (first + k), terms[k], of_term, drawn.face_count);
                 }
             }
         }
         pixel += UNITS;
     }
+}
+
+/// Whether a number of a pixel is a derivative.
+#[cube]
+fn is_moved(number: usize, #[comptime] kind: BlendSpec) -> bool {
+    if kind.second { number % 2 == 1 } else { false.runtime() }
 }
 
 /// Keeps a number among those of a pixel, with its derivative in a pass of second order.
@@ -136,6 +158,7 @@ fn total(
     of_pixel: usize,
     number: usize,
     size: u32,
+    moved: u32,
     face_count: u32,
     #[comptime] kind: BlendSpec,
 ) -> Dual {
@@ -144,14 +167,14 @@ fn total(
         let at = 2 * (first + 2 * number);
         Dual {
             value: whole::relative_sum(sums, at, size, face_count),
-            tangent: whole::relative_sum(sums, at + 2, size, face_count),
+            tangent: whole::relative_sum(sums, at + 2, moved, face_count),
         }
     } else {
         Dual::constant(whole::relative_sum(sums, 2 * (first + number), size, face_count))
     }
 }
 
-/// What [`finish_pixels`] reads beside the numbers that all pixels share.
+/// Input of [`finish_pixels`] beside the numbers that all pixels share.
 #[derive(CubeType, CubeLaunch)]
 pub(super) struct Added {
     marks: Array<u32>,
@@ -193,8 +216,10 @@ pub(super) fn finish_pixels(
     let log_behind = load(numbers, at, direction, along + at, second);
     let of_pixel = own as usize;
     let largest = largest(added.marks[(MARKS * own) as usize], log_behind.value);
-    let size = added.marks[(MARKS * own) as usize + 1];
-    let sum = total(&added.sums, of_pixel, 0usize, size, added.face_count, kind);
+    let shown = added.marks[(MARKS * own) as usize + 1];
+    let moved = added.marks[(MARKS * own) as usize + 2];
+    let sum = total(&added.sums, of_pixel, 0usize, ONE, moved, added.face_count, kind);
+    let sum = Dual { value: or_nan(shown < INFINITE, sum.value), tangent: sum.tangent };
     let behind = log_behind.sub(Dual::constant(largest)).exp();
     let whole_weight = sum.add(behind);
     let per_total = whole_weight.recip();
@@ -217,7 +242,7 @@ pub(super) fn finish_pixels(
     for channel in 0..channels {
         let at = background + channel;
         let colour = load(numbers, at, direction, along + at, second);
-        let sum = total(&added.sums, of_pixel, channel + 1, size, added.face_count, kind);
+        let sum = total(&added.sums, of_pixel, channel + 1, shown, moved, added.face_count, kind);
         let seen = sum.mul(per_total).add(rest.mul(colour));
         if comptime!(!pull || kind.second) {
             image[first + channel * step] = seen.stored(second);
@@ -358,10 +383,9 @@ pub(super) fn blend_cubics(
     #[comptime] kind: BlendSpec,
 ) {
     let table = ABSOLUTE_POS as u32 * rows * 4u32;
-    let groups = drawn.views * drawn.face_count + SLOTS;
-    let mut group = CUBE_POS as u32;
-    while group < groups {
-        let part = drawn.part(group);
+    let mut job = CUBE_POS as u32;
+    while job < drawn.views * drawn.face_count {
+        let part = Part::whole(job, &drawn.reaches);
         let (view, face) = (part.job / drawn.face_count, part.job % drawn.face_count);
         let shown = FaceAttributes::of(drawn, view, face, kind);
         let mut pixel = part.start + UNIT_POS;
@@ -381,7 +405,7 @@ pub(super) fn blend_cubics(
             }
             pixel += WALKERS;
         }
-        group += CUBE_COUNT as u32;
+        job += CUBE_COUNT as u32;
     }
 }
 

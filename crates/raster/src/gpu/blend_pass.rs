@@ -65,8 +65,8 @@ pub(super) struct Gradient {
     pub(super) image: Buffer,
 }
 
-/// What of the silhouettes' op culls the faces of this one: an edge softness reaches as far as its table.
-pub(super) fn culling(op: &SoftBlend) -> ProfileSum {
+/// A silhouettes' op whose faces reach as far as those of this one: an edge softness reaches as far as its table.
+pub(super) fn as_sum(op: &SoftBlend) -> ProfileSum {
     ProfileSum {
         faces: op.faces.clone(),
         grid: Grid { outer: op.edge.inner, from: [op.edge.from[1]; 2], ..op.edge },
@@ -82,7 +82,7 @@ impl<'a> Blend<'a> {
     /// of second order.
     pub(super) fn new(
         op: &'a SoftBlend,
-        culling: &'a ProfileSum,
+        sum: &'a ProfileSum,
         inputs: Vec<Buffer>,
         direction: Option<Buffer>,
     ) -> Self {
@@ -112,9 +112,11 @@ impl<'a> Blend<'a> {
             parts.swap(1, 2);
             into_contiguous(Wgpu::float_cat(parts, 0))
         });
-        let pass = Pass::new(culling, vertices, numbers, direction.clone());
+        let pass = Pass::new(sum, vertices, numbers, direction.clone());
+        let numbers_of_entry = if op.texture.is_some() { 2 } else { channels };
         let numbers_of_pixel = if direction.is_some() { 2 } else { 1 } * (channels + 1);
-        let pass = pass.with_depths(FARTHEST_SEEN as f32, numbers_of_pixel);
+        let pass =
+            pass.with_depths(FARTHEST_SEEN as f32, [numbers_of_pixel, 9 + 3 * numbers_of_entry]);
         let device = pass.vertices.device.clone();
         let same = entry_count == pass.vertex_count && op.entries == op.faces;
         let entries = match same {

@@ -83,9 +83,17 @@ impl Orbit {
             elevation,
             azimuth,
             focal: half.cos.mul(half.sin.recip()),
-            roll: select(elevation.cos.value < 0.0f32, -1.0f32, 1.0f32),
+            roll: roll(orbits[at + 1]),
         }
     }
+}
+
+/// Which way is up at an elevation in degrees: 1, or -1 past a pole, but not at it.
+#[cube]
+fn roll(elevation: f32) -> f32 {
+    let past = elevation + 90.0f32;
+    let past = past - 360.0f32 * f32::floor(past / 360.0f32);
+    select(past > 180.0f32 && past < 360.0f32, -1.0f32, 1.0f32)
 }
 
 /// Writes the matrices of orbits `[views, 4]`, `[views, 3, 4]`: one unit a view.

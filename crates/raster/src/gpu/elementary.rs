@@ -285,7 +285,7 @@ impl Elementary {
         )
     }
 
-    /// What the pixels of each view add to.
+    /// Sums over the pixels of each view.
     fn totals(&self, op: ElementaryOp) -> Buffer {
         let (views, blocks) = (self.views(), self.blocks());
         let [partial, totals] = [4 * views * blocks, 4 * views].map(|length| self.buffer(length));

@@ -8,7 +8,7 @@ pub(super) fn length(tensor: &FloatTensor<Wgpu>) -> usize {
     tensor.shape().num_elements()
 }
 
-/// Those parts of a flat tensor that are wanted, flat.
+/// Parts of a flat tensor that are wanted, flat.
 pub(super) fn parts(
     flat: FloatTensor<Wgpu>,
     lengths: &[usize],

@@ -1,4 +1,4 @@
-//! What is done to every pixel of an image, and the losses that compare two, as `ops/elementary/image.rs` has it.
+//! Coverage of every pixel of an image, and losses that compare two, as `ops/elementary/image.rs` has it.
 
 use cubecl::prelude::*;
 use softrast_kernel::EMPTY;
@@ -66,7 +66,7 @@ pub(super) struct Compared {
     blocks: u32,
 }
 
-/// What two numbers add to: the squared difference, or the overlap and the union.
+/// Terms of two numbers: the squared difference, or the overlap and the union.
 #[derive(CubeType, Clone, Copy)]
 struct Terms {
     first: Dual,

@@ -1,6 +1,6 @@
 //! The fused op on the GPU: `CubeCL` kernels over the tensors of the wgpu backend, in f32.
 //!
-//! The same sums as in `softrast-kernel`, in another order of loops: everything goes face by face. A few units share a face and add its terms to
+//! Sums are those of `softrast-kernel` in another order of loops: everything goes face by face. A few units share a face and add its terms to
 //! the pixels of its bounding box, as whole numbers, by atomic operations, whose order does not matter; so no pixel has to know which faces reach
 //! it, and nothing is culled, sorted or read back. Gradients to vertices are gathered, first per face over its pixels, then per vertex over its
 //! faces. Cameras and losses are kernels too, so that a step launches fewer than twenty. The same numbers come out at every call. The second
@@ -44,7 +44,7 @@ pub(crate) use topology::Topology;
 use softrast_tensor::{FloatTensor, FloatTensorOps, TensorMetadata};
 
 use crate::{FusedOp, Pass, RasterBackend, SoftBlend};
-use blend_pass::{Blend, culling};
+use blend_pass::{Blend, as_sum};
 use flat::{length, parts, whole_direction};
 use pass::Pass as Kernels;
 
@@ -94,10 +94,10 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
     let mut next = || rest.next().expect("all inputs of the pass");
     let lengths: Vec<usize> = inputs.iter().map(length).collect();
     let shape = [inputs[0].shape()[0], lengths[3], op.size.height, op.size.width];
-    let culling = culling(op);
+    let sum = as_sum(op);
     let (direction, wanted, upstream) = match pass {
         Pass::Forward => {
-            let image = Blend::new(op, &culling, inputs, None).image();
+            let image = Blend::new(op, &sum, inputs, None).image();
             return Wgpu::float_reshape(image, shape.into());
         }
         Pass::Vjp { wanted } => (None, wanted, next()),
@@ -107,7 +107,7 @@ fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> Floa
         }
     };
     let of_texels = op.texture.is_some() && wanted[4];
-    let blend = Blend::new(op, &culling, inputs, direction);
+    let blend = Blend::new(op, &sum, inputs, direction);
     let found = blend.gradient(upstream, wanted[2], of_texels);
     let mut parts =
         vec![Some(found.vertices), Some(found.attributes), found.tables, Some(found.background)];

@@ -39,7 +39,7 @@ pub(super) struct Part {
 
 #[cube]
 impl Part {
-    /// What group number `group` takes: that of a face with this number, or behind them of a slot.
+    /// The pixels of group number `group`: of the face with this number, or behind them of a slot.
     pub(super) fn of(
         group: u32,
         reaches: &Array<u32>,
@@ -70,6 +70,13 @@ impl Part {
         }
         let width = select(reach.left < reach.right, reach.right - reach.left, 1u32);
         Part { job, start, end, left: reach.left, top: reach.top, width }
+    }
+
+    /// All that a face reaches: for sums of floats, whose order must not depend on who took which slot.
+    pub(super) fn whole(job: u32, reaches: &Array<u32>) -> Part {
+        let reach = Reach::load(reaches, job as usize);
+        let width = select(reach.left < reach.right, reach.right - reach.left, 1u32);
+        Part { job, start: 0u32, end: reach.pixels(), left: reach.left, top: reach.top, width }
     }
 
     pub(super) fn column(self, pixel: u32) -> u32 {

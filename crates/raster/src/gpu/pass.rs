@@ -29,6 +29,8 @@ use crate::{ImageSize, ProfileSum};
 const BUFFER: usize = 64 << 20;
 /// Pixels for each face, from which on more units share one.
 const MANY_PIXELS: usize = 32;
+/// Faces that a launch prepares: it counts at most 65535 cubes along an axis.
+const MOST_FACES: usize = 65535 * PREPARED as usize;
 /// Bytes of a number that is added up.
 const WORDS: usize = 8;
 /// All tables of [`sum_cubics`] together, in bytes.
@@ -51,8 +53,10 @@ pub(super) struct Pass<'a> {
     pub(super) vertex_count: usize,
     /// Whether what is prepared of faces has their depths.
     depths: bool,
-    /// Bytes of what is added up of a pixel.
+    /// Bytes of sums of a pixel.
     of_pixel: usize,
+    /// Numbers in the gradient of a face.
+    of_face: usize,
     /// Faces beyond this depth are not drawn.
     far: f32,
 }
@@ -61,7 +65,7 @@ pub(super) struct Pass<'a> {
 struct Splatted {
     /// Two words of each pixel.
     words: Buffer,
-    /// Of all pixels, or of each.
+    /// One for all pixels, or one for each.
     scale: Buffer,
     terms: Terms,
 }
@@ -97,14 +101,16 @@ impl<'a> Pass<'a> {
             views,
             vertex_count,
             depths: false,
-            of_pixel: 2 * WORDS,
+            of_pixel: WORDS,
+            of_face: 6,
             far: f32::INFINITY,
         }
     }
 
-    /// With the depths of faces, none of which is drawn beyond `far`, where so many numbers of a pixel are added up.
-    pub(super) fn with_depths(self, far: f32, numbers: usize) -> Self {
-        Self { depths: true, far, of_pixel: numbers * WORDS, ..self }
+    /// With the depths of faces, none of which is drawn beyond `far`, where so many numbers of a pixel are added up and a face has so many in
+    /// its gradient.
+    pub(super) fn with_depths(self, far: f32, [of_pixel, of_face]: [usize; 2]) -> Self {
+        Self { depths: true, far, of_pixel: of_pixel * WORDS, of_face, ..self }
     }
 
     /// Sums of the profile, flat: `[views * height * width]`.
@@ -191,7 +197,7 @@ impl<'a> Pass<'a> {
 
     /// First view and number of views of each part.
     fn parts(&self) -> impl Iterator<Item = [usize; 2]> {
-        let of_faces = 4 * self.stride() * self.op.faces.len();
+        let of_faces = 4 * self.stride().max(self.of_face) * self.op.faces.len();
         let of_view = of_faces.max(self.of_pixel * self.op.size.pixels());
         // A launch counts at most 65535 cubes along an axis.
         let step = (BUFFER / of_view.max(1)).clamp(1, 65535);
@@ -208,6 +214,7 @@ impl<'a> Pass<'a> {
     /// Prepares the faces of some views. The first words of `slots` are 0.
     fn prepare(&self, first_view: usize, views: usize, slots: Buffer) -> Prepared {
         let faces = self.op.faces.len();
+        assert!(faces <= MOST_FACES, "a GPU draws at most {MOST_FACES} faces, found {faces}");
         let jobs = views * faces;
         let corners = self.buffer(self.stride() * jobs, DType::F32);
         let reaches = self.buffer(4 * jobs, DType::U32);

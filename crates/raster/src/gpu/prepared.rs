@@ -9,11 +9,11 @@ use super::topology::Topology;
 
 pub(super) type Buffer = CubeTensor<WgpuRuntime>;
 
-/// What an op of sums has beside its inputs on a GPU.
+/// An op of sums on a GPU, beside its inputs.
 #[derive(Clone, Debug)]
 pub(crate) struct SumOnGpu {
     pub(super) topology: Topology,
-    /// Of an op that is recorded.
+    /// Prepared faces, for an op that is recorded.
     pub(super) kept: Option<Kept>,
     /// Whether terms are like optical depths: none that counts is lost beside the largest in a sum of whole numbers.
     pub(super) like_depths: bool,
@@ -24,13 +24,13 @@ impl SumOnGpu {
         Self { topology: Topology::default(), kept: None, like_depths }
     }
 
-    /// The same of one call whose passes share what they find out.
+    /// One for a call whose passes share what they find out.
     pub(crate) fn keeping(&self) -> Self {
         Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
     }
 }
 
-/// What a pass forward leaves to the passes back: the faces of all views, if their buffers fit. 44 bytes for each.
+/// Left by a pass forward to the passes back: the faces of all views, if their buffers fit. 44 bytes for each.
 #[derive(Clone, Default)]
 pub(super) struct Kept(Arc<OnceLock<Prepared>>);
 
@@ -58,6 +58,6 @@ pub(super) struct Prepared {
     pub(super) views: usize,
     pub(super) corners: Buffer,
     pub(super) reaches: Buffer,
-    /// How faces are cut, and how many are drawn; see [`parts`].
+    /// How faces are cut, and how many are drawn; see [`parts`](super::parts).
     pub(super) slots: Buffer,
 }

@@ -7,7 +7,7 @@ use super::{
     frame::Frame,
     pair::{Cubic, Face, Lookup},
     parts::Part,
-    whole::{INFINITE, MOST, SIZE, WORD, add, add_relative, mark, relative_sum, sum},
+    whole::{INFINITE, MOST, SIZE, WORD, add, add_relative, mark, or_nan, relative_sum, sum},
 };
 
 /// Units of a cube of [`clear`].
@@ -159,7 +159,7 @@ pub(super) fn settle(
     let total = if terms == Terms::Scaled {
         let scaled = sum(words, place) / f32::reinterpret(scale[0]);
         // A table of something that is no number makes all of them none.
-        select(scale[1] < INFINITE, scaled, f32::reinterpret(SIZE))
+        or_nan(scale[1] < INFINITE, scaled)
     } else {
         relative_sum(words, place, scale[pixel as usize], face_count)
     };

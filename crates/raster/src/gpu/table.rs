@@ -6,10 +6,10 @@ use super::{
     dual::Dual,
     frame::Frame,
     pair::{Face, Lookup},
-    parts::{Part, SLOTS},
+    parts::Part,
 };
 
-/// Units of a cube, which share a part of a face.
+/// Units of a cube, which share a face.
 pub(super) const UNITS: u32 = 64;
 
 /// Adds the gradient of the table, every unit to a table of its own over the pairs that it takes:
@@ -34,10 +34,9 @@ pub(super) fn sum_cubics(
     let own = ABSOLUTE_POS as u32 * rows * 4u32;
     let tail = (own + 4u32 * lookup.cells) as usize;
     let stride = comptime!(if second { 12usize } else { 6usize });
-    let groups = jobs + SLOTS;
-    let mut group = CUBE_POS as u32;
-    while group < groups {
-        let part = Part::of(group, reaches, slots, views, jobs);
+    let mut job = CUBE_POS as u32;
+    while job < jobs {
+        let part = Part::whole(job, reaches);
         let view = part.job / face_count + first_view;
         let face = Face::new(corners, stride * part.job as usize, second);
         let mut pixel = part.start + UNIT_POS;
@@ -52,7 +51,7 @@ pub(super) fn sum_cubics(
             }
             pixel += UNITS;
         }
-        group += CUBE_COUNT as u32;
+        job += CUBE_COUNT as u32;
     }
     if !second {
         // All faces are in the tail of pixels that they do not reach.

@@ -11,7 +11,7 @@ use super::{
     face_attributes::FaceAttributes,
     of_pixel::OfPixel,
     texture::NUMBERS,
-    whole::{INFINITE, MOST, SIZE, add, mark, sum},
+    whole::{INFINITE, MOST, add, mark, or_nan, sum},
 };
 
 /// Terms are taken as if the largest were not less than this, so that floats can hold their scale.
@@ -114,5 +114,5 @@ pub(super) fn texel_floats(sums: &Array<u32>, gradient: &mut Array<f32>, count: 
     }
     let total = sum(sums, MEASURED + (2u32 * number) as usize) / scale_of(sums[0], sums[1]);
     // One term that is no number makes all of them none.
-    gradient[number as usize] = select(sums[0] < INFINITE, total, f32::reinterpret(SIZE));
+    gradient[number as usize] = or_nan(sums[0] < INFINITE, total);
 }

@@ -10,10 +10,10 @@ pub(super) const MOST: f32 = 2_305_843_009_213_693_952.0;
 pub(super) const SIZE: u32 = 0x7fff_ffff;
 pub(super) const INFINITE: u32 = 0x7f80_0000;
 
-/// What is added to the bits of a number that is not negative, so that those of negative ones lie below.
+/// Added to the bits of a number that is not negative, so that those of negative ones lie below.
 pub(super) const NEGATIVE: u32 = 0x8000_0000;
-/// Words of a pixel beside its sums: see [`find_largest`](super::blend::find_largest) and [`add_relative`].
-pub(super) const MARKS: u32 = 2;
+/// Words of a pixel in colours beside its sums: see [`find_largest`](super::blend::find_largest) and [`add_shares`](super::blend::add_shares).
+pub(super) const MARKS: u32 = 3;
 /// Sizes below this are nothing.
 const NOTHING: f32 = 1e-37;
 
@@ -66,7 +66,13 @@ pub(super) fn add_relative(
 pub(super) fn relative_sum(sums: &Array<u32>, place: usize, size: u32, face_count: u32) -> f32 {
     let part = sum(sums, place) / (MOST / f32::cast_from(face_count));
     // One term that is no number makes all of them none.
-    select(size < INFINITE, part * f32::reinterpret(size), f32::reinterpret(SIZE))
+    or_nan(size < INFINITE, part * f32::reinterpret(size))
+}
+
+/// A number, or none where it does not hold. From bits that are put together at run time: WGSL refuses a constant that is no number.
+#[cube]
+pub(super) fn or_nan(holds: bool, number: f32) -> f32 {
+    f32::reinterpret(select(holds, u32::reinterpret(number), SIZE))
 }
 
 /// Adds a number, rounded to a whole one, to the two words at `place`: to the lower one, and with what that carries to the upper one.

@@ -131,6 +131,7 @@ fn assert_close(scene: &Scene, wanted: Wanted, name: &str) {
 
 fn renderer(
     faces: &Arc<[[u32; 3]]>,
+    size: [usize; 2],
     family: Family,
     depth: DepthSoftness,
     planes: [f64; 2],
@@ -138,12 +139,17 @@ fn renderer(
     let edge = EdgeSoftness { family, squared: false };
     let weighting = Weighting { edge, depth, planes };
     let phi = [edge.default_phi(0.03), depth.default_phi(0.05)];
-    ColourRenderer::with_weighting(faces.clone(), [18, 23], weighting, phi).with_tolerance(1e-6)
+    ColourRenderer::with_weighting(faces.clone(), size, weighting, phi).with_tolerance(1e-6)
 }
 
 /// A ball from three sides, its colours at its vertices.
 fn ball(family: Family, depth: DepthSoftness) -> Scene {
-    let (ball, azimuths) = (icosphere(1), [4.1, 108.3, 211.9]);
+    ball_of(1, [18, 23], family, depth)
+}
+
+/// One of 20 faces for 0 `subdivisions`, 80 for 1, on images of this height and width.
+fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoftness) -> Scene {
+    let (ball, azimuths) = (icosphere(subdivisions), [4.1, 108.3, 211.9]);
     let positions = ball.positions();
     let world =
         tensor::<NdArray<f64>, 3>(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
@@ -156,7 +162,7 @@ fn ball(family: Family, depth: DepthSoftness) -> Scene {
         own: 1,
         channels: 3,
         texture: None,
-        renderer: renderer(&faces, family, depth, [1.7, 3.8]),
+        renderer: renderer(&faces, size, family, depth, [1.7, 3.8]),
     }
 }
 
@@ -182,7 +188,7 @@ fn random() -> Scene {
         own: 2,
         channels: 5,
         texture: None,
-        renderer: renderer(&faces, Family::Logistic, depth, [1.0, 3.0]),
+        renderer: renderer(&faces, [18, 23], Family::Logistic, depth, [1.0, 3.0]),
     }
 }
 
@@ -197,6 +203,12 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
         ("a ball with edges that end", ball(Family::Uniform, exp)),
         ("a ball by the network of depths", ball(Family::Gauss, DepthSoftness::Mlp)),
         ("random triangles", random()),
+        // Faces that reach more pixels than a part has.
+        ("faces in parts", ball_of(1, [310, 300], Family::Logistic, exp)),
+        (
+            "faces in parts in a picture",
+            Scene { texture: Some([5, 7]), ..ball_of(1, [310, 300], Family::Logistic, exp) },
+        ),
         ("a ball in a picture", Scene { texture: Some([5, 7]), ..ball(Family::Logistic, exp) }),
         ("a ball in two texels", Scene { texture: Some([1, 2]), ..ball(Family::Logistic, exp) }),
         ("random triangles in pictures", Scene { texture: Some([3, 4]), channels: 4, ..random() }),
@@ -228,14 +240,40 @@ fn gradients_to_the_softnesses_agree_with_the_kernel_in_f64() {
 }
 
 #[test]
-fn a_texture_gets_the_same_gradient_every_time() {
+fn colours_textures_and_softnesses_get_the_same_gradients_every_time() {
     if !adapter() {
         return;
     }
     let exp = DepthSoftness::Family(Family::Exp);
-    let scene = Scene { texture: Some([2, 2]), ..ball(Family::Logistic, exp) };
-    let [first, second] = [(); 2].map(|()| products::<Wgpu>(&scene, Wanted::Scene, DType::F32));
-    assert_eq!(first, second);
+    let textured = Scene { texture: Some([2, 2]), ..ball(Family::Logistic, exp) };
+    let cut = ball_of(1, [310, 300], Family::Logistic, exp);
+    for (scene, wanted) in [(&textured, Wanted::Scene), (&cut, Wanted::Softness)] {
+        let [first, second] = [(); 2].map(|()| products::<Wgpu>(scene, wanted, DType::F32));
+        assert_eq!(first, second);
+    }
+}
+
+#[test]
+fn views_that_no_launch_takes_together_are_drawn_in_parts() {
+    if !adapter() {
+        return;
+    }
+    // The last views differ from those that any earlier part could have drawn in their place.
+    let views = 65_540;
+    let triangle = |view: usize| {
+        let shift = if view < 65_530 { 0.0 } else { 0.01 * (view - 65_530) as f64 };
+        [[-0.5, -0.4], [0.5, -0.6], [0.1, 0.5]].map(|[x, y]| [x + shift, y + shift, 2.0])
+    };
+    let renderer = ColourRenderer::new(&[[0, 1, 2]], 1, Family::Logistic, 0.1, [1.0, 3.0]);
+    let image = |first: usize, count: usize| -> Vec<f64> {
+        let part: Vec<f64> = (first..first + count).flat_map(triangle).flatten().collect();
+        let colours = tensor::<Wgpu, 3>(&[0.2, 0.5, 0.9], [1, 3, 1], DType::F32);
+        let attributes = Attributes::of_vertices(colours, &[[0, 1, 2]]);
+        let background = renderer.background(&[0.0], &Default::default());
+        let vertices = tensor::<Wgpu, 3>(&part, [count, 3, 3], DType::F32);
+        numbers(renderer.image(vertices, &attributes, &background))
+    };
+    assert_eq!(image(0, views)[2 * 65_520..], image(65_520, 20));
 }
 
 #[test]

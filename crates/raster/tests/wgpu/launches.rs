@@ -82,7 +82,7 @@ fn assert_few(name: &str, most: usize) {
         return;
     }
     let [once, twice] = [1, 2].map(|steps| launched(name, steps));
-    let found = twice.len() - once.len();
+    let found = twice.len().checked_sub(once.len()).expect("logs of both runs");
     println!("{name}: {found} launches a step\n{}", twice[once.len()..].join("\n"));
     assert!(found > 0, "the log names no kernel");
     assert!(found <= most, "{name}: {found} launches a step");

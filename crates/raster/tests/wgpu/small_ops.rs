@@ -16,10 +16,10 @@ const POINTS: usize = 300;
 /// More than one cube compares.
 const SIDES: [usize; 2] = [100, 103];
 
-/// What is computed of a vector.
+/// A function of a vector.
 #[derive(Clone, Copy, Debug)]
 enum Of {
-    /// So many point sets seen by three cameras.
+    /// Point sets seen by three cameras, and how many.
     Projection(usize),
     Coverage,
     /// Losses of images and targets, of which there are so many.
@@ -80,6 +80,24 @@ impl Of {
         let again = (gradient.clone() * vector(&wave(count, 1.3))).sum().backward();
         let second = inner.grad(&again).expect("a second order");
         [numbers(value), numbers(gradient), numbers(second)]
+    }
+}
+
+#[test]
+fn cameras_at_the_poles_are_turned_as_on_the_cpu() {
+    if !adapter() {
+        return;
+    }
+    fn seen<T: RasterBackend>(elevations: &[f64]) -> Vec<f64> {
+        let orbits: Vec<f64> = elevations.iter().flat_map(|&e| [3.0, e, 40.0, 60.0]).collect();
+        let orbits = vector::<T>(&orbits).reshape([elevations.len(), 4]);
+        numbers(project(vector::<T>(&[0.3, 0.2, 0.1]).reshape([1, 1, 3]), orbits))
+    }
+    let elevations = [90.0, -90.0, 270.0, 450.0, 91.0, -91.0, 89.0, 269.0];
+    let (exact, cpu) = (seen::<NdArray<f64>>(&elevations), seen::<NdArray<f32>>(&elevations));
+    for (k, (a, b)) in seen::<Wgpu>(&elevations).iter().zip(exact.iter().zip(cpu)).enumerate() {
+        let near = |x: f64| (a - x).abs() < 1e-5;
+        assert!(near(*b.0) && near(b.1), "{}: {a}, {b:?}", elevations[k / 3]);
     }
 }
 

@@ -11,12 +11,15 @@ use crate::{NEAR, limits::FARTHEST};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OrbitMatrix;
 
-/// The rotation of an orbit by its elevation and azimuth, row by row: left, up and ahead of the camera, see
+/// The rotation of an orbit by its elevation and azimuth in degrees, row by row: left, up and ahead of the camera, see
 /// [`crate::view_rotation`].
 fn rotation<N: Number>(elevation: N, azimuth: N) -> [[N; 3]; 3] {
-    let ((sin_e, cos_e), (sin_a, cos_a)) = (elevation.sin_cos(), azimuth.sin_cos());
-    let zero = N::Float::ZERO;
-    let roll = if cos_e.value() < zero { -N::Float::ONE } else { N::Float::ONE };
+    let degree = N::Float::from_f64(std::f64::consts::PI / 180.0);
+    // Told from degrees: in f32 the cosine at a pole has any sign.
+    let past = (elevation.value().to_f64() + 90.0).rem_euclid(360.0);
+    let roll = if past > 180.0 { -N::Float::ONE } else { N::Float::ONE };
+    let (sin_e, cos_e) = elevation.scale(degree).sin_cos();
+    let (sin_a, cos_a) = azimuth.scale(degree).sin_cos();
     let minus = -N::Float::ONE;
     [
         [cos_a.scale(roll), N::of(0.0), sin_a.scale(roll)],
@@ -28,7 +31,7 @@ fn rotation<N: Number>(elevation: N, azimuth: N) -> [[N; 3]; 3] {
 /// The matrix of one orbit.
 fn matrix<N: Number>(orbit: &[N]) -> [[N; 4]; 3] {
     let degree = N::Float::from_f64(std::f64::consts::PI / 180.0);
-    let rotation = rotation(orbit[1].scale(degree), orbit[2].scale(degree));
+    let rotation = rotation(orbit[1], orbit[2]);
     let (sin, cos) = orbit[3].scale(degree).scale(N::Float::from_f64(0.5)).sin_cos();
     let focal = cos * sin.recip();
     let zero = N::of(0.0);
