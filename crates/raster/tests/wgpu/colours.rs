@@ -144,12 +144,7 @@ fn renderer(
 
 /// A ball from three sides, its colours at its vertices.
 fn ball(family: Family, depth: DepthSoftness) -> Scene {
-    ball_of(1, [18, 23], family, depth)
-}
-
-/// One of 20 faces for 0 `subdivisions`, 80 for 1, on images of this height and width.
-fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoftness) -> Scene {
-    let (ball, azimuths) = (icosphere(subdivisions), [4.1, 108.3, 211.9]);
+    let (ball, azimuths) = (icosphere(1), [4.1, 108.3, 211.9]);
     let positions = ball.positions();
     let world =
         tensor::<NdArray<f64>, 3>(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
@@ -162,7 +157,33 @@ fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoft
         own: 1,
         channels: 3,
         texture: None,
-        renderer: renderer(&faces, size, family, depth, [1.7, 3.8]),
+        renderer: renderer(&faces, [18, 23], family, depth, [1.7, 3.8]),
+    }
+}
+
+/// Three triangles that reach more pixels than a part has, one through another.
+fn large() -> Scene {
+    let vertices = vec![
+        [-0.83, -0.61, 1.9],
+        [0.71, -0.77, 2.6],
+        [0.13, 0.87, 2.2],
+        [-0.91, 0.52, 2.4],
+        [-0.34, -0.95, 1.7],
+        [0.88, 0.41, 2.9],
+        [0.21, 0.93, 2.1],
+        [-0.67, 0.17, 2.3],
+        [0.93, -0.38, 2.0],
+    ];
+    let faces: Arc<[[u32; 3]]> = [[0, 1, 2], [3, 4, 5], [6, 7, 8]].into();
+    let depth = DepthSoftness::Family(Family::Exp);
+    Scene {
+        vertices: vertices.concat(),
+        views: 1,
+        entries: (faces.clone(), 9),
+        own: 1,
+        channels: 3,
+        texture: None,
+        renderer: renderer(&faces, [150, 140], Family::Logistic, depth, [1.7, 3.0]),
     }
 }
 
@@ -204,11 +225,8 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
         ("a ball by the network of depths", ball(Family::Gauss, DepthSoftness::Mlp)),
         ("random triangles", random()),
         // Faces that reach more pixels than a part has.
-        ("faces in parts", ball_of(1, [310, 300], Family::Logistic, exp)),
-        (
-            "faces in parts in a picture",
-            Scene { texture: Some([5, 7]), ..ball_of(1, [310, 300], Family::Logistic, exp) },
-        ),
+        ("faces in parts", large()),
+        ("faces in parts in a picture", Scene { texture: Some([5, 7]), ..large() }),
         ("a ball in a picture", Scene { texture: Some([5, 7]), ..ball(Family::Logistic, exp) }),
         ("a ball in two texels", Scene { texture: Some([1, 2]), ..ball(Family::Logistic, exp) }),
         ("random triangles in pictures", Scene { texture: Some([3, 4]), channels: 4, ..random() }),
@@ -246,7 +264,7 @@ fn colours_textures_and_softnesses_get_the_same_gradients_every_time() {
     }
     let exp = DepthSoftness::Family(Family::Exp);
     let textured = Scene { texture: Some([2, 2]), ..ball(Family::Logistic, exp) };
-    let cut = ball_of(1, [310, 300], Family::Logistic, exp);
+    let cut = large();
     for (scene, wanted) in [(&textured, Wanted::Scene), (&cut, Wanted::Softness)] {
         let [first, second] = [(); 2].map(|()| products::<Wgpu>(scene, wanted, DType::F32));
         assert_eq!(first, second);
