@@ -48,21 +48,23 @@ pub(super) struct Compared<'a, F> {
     pub(super) counted: Option<&'a [F]>,
 }
 
-impl<'a, F: Float> Compared<'a, F> {
-    /// Eight pixels at a time: the coverage `w (1 - exp(-sum))` of the share `w` that counts, its derivative by the sum, and the target.
+impl<F: Float> Compared<'_, F> {
+    /// Eight pixels, number `k` of such groups: the coverage `w (1 - exp(-sum))` of the share `w` that counts, its derivative by the sum, and the
+    /// target.
+    ///
+    /// Not an iterator: the closure of one is compiled without the vectors of its caller, and each operation becomes a call.
     #[inline(always)]
-    fn pixels<L: Lanes<Float = F>>(self) -> impl Iterator<Item = [L; 3]> + use<'a, F, L> {
-        let one = splat::<L>(1.0);
-        let pixels = self.sums.as_chunks().0.iter().zip(self.target.as_chunks().0);
-        let counted = self.counted.map(|counted| counted.as_chunks().0);
-        pixels.enumerate().map(move |(k, (sums, target))| {
-            let rest = L::of(sums).neg().exp();
-            let [coverage, slope] = match counted {
-                None => [one - rest, rest],
-                Some(counted) => [one - rest, rest].map(|number| number * L::of(&counted[k])),
-            };
-            [coverage, slope, L::of(target)]
-        })
+    fn pixels<L: Lanes<Float = F>>(&self, k: usize) -> [L; 3] {
+        let rest = L::of(&self.sums.as_chunks().0[k]).neg().exp();
+        let target = L::of(&self.target.as_chunks().0[k]);
+        let coverage = splat::<L>(1.0) - rest;
+        match self.counted {
+            None => [coverage, rest, target],
+            Some(counted) => {
+                let share = L::of(&counted.as_chunks().0[k]);
+                [coverage * share, rest * share, target]
+            }
+        }
     }
 }
 
@@ -73,8 +75,8 @@ pub(super) fn squared_error<L: Lanes>(
     part: &mut [L::Float],
 ) -> [L; 2] {
     let mut total = splat::<L>(0.0);
-    let parts = part.as_chunks_mut().0.iter_mut();
-    for (part, [coverage, slope, target]) in parts.zip(compared.pixels::<L>()) {
+    for (k, part) in part.as_chunks_mut().0.iter_mut().enumerate() {
+        let [coverage, slope, target] = compared.pixels::<L>(k);
         let difference = coverage - target;
         total += difference * difference;
         *part = (difference * slope).array();
@@ -92,8 +94,8 @@ pub(super) fn overlap_and_union<L: Lanes>(
     let one = splat::<L>(1.0);
     let (mut overlap, mut union) = (splat::<L>(0.0), splat::<L>(0.0));
     let parts = to_overlap.as_chunks_mut().0.iter_mut().zip(to_union.as_chunks_mut().0);
-    let pixels = compared.pixels::<L>();
-    for ((to_overlap, to_union), [coverage, slope, target]) in parts.zip(pixels) {
+    for (k, (to_overlap, to_union)) in parts.enumerate() {
+        let [coverage, slope, target] = compared.pixels::<L>(k);
         let both = coverage * target;
         overlap += both;
         union += coverage + target - both;
