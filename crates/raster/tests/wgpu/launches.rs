@@ -39,11 +39,11 @@ fn step<T: RasterBackend>(
     };
 }
 
-fn take_steps(pose: bool) {
+fn take_steps(pose: bool, size: usize) {
     let steps: usize = std::env::var(STEPS).ok().and_then(|steps| steps.parse().ok()).unwrap_or(0);
     let softness = EdgeSoftness { family: Family::Logistic, squared: true };
-    let renderer = SoftRenderer::new(icosphere(2).faces(), 64, softness, 1e-3);
-    let target = Tensor::zeros([3, 64, 64], &Default::default());
+    let renderer = SoftRenderer::new(icosphere(2).faces(), size, softness, 1e-3);
+    let target = Tensor::zeros([3, size, size], &Default::default());
     for _ in 0..steps {
         step::<Wgpu>(&renderer, target.clone(), pose);
     }
@@ -52,13 +52,19 @@ fn take_steps(pose: bool) {
 #[test]
 #[ignore = "run by another test, with a log of its own"]
 fn steps_of_a_shape() {
-    take_steps(false);
+    take_steps(false, 64);
+}
+
+#[test]
+#[ignore = "run by another test, with a log of its own"]
+fn steps_of_a_larger_shape() {
+    take_steps(false, 80);
 }
 
 #[test]
 #[ignore = "run by another test, with a log of its own"]
 fn steps_of_a_pose() {
-    take_steps(true);
+    take_steps(true, 64);
 }
 
 /// Kernels that a process launches which takes so many steps, with their names.
@@ -91,6 +97,7 @@ fn assert_few(name: &str, most: usize) {
 #[test]
 fn a_step_of_a_shape_launches_few_kernels() {
     assert_few("steps_of_a_shape", 15);
+    assert_few("steps_of_a_larger_shape", 16);
 }
 
 #[test]
