@@ -6,6 +6,8 @@ use super::dual::{Dual, load};
 
 /// Edge vectors shorter than this (NDC², squared length) count as a point.
 const POINT: f32 = 1e-30;
+/// Triangles lower than this part of their longest edge count as slivers.
+const SLIVER: f32 = 1e-3;
 /// Largest rate at which a place in a cell moves with the squared distance, in NDC⁻².
 const STEEPEST: f32 = 1e30;
 /// Bits of the fraction of an f32, and the bias of its exponent.
@@ -141,6 +143,8 @@ pub(super) struct Face {
     pub(super) third: Edge,
     /// Sign of the area; 0 for a triangle without area.
     pub(super) orientation: f32,
+    /// 1 where edges are far from parallel, else 0.
+    stout: f32,
 }
 
 /// Closest point of an edge, or of the whole boundary, to a pixel.
@@ -154,6 +158,8 @@ pub(super) struct Closest {
     pub(super) edge: u32,
     /// At least 0 where the pixel is on the inner side of all edges so far.
     pub(super) side: f32,
+    /// Signed distance to the line of the edge, above 0 on its inner side.
+    line: f32,
 }
 
 /// What the profile makes of one pixel and one face.
@@ -183,6 +189,10 @@ impl Edge {
         Edge { x, y, along_x, along_y, inverse }
     }
 
+    fn length2(self) -> f32 {
+        self.along_x.value * self.along_x.value + self.along_y.value * self.along_y.value
+    }
+
     /// The doubled area of the pixel at `px`, `py` and the edge, above 0 to its left.
     pub(super) fn area(self, px: f32, py: f32) -> Dual {
         let wx = Dual::constant(px).sub(self.x);
@@ -206,6 +216,7 @@ impl Edge {
             along: t,
             edge,
             side: orientation * edge_function,
+            line: orientation * edge_function * f32::sqrt(self.inverse.value),
         }
     }
 }
@@ -228,14 +239,19 @@ impl Pull {
 
 #[cube]
 impl Closest {
-    fn nearer(self, other: Closest) -> Closest {
-        let other_wins = other.distance2.value < self.distance2.value;
+    /// The closer of both points. On the boundary of a face that is `stout` the edge whose line has the least signed distance holds it
+    /// (docs/notes.md, Nearest edge), and floats tell lines apart where they do not tell squared distances.
+    fn nearer(self, other: Closest, stout: bool) -> Closest {
+        let by_line = other.line < self.line;
+        let by_distance = other.distance2.value < self.distance2.value;
+        let other_wins = select(stout, by_line, by_distance);
         Closest {
             distance2: Dual::select(other_wins, other.distance2, self.distance2),
             dx: Dual::select(other_wins, other.dx, self.dx),
             dy: Dual::select(other_wins, other.dy, self.dy),
             along: Dual::select(other_wins, other.along, self.along),
             edge: select(other_wins, other.edge, self.edge),
+            line: select(other_wins, other.line, self.line),
             side: select(other.side < self.side, other.side, self.side),
         }
     }
@@ -257,7 +273,14 @@ impl Face {
         let area = edge_a.along_x.value * edge_b.along_y.value
             - edge_a.along_y.value * edge_b.along_x.value;
         let orientation = select(area > 0.0f32, 1.0f32, select(area < 0.0f32, -1.0f32, 0.0f32));
-        Face { first: edge_a, second: edge_b, third: edge_c, orientation }
+        let ab = edge_a.length2();
+        let bc = edge_b.length2();
+        let ca = edge_c.length2();
+        let longest = select(ab > bc, ab, bc);
+        let longest = select(ca > longest, ca, longest);
+        let size = f32::abs(area);
+        let stout = select(size > SLIVER * longest, 1.0f32, 0.0f32);
+        Face { first: edge_a, second: edge_b, third: edge_c, orientation, stout }
     }
 
     /// The point of the boundary that is closest to the pixel at `px`, `py` (NDC).
@@ -266,7 +289,7 @@ impl Face {
         let first = self.first.closest(px, py, orientation, 0u32);
         let second = self.second.closest(px, py, orientation, 1u32);
         let third = self.third.closest(px, py, orientation, 2u32);
-        first.nearer(second).nearer(third)
+        first.nearer(second, self.stout > 0.5f32).nearer(third, self.stout > 0.5f32)
     }
 
     /// Where the pixel at `px`, `py` (NDC) lies in the table.

@@ -144,7 +144,12 @@ fn renderer(
 
 /// A ball from three sides, its colours at its vertices.
 fn ball(family: Family, depth: DepthSoftness) -> Scene {
-    let (ball, azimuths) = (icosphere(1), [4.1, 108.3, 211.9]);
+    ball_of(1, [18, 23], family, depth)
+}
+
+/// One of 20 faces without `subdivisions`, of 80 after one, on images of this height and width.
+fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoftness) -> Scene {
+    let (ball, azimuths) = (icosphere(subdivisions), [4.1, 108.3, 211.9]);
     let positions = ball.positions();
     let world =
         tensor::<NdArray<f64>, 3>(positions.as_flattened(), [1, positions.len(), 3], DType::F64);
@@ -157,7 +162,7 @@ fn ball(family: Family, depth: DepthSoftness) -> Scene {
         own: 1,
         channels: 3,
         texture: None,
-        renderer: renderer(&faces, [18, 23], family, depth, [1.7, 3.8]),
+        renderer: renderer(&faces, size, family, depth, [1.7, 3.8]),
     }
 }
 
@@ -234,6 +239,21 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
     for (name, scene) in scenes {
         assert_close(&scene, Wanted::Scene, name);
     }
+}
+
+#[test]
+fn gradients_of_large_faces_that_share_edges_agree_with_the_kernel_in_f64() {
+    if !adapter() {
+        return;
+    }
+    // Some of their pixels are so near an edge that squared distances do not tell which one is the nearest. The second order is not held: f32 on
+    // the CPU is off there too.
+    let scene = ball_of(0, [150, 140], Family::Logistic, DepthSoftness::Family(Family::Exp));
+    let expected = products::<NdArray<f64>>(&scene, Wanted::Scene, DType::F64);
+    let found = products::<Wgpu>(&scene, Wanted::Scene, DType::F32);
+    let errors: Vec<f64> = (1..4).map(|k| relative(&found[k], &expected[k])).collect();
+    println!("{errors:?}");
+    assert!(errors.iter().all(|&error| error <= 2e-4), "relative errors {errors:?}");
 }
 
 #[test]
