@@ -39,9 +39,7 @@ pub(super) fn find_largest(
     let mut pixel = part.start + UNIT_POS;
     while pixel < part.end {
         let (column, row) = (part.column(pixel), part.row(pixel));
-        let px = drawn.frame.column_centre(column);
-        let py = drawn.frame.row_centre(row);
-        let pair = shown.pair(px, py, drawn, kind);
+        let pair = shown.pair(column, row, drawn, kind);
         if pair.counts(drawn.weights) {
             let bits = u32::reinterpret(pair.log_edge.value + pair.log_depth.value);
             let ordered = select(bits > SIZE, u32::MAX - bits, bits + NEGATIVE);
@@ -82,9 +80,7 @@ pub(super) fn add_shares(
     let mut pixel = part.start + UNIT_POS;
     while pixel < part.end {
         let (column, row) = (part.column(pixel), part.row(pixel));
-        let px = drawn.frame.column_centre(column);
-        let py = drawn.frame.row_centre(row);
-        let pair = shown.pair(px, py, drawn, kind);
+        let pair = shown.pair(column, row, drawn, kind);
         if pair.counts(weights) {
             let of_pixel = drawn.frame.pixel(view, row, column);
             let at = (MARKS * of_pixel) as usize;
@@ -290,7 +286,7 @@ pub(super) fn blend_faces(
     let second = comptime!(kind.second);
     let count = comptime!(9 + 3 * kind.numbers());
     let units = comptime!(UNITS as usize);
-    let (frame, weights) = (drawn.frame, drawn.weights);
+    let weights = drawn.weights;
     let part = drawn.part(group as u32);
     let (view, face) = (part.job / drawn.face_count, part.job % drawn.face_count);
     let shown = FaceAttributes::of(drawn, view, face, kind);
@@ -302,9 +298,7 @@ pub(super) fn blend_faces(
     while pixel < part.end {
         let (column, row) = (part.column(pixel), part.row(pixel));
         let first = drawn.in_image(view, row, column, kind);
-        let px = frame.column_centre(column);
-        let py = frame.row_centre(row);
-        let pair = shown.pair(px, py, drawn, kind);
+        let pair = shown.pair(column, row, drawn, kind);
         if pair.counts(weights) {
             let of_pixel = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind));
             let share = pair.share(of_pixel.log, weights);
@@ -391,9 +385,7 @@ pub(super) fn blend_cubics(
         let mut pixel = part.start + UNIT_POS;
         while pixel < part.end {
             let (column, row) = (part.column(pixel), part.row(pixel));
-            let px = drawn.frame.column_centre(column);
-            let py = drawn.frame.row_centre(row);
-            let pair = shown.pair(px, py, drawn, kind);
+            let pair = shown.pair(column, row, drawn, kind);
             if pair.counts(drawn.weights) {
                 let first = drawn.in_image(view, row, column, kind);
                 let of_pixel = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind));

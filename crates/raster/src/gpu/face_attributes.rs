@@ -245,15 +245,17 @@ impl FaceAttributes {
         }
     }
 
-    /// What it is to the pixel at `px`, `py` (NDC).
+    /// The pair of the face and a pixel.
     pub(super) fn pair(
         self,
-        px: f32,
-        py: f32,
+        column: u32,
+        row: u32,
         drawn: &BlendInputs,
         #[comptime] kind: BlendSpec,
     ) -> ColourPair {
         let weights = drawn.weights;
+        let px = drawn.frame.column_centre(column);
+        let py = drawn.frame.row_centre(row);
         let closest = self.face.closest(px, py);
         let inside = closest.side >= 0.0f32 && self.face.orientation != 0.0f32;
         let within = inside && self.per_area.value != 0.0f32;

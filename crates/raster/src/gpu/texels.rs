@@ -45,9 +45,7 @@ pub(super) fn sum_texels(
     let mut pixel = part.start + UNIT_POS;
     while pixel < part.end {
         let (column, row) = (part.column(pixel), part.row(pixel));
-        let px = drawn.frame.column_centre(column);
-        let py = drawn.frame.row_centre(row);
-        let pair = shown.pair(px, py, drawn, kind);
+        let pair = shown.pair(column, row, drawn, kind);
         if pair.counts(drawn.weights) {
             let first = drawn.in_image(view, row, column, kind);
             let log = OfPixel::load(pixels, OfPixel::at(drawn, view, row, column, kind)).log;
