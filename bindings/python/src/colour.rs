@@ -36,6 +36,7 @@ impl ColourRenderer {
         depth: &str,
         depth_scale: f64,
         tolerance: f64,
+        cull_back_faces: bool,
     ) -> PyResult<Self> {
         check_tolerance(tolerance)?;
         check_size(size)?;
@@ -64,6 +65,7 @@ impl ColourRenderer {
             let renderer =
                 softrast_raster::ColourRenderer::with_weighting(faces, size, weighting, phi)
                     .with_tolerance(tolerance);
+            let renderer = if cull_back_faces { renderer.without_back_faces() } else { renderer };
             let behind = renderer.background::<NdArray<f64>>(&[], &Default::default());
             (renderer, behind.log_weight.into_scalar())
         };

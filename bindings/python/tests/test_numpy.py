@@ -100,6 +100,13 @@ def test_a_face_of_one_colour_hides_the_background_where_it_covers_a_pixel():
     assert image[0, :, 0, 0] == pytest.approx([1.0, 0.0, 0.0], abs=1e-5)
 
 
+def test_without_back_faces_a_face_is_seen_from_one_side():
+    both, culled = (softrast.blend(colours(cull_back_faces=cull), CORNERS, np.ones((3, 1))) for cull in (False, True))
+    mirrored = softrast.blend(colours(cull_back_faces=True), CORNERS * [-1, 1, 1], np.ones((3, 1)))
+    shares = [image[0, 1].max() for image in (both, culled, mirrored)]
+    assert shares[0] > 0.9 and sorted(shares[1:]) == [0.0, shares[0]]
+
+
 def test_entries_of_corners_and_a_texture_show_what_vertices_would():
     values = np.array([[0.1], [0.5], [0.9]])
     expected = softrast.blend(colours(), CORNERS, values)

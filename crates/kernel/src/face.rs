@@ -102,12 +102,6 @@ impl<T: Real> Face<'_, T> {
         self.faces.solid >> self.lane & 1 == 1
     }
 
-    /// Whether it is a sliver or has no area.
-    #[inline(always)]
-    pub(crate) fn is_sliver(&self) -> bool {
-        self.faces.slivers >> self.lane & 1 == 1
-    }
-
     /// Signed distances of pixels to the line of edge k.
     #[inline(always)]
     pub(crate) fn line(&self, k: usize, px: T::Lanes, py: T::Lanes) -> T::Lanes {

@@ -12,7 +12,7 @@ pub(crate) use super::lanes::{Float, Vectors};
 type F32x8 = Plain<f32>;
 
 macro_rules! float {
-    ($float:ty, $bits:ty, $mantissa:expr, $bias:expr, $best:ty, $exp:path) => {
+    ($float:ty, $bits:ty, $mantissa:expr, $bias:expr, $best:ty, $exp:path, $power:path) => {
         impl Vectors for $float {
             type Best = $best;
         }
@@ -68,6 +68,10 @@ macro_rules! float {
                 $exp(self)
             }
             #[inline(always)]
+            fn power(self) -> Self {
+                $power(self)
+            }
+            #[inline(always)]
             fn ln(self) -> Self {
                 self.ln()
             }
@@ -79,8 +83,8 @@ macro_rules! float {
     };
 }
 
-float!(f32, u32, 23, 127, F32x8, exp);
-float!(f64, u64, 52, 1023, Plain<f64>, f64::exp);
+float!(f32, u32, 23, 127, F32x8, exp, power);
+float!(f64, u64, 52, 1023, Plain<f64>, f64::exp, f64::exp);
 
 /// `e^x` without a branch or a call, so that loops over it become vectors; to 2 units in the last
 /// place. It ends at 0 and infinity as it should, and NaN stays.
@@ -107,9 +111,48 @@ fn exp(x: f32) -> f32 {
     power * two_to(half) * two_to(exponent - half)
 }
 
+/// `e^x` below 88, with a third of the steps of [`exp`]: `x` is rounded once more, to 6e-8 of itself.
+#[inline(always)]
+fn power(x: f32) -> f32 {
+    let binary = x * std::f32::consts::LOG2_E;
+    let held = if binary < -126.0 { -126.0 } else { binary };
+    const MAGIC: f32 = 12_582_912.0;
+    let shifted = held + MAGIC;
+    let rest = held - (shifted - MAGIC);
+    // 2^rest in pairs, and pairs of pairs.
+    let square = rest * rest;
+    let low = rest * LN_2[0] + square * (LN_2[1] + rest * LN_2[2]);
+    let high = (LN_2[3] + rest * LN_2[4]) + square * (LN_2[5] + rest * LN_2[6]);
+    let power = 1.0 + (low + square * square * high);
+    power * f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0f32.to_bits()))
+}
+
+/// `(ln 2)^n / n!` from n = 1.
+const LN_2: [f32; 7] = [
+    std::f32::consts::LN_2,
+    0.240_226_5,
+    0.055_504_11,
+    0.009_618_129,
+    0.001_333_355_8,
+    0.000_154_035_3,
+    0.000_015_252_734,
+];
+
 #[cfg(test)]
 mod tests {
-    use super::exp;
+    use super::{exp, power};
+
+    #[test]
+    fn the_power_is_right_to_1e_7_times_the_exponent() {
+        for k in -870_000..880_000 {
+            let x = k as f32 * 1e-4;
+            let (found, exact) = (f64::from(power(x)), f64::from(x).exp());
+            let bound = exact * (1.0 + f64::from(x).abs()) * 1.2e-7;
+            assert!((found - exact).abs() <= bound, "e^{x}: {found:e} instead of {exact:e}");
+        }
+        assert_eq!(power(0.0), 1.0);
+        assert!((0.0..2e-38).contains(&power(-1e30)) && (0.0..2e-38).contains(&power(-90.0)));
+    }
 
     #[test]
     fn the_exponential_is_right_to_two_units_in_the_last_place() {

@@ -88,6 +88,8 @@ pub trait Float:
     fn rounded(self) -> Self;
     /// `e` to this power, to 2 units in the last place.
     fn exp(self) -> Self;
+    /// `e` to a power below 88, to no more than 1e-7 times that power, and 0 or next to it below -87.
+    fn power(self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;
     /// Sine and cosine of an angle in radians.
@@ -146,6 +148,12 @@ pub(crate) trait Lanes:
     fn exp(self) -> Self {
         let numbers = self.array();
         Self::of(&lanes!(I => Float::exp(numbers[I])))
+    }
+    /// See [`Float::power`].
+    #[inline(always)]
+    fn power(self) -> Self {
+        let numbers = self.array();
+        Self::of(&lanes!(I => Float::power(numbers[I])))
     }
     /// Natural logarithm.
     #[inline(always)]
@@ -211,6 +219,33 @@ pub(crate) trait Lanes:
     fn rows(table: &[[Self::Float; 4]], at: &Places) -> [Self; 4];
     /// Adds to the rows of a table at some places, lane by lane.
     fn add_to_rows(table: &mut [[Self::Float; 4]], at: &Places, columns: [Self; 4]);
+    /// Two groups of rows, column by column.
+    #[inline(always)]
+    fn quads(rows: &[[Self::Float; 4]], [low, high]: [u32; 2]) -> [Self; 4] {
+        let [low, high] = [low as usize, high as usize];
+        let (low, high) = (&rows[low..low + GROUP], &rows[high..high + GROUP]);
+        let row = lanes!(I => if I < GROUP { low[I % GROUP] } else { high[I % GROUP] });
+        [
+            Self::of(&lanes!(I => row[I][0])),
+            Self::of(&lanes!(I => row[I][1])),
+            Self::of(&lanes!(I => row[I][2])),
+            Self::of(&lanes!(I => row[I][3])),
+        ]
+    }
+    /// Adds to two groups of rows, the first one first.
+    #[inline(always)]
+    fn add_to_quads(rows: &mut [[Self::Float; 4]], at: [u32; 2], [a, b, c, d]: [Self; 4]) {
+        let (a, b, c, d) = (a.array(), b.array(), c.array(), d.array());
+        for half in 0..2 {
+            let first = at[half] as usize;
+            let own = &mut rows[first..first + GROUP];
+            for i in 0..GROUP {
+                let k = half * GROUP + i;
+                let row = own[i];
+                own[i] = [row[0] + a[k], row[1] + b[k], row[2] + c[k], row[3] + d[k]];
+            }
+        }
+    }
 }
 
 /// Something that is computed with vectors, and compiled for the machines that have better ones.

@@ -8,6 +8,7 @@ use super::{
 };
 
 /// Closest points of a triangle's boundary to eight pixels.
+#[derive(Clone, Copy)]
 pub(crate) struct Closest<T: Real> {
     /// Squared distance to it, in pixels.
     pub(crate) distance2: T,
@@ -24,11 +25,19 @@ pub(crate) struct Closest<T: Real> {
 }
 
 impl<T: Real> Closest<T> {
-    /// The gradient to the closest point held where it is, of a function with this derivative by the squared distance.
-    #[inline(always)]
-    pub(crate) fn pull(&self, by_distance2: T) -> [T; 2] {
-        let pull = by_distance2.scale(splat(-2.0));
-        [pull * self.dx, pull * self.dy]
+    /// Of no face.
+    pub(crate) fn nothing() -> Self {
+        let zero = T::constant(splat(0.0));
+        let nowhere = splat::<T::Lanes>(0.0).less(splat(0.0));
+        Self {
+            distance2: zero,
+            dx: zero,
+            dy: zero,
+            weights: [zero; 3],
+            inside: nowhere,
+            along: zero,
+            edges: [nowhere; 3],
+        }
     }
 }
 

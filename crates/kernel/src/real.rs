@@ -31,6 +31,8 @@ pub(crate) trait Real:
     fn inverse(self) -> Self;
     /// `e` to this power.
     fn exponential(self) -> Self;
+    /// `e` to this power, as [`Lanes::power`] has it.
+    fn power_of_e(self) -> Self;
     /// Natural logarithm.
     fn logarithm(self) -> Self;
     /// `yes` where the mask holds, else `no`.
@@ -107,6 +109,10 @@ impl<L: Lanes> Real for L {
     #[inline(always)]
     fn exponential(self) -> Self {
         Lanes::exp(self)
+    }
+    #[inline(always)]
+    fn power_of_e(self) -> Self {
+        Lanes::power(self)
     }
     #[inline(always)]
     fn logarithm(self) -> Self {
@@ -210,6 +216,11 @@ impl<L: Lanes> Real for Dual<L> {
     #[inline(always)]
     fn exponential(self) -> Self {
         let value = Lanes::exp(self.value);
+        Self { value, tangent: value * self.tangent }
+    }
+    #[inline(always)]
+    fn power_of_e(self) -> Self {
+        let value = Lanes::power(self.value);
         Self { value, tangent: value * self.tangent }
     }
     #[inline(always)]

@@ -1,13 +1,15 @@
 //! Times of a step in colour against one of silhouettes, over the same scene.
 //!
 //! ```text
-//! cargo bench -p softrast-raster --bench blend
+//! cargo bench -p softrast-raster --bench blend            # all
+//! cargo bench -p softrast-raster --bench blend -- W1      # what has W1 in its name
 //! ```
 //!
 //! A step is all that an optimisation does: projection, image, mean squared difference, gradient to the world vertices, and in colour to
 //! the colours of the vertices too. Medians in `f32`, in turn; the edge softness is that of the silhouettes, and the planes lie around the
 //! mesh. Under a depth softness that hardly tells one depth from another, all faces reach as far as those of a silhouette of another
-//! tolerance, so that both visit the same pairs; the last column is the step at the default scale, where near faces reach farther.
+//! tolerance, so that both visit the same pairs. The last columns are the step at the default scale, where near faces reach farther, with all
+//! faces and with front faces alone.
 
 #[allow(dead_code, reason = "the other benchmark uses the rest")]
 mod coloured;
@@ -36,32 +38,41 @@ const STEPS: usize = 40;
 const FLAT: f64 = 10.0;
 
 fn main() {
+    // Cargo adds a flag of its own.
+    let filter = std::env::args().skip(1).find(|word| word != "--bench");
     println!("{}", machine::machine());
-    println!("| scene | threads | silhouette, ms | image, ms | colour, ms | ratio | default, ms |");
-    println!("|---|---|---|---|---|---|---|");
+    println!(
+        "| scene | threads | silhouette, ms | image, ms | colour, ms | ratio | default, ms | front, ms |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     let narrow = Workload {
         name: "W2, edges half a pixel wide".into(),
         width: 1.0 / 256.0,
         ..Workload::w2()
     };
     for workload in [Workload::w1(), Workload::w2(), narrow] {
+        if filter.as_ref().is_some_and(|filter| !workload.name.contains(filter)) {
+            continue;
+        }
         let silhouettes = Silhouettes::new(&workload);
         let flat = Coloured::<B>::new(&workload, FLAT, DType::F32);
         let default = Coloured::<B>::new(&workload, ColourRenderer::DEPTH_SCALE, DType::F32);
+        let front = default.clone().without_back_faces();
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.expect("threads can be started");
-            let [silhouette, image, colour, default] = pool.install(|| {
+            let [silhouette, image, colour, default, front] = pool.install(|| {
                 medians([
                     &|| drop(black_box(silhouettes.step())),
                     &|| drop(black_box(flat.image())),
                     &|| drop(black_box(flat.step())),
                     &|| drop(black_box(default.step())),
+                    &|| drop(black_box(front.step())),
                 ])
             });
             let ratio = colour / silhouette;
             println!(
-                "| {} | {threads} | {silhouette:.2} | {image:.2} | {colour:.2} | {ratio:.2} | {default:.2} |",
+                "| {} | {threads} | {silhouette:.2} | {image:.2} | {colour:.2} | {ratio:.2} | {default:.2} | {front:.2} |",
                 workload.name
             );
         }

@@ -56,6 +56,11 @@ impl<B: RasterBackend> Coloured<B> {
         self
     }
 
+    pub(crate) fn without_back_faces(mut self) -> Self {
+        self.renderer = self.renderer.without_back_faces();
+        self
+    }
+
     /// The image alone, `[views, channels + 1, height, width]`.
     pub(crate) fn image(&self) -> Tensor<B, 4> {
         let seen = project(self.world.clone(), self.cameras.clone());

@@ -62,6 +62,7 @@ pub struct ColourRenderer<S = EdgeSoftness> {
     weighting: Weighting<S>,
     phi: [Vec<f64>; 2],
     tolerance: f64,
+    culls: bool,
     cache: Cache<Prepared<S>>,
     #[cfg(feature = "wgpu")]
     topology: crate::gpu::Topology,
@@ -128,6 +129,7 @@ impl<S: Softness> ColourRenderer<S> {
             weighting,
             phi,
             tolerance,
+            culls: false,
             cache: Cache::default(),
             #[cfg(feature = "wgpu")]
             topology: Default::default(),
@@ -143,6 +145,16 @@ impl<S: Softness> ColourRenderer<S> {
     pub fn with_tolerance(mut self, tolerance: f64) -> Self {
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         (self.tolerance, self.cache) = (tolerance, Cache::default());
+        self
+    }
+
+    /// Without back faces: those whose corners the camera sees clockwise. For closed meshes whose faces go counter-clockwise as seen from outside,
+    /// where back faces are hidden by front faces and cost half of the time.
+    ///
+    /// The image is that of the front faces alone. It jumps where a face turns, by what the face shows there at its edges.
+    #[must_use]
+    pub fn without_back_faces(mut self) -> Self {
+        self.culls = true;
         self
     }
 
@@ -298,6 +310,7 @@ impl<S: Softness> ColourRenderer<S> {
             planes: self.weighting.planes,
             size: self.size,
             tolerance: 0.5 * self.tolerance,
+            culls: self.culls,
             kept: None,
             #[cfg(feature = "wgpu")]
             topology: self.topology.clone(),

@@ -35,6 +35,8 @@ struct Case<S = EdgeSoftness> {
     /// The colour, then the logarithm of the weight.
     background: Vec<f64>,
     tolerance: f64,
+    /// Whether the kernel leaves back faces out.
+    culls: bool,
 }
 
 /// Inputs of a case, one after the other: vertices, attributes, both parameters, background, and texels if there are any.
@@ -62,7 +64,17 @@ impl<S: Softness> Case<S> {
             phi,
             background: vec![0.2, -0.3, 0.5, -5.0],
             tolerance: 1e-9,
+            culls: false,
         }
+    }
+
+    /// The faces whose corners go counter-clockwise as they are seen.
+    fn front_faces(&self) -> Arc<[[u32; 3]]> {
+        let is_front = |face: &&[u32; 3]| {
+            let [a, b, c] = face.map(|v| &self.vertices[3 * v as usize..3 * v as usize + 2]);
+            (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])
+        };
+        self.faces.iter().filter(is_front).copied().collect()
     }
 
     /// The same with a texture, of which faces show pieces of any size.
@@ -82,8 +94,9 @@ impl<S: Softness> Case<S> {
 
     fn renderer(&self) -> ColourRenderer<S> {
         let (faces, weighting) = (self.faces.clone(), self.weighting.clone());
-        ColourRenderer::with_weighting(faces, SIZE, weighting, self.phi.clone())
-            .with_tolerance(self.tolerance)
+        let renderer = ColourRenderer::with_weighting(faces, SIZE, weighting, self.phi.clone())
+            .with_tolerance(self.tolerance);
+        if self.culls { renderer.without_back_faces() } else { renderer }
     }
 
     /// The image `[1, channels + 1, height, width]` by the kernel or by the reference.
@@ -159,12 +172,16 @@ fn weighting<S>(edge: S, depth: DepthSoftness) -> Weighting<S> {
 const NAMES: [&str; 6] = ["vertices", "attributes", "edge", "depth", "background", "texels"];
 
 fn compare(name: &str, case: &Case<impl Softness>, bounds: [f64; 3]) {
-    let (found, expected) = (case.derivatives(true), case.derivatives(false));
+    assert_same(name, [case.derivatives(true), case.derivatives(false)], bounds);
+}
+
+/// Compares what [`Case::derivatives`] found with what is expected, by order.
+fn assert_same(name: &str, [found, expected]: [Vec<Vec<f64>>; 2], bounds: [f64; 3]) {
+    let inputs = found.len() / 2;
     for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
-        let inputs = case.inputs::<B>().len();
-        let (order, bound) = (k.div_ceil(inputs), bounds[k.div_ceil(inputs)]);
+        let order = k.div_ceil(inputs);
         let of = if k == 0 { "image" } else { NAMES[(k - 1) % inputs] };
-        let error = relative(found, expected);
+        let (error, bound) = (relative(found, expected), bounds[order]);
         assert!(error <= bound, "{name}, {of}, order {order}: {error:e} above {bound:e}");
     }
 }
@@ -201,6 +218,22 @@ fn a_softness_of_ones_own_draws_colours_to_second_order() {
     for seed in 0..2 {
         let case = Case::random(seed, 20, weighting(Tanh, EXP), phi.clone());
         compare("tanh", &case, [1e-8, 1e-6, 1e-4]);
+    }
+}
+
+#[test]
+fn without_back_faces_there_are_only_front_faces() {
+    let edge = LOGISTIC;
+    let phi = [edge.default_phi(0.05), EXP.default_phi(0.2)];
+    for seed in 0..3 {
+        let mut case = Case::random(seed, 24, weighting(edge, EXP), phi.clone());
+        let mut fronts = Case::random(seed, 24, weighting(edge, EXP), phi.clone());
+        fronts.faces = fronts.front_faces();
+        fronts.entries = fronts.faces.clone();
+        assert!((2..23).contains(&fronts.faces.len()), "{} front faces", fronts.faces.len());
+        case.culls = true;
+        let both = [case.derivatives(true), fronts.derivatives(false)];
+        assert_same("front faces", both, [1e-8, 1e-6, 1e-4]);
     }
 }
 

@@ -72,19 +72,21 @@ class ColourRenderer(_native.ColourRenderer):
     `softness`, a `Softness` at `progress` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
     of a family, or "depth_mlp". `planes` are a near and a far depth in world units, around the mesh; they do not cut. `depth_scale` is in
     units of the distance between them: with "exp" a face counts e times as much as one that lies so far behind it. `tolerance` (0 to 1)
-    bounds the error of any pixel, as a part of the range of what is shown.
+    bounds the error of any pixel, as a part of the range of what is shown. `cull_back_faces` leaves out faces whose corners the camera
+    sees clockwise: for closed meshes whose faces go counter-clockwise as seen from outside, in half of the time.
 
     Raises `ValueError` if one of them is out of range, or the softness has a surrogate.
     """
 
     def __new__(
         cls, faces: _ArrayLike, size: _Size, softness: Softness, planes: _Sequence[float], *, progress: float = 0.0, depth: str = "exp",
-        depth_scale: float = 0.05, tolerance: float = 1e-5,
+        depth_scale: float = 0.05, tolerance: float = 1e-5, cull_back_faces: bool = False,
     ) -> ColourRenderer:
         _shapes.softness(softness)
         planes = _shapes.planes(planes)
         return super().__new__(
             cls, _shapes.faces(faces), _shapes.size(size), softness, planes, progress, depth, depth_scale, tolerance,
+            cull_back_faces,
         )
 
 

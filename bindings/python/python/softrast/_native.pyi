@@ -58,7 +58,7 @@ class Prepared:
 class ColourRenderer:
     def __new__(
         cls, faces: NDArray[np.int64], size: Sequence[int], softness: Softness, planes: Sequence[float], progress: float, depth: str,
-        depth_scale: float, tolerance: float
+        depth_scale: float, tolerance: float, cull_back_faces: bool
     ) -> ColourRenderer: ...
     def prepared(
         self, phi: _Numbers, phi_depth: _Numbers, log_weight: float, entries: Optional[NDArray[np.int64]],

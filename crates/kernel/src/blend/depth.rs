@@ -41,6 +41,7 @@ pub(super) struct DepthLookup<'a, T: Real> {
 }
 
 /// What points count by their depth.
+#[derive(Clone, Copy)]
 pub(super) enum DepthAt<T: Real> {
     /// From a table: the logarithm of the weight, its derivative by the place, and the place in the table.
     Table { log: T, slope: T, t: T, row: Places },
@@ -110,6 +111,12 @@ impl<'a, T: Real> DepthLookup<'a, T> {
 }
 
 impl<T: Real> DepthAt<T> {
+    /// Of no point.
+    pub(super) fn nothing() -> Self {
+        let zero = T::constant(splat(0.0));
+        Self::Table { log: zero, slope: zero, t: zero, row: Places::FIRST }
+    }
+
     /// The logarithm of the weight.
     #[inline(always)]
     pub(super) fn log(&self) -> T {

@@ -6,8 +6,8 @@
 #![allow(clippy::needless_range_loop)]
 
 mod depth;
-mod planes;
 mod point;
+mod quads;
 mod reach;
 mod scene;
 mod texture;
@@ -24,7 +24,7 @@ pub use self::{
     texture::TEXEL_CHANNELS,
 };
 use self::{
-    planes::Planes,
+    quads::{QUAD, Quads},
     reach::Reached,
     scene::{Blend, of_type},
     texture::TexelSums,
@@ -33,7 +33,7 @@ use self::{
 use super::{
     bands::View,
     float::{self, Vectors},
-    lanes::{Lanes, Plain, Work, has_vectors, run},
+    lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
     real::{Dual, Float, Real, splat},
 };
 
@@ -43,9 +43,16 @@ const RANGE: [f64; 2] = [60.0, 600.0];
 /// What passes over the same inputs share.
 pub struct Kept<F> {
     reached: Reached,
-    /// Of each band of each view, what weights are relative to, and their sums, once an image has been drawn; nothing where no pass
-    /// follows that would need them.
-    sums: Vec<OnceLock<[Vec<F>; 2]>>,
+    /// Those of each band of each view, once an image has been drawn; nothing where no pass follows that would need them.
+    sums: Vec<OnceLock<BandSums<F>>>,
+}
+
+/// Sums over the faces at the pixels of a band.
+struct BandSums<F> {
+    /// Logarithms that weights are relative to: none is so much larger or smaller than that of a pixel's sum that it could not be told.
+    largest: Vec<F>,
+    /// Of the weights, then of each channel.
+    sums: Quads<F>,
 }
 
 impl<F> Kept<F> {
@@ -311,7 +318,7 @@ struct Band<'a, 's, T: Real> {
     logs: &'a [f32],
     /// Logarithm of what may be left out of a pixel of each face, as a part of the weights there.
     least: f64,
-    kept: Option<&'a OnceLock<[Vec<Float<T>>; 2]>>,
+    kept: Option<&'a OnceLock<BandSums<Float<T>>>>,
     /// `[channels + 1, height, width]`, and what gradients are wanted.
     upstream: Option<(&'a [Float<T>], [bool; 5])>,
 }
@@ -323,53 +330,88 @@ impl<T: Real> Work for Band<'_, '_, T> {
     fn run(self) -> Walked<Float<T>> {
         let blend = self.blend;
         let (scene, channels) = (&blend.scene, blend.channels);
+        let zero = <Float<T> as float::Float>::ZERO;
         let length = scene.band_length(self.band);
-        let [largest, sums] = self.sums(length);
+        let padded = length.next_multiple_of(LANES);
+        // Those that are kept have no tangents.
+        let kept = self.kept.filter(|_| !T::DUAL);
+        let own;
+        let BandSums { largest, sums } = match kept {
+            Some(kept) => {
+                if kept.get().is_none() {
+                    // Another walk may have been as quick; its sums are the same.
+                    let _ = kept.set(self.summed(length));
+                }
+                kept.get().expect("it was set")
+            }
+            None => {
+                own = self.summed(length);
+                &own
+            }
+        };
         let upstream = self.upstream.map(|(upstream, _)| self.padded(upstream, length));
-        // The image; one over the sum of all weights, and what the upstream makes of the image; what each channel of the background gets.
-        let mut image = Planes::new(channels + 1, length);
-        let mut pixels = Planes::new(3, length);
+        let with_image = self.upstream.is_none() || T::DUAL;
+        let mut image = vec![zero; if with_image { (channels + 1) * largest.len() } else { 0 }];
+        let of_pixels = if upstream.is_some() { length } else { 0 };
+        let mut pixels = Quads::new(QUAD, of_pixels, T::DUAL);
+        let mut limits = vec![zero; of_pixels.next_multiple_of(LANES)];
+        // What each channel of the background gets.
         let mut background = vec![splat::<T::Lanes>(0.0); channels + 1];
+        let mut seen = vec![T::constant(splat(0.0)); channels + 1];
         let log_weight = blend.behind(channels);
-        for k in 0..largest.vectors() {
-            let behind = T::exponential(log_weight - T::constant(largest.vector(0, k).value()));
-            let per_total = T::inverse(sums.vector(0, k) + behind);
-            let rest = behind * per_total;
-            let covered = sums.vector(0, k) * per_total;
-            image.set(channels, k, covered);
-            for channel in 0..channels {
-                let seen = sums.vector(1 + channel, k) * per_total;
-                image.set(channel, k, seen + rest * blend.behind(channel));
+        for (k, largest) in largest.as_chunks().0.iter().enumerate() {
+            let largest = T::Lanes::of(largest);
+            let behind = T::exponential(log_weight - T::constant(largest));
+            let mut sum = T::constant(splat(0.0));
+            let (mut per_total, mut rest) = (sum, sum);
+            for (number, quad) in (0..channels + 1).step_by(QUAD).zip(0..) {
+                for (number, own) in (number..=channels).zip(sums.vector(quad, k)) {
+                    if number == 0 {
+                        sum = own;
+                        per_total = T::inverse(sum + behind);
+                        rest = behind * per_total;
+                        seen[channels] = sum * per_total;
+                    } else {
+                        seen[number - 1] = own * per_total + rest * blend.behind(number - 1);
+                    }
+                }
+            }
+            if with_image {
+                for (plane, seen) in image.chunks_exact_mut(padded).zip(&seen) {
+                    plane[k * LANES..(k + 1) * LANES].copy_from_slice(&seen.output().array());
+                }
             }
             let Some(upstream) = &upstream else { continue };
-            let of_share = upstream.vector(channels, k).value();
-            let mut whole = covered.scale(of_share);
-            let mut alone = T::constant(splat(0.0));
-            for channel in 0..channels {
-                let upstream = upstream.vector(channel, k).value();
-                whole = whole + image.vector(channel, k).scale(upstream);
-                alone = alone + blend.behind(channel).scale(upstream);
-                background[channel] += rest.scale(upstream).output();
+            let mut whole = T::constant(splat(0.0));
+            let (mut alone, mut of_share) = (whole, splat(0.0));
+            for (first, quad) in (0..channels + 1).step_by(QUAD).zip(0..) {
+                for (channel, upstream) in (first..=channels).zip(upstream.vector::<T>(quad, k)) {
+                    let upstream = upstream.value();
+                    whole = whole + seen[channel].scale(upstream);
+                    if channel == channels {
+                        of_share = upstream;
+                    } else {
+                        alone = alone + blend.behind(channel).scale(upstream);
+                        background[channel] += rest.scale(upstream).output();
+                    }
+                }
             }
             background[channels] += (rest * (alone - whole)).output();
-            pixels.set(0, k, per_total);
-            pixels.set(1, k, whole - T::constant(of_share));
-            let total = (sums.vector(0, k) + behind).value().ln();
-            let total = total + largest.vector(0, k).value() + splat(self.least);
-            pixels.set(2, k, T::constant(total));
+            let image = whole - T::constant(of_share);
+            let total = (sum + behind).value().ln();
+            let total = total + largest + splat(self.least);
+            pixels.set(k, [T::constant(largest), per_total, image, T::constant(total)]);
+            limits[k * LANES..(k + 1) * LANES].copy_from_slice(&total.array());
         }
         let mut walked = Walked {
-            image: Vec::new(),
+            image: image.chunks_exact(padded).map(|plane| self.trimmed(plane)).collect(),
             faces: Vec::new(),
             tables: [Vec::new(), Vec::new()],
             background: background.into_iter().map(Lanes::sum).collect(),
             texels: blend.no_texels(self.upstream.is_some_and(|(_, wanted)| wanted[4])),
         };
-        if self.upstream.is_none() || T::DUAL {
-            walked.image = (0..=channels).map(|plane| self.trimmed(image.output(plane))).collect();
-        }
         if let (Some(upstream), Some((_, wanted))) = (&upstream, self.upstream) {
-            self.pull(&largest, &pixels, upstream, wanted, &mut walked);
+            self.pull(&pixels, &limits, upstream, wanted, &mut walked);
         }
         walked
     }
@@ -382,51 +424,39 @@ impl<T: Real> Band<'_, '_, T> {
         Walk { blend: self.blend, place, view: self.view, logs: self.logs, visitor }.run();
     }
 
-    /// What weights are relative to, and their sums: the weights, then a plane for each channel.
     #[inline(always)]
-    fn sums(&self, length: usize) -> [Planes<T>; 2] {
-        // Those that are kept have no tangents.
-        let kept = self.kept.filter(|_| !T::DUAL);
-        if let Some(planes) = kept.and_then(OnceLock::get) {
-            let [largest, sums] = planes;
-            return [Planes::of(largest, length), Planes::of(sums, length)];
-        }
+    fn summed(&self, length: usize) -> BandSums<Float<T>> {
         let largest = self.largest(length);
-        let mut sums = Planes::new(1 + self.blend.channels, length);
+        let mut sums = Quads::new(1 + self.blend.channels, length, T::DUAL);
         self.walk(&mut Sums { largest: &largest, sums: &mut sums });
-        if let Some(kept) = kept {
-            // Another walk may have been as quick; its sums are the same.
-            let _ = kept.set([largest.values().to_vec(), sums.values().to_vec()]);
-        }
-        [largest, sums]
+        BandSums { largest, sums }
     }
 
-    /// Logarithms that weights are relative to: none is so much larger or smaller than that of a pixel's sum that it could not be told.
+    /// See [`BandSums`].
     #[inline(always)]
-    fn largest(&self, length: usize) -> Planes<T> {
+    fn largest(&self, length: usize) -> Vec<Float<T>> {
         let blend = self.blend;
         let behind = blend.background[0][blend.channels];
         let number = <Float<T> as float::Float>::from_f64;
-        let mut largest = Planes::new(1, length);
+        let length = length.next_multiple_of(LANES);
         // No weight is larger than this, and the background is always there: so one number does for all pixels.
         let faces = self.of_view.faces(self.band).iter();
         let highest = faces.map(|&face| self.logs[face as usize]).fold(f32::MIN, f32::max);
         let highest = number(f64::from(highest));
         if highest <= behind + number(of_type::<Float<T>>(RANGE)) {
-            largest.fill(if highest > behind { highest } else { behind });
-        } else {
-            largest.fill(behind);
-            self.walk(&mut Largest { largest: &mut largest });
+            return vec![if highest > behind { highest } else { behind }; length];
         }
+        let mut largest = vec![behind; length];
+        self.walk(&mut Largest { largest: &mut largest });
         largest
     }
 
     #[inline(always)]
     fn pull(
         &self,
-        largest: &Planes<T>,
-        pixels: &Planes<T>,
-        upstream: &Planes<T>,
+        pixels: &Quads<Float<T>>,
+        limits: &[Float<T>],
+        upstream: &Quads<Float<T>>,
         [_, of_attributes, of_tables, _, of_texels]: [bool; 5],
         walked: &mut Walked<Float<T>>,
     ) {
@@ -437,8 +467,8 @@ impl<T: Real> Band<'_, '_, T> {
         let rows = [self.blend.scene.grid.rows(), self.blend.depth.rows()];
         let mut tables = rows.map(|rows| vec![[zero; 4]; if of_tables { rows } else { 0 }]);
         self.walk(&mut Pull {
-            largest,
             pixels,
+            limits,
             upstream,
             faces: &mut walked.faces,
             stride,
@@ -446,23 +476,23 @@ impl<T: Real> Band<'_, '_, T> {
             corners: [splat(0.0); CORNER_NUMBERS],
             attributes: vec![[splat(0.0); 3]; numbers],
             texels: of_texels.then_some(&mut walked.texels),
+            owner: None,
         });
         walked.tables = tables;
     }
 
     /// The band's rows of an upstream, followed by zeros.
-    fn padded(&self, upstream: &[Float<T>], length: usize) -> Planes<T> {
+    fn padded(&self, upstream: &[Float<T>], length: usize) -> Quads<Float<T>> {
         let scene = &self.blend.scene;
         let (width, rows) = (scene.size.width, scene.band_rows(self.band));
-        let mut planes = Planes::new(self.blend.channels + 1, length);
-        for (plane, upstream) in upstream.chunks_exact(scene.size.pixels()).enumerate() {
+        let mut padded = Quads::new(self.blend.channels + 1, length, false);
+        for (number, upstream) in upstream.chunks_exact(scene.size.pixels()).enumerate() {
             let own = &upstream[rows.start * width..rows.end * width];
-            let padded = planes.values_mut(plane).chunks_mut(scene.stride());
-            for (padded, row) in padded.zip(own.chunks(width)) {
-                padded[..width].copy_from_slice(row);
+            for (row, own) in own.chunks(width).enumerate() {
+                padded.set_values(number, row * scene.stride(), own);
             }
         }
-        planes
+        padded
     }
 
     /// The band's rows as they stand in the image.

@@ -3,7 +3,7 @@
 use crate::{
     face::Face,
     lanes::Lanes,
-    pair::{Closest, closest},
+    pair::Closest,
     real::{Float, Mask, Real, splat},
 };
 
@@ -11,82 +11,92 @@ use crate::{
 /// centre lies in such a face but by chance, and dividing by its area would leave the range of f32.
 pub const AREA: f64 = 1e-15;
 
-/// Barycentric weights on the screen of a face: `constant + x px + y py` each, in all lanes.
-pub(super) struct Barycentric<T: Real> {
-    constant: [T; 3],
-    x: [T; 3],
-    y: [T; 3],
-    /// Whether the area is large enough to divide by.
-    some: bool,
-}
-
-impl<T: Real> Barycentric<T> {
-    /// Of a face without an inside.
-    pub(super) fn nothing() -> Self {
-        let zero = [T::constant(splat(0.0)); 3];
-        Self { constant: zero, x: zero, y: zero, some: false }
+/// Barycentric weights on the screen of a face, `constant + x px + y py` each, in all lanes; and whether its area is large enough to divide
+/// by. `least_area` is [`AREA`] in pixels.
+#[inline(always)]
+pub(super) fn planes<T: Real>(face: Face<T>, least_area: Float<T>) -> ([[T; 3]; 3], bool) {
+    let zero = T::constant(splat(0.0));
+    let [mut constant, mut x, mut y] = [[zero; 3]; 3];
+    let mut area = zero;
+    for k in 0..3 {
+        // The doubled area of pixel and edge, which lies across from corner k + 2.
+        let edge = face.edge(k);
+        let corner = (k + 2) % 3;
+        constant[corner] = edge.to_y * edge.x - edge.to_x * edge.y;
+        (x[corner], y[corner]) = (zero - edge.to_y, edge.to_x);
+        area = area + constant[corner];
     }
-
-    /// `least_area` is [`AREA`] in pixels.
-    #[inline(always)]
-    pub(super) fn new(face: Face<T>, least_area: Float<T>) -> Self {
-        let zero = T::constant(splat(0.0));
-        let (mut constant, mut x, mut y) = ([zero; 3], [zero; 3], [zero; 3]);
-        let mut area = zero;
-        for k in 0..3 {
-            // The doubled area of pixel and edge, which lies across from corner k + 2.
-            let edge = face.edge(k);
-            let corner = (k + 2) % 3;
-            constant[corner] = edge.to_y * edge.x - edge.to_x * edge.y;
-            (x[corner], y[corner]) = (zero - edge.to_y, edge.to_x);
-            area = area + constant[corner];
-        }
-        let some = area.value().array()[0] > least_area;
-        let one = T::constant(splat(1.0));
-        let per_area = if some { area } else { one }.inverse();
-        for k in 0..3 {
-            (constant[k], x[k], y[k]) = (constant[k] * per_area, x[k] * per_area, y[k] * per_area);
-        }
-        Self { constant, x, y, some }
+    let some = area.value().array()[0] > least_area;
+    let one = T::constant(splat(1.0));
+    let per_area = if some { area } else { one }.inverse();
+    for k in 0..3 {
+        (constant[k], x[k], y[k]) = (constant[k] * per_area, x[k] * per_area, y[k] * per_area);
     }
+    ([constant, x, y], some)
 }
 
 /// Nearest points of a face to eight pixels: the pixels themselves where they lie in it, else the closest points of its boundary.
+#[derive(Clone, Copy)]
 pub(super) struct Point<T: Real> {
-    pub(super) closest: Closest<T>,
+    /// Of the closest point of the boundary: the way from there to the pixel, the place on its edge, its barycentric weights, and which edge
+    /// that is.
+    offset: [T; 2],
+    along: T,
+    weights: [T; 3],
+    edges: [Mask<T>; 3],
     /// Barycentric weights of the nearest point of the face, on the screen.
     pub(super) barycentric: [T; 3],
     /// Where the nearest point is the pixel itself.
     within: Mask<T>,
     /// The edge of the closest point, and one over its squared length.
-    edge_x: T,
-    edge_y: T,
+    edge: [T; 2],
     inverse: T,
 }
 
 impl<T: Real> Point<T> {
-    /// Nearest points to the pixels at `px`, `py`, from the origin of the face.
-    #[inline(always)]
-    pub(super) fn new(face: Face<T>, planes: &Barycentric<T>, px: T::Lanes, py: T::Lanes) -> Self {
-        let closest = match face.is_sliver() {
-            true => closest::<T, true>(face, px, py),
-            false => closest::<T, false>(face, px, py),
-        };
-        let limit = splat::<T::Lanes>(if planes.some { 1.0 } else { 0.0 });
-        let one = splat::<T::Lanes>(1.0).only(closest.inside);
-        let within = splat::<T::Lanes>(0.5).less(one.min(limit));
-        let mut barycentric = closest.weights;
-        for k in 0..3 {
-            let own = planes.constant[k] + planes.x[k].scale(px) + planes.y[k].scale(py);
-            barycentric[k] = T::choose(within, own, barycentric[k]);
+    /// Of no face.
+    pub(super) fn nothing() -> Self {
+        let zero = T::constant(splat(0.0));
+        let nowhere = splat::<T::Lanes>(0.0).less(splat(0.0));
+        Self {
+            offset: [zero; 2],
+            along: zero,
+            weights: [zero; 3],
+            edges: [nowhere; 3],
+            barycentric: [zero; 3],
+            within: nowhere,
+            edge: [zero; 2],
+            inverse: zero,
         }
-        let edge = face.chosen_by(closest.edges);
-        let (edge_x, edge_y, inverse) = (edge.to_x, edge.to_y, edge.inverse);
-        Self { closest, barycentric, within, edge_x, edge_y, inverse }
+    }
+
+    /// Those of a face. `closest` are the closest points of its boundary, `own` the barycentric weights of the pixels themselves, and `some`
+    /// says whether these can be told.
+    #[inline(always)]
+    pub(super) fn new(closest: &Closest<T>, face: Face<T>, own: [T; 3], some: bool) -> Self {
+        let Closest { dx, dy, along, weights, inside, edges, .. } = *closest;
+        let limit = splat::<T::Lanes>(if some { 1.0 } else { 0.0 });
+        let one = splat::<T::Lanes>(1.0).only(inside);
+        let within = splat::<T::Lanes>(0.5).less(one.min(limit));
+        let mut barycentric = weights;
+        for k in 0..3 {
+            barycentric[k] = T::choose(within, own[k], barycentric[k]);
+        }
+        let edge = face.chosen_by(edges);
+        Self {
+            offset: [dx, dy],
+            along,
+            weights,
+            edges,
+            barycentric,
+            within,
+            edge: [edge.to_x, edge.to_y],
+            inverse: edge.inverse,
+        }
     }
 
     /// Gradient to x and y of the three corners in pixels, of a function with these derivatives by the squared distance and by the
-    /// barycentric weights.
+    /// barycentric weights, which have these slopes along x and y.
     ///
     /// The closest point of the boundary is where it is closest, so the squared distance moves as though the point stayed on its edge
     /// where it is. A pixel `p = Σ λₖ aₖ` stays while corner m moves by δ, and with it all that lies at p by `λₘ δ`; so `λₖ` changes by
@@ -94,27 +104,28 @@ impl<T: Real> Point<T> {
     #[inline(always)]
     pub(super) fn pulled(
         &self,
-        planes: &Barycentric<T>,
+        [planes_x, planes_y]: [[T; 3]; 2],
         by_distance2: T,
         by_weights: [T; 3],
     ) -> [T; 6] {
         let zero = T::constant(splat(0.0));
         let [w0, w1, w2] = by_weights;
-        let Closest { dx, dy, along, weights, edges, .. } = self.closest;
+        let Self { offset: [dx, dy], along, weights, edges, .. } = *self;
         let [on_first, on_second, on_third] = edges;
         // Of the pixel itself.
-        let field_x = w0 * planes.x[0] + w1 * planes.x[1] + w2 * planes.x[2];
-        let field_y = w0 * planes.y[0] + w1 * planes.y[1] + w2 * planes.y[2];
+        let field_x = w0 * planes_x[0] + w1 * planes_x[1] + w2 * planes_x[2];
+        let field_y = w0 * planes_y[0] + w1 * planes_y[1] + w2 * planes_y[2];
         // Of a point of an edge that is not held at one of its ends.
         let slide = (w1 - w0).masked(on_first) + (w2 - w1).masked(on_second);
         let slide = slide + (w0 - w2).masked(on_third);
         let free = slide.masked(splat::<T::Lanes>(0.0).less(along.value()));
         let free = free.masked(along.value().less(splat(1.0)));
         let slide = T::choose(self.within, zero, free) * self.inverse;
-        let field_x = T::choose(self.within, field_x, slide * self.edge_x);
-        let field_y = T::choose(self.within, field_y, slide * self.edge_y);
+        let field_x = T::choose(self.within, field_x, slide * self.edge[0]);
+        let field_y = T::choose(self.within, field_y, slide * self.edge[1]);
         let (across_x, across_y) = (turned(edges, slide * dx), turned(edges, slide * dy));
-        let [pull_x, pull_y] = self.closest.pull(by_distance2);
+        let pull = by_distance2.scale(splat(-2.0));
+        let (pull_x, pull_y) = (pull * dx, pull * dy);
         let mut corners = [zero; 6];
         for k in 0..3 {
             let (weight, own) = (weights[k], self.barycentric[k]);

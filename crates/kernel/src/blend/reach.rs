@@ -148,6 +148,9 @@ pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
         let half = 0.5 * inputs.size.shorter() as f64;
         let reach = |face: &[u32; 3]| {
             let corners = face.map(|v| places[v as usize].0);
+            if inputs.culls && is_seen_clockwise(face.map(|v| [x[v as usize], y[v as usize]])) {
+                return (Reach::NOTHING, (0.0, f32::NEG_INFINITY));
+            }
             let radius = face.iter().filter_map(|&v| places[v as usize].1).reduce(f64::max);
             let reach = radius
                 .and_then(|radius| Reach::around(corners, F::from_f64(radius * half), inputs.size));
@@ -162,4 +165,10 @@ pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
     let views = inputs.vertices.par_chunks(3 * vertices.max(1)).map(view);
     let (views, logs) = views.unzip();
     Reached { bands: Bands { views, count }, logs, least: part }
+}
+
+/// Whether corners given in NDC, y up, go round clockwise.
+fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
+    let [[ax, ay], [bx, by], [cx, cy]] = corners.map(|corner| corner.map(F::to_f64));
+    (bx - ax) * (cy - ay) < (by - ay) * (cx - ax)
 }

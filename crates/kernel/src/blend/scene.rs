@@ -60,6 +60,8 @@ pub struct Inputs<'a, F> {
     pub far: f64,
     /// What all that is left out of a pixel may add up to, in weights of the background.
     pub tolerance: f64,
+    /// Whether back faces are not drawn: those whose corners are seen clockwise.
+    pub culls: bool,
     /// Number of views.
     pub views: usize,
     /// Whether all views have the same attributes.

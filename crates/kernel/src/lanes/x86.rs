@@ -336,6 +336,56 @@ impl Lanes for F32x8 {
             add_to_row(table, places.at[7], _mm256_extractf128_ps::<1>(d));
         }
     }
+
+    #[inline(always)]
+    fn quads(rows: &[[f32; 4]], at: [u32; 2]) -> [Self; 4] {
+        let low = rows[at[0] as usize..at[0] as usize + GROUP].as_ptr();
+        let high = rows[at[1] as usize..at[1] as usize + GROUP].as_ptr();
+        unsafe {
+            let [a, b, c, d] = transposed([
+                both_rows(low, high),
+                both_rows(low.add(1), high.add(1)),
+                both_rows(low.add(2), high.add(2)),
+                both_rows(low.add(3), high.add(3)),
+            ]);
+            [Self(a), Self(b), Self(c), Self(d)]
+        }
+    }
+
+    #[inline(always)]
+    fn add_to_quads(rows: &mut [[f32; 4]], at: [u32; 2], [a, b, c, d]: [Self; 4]) {
+        unsafe {
+            let [a, b, c, d] = transposed([a.0, b.0, c.0, d.0]);
+            let low = rows[at[0] as usize..at[0] as usize + GROUP].as_mut_ptr().cast::<f32>();
+            add_both(low, _mm256_permute2f128_ps::<0x20>(a, b));
+            add_both(low.add(8), _mm256_permute2f128_ps::<0x20>(c, d));
+            let high = rows[at[1] as usize..at[1] as usize + GROUP].as_mut_ptr().cast::<f32>();
+            add_both(high, _mm256_permute2f128_ps::<0x31>(a, b));
+            add_both(high.add(8), _mm256_permute2f128_ps::<0x31>(c, d));
+        }
+    }
+}
+
+/// Adds to two rows.
+///
+/// # Safety
+///
+/// Thirty-two bytes must lie there.
+#[inline(always)]
+unsafe fn add_both(at: *mut f32, numbers: __m256) {
+    // SAFETY: the caller has checked the place.
+    unsafe { _mm256_storeu_ps(at, _mm256_add_ps(_mm256_loadu_ps(at), numbers)) };
+}
+
+/// One row in the lower half and one in the upper.
+///
+/// # Safety
+///
+/// Both must be there.
+#[inline(always)]
+unsafe fn both_rows(low: *const [f32; 4], high: *const [f32; 4]) -> __m256 {
+    // SAFETY: the caller has checked both places.
+    unsafe { _mm256_set_m128(_mm_loadu_ps(high.cast()), _mm_loadu_ps(low.cast())) }
 }
 
 /// For each mask, the lanes where it holds, in ascending order.

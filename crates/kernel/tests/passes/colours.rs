@@ -57,6 +57,7 @@ fn passes<F: Kernels>(
         size,
         near: 0.01,
         far: 1e15,
+        culls: false,
         tolerance: 1e-3,
         views,
         shared: true,

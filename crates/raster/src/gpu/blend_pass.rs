@@ -25,7 +25,7 @@ use super::{
     topology::{OnDevice, Topology},
     whole::MARKS,
 };
-use crate::{ProfileSum, SoftBlend, weighting::FARTHEST_SEEN};
+use crate::{ProfileSum, SoftBlend};
 
 /// Stands for no limit.
 const LOWEST: f32 = -1e30;
@@ -115,8 +115,7 @@ impl<'a> Blend<'a> {
         let pass = Pass::new(sum, vertices, numbers, direction.clone());
         let numbers_of_entry = if op.texture.is_some() { 2 } else { channels };
         let numbers_of_pixel = if direction.is_some() { 2 } else { 1 } * (channels + 1);
-        let pass =
-            pass.with_depths(FARTHEST_SEEN as f32, [numbers_of_pixel, 9 + 3 * numbers_of_entry]);
+        let pass = pass.with_depths(op, [numbers_of_pixel, 9 + 3 * numbers_of_entry]);
         let device = pass.vertices.device.clone();
         let same = entry_count == pass.vertex_count && op.entries == op.faces;
         let entries = match same {

@@ -65,7 +65,7 @@ pub(super) const PREPARED: u32 = 256;
 ///
 /// `vertices` is `[views, 3, vertices]`; `direction` starts with its derivatives. `corners` becomes
 /// `[views, faces, 6]`, in a pass of second order `[views, faces, 12]` with the derivatives last; with `depths` those of the three corners
-/// follow, and their derivatives.
+/// follow, and their derivatives. With `culls` back faces are not drawn.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn prepare(
@@ -84,6 +84,7 @@ pub(super) fn prepare(
     far: u32,
     radius: f32,
     #[comptime] depths: bool,
+    #[comptime] culls: bool,
     #[comptime] second: bool,
 ) {
     let view = CUBE_POS_Y;
@@ -106,6 +107,7 @@ pub(super) fn prepare(
             far,
             radius,
             depths,
+            culls,
             second,
         );
         let at = 4 * job as usize;
@@ -155,6 +157,7 @@ fn prepare_face(
     far: u32,
     radius: f32,
     #[comptime] depths: bool,
+    #[comptime] culls: bool,
     #[comptime] second: bool,
 ) -> Reach {
     let vertex_count = vertex_count as usize;
@@ -196,6 +199,8 @@ fn prepare_face(
     let drawn = is_drawn(ax, ay, az, near, far)
         && is_drawn(bx, by, bz, near, far)
         && is_drawn(cx, cy, cz, near, far);
+    // Corners that are seen clockwise are those of a back face.
+    let drawn = drawn && (comptime!(!culls) || (bx - ax) * (cy - ay) >= (by - ay) * (cx - ax));
     let left = first_pixel(least(ax, bx, cx) - radius, frame.width, frame.shorter);
     let right = end_pixel(largest(ax, bx, cx) + radius, frame.width, frame.shorter);
     let top = first_pixel(-largest(ay, by, cy) - radius, frame.height, frame.shorter);

@@ -25,6 +25,8 @@ pub struct SoftBlend {
     pub(crate) size: ImageSize,
     /// What all that is left out of a pixel may add up to, in weights of the background.
     pub(crate) tolerance: f64,
+    /// Whether back faces are not drawn.
+    pub(crate) culls: bool,
     /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows, 28 bytes for each face of
     /// each view, and the sums of each pixel, a number for each channel and two more. Its type is that of the floats.
     pub(crate) kept: Option<Arc<OnceLock<Box<dyn Any + Send + Sync>>>>,
@@ -66,6 +68,7 @@ impl SoftBlend {
             near: NEAR,
             far: FARTHEST_SEEN,
             tolerance: self.tolerance,
+            culls: self.culls,
             views,
             shared: dims[1][0] == 1,
         };

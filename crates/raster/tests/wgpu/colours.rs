@@ -224,8 +224,11 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
         return;
     }
     let exp = DepthSoftness::Family(Family::Exp);
+    let front = ball(Family::Logistic, exp);
+    let front = Scene { renderer: front.renderer.clone().without_back_faces(), ..front };
     let scenes = [
         ("a ball", ball(Family::Logistic, exp)),
+        ("a ball without back faces", front),
         ("a ball with edges that end", ball(Family::Uniform, exp)),
         ("a ball by the network of depths", ball(Family::Gauss, DepthSoftness::Mlp)),
         ("random triangles", random()),
