@@ -1,18 +1,40 @@
 //! Which faces reach which rows: the list that culling leaves.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::{
     float::{Float as _, Vectors},
-    lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
+    lanes::{GROUP, LANES, Lanes, Plain, Work, has_vectors, run},
     reach::{Reach, grown, in_pixels},
     real::splat,
+    tasks::task,
 };
 use crate::ImageSize;
+
+/// Most rows of a band on the average.
+const MOST_ROWS: usize = 64;
+/// Fewer views than this are cut into bands of half as many rows.
+const FEW_VIEWS: usize = 4;
+/// No band has more rows: a list has eight bits for them.
+const ROWS: usize = 255;
+/// Faces or vertices that one thread takes at once.
+const AT_ONCE: usize = 1 << 14;
+/// What a face costs in each row, beside its groups of pixels.
+const ROW_OF_FACE: i64 = 1;
+
+/// Bands that each of some views is cut into. Bits must not depend on the number of threads, so neither may this.
+pub fn bands_of_view(views: usize, size: ImageSize) -> usize {
+    let rows = if views < FEW_VIEWS { MOST_ROWS / 2 } else { MOST_ROWS };
+    size.height.div_ceil(rows)
+}
 
 /// Faces of one view by band, in ascending order of faces.
 #[derive(Debug)]
 pub(crate) struct View {
+    /// The first row of each band, and the row after the last one.
+    starts: Vec<u32>,
     /// `entries[offsets[b]..offsets[b + 1]]` are the faces of band b.
     offsets: Vec<u32>,
     entries: Vec<u32>,
@@ -25,21 +47,37 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Lists faces by the pixels that each reaches, in `count` bands of `rows` each: a power of two.
-    pub(crate) fn of_reaches(
+    /// Lists faces by the pixels that each reaches, in `count` bands that are about as much work. `drawn` faces are drawn at all.
+    pub(crate) fn new(
         reaches: Vec<Reach>,
         radii: Vec<f32>,
+        drawn: usize,
         count: usize,
-        rows: usize,
+        size: ImageSize,
     ) -> Self {
-        let (offsets, entries) = by_band(&reaches, count, rows);
-        let drawn = reaches.iter().filter(|&&reach| reach != Reach::NOTHING).count();
-        Self { offsets, entries, reaches, drawn, radii }
+        let starts = starts(&reaches, count, size);
+        let mut band_of = vec![0u32; size.height];
+        for (band, rows) in starts.windows(2).enumerate() {
+            band_of[rows[0] as usize..rows[1] as usize].fill(band as u32);
+        }
+        let (offsets, entries) = by_band(&reaches, &band_of, count);
+        Self { starts, offsets, entries, reaches, drawn, radii }
     }
 
     /// Faces of band `band`.
     pub(crate) fn faces(&self, band: usize) -> &[u32] {
         &self.entries[self.offsets[band] as usize..self.offsets[band + 1] as usize]
+    }
+
+    /// Rows of the image that band `band` holds.
+    pub(crate) fn rows(&self, band: usize) -> Range<usize> {
+        self.starts[band] as usize..self.starts[band + 1] as usize
+    }
+
+    /// Cuts an image into its bands.
+    pub(crate) fn cut<'a, F>(&self, mut image: &'a mut [F], width: usize) -> Vec<&'a mut [F]> {
+        let rows = self.starts.windows(2).map(|rows| (rows[1] - rows[0]) as usize);
+        rows.map(|rows| image.split_off_mut(..rows * width).expect("rows of the image")).collect()
     }
 }
 
@@ -52,46 +90,47 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Lists the faces of each band of each view. `vertices` `[views, 3, vertices]` holds x, y in
+    /// Lists the faces of each of `count` bands of each view. `vertices` `[views, 3, vertices]` holds x, y in
     /// NDC and the depth; a face enters the bands that its bounding box grown by `radius` touches.
     pub(crate) fn new<F: Vectors>(
         vertices: &[F],
         vertices_per_view: usize,
         faces: &[[u32; 3]],
         size: ImageSize,
-        rows: usize,
+        count: usize,
         near: f64,
         radius: f64,
     ) -> Self {
-        let count = size.height.div_ceil(rows);
         let radius = F::from_f64(0.5 * radius * size.shorter() as f64);
         let near = F::from_f64(near);
         let view = |vertices: &[F]| {
             let (x, rest) = vertices.split_at(vertices_per_view);
             let (y, z) = rest.split_at(vertices_per_view);
-            let place = |((&x, &y), &z)| in_pixels([x, y, z], near, size);
-            let places: Vec<_> = x.iter().zip(y).zip(z).map(place).collect();
+            let mut places = vec![[F::ZERO; 2]; vertices_per_view];
+            places.par_chunks_mut(AT_ONCE).enumerate().for_each(|(chunk, places)| {
+                task("places", || {
+                    for (k, place) in (chunk * AT_ONCE..).zip(places) {
+                        *place = in_pixels([x[k], y[k], z[k]], near, size);
+                    }
+                });
+            });
+            let places = &places;
             let mut reaches = vec![Reach::NOTHING; faces.len()];
-            let (places, reached) = (&places, &mut reaches);
-            let drawn = if has_vectors() {
-                run::<F::Best, _>(ReachOfFaces::<F::Best> {
-                    places,
-                    faces,
-                    radius,
-                    size,
-                    reaches: reached,
-                })
-            } else {
-                run::<Plain<F>, _>(ReachOfFaces::<Plain<F>> {
-                    places,
-                    faces,
-                    radius,
-                    size,
-                    reaches: reached,
+            let chunks = faces.par_chunks(AT_ONCE).zip(reaches.par_chunks_mut(AT_ONCE));
+            let reach = |(faces, reaches)| {
+                task("reach", || {
+                    if has_vectors() {
+                        let work = ReachOfFaces::<F::Best> { places, faces, radius, size, reaches };
+                        run::<F::Best, _>(work)
+                    } else {
+                        let work =
+                            ReachOfFaces::<Plain<F>> { places, faces, radius, size, reaches };
+                        run::<Plain<F>, _>(work)
+                    }
                 })
             };
-            let (offsets, entries) = by_band(&reaches, count, rows);
-            View { offsets, entries, reaches, drawn, radii: Vec::new() }
+            let drawn = chunks.map(reach).sum();
+            View::new(reaches, Vec::new(), drawn, count, size)
         };
         let views = vertices.par_chunks(3 * vertices_per_view.max(1)).map(view).collect();
         Self { views, count }
@@ -125,8 +164,8 @@ impl<L: Lanes> Work for ReachOfFaces<'_, L> {
                 }
             }
             let [x, y] = &corners;
-            let columns = Range::<L>::new(x, radius, size.width);
-            let rows = Range::<L>::new(y, radius, size.height);
+            let columns = Pixels::<L>::new(x, radius, size.width);
+            let rows = Pixels::<L>::new(y, radius, size.height);
             for (lane, reach) in reaches.iter_mut().enumerate() {
                 let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
                 let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
@@ -143,13 +182,13 @@ impl<L: Lanes> Work for ReachOfFaces<'_, L> {
 }
 
 /// Pixels that faces may reach along an axis: first and after the last.
-struct Range<L: Lanes> {
+struct Pixels<L: Lanes> {
     start: [i32; LANES],
     end: [i32; LANES],
     highest: [L::Float; LANES],
 }
 
-impl<L: Lanes> Range<L> {
+impl<L: Lanes> Pixels<L> {
     #[inline(always)]
     fn new([a, b, c]: &[[L::Float; LANES]; 3], radius: L::Float, side: usize) -> Self {
         let (a, b, c) = (L::of(a), L::of(b), L::of(c));
@@ -165,12 +204,100 @@ impl<L: Lanes> Range<L> {
     }
 }
 
-/// Sorts faces into the bands that they reach, of `rows` each: a power of two.
-fn by_band(reaches: &[Reach], count: usize, rows: usize) -> (Vec<u32>, Vec<u32>) {
-    let shift = rows.trailing_zeros();
-    let bands = |reach: &Reach| {
-        let end = (reach.bottom as usize + rows - 1) >> shift;
-        (reach.top as usize) >> shift..end
+/// Rows at which bands start, so that each is about as much work.
+fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
+    if count == 1 {
+        return vec![0, size.height as u32];
+    }
+    // What begins and what ends at each row.
+    let changes = |reaches: &[Reach]| {
+        task("work", || {
+            let mut changes = vec![0i64; size.height + 1];
+            for reach in reaches {
+                let groups = i64::from((reach.right - reach.left).div_ceil(GROUP as u32));
+                let work = if reach.top < reach.bottom { groups + ROW_OF_FACE } else { 0 };
+                changes[reach.top as usize] += work;
+                changes[reach.bottom as usize] -= work;
+            }
+            changes
+        })
+    };
+    let add = |mut all: Vec<i64>, some: Vec<i64>| {
+        all.iter_mut().zip(some).for_each(|(all, some)| *all += some);
+        all
+    };
+    let changes = reaches.par_chunks(AT_ONCE).map(changes).reduce_with(add).unwrap_or_default();
+    let (mut of_row, mut all) = (0, 0);
+    // What a row and those above it are.
+    let until: Vec<i64> = (0..size.height)
+        .map(|row| {
+            of_row += changes.get(row).copied().unwrap_or_default();
+            all += of_row + (size.width / GROUP) as i64;
+            all
+        })
+        .collect();
+    let mut starts = vec![0];
+    for band in 1..count {
+        let last = starts[band - 1];
+        // An even share of what is left; enough rows for the others, and not too many.
+        let left = count - band;
+        let done = if last == 0 { 0 } else { until[last - 1] };
+        let share = done + (all - done) / (left as i64 + 1);
+        let row = until.partition_point(|&until| until <= share);
+        // A list takes as many rows of a face at once as there are lanes.
+        let row = if row < last + LANES * 3 / 2 { last + LANES } else { row };
+        let most = (last + ROWS).min(size.height - left);
+        let least = size.height.saturating_sub(left * ROWS);
+        starts.push(row.min(most).max(least).max(last + 1));
+    }
+    starts.push(size.height);
+    starts.into_iter().map(|row| row as u32).collect()
+}
+
+/// Sorts faces into the bands that they reach, `band_of` the rows: where each band begins, and the faces.
+fn by_band(reaches: &[Reach], band_of: &[u32], count: usize) -> (Vec<u32>, Vec<u32>) {
+    let some = |(chunk, reaches): (usize, &[Reach])| {
+        task("lists", || some_by_band(reaches, (chunk * AT_ONCE) as u32, band_of, count))
+    };
+    let mut parts: Vec<_> = reaches.par_chunks(AT_ONCE).enumerate().map(some).collect();
+    if parts.len() == 1 {
+        return parts.remove(0);
+    }
+    let mut offsets = vec![0u32; count + 1];
+    for band in 0..count {
+        let own = parts.iter().map(|(starts, _)| starts[band + 1] - starts[band]);
+        offsets[band + 1] = offsets[band] + own.sum::<u32>();
+    }
+    let mut entries = vec![0u32; offsets[count] as usize];
+    let mut left = &mut entries[..];
+    let lists: Vec<_> = offsets
+        .windows(2)
+        .map(|ends| left.split_off_mut(..(ends[1] - ends[0]) as usize).expect("entries"))
+        .collect();
+    lists.into_par_iter().enumerate().for_each(|(band, mut list)| {
+        task("lists together", || {
+            for (starts, faces) in &parts {
+                let own = &faces[starts[band] as usize..starts[band + 1] as usize];
+                list.split_off_mut(..own.len()).expect("entries").copy_from_slice(own);
+            }
+        });
+    });
+    (offsets, entries)
+}
+
+/// The same of some faces, the first of which has this number.
+fn some_by_band(
+    reaches: &[Reach],
+    first: u32,
+    band_of: &[u32],
+    count: usize,
+) -> (Vec<u32>, Vec<u32>) {
+    let bands = |reach: &Reach| match reach.top < reach.bottom {
+        true => {
+            let last = band_of[reach.bottom as usize - 1];
+            band_of[reach.top as usize] as usize..last as usize + 1
+        }
+        false => 0..0,
     };
     let mut offsets = vec![0u32; count + 1];
     for reach in reaches {
@@ -182,9 +309,9 @@ fn by_band(reaches: &[Reach], count: usize, rows: usize) -> (Vec<u32>, Vec<u32>)
     }
     let mut entries = vec![0u32; total as usize];
     let mut next = offsets.clone();
-    for (face, reach) in reaches.iter().enumerate() {
+    for (face, reach) in (first..).zip(reaches) {
         for slot in &mut next[bands(reach)] {
-            entries[*slot as usize] = face as u32;
+            entries[*slot as usize] = face;
             *slot += 1;
         }
     }

@@ -16,16 +16,6 @@ pub(crate) const LISTED: usize = 64;
 pub(crate) const AHEAD: usize = 4;
 /// Groups behind those of a face that are written without asking.
 const MORE: usize = 2 * LANES + 2 * AHEAD;
-/// Most rows of a band.
-const MOST_ROWS: usize = 64;
-/// Fewer of them for fewer views than this, so that there are bands for all threads.
-const FEW_VIEWS: usize = 4;
-
-/// Rows of a band. Bits must not depend on the number of threads, so neither may this.
-pub fn rows_of_bands(views: usize) -> usize {
-    if views < FEW_VIEWS { MOST_ROWS / 2 } else { MOST_ROWS }
-}
-
 /// Some faces of a band and their pixels: groups of neighbours of a row, two groups of one face in a chunk.
 pub(crate) struct List<T: Real> {
     blocks: [Faces<T>; LISTED / LANES],
@@ -92,7 +82,7 @@ impl<T: Real> List<T> {
         let index = <T::Lanes as Lanes>::index;
         let plus = <T::Lanes as Lanes>::plus;
         let four = splat::<T::Lanes>(GROUP as f64);
-        let band = scene.band_rows(place.band);
+        let band = place.rows();
         let stride = scene.stride();
         let nowhere = (band.len() * stride) as u32;
         let (mut rows_apart, mut rows_below) = ([0; LANES], [0; LANES]);

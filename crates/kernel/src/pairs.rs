@@ -27,7 +27,7 @@ pub(crate) fn pairs<F: Vectors>(inputs: &Inputs<F>) -> usize {
                 let spans = place.faces(&scene, numbers, &mut prepared);
                 for (lane, &number) in numbers.iter().enumerate() {
                     let reach = place.view.reaches[number as usize];
-                    let rows = within(scene.band_rows(band), reach).len();
+                    let rows = within(place.rows(), reach).len();
                     let width = splat::<Plain<F>>(f64::from(reach.right - reach.left));
                     for row in (0..rows).step_by(LANES) {
                         let y = rows_from_origin::<Plain<F>>() + splat(row as f64);

@@ -24,8 +24,6 @@ pub(crate) struct Scene<'a, T: Real> {
     pub(crate) table: Table<'a, T>,
     pub(crate) grid: Grid,
     pub(crate) size: ImageSize,
-    /// Rows of a band.
-    pub(crate) rows: usize,
     pub(crate) lookup: Lookup<Float<T>>,
     /// Pixels in a unit of NDC.
     pub(crate) half: f64,
@@ -65,7 +63,7 @@ impl<T: Real> BandRef<'_, T> {
         let mut radii = [Float::<T>::from_f64(scene.grid.outer); LANES];
         let count = self.vertices.len() / 3;
         let (xs, ys) = (&self.vertices[..count], &self.vertices[count..2 * count]);
-        let band = scene.band_rows(self.band);
+        let band = self.rows();
         for lane in 0..LANES {
             let number = numbers[lane.min(numbers.len() - 1)] as usize;
             let (face, reach) = (scene.faces[number], self.view.reaches[number]);
@@ -98,6 +96,16 @@ impl<T: Real> BandRef<'_, T> {
             placed(&y[2], &dy[2], top, down),
         ];
         prepare(x, y, T::Lanes::of(&radii) * right, scene.half, faces)
+    }
+
+    /// Rows of the image that the band holds.
+    pub(crate) fn rows(&self) -> Range<usize> {
+        self.view.rows(self.band)
+    }
+
+    /// Numbers of the band: its rows, and a group for pixels on which nothing depends.
+    pub(crate) fn length(&self, scene: &Scene<T>) -> usize {
+        self.rows().len() * scene.stride() + GROUP
     }
 
     /// The constant outside the support.
@@ -133,7 +141,6 @@ impl<'a, T: Real> Scene<'a, T> {
         table: Table<'a, T>,
         grid: Grid,
         size: ImageSize,
-        rows: usize,
     ) -> Self {
         let number = Float::<T>::from_f64;
         let [vertices, tangents] = vertices;
@@ -145,7 +152,6 @@ impl<'a, T: Real> Scene<'a, T> {
             table,
             grid,
             size,
-            rows,
             lookup: Lookup::new(&grid, half),
             half,
             columns: (0..size.width).map(|column| number(size.column_centre(column))).collect(),
@@ -172,35 +178,8 @@ impl<'a, T: Real> Scene<'a, T> {
         BandRef { vertices, tangents, table: self.table, view, band, first_list: 0 }
     }
 
-    /// Adds the gradients to x and y of the three corners of some faces, times a factor, to those of the vertices, `[3, vertices]`.
-    pub(crate) fn gather(
-        &self,
-        faces: &[u32],
-        corners: &[[Float<T>; 6]],
-        factor: Float<T>,
-        vertices: &mut [Float<T>],
-    ) {
-        let (x, rest) = vertices.split_at_mut(vertices.len() / 3);
-        for (&face, corners) in faces.iter().zip(corners) {
-            for (corner, xy) in self.faces[face as usize].iter().zip(corners.chunks_exact(2)) {
-                x[*corner as usize] += xy[0] * factor;
-                rest[*corner as usize] += xy[1] * factor;
-            }
-        }
-    }
-
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.
     pub(crate) fn stride(&self) -> usize {
         self.size.width + GROUP
-    }
-
-    /// Numbers of a band: its rows, and a group for pixels on which nothing depends.
-    pub(crate) fn band_length(&self, band: usize) -> usize {
-        self.band_rows(band).len() * self.stride() + GROUP
-    }
-
-    /// Rows of the image that band `band` holds.
-    pub(crate) fn band_rows(&self, band: usize) -> Range<usize> {
-        band * self.rows..((band + 1) * self.rows).min(self.size.height)
     }
 }

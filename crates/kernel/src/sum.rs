@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use super::{
     bands::{Bands, View},
     float::{Float, Vectors},
+    gather::{Part, gather as gather_corners},
     lanes::{Plain, has_vectors},
     real::{self, Dual, Real, Table},
     scene::Scene,
     table::Grid,
+    tasks::task,
     walk::{Gradient, Image, TableGradient, walk},
 };
 use crate::ImageSize;
@@ -30,8 +32,8 @@ pub struct Inputs<'a, F> {
     pub near: f64,
     /// Number of views.
     pub views: usize,
-    /// Rows of a band, a power of two: [`rows_of_bands`](crate::rows_of_bands), or for losses [`rows_of_losses`](crate::rows_of_losses).
-    pub rows: usize,
+    /// Bands of a view: [`bands_of_view`](crate::bands_of_view), or for losses [`bands_of_losses`](crate::bands_of_losses).
+    pub bands: usize,
 }
 
 impl<F> Inputs<'_, F> {
@@ -40,8 +42,8 @@ impl<F> Inputs<'_, F> {
         F: Vectors,
     {
         let per_view = self.vertices.len() / 3 / self.views.max(1);
-        let Self { vertices, faces, size, rows, near, .. } = *self;
-        Bands::new(vertices, per_view, faces, size, rows, near, self.grid.outer)
+        let Self { vertices, faces, size, bands, near, .. } = *self;
+        Bands::new(vertices, per_view, faces, size, bands, near, self.grid.outer)
     }
 
     /// What a walk over these inputs reads; `tangents` are those of vertices and table, or nothing.
@@ -51,8 +53,8 @@ impl<F> Inputs<'_, F> {
         T::Lanes: super::lanes::Lanes<Float = F>,
     {
         let table = Table { values: self.table.as_chunks().0, tangents: tangents[1].as_chunks().0 };
-        let Self { vertices, faces, grid, size, rows, .. } = *self;
-        Scene::new([vertices, tangents[0]], faces, table, grid, size, rows)
+        let Self { vertices, faces, grid, size, .. } = *self;
+        Scene::new([vertices, tangents[0]], faces, table, grid, size)
     }
 }
 
@@ -115,15 +117,16 @@ fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<real::Float<T>> {
     let mut image = vec![real::Float::<T>::ZERO; views * pixels];
     image.par_chunks_mut(pixels).zip(&bands.views).enumerate().for_each(
         |(index, (image, view))| {
-            image.par_chunks_mut(scene.rows * scene.size.width).enumerate().for_each(
-                |(band, image)| {
+            let rows = view.cut(image, scene.size.width);
+            rows.into_par_iter().enumerate().for_each(|(band, image)| {
+                task("image of a band", || {
                     let place = scene.place(view, index, views, band);
-                    let mut padded = vec![place.empty(&scene.grid); scene.band_length(band)];
+                    let mut padded = vec![place.empty(&scene.grid); place.length(scene)];
                     let tail = place.tail(&scene.grid);
                     walk(scene, place, &mut Image { image: &mut padded, tail });
                     trim(&padded, image, scene);
-                },
-            );
+                });
+            });
         },
     );
     image
@@ -138,8 +141,8 @@ fn trim<T: Real>(padded: &[real::Float<T>], image: &mut [real::Float<T>], scene:
 }
 
 /// Rows of the image as they stand in a band, followed by zeros.
-fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, band: usize) -> Vec<real::Float<T>> {
-    let mut padded = vec![real::Float::<T>::ZERO; scene.band_length(band)];
+fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, length: usize) -> Vec<real::Float<T>> {
+    let mut padded = vec![real::Float::<T>::ZERO; length];
     let width = scene.size.width;
     for (padded, row) in padded.chunks_mut(scene.stride()).zip(rows.chunks(width)) {
         padded[..width].copy_from_slice(row);
@@ -169,17 +172,17 @@ fn gradient<T: Real>(
     let table_rows = if wrt_table { scene.grid.rows() } else { 0 };
     let in_band = |index: usize, band: usize| {
         let view = &bands.views[index];
-        let rows = scene.band_rows(band);
         let place = scene.place(view, index, views, band);
+        let rows = place.rows();
         // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
-        let length = if T::DUAL { scene.band_length(band) } else { 0 };
+        let length = if T::DUAL { place.length(scene) } else { 0 };
         let mut walked = Walked {
             corners: vec![[zero; 6]; view.faces(band).len()],
             table: vec![[zero; 4]; table_rows],
             image: vec![place.empty(&scene.grid); length],
         };
         let of_band = index * pixels + rows.start * width..index * pixels + rows.end * width;
-        let upstream = &pad(&upstream[of_band], scene, band);
+        let upstream = &pad(&upstream[of_band], scene, place.length(scene));
         let gradient = Gradient::new(scene, upstream, &mut walked.corners);
         let image = Image { image: &mut walked.image, tail: place.tail(&scene.grid) };
         let table = TableGradient::new(upstream, &mut walked.table);
@@ -210,8 +213,8 @@ fn gradient<T: Real>(
         .par_chunks_mut((count / views.max(1)).max(1))
         .enumerate()
         .map(|(index, total)| {
-            let walked: Vec<_> =
-                (0..bands.count).into_par_iter().map(|band| in_band(index, band)).collect();
+            let in_band = |band| task("gradient of a band", || in_band(index, band));
+            let walked: Vec<_> = (0..bands.count).into_par_iter().map(in_band).collect();
             let upstream = &upstream[index * pixels..(index + 1) * pixels];
             gather(scene, &bands.views[index], upstream, walked, total)
         })
@@ -241,8 +244,14 @@ fn gather<T: Real>(
     let zero = real::Float::<T>::ZERO;
     let mut table = vec![[zero; 4]; walked.first().map_or(0, |band| band.table.len())];
     let mut image = Vec::with_capacity(walked.iter().map(|band| band.image.len()).sum());
-    for (band, walked) in walked.into_iter().enumerate() {
-        scene.gather(view.faces(band), &walked.corners, real::Float::<T>::ONE, vertices);
+    let factor = real::Float::<T>::ONE;
+    let part = |(band, walked)| {
+        let Walked { corners, .. }: &Walked<_> = walked;
+        Part { faces: view.faces(band), corners, factor }
+    };
+    let parts: Vec<_> = walked.iter().enumerate().map(part).collect();
+    gather_corners(scene.faces, &parts, vertices);
+    for walked in walked {
         for (total, part) in table.iter_mut().zip(&walked.table) {
             total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
         }

@@ -32,9 +32,6 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 const MEASUREMENT: Duration = Duration::from_millis(1500);
 const BATCH: Duration = Duration::from_millis(50);
 
-/// Half a pixel of 1024, in NDC.
-const HALF_A_PIXEL: f64 = 1.0 / 1024.0;
-
 fn main() {
     match adapter_name() {
         Ok(name) => println!("GPU: {name}; CPU: {}", machine()),
@@ -43,16 +40,11 @@ fn main() {
             return;
         }
     }
-    let named = |name: &str, workload: Workload| Workload { name: name.to_owned(), ..workload };
-    let large = Workload::new("W4 (sphere of 20,480 faces, 1024 px)", &icosphere(5), &[30.0], 1024);
-    let million = Workload::new("", &icosphere(8), &[30.0], 1024);
-    let million = Workload { width: HALF_A_PIXEL, ..million };
-    let million = named("W5 (sphere of 1,310,720 faces, 1024 px, half a pixel)", million);
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
     let filter = words.iter().find(|word| !word.starts_with("--"));
     let wanted = |workload: &Workload| filter.is_none_or(|part| workload.name.contains(part));
-    let silhouettes = [Workload::w1(), Workload::w2(), large, million];
-    let colours = named("W3 (W2 in colours)", Workload::w2());
+    let silhouettes = [Workload::w1(), Workload::w2(), Workload::w4(), Workload::w5()];
+    let colours = Workload { name: "W3 (W2 in colours)".to_owned(), ..Workload::w2() };
     println!("{:<56} {:>10} {:>10}", "a step, ms (median)", "GPU", "CPU");
     let mut rows = Vec::new();
     for workload in silhouettes.iter().filter(|workload| wanted(workload)) {

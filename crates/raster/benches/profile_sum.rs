@@ -15,6 +15,7 @@
 mod machine;
 mod record;
 mod scalar;
+#[allow(dead_code, reason = "other benchmarks use the rest")]
 mod workload;
 
 use std::{

@@ -57,6 +57,17 @@ impl Workload {
         }
     }
 
+    /// A sphere of 20,480 faces in one view of 1024 x 1024.
+    pub(crate) fn w4() -> Self {
+        Self::new("W4 (sphere of 20,480 faces, 1024 px)", &icosphere(5), &[30.0], 1024)
+    }
+
+    /// A sphere of 1,310,720 faces in one view of 1024 x 1024, at a width of half a pixel.
+    pub(crate) fn w5() -> Self {
+        let name = "W5 (sphere of 1,310,720 faces, 1024 px, half a pixel)";
+        Self { width: 1.0 / 1024.0, ..Self::new(name, &icosphere(8), &[30.0], 1024) }
+    }
+
     /// World vertices `[1, vertices, 3]`.
     pub(crate) fn world<B: Backend>(&self, dtype: DType) -> Tensor<B, 3> {
         tensor(&self.vertices, [1, self.vertices.len() / 3, 3], dtype)

@@ -35,6 +35,8 @@ use super::{
     float::{self, Vectors},
     lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
     real::{Dual, Float, Real, splat},
+    scene::BandRef,
+    tasks::task,
 };
 
 /// Logarithm of the largest ratio of two weights that floats of 32 and of 64 bits add up without losing the sum.
@@ -195,17 +197,13 @@ fn passes<T: Real>(
                         kept: sums.get(view * bands.count + band),
                         upstream,
                     };
-                    run::<T::Lanes, _>(work)
+                    task(if pull.is_some() { "pull of a band" } else { "image of a band" }, || {
+                        run::<T::Lanes, _>(work)
+                    })
                 })
                 .collect();
-            gather(
-                blend,
-                inputs,
-                &bands.views[view],
-                walked,
-                with_image,
-                pull.map(|(_, wanted)| wanted),
-            )
+            let wanted = pull.map(|(_, wanted)| wanted);
+            task("gather", || gather(blend, inputs, &bands.views[view], walked, with_image, wanted))
         })
         .collect();
     let mut passed = Passed {
@@ -331,7 +329,7 @@ impl<T: Real> Work for Band<'_, '_, T> {
         let blend = self.blend;
         let (scene, channels) = (&blend.scene, blend.channels);
         let zero = <Float<T> as float::Float>::ZERO;
-        let length = scene.band_length(self.band);
+        let length = self.place().length(scene);
         let padded = length.next_multiple_of(LANES);
         // Those that are kept have no tangents.
         let kept = self.kept.filter(|_| !T::DUAL);
@@ -418,9 +416,13 @@ impl<T: Real> Work for Band<'_, '_, T> {
 }
 
 impl<T: Real> Band<'_, '_, T> {
+    fn place(&self) -> BandRef<'_, T> {
+        self.blend.scene.place(self.of_view, self.view, self.views, self.band)
+    }
+
     #[inline(always)]
     fn walk<V: Visitor<T>>(&self, visitor: &mut V) {
-        let place = self.blend.scene.place(self.of_view, self.view, self.views, self.band);
+        let place = self.place();
         Walk { blend: self.blend, place, view: self.view, logs: self.logs, visitor }.run();
     }
 
@@ -484,7 +486,7 @@ impl<T: Real> Band<'_, '_, T> {
     /// The band's rows of an upstream, followed by zeros.
     fn padded(&self, upstream: &[Float<T>], length: usize) -> Quads<Float<T>> {
         let scene = &self.blend.scene;
-        let (width, rows) = (scene.size.width, scene.band_rows(self.band));
+        let (width, rows) = (scene.size.width, self.of_view.rows(self.band));
         let mut padded = Quads::new(self.blend.channels + 1, length, false);
         for (number, upstream) in upstream.chunks_exact(scene.size.pixels()).enumerate() {
             let own = &upstream[rows.start * width..rows.end * width];
@@ -498,7 +500,7 @@ impl<T: Real> Band<'_, '_, T> {
     /// The band's rows as they stand in the image.
     fn trimmed(&self, padded: &[Float<T>]) -> Vec<Float<T>> {
         let scene = &self.blend.scene;
-        let (width, rows) = (scene.size.width, scene.band_rows(self.band).len());
+        let (width, rows) = (scene.size.width, self.of_view.rows(self.band).len());
         let padded = padded.chunks(scene.stride()).take(rows);
         padded.flat_map(|row| &row[..width]).copied().collect()
     }

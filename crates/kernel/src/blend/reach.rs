@@ -7,9 +7,8 @@ use super::{
     scene::{Inputs, NOTHING},
 };
 use crate::{
-    bands::{Bands, View},
+    bands::{Bands, View, bands_of_view},
     float::{Float, Vectors},
-    list::rows_of_bands,
     reach::{Reach, in_pixels},
     table::Grid,
 };
@@ -127,8 +126,7 @@ pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
     let background = inputs.background[inputs.channels()].to_f64();
     let part = (inputs.tolerance / inputs.faces.len() as f64).ln();
     let least = part + background;
-    let rows = rows_of_bands(inputs.views);
-    let count = inputs.size.height.div_ceil(rows);
+    let count = bands_of_view(inputs.views, inputs.size);
     let (near, far) = (F::from_f64(inputs.near), F::from_f64(inputs.far));
     let nowhere = [F::from_f64(f64::INFINITY); 2];
     let vertices = inputs.vertices.len() / 3 / inputs.views.max(1);
@@ -159,8 +157,9 @@ pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
             (reach.unwrap_or(Reach::NOTHING), (radius.unwrap_or(0.0) as f32, log as f32))
         };
         let faces = inputs.faces.par_iter().with_min_len(AT_ONCE);
-        let (reaches, (radii, logs)): (_, (_, Vec<f32>)) = faces.map(reach).unzip();
-        (View::of_reaches(reaches, radii, count, rows), logs)
+        let (reaches, (radii, logs)): (Vec<Reach>, (_, Vec<f32>)) = faces.map(reach).unzip();
+        let drawn = reaches.iter().filter(|&&reach| reach != Reach::NOTHING).count();
+        (View::new(reaches, radii, drawn, count, inputs.size), logs)
     };
     let views = inputs.vertices.par_chunks(3 * vertices.max(1)).map(view);
     let (views, logs) = views.unzip();

@@ -8,7 +8,6 @@ use super::{
 use crate::{
     ImageSize, float,
     lanes::Lanes,
-    list::rows_of_bands,
     real::{Float, Real, Table, everywhere},
     scene::Scene,
     table::Grid,
@@ -95,13 +94,12 @@ impl<'a, F: float::Float> Inputs<'a, F> {
         let along = self.split_tables(tangents[2]);
         let edge = Table { values: values.0, tangents: along.0 };
         let depth = Table { values: values.1, tangents: along.1 };
-        let rows = rows_of_bands(self.views);
         let vertices = [self.vertices, tangents[0]];
         let half = 0.5 * self.size.shorter() as f64;
         Blend {
             least_area: F::from_f64(AREA * half * half),
             vanishing: F::from_f64(of_type::<F>(VANISHING)),
-            scene: Scene::new(vertices, self.faces, edge, self.edge, self.size, rows),
+            scene: Scene::new(vertices, self.faces, edge, self.edge, self.size),
             attributes: [self.attributes, tangents[1]],
             entries: self.entries,
             channels: self.channels(),

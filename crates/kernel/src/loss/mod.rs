@@ -11,15 +11,17 @@ use rayon::prelude::*;
 use self::pixel::{Compared, PARTS, overlap_and_union, squared_error};
 pub use self::pixel::{EMPTY, PixelLoss};
 use super::{
-    bands::{Bands, View},
+    bands::{Bands, View, bands_of_view},
     face::Face,
     float::{Float as _, Vectors},
+    gather::{Part, gather as gather_corners},
     lanes::{LANES, Lanes, Plain, Work, has_vectors, run},
-    list::{LISTED, List, group, rows_of_bands},
+    list::{LISTED, List, group},
     pair::CornerSums,
     real::splat,
     scene::{BandRef, Scene},
     sum::Inputs,
+    tasks::task,
     walk::{Gradient, Image, Pair, TOGETHER, Visitor, walk},
 };
 use crate::ImageSize;
@@ -28,15 +30,15 @@ use crate::ImageSize;
 /// twice. A power of two, as vectors grow.
 const KEPT: usize = 1 << 15;
 
-/// Pixels of a band from which on it has no more rows than [`LEAST_ROWS`], so that what is kept stays near the processor.
+/// Pixels of a band, so that what is kept of it stays near the processor.
 const PIXELS: usize = 1 << 12;
-/// Fewest rows of a band in images that have more.
+/// Fewest rows of a band on the average in images that have more.
 const LEAST_ROWS: usize = 16;
 
-/// Rows of a band.
-pub fn rows_of_losses(views: usize, size: ImageSize) -> usize {
-    let most = rows_of_bands(views);
-    PIXELS.div_ceil(size.width.max(1)).next_power_of_two().clamp(LEAST_ROWS, most)
+/// Bands that each of some views is cut into.
+pub fn bands_of_losses(views: usize, size: ImageSize) -> usize {
+    let rows = PIXELS.div_ceil(size.width.max(1)).max(LEAST_ROWS);
+    size.height.div_ceil(rows).max(bands_of_view(views, size))
 }
 
 /// Images that silhouettes are compared with, each `[1 or views, height, width]`.
@@ -85,12 +87,12 @@ fn of_views<L: Lanes>(
     let (views, pixels) = (bands.views.len(), scene.size.pixels());
     let in_band = |view: usize, band: usize| {
         let mut room = Room::taken();
-        let (rows, width) = (scene.band_rows(band), scene.size.width);
-        let judged = judged.part(view, pixels, rows.start * width..rows.end * width);
         let place = scene.place(&bands.views[view], view, views, band);
+        let (rows, width) = (place.rows(), scene.size.width);
+        let judged = judged.part(view, pixels, rows.start * width..rows.end * width);
         let whole = bands.count == 1;
-        let done =
-            run::<L, _>(Band { scene, place, judged, loss, with_gradient, whole, room: &mut room });
+        let work = Band { scene, place, judged, loss, with_gradient, whole, room: &mut room };
+        let done = task("loss of a band", || run::<L, _>(work));
         room.leave();
         done
     };
@@ -130,12 +132,14 @@ fn gather<L: Lanes>(
         sums[1] += band.sums[1];
     }
     let (value, factors) = loss.of_sums(sums, scene.size.pixels());
+    let mut all = Vec::new();
     for (band, Walked { whole, parts, .. }) in walked.iter().enumerate() {
         for (corners, &factor) in parts.iter().zip(&factors) {
             let factor = if *whole { L::Float::ONE } else { factor };
-            scene.gather(view.faces(band), corners, factor, gradient);
+            all.push(Part { faces: view.faces(band), corners, factor });
         }
     }
+    gather_corners(scene.faces, &all, gradient);
     value
 }
 
@@ -218,7 +222,7 @@ impl<L: Lanes> Band<'_, '_, L> {
     #[inline(always)]
     fn draw(&mut self) -> usize {
         let Self { scene, place, room, .. } = self;
-        let length = scene.band_length(place.band).next_multiple_of(LANES);
+        let length = place.length(scene).next_multiple_of(LANES);
         room.kept.clear();
         room.at.clear();
         room.corners.clear();

@@ -34,7 +34,7 @@ fn passes<F: Kernels>(size: [usize; 2], views: usize, far: u32) -> Vec<F> {
         size,
         near: 0.01,
         views,
-        rows: 32,
+        bands: 2,
     };
     let upstream = numbers(views * size.pixels(), 0.3);
     let direction = numbers(vertices.len() + table.len(), 2.3);

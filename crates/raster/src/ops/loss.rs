@@ -1,6 +1,6 @@
 use std::sync::{Arc, OnceLock};
 
-use softrast_kernel::{Bands, Inputs, Judged, Kernels, PixelLoss, rows_of_losses};
+use softrast_kernel::{Bands, Inputs, Judged, Kernels, PixelLoss, bands_of_losses};
 use softrast_tensor::{Element, TensorData};
 
 use crate::{
@@ -41,8 +41,8 @@ impl SilhouetteLoss {
         let [vertices, table] = [slices[0], slices[1]];
         let judged = Judged { target: images[0], counted: images.get(1).copied() };
         let views = dims[0][0];
-        let rows = rows_of_losses(views, self.sum.size);
-        let inputs = Inputs { rows, ..self.sum.inputs(views, vertices, table) };
+        let bands = bands_of_losses(views, self.sum.size);
+        let inputs = Inputs { bands, ..self.sum.inputs(views, vertices, table) };
         let own = OnceLock::new();
         let bands = self.sum.kept.as_deref().unwrap_or(&own).get_or_init(|| F::bands(&inputs));
         let losses = |gradient| F::losses(&inputs, bands, judged, self.loss, gradient);

@@ -1,6 +1,6 @@
 use std::sync::{Arc, OnceLock};
 
-use softrast_kernel::{Bands, Grid, Inputs, Kernels, rows_of_bands};
+use softrast_kernel::{Bands, Grid, Inputs, Kernels, bands_of_view};
 use softrast_tensor::{Element, TensorData};
 
 use crate::{ImageSize, ops::pass::Pass};
@@ -44,7 +44,7 @@ impl ProfileSum {
             size: self.size,
             near: self.near,
             views,
-            rows: rows_of_bands(views),
+            bands: bands_of_view(views, self.size),
         }
     }
 

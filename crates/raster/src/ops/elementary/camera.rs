@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Elementary, Views, number::Number};
-use softrast_kernel::{Dual, Float};
+use softrast_kernel::{Dual, Float, task};
 
 use crate::{NEAR, limits::FARTHEST};
 
@@ -79,6 +79,8 @@ pub(crate) struct Perspective;
 
 /// Points whose gradients to a matrix are added up before they join the others.
 const BLOCK: usize = 256;
+/// Points that one thread takes at once.
+const POINTS: usize = 64 * BLOCK;
 
 impl Perspective {
     /// The point of a view and what the camera sees: x, y, depth, and one over the depth that divides.
@@ -105,10 +107,19 @@ impl Elementary for Perspective {
         views.enumerate().for_each(|(view, (out, matrix))| {
             let (xs, rest) = out.split_at_mut(count);
             let (ys, depths) = rest.split_at_mut(count);
-            for (k, point) in points.of(view).chunks_exact(3).enumerate() {
-                let (_, [x, y, depth], _) = Self::seen(matrix, point);
-                (xs[k], ys[k], depths[k]) = (x, y, depth);
-            }
+            let planes = xs
+                .par_chunks_mut(POINTS)
+                .zip(ys.par_chunks_mut(POINTS))
+                .zip(depths.par_chunks_mut(POINTS));
+            planes.zip(points.of(view).par_chunks(3 * POINTS)).for_each(|(planes, points)| {
+                let ((xs, ys), depths) = planes;
+                task("projection", || {
+                    for (k, point) in points.chunks_exact(3).enumerate() {
+                        let (_, [x, y, depth], _) = Self::seen(matrix, point);
+                        (xs[k], ys[k], depths[k]) = (x, y, depth);
+                    }
+                });
+            });
         });
         all
     }
@@ -122,15 +133,17 @@ impl Elementary for Perspective {
     ) -> Vec<N> {
         let (points, count, views) = (Views::new(inputs[0], &dims[0]), dims[0][1], dims[1][0]);
         let zero = N::of(0.0);
-        let of_view = |view: usize| {
+        // The gradients to some points of a view, and to its matrix block by block.
+        let of_points = |view: usize, chunk: usize, points: &[N]| {
             let matrix = &inputs[1][12 * view..12 * view + 12];
             let upstream = &upstream[3 * count * view..3 * count * (view + 1)];
-            let mut to_points = vec![zero; if wanted[0] { 3 * count } else { 0 }];
-            let mut to_matrix = [zero; 12];
-            for (block, points) in points.of(view).chunks(3 * BLOCK).enumerate() {
+            let mut to_points = vec![zero; if wanted[0] { points.len() } else { 0 }];
+            let mut to_matrix = Vec::with_capacity(POINTS / BLOCK);
+            for (block, points) in points.chunks(3 * BLOCK).enumerate() {
                 let mut part = [zero; 12];
                 for (k, point) in points.chunks_exact(3).enumerate() {
-                    let k = k + block * BLOCK;
+                    let own = k + block * BLOCK;
+                    let k = own + chunk * POINTS;
                     let (at, [x, y, depth], inverse) = Self::seen(matrix, point);
                     let u = [upstream[k], upstream[count + k], upstream[2 * count + k]];
                     let (to_x, to_y) = (inverse.scale(u[0]), inverse.scale(u[1]));
@@ -150,11 +163,22 @@ impl Elementary for Perspective {
                             let pulled = to_seen[0] * matrix[j]
                                 + to_seen[1] * matrix[4 + j]
                                 + to_seen[2] * matrix[8 + j];
-                            to_points[3 * k + j] = if inside { pulled } else { zero };
+                            to_points[3 * own + j] = if inside { pulled } else { zero };
                         }
                     }
                 }
-                for (total, part) in to_matrix.iter_mut().zip(part) {
+                to_matrix.push(part);
+            }
+            (to_points, to_matrix)
+        };
+        let of_view = |view: usize| {
+            let chunks = points.of(view).par_chunks(3 * POINTS).enumerate();
+            let of_points =
+                |(chunk, points)| task("projection, back", || of_points(view, chunk, points));
+            let (to_points, blocks): (Vec<_>, Vec<_>) = chunks.map(of_points).unzip();
+            let mut to_matrix = [zero; 12];
+            for part in blocks.iter().flatten() {
+                for (total, &part) in to_matrix.iter_mut().zip(part) {
                     *total = *total + part;
                 }
             }
@@ -165,9 +189,10 @@ impl Elementary for Perspective {
         if wanted[0] {
             gradient = vec![zero; inputs[0].len()];
             for (view, (to_points, _)) in of_views.iter().enumerate() {
-                for (total, &part) in points.of_mut(&mut gradient, view).iter_mut().zip(to_points) {
-                    *total = *total + part;
-                }
+                let chunks = points.of_mut(&mut gradient, view).par_chunks_mut(3 * POINTS);
+                chunks.zip(to_points).for_each(|(totals, parts)| {
+                    totals.iter_mut().zip(parts).for_each(|(total, &part)| *total = *total + part);
+                });
             }
         }
         if wanted[1] {

@@ -1,0 +1,88 @@
+//! What faces give to their vertices, added up.
+
+use rayon::prelude::*;
+
+use super::{lanes::Float, tasks::task};
+
+/// Faces that are passed over together.
+const AT_ONCE: usize = 1 << 12;
+/// Ranges of vertices that threads may take, and fewest vertices of one.
+const RANGES: usize = 16;
+const LEAST: usize = 1 << 13;
+/// Ranges are taken one by one where a face is looked at by no more of them on the average, as where vertices lie in the order of faces.
+const MOST_LOOKS: usize = 2;
+
+/// Numbers for the x and y of the three corners of some faces, and a factor of all of them.
+pub(crate) struct Part<'a, F> {
+    /// In ascending order.
+    pub(crate) faces: &'a [u32],
+    pub(crate) corners: &'a [[F; 6]],
+    pub(crate) factor: F,
+}
+
+/// Adds parts to the first two rows of `vertices`, `[3, vertices]`, one after the other.
+///
+/// Each range of vertices is a task of its own where few faces have vertices in several of them. A vertex's sum has the same order anyway.
+pub(crate) fn gather<F: Float>(faces: &[[u32; 3]], parts: &[Part<F>], vertices: &mut [F]) {
+    let (x, rest) = vertices.split_at_mut(vertices.len() / 3);
+    let own = x.len().div_ceil(RANGES).max(LEAST);
+    let spans: Vec<[u32; 2]> = match x.len() > own {
+        true => faces.par_chunks(AT_ONCE).map(span).collect(),
+        false => Vec::new(),
+    };
+    // How many faces all ranges look at together.
+    let ranges = |&[least, largest]: &[u32; 2]| (largest as usize / own + 1) - least as usize / own;
+    let looks = spans.iter().map(ranges).sum::<usize>();
+    if looks > MOST_LOOKS * spans.len() || spans.is_empty() {
+        return task("gather", || add(faces, parts, &[], 0, [x, rest]));
+    }
+    let y = &mut rest[..x.len()];
+    let ranges = x.par_chunks_mut(own).zip(y.par_chunks_mut(own)).enumerate();
+    ranges.for_each(|(range, (x, y))| {
+        task("gather", || add(faces, parts, &spans, range * own, [x, y]));
+    });
+}
+
+/// The least and the largest vertex of some faces.
+fn span(faces: &[[u32; 3]]) -> [u32; 2] {
+    let corners = faces.as_flattened().iter();
+    corners.fold([u32::MAX, 0], |[least, largest], &v| [least.min(v), largest.max(v)])
+}
+
+/// Adds parts to the vertices from `first` on. `spans` are those of each [`AT_ONCE`] faces, or nothing where all of them matter.
+fn add<F: Float>(
+    faces: &[[u32; 3]],
+    parts: &[Part<F>],
+    spans: &[[u32; 2]],
+    first: usize,
+    [x, y]: [&mut [F]; 2],
+) {
+    for &Part { faces: numbers, corners, factor } in parts {
+        let mut start = 0;
+        while start < numbers.len() {
+            let chunk = numbers[start] as usize / AT_ONCE;
+            let same = |number: &u32| (*number as usize) / AT_ONCE <= chunk;
+            let end = match spans {
+                [] => numbers.len(),
+                _ => start + numbers[start..].partition_point(same),
+            };
+            let (own, corners) = (&numbers[start..end], &corners[start..end]);
+            start = end;
+            if let Some(&[least, largest]) = spans.get(chunk)
+                && ((largest as usize) < first || least as usize >= first + x.len())
+            {
+                continue;
+            }
+            for (&face, corners) in own.iter().zip(corners) {
+                for (&vertex, xy) in faces[face as usize].iter().zip(corners.chunks_exact(2)) {
+                    // Those before the first wrap around to beyond the last.
+                    let at = (vertex as usize).wrapping_sub(first);
+                    if let Some(x) = x.get_mut(at) {
+                        *x += xy[0] * factor;
+                        y[at] += xy[1] * factor;
+                    }
+                }
+            }
+        }
+    }
+}
