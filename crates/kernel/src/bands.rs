@@ -317,3 +317,58 @@ fn some_by_band(
     }
     (offsets, entries)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size(height: usize) -> ImageSize {
+        ImageSize { height, width: 64 }
+    }
+
+    /// Faces of 9 rows and 8 columns, more and more of them downwards, and none above a third.
+    fn reaches(height: u32, count: u32) -> Vec<Reach> {
+        let face = |k: u32| {
+            let place = (f64::from(k) / f64::from(count)).sqrt();
+            let top = height / 3 + (place * f64::from(height - height / 3 - 9)) as u32;
+            Reach { top, bottom: top + 9, left: k % 50, right: k % 50 + 8 }
+        };
+        (0..count).map(face).collect()
+    }
+
+    #[test]
+    fn bands_hold_all_rows_and_about_as_much_work() {
+        for (height, count) in [(256, 8), (1024, 64), (700, 3), (300, 2), (40, 1), (17, 16)] {
+            let reaches = reaches(height, 5000);
+            let starts = starts(&reaches, count, size(height as usize));
+            assert_eq!((starts[0], starts[count], starts.len()), (0, height, count + 1));
+            let rows: Vec<u32> = starts.windows(2).map(|rows| rows[1] - rows[0]).collect();
+            assert!(rows.iter().all(|&rows| (1..=255).contains(&rows)), "{rows:?}");
+        }
+        let reaches = reaches(1024, 5000);
+        let starts = starts(&reaches, 16, size(1024));
+        let work = |rows: &[u32]| {
+            let of = |r: &Reach| r.bottom.min(rows[1]).saturating_sub(r.top.max(rows[0]));
+            reaches.iter().map(of).sum::<u32>()
+        };
+        let work: Vec<u32> = starts.windows(2).map(work).collect();
+        let (most, all) = (*work.iter().max().unwrap(), work.iter().sum::<u32>());
+        assert!(most * 16 < all * 5 / 4, "{work:?}");
+    }
+
+    #[test]
+    fn every_face_is_listed_in_the_bands_that_it_reaches_and_in_no_other() {
+        // More than one thread takes at once, and some that reach nothing.
+        let mut reaches = reaches(256, 40_000);
+        reaches.iter_mut().step_by(7).for_each(|reach| *reach = Reach::NOTHING);
+        let view = View::new(reaches.clone(), Vec::new(), 0, 8, size(256));
+        for band in 0..8 {
+            let rows = view.rows(band);
+            let reaches_it = |r: &Reach| {
+                (r.top as usize) < rows.end && r.bottom as usize > rows.start && r.top < r.bottom
+            };
+            let expected = (0u32..).zip(&reaches).filter(|(_, reach)| reaches_it(reach));
+            assert!(view.faces(band).iter().copied().eq(expected.map(|(face, _)| face)));
+        }
+    }
+}

@@ -86,3 +86,44 @@ fn add<F: Float>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A strip of faces, whose vertices have these numbers.
+    fn assert_added(number: impl Fn(u32) -> u32, tasks: usize) {
+        let count = 40_000;
+        let faces: Vec<[u32; 3]> =
+            (0..count - 2).map(|k| [0, 1, 2].map(|i| number(k + i))).collect();
+        let wave = |k: usize| (1.3 * k as f64).sin();
+        let corners: Vec<[f64; 6]> =
+            (0..faces.len()).map(|f| std::array::from_fn(|i| wave(7 * f + i))).collect();
+        let all: Vec<u32> = (0..faces.len() as u32).collect();
+        let odd: Vec<u32> = all.iter().copied().filter(|face| face % 2 == 1).collect();
+        let parts = [
+            Part { faces: &all, corners: &corners, factor: 1.0 },
+            Part { faces: &odd, corners: &corners[..odd.len()], factor: -0.5 },
+        ];
+        let mut expected = vec![0.0; 3 * count as usize];
+        for Part { faces: numbers, corners, factor } in &parts {
+            for (&face, corners) in numbers.iter().zip(*corners) {
+                for (k, &vertex) in faces[face as usize].iter().enumerate() {
+                    expected[vertex as usize] += corners[2 * k] * factor;
+                    expected[(count + vertex) as usize] += corners[2 * k + 1] * factor;
+                }
+            }
+        }
+        let mut found = vec![0.0; 3 * count as usize];
+        let (_, recorded) = crate::recorded_tasks(|| gather(&faces, &parts, &mut found));
+        assert!(found == expected, "another sum, or another order");
+        assert_eq!(recorded.iter().filter(|(phase, _)| *phase == "gather").count(), tasks);
+    }
+
+    #[test]
+    fn ranges_of_vertices_add_up_to_the_same_bits_as_one_task() {
+        assert_added(|k| k, 5);
+        // Neighbours are far apart: one task.
+        assert_added(|k| k * 7_919 % 40_000, 1);
+    }
+}

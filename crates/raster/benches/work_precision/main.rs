@@ -17,6 +17,7 @@ mod coloured;
 mod machine;
 #[path = "../scalar.rs"]
 mod scalar;
+#[allow(dead_code, reason = "other benchmarks use the rest")]
 #[path = "../workload.rs"]
 mod workload;
 
