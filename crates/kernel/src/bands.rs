@@ -55,6 +55,8 @@ impl View {
         count: usize,
         size: ImageSize,
     ) -> Self {
+        let fits = count <= size.height && size.height <= ROWS * count;
+        assert!(fits, "{count} bands of an image of {} rows", size.height);
         let starts = starts(&reaches, count, size);
         let mut band_of = vec![0u32; size.height];
         for (band, rows) in starts.windows(2).enumerate() {
@@ -209,7 +211,7 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
     if count == 1 {
         return vec![0, size.height as u32];
     }
-    // What begins and what ends at each row.
+    // Work that begins and work that ends at each row.
     let changes = |reaches: &[Reach]| {
         task("work", || {
             let mut changes = vec![0i64; size.height + 1];
@@ -228,7 +230,7 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
     };
     let changes = reaches.par_chunks(AT_ONCE).map(changes).reduce_with(add).unwrap_or_default();
     let (mut of_row, mut all) = (0, 0);
-    // What a row and those above it are.
+    // The work of each row and of those above it.
     let until: Vec<i64> = (0..size.height)
         .map(|row| {
             of_row += changes.get(row).copied().unwrap_or_default();

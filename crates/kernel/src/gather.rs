@@ -1,4 +1,4 @@
-//! What faces give to their vertices, added up.
+//! Adds up the gradients that faces give to their vertices.
 
 use rayon::prelude::*;
 

@@ -43,8 +43,8 @@ pub trait Kernels: Float {
     /// Number of pixel-face pairs over all views that one pass visits; the table is not read.
     fn pairs(inputs: &Inputs<Self>) -> usize;
 
-    /// Prepares the data that passes in colour over these inputs share. `sums`: whether those of the image are kept, a number for each channel of each
-    /// pixel and two more.
+    /// Prepares the data that passes in colour over these inputs share. `sums`: whether those of the image are kept, channels and share of each
+    /// pixel in fours, and one number more.
     fn kept(inputs: &blend::Inputs<Self>, sums: bool) -> Kept<Self>;
 
     /// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` is of these inputs.

@@ -88,7 +88,7 @@ pub trait Float:
     fn rounded(self) -> Self;
     /// `e` to this power, to 2 units in the last place.
     fn exp(self) -> Self;
-    /// `e` to a power below 88, to no more than 1e-7 times that power, and 0 or next to it below -87.
+    /// `e^self` up to 88, in f32 with a relative error of at most 1.2e-7 (1 + |self|) and 0 below -87.34.
     fn power(self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;

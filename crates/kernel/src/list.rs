@@ -16,6 +16,7 @@ pub(crate) const LISTED: usize = 64;
 pub(crate) const AHEAD: usize = 4;
 /// Groups behind those of a face that are written without asking.
 const MORE: usize = 2 * LANES + 2 * AHEAD;
+
 /// Some faces of a band and their pixels: groups of neighbours of a row, two groups of one face in a chunk.
 pub(crate) struct List<T: Real> {
     blocks: [Faces<T>; LISTED / LANES],

@@ -25,7 +25,8 @@ pub(crate) struct Closest<T: Real> {
 }
 
 impl<T: Real> Closest<T> {
-    /// Of no face.
+    /// Stands where no point is yet.
+    #[inline(always)]
     pub(crate) fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
         let nowhere = splat::<T::Lanes>(0.0).less(splat(0.0));

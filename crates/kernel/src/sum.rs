@@ -33,6 +33,7 @@ pub struct Inputs<'a, F> {
     /// Number of views.
     pub views: usize,
     /// Bands of a view: [`bands_of_view`](crate::bands_of_view), or for losses [`bands_of_losses`](crate::bands_of_losses).
+    /// One to the number of rows, and none of more than 255 rows on the average.
     pub bands: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What a step would take on more cores: the time of each of its phases on one thread, and their longest tasks.
+//! Predicts a step on more cores from the time of each of its phases on one thread and from their tasks.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench phases            # all
@@ -7,7 +7,7 @@
 //!
 //! A step is projection, squared error to a disk in the op, and gradient to the world vertices, in `f32`; in colour (W3) the image in three
 //! channels, its loss, and gradients to vertices and colours. All run on one thread here. Tasks of a phase may run in parallel, phases follow each other,
-//! and what is in no task counts as one. So many threads that take tasks in their order end a phase after a time that is known, and a step
+//! and what is in no task counts as one. N threads that take tasks in their order end a phase after a time that is known, and a step
 //! after the sum of these: that is the speed-up that is printed. It leaves out what threads cost and what memory they share.
 
 #[allow(dead_code, reason = "other benchmarks use the rest")]

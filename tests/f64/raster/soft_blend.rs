@@ -68,6 +68,14 @@ impl<S: Softness> Case<S> {
         }
     }
 
+    /// The same with so many channels.
+    fn with_channels(mut self, channels: usize) -> Self {
+        self.channels = channels;
+        self.attributes = wave(self.vertices.len() / 3 * channels, 1.3);
+        self.background = [wave(channels, 0.8), vec![-5.0]].concat();
+        self
+    }
+
     /// The faces whose corners go counter-clockwise as they are seen.
     fn front_faces(&self) -> Arc<[[u32; 3]]> {
         let is_front = |face: &&[u32; 3]| {
@@ -139,8 +147,9 @@ impl<S: Softness> Case<S> {
         let outer = |x: &Tensor<A, 1>| Tensor::<AA, 1>::from_inner(x.clone()).require_grad();
         let leaves: Inputs<AA> = inner.iter().map(outer).collect();
         let image = self.image(leaves.clone(), by_kernel);
-        let weights = wave(4 * PIXELS, 0.37);
-        let weights = tensor::<AA, 4>(&weights, [1, 4, SIZE[0], SIZE[1]]);
+        let planes = self.channels + 1;
+        let weights = wave(planes * PIXELS, 0.37);
+        let weights = tensor::<AA, 4>(&weights, [1, planes, SIZE[0], SIZE[1]]);
         let mut found = vec![numbers(image.clone().inner().inner())];
         let grads = (image.clone() * image * weights).sum().backward();
         let of = |leaf: &Tensor<AA, 1>| leaf.grad(&grads).expect("the image depends on it");
@@ -195,6 +204,20 @@ fn the_kernel_agrees_with_the_reference_to_second_order() {
     let phi = [LOGISTIC.default_phi(0.05), EXP.default_phi(0.1)];
     for seed in 0..5 {
         compare("logistic", &Case::random(seed, 20, weighting, phi.clone()), [1e-8, 1e-6, 1e-4]);
+    }
+}
+
+#[test]
+fn any_number_of_channels_agrees_with_the_reference() {
+    let weighting = weighting(LOGISTIC, EXP);
+    let phi = [LOGISTIC.default_phi(0.05), EXP.default_phi(0.1)];
+    for channels in [1, 4, 8] {
+        let case = Case::random(1, 12, weighting, phi.clone()).with_channels(channels);
+        compare("channels", &case, [1e-8, 1e-6, 1e-4]);
+    }
+    for channels in [1, 4] {
+        let case = Case::random(1, 12, weighting, phi.clone()).with_channels(channels).textured();
+        compare("channels of a texture", &case, [1e-8, 1e-6, 1e-4]);
     }
 }
 

@@ -111,7 +111,8 @@ impl<'a, T: Real> DepthLookup<'a, T> {
 }
 
 impl<T: Real> DepthAt<T> {
-    /// Of no point.
+    /// Stands where no point is yet.
+    #[inline(always)]
     pub(super) fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
         Self::Table { log: zero, slope: zero, t: zero, row: Places::FIRST }

@@ -54,7 +54,8 @@ pub(super) struct Point<T: Real> {
 }
 
 impl<T: Real> Point<T> {
-    /// Of no face.
+    /// Stands where no point is yet.
+    #[inline(always)]
     pub(super) fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
         let nowhere = splat::<T::Lanes>(0.0).less(splat(0.0));

@@ -17,7 +17,7 @@ pub(super) struct Quads<F> {
 }
 
 impl<F: Float> Quads<F> {
-    /// So many zeros for each pixel of a band of this length, with tangents or without.
+    /// Zeros: this many numbers for each pixel of a band of this length, with tangents or without.
     pub(super) fn new(numbers: usize, length: usize, tangents: bool) -> Self {
         let length = length.next_multiple_of(LANES);
         let count = numbers.div_ceil(QUAD) * length;

@@ -111,6 +111,7 @@ pub(super) struct Block<T: Real> {
 }
 
 impl<T: Real> Block<T> {
+    #[inline(always)]
     fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
         Self {
@@ -375,6 +376,7 @@ impl<T: Real> Blend<'_, T> {
             return [whole, whole];
         }
         let rest = T::Lanes::splat(Float::<T>::ONE / (Float::<T>::ONE - self.floor));
+        // A face that does not count may be nearer than all that do: then this is anything, and masked.
         let floor = by_depth.power_of_e().scale(T::Lanes::splat(self.floor));
         let some = T::Lanes::splat(self.counts_from).less(log_edge.value());
         [(whole - floor).scale(rest).masked(some), whole.scale(rest).masked(some)]
@@ -484,12 +486,12 @@ impl<T: Real> Visitor<T> for Sums<'_, T> {
 
 /// Gradients of `Σ upstream · image` to a band's faces and to the tables.
 pub(super) struct Pull<'a, T: Real> {
-    /// What weights of a pixel are relative to; one over the sum of all of them; what the image is, `Σ upstream · image` over the channels,
-    /// less the upstream of the faces' share; and the logarithm of a weight that may be left out of the sum.
+    /// Of each pixel 0: the logarithm that weights are relative to; 1: one over the sum of all weights; 2: `Σ upstream · image` over the channels,
+    /// less the upstream of the faces' share; 3: the logarithm of a weight that may be left out of the sum.
     pub(super) pixels: &'a Quads<Float<T>>,
-    /// That logarithm again.
+    /// Number 3 of the pixels side by side: each chunk reads it, to be skipped.
     pub(super) limits: &'a [Float<T>],
-    /// Of the channels. Only values.
+    /// The upstream by channels, without tangents.
     pub(super) upstream: &'a Quads<Float<T>>,
     /// For each face of the band [`CORNER_NUMBERS`] numbers, then three for each number of an attribute if the gradient to the attributes is wanted.
     pub(super) faces: &'a mut [Float<T>],

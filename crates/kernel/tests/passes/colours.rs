@@ -9,10 +9,10 @@ use crate::assert_same_with_and_without_vectors;
 
 const VERTICES: usize = 40;
 const FACES: u32 = 50;
-const CHANNELS: usize = 2;
 
 /// All that the three passes give, over random triangles, some of them points or without area.
 fn passes<F: Kernels>(
+    channels: usize,
     views: usize,
     log_weight: f64,
     floor: f64,
@@ -29,10 +29,11 @@ fn passes<F: Kernels>(
         wave(k, 1.7) + if depth { 2.5 } else { 0.0 }
     };
     let vertices: Vec<F> = (0..3 * VERTICES * views).map(|k| F::from_f64(coordinate(k))).collect();
-    let attributes = numbers(VERTICES * CHANNELS, 0.9);
+    let attributes = numbers(VERTICES * if texture_size.is_some() { 2 } else { channels }, 0.9);
     let texture = numbers(texture_size.map_or(0, |[height, width]| 4 * height * width), 1.1);
     let tables = numbers(4 * (edge.rows() + depth.rows()), 0.7);
-    let background = [0.1, 0.2, log_weight].map(F::from_f64);
+    let mut background = numbers(channels, 0.2);
+    background.push(F::from_f64(log_weight));
     let corner = |k: u32| k % VERTICES as u32;
     let face = |f: u32| match (f % 7, f % 11) {
         (0, _) => [corner(f), corner(f + 1), corner(f)],
@@ -62,7 +63,7 @@ fn passes<F: Kernels>(
         views,
         shared: true,
     };
-    let upstream = numbers(views * (CHANNELS + 1) * size.pixels(), 0.3);
+    let upstream = numbers(views * (channels + 1) * size.pixels(), 0.3);
     let lengths = [&vertices, &attributes, &tables, &texture].map(Vec::len);
     let direction = numbers(lengths.iter().sum::<usize>() + background.len(), 2.3);
     let kept = &F::kept(&inputs, false);
@@ -89,14 +90,15 @@ fn assert_same_bits<F: Kernels>() {
     });
     let line = DepthGrid::Line { floor: 1e-7 };
     // A background that weighs little asks for the largest weight of each pixel.
-    for (views, log_weight, floor, depth, texture) in [
-        (1, -2.0, 0.0, table, None),
-        (4, -1.0, 1e-7, line, None),
-        (3, -700.0, 1e-7, table, None),
-        (3, -1.0, 0.0, DepthGrid::Exponential, None),
-        (2, -2.0, 0.0, table, Some([9, 13])),
+    for (channels, views, log_weight, floor, depth, texture) in [
+        (2, 1, -2.0, 0.0, table, None),
+        (7, 4, -1.0, 1e-7, line, None),
+        (4, 3, -700.0, 1e-7, table, None),
+        (3, 3, -1.0, 0.0, DepthGrid::Exponential, None),
+        (2, 2, -2.0, 0.0, table, Some([9, 13])),
+        (4, 2, -2.0, 0.0, table, Some([9, 13])),
     ] {
-        let passes = || passes::<F>(views, log_weight, floor, depth, texture);
+        let passes = || passes::<F>(channels, views, log_weight, floor, depth, texture);
         assert_same_with_and_without_vectors(&format!("{views} views"), passes);
     }
 }

@@ -73,3 +73,33 @@ fn every_instruction_set_gives_the_same_bits() {
     assert_same_bits::<f32>();
     assert_same_bits::<f64>();
 }
+
+#[test]
+fn bands_of_any_height_give_the_same_sums() {
+    // One face over all 400 rows, and 200 in the topmost 25: bands below those are as high as bands may be.
+    let size = ImageSize { height: 400, width: 24 };
+    let grid = Grid { outer: 0.2, inner: 0.2, from: [0.0; 2], octaves: 12, far: 0, bits: 2 };
+    let wave = |k: usize, step: f64| (step * k as f64).sin();
+    let table: Vec<f64> = (0..4 * grid.rows()).map(|k| wave(k, 0.7)).collect();
+    let count = 602;
+    let mut vertices = vec![2.0; 3 * count];
+    for k in 0..count {
+        (vertices[k], vertices[count + k]) = (wave(k, 1.7), 15.6 + wave(k, 0.9));
+    }
+    for (k, [x, y]) in [[-2.0, -17.0], [2.0, -17.0], [0.1, 17.0]].into_iter().enumerate() {
+        (vertices[599 + k], vertices[count + 599 + k]) = (x, y);
+    }
+    let mut faces: Vec<[u32; 3]> = (0..199).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    faces.push([599, 600, 601]);
+    let (vertices, table, faces) = (&vertices, &table, &faces);
+    let sums = |bands| {
+        let inputs = Inputs { vertices, table, faces, grid, size, near: 0.01, views: 1, bands };
+        f64::sums(&inputs, &f64::bands(&inputs))
+    };
+    let expected = sums(size.height);
+    for bands in [2, 3, 4, 50] {
+        let found = sums(bands);
+        let error = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 1e-8, "{bands} bands: {error:e}");
+    }
+}

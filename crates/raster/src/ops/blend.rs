@@ -28,7 +28,7 @@ pub struct SoftBlend {
     /// Whether back faces are not drawn.
     pub(crate) culls: bool,
     /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows, 28 bytes for each face of
-    /// each view, and the sums of each pixel, a number for each channel and two more. Its type is that of the floats.
+    /// each view, and the sums of each pixel: channels and share in fours, and one number more. Its type is that of the floats.
     pub(crate) kept: Option<Arc<OnceLock<Box<dyn Any + Send + Sync>>>>,
     #[cfg(feature = "wgpu")]
     pub(crate) topology: crate::gpu::Topology,
