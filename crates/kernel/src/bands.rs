@@ -21,7 +21,7 @@ const FEW_VIEWS: usize = 4;
 const ROWS: usize = 255;
 /// Faces or vertices that one thread takes at once.
 const AT_ONCE: usize = 1 << 14;
-/// What a face costs in each row, beside its groups of pixels.
+/// Work of a face in each row, beside its groups of pixels.
 const ROW_OF_FACE: i64 = 1;
 
 /// Bands that each of some views is cut into. Bits must not depend on the number of threads, so neither may this.
@@ -287,7 +287,7 @@ fn by_band(reaches: &[Reach], band_of: &[u32], count: usize) -> (Vec<u32>, Vec<u
     (offsets, entries)
 }
 
-/// The same of some faces, the first of which has this number.
+/// Sorts some faces, the first of which has this number.
 fn some_by_band(
     reaches: &[Reach],
     first: u32,

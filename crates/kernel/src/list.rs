@@ -161,6 +161,12 @@ pub(crate) fn group<F>(numbers: &[F], at: u32) -> &[F; GROUP] {
     numbers[at as usize..at as usize + GROUP].try_into().expect("a group of pixels")
 }
 
+/// The numbers of two groups of pixels.
+#[inline(always)]
+pub(crate) fn of_pixels<T: Real>(numbers: &[Float<T>], [low, high]: [u32; 2]) -> T::Lanes {
+    T::Lanes::of_groups(group(numbers, low), group(numbers, high))
+}
+
 /// Room for [`LANES`] numbers.
 #[inline(always)]
 fn eight<F>(numbers: &mut [F], at: usize) -> &mut [F; LANES] {

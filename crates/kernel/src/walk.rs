@@ -3,7 +3,7 @@
 use super::{
     face::Face,
     lanes::{Lanes, Places, Work, run},
-    list::{AHEAD, Chunk, LISTED, List, group},
+    list::{AHEAD, Chunk, LISTED, List, of_pixels},
     pair::{CornerSums, closest},
     real::{Float, Real, splat},
     scene::{BandRef, Scene},
@@ -288,10 +288,4 @@ impl<T: Real> Visitor<T> for TableGradient<'_, T> {
         T::Lanes::add_to_rows(self.rows, &pair.row, columns);
         self.visited += one.output();
     }
-}
-
-/// The numbers of two groups of pixels.
-#[inline(always)]
-fn of_pixels<T: Real>(numbers: &[Float<T>], [low, high]: [u32; 2]) -> T::Lanes {
-    T::Lanes::of_groups(group(numbers, low), group(numbers, high))
 }

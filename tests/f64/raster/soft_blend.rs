@@ -68,7 +68,7 @@ impl<S: Softness> Case<S> {
         }
     }
 
-    /// The same with so many channels.
+    /// A case with this many channels.
     fn with_channels(mut self, channels: usize) -> Self {
         self.channels = channels;
         self.attributes = wave(self.vertices.len() / 3 * channels, 1.3);

@@ -38,7 +38,7 @@ pub(super) fn planes<T: Real>(face: Face<T>, least_area: Float<T>) -> ([[T; 3]; 
 /// Nearest points of a face to eight pixels: the pixels themselves where they lie in it, else the closest points of its boundary.
 #[derive(Clone, Copy)]
 pub(super) struct Point<T: Real> {
-    /// Of the closest point of the boundary: the way from there to the pixel, the place on its edge, its barycentric weights, and which edge
+    /// The closest point of the boundary: the way from there to the pixel, the place on its edge, its barycentric weights, and which edge
     /// that is.
     offset: [T; 2],
     along: T,
@@ -71,7 +71,7 @@ impl<T: Real> Point<T> {
         }
     }
 
-    /// Those of a face. `closest` are the closest points of its boundary, `own` the barycentric weights of the pixels themselves, and `some`
+    /// Nearest points of a face. `closest` are the closest points of its boundary, `own` the barycentric weights of the pixels themselves, and `some`
     /// says whether these can be told.
     #[inline(always)]
     pub(super) fn new(closest: &Closest<T>, face: Face<T>, own: [T; 3], some: bool) -> Self {
