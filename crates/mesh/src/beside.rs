@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{MeshError, bounded::read_bounded, texture::media_type};
+use crate::{MeshError, bounded::read_bounded, material::media_type};
 
 /// Where the file lies that another one in `folder` calls `name`.
 ///

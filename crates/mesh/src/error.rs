@@ -121,6 +121,27 @@ pub enum MeshError {
         /// How many faces there are.
         faces: usize,
     },
+    /// There are more or fewer numbers of materials than faces.
+    #[error("materials of {found} faces for the {faces} faces of a texture")]
+    MaterialFaces {
+        /// How many faces have a number.
+        found: usize,
+        /// How many faces there are.
+        faces: usize,
+    },
+    /// A face refers to a material that the texture does not have.
+    #[error("face {face} has material {material}, but there are {materials}")]
+    Material {
+        /// Index of the face, from 0.
+        face: usize,
+        /// The material it asks for, from 0.
+        material: u32,
+        /// How many materials there are.
+        materials: usize,
+    },
+    /// A factor of a material is not from 0 to 1.
+    #[error("a factor of a material is not from 0 to 1")]
+    Factor,
     /// The first bytes of a picture are not those of a format that is read.
     #[error("the picture of a texture is neither PNG nor JPEG")]
     Picture,

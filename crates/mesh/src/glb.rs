@@ -12,8 +12,9 @@ use crate::{
     colours::{Beyond, Colours},
     error::{Place, Trouble, shown},
     glb_parts::{Room, at, factors, primitives, shared, surface_of},
-    glb_texture::Unwrapped,
+    glb_texture::{Part, Unwrapped},
     gltf::{Gltf, Node, Primitive, number},
+    material::from_linear,
     mesh::finite,
     parts::Parts,
     placement::Placement,
@@ -270,9 +271,9 @@ impl Surface<'_> {
             let triangles =
                 self.add_triangles(primitive, first, vertices, placement).map_err(&at)?;
             let [_, faces] = self.most;
+            let part = Part { primitive, triangles: &triangles, vertices, lit: factors[number] };
             if let Some(Ok(unwrapped)) = &mut self.unwrapped
-                && let Err(trouble) =
-                    unwrapped.add(self.gltf, primitive, &triangles, vertices, faces)
+                && let Err(trouble) = unwrapped.add(self.gltf, &part, faces)
             {
                 self.unwrapped = Some(Err(at(trouble)));
             }
@@ -343,6 +344,7 @@ impl Surface<'_> {
                 let colours =
                     self.parts.colours.get_or_insert_with(|| Vec::with_capacity(vertices));
                 colours.resize(first, WHITE);
+                // Linear: glTF 2.0 specification, Sec. 3.7.2.1.
                 let shown =
                     |colour: [f64; 3]| [0, 1, 2].map(|k| from_linear(colour[k] * factor[k]));
                 colours.extend(linear.into_iter().map(shown));
@@ -405,13 +407,4 @@ fn triangles(mode: u64, indices: &[u32]) -> Vec<[u32; 3]> {
             .collect(),
         _ => indices.windows(2).skip(1).map(|w| [indices[0], w[0], w[1]]).collect(),
     }
-}
-
-/// A channel as screens have it, of one that is proportional to light; both from 0 to 1.
-///
-/// Source: IEC 61966-2-1 (sRGB). Vertex colours of glTF are linear: specification, Sec. 3.7.2.1.
-fn from_linear(x: f64) -> f64 {
-    let root = x.powf(1.0 / 2.4);
-    // In this form 1 is exactly 1.
-    if x <= 0.003_130_8 { 12.92 * x } else { root + 0.055 * (root - 1.0) }
 }

@@ -2,6 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
+use serde_json::Value;
+
 use crate::{
     error::Trouble,
     gltf::{Attributes, Gltf, Primitive, entry},
@@ -64,18 +66,22 @@ pub(crate) fn factors(gltf: &Gltf, primitives: &[Primitive]) -> Vec<[f64; 3]> {
     primitives.iter().map(|primitive| known(primitive).unwrap_or([1.0; 3])).collect()
 }
 
-/// The factor of the material of a part: 1 if it has none that can be read, or a picture, which counts in place of colours.
-///
-/// Source: glTF 2.0 specification, Sec. 3.9.2; `KHR_materials_pbrSpecularGlossiness`, which comes first where it is.
+/// The factor of the material of a part for the colours of its vertices: 1 if it shows a picture, which the factor multiplies.
 fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
     let material = entry(&gltf.materials, &primitive.material);
-    let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
-    let rough = &material["pbrMetallicRoughness"];
-    if !glossy["diffuseTexture"].is_null() || !rough["baseColorTexture"].is_null() {
-        return [1.0; 3];
+    match picture_of(material).is_null() {
+        true => factor_of(material),
+        false => [1.0; 3],
     }
+}
+
+/// The factor of a material: 1 if it has none that can be read.
+///
+/// Source: glTF 2.0 specification, Sec. 3.9.2; `KHR_materials_pbrSpecularGlossiness`, which comes first where it is.
+pub(crate) fn factor_of(material: &Value) -> [f64; 3] {
+    let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
     let factor = match glossy.is_null() {
-        true => &rough["baseColorFactor"],
+        true => &material["pbrMetallicRoughness"]["baseColorFactor"],
         false => &glossy["diffuseFactor"],
     };
     let channel = |k: usize| factor[k].as_f64().filter(|x| (0.0..=1.0).contains(x));
@@ -83,6 +89,14 @@ fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
         [Some(red), Some(green), Some(blue)] => [red, green, blue],
         _ => [1.0; 3],
     }
+}
+
+/// The texture of the colours of a material.
+pub(crate) fn picture_of(material: &Value) -> &Value {
+    // Programs that know the extension show its picture, whatever stands beside it for others.
+    let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"]["diffuseTexture"];
+    let rough = &material["pbrMetallicRoughness"]["baseColorTexture"];
+    if glossy.is_null() { rough } else { glossy }
 }
 
 /// The numbers of parts, vertices and faces that are placed.

@@ -1,4 +1,4 @@
-//! The texture of a GLB file: coordinates of its parts, and the picture of their materials.
+//! The texture of a GLB file: coordinates of its parts, and the pictures and factors of their materials.
 
 use std::{
     collections::{HashMap, hash_map::Entry},
@@ -8,16 +8,30 @@ use std::{
 use serde_json::Value;
 
 use crate::{
-    Texture,
+    Material, Texture,
     beside::{beside_uri, picture_at},
     error::{FARTHEST, Trouble, shown},
+    glb_parts::{factor_of, picture_of},
     gltf::{Gltf, Primitive, entry, number},
     gltf_buffers::data,
-    texture::{is_near, media_type},
+    material::media_type,
+    pictures::Pictures,
+    texture::is_near,
 };
 
 /// Coordinates of a file that is not longer, in bytes. Many small accessors may lie over the same bytes.
 const MOST_COORDINATES: usize = 10_000_000;
+
+/// A part of a mesh, as it is placed.
+pub(crate) struct Part<'a> {
+    pub(crate) primitive: &'a Primitive,
+    /// Between its own vertices.
+    pub(crate) triangles: &'a [[u32; 3]],
+    /// Number of its vertices.
+    pub(crate) vertices: usize,
+    /// The factor that the colours of its vertices already have.
+    pub(crate) lit: [f64; 3],
+}
 
 /// The texture of the parts placed so far.
 pub(crate) struct Unwrapped {
@@ -26,8 +40,14 @@ pub(crate) struct Unwrapped {
     corners: Vec<[u32; 3]>,
     /// Where the coordinates of an accessor begin.
     firsts: HashMap<usize, usize>,
-    /// Whether the first part has coordinates, and the image that it shows: all have the same.
-    of_all: Option<(bool, Option<usize>)>,
+    /// Image and factor of each material, and which faces have it.
+    materials: Vec<(Option<usize>, [f64; 3])>,
+    /// Where each is among the materials, by the bits of its factor.
+    numbers: HashMap<(Option<usize>, [u64; 3]), u32>,
+    of_faces: Vec<u32>,
+    /// The coordinate of corners that have none of their own.
+    nowhere: Option<u32>,
+    multiplies_colours: bool,
 }
 
 impl Unwrapped {
@@ -38,94 +58,113 @@ impl Unwrapped {
             coordinates: Vec::new(),
             corners: Vec::new(),
             firsts: HashMap::new(),
-            of_all: None,
+            materials: Vec::new(),
+            numbers: HashMap::new(),
+            of_faces: Vec::new(),
+            nowhere: None,
+            multiplies_colours: false,
         }
     }
 
-    /// Adds the coordinates of the `triangles` of a part of `vertices` vertices, one of `faces` faces in all.
-    pub(crate) fn add(
-        &mut self,
-        gltf: &Gltf,
-        primitive: &Primitive,
-        triangles: &[[u32; 3]],
-        vertices: usize,
-        faces: usize,
-    ) -> Result<(), Trouble> {
-        fn wrong(reason: impl AsRef<str>) -> Result<(), Trouble> {
-            Err(Trouble::part("", reason))
-        }
+    /// Adds the coordinates and the material of a part, one of `faces` faces in all.
+    pub(crate) fn add(&mut self, gltf: &Gltf, part: &Part, faces: usize) -> Result<(), Trouble> {
+        let Part { primitive, triangles, .. } = part;
         if triangles.is_empty() {
             return Ok(());
         }
-        let (image, set) = base_colour(gltf, primitive).map_err(|why| Trouble::part("", why))?;
+        let wrong = |reason: String| Err(Trouble::part("", reason));
+        let material = entry(&gltf.materials, &primitive.material);
+        let (image, set) = base_colour(gltf, material).map_err(|why| Trouble::part("", why))?;
         let attributes = &primitive.attributes;
         let accessor = match set {
             0 => number(&attributes.coordinates),
             1 => number(&attributes.more_coordinates),
             _ => return wrong(format!("its texture needs TEXCOORD_{set}: 0 and 1 are read")),
         };
-        let own = (accessor.is_some(), image);
-        let (some, shown) = *self.of_all.get_or_insert(own);
-        if some != own.0 {
-            return wrong(match some {
-                true => "it has no texture coordinates, but parts before it have",
-                false => "it has texture coordinates, but parts before it have none",
-            });
-        }
-        if shown != image {
-            let name = |image: Option<usize>| match image {
-                Some(number) => format!("image {number}"),
-                None => "no image".to_owned(),
-            };
-            return wrong(format!(
-                "it shows {}, parts before it {}: a mesh has one picture, so join them into one",
-                name(image),
-                name(shown)
-            ));
-        }
-        let Some(accessor) = accessor else { return Ok(()) };
-        let first = match self.firsts.entry(accessor) {
-            Entry::Occupied(first) => *first.get(),
-            Entry::Vacant(entry) => {
-                let first = self.coordinates.len();
-                let count = gltf.count(accessor)?;
-                if count != vertices {
-                    return wrong(format!("{count} texture coordinates for {vertices} vertices"));
+        let first = match (accessor, image) {
+            (Some(accessor), _) => self.first(gltf, accessor, part.vertices)?,
+            (None, Some(image)) => {
+                return wrong(format!("it shows image {image}, but has no texture coordinates"));
+            }
+            (None, None) => {
+                let next = self.coordinates.len() as u32;
+                let nowhere = *self.nowhere.get_or_insert(next);
+                if nowhere == next {
+                    self.coordinates.push([0.0; 2]);
                 }
-                let most = self.most;
-                if count > most - first {
-                    return wrong(format!("with it there are more than {most} coordinates"));
-                }
-                for (vertex, [u, v]) in gltf.coordinates(accessor)?.into_iter().enumerate() {
-                    let upward = [u, 1.0 - v];
-                    if !upward.iter().all(is_near) {
-                        let reason = format!(
-                            "texture coordinate ({u}, {v}) is not from -{FARTHEST} to {FARTHEST}"
-                        );
-                        return Err(Trouble::part(format!("vertex {vertex}"), reason));
-                    }
-                    self.coordinates.push(upward);
-                }
-                *entry.insert(first)
+                nowhere
             }
         };
+        let place = |k: u32| if accessor.is_some() { first + k } else { first };
         self.corners.reserve_exact(faces.saturating_sub(self.corners.len()));
-        let placed = triangles.iter().map(|triangle| triangle.map(|k| first as u32 + k));
-        self.corners.extend(placed);
+        self.corners.extend(triangles.iter().map(|triangle| triangle.map(place)));
+
+        let factor = factor_of(material);
+        // Vertices that parts of several factors share have no factor in their colours.
+        let factor = if part.lit == factor { [1.0; 3] } else { factor };
+        let next = self.materials.len() as u32;
+        let number = *self.numbers.entry((image, factor.map(f64::to_bits))).or_insert(next);
+        if number == next {
+            self.materials.push((image, factor));
+        }
+        self.multiplies_colours |= image.is_some() && !attributes.colour.is_null();
+        self.of_faces.reserve_exact(faces.saturating_sub(self.of_faces.len()));
+        self.of_faces.resize(self.corners.len(), number);
         Ok(())
     }
 
-    /// The texture, if there are coordinates; `warnings` gets why its picture was left out.
+    /// Where the coordinates of an accessor for as many vertices begin.
+    fn first(&mut self, gltf: &Gltf, accessor: usize, vertices: usize) -> Result<u32, Trouble> {
+        let wrong = |reason: String| Err(Trouble::part("", reason));
+        let entry = match self.firsts.entry(accessor) {
+            Entry::Occupied(first) => return Ok(*first.get() as u32),
+            Entry::Vacant(entry) => entry,
+        };
+        let first = self.coordinates.len();
+        let count = gltf.count(accessor)?;
+        if count != vertices {
+            return wrong(format!("{count} texture coordinates for {vertices} vertices"));
+        }
+        let most = self.most;
+        if count > most - first.min(most) {
+            return wrong(format!("with it there are more than {most} coordinates"));
+        }
+        for (vertex, [u, v]) in gltf.coordinates(accessor)?.into_iter().enumerate() {
+            let upward = [u, 1.0 - v];
+            if !upward.iter().all(is_near) {
+                let reason =
+                    format!("texture coordinate ({u}, {v}) is not from -{FARTHEST} to {FARTHEST}");
+                return Err(Trouble::part(format!("vertex {vertex}"), reason));
+            }
+            self.coordinates.push(upward);
+        }
+        Ok(*entry.insert(first) as u32)
+    }
+
+    /// The texture, if there are coordinates or several materials; `warnings` gets why pictures were left out.
     pub(crate) fn texture(
         self,
         gltf: &Gltf,
         folder: &Path,
         warnings: &mut Vec<Trouble>,
     ) -> Option<Texture> {
-        let Some((true, image)) = self.of_all else { return None };
-        let picture = image.map(|image| content(gltf, folder, image)).transpose();
-        match Texture::new(self.coordinates, self.corners) {
-            Ok(texture) => Some(texture.pictured(picture, warnings)),
+        let is_plain = self.materials.iter().all(|material| *material == (None, [1.0; 3]));
+        if self.firsts.is_empty() && is_plain {
+            return None;
+        }
+        let mut pictures = Pictures::default();
+        let materials = self.materials.into_iter().map(|(image, factor)| {
+            let picture = image.and_then(|number| {
+                pictures.get(number, || content(gltf, folder, number), warnings)
+            });
+            Material::of(picture, factor)
+        });
+        let materials = materials.collect();
+        let texture = Texture::new(self.coordinates, self.corners)
+            .and_then(|texture| texture.with_materials(materials, self.of_faces));
+        match texture {
+            Ok(texture) if self.multiplies_colours => Some(texture.multiplying_colours()),
+            Ok(texture) => Some(texture),
             Err(error) => {
                 warnings.push(Trouble::OtherFile(error));
                 None
@@ -134,17 +173,14 @@ impl Unwrapped {
     }
 }
 
-/// The image that a part shows, and the set of coordinates that places it.
+/// The image that a material shows, and the set of coordinates that places it.
 ///
 /// Read leniently: what is wrong with materials does not keep a mesh from being read.
-fn base_colour(gltf: &Gltf, primitive: &Primitive) -> Result<(Option<usize>, u64), String> {
-    let material = entry(&gltf.materials, &primitive.material);
-    // Programs that know the extension show its picture, whatever stands beside it for others.
-    let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"]["diffuseTexture"];
-    let rough = &material["pbrMetallicRoughness"]["baseColorTexture"];
-    let Some(shown) = [glossy, rough].into_iter().find(|shown| !shown.is_null()) else {
+fn base_colour(gltf: &Gltf, material: &Value) -> Result<(Option<usize>, u64), String> {
+    let shown = picture_of(material);
+    if shown.is_null() {
         return Ok((None, 0));
-    };
+    }
     if !shown["extensions"]["KHR_texture_transform"].is_null() {
         return Err("KHR_texture_transform is not read: apply it to the coordinates".to_owned());
     }

@@ -1,17 +1,21 @@
 //! Writes a GLB file.
 
+use std::collections::HashMap;
+
 use serde_json::{Value, json};
 
 use crate::{
-    Mesh,
+    Material, Mesh, Texture,
     glb::{BIN, JSON, MAGIC},
-    texture::media_type,
+    material::{media_type, to_linear},
 };
 
 const FLOATS: u32 = 5126;
 const WHOLE: u32 = 5125;
 const OF_VERTICES: u32 = 34962;
 const OF_INDICES: u32 = 34963;
+/// Of a material without a picture, on a mesh without colours; proportional to light.
+const GREY: f64 = 0.75;
 /// Coordinates are written from the origin on where 32 bits round them by at most this part of the longest side of the mesh.
 const COARSEST: f64 = 1e-5;
 
@@ -86,21 +90,20 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     let position = buffer.floats(places());
     buffer.accessors[position]["min"] = json!(extreme(f32::min));
     buffer.accessors[position]["max"] = json!(extreme(f32::max));
-    let corners = faces.as_flattened().iter().map(|v| [v.to_le_bytes()]);
-    let indices = buffer.accessor(corners, [WHOLE, OF_INDICES]);
     let mut attributes = json!({"POSITION": position});
-    let mut colour = json!({
-        "baseColorFactor": [0.75, 0.75, 0.75, 1.0],
-        "metallicFactor": 0.0,
-        "roughnessFactor": 0.75,
-    });
-    let picture = mesh.texture().and_then(|texture| texture.picture());
-    // Others would show the product of both.
-    if let (Some(colours), None) = (mesh.colours(), picture) {
-        let linear = vertices.iter().map(|&[vertex, _]| colours[vertex as usize].map(to_linear));
-        attributes["COLOR_0"] = json!(buffer.floats(linear));
-        colour["baseColorFactor"] = json!([1.0, 1.0, 1.0, 1.0]);
+    if let Some(texture) = mesh.texture() {
+        let down = vertices.iter().map(|&[_, k]| texture.coordinates()[k as usize]);
+        attributes["TEXCOORD_0"] = json!(buffer.floats(down.map(|[u, v]| [u, 1.0 - v])));
     }
+    let white = [Material::default()];
+    let materials = mesh.texture().map_or(&white[..], Texture::materials);
+    let shows_colours = |material: &Material| {
+        material.picture().is_none() || mesh.texture().is_some_and(Texture::multiplies_colours)
+    };
+    let colours = mesh.colours().filter(|_| materials.iter().any(shows_colours));
+    let colours = colours.map(|colours| {
+        buffer.floats(vertices.iter().map(|&[vertex, _]| colours[vertex as usize].map(to_linear)))
+    });
     let mut json = json!({
         "asset": {"version": "2.0", "generator": "softrast-mesh"},
         "scene": 0,
@@ -110,20 +113,49 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     if origin != [0.0; 3] {
         json["nodes"][0]["translation"] = json!(origin);
     }
-    if let Some(texture) = mesh.texture() {
-        let down = vertices.iter().map(|&[_, k]| texture.coordinates()[k as usize]);
-        attributes["TEXCOORD_0"] = json!(buffer.floats(down.map(|[u, v]| [u, 1.0 - v])));
+    let [mut all, mut primitives, mut images] = [(); 3].map(|()| Vec::new());
+    let mut known = HashMap::new();
+    let of_faces = mesh.texture().map(Texture::of_faces);
+    let material_of = |&face: &usize| of_faces.map_or(0, |of_faces| of_faces[face] as usize);
+    let mut order = Vec::from_iter(0..faces.len());
+    order.sort_by_key(material_of);
+    for own in order.chunk_by(|a, b| material_of(a) == material_of(b)) {
+        let material = &materials[material_of(&own[0])];
+        let corners = own.iter().flat_map(|&face| faces[face]).map(|v| [v.to_le_bytes()]);
+        let indices = buffer.accessor(corners, [WHOLE, OF_INDICES]);
+        let mut attributes = attributes.clone();
+        let colours = colours.filter(|_| shows_colours(material));
+        if let Some(colours) = colours {
+            attributes["COLOR_0"] = json!(colours);
+        }
+        let [red, green, blue] = match (material.factor(), material.picture(), colours) {
+            ([1.0, 1.0, 1.0], None, None) => [GREY; 3],
+            (factor, ..) => factor,
+        };
+        let mut colour = json!({
+            "baseColorFactor": [red, green, blue, 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": 0.75,
+        });
+        if let Some(picture) = material.picture() {
+            let image = *known.entry(picture.as_ptr()).or_insert_with(|| {
+                let view = buffer.view(picture.iter().copied());
+                images.push(json!({"bufferView": view, "mimeType": media_type(picture)}));
+                images.len() - 1
+            });
+            colour["baseColorTexture"] = json!({"index": image});
+        }
+        primitives
+            .push(json!({"attributes": attributes, "indices": indices, "material": all.len()}));
+        all.push(json!({"doubleSided": true, "pbrMetallicRoughness": colour}));
     }
-    if let Some(picture) = picture {
-        let view = buffer.view(picture.iter().copied());
-        json["images"] = json!([{"bufferView": view, "mimeType": media_type(picture)}]);
-        json["textures"] = json!([{"source": 0}]);
-        colour["baseColorTexture"] = json!({"index": 0});
-        colour["baseColorFactor"] = json!([1.0, 1.0, 1.0, 1.0]);
+    if !images.is_empty() {
+        let textures = (0..images.len()).map(|image| json!({"source": image}));
+        json["textures"] = textures.collect();
+        json["images"] = json!(images);
     }
-    json["materials"] = json!([{"doubleSided": true, "pbrMetallicRoughness": colour}]);
-    let primitive = json!({"attributes": attributes, "indices": indices, "material": 0});
-    json["meshes"] = json!([{"primitives": [primitive]}]);
+    json["materials"] = json!(all);
+    json["meshes"] = json!([{"primitives": primitives}]);
     json["buffers"] = json!([{"byteLength": buffer.bytes.len()}]);
     json["bufferViews"] = json!(buffer.views);
     json["accessors"] = json!(buffer.accessors);
@@ -146,11 +178,6 @@ fn split(mesh: &Mesh) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
     let numbers: Vec<u32> = corners.iter().map(number).collect();
     let faces = numbers.as_chunks().0.to_vec();
     (vertices, faces)
-}
-
-/// A channel that is proportional to light, of one as screens have it: the inverse of how they are read.
-fn to_linear(x: f64) -> f64 {
-    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Both chunks and their heads.

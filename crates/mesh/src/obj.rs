@@ -69,8 +69,10 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
         false => (None, None),
     };
     let mut warnings = Vec::from_iter(warning);
-    let texture =
-        folder.and_then(|folder| obj_texture::parse(texture, bytes, folder, &cut, &mut warnings));
+    let is_coloured = colours.is_some();
+    let texture = folder.and_then(|folder| {
+        obj_texture::parse(texture, bytes, folder, &cut, is_coloured, &mut warnings)
+    });
     Ok(Parts { positions, faces, colours, texture, warnings })
 }
 

@@ -1,15 +1,17 @@
-//! The texture of an OBJ file: its coordinates, and the picture that its materials name.
+//! The texture of an OBJ file: its coordinates, and the pictures and colours of its materials.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
-    path::Path,
+    collections::HashMap,
+    path::{Path, PathBuf},
 };
 
 use crate::{
-    Fault, Texture,
+    Fault, Material, Texture,
     beside::{beside, picture, read},
     corner::absolute,
     error::{FARTHEST, Trouble, shown},
+    material::to_linear,
+    pictures::Pictures,
     statements::{Statement, count, statements},
     texture::is_near,
 };
@@ -21,39 +23,63 @@ const MOST_LIBRARIES: usize = 100;
 #[derive(Default)]
 pub(crate) struct Found {
     coordinates: Vec<[f64; 2]>,
-    /// Of each corner of each face, in the order of the file.
+    /// Of each corner of each face, in the order of the file; [`NOWHERE`] for those that have none.
     corners: Vec<u32>,
     /// The texts after `mtllib`, each once.
     libraries: Vec<String>,
-    /// The materials of faces; that of faces without one is "".
-    materials: BTreeSet<String>,
+    /// The materials of faces, in the order of first use; that of faces before the first `usemtl` is "".
+    materials: Vec<Used>,
+    /// Where each is among the materials.
+    numbers: HashMap<String, u32>,
+    /// The corner at which each run of faces of one material begins, and its material.
+    runs: Vec<(u32, u32)>,
     /// The material of the next faces, until one has it.
     material: Option<String>,
-    /// Lines of the first corner that has a coordinate, and of the first that has none.
+    /// The line of the first corner that has a coordinate.
     with: Option<usize>,
+}
+
+/// A material that faces have.
+struct Used {
+    name: String,
+    /// The line of its first corner that has no coordinate.
     without: Option<usize>,
 }
 
+/// In place of a coordinate that a corner has not.
+const NOWHERE: u32 = u32::MAX;
+
 /// The texture in `bytes`, a file in `folder` whose vertices and faces are sound; `warnings` gets why it, its picture or a library was left
 /// out. `found` is what its statements have unless one is wrong, `cut` the corners of the triangles, all corners of the file being numbered
-/// in order.
+/// in order. Colours of vertices count in place of those of materials.
 pub(crate) fn parse(
     found: Option<Found>,
     bytes: &[u8],
     folder: &Path,
     cut: &[[u32; 3]],
+    has_colours: bool,
     warnings: &mut Vec<Trouble>,
 ) -> Option<Texture> {
     let of = || {
         let found = found.filter(Found::is_in_range).map_or_else(|| Found::of(bytes), Ok)?;
-        if !found.is_on_faces()? {
+        let (mut looks, of_materials) = looks(&found, folder, warnings);
+        if has_colours {
+            looks.iter_mut().for_each(|look| look.colour = None);
+        }
+        if !found.is_on_faces(&looks, &of_materials)? {
             return Ok(None);
         }
-        let corners = cut.iter().map(|triangle| triangle.map(|k| found.corners[k as usize]));
-        let corners = corners.collect();
-        let shown = of_materials(&found, folder, warnings);
-        let texture = Texture::new(found.coordinates, corners).map_err(Trouble::OtherFile)?;
-        Ok(Some(texture.pictured(shown, warnings)))
+        let mut pictures = Pictures::default();
+        let materials = looks.into_iter().map(|look| {
+            let colour = look.colour.filter(|_| look.picture.is_none()).unwrap_or([1.0; 3]);
+            let shown = look.picture.and_then(|(folder, name)| {
+                let read = || picture(&folder, &name).map_err(Trouble::OtherFile);
+                pictures.get((folder.clone(), name.clone()), read, warnings)
+            });
+            Material::of(shown, colour)
+        });
+        let materials = materials.collect();
+        found.texture(cut, &of_materials, materials).map(Some)
     };
     of().unwrap_or_else(|trouble| {
         warnings.push(trouble);
@@ -81,15 +107,24 @@ impl Found {
         match words.next() {
             Some("vt") => self.coordinates.push(coordinate(words).map_err(at)?),
             Some("f") => {
-                self.materials.extend(self.material.take());
+                if let Some(name) = self.material.take() {
+                    let number = self.number(name);
+                    self.runs.push((self.corners.len() as u32, number));
+                }
                 for corner in words {
                     let field = corner.split('/').nth(1).filter(|field| !field.is_empty());
-                    let first = if field.is_some() { &mut self.with } else { &mut self.without };
-                    first.get_or_insert(line);
-                    if let Some(field) = field {
-                        let number = index(field, self.coordinates.len(), all).map_err(at)?;
-                        self.corners.push(number);
-                    }
+                    let number = match field {
+                        Some(field) => {
+                            self.with.get_or_insert(line);
+                            index(field, self.coordinates.len(), all).map_err(at)?
+                        }
+                        None => {
+                            let (_, material) = self.runs[self.runs.len() - 1];
+                            self.materials[material as usize].without.get_or_insert(line);
+                            NOWHERE
+                        }
+                    };
+                    self.corners.push(number);
                 }
             }
             Some("mtllib") if self.libraries.len() <= MOST_LIBRARIES => {
@@ -101,20 +136,66 @@ impl Found {
         Ok(())
     }
 
-    /// Whether there is each coordinate that a corner has: it may come after the face.
-    fn is_in_range(&self) -> bool {
-        self.corners.iter().all(|&number| (number as usize) < self.coordinates.len())
+    /// The number of a material that a face has.
+    fn number(&mut self, name: String) -> u32 {
+        let next = self.materials.len() as u32;
+        let number = *self.numbers.entry(name.clone()).or_insert(next);
+        if number == next {
+            self.materials.push(Used { name, without: None });
+        }
+        number
     }
 
-    /// Whether corners have coordinates; an error if only some have.
-    fn is_on_faces(&self) -> Result<bool, Trouble> {
-        if let (Some(with), Some(line)) = (self.with, self.without) {
-            let reason = format!(
-                "a corner has no texture coordinate, but one of line {with} has: all need one"
-            );
+    /// Whether there is each coordinate that a corner has: it may come after the face.
+    fn is_in_range(&self) -> bool {
+        let is_there =
+            |&number: &u32| number == NOWHERE || (number as usize) < self.coordinates.len();
+        self.corners.iter().all(is_there)
+    }
+
+    /// Whether there is a texture: corners with coordinates, or materials with colours. An error if corners need a coordinate and have none.
+    fn is_on_faces(&self, looks: &[Look], of_materials: &[u32]) -> Result<bool, Trouble> {
+        let are_plain = looks.iter().all(|look| look.picture.is_none() && look.colour.is_none());
+        for (Used { without, name }, &look) in self.materials.iter().zip(of_materials) {
+            let Some(line) = *without else { continue };
+            let reason = match (self.with, &looks[look as usize].picture) {
+                (_, Some(_)) => format!(
+                    "a corner has no texture coordinate, but its material {:?} shows a picture",
+                    shown(name)
+                ),
+                // Nothing but a picture that comes later is shown by coordinates.
+                (Some(with), None) if are_plain => format!(
+                    "a corner has no texture coordinate, but one of line {with} has: all need one"
+                ),
+                _ => continue,
+            };
             return Err(Trouble::Line(line, Fault::format(reason)));
         }
-        Ok(self.with.is_some())
+        Ok(self.with.is_some() || !are_plain)
+    }
+
+    /// The texture on triangles, whose corners are numbers of those of the file.
+    fn texture(
+        mut self,
+        cut: &[[u32; 3]],
+        of_materials: &[u32],
+        looks: Vec<Material>,
+    ) -> Result<Texture, Trouble> {
+        let nowhere = self.coordinates.len() as u32;
+        if self.corners.contains(&NOWHERE) {
+            self.coordinates.push([0.0; 2]);
+        }
+        let corners =
+            cut.iter().map(|triangle| triangle.map(|k| self.corners[k as usize].min(nowhere)));
+        let of_faces = cut.iter().map(|&[first, ..]| {
+            let run = self.runs.partition_point(|&(begin, _)| begin <= first);
+            of_materials[self.runs[run - 1].1 as usize]
+        });
+        let of_faces = of_faces.collect();
+        let corners = corners.collect();
+        Texture::new(self.coordinates, corners)
+            .and_then(|texture| texture.with_materials(looks, of_faces))
+            .map_err(Trouble::OtherFile)
     }
 }
 
@@ -142,7 +223,8 @@ fn coordinate<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 2], 
 /// The coordinate, from 0, that the second field of a corner means.
 fn index(field: &str, before: usize, all: usize) -> Result<u32, Fault> {
     let number = absolute(field, before, all).ok();
-    number.and_then(|number| u32::try_from(number - 1).ok()).ok_or_else(|| {
+    let number = number.and_then(|number| u32::try_from(number - 1).ok());
+    number.filter(|&number| number != NOWHERE).ok_or_else(|| {
         let field = shown(field);
         Fault::format(format!(
             "texture coordinate {field} is out of range: the file has {all}, {before} of them before it"
@@ -177,12 +259,30 @@ fn names(folder: &Path, text: &str) -> Vec<String> {
     names
 }
 
-/// The picture that all faces show by their materials, if they show one; `warnings` gets the libraries that cannot be read.
-fn of_materials(
-    found: &Found,
-    folder: &Path,
-    warnings: &mut Vec<Trouble>,
-) -> Result<Option<Vec<u8>>, Trouble> {
+/// The look of a material.
+#[derive(Clone, Default)]
+struct Look {
+    /// Folder and name of its picture.
+    picture: Option<(PathBuf, String)>,
+    /// Its colour, which counts where there is no picture; proportional to light.
+    colour: Option<[f64; 3]>,
+}
+
+impl Look {
+    /// The same without a picture that has options, of a material of this name.
+    fn without_options(mut self, name: &str, warnings: &mut Vec<Trouble>) -> Self {
+        if let Some((_, options)) = self.picture.take_if(|(_, name)| name.starts_with('-')) {
+            let (options, name) = (shown(&options), shown(name));
+            let reason = format!("map_Kd of {name:?} has options, which are not read: {options}");
+            warnings.push(Trouble::part("materials", reason));
+        }
+        self
+    }
+}
+
+/// The looks of the materials that faces have, each once, as far as they are known, and that of each material; `warnings` gets what cannot be
+/// read.
+fn looks(found: &Found, folder: &Path, warnings: &mut Vec<Trouble>) -> (Vec<Look>, Vec<u32>) {
     let mut paths = Vec::new();
     for name in found.libraries.iter().flat_map(|text| names(folder, text)) {
         if paths.len() <= MOST_LIBRARIES {
@@ -193,59 +293,56 @@ fn of_materials(
         let reason = format!("more than {MOST_LIBRARIES} libraries: the others are not read");
         warnings.push(Trouble::part("materials", reason));
     }
-    // Folder and name of the picture of each material that has one; the first library that has a material counts.
-    let mut pictures = BTreeMap::new();
+    // The first library that has a material counts.
+    let mut known = HashMap::new();
     for path in paths.iter().take(MOST_LIBRARIES) {
-        let content = match read(path) {
-            Ok(content) => content,
-            Err(error) => {
-                warnings.push(Trouble::OtherFile(error));
-                continue;
-            }
-        };
-        let folder = path.parent().unwrap_or(folder);
-        let mut keep = |material: &mut String, picture: &mut Option<String>| {
-            let material = std::mem::take(material);
-            if let Some(picture) = picture.take() {
-                pictures.entry(material).or_insert((folder, picture));
-            }
-        };
-        let (mut material, mut picture) = (String::new(), None);
-        for statement in statements(&content) {
-            match statement.words().next() {
-                Some("newmtl") => {
-                    keep(&mut material, &mut picture);
-                    material = rest(&statement);
+        match read(path) {
+            Ok(content) => {
+                for (name, look) in library(&content, path.parent().unwrap_or(folder)) {
+                    known.entry(name).or_insert(look);
                 }
-                Some(word) if word.eq_ignore_ascii_case("map_Kd") => {
-                    picture = Some(rest(&statement));
-                }
-                _ => {}
             }
-        }
-        keep(&mut material, &mut picture);
-    }
-    let mut of_faces = BTreeMap::new();
-    for material in &found.materials {
-        of_faces.entry(pictures.get(material)).or_insert(material);
-    }
-    let wrong = |reason: String| Err(Trouble::part("materials", reason));
-    match of_faces.iter().collect::<Vec<_>>()[..] {
-        [] | [(None, _)] => Ok(None),
-        [(Some((_, name)), material)] if name.starts_with('-') => {
-            let (name, material) = (shown(name), shown(material));
-            wrong(format!("map_Kd of {material:?} has options, which are not read: {name}"))
-        }
-        [(Some((folder, name)), _)] => picture(folder, name).map(Some).map_err(Trouble::OtherFile),
-        [(a, one), (b, other), ..] => {
-            let [a, b] = [a, b].map(|picture| match picture {
-                Some((_, name)) => shown(name),
-                None => "no picture".to_owned(),
-            });
-            let [one, other] = [one, other].map(|material| shown(material));
-            wrong(format!(
-                "faces of {other:?} show {b}, but those of {one:?} {a}: a mesh has one picture, so join them into one"
-            ))
+            Err(error) => warnings.push(Trouble::OtherFile(error)),
         }
     }
+    let (mut looks, mut numbers) = (Vec::new(), HashMap::new());
+    let mut number = |used: &Used| {
+        let look = known.get(&used.name).cloned().unwrap_or_default();
+        // Beside a picture it does not count.
+        let colour = look.colour.filter(|_| look.picture.is_none());
+        let bits = colour.map(|colour| colour.map(f64::to_bits));
+        *numbers.entry((look.picture.clone(), bits)).or_insert_with(|| {
+            looks.push(look.without_options(&used.name, warnings));
+            (looks.len() - 1) as u32
+        })
+    };
+    let of_materials = found.materials.iter().map(&mut number).collect();
+    (looks, of_materials)
+}
+
+/// The materials of a library in `folder`, in its order.
+fn library(content: &[u8], folder: &Path) -> Vec<(String, Look)> {
+    let mut materials = vec![(String::new(), Look::default())];
+    for statement in statements(content) {
+        let (_, look) = materials.last_mut().expect("there is one");
+        let mut words = statement.words();
+        match words.next() {
+            Some("newmtl") => materials.push((rest(&statement), Look::default())),
+            Some("Kd") => {
+                let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+                let colour = match numbers[..] {
+                    [grey] => Some([grey; 3]),
+                    [red, green, blue] => Some([red, green, blue]),
+                    _ => None,
+                };
+                let colour = colour.filter(|all| all.iter().all(|x| (0.0..=1.0).contains(x)));
+                look.colour = colour.map(|all| all.map(to_linear));
+            }
+            Some(word) if word.eq_ignore_ascii_case("map_Kd") => {
+                look.picture = Some((folder.to_owned(), rest(&statement)));
+            }
+            _ => {}
+        }
+    }
+    materials
 }

@@ -26,15 +26,18 @@ impl Mesh {
     /// picture that is left out, a library of materials that cannot be read, an extension of glTF that the file requires and that is not read.
     /// `Mesh::load` gives the same mesh but for the texture, without warnings.
     ///
-    /// A mesh has one texture on all of its faces, with one picture. So it is left out where only some corners have coordinates, and
-    /// the picture is left out where materials show several, or some show one and others none. Coordinates stay where the picture alone
-    /// is missing. Other properties of materials are ignored, beyond 0 to 1 pictures always repeat.
+    /// A texture lies on all faces of a mesh, and each face has the picture or the colour of its [`Material`](crate::Material). A texture is
+    /// left out where corners that need a coordinate have none; where a picture cannot be had, coordinates stay. Other properties of materials
+    /// are ignored, beyond 0 to 1 pictures always repeat.
     ///
-    /// - OBJ: `vt` at the corners of faces, and `map_Kd` of the materials of `mtllib`. Options of `map_Kd` are not read. A line `mtllib` names
-    ///   one library, or several that end in `.mtl`; names may hold spaces.
+    /// - OBJ: `vt` at the corners of faces, and `map_Kd` of the materials of `mtllib`; without it `Kd` as pictures and screens have it, unless
+    ///   vertices have colours. Options of `map_Kd` are not read. A line `mtllib` names one library, or several that end in `.mtl`; names may
+    ///   hold spaces.
     /// - GLB and glTF: `TEXCOORD_0` or `TEXCOORD_1`, whichever the base colour texture names, or the diffuse texture of
     ///   `KHR_materials_pbrSpecularGlossiness`; turned so that v is up. Its picture lies in the file, in a data URI, or in a file of its own.
+    ///   Factors and colours of vertices multiply it, as the format has it.
     ///
+    /// A mesh has up to 1000 pictures, of 1 GiB together.
     /// Pictures are PNG or JPEG. Libraries of materials lie in the folder of the mesh or below it, pictures in the folder of the mesh (GLB, glTF)
     /// or of the library (OBJ) or below it, and nothing else is opened: of a path that leads out of the folder the last part counts. Links in
     /// the folder are followed.

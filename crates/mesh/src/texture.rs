@@ -1,20 +1,16 @@
-//! A picture on the faces of a mesh.
-
-use std::sync::Arc;
+//! Pictures on the faces of a mesh.
 
 use crate::{
-    MeshError,
-    error::{FARTHEST, Trouble},
+    Material, MeshError,
+    error::FARTHEST,
     subdivision::{between, quartered},
 };
 
-/// Where the corners of faces lie on a picture, and the picture if it is there.
+/// Where the corners of faces lie on pictures, and the [`Material`] of each face.
 ///
 /// A coordinate is (u, v): u goes from 0 at the left end of the picture to 1 at the right one, v from 0 at the bottom to 1 at the top. Beyond
 /// them the picture repeats. Each corner of each face has one of its own, so vertices on a seam have several. All coordinates are from
 /// -10000 to 10000, and every index is in range.
-///
-/// The picture is kept as the content of its file, PNG or JPEG. Nothing here decodes it, so it may still be broken.
 ///
 /// ```
 /// use softrast_mesh::{Mesh, Texture};
@@ -29,11 +25,13 @@ use crate::{
 pub struct Texture {
     coordinates: Vec<[f64; 2]>,
     corners: Vec<[u32; 3]>,
-    picture: Option<Arc<[u8]>>,
+    materials: Vec<Material>,
+    of_faces: Vec<u32>,
+    multiplies_colours: bool,
 }
 
 impl Texture {
-    /// `coordinates` (u, v), and for each face of a mesh the three of its corners, as indices from 0; without a picture.
+    /// `coordinates` (u, v), and for each face of a mesh the three of its corners, as indices from 0; all faces of one white material.
     ///
     /// # Errors
     ///
@@ -48,19 +46,45 @@ impl Texture {
                 return Err(MeshError::Corner { face, coordinate, coordinates: coordinates_found });
             }
         }
-        Ok(Self { coordinates, corners, picture: None })
+        let (materials, of_faces) = (vec![Material::default()], vec![0; corners.len()]);
+        Ok(Self { coordinates, corners, materials, of_faces, multiplies_colours: false })
     }
 
-    /// With this picture: the content of a PNG or JPEG file.
+    /// With this picture on all faces: the content of a PNG or JPEG file.
     ///
     /// # Errors
     ///
     /// If its first bytes are those of neither.
     pub fn with_picture(self, picture: Vec<u8>) -> Result<Self, MeshError> {
-        if media_type(&picture).is_none() {
-            return Err(MeshError::Picture);
+        let of_faces = vec![0; self.corners.len()];
+        self.with_materials(vec![Material::default().with_picture(picture)?], of_faces)
+    }
+
+    /// With these materials, and for each face the number of its own, from 0.
+    ///
+    /// # Errors
+    ///
+    /// If there are not as many numbers as faces, or one is out of range.
+    pub fn with_materials(
+        self,
+        materials: Vec<Material>,
+        of_faces: Vec<u32>,
+    ) -> Result<Self, MeshError> {
+        let (found, faces) = (of_faces.len(), self.corners.len());
+        if found != faces {
+            return Err(MeshError::MaterialFaces { found, faces });
         }
-        Ok(Self { picture: Some(picture.into()), ..self })
+        let found = materials.len();
+        if let Some(face) = of_faces.iter().position(|&number| number as usize >= found) {
+            return Err(MeshError::Material { face, material: of_faces[face], materials: found });
+        }
+        Ok(Self { materials, of_faces, ..self })
+    }
+
+    /// The same texture, but the colours of the vertices multiply the pictures too, as in glTF files.
+    #[must_use]
+    pub fn multiplying_colours(self) -> Self {
+        Self { multiplies_colours: true, ..self }
     }
 
     /// The coordinates (u, v), v up.
@@ -73,23 +97,26 @@ impl Texture {
         &self.corners
     }
 
-    /// The content of a PNG or JPEG file.
-    pub fn picture(&self) -> Option<&[u8]> {
-        self.picture.as_deref()
+    /// The materials of the faces.
+    pub fn materials(&self) -> &[Material] {
+        &self.materials
     }
 
-    /// With a picture of a kind that is known, if there is one; without it and with one more warning if it cannot be had.
-    pub(crate) fn pictured(
-        self,
-        picture: Result<Option<Vec<u8>>, Trouble>,
-        warnings: &mut Vec<Trouble>,
-    ) -> Self {
-        match picture {
-            Ok(picture) => Self { picture: picture.map(Arc::from), ..self },
-            Err(trouble) => {
-                warnings.push(trouble);
-                self
-            }
+    /// For each face of the mesh, an index into [`Texture::materials`].
+    pub fn of_faces(&self) -> &[u32] {
+        &self.of_faces
+    }
+
+    /// Whether the colours of the vertices multiply pictures. Faces without a picture show the colours of the vertices in any case.
+    pub fn multiplies_colours(&self) -> bool {
+        self.multiplies_colours
+    }
+
+    /// The picture of the one material, where there is one only: the content of a PNG or JPEG file.
+    pub fn picture(&self) -> Option<&[u8]> {
+        match self.materials.as_slice() {
+            [material] => material.picture(),
+            _ => None,
         }
     }
 
@@ -100,21 +127,14 @@ impl Texture {
             coordinates.push(between(&self.coordinates, ends));
             (coordinates.len() - 1) as u32
         });
-        Self { coordinates, corners, picture: self.picture.clone() }
+        let of_faces = self.of_faces.iter().flat_map(|&number| [number; 4]).collect();
+        Self { coordinates, corners, of_faces, materials: self.materials.clone(), ..*self }
     }
 }
 
 /// Whether a coordinate is one.
 pub(crate) fn is_near(x: &f64) -> bool {
     x.abs() <= FARTHEST
-}
-
-/// The media type of a PNG or JPEG file, by its first bytes.
-pub(crate) fn media_type(picture: &[u8]) -> Option<&'static str> {
-    if picture.starts_with(b"\x89PNG\r\n\x1a\n") {
-        return Some("image/png");
-    }
-    picture.starts_with(b"\xff\xd8\xff").then_some("image/jpeg")
 }
 
 #[cfg(test)]
@@ -129,7 +149,9 @@ mod tests {
         let positions = SQUARE.map(|[x, y]| [x, y, 3.0]).to_vec();
         let coordinates = [SQUARE, [[0.5, 0.5], [0.25, 0.5], [3.0, -2.0], [0.0; 2]]].concat();
         let texture = Texture::new(coordinates, vec![[0, 1, 2], [4, 5, 6]]).unwrap();
-        let texture = texture.with_picture(b"\xff\xd8\xff\xe0".to_vec()).unwrap();
+        let pictured = Material::default().with_picture(b"\xff\xd8\xff\xe0".to_vec()).unwrap();
+        let texture = texture.with_materials(vec![pictured, Material::default()], vec![1, 0]);
+        let texture = texture.unwrap().multiplying_colours();
         let mesh = Mesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
         mesh.with_texture(texture).unwrap()
     }
@@ -150,6 +172,11 @@ mod tests {
         let texture = Texture::new(SQUARE.to_vec(), vec![[0, 1, 2]]).unwrap();
         let gif = texture.clone().with_picture(b"GIF89a".to_vec()).unwrap_err();
         assert_eq!(gif.to_string(), "the picture of a texture is neither PNG nor JPEG");
+        let white = vec![Material::default()];
+        let few = texture.clone().with_materials(white.clone(), vec![]).unwrap_err();
+        assert_eq!(few.to_string(), "materials of 0 faces for the 1 faces of a texture");
+        let high = texture.clone().with_materials(white, vec![1]).unwrap_err();
+        assert_eq!(high.to_string(), "face 0 has material 1, but there are 1");
         let ball = icosphere(0).with_texture(texture).unwrap_err();
         assert_eq!(ball.to_string(), "a texture on 1 faces for the 20 faces of the mesh");
     }
@@ -161,7 +188,11 @@ mod tests {
         assert_eq!(mesh.with_positions(vec![[1.0; 3]; 4]).unwrap().texture(), mesh.texture());
         let finer = mesh.subdivided();
         let [coarse, fine] = [&mesh, &finer].map(|mesh| mesh.texture().unwrap());
-        assert_eq!(fine.picture(), coarse.picture());
+        assert_eq!(fine.materials(), coarse.materials());
+        assert_eq!(
+            (fine.of_faces(), fine.multiplies_colours()),
+            (&[1, 1, 1, 1, 0, 0, 0, 0][..], true)
+        );
         let at = |corner: u32| fine.coordinates()[corner as usize];
         // The fourth part of the first face lies between the middles of its edges.
         assert_eq!(fine.corners()[3].map(at), [[0.5, 0.0], [1.0, 0.5], [0.5, 0.5]]);

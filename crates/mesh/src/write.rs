@@ -26,8 +26,9 @@ impl Mesh {
     ///
     /// Coordinates are rounded to 32 bits: the format has no others. So a mesh that is far from the origin for its size is written around
     /// [`Mesh::glb_origin`], to which its node moves it. Colours are written as the linear ones that the
-    /// format asks for, in 32 bits. A texture is written with its picture, as it is; then colours are left out, since programs would
-    /// show the product of both. The format has one texture coordinate for each vertex, so vertices on seams are doubled, and those that no
+    /// format asks for, in 32 bits. A texture is written with its pictures, as they are; beside pictures colours are left out, since programs
+    /// would show the product of both, unless it is one ([`Texture::multiplies_colours`](crate::Texture::multiplies_colours)). Faces lie
+    /// material by material then. The format has one texture coordinate for each vertex, so vertices on seams are doubled, and those that no
     /// face uses are left out.
     ///
     /// # Panics

@@ -5,7 +5,7 @@
 use std::{fs, path::Path};
 
 use serde_json::{Value, json};
-use softrast_mesh::{Mesh, Texture, icosphere};
+use softrast_mesh::{Material, Mesh, Texture, icosphere};
 use tempfile::TempDir;
 
 /// What starts as a PNG file does; nothing decodes it here.
@@ -120,8 +120,8 @@ fn what_is_wrong_with_the_texture_of_an_obj_file_leaves_it_out_by_name() {
         assert_eq!(left_out.as_deref(), Some(message));
         assert_eq!(mesh.texture(), None);
     }
-    // No corner has a coordinate: nothing is missing, and no material is looked for.
-    let (mesh, left_out) = wrong(&format!("mtllib none.mtl\n{SQUARE}f 1 2 3\nf 1/ 3//1 4/\n"));
+    // No corner has a coordinate: nothing is missing.
+    let (mesh, left_out) = wrong(&format!("{SQUARE}f 1 2 3\nf 1/ 3//1 4/\n"));
     assert_eq!((mesh.texture(), left_out), (None, None));
 }
 
@@ -153,15 +153,51 @@ fn a_picture_that_cannot_be_had_leaves_coordinates_and_says_why() {
         options,
         "a.obj: materials: map_Kd of \"a\" has options, which are not read: -s 2 2 a.png",
     );
+    // Of two pictures the one that is there is shown.
     let several = mtl(&[("a.png", PNG)], "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png");
-    let expected = "a.obj: materials: faces of \"b\" show b.png, but those of \"a\" a.png: a mesh has one picture, so join them into one";
-    assert_eq!(several.as_deref(), Some(expected));
-    starts(
-        mtl(&[("a.png", PNG)], "newmtl a\nmap_Kd a.png\nnewmtl b"),
-        "a.obj: materials: faces of \"a\" show a.png, but those of \"b\" no picture",
-    );
-    // Materials without pictures are as good as none.
+    starts(several, "b.png: cannot be read: ");
+    // Materials without pictures have colours.
     assert_eq!(mtl(&[], "newmtl a\nKd 1 0 0"), None);
+}
+
+#[test]
+fn faces_of_an_obj_file_show_the_pictures_and_colours_of_their_materials() {
+    let obj = format!(
+        "mtllib a.mtl\n{SQUARE}f 1 2 3\nusemtl b\nf 1/1 2/2 3/3 4/4\nusemtl a\nf 1/4 2/3 3/2\n\
+         usemtl red\nf 1 3 4\nusemtl c\nf 2/1 3/1 4/2\n"
+    );
+    let mtl = "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.jpg\nnewmtl red\nKd 1 0 .5\n\
+               newmtl c\nmap_Kd a.png\n";
+    let files: [(&str, &[u8]); 4] =
+        [("a.obj", obj.as_bytes()), ("a.mtl", mtl.as_bytes()), ("a.png", PNG), ("b.jpg", JPEG)];
+    let (mesh, warning) = load(folder(&files).path(), "a.obj");
+    assert_eq!(warning, None);
+    let texture = mesh.texture().unwrap();
+    assert_eq!((texture.of_faces(), texture.picture()), (&[0, 1, 1, 2, 3, 2][..], None));
+    let pictures: Vec<_> = texture.materials().iter().map(Material::picture).collect();
+    assert_eq!(pictures, [None, Some(JPEG), Some(PNG), None]);
+    let [red, green, blue] = texture.materials()[3].factor();
+    assert!(red == 1.0 && green == 0.0 && (blue - 0.2140).abs() < 1e-4, "{blue}: half of sRGB");
+    assert_eq!(corners(&mesh)[3], [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]);
+
+    // A picture has no place on a corner without a coordinate.
+    let spoiled = obj.replace("f 1/4 2/3 3/2", "f 1/4 2/3 3");
+    let files = [("a.obj", spoiled.as_bytes()), files[1], files[2], files[3]];
+    let (mesh, warning) = load(folder(&files).path(), "a.obj");
+    assert_eq!(mesh.texture(), None);
+    let expected =
+        "a.obj:14: a corner has no texture coordinate, but its material \"a\" shows a picture";
+    assert_eq!(warning.as_deref(), Some(expected));
+
+    // Colours without any picture or coordinate; those of vertices count in their place.
+    let plain = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
+    let painted = plain.replace(" 0 0\n", " 0 0 1 1 1\n").replace(" 1 0\n", " 1 0 1 1 1\n");
+    for (text, factor) in [(plain, Some([1.0, 0.0, blue])), (painted.as_str(), None)] {
+        let files = [("a.obj", text.as_bytes()), files[1]];
+        let (mesh, warning) = load(folder(&files).path(), "a.obj");
+        assert_eq!(warning, None);
+        assert_eq!(mesh.texture().map(|texture| texture.materials()[0].factor()), factor);
+    }
 }
 
 const FACES: &str = "usemtl picture\nf 1/1 2/2 3/3 4/4\n";
@@ -360,7 +396,7 @@ fn the_texture_of_a_glb_file_has_v_up_and_its_picture() {
 #[test]
 fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
     let part = "a.glb: mesh 0, primitive";
-    let cases: [(Change, &str, bool); 15] = [
+    let cases: [(Change, &str, bool); 14] = [
         (
             &|j, _| {
                 drop(
@@ -370,7 +406,7 @@ fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
                         .remove("TEXCOORD_0"),
                 )
             },
-            " 1: it has no texture coordinates, but parts before it have",
+            " 1: it shows image 0, but has no texture coordinates",
             false,
         ),
         (
@@ -382,12 +418,7 @@ fn what_is_wrong_with_the_texture_of_a_glb_file_leaves_it_out_by_name() {
                         .remove("TEXCOORD_0"),
                 )
             },
-            " 1: it has texture coordinates, but parts before it have none",
-            false,
-        ),
-        (
-            &|j, _| j["meshes"][0]["primitives"][1]["material"] = json!(7),
-            " 1: it shows no image, parts before it image 0: a mesh has one picture, so join them into one",
+            " 0: it shows image 0, but has no texture coordinates",
             false,
         ),
         (
@@ -480,6 +511,105 @@ fn the_diffuse_picture_of_specular_and_glossy_materials_is_the_texture() {
             });
             let (mesh, warning) = load(folder(&[("a.glb", &file)]).path(), "a.glb");
             assert_eq!((mesh.texture().unwrap().picture(), warning), (Some(PNG), None));
+        }
+    }
+}
+
+/// The part in two materials, the second with a picture beside the file.
+fn of_two_materials(change: impl Fn(&mut Value)) -> (Mesh, Option<String>) {
+    let file = glb(|json, _| {
+        json["meshes"][0]["primitives"][1]["material"] = json!(1);
+        json["images"].as_array_mut().unwrap().push(json!({"uri": "a.jpg"}));
+        json["textures"] = json!([{"source": 0}, {"source": 1}]);
+        json["materials"] = json!([
+            {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
+            {"pbrMetallicRoughness":
+                {"baseColorTexture": {"index": 1}, "baseColorFactor": [0.25, 0.5, 1.0, 1.0]}},
+        ]);
+        change(json);
+    });
+    load(folder(&[("a.glb", &file), ("a.jpg", JPEG)]).path(), "a.glb")
+}
+
+#[test]
+fn parts_of_a_glb_file_have_pictures_and_factors_of_their_own() {
+    let looks = |mesh: &Mesh| {
+        let texture = mesh.texture().unwrap();
+        let look = |&number: &u32| {
+            let material = &texture.materials()[number as usize];
+            (material.picture().map(<[u8]>::to_vec), material.factor())
+        };
+        texture.of_faces().iter().map(look).collect::<Vec<_>>()
+    };
+    let (png, jpeg) = (Some(PNG.to_vec()), Some(JPEG.to_vec()));
+    let (white, blue) = ([1.0; 3], [0.25, 0.5, 1.0]);
+    let (mesh, warning) = of_two_materials(|_| ());
+    assert_eq!((looks(&mesh), warning), (vec![(png.clone(), white), (jpeg, blue)], None));
+    assert!(!mesh.texture().unwrap().multiplies_colours());
+    assert_eq!(mesh.texture().unwrap().coordinates().len(), 4, "both parts share them");
+
+    // What cannot be read is left out alone.
+    let (mesh, warning) = of_two_materials(|json| json["images"][1]["uri"] = json!("b.jpg"));
+    assert_eq!(looks(&mesh), [(png.clone(), white), (None, blue)]);
+    assert!(warning.unwrap().starts_with("b.jpg: cannot be read: "));
+
+    // Without a picture the factor is in the colours of vertices, unless others share these.
+    let (mesh, warning) = of_two_materials(|json| {
+        json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = json!(null);
+    });
+    assert_eq!((looks(&mesh), warning), (vec![(png, white), (None, blue)], None));
+    assert_eq!(mesh.colours(), None);
+    let (mesh, _) = of_two_materials(|json| {
+        for material in json["materials"].as_array_mut().unwrap() {
+            material["pbrMetallicRoughness"] = json!({"baseColorFactor": [0, 1, 0, 1]});
+        }
+        json["meshes"][0]["primitives"][1]["attributes"] = json!({"POSITION": 0});
+    });
+    assert_eq!(mesh.colours(), Some(&[[0.0, 1.0, 0.0]; 4][..]));
+    assert_eq!(looks(&mesh), [(None, white), (None, white)]);
+
+    // Colours of vertices multiply the picture.
+    let (mesh, warning) = of_two_materials(|json| {
+        for part in json["meshes"][0]["primitives"].as_array_mut().unwrap() {
+            part["attributes"]["COLOR_0"] = json!(0);
+        }
+    });
+    assert!(mesh.texture().unwrap().multiplies_colours());
+    assert_eq!((mesh.colours().unwrap()[2], warning), ([1.0, 1.0, 0.0], None));
+}
+
+#[test]
+fn several_materials_that_are_written_to_glb_come_back() {
+    let ball = icosphere(1);
+    let corners = ball.faces().to_vec();
+    let places = ball.positions().iter().map(|p| [p[0], p[1]]).collect();
+    let material = |picture: &[u8]| Material::default().with_picture(picture).unwrap();
+    let red = Material::default().with_factor([1.0, 0.0, 0.0]).unwrap();
+    let dim = material(PNG).with_factor([0.5; 3]).unwrap();
+    let materials = vec![material(JPEG), red, dim, material(PNG)];
+    let of_faces = (0..corners.len() as u32).map(|face| face % 3).collect();
+    let texture = Texture::new(places, corners).unwrap();
+    let texture = texture.with_materials(materials.clone(), of_faces).unwrap();
+    let plain = ball.with_texture(texture.clone()).unwrap();
+    let colours = plain.positions().iter().map(|p| p.map(f64::abs)).collect();
+    let painted = plain.clone().with_colours(colours).unwrap();
+    let painted = painted.with_texture(texture.multiplying_colours()).unwrap();
+    for mesh in [plain, painted] {
+        let folder = folder(&[("a.glb", &mesh.to_glb())]);
+        let (found, warning) = load(folder.path(), "a.glb");
+        assert_eq!(warning, None);
+        let texture = found.texture().unwrap();
+        // Faces lie by material, and the material that no face has is gone.
+        assert_eq!(texture.materials(), &materials[..3]);
+        let expected: Vec<u32> = (0..80).map(|face| face / 27).collect();
+        assert_eq!(texture.of_faces(), expected);
+        assert_eq!(found.colours().is_some(), mesh.colours().is_some());
+        assert_eq!(texture.multiplies_colours(), mesh.colours().is_some());
+        // Triangles 0, 3, 6 and so on come first.
+        for (k, triangle) in mesh.triangles().enumerate() {
+            let other = found.triangles().nth((k % 3 * 27) + k / 3).unwrap();
+            let pairs = triangle.as_flattened().iter().zip(other.as_flattened());
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-7), "face {k}");
         }
     }
 }

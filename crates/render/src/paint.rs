@@ -5,10 +5,10 @@ use std::{fmt, sync::Arc};
 use anyhow::{Context, bail};
 use image::RgbImage;
 use softrast_lab::Error;
-use softrast_mesh::{Mesh, MeshError, Texture};
+use softrast_mesh::{Mesh, MeshError};
 use softrast_raster::Attributes;
 use softrast_tensor::{Backend, Tensor, TensorData, tensor};
-use softrast_views::PictureFile;
+use softrast_views::{Atlas, PictureFile};
 
 use crate::args::Args;
 
@@ -90,7 +90,9 @@ impl Paint {
             return match mesh.texture() {
                 Some(texture) => {
                     let picture = PictureFile::load(path).context("--texture")?;
-                    Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), vec![]))
+                    let (coordinates, corners) = (texture.coordinates(), texture.corners());
+                    let picture = picture.texels(MOST_TEXELS);
+                    Ok((Self::on_picture(coordinates, corners, picture), vec![]))
                 }
                 None if warnings.is_empty() => {
                     bail!("--texture: {name} has no texture coordinates")
@@ -98,14 +100,17 @@ impl Paint {
                 None => bail!("--texture has no place on the mesh: {}", warnings.join("; ")),
             };
         }
-        if let Some((texture, picture)) = mesh.texture().and_then(|it| Some((it, it.picture()?))) {
-            match PictureFile::decode(picture) {
-                Ok(picture) => {
-                    return Ok((Self::textured(texture, picture.texels(MOST_TEXELS)), warnings));
-                }
-                Err(reason) => warnings
-                    .push(format!("drawn without its texture: {name}: its picture: {reason:#}")),
-            }
+        let (atlas, errors) = Atlas::of(mesh, MOST_TEXELS);
+        let left_out = match atlas {
+            Some(_) => "drawn without a picture",
+            None => "drawn without its texture",
+        };
+        let warning = |reason| format!("{left_out}: {name}: its picture: {reason:#}");
+        warnings.extend(errors.into_iter().map(warning));
+        if let Some(atlas) = atlas {
+            let (coordinates, corners) = (atlas.coordinates(), atlas.corners());
+            let paint = Self::on_picture(coordinates, corners, atlas.picture().clone());
+            return Ok((paint, warnings));
         }
         let paint = match mesh.colours() {
             Some(colours) => Self::Vertices(colours.as_flattened().to_vec()),
@@ -114,12 +119,9 @@ impl Paint {
         Ok((paint, warnings))
     }
 
-    fn textured(texture: &Texture, picture: RgbImage) -> Self {
-        Self::Texture {
-            coordinates: texture.coordinates().as_flattened().to_vec(),
-            corners: texture.corners().into(),
-            picture,
-        }
+    fn on_picture(coordinates: &[[f64; 2]], corners: &[[u32; 3]], picture: RgbImage) -> Self {
+        let coordinates = coordinates.as_flattened().to_vec();
+        Self::Texture { coordinates, corners: corners.into(), picture }
     }
 
     /// As the op takes it, for these faces: three channels.

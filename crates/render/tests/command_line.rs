@@ -268,6 +268,42 @@ fn a_texture_is_seen_where_its_coordinates_place_it() {
 }
 
 #[test]
+fn each_material_shows_its_own_picture_or_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    // A column of three squares: a picture, a colour, another picture.
+    let square = |k: u32| {
+        let (low, first) = (f64::from(k) - 1.5, 4 * k);
+        let at = |x: f64, y: f64| format!("v {x} {} 0\n", low + y);
+        let v = [at(-1.5, 0.0), at(1.5, 0.0), at(1.5, 1.0), at(-1.5, 1.0)].concat();
+        let corner = |n: u32| format!("{}/{n}", first + n);
+        format!("{v}usemtl m{k}\nf {} {} {} {}\n", corner(1), corner(2), corner(3), corner(4))
+    };
+    let all: String = (0..3).map(square).collect();
+    let obj = format!("mtllib a.mtl\nvt 0 0\nvt 2 0\nvt 2 1\nvt 0 1\n{all}");
+    let path = folder.path().join("a.obj");
+    fs::write(&path, obj).unwrap();
+    let mtl = "newmtl m0\nmap_Kd halves.png\nnewmtl m1\nKd 0 1 0\nnewmtl m2\nmap_Kd blue.png\n";
+    fs::write(folder.path().join("a.mtl"), mtl).unwrap();
+    let halves = |x: u32, _| Rgb(if x < 8 { RED } else { WHITE });
+    RgbImage::from_fn(16, 8, halves).save(folder.path().join("halves.png")).unwrap();
+    RgbImage::from_pixel(5, 3, Rgb(BLUE)).save(folder.path().join("blue.png")).unwrap();
+    let (picture, _) = front(path.to_str().unwrap(), &[]);
+    // Twice red and white from the left to the right.
+    for (x, y, colour) in [
+        (14, 48, RED),
+        (26, 48, WHITE),
+        (38, 48, RED),
+        (50, 48, WHITE),
+        (20, 32, GREEN),
+        (44, 32, GREEN),
+        (14, 16, BLUE),
+        (50, 16, BLUE),
+    ] {
+        assert_eq!(picture.get_pixel(x, y).0, colour, "at {x}, {y}");
+    }
+}
+
+#[test]
 fn a_picture_may_be_replaced_and_may_be_missing() {
     let folder = tempfile::tempdir().unwrap();
     let [obj, _] = pictured(folder.path());

@@ -18,6 +18,7 @@
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("softrast-views needs a backend: turn on one of the features ndarray, flex, wgpu");
 
+mod atlas;
 mod cameras;
 mod coloured_pixels;
 mod cut_sides;
@@ -31,6 +32,7 @@ mod picture_file;
 mod view;
 mod views;
 
+pub use atlas::{Atlas, painted_by_texture};
 pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask, load_views};
 pub use coloured_pixels::coloured_pixels;
 pub use cut_sides::cut_sides;

@@ -10,7 +10,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", display_order = 0)]
     pub mesh: Option<PathBuf>,
 
-    /// Find the camera by a picture in colours, of a mesh with colours at its vertices
+    /// Find the camera by a picture in colours, of a mesh with a texture or with colours at its vertices
     #[arg(long)]
     pub colour: bool,
 

@@ -1,23 +1,49 @@
+use std::path::Path;
+
 use softrast_mesh::{Mesh, fox, painted_fox};
-use softrast_views::Frame;
+use softrast_views::{Frame, painted_by_texture};
 
 use crate::{Args, Instances};
 
-/// The mesh to view, its name, and the frame of its file in which it is viewed.
-pub(crate) fn mesh(args: &Args) -> anyhow::Result<(Mesh, String, Frame)> {
-    let (mesh, name) = match &args.mesh {
-        None if args.colour => (painted_fox(), "fox".to_owned()),
-        None => (fox(), "fox".to_owned()),
-        Some(path) => (Mesh::load(path)?, path.display().to_string()),
+/// The mesh that is viewed.
+pub(crate) struct Viewed {
+    pub(crate) mesh: Mesh,
+    pub(crate) name: String,
+    /// The frame of its file in which it is viewed.
+    pub(crate) frame: Frame,
+    /// Notes on its colours.
+    pub(crate) notes: Vec<String>,
+}
+
+/// The mesh to view.
+pub(crate) fn viewed(args: &Args) -> anyhow::Result<Viewed> {
+    let ((mesh, notes), name) = match &args.mesh {
+        None if args.colour => ((painted_fox(), vec![]), "fox".to_owned()),
+        None => ((fox(), vec![]), "fox".to_owned()),
+        Some(path) if args.colour => (in_colours(path)?, path.display().to_string()),
+        Some(path) => ((Mesh::load(path)?, vec![]), path.display().to_string()),
     };
     // The released pairs belong to the released meshes.
     let as_it_stands = args.raw || args.instances == Instances::Released24;
     Ok(if as_it_stands || args.mesh.is_none() {
-        (mesh, name, Frame { middle: [0.0; 3], unit: 1.0 })
+        Viewed { mesh, name, frame: Frame { middle: [0.0; 3], unit: 1.0 }, notes }
     } else {
         let frame = normalizing(&mesh);
-        (mesh.normalized(), format!("{name}, normalized"), frame)
+        Viewed { mesh: mesh.normalized(), name: format!("{name}, normalized"), frame, notes }
     })
+}
+
+/// Faces of a mesh that is cut until its vertices are close enough for the colours of its texture.
+const MOST_FACES: usize = 20_000;
+
+/// The mesh of a file with colours at its vertices, those of its texture if it has one; and notes on what is not shown.
+fn in_colours(path: &Path) -> anyhow::Result<(Mesh, Vec<String>)> {
+    let (mesh, warnings) = Mesh::load_textured(path)?;
+    let (painted, errors) = painted_by_texture(&mesh, MOST_FACES);
+    let name = path.display();
+    let errors = errors.into_iter().map(|error| format!("{name}: its picture: {error:#}"));
+    let notes = warnings.iter().map(ToString::to_string).chain(errors).collect();
+    Ok((painted.unwrap_or(mesh), notes))
 }
 
 /// The frame of [`Mesh::normalized`].

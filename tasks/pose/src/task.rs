@@ -10,14 +10,18 @@ use softrast_inverse::{
     InverseProblem, Iterate, PoseProblem, SoftnessAt, SolveConfig,
     pose::{PoseInstance, PoseScene, nearest_distance},
 };
-use softrast_lab::Error;
+use softrast_lab::{Error, program::say};
 use softrast_raster::{HostBackend, RasterBackend};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers};
 
 use crate::{
-    Args, Instances, Pictures, PoseError, Range, framing::mesh, paper::PAPER, picture::outlined,
-    pictures::solve_pictures, released::released24,
+    Args, Instances, Pictures, PoseError, Range,
+    framing::{Viewed, viewed},
+    paper::PAPER,
+    picture::outlined,
+    pictures::solve_pictures,
+    released::released24,
 };
 
 /// A run succeeds when the camera ends at most this far from the target.
@@ -150,7 +154,8 @@ impl Task for Pose {
     }
 
     fn new(args: &Args, variant: Variant, _edges: &EdgeChoice) -> anyhow::Result<Self> {
-        let (mesh, mesh_name, _) = mesh(args)?;
+        let Viewed { mesh, name: mesh_name, notes, .. } = viewed(args)?;
+        notes.iter().for_each(|note| say(&format!("warning: {note}")));
         let source = match (args.instances, args.range) {
             (Instances::Seeded, range) => Source::Seeded(range.unwrap_or_default()),
             (Instances::Released24, None) => Source::Released(released24()?),

@@ -9,7 +9,7 @@ use std::{
 
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use serde_json::{Value, json};
-use softrast_inverse::silhouette_pixels;
+use softrast_inverse::{baked, silhouette_pixels};
 use softrast_mesh::icosphere;
 use softrast_raster::Pinhole;
 use softrast_test_kit::Program;
@@ -247,7 +247,7 @@ fn bad_input_is_one_line_that_says_what_to_do_and_nothing_is_written() {
         (vec!["--target", &disc, "--softness", "auto"], vec!["--softness auto"]),
         (
             vec!["--target", &disc, "--colour", "--mesh", &plain],
-            vec!["plain.obj", "colours at its vertices"],
+            vec!["plain.obj", "a texture or with colours at its vertices"],
         ),
     ] {
         let out = folder.path().join("out");
@@ -498,8 +498,17 @@ fn a_ball_is_found_by_its_colours() {
     fs::write(&lens, json!({ "K": truth["K"], "width": 80, "height": 60 }).to_string()).unwrap();
     let words = ["--mesh", &mesh, "--target", &target, "--camera", &lens, "--size", "64"];
     let found = run(out.path(), &[&words[..], &["--colour"]].concat()).unwrap();
-    let off = angle_deg(&found["camera"], &truth);
-    assert!(off < 4.0 && found["psnr"].as_f64().unwrap() > 25.0, "{off} degrees off, {found}");
+    // The same colours as a texture, as shape3d writes it.
+    let textured = folder.path().join("textured.glb");
+    baked(&ball, &ball).unwrap().save(&textured).unwrap();
+    let of_texture = ["--mesh", textured.to_str().unwrap(), "--raw", "--colour"];
+    let seen = words.iter().skip_while(|word| **word != "--target").copied().collect::<Vec<_>>();
+    let out_of_texture = tempfile::tempdir().unwrap();
+    let by_texture = run(out_of_texture.path(), &[&seen[..], &of_texture].concat()).unwrap();
+    for found in [&found, &by_texture] {
+        let off = angle_deg(&found["camera"], &truth);
+        assert!(off < 4.0 && found["psnr"].as_f64().unwrap() > 25.0, "{off} degrees off, {found}");
+    }
     let page = fs::read_to_string(out.path().join("report.html")).unwrap();
     assert!(page.contains("The mesh in its own colours"), "the colours are not shown");
     // By its silhouette alone it may be anywhere.

@@ -24,8 +24,8 @@ pub(crate) fn coloured<'a>(args: &Args, mesh: &'a Mesh) -> anyhow::Result<&'a [[
     mesh.colours().ok_or_else(|| {
         let mesh = args.mesh.as_deref().unwrap_or(std::path::Path::new("the mesh"));
         Error::usage(format!(
-            "--colour needs a mesh with colours at its vertices, and {} has none: give a PLY, GLB or OBJ file that has, as shape3d \
-             --colour writes them",
+            "--colour needs a mesh with a texture or with colours at its vertices, and {} has neither: give a PLY, GLB or OBJ file \
+             that has, as shape3d --colour writes them",
             mesh.display()
         ))
     })

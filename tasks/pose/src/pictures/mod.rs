@@ -14,7 +14,11 @@ use softrast_views::{
 };
 
 use self::answer::{Framed, POSES, Solved, answer, overlay_names};
-use crate::{Args, Instances, colour::coloured, framing::mesh};
+use crate::{
+    Args, Instances,
+    colour::coloured,
+    framing::{Viewed, viewed},
+};
 
 /// Field of view along the shorter side where no camera is given, in degrees.
 const ASSUMED_FOV_DEG: f64 = 45.0;
@@ -87,7 +91,7 @@ pub(crate) fn solve_pictures(
 ) -> anyhow::Result<Answer> {
     let args = given.args;
     refuse_flags_of_seeds(given)?;
-    let (mesh, _, frame) = mesh(args)?;
+    let Viewed { mesh, frame, notes: of_mesh, .. } = viewed(args)?;
     if args.colour {
         coloured(args, &mesh)?;
     }
@@ -168,7 +172,7 @@ pub(crate) fn solve_pictures(
     let best = solved.iter().map(|one| (one.path.display(), one.poses[0].camera));
     let across = faces_across_note(&mesh, best, NEAR);
     let mut warnings = warnings(cameras.is_some(), args.optimise_fov, &solved);
-    warnings.extend(notes.into_iter().chain(across));
+    warnings.extend(of_mesh.into_iter().chain(notes).chain(across));
     let name = args.mesh.as_ref().map_or("fox".to_owned(), |path| path.display().to_string());
     let mesh = Framed { mesh, name, frame, started: start.is_some() };
     answer(&mesh, &solved, &overlays, warnings, single)

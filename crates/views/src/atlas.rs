@@ -1,0 +1,637 @@
+//! One picture for all faces of a mesh.
+
+use std::collections::HashMap;
+
+use anyhow::{Error, anyhow};
+use image::{Rgb, RgbImage};
+use softrast_mesh::{Mesh, Texture, from_linear, to_linear};
+
+use crate::PictureFile;
+
+/// Red, green and blue of faces that have neither a picture nor colours; as screens have them.
+const GREY: [f64; 3] = [0.7; 3];
+/// Texels along a side of the square of a face whose colours change from corner to corner.
+const SMALLEST: usize = 4;
+/// Texels around a part of a picture.
+const MARGIN: i64 = 1;
+/// Times that pictures are reduced until everything has room.
+const MOST_ROUNDS: usize = 8;
+
+/// One picture for all faces of a mesh, whatever materials they have: pictures, factors and colours of vertices are multiplied as glTF asks.
+///
+/// A single picture without a factor stays as it is. Of others the parts that faces show are packed beside each other. Between texels the colours are
+/// then those of the pictures themselves, over seams and repeats too.
+#[derive(Clone, Debug)]
+pub struct Atlas {
+    coordinates: Vec<[f64; 2]>,
+    corners: Vec<[u32; 3]>,
+    picture: RgbImage,
+}
+
+impl Atlas {
+    /// The atlas of the texture of a mesh, of at most so many texels, and why pictures are not in it. Pictures that are too large for that are
+    /// reduced. None where the mesh has no texture, or one whose materials have neither pictures nor factors that can be shown: colours of
+    /// vertices say everything then.
+    pub fn of(mesh: &Mesh, most: usize) -> (Option<Self>, Vec<Error>) {
+        let Some(texture) = mesh.texture() else { return (None, vec![]) };
+        let mut pictures = Pictures::of(texture);
+        let mut errors = pictures.reduce(texture, most, |_| 1.0);
+        let is_plain = |number: usize| {
+            pictures.of_material(number).is_none() && texture.materials()[number].factor() == WHITE
+        };
+        if (0..texture.materials().len()).all(is_plain) {
+            return (None, errors);
+        }
+        let multiplies = texture.multiplies_colours() && mesh.colours().is_some();
+        if let ([material], Some(picture), false) =
+            (texture.materials(), pictures.of_material(0), multiplies)
+            && material.factor() == WHITE
+        {
+            let (coordinates, corners) =
+                (texture.coordinates().to_vec(), texture.corners().to_vec());
+            return (Some(Self { coordinates, corners, picture: picture.clone() }), errors);
+        }
+        for _ in 0..MOST_ROUNDS {
+            let layout = Layout::of(mesh, texture, &pictures);
+            let placed = layout.placed();
+            let texels = placed.width as f64 * placed.height as f64;
+            if texels <= most as f64 {
+                return (Some(layout.drawn(&placed, texture, &pictures)), errors);
+            }
+            // Margins do not shrink with the pictures.
+            let share = 0.8 * most as f64 / texels;
+            errors.extend(pictures.reduce(texture, most, |pixels| share * pixels));
+        }
+        let faces = mesh.faces().len();
+        errors.push(anyhow!("{faces} faces with several materials have no room in one picture"));
+        (None, errors)
+    }
+
+    /// (u, v) from 0 to 1, v up; beyond them the picture repeats.
+    pub fn coordinates(&self) -> &[[f64; 2]] {
+        &self.coordinates
+    }
+
+    /// For each face of the mesh, three indices into [`Atlas::coordinates`].
+    pub fn corners(&self) -> &[[u32; 3]] {
+        &self.corners
+    }
+
+    /// The picture.
+    pub fn picture(&self) -> &RgbImage {
+        &self.picture
+    }
+
+    /// The colour between the texels at a coordinate, from 0 to 1 as screens have it.
+    pub fn colour_at(&self, coordinate: [f64; 2]) -> [f64; 3] {
+        between(texels(coordinate, &self.picture), &self.picture)
+    }
+}
+
+/// The same mesh with the colours of its texture at its vertices, so that these are means over their surroundings; or none where the texture
+/// has none, and why pictures are not in them.
+///
+/// A mesh of few faces is cut as by [`Mesh::subdivided`] before, while it has at most so many in the end.
+pub fn painted_by_texture(mesh: &Mesh, most_faces: usize) -> (Option<Mesh>, Vec<Error>) {
+    let mut mesh = mesh.clone();
+    let (atlas, errors) = Atlas::of(&mesh, MOST_TEXELS);
+    if atlas.is_none() {
+        return (None, errors);
+    }
+    while 4 * mesh.faces().len() <= most_faces {
+        mesh = mesh.subdivided();
+    }
+    let Some(atlas) = Atlas::of(&mesh, MOST_TEXELS).0 else { return (None, errors) };
+    let mut sums = vec![([0.0; 3], 0.0); mesh.positions().len()];
+    for (face, corners) in mesh.faces().iter().zip(atlas.corners()) {
+        let uv = corners.map(|k| atlas.coordinates()[k as usize]);
+        for (k, &vertex) in face.iter().enumerate() {
+            let (sum, count) = &mut sums[vertex as usize];
+            for [own, next, last] in AROUND {
+                let (a, b, c) = (uv[k], uv[(k + 1) % 3], uv[(k + 2) % 3]);
+                let place = [0, 1].map(|axis| own * a[axis] + next * b[axis] + last * c[axis]);
+                let colour = atlas.colour_at(place);
+                (0..3).for_each(|c| sum[c] += colour[c]);
+                *count += 1.0;
+            }
+        }
+    }
+    // A vertex that no face uses is not seen.
+    let mean = |(sum, count): ([f64; 3], f64)| sum.map(|x| (x / count.max(1.0)).clamp(0.0, 1.0));
+    let colours = sums.into_iter().map(mean).collect();
+    (mesh.with_colours(colours).ok(), errors)
+}
+
+/// Texels of the atlas of a mesh that gets colours at its vertices.
+const MOST_TEXELS: usize = 1 << 22;
+/// Weights of corners where a vertex looks for its colour: the corner itself, and three places around it.
+const AROUND: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.7, 0.3, 0.0], [0.7, 0.0, 0.3], [0.6, 0.2, 0.2]];
+
+const WHITE: [f64; 3] = [1.0; 3];
+
+/// The texels of the pictures of a texture.
+struct Pictures {
+    /// By where their files lie in memory, so that each is decoded once.
+    of_files: HashMap<*const u8, Option<RgbImage>>,
+    of_materials: Vec<Option<*const u8>>,
+}
+
+impl Pictures {
+    /// Pictures that are not decoded yet.
+    fn of(texture: &Texture) -> Self {
+        let mut is_used = vec![false; texture.materials().len()];
+        texture.of_faces().iter().for_each(|&number| is_used[number as usize] = true);
+        let key = |(material, used): (&softrast_mesh::Material, bool)| {
+            material.picture().filter(|_| used).map(<[u8]>::as_ptr)
+        };
+        let of_materials = texture.materials().iter().zip(is_used).map(key).collect();
+        Self { of_files: HashMap::new(), of_materials }
+    }
+
+    /// Decodes pictures anew: together at most so many texels, and each at most what `limit` makes of the number of those it has now.
+    fn reduce(&mut self, texture: &Texture, most: usize, limit: impl Fn(f64) -> f64) -> Vec<Error> {
+        let mut errors = vec![];
+        let mut done = HashMap::new();
+        let of_materials = self.of_materials.iter().zip(texture.materials());
+        let mut files: Vec<_> =
+            of_materials.filter_map(|(key, it)| key.zip(it.picture())).collect();
+        files.sort_unstable();
+        files.dedup();
+        let each = (most / files.len().max(1)).max(1);
+        for (key, file) in files {
+            let known = self.of_files.get(&key);
+            let texels = match known {
+                Some(None) => {
+                    done.insert(key, None);
+                    continue;
+                }
+                Some(Some(now)) => (limit(f64::from(now.width() * now.height())) as usize).max(1),
+                None => each,
+            };
+            let decoded = PictureFile::decode(file).map(|file| file.texels(texels.min(each)));
+            done.insert(key, decoded.map_err(|error| errors.push(error)).ok());
+        }
+        self.of_files = done;
+        errors
+    }
+
+    fn of_material(&self, number: usize) -> Option<&RgbImage> {
+        self.of_files.get(&self.of_materials[number]?)?.as_ref()
+    }
+}
+
+/// A part of the atlas.
+#[derive(Clone, Copy)]
+struct Patch {
+    size: [usize; 2],
+    fill: Fill,
+}
+
+/// The content of a patch.
+#[derive(Clone, Copy)]
+enum Fill {
+    /// The picture of a material from this texel on.
+    Cut { material: usize, low: [i64; 2] },
+    /// A face, its first corner above left, the second right, the third below: colours of its corners, proportional to light, times the picture
+    /// of a material, on which the corners lie at these texels.
+    Face { light: [[f64; 3]; 3], shown: Option<(usize, [[f64; 2]; 3])> },
+}
+
+/// A box around texels: the first and the last.
+type Bounds = [[i64; 2]; 2];
+
+/// Which patches there are, and where on them faces lie.
+struct Layout {
+    patches: Vec<Patch>,
+    /// Of each face: its patch, and its corners in texels from the patch's corner above left.
+    faces: Vec<(usize, [[f64; 2]; 3])>,
+}
+
+/// Where patches begin.
+struct Placed {
+    width: usize,
+    height: usize,
+    at: Vec<[usize; 2]>,
+}
+
+impl Layout {
+    fn of(mesh: &Mesh, texture: &Texture, pictures: &Pictures) -> Self {
+        let mut layout = Self { patches: vec![], faces: Vec::with_capacity(mesh.faces().len()) };
+        let shared = layout.add_shared(mesh, texture, pictures);
+        let mut flat = HashMap::new();
+        for (face, uv) in uv_of_faces(texture).enumerate() {
+            let number = texture.of_faces()[face] as usize;
+            let (material, picture) = (&texture.materials()[number], pictures.of_material(number));
+            let is_lit = picture.is_none() || texture.multiplies_colours();
+            let colours = mesh.colours().filter(|_| is_lit);
+            let next = layout.patches.len();
+            if let (Some(picture), None) = (picture, colours) {
+                let corners = shifted(uv.map(|uv| texels(uv, picture)), picture);
+                let (patch, low) = shared[number].unwrap_or_else(|| {
+                    let around = bounds(corners);
+                    let fill = Fill::Cut { material: number, low: around[0] };
+                    layout.patches.push(Patch { size: size(around), fill });
+                    (next, around[0])
+                });
+                layout.faces.push((patch, from(corners, low)));
+                continue;
+            }
+            let plain = if picture.is_none() && material.factor() == WHITE { GREY } else { WHITE };
+            let light = [0, 1, 2].map(|k| {
+                let own = colours.map_or(plain, |all| all[mesh.faces()[face][k] as usize]);
+                [0, 1, 2].map(|c| to_linear(own[c]) * material.factor()[c])
+            });
+            let shown = picture.map(|picture| (number, uv.map(|uv| texels(uv, picture))));
+            let longest = shown.map_or(0.0, |(_, corners)| {
+                let edge = |k: usize| length(corners[k], corners[(k + 1) % 3]);
+                (0..3).map(edge).fold(0.0, f64::max)
+            });
+            let fill = Fill::Face { light, shown };
+            if shown.is_none() && light[0] == light[1] && light[1] == light[2] {
+                let patch = *flat.entry(light[0].map(f64::to_bits)).or_insert(next);
+                if patch == next {
+                    layout.patches.push(Patch { size: [2; 2], fill });
+                }
+                layout.faces.push((patch, [[1.0; 2]; 3]));
+                continue;
+            }
+            let side = SMALLEST.max(longest.ceil() as usize + 1);
+            layout.patches.push(Patch { size: [side; 2], fill });
+            let far = side as f64 - 0.5;
+            layout.faces.push((next, [[0.5, 0.5], [far, 0.5], [0.5, far]]));
+        }
+        layout
+    }
+
+    /// Adds a patch for each material whose faces overlap so much that one for all of them is smaller than one for each. Returns, for such a
+    /// material, the patch and the texel at which it begins.
+    fn add_shared(
+        &mut self,
+        mesh: &Mesh,
+        texture: &Texture,
+        pictures: &Pictures,
+    ) -> Vec<Option<(usize, [i64; 2])>> {
+        let materials = texture.materials().len();
+        if texture.multiplies_colours() && mesh.colours().is_some() {
+            return vec![None; materials];
+        }
+        let mut all: Vec<Option<(Bounds, f64)>> = vec![None; materials];
+        for (uv, &number) in uv_of_faces(texture).zip(texture.of_faces()) {
+            let Some(picture) = pictures.of_material(number as usize) else { continue };
+            let own = bounds(shifted(uv.map(|uv| texels(uv, picture)), picture));
+            let (around, sum) = all[number as usize].get_or_insert((own, 0.0));
+            *around = joined(*around, own);
+            *sum += texels_in(own);
+        }
+        let mut add = |(number, found): (usize, Option<(Bounds, f64)>)| {
+            let (around, _) = found.filter(|&(around, sum)| texels_in(around) <= sum)?;
+            let fill = Fill::Cut { material: number, low: around[0] };
+            self.patches.push(Patch { size: size(around), fill });
+            Some((self.patches.len() - 1, around[0]))
+        };
+        all.into_iter().enumerate().map(&mut add).collect()
+    }
+
+    /// Patches on shelves, the highest first.
+    fn placed(&self) -> Placed {
+        let mut order = Vec::from_iter(0..self.patches.len());
+        order.sort_by_key(|&k| std::cmp::Reverse(self.patches[k].size[1]));
+        let texels: f64 =
+            self.patches.iter().map(|patch| (patch.size[0] as f64) * patch.size[1] as f64).sum();
+        let widest = self.patches.iter().map(|patch| patch.size[0]).max().unwrap_or(1);
+        let width = widest.max(texels.sqrt().ceil() as usize);
+        let mut at = vec![[0; 2]; self.patches.len()];
+        let ([mut x, mut y], mut shelf) = ([0, 0], 0);
+        for k in order {
+            let [wide, high] = self.patches[k].size;
+            if x + wide > width {
+                (x, y, shelf) = (0, y + shelf, 0);
+            }
+            at[k] = [x, y];
+            shelf = shelf.max(high);
+            x += wide;
+        }
+        Placed { width, height: (y + shelf).max(1), at }
+    }
+
+    fn drawn(&self, placed: &Placed, texture: &Texture, pictures: &Pictures) -> Atlas {
+        let mut picture = RgbImage::new(placed.width as u32, placed.height as u32);
+        for (patch, &[left, top]) in self.patches.iter().zip(&placed.at) {
+            for y in 0..patch.size[1] {
+                for x in 0..patch.size[0] {
+                    let colour = patch.texel([x, y], texture, pictures);
+                    picture.put_pixel((left + x) as u32, (top + y) as u32, Rgb(colour));
+                }
+            }
+        }
+        let [width, height] = [placed.width, placed.height].map(|side| side as f64);
+        let place = |&(patch, corners): &(usize, [[f64; 2]; 3])| {
+            let [left, top] = placed.at[patch].map(|k| k as f64);
+            corners.map(|[x, y]| [(left + x) / width, 1.0 - (top + y) / height])
+        };
+        let coordinates = self.faces.iter().flat_map(place).collect();
+        let corners = (0..self.faces.len() as u32).map(|face| [0, 1, 2].map(|k| 3 * face + k));
+        Atlas { coordinates, corners: corners.collect(), picture }
+    }
+}
+
+impl Patch {
+    /// The colour of a texel.
+    fn texel(&self, [x, y]: [usize; 2], texture: &Texture, pictures: &Pictures) -> [u8; 3] {
+        match self.fill {
+            Fill::Cut { material, low } => {
+                let Some(picture) = pictures.of_material(material) else { return [0; 3] };
+                let levels = repeated(picture, low[0] + x as i64, low[1] + y as i64);
+                let factor = texture.materials()[material].factor();
+                if factor == WHITE {
+                    return levels;
+                }
+                let share = |k: usize| to_linear(f64::from(levels[k]) / 255.0) * factor[k];
+                [0, 1, 2].map(|k| byte(from_linear(share(k))))
+            }
+            Fill::Face { light, shown } => {
+                let [right, down] = [x, y].map(|k| k as f64 / (self.size[0] - 1) as f64);
+                let weights = [1.0 - right - down, right, down];
+                let sum = |of: [f64; 3]| (0..3).map(|k| weights[k] * of[k]).sum::<f64>();
+                let light = [0, 1, 2].map(|c| sum(light.map(|colour| colour[c])).clamp(0.0, 1.0));
+                let picture = shown.and_then(|(material, corners)| {
+                    let place = [0, 1].map(|k| sum(corners.map(|corner| corner[k])));
+                    Some(between(place, pictures.of_material(material)?))
+                });
+                let levels = picture.unwrap_or(WHITE);
+                [0, 1, 2].map(|c| byte(from_linear(to_linear(levels[c]) * light[c])))
+            }
+        }
+    }
+}
+
+fn byte(level: f64) -> u8 {
+    (255.0 * level.clamp(0.0, 1.0)).round() as u8
+}
+
+fn length(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (b[0] - a[0]).hypot(b[1] - a[1])
+}
+
+fn uv_of_faces(texture: &Texture) -> impl Iterator<Item = [[f64; 2]; 3]> {
+    let at = |k: u32| texture.coordinates()[k as usize];
+    texture.corners().iter().map(move |corners| corners.map(at))
+}
+
+/// A coordinate in texels of a picture, from its corner above left.
+fn texels([u, v]: [f64; 2], picture: &RgbImage) -> [f64; 2] {
+    [u * f64::from(picture.width()), (1.0 - v) * f64::from(picture.height())]
+}
+
+/// Corners moved by whole pictures, so that the lowest lie in the first.
+fn shifted(corners: [[f64; 2]; 3], picture: &RgbImage) -> [[f64; 2]; 3] {
+    let sides = [picture.width(), picture.height()].map(f64::from);
+    let lowest =
+        [0, 1].map(|k| corners.iter().map(|corner| corner[k]).fold(f64::INFINITY, f64::min));
+    let back = [0, 1].map(|k| (lowest[k] / sides[k]).floor() * sides[k]);
+    corners.map(|corner| [0, 1].map(|k| corner[k] - back[k]))
+}
+
+/// The texels that a triangle needs, margins included.
+fn bounds(corners: [[f64; 2]; 3]) -> Bounds {
+    let of = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
+        let all = corners.iter().map(|corner| corner[k]);
+        (all.fold(start, pick) - 0.5).floor() as i64
+    };
+    [
+        [0, 1].map(|k| of(k, f64::min, f64::INFINITY) - MARGIN),
+        [0, 1].map(|k| of(k, f64::max, f64::NEG_INFINITY) + 1 + MARGIN),
+    ]
+}
+
+fn joined([low, high]: [[i64; 2]; 2], other: [[i64; 2]; 2]) -> [[i64; 2]; 2] {
+    [[0, 1].map(|k| low[k].min(other[0][k])), [0, 1].map(|k| high[k].max(other[1][k]))]
+}
+
+fn size([low, high]: [[i64; 2]; 2]) -> [usize; 2] {
+    [0, 1].map(|k| (high[k] - low[k] + 1) as usize)
+}
+
+fn texels_in(bounds: [[i64; 2]; 2]) -> f64 {
+    let [width, height] = size(bounds);
+    width as f64 * height as f64
+}
+
+/// Corners in texels from this one on.
+fn from(corners: [[f64; 2]; 3], low: [i64; 2]) -> [[f64; 2]; 3] {
+    corners.map(|corner| [0, 1].map(|k| corner[k] - low[k] as f64))
+}
+
+/// The levels of a texel of a picture that repeats.
+fn repeated(picture: &RgbImage, x: i64, y: i64) -> [u8; 3] {
+    let [x, y] = [(x, picture.width()), (y, picture.height())]
+        .map(|(k, side)| k.rem_euclid(i64::from(side)) as u32);
+    picture.get_pixel(x, y).0
+}
+
+/// The colour between the middles of the four texels around a place, from 0 to 1.
+fn between([x, y]: [f64; 2], picture: &RgbImage) -> [f64; 3] {
+    let [x, y] = [x - 0.5, y - 0.5];
+    let [left, above] = [x.floor(), y.floor()];
+    let mix = |a: [f64; 3], b: [f64; 3], part: f64| [0, 1, 2].map(|k| a[k] + part * (b[k] - a[k]));
+    let texel = |x: i64, y: i64| repeated(picture, x, y).map(|level| f64::from(level) / 255.0);
+    let row = |y: i64| mix(texel(left as i64, y), texel(left as i64 + 1, y), x - left);
+    mix(row(above as i64), row(above as i64 + 1), y - above)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use softrast_mesh::{Material, icosphere};
+
+    /// A picture whose colours change from texel to texel, as a PNG file.
+    fn png(width: u32, height: u32, seed: u32) -> Vec<u8> {
+        let level = |x: u32, y: u32, k: u32| (37 * x + 91 * y + 53 * k + 17 * seed) % 256;
+        let picture =
+            RgbImage::from_fn(width, height, |x, y| Rgb([0, 1, 2].map(|k| level(x, y, k) as u8)));
+        let mut file = std::io::Cursor::new(vec![]);
+        picture.write_to(&mut file, image::ImageFormat::Png).unwrap();
+        file.into_inner()
+    }
+
+    /// A ball whose faces lie on pictures by their places, `repeats` times; every third face has another of three materials: a picture with a
+    /// factor, none with a factor, another picture.
+    fn ball(repeats: f64) -> (Mesh, Vec<Material>) {
+        let ball = icosphere(1);
+        let places = ball.positions().iter().map(|p| [p[0] * repeats, p[1] * repeats - 3.0]);
+        let texture = Texture::new(places.collect(), ball.faces().to_vec()).unwrap();
+        let materials = vec![
+            Material::default()
+                .with_picture(png(7, 4, 1))
+                .unwrap()
+                .with_factor([0.5, 1.0, 0.2])
+                .unwrap(),
+            Material::default().with_factor([0.1, 0.0, 1.0]).unwrap(),
+            Material::default().with_picture(png(5, 9, 2)).unwrap(),
+        ];
+        let of_faces = (0..80).map(|face| face % 3).collect();
+        let texture = texture.with_materials(materials.clone(), of_faces).unwrap();
+        (ball.with_texture(texture).unwrap(), materials)
+    }
+
+    const WITHIN: [[f64; 3]; 4] =
+        [[1.0, 0.0, 0.0], [0.2, 0.5, 0.3], [0.0, 0.5, 0.5], [0.6, 0.3, 0.1]];
+
+    fn at(corners: [[f64; 2]; 3], weights: [f64; 3]) -> [f64; 2] {
+        [0, 1].map(|k| (0..3).map(|corner| weights[corner] * corners[corner][k]).sum())
+    }
+
+    /// The largest difference of an atlas from `expected`, which gets a face and the weights of its corners.
+    fn error(mesh: &Mesh, atlas: &Atlas, expected: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> f64 {
+        let mut worst = 0.0f64;
+        for face in 0..mesh.faces().len() {
+            let corners = atlas.corners()[face].map(|k| atlas.coordinates()[k as usize]);
+            for weights in WITHIN {
+                let (found, right) =
+                    (atlas.colour_at(at(corners, weights)), expected(face, weights));
+                worst = (0..3).map(|k| (found[k] - right[k]).abs()).fold(worst, f64::max);
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn a_single_picture_stays_as_it_is() {
+        let (ball, _) = ball(1.0);
+        let texture = ball.texture().unwrap().clone().with_picture(png(7, 4, 1)).unwrap();
+        let ball = ball.with_texture(texture.clone()).unwrap();
+        let (atlas, errors) = Atlas::of(&ball, 100);
+        let atlas = atlas.unwrap();
+        assert!(errors.is_empty());
+        assert_eq!(
+            (atlas.coordinates(), atlas.corners()),
+            (texture.coordinates(), texture.corners())
+        );
+        assert_eq!(atlas.picture().dimensions(), (7, 4));
+        let (smaller, _) = Atlas::of(&ball, 10);
+        assert!(smaller.unwrap().picture().len() <= 3 * 10);
+    }
+
+    #[test]
+    fn colours_are_those_of_the_pictures_times_their_factors() {
+        for repeats in [0.3, 1.0, 2.5] {
+            let (ball, materials) = ball(repeats);
+            let (atlas, errors) = Atlas::of(&ball, 1 << 20);
+            let atlas = atlas.unwrap();
+            assert!(errors.is_empty(), "{errors:?}");
+            let texture = ball.texture().unwrap();
+            let pictures = [png(7, 4, 1), png(5, 9, 2)]
+                .map(|file| PictureFile::decode(&file).unwrap().texels(100));
+            let expected = |face: usize, weights: [f64; 3]| {
+                let material = &materials[face % 3];
+                let picture = match face % 3 {
+                    0 => &pictures[0],
+                    1 => return material.factor().map(from_linear),
+                    _ => &pictures[1],
+                };
+                let uv = texture.corners()[face].map(|k| texture.coordinates()[k as usize]);
+                // Factors are for light, means between texels are of levels: so texels are multiplied first.
+                let mut multiplied = picture.clone();
+                for pixel in multiplied.pixels_mut() {
+                    let light = pixel.0.map(|level| to_linear(f64::from(level) / 255.0));
+                    pixel.0 = [0, 1, 2].map(|k| byte(from_linear(light[k] * material.factor()[k])));
+                }
+                between(texels(at(uv, weights), picture), &multiplied)
+            };
+            // Half of a level.
+            assert!(error(&ball, &atlas, expected) < 0.51 / 255.0, "{repeats}");
+        }
+    }
+
+    #[test]
+    fn colours_of_vertices_multiply_pictures_that_say_so() {
+        let (ball, _) = ball(0.7);
+        let white = RgbImage::from_pixel(3, 3, Rgb([255; 3]));
+        let mut file = std::io::Cursor::new(vec![]);
+        white.write_to(&mut file, image::ImageFormat::Png).unwrap();
+        let texture = ball.texture().unwrap().clone().with_picture(file.into_inner()).unwrap();
+        let colours: Vec<[f64; 3]> =
+            ball.positions().iter().map(|p| p.map(|x| 0.5 + 0.5 * x)).collect();
+        let ball = ball.with_colours(colours.clone()).unwrap();
+        let plain = ball.clone().with_texture(texture.clone()).unwrap();
+        let atlas = Atlas::of(&plain, 1 << 20).0.unwrap();
+        assert_eq!(error(&plain, &atlas, |_, _| [1.0; 3]), 0.0, "without them");
+        let lit = ball.with_texture(texture.multiplying_colours()).unwrap();
+        let atlas = Atlas::of(&lit, 1 << 20).0.unwrap();
+        let corner = |face: usize, weights: [f64; 3]| {
+            let light = lit.faces()[face].map(|v| colours[v as usize].map(to_linear));
+            let sum = |c: usize| (0..3).map(|k| weights[k] * light[k][c]).sum::<f64>();
+            [0, 1, 2].map(|c| from_linear(sum(c)))
+        };
+        // Four texels along an edge are few: levels between them are means, light is not.
+        let worst = error(&lit, &atlas, corner);
+        assert!(worst < 0.06, "{worst}");
+    }
+
+    #[test]
+    fn faces_without_pictures_have_the_colours_of_their_vertices() {
+        let (ball, materials) = ball(1.0);
+        let colours: Vec<[f64; 3]> =
+            ball.positions().iter().map(|p| p.map(|x| 0.5 + 0.5 * x)).collect();
+        let ball = ball.with_colours(colours.clone()).unwrap();
+        let atlas = Atlas::of(&ball, 1 << 20).0.unwrap();
+        for face in (1..80).step_by(3) {
+            let corners = atlas.corners()[face].map(|k| atlas.coordinates()[k as usize]);
+            for k in 0..3 {
+                let own = colours[ball.faces()[face][k] as usize];
+                let factor = materials[1].factor();
+                let right = [0, 1, 2].map(|c| from_linear(to_linear(own[c]) * factor[c]));
+                let found = atlas.colour_at(corners[k]);
+                assert!((0..3).all(|c| (found[c] - right[c]).abs() < 0.51 / 255.0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_texture_gives_colours_to_vertices() {
+        let ball = icosphere(2);
+        // From black at the left to white at the right.
+        let slope = RgbImage::from_fn(64, 2, |x, _| Rgb([(4 * x) as u8; 3]));
+        let mut file = std::io::Cursor::new(vec![]);
+        slope.write_to(&mut file, image::ImageFormat::Png).unwrap();
+        let places = ball.positions().iter().map(|p| [0.5 + 0.4 * p[0], 0.5]).collect();
+        let texture = Texture::new(places, ball.faces().to_vec()).unwrap();
+        let bare = ball.clone().with_texture(texture.clone()).unwrap();
+        assert!(painted_by_texture(&bare, 5000).0.is_none(), "there is no picture");
+        let ball = ball.with_texture(texture.with_picture(file.into_inner()).unwrap()).unwrap();
+        for (most, faces) in [(100, 320), (5000, 1280)] {
+            let (painted, errors) = painted_by_texture(&ball, most);
+            let painted = painted.unwrap();
+            assert_eq!((painted.faces().len(), errors.len()), (faces, 0));
+            for (p, colour) in painted.positions().iter().zip(painted.colours().unwrap()) {
+                let right = 4.0 * (64.0 * (0.5 + 0.4 * p[0]) - 0.5) / 255.0;
+                assert!((colour[1] - right).abs() < 0.02, "{colour:?} and {right}");
+            }
+        }
+    }
+
+    #[test]
+    fn atlases_keep_their_bound_and_broken_pictures_are_told() {
+        let (ball, mut materials) = ball(3.0);
+        let texture = ball.texture().unwrap().clone();
+        for most in [5000, 20_000] {
+            let (atlas, errors) = Atlas::of(&ball, most);
+            assert!(errors.is_empty());
+            let (width, height) = atlas.unwrap().picture().dimensions();
+            assert!(width * height <= most as u32, "{width} x {height}");
+        }
+        // Eighty faces in ten texels.
+        let (atlas, errors) = Atlas::of(&ball, 10);
+        assert!(atlas.is_none() && errors[0].to_string().starts_with("80 faces with several"));
+        let broken = b"\x89PNG\r\n\x1a\n and so on".to_vec();
+        materials[2] = Material::default().with_picture(broken).unwrap();
+        let of_faces = texture.of_faces().to_vec();
+        let ball = ball.with_texture(texture.with_materials(materials, of_faces).unwrap()).unwrap();
+        let (atlas, errors) = Atlas::of(&ball, 1 << 20);
+        assert_eq!(errors.len(), 1);
+        let atlas = atlas.unwrap();
+        let corners = atlas.corners()[2].map(|k| atlas.coordinates()[k as usize]);
+        let [grey, ..] = atlas.colour_at(at(corners, [0.3, 0.3, 0.4]));
+        assert!((grey - GREY[0]).abs() < 0.003, "{grey}");
+    }
+}
