@@ -200,6 +200,27 @@ fn cameras_come_in_many_ways() {
     assert!(with(masks, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
 }
 
+/// As Blender's NeRF data come: views to work with and views to test.
+#[test]
+fn views_of_another_file_of_cameras_are_held_out() {
+    let train = |cameras: &mut Value| cameras["frames"].as_array_mut().unwrap().truncate(9);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("transforms_test.json");
+    let text = fs::read(Path::new(&fox()).join("transforms.json")).unwrap();
+    let mut cameras: Value = serde_json::from_slice(&text).unwrap();
+    let mut frames = cameras["frames"].as_array().unwrap()[15..].to_vec();
+    for frame in &mut frames {
+        frame["file_path"] = json!(Path::new(&fox()).join(frame["file_path"].as_str().unwrap()));
+    }
+    cameras["frames"] = json!(frames);
+    fs::write(&file, cameras.to_string()).unwrap();
+    let found = with(train, &["--hold-out", file.to_str().unwrap()]).unwrap();
+    let views = found["views"].as_array().unwrap();
+    let held_out: Vec<bool> = views.iter().map(|view| view["held_out"] == true).collect();
+    assert_eq!(held_out, [[false; 9].as_slice(), &[true; 5]].concat(), "{found}");
+    assert!(found["held_out_iou"].as_f64().unwrap() > 0.8, "{found}");
+}
+
 /// Rotations of three decimals, names as Windows writes them, and names with a dot and no ending.
 #[test]
 fn cameras_as_tools_write_them_are_taken_and_what_was_rounded_is_said() {
@@ -290,6 +311,8 @@ fn bad_views_are_one_line_that_names_file_and_frame() {
     assert!(error.contains("--hold-out 11 leaves fewer than two of 12 views"), "{error}");
     let error = with(|_| (), &["--hold-out", "18446744073709551615"]).unwrap_err();
     assert!(error.contains("leaves fewer than two"), "{error}");
+    let error = with(|_| (), &["--hold-out", "no.json"]).unwrap_err();
+    assert!(error.contains("no.json"), "{error}");
     let error = with(|_| (), &["--detail", "3"]).unwrap_err();
     assert!(error.contains("--start sphere"), "{error}");
     let out = tempfile::tempdir().unwrap();

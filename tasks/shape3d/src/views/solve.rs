@@ -61,9 +61,10 @@ pub struct Views {
     #[arg(long, value_name = "DIR")]
     pub views: Option<PathBuf>,
 
-    /// Views to keep aside, evenly spaced, on which the result is scored
-    #[arg(long, value_name = "N", requires = "views")]
-    pub hold_out: Option<usize>,
+    /// Views on which the result is scored, and which the search does not see: a number of those in the folder, evenly spaced, or another file of cameras in
+    /// the same world, such as `transforms_test.json`
+    #[arg(long, value_name = "N|FILE", requires = "views")]
+    pub hold_out: Option<HoldOut>,
 
     /// What is deformed: the visual hull of the masks, or a sphere, which has no holes [default: hull]
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
@@ -80,6 +81,21 @@ pub struct Views {
     /// How pictures become masks.
     #[command(flatten)]
     pub masks: MaskFlags,
+}
+
+/// Views on which a result is scored, and which the search does not see.
+#[derive(Clone, Debug)]
+pub enum HoldOut {
+    /// So many of the folder's views, evenly spaced.
+    Count(usize),
+    /// All views of another file of cameras.
+    Cameras(PathBuf),
+}
+
+impl From<&str> for HoldOut {
+    fn from(text: &str) -> Self {
+        text.parse().map_or_else(|_| Self::Cameras(text.into()), Self::Count)
+    }
 }
 
 /// What is deformed.
@@ -130,21 +146,33 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         ));
     }
     let cameras = CameraFile::load(folder)?;
-    let reads = RefCell::new(cameras.files().to_vec());
-    let all = cameras.views(flags.masks.masks.as_deref(), |path| {
-        reads.borrow_mut().push(path.to_owned());
-        flags.masks.load(path)
-    })?;
-    let pictures = all.iter().map(|view| view.picture.clone());
+    let test = match &flags.hold_out {
+        Some(HoldOut::Cameras(file)) => Some(CameraFile::load(file)?),
+        _ => None,
+    };
+    let reads = RefCell::new(Vec::new());
+    let read = |cameras: &CameraFile| {
+        reads.borrow_mut().extend_from_slice(cameras.files());
+        cameras.views(flags.masks.masks.as_deref(), |path| {
+            reads.borrow_mut().push(path.to_owned());
+            flags.masks.load(path)
+        })
+    };
+    let (all, apart) = (read(&cameras)?, test.as_ref().map(read).transpose()?);
+    let loaded = || [Some(&all), apart.as_ref()].into_iter().flatten();
+    let pictures = loaded().flatten().map(|view| view.picture.clone());
     given.will_write(names(flags.colour), reads.into_inner().into_iter().chain(pictures))?;
     let note = cameras.note().map(str::to_owned);
-    let notes: Vec<String> = note.into_iter().chain(reading_notes(&all)).collect();
+    let notes = note.into_iter().chain(loaded().flat_map(|views| reading_notes(views)));
+    let notes: Vec<String> = notes.collect();
     // What is wrong with a picture is said before the work.
     let paint = |views: &[View]| {
         let painted = views.iter().filter(|_| flags.colour).map(PaintedView::load);
         painted.collect::<anyhow::Result<Vec<_>>>()
     };
-    let parts = split_held_out(all, flags.hold_out.unwrap_or(0))?;
+    let count = if let Some(HoldOut::Count(count)) = flags.hold_out { count } else { 0 };
+    let [train, held_out] = split_held_out(all, count)?;
+    let parts = [train, apart.unwrap_or(held_out)];
     let [to_paint, to_compare] = [paint(&parts[0])?, paint(&parts[1])?];
     let [train, held_out] = parts;
     let clock = std::time::Instant::now();

@@ -6,27 +6,22 @@ use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
 
-use crate::{Frame, View, cut_sides};
+use self::cone::Cone;
+use crate::{Frame, View};
 
-/// Pixels a side of what is looked at of each mask.
-const SIDE: usize = 128;
+mod cone;
+
 /// Cells along each side of the first grid.
 const COARSE: usize = 40;
 
-/// A mask as its camera looks through it.
-struct Cone<'a> {
-    view: &'a View,
-    square: [f64; 3],
-    /// Extent of what is white, in pixels.
-    white: f64,
-    /// Signed distance to the outline in pixels of the picture, negative inside, at the cells of the square.
-    distance: Vec<f64>,
-    /// Whether the picture cuts the object off: what is beyond its border is unknown then, else it is empty.
-    cut: bool,
-}
+/// Masks that must show what a single one rules out.
+const WITNESSES: usize = 2;
 
-/// The visual hull of the masks as a mesh in world units of the cameras: closed, counterclockwise from outside, without parts of fewer faces
+/// The visual hull of the masks, but for the faults of single ones, as a mesh in world units of the cameras: closed, counterclockwise from outside, without parts of fewer faces
 /// than a fiftieth of the largest. A box around the hull has `cells` cells, at least one, along its longest side.
+///
+/// A place that one mask alone rules out belongs to the hull if two others show something there that the hull lacks. So a hole in one mask does not cut
+/// through the object.
 ///
 /// # Errors
 ///
@@ -36,6 +31,34 @@ pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
     let (centre, reach) = region(&cones)?;
     let field =
         |p: [f64; 3]| cones.iter().map(|cone| cone.distance(p)).fold(-reach, f64::max).min(reach);
+    let strict = solid(centre, reach, cells, field)?;
+    let lacking: Vec<Vec<bool>> = cones.iter().map(|cone| cone.lacking(&strict)).collect();
+    if lacking.iter().filter(|cells| cells.contains(&true)).count() < WITNESSES {
+        return Ok(strict);
+    }
+    let slack = 2.0 * reach / cells.max(1) as f64;
+    solid(centre, reach, cells, |p: [f64; 3]| {
+        let [mut farthest, mut second] = [-reach; 2];
+        for distance in cones.iter().map(|cone| cone.distance(p)) {
+            second = second.max(farthest.min(distance));
+            farthest = farthest.max(distance);
+        }
+        let lacks = |(cone, cells): &(&Cone, &Vec<bool>)| cone.cell(p).is_some_and(|k| cells[k]);
+        let is_ruled_out_once = farthest > 0.0 && second < slack;
+        match is_ruled_out_once && cones.iter().zip(&lacking).filter(lacks).count() >= WITNESSES {
+            true => second,
+            false => farthest.min(reach),
+        }
+    })
+}
+
+/// The solid in a cube where a field is negative, without specks; a box around it has so many cells along its longest side.
+fn solid(
+    centre: [f64; 3],
+    reach: f64,
+    cells: usize,
+    field: impl Fn([f64; 3]) -> f64,
+) -> anyhow::Result<Mesh> {
     // Where there is something at all.
     let step = 2.0 * reach / COARSE as f64;
     let at = |k: usize| {
@@ -157,92 +180,6 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     Ok((middle, reach))
 }
 
-impl<'a> Cone<'a> {
-    fn new(view: &'a View) -> anyhow::Result<Self> {
-        let square = view.square()?;
-        let [_, _, white] = view.mask.square().unwrap_or(square);
-        let mask = view.mask.despeckled();
-        let [levels, _] = mask.part(square, SIDE);
-        let distance = signed_distance(&levels, square[2] / SIDE as f64);
-        Ok(Self { view, square, white, distance, cut: !cut_sides(&view.mask).is_empty() })
-    }
-
-    /// The line of sight through the middle of the mask, of length 1, in the world.
-    fn ray(&self) -> [f64; 3] {
-        let ([left, top, extent], camera) = (self.square, &self.view.camera);
-        let at = [left + extent / 2.0, top + extent / 2.0];
-        let [x, y] = [0, 1].map(|k| (at[k] - camera.centre[k]) / camera.focal[k]);
-        let length = (x * x + y * y + 1.0).sqrt();
-        let r = camera.rotation;
-        [0, 1, 2].map(|k| (x * r[0][k] + y * r[1][k] + r[2][k]) / length)
-    }
-
-    /// A point's distance to the cone of the mask in world units, about; negative inside, and beyond a picture that cuts the object off.
-    fn distance(&self, p: [f64; 3]) -> f64 {
-        let camera = &self.view.camera;
-        let [column, row, depth] = camera.pixel(p);
-        if depth <= 0.0 {
-            return f64::MAX;
-        }
-        let size = camera.size;
-        let beyond = |x: f64, pixels: usize| x < 0.0 || x > pixels as f64;
-        if self.cut && (beyond(column, size.width) || beyond(row, size.height)) {
-            return f64::MIN;
-        }
-        let ([left, top, extent], last) = (self.square, (SIDE - 1) as f64);
-        let cell = extent / SIDE as f64;
-        let place = [(column - left) / cell - 0.5, (row - top) / cell - 0.5];
-        let held = place.map(|x| x.clamp(0.0, last));
-        let off = cell * (place[0] - held[0]).hypot(place[1] - held[1]);
-        let low = held.map(|x| (x as usize).min(SIDE - 2));
-        let [u, v] = [0, 1].map(|k| held[k] - low[k] as f64);
-        let at = |dx: usize, dy: usize| self.distance[(low[1] + dy) * SIDE + low[0] + dx];
-        let upper = (1.0 - u) * at(0, 0) + u * at(1, 0);
-        let lower = (1.0 - u) * at(0, 1) + u * at(1, 1);
-        let [fx, fy] = camera.focal;
-        ((1.0 - v) * upper + v * lower + off) * depth * 2.0 / (fx + fy)
-    }
-}
-
-/// Signed distance to where an image `[SIDE * SIDE]` is one half, negative where it is more, for cells of this width.
-fn signed_distance(levels: &[f64], cell: f64) -> Vec<f64> {
-    let white: Vec<bool> = levels.iter().map(|&level| level >= 0.5).collect();
-    let black: Vec<bool> = white.iter().map(|white| !white).collect();
-    let (to_white, to_black) = (distances(&white), distances(&black));
-    let signed = |k: usize| {
-        let level = levels[k];
-        // Within the cell that the outline passes, its share tells more.
-        if to_white[k].max(to_black[k]) < 1.5 && level > 0.0 && level < 1.0 {
-            return cell * (0.5 - level);
-        }
-        cell * if white[k] { 0.5 - to_black[k] } else { to_white[k] - 0.5 }
-    };
-    (0..levels.len()).map(signed).collect()
-}
-
-/// Distance of each cell to the nearest that is on, in cells.
-fn distances(on: &[bool]) -> Vec<f64> {
-    const FAR: f64 = 1e9;
-    // Along each column first, then the best of each row.
-    let mut along = vec![FAR; on.len()];
-    for x in 0..SIDE {
-        for forward in [true, false] {
-            let mut last = FAR;
-            for k in 0..SIDE {
-                let cell = if forward { k } else { SIDE - 1 - k } * SIDE + x;
-                last = if on[cell] { 0.0 } else { last + 1.0 };
-                along[cell] = along[cell].min(last);
-            }
-        }
-    }
-    let nearest = |k: usize| {
-        let (row, x) = (&along[k / SIDE * SIDE..][..SIDE], (k % SIDE) as f64);
-        let squares = row.iter().enumerate().map(|(at, d)| (at as f64 - x).powi(2) + d * d);
-        squares.fold(f64::INFINITY, f64::min).sqrt()
-    };
-    (0..on.len()).map(nearest).collect()
-}
-
 /// Where a camera stands. Far from the origin, the digits that a file leaves out of a rotation would move the product with its transpose.
 fn eye(camera: &Pinhole) -> anyhow::Result<[f64; 3]> {
     solved(camera.rotation, camera.translation.map(|x| -x)).context("a rotation has an inverse")
@@ -272,41 +209,51 @@ fn solved(matrix: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coloured_pixels;
+
+    const CENTRE: [f64; 3] = [4e5, 2.0, -7.0];
+
+    /// Views of a ball of radius 3, from directions.
+    fn of_ball<const N: usize>(away: [[f64; 3]; N]) -> Vec<View> {
+        let ball = softrast_mesh::icosphere(2);
+        let place = |p: &[f64; 3]| [0, 1, 2].map(|k| CENTRE[k] + 3.0 * p[k]);
+        let ball = ball.with_positions(ball.positions().iter().map(place).collect()).unwrap();
+        let view = |(k, away): (usize, [f64; 3])| {
+            let eye = [0, 1, 2].map(|k| CENTRE[k] + 12.0 * away[k]);
+            let camera = Pinhole::look_at(eye, CENTRE, [0.1, 1.0, 0.2], 40.0, 96);
+            let [.., covered] = coloured_pixels(&ball, &camera);
+            let mask = crate::Picture::new(covered.iter().map(|&part| part as f32).collect(), 96);
+            let (name, picture) = (k.to_string(), "a".into());
+            View { name, picture, mask, camera, distortion: None, off: 0.0 }
+        };
+        away.into_iter().enumerate().map(view).collect()
+    }
 
     #[test]
-    fn the_distance_to_a_disc_is_that_of_a_circle() {
-        let centre = 63.3;
-        let far = |k: usize| ((k % SIDE) as f64 - centre).hypot((k / SIDE) as f64 - centre);
-        // Cells that the circle passes are covered in part.
-        let levels: Vec<f64> = (0..SIDE * SIDE).map(|k| (30.5 - far(k)).clamp(0.0, 1.0)).collect();
-        for (k, found) in signed_distance(&levels, 2.0).into_iter().enumerate() {
-            assert!((found - 2.0 * (far(k) - 30.0)).abs() < 1.2, "{k}: {found}");
-        }
+    fn a_hole_in_one_mask_does_not_cut_through_the_object() {
+        let away = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, -0.8], [0.0, 0.8, 0.6]];
+        let mut views = of_ball(away);
+        let whole = visual_hull(&views, 40).unwrap();
+        // The first mask lacks all that is below its middle.
+        let mut levels = views[0].mask.pixels().to_vec();
+        levels[52 * 96..].fill(0.0);
+        views[0].mask = crate::Picture::new(levels, 96);
+        let found = visual_hull(&views, 40).unwrap();
+        let [[expected, _], [low, high]] = [whole.bounds(), found.bounds()];
+        assert!((low[1] - expected[1]).abs() < 0.5, "{low:?}, not {expected:?}");
+        assert!(high[1] - low[1] > 5.5, "{low:?} to {high:?}");
+        // Where two lack it, nobody tells who is right.
+        let mut levels = views[1].mask.pixels().to_vec();
+        levels[52 * 96..].fill(0.0);
+        views[1].mask = crate::Picture::new(levels, 96);
+        let [low, high] = visual_hull(&views, 40).unwrap().bounds();
+        assert!(high[1] - low[1] < 4.5, "{low:?} to {high:?}");
     }
 
     #[test]
     fn a_ball_is_found_from_its_silhouettes() {
-        let ball = softrast_mesh::icosphere(2);
-        let centre = [4e5, 2.0, -7.0];
-        let place = |p: &[f64; 3]| [0, 1, 2].map(|k| centre[k] + 3.0 * p[k]);
-        let ball = ball.with_positions(ball.positions().iter().map(place).collect()).unwrap();
-        let view = |(k, away): (usize, [f64; 3])| {
-            let eye = [0, 1, 2].map(|k| centre[k] + 12.0 * away[k]);
-            let camera = Pinhole::look_at(eye, centre, [0.1, 1.0, 0.2], 40.0, 96);
-            let [.., covered] = crate::coloured_pixels(&ball, &camera);
-            let mask = covered.iter().map(|&part| part as f32).collect();
-            let mask = crate::Picture::new(mask, 96);
-            View {
-                name: k.to_string(),
-                picture: "a".into(),
-                mask,
-                camera,
-                distortion: None,
-                off: 0.0,
-            }
-        };
         let away = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [0.0, 0.6, -0.8]];
-        let views: Vec<View> = away.into_iter().enumerate().map(view).collect();
+        let (views, centre) = (of_ball(away), CENTRE);
         let frame = frame_of_masks(&views).unwrap();
         assert!((0..3).all(|k| (frame.middle[k] - centre[k]).abs() < 0.1), "{frame:?}");
         assert!((3.0..5.0).contains(&frame.unit), "{frame:?}");
