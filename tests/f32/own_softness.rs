@@ -38,9 +38,8 @@ fn a_camera_is_found_by_a_mask_under_an_own_softness() {
     let silhouette: Tensor<NdArray, 3> = hard_silhouette(seen, mesh.faces(), size);
     let mask = Picture::new(silhouette.into_data().iter().collect(), size[1]);
     let camera = Lens::of_fov(45.0, mask.size()).pinhole(mask.size()).unwrap();
-    let search = PoseSearch { fine_steps: 30, fine_size: 48, ..PoseSearch::default() };
+    let search = PoseSearch::new(&mesh, camera).with_fine_steps(30).with_fine_size(48);
     let method = Method::new("arctan", ScheduledSoftness::decay(Arctan, 0.05, 0.002));
-    let found =
-        search.run::<NdArray>(&mesh, &mask, &camera, false, &method, |_, _| Ok(())).unwrap();
+    let found = search.with_method(method).run::<NdArray>(&mask).unwrap();
     assert!(found[0].iou > 0.95, "{}", found[0].iou);
 }

@@ -42,9 +42,9 @@ impl<B: RasterBackend> MaskRun<B> {
     /// If the mask is empty or full, the mesh has no extent, or the softness is not one.
     pub fn new(mesh: &Mesh, mask: Picture, settings: &Settings) -> anyhow::Result<Self> {
         let camera = Lens::of_fov(ASSUMED_FOV_DEG, mask.size()).pinhole(mask.size())?;
-        PoseSearch::check(mesh, &mask, &camera, false)?;
+        PoseSearch::new(mesh, camera).check(&mask)?;
         let (method, config) =
-            settings.method("mask", PoseSearch::default().fine().learning_rate)?;
+            settings.method("mask", PoseSearch::LEARNING_RATE / 3.0)?;
         let square = mask.view_square()?;
         Ok(Self {
             mesh: mesh.clone(),
@@ -88,22 +88,17 @@ impl<B: RasterBackend> Run for MaskRun<B> {
     }
 
     fn prepare(&mut self, told: &mut dyn FnMut(f64)) -> anyhow::Result<()> {
-        let search = PoseSearch::default();
         // A softness with feedback solves one instance at a time; here there are many, and only coarse.
         let mut method = self.method.clone();
         method.softness.feedback = None;
         told(0.0);
         let steps = PoseSearch::steps_of_starts(&self.mask) as f64;
-        let starts = search.starts::<Backend>(
-            &self.mesh,
-            &self.mask,
-            &self.camera,
-            &method,
-            |step, _| {
-                told(step as f64 / steps);
-                Ok(())
-            },
-        )?;
+        let search = PoseSearch::new(&self.mesh, self.camera).with_method(method);
+        let search = search.progress(|step, _| {
+            told(step as f64 / steps);
+            Ok(())
+        });
+        let starts = search.starts::<Backend>(&self.mask)?;
         self.starts = starts.into_iter().take(STARTS).collect();
         self.begin()
     }

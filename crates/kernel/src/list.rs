@@ -4,7 +4,7 @@
 use super::{
     face::{Face, Faces},
     float::Float as _,
-    lanes::{GROUP, LANES, Lanes},
+    lanes::{GROUP, LANES, Lanes, Work, run},
     reach::within,
     real::{Float, Real, splat},
     scene::{BandRef, Scene},
@@ -78,8 +78,13 @@ impl<T: Real> List<T> {
     }
 
     /// Prepares up to [`LISTED`] faces of a band, given by their numbers, and lists their pixels.
-    #[inline(always)]
     pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &BandRef<T>, numbers: &[u32]) {
+        // One function for all walks: inlined into each, it takes a minute to compile.
+        run::<T::Lanes, _>(Fill { list: self, scene, place, numbers });
+    }
+
+    #[inline(always)]
+    fn filled(&mut self, scene: &Scene<T>, place: &BandRef<T>, numbers: &[u32]) {
         let index = <T::Lanes as Lanes>::index;
         let plus = <T::Lanes as Lanes>::plus;
         let four = splat::<T::Lanes>(GROUP as f64);
@@ -152,6 +157,23 @@ impl<T: Real> List<T> {
         self.at[last.clone()].fill(nowhere);
         self.owners[last].fill(numbers.len().saturating_sub(1) as u8);
         self.chunks = listed / 2;
+    }
+}
+
+/// See [`List::fill`].
+struct Fill<'a, 's, T: Real> {
+    list: &'a mut List<T>,
+    scene: &'a Scene<'s, T>,
+    place: &'a BandRef<'a, T>,
+    numbers: &'a [u32],
+}
+
+impl<T: Real> Work for Fill<'_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.list.filled(self.scene, self.place, self.numbers);
     }
 }
 

@@ -17,11 +17,7 @@ fn main() -> anyhow::Result<()> {
 
     // The lens is known, the pose is not. Of your own: Lens::load("camera.json")?.pinhole(mask.size())?
     let camera = Lens::of_fov(45.0, mask.size()).pinhole(mask.size())?;
-    let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
-    let start = false; // nothing is known of it: all directions and rolls are tried
-    let found =
-        PoseSearch::default()
-            .run::<NdArray>(&mesh, &mask, &camera, start, &method, |_, _| Ok(()))?;
+    let found = PoseSearch::new(&mesh, camera).run::<NdArray>(&mask)?;
     let FoundPose { camera, iou, .. } = found[0]; // the best; others that fit nearly as well stand behind it
     println!("R {:.3?}\nt {:.3?}", camera.rotation, camera.translation);
     println!("stood at {:.2?}, found at {:.2?}, IoU {iou:.3}", truth.eye(), camera.eye());

@@ -25,17 +25,20 @@ fn inputs(folder: &Path) {
     }
     fs::create_dir_all(path("fox/images")).unwrap();
     fs::create_dir(path("masks")).unwrap();
+    fs::create_dir(path("test")).unwrap();
     let fox = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views/fox");
     for k in 0..12 {
         let name = format!("images/{k:02}.png");
         fs::copy(fox.join(&name), path("fox").join(&name)).unwrap();
         fs::copy(fox.join(&name), path(&format!("masks/{k:02}.png"))).unwrap();
     }
-    for to in ["fox/views.png", "masks/views.png"] {
+    for to in ["fox/views.png", "masks/views.png", "test/views.png"] {
         fs::copy(fox.join("images/00.png"), path(to)).unwrap();
     }
     let cameras = fs::read_to_string(fox.join("transforms.json")).unwrap();
-    fs::write(path("fox/transforms.json"), cameras.replace("images/00.png", "views.png")).unwrap();
+    let cameras = cameras.replace("images/00.png", "views.png");
+    fs::write(path("fox/transforms.json"), &cameras).unwrap();
+    fs::write(path("test/transforms.json"), cameras.replace("images/", "../fox/images/")).unwrap();
 }
 
 const LINES: &[(&str, &str)] = &[
@@ -46,6 +49,11 @@ const LINES: &[(&str, &str)] = &[
     ("--views fox --colour --mesh mesh.obj --out .", "mesh.obj is an input of this run"),
     ("--views fox --template mine.obj --out .", "mesh.obj is not a recorded result"),
     ("--views fox --template mine.obj --out fox", "views.png is an input of this run"),
+    ("--views fox --hold-out test/transforms.json --template mine.obj --out new", ""),
+    (
+        "--views fox --hold-out test/transforms.json --template mine.obj --out test",
+        "views.png is an input of this run",
+    ),
     ("--views fox --masks masks --template mine.obj --out new", ""),
     (
         "--views fox --masks masks --template mine.obj --out masks",

@@ -5,10 +5,12 @@
 //! Sec. 5.1; docs/notes.md, Pose.
 
 mod coloured;
+mod found;
 mod glance;
 mod instance;
 mod least_squares;
 mod masks;
+mod pose_search;
 mod problem;
 mod scene;
 mod search;
@@ -17,9 +19,10 @@ mod target;
 mod vertex_colours;
 
 pub use coloured::{ColouredViews, split_coverage};
+pub use found::FoundPose;
 pub use instance::PoseInstance;
 pub use masks::{MaskPose, MaskPoses, MaskScene};
+pub use pose_search::PoseSearch;
 pub use problem::PoseProblem;
 pub use scene::{PoseScene, nearest_distance};
-pub use search::{FoundPose, PoseSearch};
 pub use vertex_colours::VertexColours;

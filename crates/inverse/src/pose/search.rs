@@ -7,15 +7,14 @@ use softrast_softness::Softness;
 use softrast_tensor::{numbers, tensor};
 
 use super::{
+    found::FoundPose,
     glance::glance,
     least_squares::least_squares,
     masks::{MaskPose, MaskPoses},
     target::Target,
 };
 use crate::{InverseProblem, Iterate, Method, SolveConfig, minimize, silhouette_pixels};
-use softrast_views::{
-    Frame, PaintedView, Picture, bounding_ball, coloured_pixels, cut_sides, mask_iou,
-};
+use softrast_views::{Frame, Picture, bounding_ball, coloured_pixels, cut_sides, mask_iou};
 
 /// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about a pixel and a half.
 const DETAIL: f64 = 1.0 / 20.0;
@@ -69,143 +68,57 @@ const SHARPENING_STEPS: usize = 16;
 const ZOOMS: [f64; 3] = [0.65, 1.0, 1.5];
 const NEAREST: f64 = 1.2;
 
-/// How poses are looked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseSearch {
+/// How poses are looked for; see [`PoseSearch`](super::PoseSearch).
+#[derive(Clone, Copy)]
+pub(super) struct Search {
     /// Steps on many pixels.
-    pub fine_steps: usize,
+    pub(super) fine_steps: usize,
     /// Pixels a side of these.
-    pub fine_size: usize,
+    pub(super) fine_size: usize,
     /// Learning rate on few pixels, in radians; on many it is a third of that.
-    pub learning_rate: f64,
-    /// Whether the focal length is optimised too, once poses have been found with the one that is given: of both the better is taken.
-    pub optimise_fov: bool,
+    pub(super) learning_rate: f64,
+    pub(super) optimise_fov: bool,
 }
 
-impl Default for PoseSearch {
-    fn default() -> Self {
-        Self { fine_steps: 20, fine_size: 128, learning_rate: 0.03, optimise_fov: false }
-    }
+/// Steps of a search for the poses from which it goes on, where nothing is known.
+pub(super) fn steps_of_starts(mask: &Picture) -> usize {
+    STARTS.1 + Stages::of(!cut_sides(mask).is_empty()).coarse.1
 }
 
-/// A pose that fits a mask.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FoundPose {
-    /// The camera of the whole picture.
-    pub camera: Pinhole,
-    /// Overlap over union of its hard silhouette and the mask, both of all pixels of the picture, where a pixel of the mask is in from one
-    /// half on.
-    pub iou: f64,
-    /// How near its colours come to the picture, in decibels, where they are asked for; see [`PaintedView::psnr`].
-    pub psnr: Option<f64>,
+/// What a search refuses at once.
+pub(super) fn check(
+    mesh: &Mesh,
+    mask: &Picture,
+    camera: &Pinhole,
+    started: bool,
+) -> anyhow::Result<()> {
+    mask.view_square()?;
+    let (middle, radius) = bounding_ball(mesh);
+    ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
+    let [_, _, depth] = camera.seen(middle);
+    ensure!(
+        !started || depth > radius,
+        "the start is inside the mesh, or has it behind: the middle of the mesh is {depth:.3} ahead, and must be more than {radius:.3}, as \
+         far as its farthest vertex; is t in the units of the mesh?"
+    );
+    Ok(())
 }
 
-impl FoundPose {
-    /// Angle between the rotations of this pose and another, in degrees.
-    pub fn angle_deg(&self, other: &Self) -> f64 {
-        angle_deg(&self.camera, &other.camera)
-    }
-}
-
-impl Borrow<Pinhole> for FoundPose {
-    fn borrow(&self) -> &Pinhole {
-        &self.camera
-    }
-}
-
-impl PoseSearch {
-    /// The usual search by colours: only silhouettes are brought to their least squares, so it takes four times the steps on many pixels.
-    pub fn by_colour() -> Self {
-        Self { fine_steps: 80, ..Self::default() }
-    }
-
-    /// Steps that [`PoseSearch::run`] takes for a mask, or [`PoseSearch::run_by_colour`] for a picture that is `painted` too, from a start
-    /// or from anywhere.
-    pub fn steps(&self, mask: &Picture, painted: Option<&PaintedView>, started: bool) -> usize {
+impl Search {
+    /// Steps that a search takes for a mask, or for a picture that is `painted` too, from a start or from anywhere.
+    pub(super) fn steps(&self, mask: &Picture, painted: bool, started: bool) -> usize {
         let Stages { last, .. } = Stages::of(!cut_sides(mask).is_empty());
         let fine = (1 + usize::from(last > 0)) * self.fine_steps;
         let last = match painted {
-            None => SHARPENING_STEPS,
-            Some(_) if self.optimise_fov => self.fine_steps,
-            Some(_) => 0,
+            false => SHARPENING_STEPS,
+            true if self.optimise_fov => self.fine_steps,
+            true => 0,
         };
-        fine + last + if started { 0 } else { Self::steps_of_starts(mask) }
+        fine + last + if started { 0 } else { steps_of_starts(mask) }
     }
 
-    /// Steps that [`PoseSearch::starts`] takes for a mask.
-    pub fn steps_of_starts(mask: &Picture) -> usize {
-        STARTS.1 + Stages::of(!cut_sides(mask).is_empty()).coarse.1
-    }
-
-    /// What [`PoseSearch::run`] would refuse at once.
-    ///
-    /// # Errors
-    ///
-    /// If nothing or all of the mask is white, the mesh has no extent, or the start does not see it.
-    pub fn check(
-        mesh: &Mesh,
-        mask: &Picture,
-        camera: &Pinhole,
-        started: bool,
-    ) -> anyhow::Result<()> {
-        mask.view_square()?;
-        let (middle, radius) = bounding_ball(mesh);
-        ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
-        let [_, _, depth] = camera.seen(middle);
-        ensure!(
-            !started || depth > radius,
-            "the start is inside the mesh, or has it behind: the middle of the mesh is {depth:.3} ahead, and must be more than {radius:.3}, as \
-             far as its farthest vertex; is t in the units of the mesh?"
-        );
-        Ok(())
-    }
-
-    /// The poses from which `mesh` has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before,
-    /// look otherwise from some side, and fit nearly as well: their `IoU` is less by 0.03 at most.
-    ///
-    /// Mesh and camera may be anywhere, in any unit. A mask that reaches a side of the picture ([`cut_sides`]) may belong to an object that
-    /// goes on there: only what is in the picture is compared, and sizes and places of the whole object are tried.
-    ///
-    /// `camera` has the intrinsics; its pose is where to start if it is `started`, else all directions and rolls are tried. `visit` sees
-    /// the number of each step and the least loss; an error of it ends the search.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`PoseSearch::check`], of `visit` and of the device.
-    pub fn run<B: RasterBackend>(
-        &self,
-        mesh: &Mesh,
-        mask: &Picture,
-        camera: &Pinhole,
-        started: bool,
-        method: &Method<impl Softness>,
-        mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
-    ) -> anyhow::Result<Vec<FoundPose>> {
-        let target = Target::new(mask, None)?;
-        self.found::<B>(mesh, &target, camera, started, method, &mut visit)
-    }
-
-    /// The same by the colours of a picture too, those of the vertices of `mesh` being known: colours tell apart poses that look alike as
-    /// silhouettes. The camera is that of the view. Poses are ranked by the `IoU` loss and the error of colours together; those after the
-    /// first may look like it as silhouettes, and have losses that are larger by 0.03 at most.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`PoseSearch::run`]; if the mesh has no colours, or no pixel of the view has a colour.
-    pub fn run_by_colour<B: RasterBackend>(
-        &self,
-        mesh: &Mesh,
-        view: &PaintedView,
-        started: bool,
-        method: &Method<impl Softness>,
-        mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
-    ) -> anyhow::Result<Vec<FoundPose>> {
-        ensure!(mesh.colours().is_some(), "the mesh has no colours at its vertices");
-        let target = Target::new(&view.view.mask, Some(view))?;
-        self.found::<B>(mesh, &target, &view.view.camera, started, method, &mut visit)
-    }
-
-    fn found<B: RasterBackend>(
+    /// The poses that fit the target, the best first. `camera` has the intrinsics, and where to start if it is `started`.
+    pub(super) fn found<B: RasterBackend>(
         &self,
         mesh: &Mesh,
         target: &Target<'_>,
@@ -214,7 +127,7 @@ impl PoseSearch {
         method: &Method<impl Softness>,
         visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<FoundPose>> {
-        Self::check(mesh, target.mask, camera, started)?;
+        check(mesh, target.mask, camera, started)?;
         let frame = Frame::of_mesh(mesh);
         let (mesh, camera) = (&frame.mesh(mesh), frame.camera(camera));
         let fixed = Self { optimise_fov: false, ..*self };
@@ -264,25 +177,20 @@ impl PoseSearch {
         Ok(nearly.map(|(pose, _)| in_world(pose)).collect())
     }
 
-    /// The poses that [`PoseSearch::run`] improves on many pixels where nothing is known, the most promising first: at most six, or ten
-    /// where the picture cuts the object off.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`PoseSearch::check`], of `visit` and of the device.
-    pub fn starts<B: RasterBackend>(
+    /// The poses that a search improves on many pixels where nothing is known, the most promising first.
+    pub(super) fn starts<B: RasterBackend>(
         &self,
         mesh: &Mesh,
         mask: &Picture,
         camera: &Pinhole,
         method: &Method<impl Softness>,
-        mut visit: impl FnMut(usize, f64) -> anyhow::Result<()>,
+        visit: &mut impl FnMut(usize, f64) -> anyhow::Result<()>,
     ) -> anyhow::Result<Vec<Pinhole>> {
-        Self::check(mesh, mask, camera, false)?;
+        check(mesh, mask, camera, false)?;
         let frame = Frame::of_mesh(mesh);
         let (mesh, camera, target) =
             (frame.mesh(mesh), frame.camera(camera), Target::new(mask, None)?);
-        let starts = self.promising_starts::<B>(&mesh, &target, &camera, method, &mut visit)?;
+        let starts = self.promising_starts::<B>(&mesh, &target, &camera, method, visit)?;
         Ok(starts.iter().map(|camera| frame.camera_to_world(camera)).collect())
     }
 
@@ -366,7 +274,7 @@ impl PoseSearch {
     }
 
     /// How poses are improved on many pixels.
-    pub fn fine(&self) -> SolveConfig {
+    fn fine(&self) -> SolveConfig {
         let learning_rate = self.learning_rate / 3.0;
         SolveConfig { size: self.fine_size, steps: self.fine_steps, learning_rate }
     }

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     bands::View,
     float,
-    lanes::{LANES, Lanes, Work},
+    lanes::{LANES, Lanes, Work, run},
     real::{Float, Real, splat},
     scene::BandRef,
 };
@@ -158,7 +158,13 @@ impl<T: Real> Band<'_, '_, T> {
     #[inline(always)]
     fn walk<V: Visitor<T>>(&self, visitor: &mut V) {
         let place = self.place();
-        Walk { blend: self.blend, place, view: self.view, logs: self.logs, visitor }.run();
+        run::<T::Lanes, _>(Walk {
+            blend: self.blend,
+            place,
+            view: self.view,
+            logs: self.logs,
+            visitor,
+        });
     }
 
     #[inline(always)]

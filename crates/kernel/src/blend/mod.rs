@@ -6,6 +6,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod band;
+mod block;
 mod depth;
 mod point;
 mod pull;

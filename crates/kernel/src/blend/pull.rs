@@ -2,13 +2,14 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::{
+    block::{BLOCK, Block},
     depth::pull_row,
     quads::{QUAD, Quads},
     scene::Blend,
     shown::{FaceAttributes, Shown},
     sums::{between, place_on_texture},
     texture::{TEXEL_CHANNELS, TexelSums},
-    walk::{BLOCK, Block, Visitor},
+    walk::Visitor,
 };
 use crate::{
     float::Float as _,

@@ -2,11 +2,12 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::{
+    block::{BLOCK, Block},
     quads::{QUAD, Quads},
     scene::Blend,
     shown::{Number, Shown},
     texture::TEXEL_CHANNELS,
-    walk::{BLOCK, Block, Visitor},
+    walk::Visitor,
 };
 use crate::{
     lanes::{GROUP, Lanes},

@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given, MaskFlags, Variant};
 use softrast_inverse::pose::PoseSearch;
 use softrast_lab::Error;
-use softrast_raster::{NEAR, on_backend};
+use softrast_raster::{NEAR, Pinhole, on_backend};
 use softrast_views::{
     CameraFile, Lens, PaintedView, PoseFile, View, cut_sides, faces_across_note, reading_notes,
 };
@@ -96,13 +96,23 @@ pub(crate) fn solve_pictures(
         coloured(args, &mesh)?;
     }
     let (method, backend) = (given.method()?, given.backend()?);
-    let usual = if args.colour { PoseSearch::by_colour() } else { PoseSearch::default() };
-    let mut search = PoseSearch { optimise_fov: args.optimise_fov, ..usual };
-    search.learning_rate = given.learning_rate().unwrap_or(search.learning_rate);
-    search.fine_size = given.common.size.unwrap_or(search.fine_size);
-    search.fine_steps = given.common.steps.unwrap_or(search.fine_steps);
     let cameras = pictures.camera.as_ref().map(CameraFile::load).transpose()?;
     let start = pictures.start.as_ref().map(PoseFile::load).transpose()?;
+    let started = start.is_some();
+    let search = |camera: &Pinhole| {
+        let mut search = PoseSearch::new(&mesh, *camera).with_method(method.clone());
+        search = if started { search.starting_at(camera) } else { search };
+        search = if args.optimise_fov { search.optimising_fov() } else { search };
+        search = match given.common.steps {
+            Some(steps) => search.with_fine_steps(steps),
+            None => search,
+        };
+        search = match given.common.size {
+            Some(size) => search.with_fine_size(size),
+            None => search,
+        };
+        search.with_learning_rate(given.learning_rate().unwrap_or(PoseSearch::LEARNING_RATE))
+    };
     let paths = pictures.paths()?;
     // What would fail in the middle fails at once.
     let mut tasks = Vec::new();
@@ -130,8 +140,7 @@ pub(crate) fn solve_pictures(
             Some(distortion) => mask.undistorted(&camera, distortion),
             None => mask,
         };
-        PoseSearch::check(&mesh, &mask, &camera, start.is_some())
-            .with_context(|| path.display().to_string())?;
+        search(&camera).check(&mask).with_context(|| path.display().to_string())?;
         reads.push(mask_path);
         let name = path.display().to_string();
         let view = View { name, picture: path, mask, camera, distortion, off: 0.0 };
@@ -147,8 +156,9 @@ pub(crate) fn solve_pictures(
     let poses = (!single).then_some(POSES);
     reads.extend(paths);
     given.will_write(overlays.iter().map(String::as_str).chain(poses), reads)?;
-    let steps = |(view, painted): &(View, Option<PaintedView>)| {
-        search.steps(&view.mask, painted.as_ref(), start.is_some())
+    let steps = |(view, painted): &(View, Option<PaintedView>)| match painted {
+        Some(painted) => search(&view.camera).steps_by_colour(painted),
+        None => search(&view.camera).steps(&view.mask),
     };
     let mut progress = given.progress(tasks.iter().map(steps).sum())?;
     let (mut solved, mut begun) = (Vec::new(), 0);
@@ -158,11 +168,11 @@ pub(crate) fn solve_pictures(
         begun += steps(&task);
         let (view, painted) = task;
         let visit = |step: usize, loss: f64| progress.step(before + step, loss);
-        let (View { name, picture: path, mask, camera, distortion, .. }, started) =
-            (view, start.is_some());
+        let View { name, picture: path, mask, camera, distortion, .. } = view;
+        let search = search(&camera).progress(visit);
         let poses = on_backend!(backend, B => match &painted {
-            Some(view) => search.run_by_colour::<B>(&mesh, view, started, &method, visit),
-            None => search.run::<B>(&mesh, &mask, &camera, started, &method, visit),
+            Some(view) => search.run_by_colour::<B>(view),
+            None => search.run::<B>(&mask),
         });
         let poses = poses.context(name)?;
         let seconds = clock.elapsed().as_secs_f64();
@@ -174,7 +184,7 @@ pub(crate) fn solve_pictures(
     let mut warnings = warnings(cameras.is_some(), args.optimise_fov, &solved);
     warnings.extend(of_mesh.into_iter().chain(notes).chain(across));
     let name = args.mesh.as_ref().map_or("fox".to_owned(), |path| path.display().to_string());
-    let mesh = Framed { mesh, name, frame, started: start.is_some() };
+    let mesh = Framed { mesh, name, frame, started };
     answer(&mesh, &solved, &overlays, warnings, single)
 }
 

@@ -1,4 +1,4 @@
-use std::{cell::RefCell, path::PathBuf, sync::Arc};
+use std::{cell::RefCell, ffi::OsString, path::PathBuf, sync::Arc};
 
 use anyhow::{anyhow, ensure};
 use clap::ValueEnum;
@@ -92,9 +92,12 @@ pub enum HoldOut {
     Cameras(PathBuf),
 }
 
-impl From<&str> for HoldOut {
-    fn from(text: &str) -> Self {
-        text.parse().map_or_else(|_| Self::Cameras(text.into()), Self::Count)
+impl From<OsString> for HoldOut {
+    fn from(text: OsString) -> Self {
+        match text.to_str().and_then(|text| text.parse().ok()) {
+            Some(count) => Self::Count(count),
+            None => Self::Cameras(text.into()),
+        }
     }
 }
 

@@ -1,0 +1,30 @@
+use std::borrow::Borrow;
+
+use softrast_raster::Pinhole;
+
+use super::search::angle_deg;
+
+/// A pose that fits a mask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundPose {
+    /// The camera of the whole picture.
+    pub camera: Pinhole,
+    /// Overlap over union of its hard silhouette and the mask, both of all pixels of the picture, where a pixel of the mask is in from one
+    /// half on.
+    pub iou: f64,
+    /// How near its colours come to the picture, in decibels, where they are asked for; see [`PaintedView::psnr`].
+    pub psnr: Option<f64>,
+}
+
+impl FoundPose {
+    /// Angle between the rotations of this pose and another, in degrees.
+    pub fn angle_deg(&self, other: &Self) -> f64 {
+        angle_deg(&self.camera, &other.camera)
+    }
+}
+
+impl Borrow<Pinhole> for FoundPose {
+    fn borrow(&self) -> &Pinhole {
+        &self.camera
+    }
+}

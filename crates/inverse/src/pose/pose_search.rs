@@ -1,0 +1,209 @@
+use anyhow::ensure;
+use softrast_mesh::Mesh;
+use softrast_raster::{Pinhole, RasterBackend};
+use softrast_softness::{EdgeSoftness, Softness};
+use softrast_views::{PaintedView, Picture};
+
+use super::{
+    found::FoundPose,
+    search::{Search, check, steps_of_starts},
+    target::Target,
+};
+use crate::{Method, ScheduledSoftness};
+
+/// Steps on many pixels unless asked for: by a mask, and by colours. Only silhouettes are brought to their least squares.
+const FINE_STEPS: [usize; 2] = [20, 80];
+
+/// What sees the number of each step and the least loss.
+type Visit<'a> = Box<dyn FnMut(usize, f64) -> anyhow::Result<()> + 'a>;
+
+/// The search for the camera from which a mesh has a given silhouette.
+///
+/// ```
+/// use softrast_inverse::pose::PoseSearch;
+/// use softrast_mesh::fox;
+/// use softrast_tensor::NdArray;
+/// use softrast_views::{Lens, Picture};
+///
+/// # fn main() -> anyhow::Result<()> {
+/// let mask = Picture::load_mask(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/views/fox/images/03.png"))?;
+/// let lens = Lens::of_fov(45.0, mask.size()).pinhole(mask.size())?;
+/// let (mesh, mut steps) = (fox(), 0);
+/// let search = PoseSearch::new(&mesh, lens).with_fine_steps(5).progress(|step, _| Ok(steps = step));
+/// let found = search.run::<NdArray>(&mask)?;
+/// println!("stood at {:?}, IoU {}", found[0].camera.eye(), found[0].iou);
+/// # assert!(found[0].iou > 0.9, "{}", found[0].iou);
+/// # Ok(())
+/// # }
+/// ```
+pub struct PoseSearch<'a, S = EdgeSoftness> {
+    mesh: &'a Mesh,
+    camera: Pinhole,
+    started: bool,
+    fine_steps: Option<usize>,
+    fine_size: usize,
+    learning_rate: f64,
+    optimise_fov: bool,
+    method: Method<S>,
+    visit: Visit<'a>,
+}
+
+impl<'a> PoseSearch<'a> {
+    /// Learning rate on few pixels unless asked for, in radians.
+    pub const LEARNING_RATE: f64 = 0.03;
+
+    /// A search for the pose of `mesh`, anywhere and in any unit, under the intrinsics of `lens`: all directions and rolls are tried, with the
+    /// softness that was learned on POSE.
+    #[allow(
+        clippy::missing_panics_doc,
+        reason = "the softness comes with the crate, which tests read"
+    )]
+    pub fn new(mesh: &'a Mesh, lens: Pinhole) -> Self {
+        let learned = ScheduledSoftness::learned("pose").expect("it comes with the crate");
+        Self {
+            mesh,
+            camera: lens,
+            started: false,
+            fine_steps: None,
+            fine_size: 128,
+            learning_rate: Self::LEARNING_RATE,
+            optimise_fov: false,
+            method: Method::new("learned", learned),
+            visit: Box::new(|_, _| Ok(())),
+        }
+    }
+
+    /// Steps that [`PoseSearch::starts`] takes for a mask.
+    pub fn steps_of_starts(mask: &Picture) -> usize {
+        steps_of_starts(mask)
+    }
+}
+
+impl<'a, S: Softness> PoseSearch<'a, S> {
+    /// From this pose alone: its rotation and translation.
+    #[must_use]
+    pub fn starting_at(mut self, pose: &Pinhole) -> Self {
+        (self.camera.rotation, self.camera.translation) = (pose.rotation, pose.translation);
+        self.started = true;
+        self
+    }
+
+    /// With so many steps on many pixels.
+    #[must_use]
+    pub fn with_fine_steps(self, steps: usize) -> Self {
+        Self { fine_steps: Some(steps), ..self }
+    }
+
+    /// With so many pixels a side of these.
+    #[must_use]
+    pub fn with_fine_size(self, size: usize) -> Self {
+        Self { fine_size: size, ..self }
+    }
+
+    /// With another learning rate on few pixels, in radians; on many it is a third of that.
+    #[must_use]
+    pub fn with_learning_rate(self, learning_rate: f64) -> Self {
+        Self { learning_rate, ..self }
+    }
+
+    /// Optimises the focal length too, once poses have been found with the given one: of both the better is taken.
+    #[must_use]
+    pub fn optimising_fov(self) -> Self {
+        Self { optimise_fov: true, ..self }
+    }
+
+    /// With another softness.
+    #[must_use]
+    pub fn with_method<T: Softness>(self, method: Method<T>) -> PoseSearch<'a, T> {
+        PoseSearch {
+            mesh: self.mesh,
+            camera: self.camera,
+            started: self.started,
+            fine_steps: self.fine_steps,
+            fine_size: self.fine_size,
+            learning_rate: self.learning_rate,
+            optimise_fov: self.optimise_fov,
+            method,
+            visit: self.visit,
+        }
+    }
+
+    /// Shows `visit` the number of each step and the least loss. An error of it ends the search.
+    #[must_use]
+    pub fn progress(self, visit: impl FnMut(usize, f64) -> anyhow::Result<()> + 'a) -> Self {
+        Self { visit: Box::new(visit), ..self }
+    }
+
+    /// Steps that [`run`](Self::run) takes for a mask.
+    pub fn steps(&self, mask: &Picture) -> usize {
+        self.search(false).steps(mask, false, self.started)
+    }
+
+    /// Steps that [`run_by_colour`](Self::run_by_colour) takes for a view.
+    pub fn steps_by_colour(&self, view: &PaintedView) -> usize {
+        self.search(true).steps(&view.view.mask, true, self.started)
+    }
+
+    /// What [`run`](Self::run) would refuse at once.
+    ///
+    /// # Errors
+    ///
+    /// If nothing or all of the mask is white, the mesh has no extent, or the start does not see it.
+    pub fn check(&self, mask: &Picture) -> anyhow::Result<()> {
+        check(self.mesh, mask, &self.camera, self.started)
+    }
+
+    /// The poses from which the mesh has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before,
+    /// look otherwise from some side, and fit nearly as well: their `IoU` is less by 0.03 at most.
+    ///
+    /// A mask that reaches a side of the picture ([`cut_sides`](softrast_views::cut_sides)) may belong to an object that goes on there: only
+    /// what is in the picture is compared, and sizes and places of the whole object are tried.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`check`](Self::check), of what sees the progress and of the device.
+    pub fn run<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<FoundPose>> {
+        self.found::<B>(&Target::new(mask, None)?)
+    }
+
+    /// The same by the colours of a picture too, those of the vertices of the mesh being known: colours tell apart poses that look alike as
+    /// silhouettes. Poses are ranked by the `IoU` loss and the error of colours together; those after the first may look like it as
+    /// silhouettes, and have losses that are larger by 0.03 at most. The camera of the view is not read.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`run`](Self::run); if the mesh has no colours, or no pixel of the view has a colour.
+    pub fn run_by_colour<B: RasterBackend>(
+        mut self,
+        view: &PaintedView,
+    ) -> anyhow::Result<Vec<FoundPose>> {
+        ensure!(self.mesh.colours().is_some(), "the mesh has no colours at its vertices");
+        self.found::<B>(&Target::new(&view.view.mask, Some(view))?)
+    }
+
+    /// The poses that [`run`](Self::run) improves on many pixels where nothing is known, the most promising first: at most six, or ten
+    /// where the picture cuts the object off.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`run`](Self::run).
+    pub fn starts<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<Pinhole>> {
+        let search = self.search(false);
+        search.starts::<B>(self.mesh, mask, &self.camera, &self.method, &mut self.visit)
+    }
+
+    fn search(&self, by_colour: bool) -> Search {
+        Search {
+            fine_steps: self.fine_steps.unwrap_or(FINE_STEPS[usize::from(by_colour)]),
+            fine_size: self.fine_size,
+            learning_rate: self.learning_rate,
+            optimise_fov: self.optimise_fov,
+        }
+    }
+
+    fn found<B: RasterBackend>(&mut self, target: &Target<'_>) -> anyhow::Result<Vec<FoundPose>> {
+        let search = self.search(target.painted.is_some());
+        let Self { mesh, camera, started, method, visit, .. } = self;
+        search.found::<B>(mesh, target, camera, *started, method, visit)
+    }
+}
