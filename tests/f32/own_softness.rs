@@ -17,7 +17,7 @@ fn poses_come_nearer_along_the_schedule_of_an_own_softness_and_of_its_surrogate(
     for softness in [decay.clone(), decay.with_surrogate_scale(0.1)] {
         let method = Method::new("arctan", softness);
         let mut seen = Vec::new();
-        minimize::<_, NdArray>(&problem, &instances, &method, &config, false, |iterate, _| {
+        minimize::<_, NdArray>(&problem, &instances, &method, &config, |iterate, _| {
             seen.push((iterate.hard_loss.iter().sum::<f64>() / 8.0, iterate.scale));
             Ok(())
         })

@@ -18,7 +18,7 @@ fn projected(points: &[[f64; 3]], view: usize) -> Vec<[f64; 3]> {
     let points = Tensor::<Backend, 3>::from_data(TensorData::new(points, [1, count, 3]), &device);
     let orbit = orbit(view).map(|x| x as f32);
     let orbit = Tensor::<Backend, 2>::from_data([orbit], &device);
-    let values: Vec<f64> = project(points, orbit).into_data().iter().collect();
+    let values: Vec<f64> = project(points, orbit).tensor().into_data().iter().collect();
     values.chunks(3).map(|p| [p[0], p[1], p[2]]).collect()
 }
 

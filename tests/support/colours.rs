@@ -1,7 +1,9 @@
 //! Everything that the op in colour computes of one scene.
 
 use softrast_mesh::fox;
-use softrast_raster::{Attributes, Background, ColourRenderer, RasterBackend, Weighting, project};
+use softrast_raster::{
+    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, project,
+};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers};
 
@@ -27,7 +29,7 @@ pub fn colours<B: RasterBackend>() -> Outputs {
     let world = tensor::<B, 3>(fox.positions().as_flattened(), [1, fox.positions().len(), 3]);
     let orbits: Vec<f64> =
         AZIMUTHS_DEG.iter().flat_map(|&azimuth| [2.732, 17.0, azimuth, 60.0]).collect();
-    let seen = project(world, tensor(&orbits, [AZIMUTHS_DEG.len(), 4]));
+    let seen = project(world, tensor(&orbits, [AZIMUTHS_DEG.len(), 4])).tensor();
     let wave = |count: usize, step: f64| -> Vec<f64> {
         (0..count).map(|k| (step * k as f64).sin()).collect()
     };
@@ -41,7 +43,7 @@ pub fn colours<B: RasterBackend>() -> Outputs {
     let inner = flat.map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x).require_grad());
     let leaves = inner.clone().map(|x| Tensor::<Autodiff<_>, 1>::from_inner(x).require_grad());
     let [seen, colour, edge, depth, behind] = leaves.clone();
-    let seen = seen.reshape([AZIMUTHS_DEG.len() as i64, -1, 3]);
+    let seen = Projected::new(seen.reshape([AZIMUTHS_DEG.len() as i64, -1, 3]));
     let colour = colour.reshape([1, -1, CHANNELS as i64]);
     let attributes = Attributes::of_vertices(colour, fox.faces());
     let background = Background {

@@ -62,7 +62,7 @@ fn projected<B: RasterBackend>(positions: &[[f64; 3]]) -> Tensor<B, 3> {
     let orbits: Vec<f64> =
         AZIMUTHS_DEG.iter().flat_map(|&azimuth| [2.732, 17.0, azimuth, 60.0]).collect();
     let world = tensor(positions.as_flattened(), [1, positions.len(), 3]);
-    project(world, tensor(&orbits, [AZIMUTHS_DEG.len(), 4]))
+    project(world, tensor(&orbits, [AZIMUTHS_DEG.len(), 4])).tensor()
 }
 
 /// Numbers between -1 and 1 that differ from place to place.

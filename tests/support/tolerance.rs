@@ -2,7 +2,7 @@
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde::{Deserialize, Serialize};
-use softrast_raster::{RasterBackend, SoftRenderer, TConorm, reference};
+use softrast_raster::{Projected, RasterBackend, SoftRenderer, TConorm, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{DType, NdArray, Tensor, TensorData, numbers, vector};
 
@@ -112,7 +112,7 @@ impl ToleranceCase {
             let vertices = self.vertices(10f64.powf(width));
             let tensor = tensor::<B>(&vertices);
             let vertices = numbers(tensor.clone());
-            let drawn = numbers(renderer.silhouette(tensor));
+            let drawn = numbers(renderer.silhouette(Projected::new(tensor)));
             let ranges = Ranges { vertices: &vertices, faces: &faces, rounding };
             let found = drawn
                 .iter()

@@ -122,7 +122,7 @@ impl Workload {
         let [distance, elevation, fov] = CAMERA;
         let orbit = |&azimuth| [distance, elevation, azimuth, fov];
         let orbits: Vec<f64> = self.azimuths_deg.iter().flat_map(orbit).collect();
-        project(world, tensor(orbits, [self.azimuths_deg.len(), 4]))
+        project(world, tensor(orbits, [self.azimuths_deg.len(), 4])).tensor()
     }
 
     /// Mean squared difference of `alpha` `[views, size, size]` to the disk, `[1]`.

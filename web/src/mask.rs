@@ -43,8 +43,7 @@ impl<B: RasterBackend> MaskRun<B> {
     pub fn new(mesh: &Mesh, mask: Picture, settings: &Settings) -> anyhow::Result<Self> {
         let camera = Lens::of_fov(ASSUMED_FOV_DEG, mask.size()).pinhole(mask.size())?;
         PoseSearch::new(mesh, camera).check(&mask)?;
-        let (method, config) =
-            settings.method("mask", PoseSearch::LEARNING_RATE / 3.0)?;
+        let (method, config) = settings.method("mask", PoseSearch::LEARNING_RATE / 3.0)?;
         let square = mask.view_square()?;
         Ok(Self {
             mesh: mesh.clone(),
@@ -66,7 +65,8 @@ impl<B: RasterBackend> MaskRun<B> {
         let Some(&start) = self.starts.get(self.start) else { return Ok(()) };
         let pose = MaskPose { mask: self.mask.clone(), square: self.square, start, painted: None };
         let problem = MaskPoses::new(&self.mesh, vec![pose.clone()], false);
-        let run = Minimization::new(problem, vec![pose.clone()], &self.method, &self.config, true)?;
+        let run = Minimization::new(problem, vec![pose.clone()], &self.method, &self.config)?
+            .with_pictures();
         self.run = Some((run, pose));
         Ok(())
     }

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use anyhow::ensure;
 use serde::Deserialize;
-use softrast_raster::{RasterBackend, SoftRenderer, TConorm, low_level::Rasterizer};
+use softrast_raster::{Projected, RasterBackend, SoftRenderer, TConorm, low_level::Rasterizer};
 use softrast_softness::{EdgeSoftness, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
@@ -103,7 +103,7 @@ impl Playground {
         picture.set_phi(phi.clone());
         pixel.set_phi(phi);
         let corners = triangles.as_flattened();
-        let image = picture.silhouette(vertices::<Backend>(corners, &[[0.0; 2]]));
+        let image = picture.silhouette(Projected::new(vertices::<Backend>(corners, &[[0.0; 2]])));
         let gradient = gradients(&pixel, corners, *grid);
         self.kept = Some((key, picture, pixel));
         Ok(Field { image: floats(image), gradient })
@@ -124,7 +124,7 @@ fn gradients(pixel: &SoftRenderer<EdgeSoftness>, corners: &[[f64; 2]], grid: usi
     let centre = |k: usize| (2 * k + 1) as f64 / grid as f64 - 1.0;
     let places: Vec<_> = (0..grid * grid).map(|k| [centre(k % grid), -centre(k / grid)]).collect();
     let leaf = vertices::<Autodiff<Backend>>(corners, &places).require_grad();
-    let gradient = leaf.grad(&pixel.silhouette(leaf.clone()).sum().backward());
+    let gradient = leaf.grad(&pixel.silhouette(Projected::new(leaf.clone())).sum().backward());
     let gradient = gradient.unwrap_or_else(|| leaf.inner().zeros_like());
     floats(gradient.narrow(2, 0, 2))
 }

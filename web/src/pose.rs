@@ -24,7 +24,7 @@ impl<B: RasterBackend> PoseRun<B> {
         let problem = PoseProblem::new(mesh);
         let (method, config) = settings.method("pose", problem.defaults().learning_rate)?;
         let instance = problem.instance(settings.seed.into())?;
-        let run = Minimization::new(problem, vec![instance], &method, &config, true)?;
+        let run = Minimization::new(problem, vec![instance], &method, &config)?.with_pictures();
         Ok(Self { run, instance, config })
     }
 

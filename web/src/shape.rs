@@ -83,7 +83,7 @@ impl<B: RasterBackend> ShapeRun<B> {
         let problem = Covering { picture, triangles: settings.triangles };
         let (method, config) = settings.method("shape2d", problem.defaults().learning_rate)?;
         let instance = problem.instance(settings.seed.into())?;
-        let run = Minimization::new(problem, vec![instance], &method, &config, true)?;
+        let run = Minimization::new(problem, vec![instance], &method, &config)?.with_pictures();
         Ok(Self { run, config })
     }
 }

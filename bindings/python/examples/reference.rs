@@ -4,7 +4,7 @@
 
 use softrast_meta::{Adam, InnerLoop, Objective};
 use softrast_raster::{
-    Attributes, Background, ColourRenderer, Orbit, RasterBackend, SoftRenderer, project,
+    Attributes, Background, ColourRenderer, Orbit, Projected, RasterBackend, SoftRenderer, project,
 };
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, Backend, NdArray, Tensor, numbers, tensor, vector};
@@ -80,7 +80,7 @@ fn silhouettes() {
 fn colours() {
     let mesh = softrast_mesh::icosphere(1);
     let renderer = ColourRenderer::new(mesh.faces(), SIZE, Family::Logistic, 0.05, [1.5, 3.5]);
-    let seen = project::<Plain>(positions(), cameras());
+    let seen = project::<Plain>(positions(), cameras()).tensor();
     let [_, count, _] = seen.dims();
     let [edge, depth] = renderer.phi().each_ref().map(|phi| outer(vector(phi)));
     let behind = renderer.background::<Plain>(&[0.25, 0.5], &Default::default());
@@ -90,7 +90,7 @@ fn colours() {
     let [parameters, parameters_depth] = [&edge, &depth].map(inner);
     let [plain, weight] = [&colour, &log_weight].map(inner);
     let image = renderer.image_with(
-        points.clone(),
+        Projected::new(points.clone()),
         &Attributes::of_vertices(shown.clone(), mesh.faces()),
         [&parameters, &parameters_depth],
         &Background { colour: plain.clone(), log_weight: weight.clone() },

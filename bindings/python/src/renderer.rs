@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use softrast_raster::{
-    HostBackend, ImageSize, SoftRenderer, TConorm,
+    HostBackend, ImageSize, Projected, SoftRenderer, TConorm,
     low_level::{Rasterizer, Silhouette},
 };
 use softrast_softness::{EdgeSoftness, Softness as _};
@@ -162,7 +162,8 @@ pub(crate) fn hard_silhouette<'py>(
     let image = guarded(py, || {
         let data = TensorData::new(values, shape);
         let vertices = Tensor::<HostBackend, 3>::from_data(data, (&Default::default(), DType::F64));
-        let image = softrast_raster::hard_silhouette(vertices, &faces, size).into_data();
+        let image =
+            softrast_raster::hard_silhouette(Projected::new(vertices), &faces, size).into_data();
         (image.shape.to_vec(), image.iter::<f32>().collect::<Vec<_>>())
     })?;
     Ok(PyArray1::from_vec(py, image.1).reshape(image.0)?.into_any())

@@ -12,7 +12,7 @@ use softrast_cli::{
 };
 use softrast_inverse::{InverseProblem, Iterate, SoftnessAt, SolveConfig, Targets};
 use softrast_mesh::icosphere;
-use softrast_raster::{HostBackend, RasterBackend, hard_silhouette};
+use softrast_raster::{HostBackend, Projected, RasterBackend, hard_silhouette};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -56,12 +56,14 @@ pub(crate) struct Scene<B: RasterBackend> {
 
 impl<B: RasterBackend> Scene<B> {
     /// The ball at θ = x and y of each view: `[views, vertices, 3]`.
-    fn vertices(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    fn vertices(&self, theta: Tensor<B, 1>) -> Projected<B> {
         let [_, count, _] = self.ball.dims();
         let views = self.start.dims()[0];
         let place = theta.reshape([views, 1, 2]);
         let place = Tensor::cat(vec![place, Tensor::zeros([views, 1, 1], &self.ball.device())], 2);
-        self.ball.clone().expand([views, count, 3]) + place.expand([views, count, 3])
+        Projected::new(
+            self.ball.clone().expand([views, count, 3]) + place.expand([views, count, 3]),
+        )
     }
 }
 

@@ -1,7 +1,7 @@
 use std::rc::Rc;
 
 use serde_json::{Map, Value, json};
-use softrast_inverse::{Iterate, Method, Resolution, SolveConfig, Surrogate, minimize};
+use softrast_inverse::{Iterate, Method, Minimization, Resolution, SolveConfig, Surrogate};
 use softrast_lab::{Batch, Error, Experiment, Metric, Pictures, Point, Progress, Run, best_point};
 use softrast_raster::{BackendChoice, HostBackend, RasterBackend, on_backend};
 use softrast_softness::Softness;
@@ -168,8 +168,7 @@ impl<T: Task> TaskExperiment<T> {
         progress: &mut Progress,
     ) -> anyhow::Result<Vec<Solved>> {
         let mut all: Vec<Solved> = Vec::new();
-        let pictures = batch.pictures;
-        let watch = |iterate: &Iterate, scene: &T::Scene<HostBackend>| {
+        let mut watch = |iterate: &Iterate, scene: &T::Scene<HostBackend>| {
             if all.is_empty() {
                 let targets = self.task.targets(scene);
                 let target = targets.chunks(targets.len() / instances.len());
@@ -203,7 +202,12 @@ impl<T: Task> TaskExperiment<T> {
             let loss = iterate.loss.iter().sum::<f64>() / iterate.loss.len() as f64;
             if iterate.step == 0 { Ok(()) } else { progress.step(iterate.step, loss) }
         };
-        minimize::<T, B>(&self.task, instances, &self.method, &self.solve, pictures, watch)?;
+        let instances = instances.to_vec();
+        let run = Minimization::<T, B, &T>::new(&self.task, instances, &self.method, &self.solve)?;
+        let mut run = if batch.pictures { run.with_pictures() } else { run };
+        while let Some(iterate) = run.next().transpose()? {
+            watch(&iterate, run.scene())?;
+        }
         Ok(all)
     }
 

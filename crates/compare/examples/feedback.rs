@@ -115,7 +115,7 @@ fn runs(study: &Study, method: &str, pairs: usize) -> anyhow::Result<Vec<Vec<See
     let run = |seed: u64| -> anyhow::Result<Vec<Seen>> {
         let instances = vec![task.instance(seed)?];
         let mut seconds = 0.0;
-        let seen = Minimization::<Pose, B, &Pose>::new(&task, instances, &method, &solve, false)?;
+        let seen = Minimization::<Pose, B, &Pose>::new(&task, instances, &method, &solve)?;
         let seen = seen.map(|iterate| {
             let iterate = iterate?;
             seconds += iterate.seconds.unwrap_or(0.0);

@@ -123,7 +123,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         let instance = self.problem.instance(seed).expect("instances of all seeds can be made");
         let mut least = f64::NAN;
         let solve = SolveConfig { learning_rate, ..self.solve };
-        minimize::<P, B>(&self.problem, &[instance], &method, &solve, false, |iterate, _| {
+        minimize::<P, B>(&self.problem, &[instance], &method, &solve, |iterate, _| {
             least = least.min(iterate.hard_loss[0]);
             Ok(())
         })

@@ -18,7 +18,7 @@
 //! let method = Method::new("learned", ScheduledSoftness::learned("pose")?);
 //! let config = SolveConfig { size: 8, steps: 2, ..problem.defaults() };
 //! let mut steps = Vec::new();
-//! minimize::<_, NdArray>(&problem, &[problem.instance(0)?], &method, &config, false, |iterate, _| {
+//! minimize::<_, NdArray>(&problem, &[problem.instance(0)?], &method, &config, |iterate, _| {
 //!     steps.push(iterate.step);
 //!     Ok(())
 //! })?;

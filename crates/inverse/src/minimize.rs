@@ -18,7 +18,8 @@ const STARTS: usize = 8;
 ///
 /// It shows every iterate from the start to the end to `visit`, along with the scene on the CPU. `visit` does not count as time of a
 /// step. Parameters without a gradient, as where nothing was drawn, stay as they are. Where the softness has feedback and a run is stuck, it
-/// begins again from the next start of the problem, as the softness says. A [`Minimization`] does the same one step at a time.
+/// begins again from the next start of the problem, as the softness says. A [`Minimization`] does the same one step at a time, and has images if
+/// they are wanted.
 ///
 /// # Errors
 ///
@@ -29,11 +30,9 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
     instances: &[P::Instance],
     method: &Method<impl Softness>,
     config: &SolveConfig,
-    pictures: bool,
     mut visit: impl FnMut(&Iterate, &P::Scene<HostBackend>) -> anyhow::Result<()>,
 ) -> anyhow::Result<Iterate> {
-    let mut run =
-        Minimization::<P, B, &P, _>::new(problem, instances.to_vec(), method, config, pictures)?;
+    let mut run = Minimization::<P, B, &P, _>::new(problem, instances.to_vec(), method, config)?;
     let mut last = None;
     while let Some(iterate) = run.next().transpose()? {
         visit(&iterate, run.scene())?;
@@ -80,7 +79,7 @@ struct Latest<B: RasterBackend> {
 }
 
 impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimization<P, B, R, S> {
-    /// A run that has not begun. With `pictures` its iterates have images.
+    /// A run that has not begun.
     ///
     /// # Errors
     ///
@@ -90,7 +89,6 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         instances: Vec<P::Instance>,
         method: &Method<S>,
         config: &SolveConfig,
-        pictures: bool,
     ) -> anyhow::Result<Self> {
         ensure!(!instances.is_empty(), "there is no instance to solve");
         let feedback = method.softness.feedback;
@@ -115,10 +113,16 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
             ended: false,
             run,
             instances,
-            pictures,
+            pictures: false,
             optimizer,
             theta,
         })
+    }
+
+    /// The same run, whose iterates have images.
+    #[must_use]
+    pub fn with_pictures(self) -> Self {
+        Self { pictures: true, ..self }
     }
 
     /// The problem.

@@ -4,7 +4,8 @@ use anyhow::{Context, ensure};
 use softrast_mesh::{Edges, Mesh};
 use softrast_meta::{Adam, InnerLoop, descend};
 use softrast_raster::{
-    Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Weighting, project, vertices,
+    Attributes, ColourRenderer, HostBackend, NEAR, Pinhole, Pinholes, Projected, Weighting,
+    project, vertices,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
@@ -63,7 +64,7 @@ pub fn paint(
     let device = Default::default();
     let corners = vertices::<HostBackend>(framed.positions(), &device);
     let seen = project(corners, Pinholes::new(&cameras, &device));
-    let renderer = renderer(&framed, &faces, size, numbers(seen.clone().narrow(2, 2, 1)))?;
+    let renderer = renderer(&framed, &faces, size, numbers(seen.clone().tensor().narrow(2, 2, 1)))?;
     let background = renderer.background::<B>(&[0.0; 3], &device);
     let surface = Surface::<B>::new(&Edges::new(&faces), count);
 
@@ -74,7 +75,7 @@ pub fn paint(
         let colours: Tensor<B, 2> = leaf.clone().reshape([3, count]);
         let colours: Tensor<_, 3> = colours.transpose().unsqueeze();
         let attributes = Attributes::new(colours.clone(), faces.clone());
-        let image = renderer.image(Tensor::from_inner(seen.clone()), &attributes, &background);
+        let image = renderer.image(Projected::from_inner(seen.clone()), &attributes, &background);
         let off = targets.loss(image);
         visit(step, numbers(off.clone().inner())[0])?;
         let loss = off + surface.laplacian(colours) * (SMOOTH / count as f64);

@@ -1,7 +1,7 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    ColourRenderer, RasterBackend, SoftRenderer, Weighting, low_level::Rasterizer,
+    ColourRenderer, Projected, RasterBackend, SoftRenderer, Weighting, low_level::Rasterizer,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Softness};
 use softrast_tensor::{Tensor, numbers, vector};
@@ -160,11 +160,11 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     /// # Panics
     ///
     /// If the problem has no faces.
-    pub fn silhouette(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
+    pub fn silhouette(&self, vertices: Projected<B>) -> Tensor<B, 3> {
         let renderer = self.renderer.silhouettes::<B>(self.progress);
         let Some(prepared) = &self.prepared else { return renderer.silhouette(vertices) };
         let (seen, table) = (renderer.prepared::<B>(renderer.phi()), prepared.clone());
-        let table = table.reshape([-1, 4]);
+        let (vertices, table) = (vertices.tensor(), table.reshape([-1, 4]));
         let Some(surrogate) = renderer.surrogate() else {
             return seen.coverage_by_table(vertices, table);
         };
@@ -180,7 +180,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     /// # Panics
     ///
     /// If the problem has no faces, or there is no target of this many pixels.
-    pub fn iou_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
+    pub fn iou_loss(&self, vertices: Projected<B>, targets: &Targets<B>) -> Tensor<B, 1> {
         if self.prepared.is_some() {
             return targets.iou_loss(self.silhouette(vertices));
         }
@@ -194,7 +194,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
     /// # Panics
     ///
     /// If the problem has no faces, or there is no target of this many pixels.
-    pub fn mse_loss(&self, vertices: Tensor<B, 3>, targets: &Targets<B>) -> Tensor<B, 1> {
+    pub fn mse_loss(&self, vertices: Projected<B>, targets: &Targets<B>) -> Tensor<B, 1> {
         if self.prepared.is_some() {
             return targets.mse_loss(self.silhouette(vertices));
         }

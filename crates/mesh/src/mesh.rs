@@ -107,6 +107,7 @@ impl Mesh {
     }
 
     /// Red, green and blue at each vertex, from 0 to 1 as pictures and screens have them (sRGB); if the mesh has colours.
+    #[doc(alias = "colors")]
     pub fn colours(&self) -> Option<&[[f64; 3]]> {
         self.colours.as_deref()
     }

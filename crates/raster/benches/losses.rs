@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let step = |iou: bool, together: bool| {
             let clock = Instant::now();
             let world = Tensor::<A, 3>::from_inner(world.clone()).require_grad();
-            let vertices = project(world.clone(), Tensor::from_inner(cameras.clone()));
+            let vertices = project(world.clone(), Tensor::from_inner(cameras.clone())).tensor();
             let table = Tensor::<A, 2>::from_inner(table.clone());
             let target = Tensor::from_inner(target.clone());
             let loss = match (together, iou) {

@@ -69,7 +69,7 @@ fn recorded(workload: &Workload) -> Vec<Recorded> {
     let target: Tensor<B, 3> = tensor(&disk(size), [1, size, size], DType::F32);
     steps(|| {
         let world = Tensor::<A, 3>::from_inner(world.clone()).require_grad();
-        let vertices = project(world.clone(), Tensor::from_inner(cameras.clone()));
+        let vertices = project(world.clone(), Tensor::from_inner(cameras.clone())).tensor();
         let (table, target) =
             (Tensor::from_inner(table.clone()), Tensor::from_inner(target.clone()));
         let loss = silhouette.mse_loss_by_table(vertices, table, target, None);

@@ -335,7 +335,7 @@ impl Step {
 
     fn gradient(&self, table: Tensor<B, 2>) -> Tensor<B, 3> {
         let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
-        let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone()));
+        let vertices = project(world.clone(), Tensor::from_inner(self.cameras.clone())).tensor();
         let (table, target) = (Tensor::from_inner(table), Tensor::from_inner(self.target.clone()));
         let loss = self.op.silhouette.mse_loss_by_table(vertices, table, target, None).mean();
         backward((loss, world))

@@ -80,7 +80,7 @@ impl Workload {
 
     /// Vertices as the op takes them, `[views, vertices, 3]`.
     pub(crate) fn projected<B: RasterBackend>(&self, dtype: DType) -> Tensor<B, 3> {
-        project(self.world(dtype), self.cameras(dtype))
+        project(self.world(dtype), self.cameras(dtype)).tensor()
     }
 
     /// Parameters of the softness.

@@ -22,6 +22,11 @@ fn slice<F: Element>(data: &TensorData) -> &[F] {
 /// By default they run on the host, which serves every CPU backend. The implementation for `Autodiff<B>` makes them differentiable
 /// twice: each pass differentiates by the next one of `B`. A third order panics. Saved for the backward pass are
 /// the inputs, and which faces reach which rows.
+#[diagnostic::on_unimplemented(
+    message = "softrast does not draw on the backend `{Self}`",
+    note = "it draws on `NdArray`, `Flex` and `softrast_raster::Wgpu`, and on `Autodiff` of these, of the features ndarray, flex and wgpu",
+    note = "`Wgpu` of burn itself is another type where its feature `fusion` is on"
+)]
 pub trait RasterBackend: Backend {
     /// Whether ops and little tensors are as quick on the CPU anyway: false where a tensor lies
     /// behind a queue, and what is computed of it in many little ops should come in one piece.

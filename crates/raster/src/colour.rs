@@ -72,6 +72,7 @@ pub fn blend<B: Backend>(
 /// # Panics
 ///
 /// If the shapes do not fit, or the backend cannot be read synchronously.
+#[doc(alias = "hard_color")]
 pub fn hard_colour<B: Backend>(
     distance: Tensor<B, 3>,
     depth: Tensor<B, 2>,

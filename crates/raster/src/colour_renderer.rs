@@ -5,8 +5,8 @@ use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness};
 use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 
 use crate::{
-    Attributes, Background, HostBackend, ImageSize, NEAR, RasterBackend, Rasterizer, Weighting,
-    Width,
+    Attributes, Background, HostBackend, ImageSize, NEAR, Projected, RasterBackend, Rasterizer,
+    Weighting, Width,
     backend::{fused, primitive},
     cache::Cache,
     curve::precise,
@@ -41,7 +41,7 @@ const BEHIND: f64 = 1e-3;
 ///
 /// ```
 /// use softrast_tensor::{Autodiff, NdArray};
-/// use softrast_raster::{Attributes, ColourRenderer, vertices};
+/// use softrast_raster::{Attributes, ColourRenderer, Projected, vertices};
 /// use softrast_softness::Family;
 ///
 /// let device = Default::default();
@@ -50,11 +50,12 @@ const BEHIND: f64 = 1e-3;
 /// let red = vertices(&[[1.0, 0.0, 0.0]; 3], &device).require_grad();
 /// let renderer = ColourRenderer::new(&faces, 16, Family::Logistic, 0.01, [1.0, 4.0]);
 /// let background = renderer.background(&[0.0, 0.0, 1.0], &device);
-/// let image = renderer.image(corners, &Attributes::of_vertices(red.clone(), &faces), &background);
+/// let image = renderer.image(Projected::new(corners), &Attributes::of_vertices(red.clone(), &faces), &background);
 /// assert_eq!(image.dims(), [1, 4, 16, 16]); // red, green, blue, and the share of the faces
 /// let gradient = red.grad(&image.mean().backward()).unwrap();
 /// assert_eq!(gradient.dims(), [1, 3, 3]);
 /// ```
+#[doc(alias = "ColorRenderer")]
 #[derive(Clone, Debug)]
 pub struct ColourRenderer<S = EdgeSoftness> {
     faces: Arc<[[u32; 3]]>,
@@ -87,7 +88,7 @@ impl<S: Softness> ColourRenderer<S> {
     /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under an edge
     /// softness of this [`Width`] (a number is its scale) and, between the depths `planes` of nearness 1 and 0 (ascending, world units), the reversed
     /// exponential as depth softness: a face counts e times as much as one that lies [`DEPTH_SCALE`](ColourRenderer::DEPTH_SCALE) of the distance
-    /// between the planes behind it, as in `SoftRas` and PyTorch3D.
+    /// between the planes behind it, as in `SoftRas` and PyTorch3D. [`Projected::planes`] finds planes around a scene.
     ///
     /// # Panics
     ///
@@ -214,8 +215,7 @@ impl<S: Softness> ColourRenderer<S> {
 
     /// Blended channels and, last, the share of the faces: `[views, channels + 1, height, width]`, top row first.
     ///
-    /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. They, the
-    /// attributes and the background receive gradients, to second order on `Autodiff<Autodiff<B>>`.
+    /// `vertices` `[views, vertices, 3]` are what [`project`](crate::project) returns. They, the attributes and the background receive gradients, to second order on `Autodiff<Autodiff<B>>`.
     ///
     /// On a GPU each image reads one number, the background's weight.
     ///
@@ -224,10 +224,11 @@ impl<S: Softness> ColourRenderer<S> {
     /// If shapes do not fit, or float types differ.
     pub fn image<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         attributes: &Attributes<B>,
         background: &Background<B>,
     ) -> Tensor<B, 4> {
+        let vertices = vertices.tensor();
         let (device, dtype) = (vertices.device(), vertices.dtype());
         let prepared = self.prepared(&self.phi, number(background));
         let data = self.cache.table(&prepared, || {
@@ -247,7 +248,7 @@ impl<S: Softness> ColourRenderer<S> {
     /// If shapes do not fit, or float types differ.
     pub fn image_with<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         attributes: &Attributes<B>,
         [edge, depth]: [&Tensor<B, 1>; 2],
         background: &Background<B>,
@@ -257,7 +258,7 @@ impl<S: Softness> ColourRenderer<S> {
         check(&self.weighting, &values);
         let prepared = self.prepared(&values, number(background));
         let tables = prepared.tables(phi);
-        self.drawn(&prepared, vertices, attributes, tables, background)
+        self.drawn(&prepared, vertices.tensor(), attributes, tables, background)
     }
 
     /// The op behind [`image_with`](Self::image_with), and what makes its tables, for callers that run it on slices: for these values of

@@ -2,12 +2,11 @@ use rayon::prelude::*;
 use softrast_kernel::inside_spans;
 use softrast_tensor::{Backend, Tensor, TensorData};
 
-use crate::{ImageSize, NEAR};
+use crate::{ImageSize, NEAR, Projected};
 
 /// Hard silhouettes: 1 where the centre of a pixel lies in a face (edges included), else 0.
 ///
-/// `vertices` `[views, vertices, 3]`: x and y in NDC, depth. The result is `[views, height, width]`,
-/// top row first, in the float type of `vertices`; it has no gradient. Used for targets and metrics.
+/// The result is `[views, height, width]`, top row first, in the float type of `vertices`; it has no gradient. Used for targets and metrics.
 /// Faces that the soft rasterizer does not draw are not drawn here either.
 ///
 /// Source: docs/notes.md, Pixels.
@@ -16,11 +15,11 @@ use crate::{ImageSize, NEAR};
 ///
 /// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
 pub fn hard_silhouette<B: Backend>(
-    vertices: Tensor<B, 3>,
+    vertices: Projected<B>,
     faces: &[[u32; 3]],
     size: impl Into<ImageSize>,
 ) -> Tensor<B, 3> {
-    let size = size.into();
+    let (vertices, size) = (vertices.tensor(), size.into());
     let [views, _, _] = vertices.dims();
     let (device, dtype) = (vertices.device(), vertices.dtype());
     let vertices: Vec<f64> = vertices.swap_dims(1, 2).into_data().iter().collect();
@@ -29,8 +28,7 @@ pub fn hard_silhouette<B: Backend>(
     Tensor::from_data(TensorData::new(image, shape), (&device, dtype))
 }
 
-/// The nearest face at the centre of each pixel, edges included: of `vertices` `[vertices, 3]`, x and y in NDC and depth, row by row from
-/// the top; none where there is no face.
+/// The nearest face at the centre of each pixel, edges included, row by row from the top, view after view; none where there is no face.
 ///
 /// The depth of a face there is that of its plane in perspective, as in [`blended`](crate::reference::blended). Of equally near faces the
 /// first is seen. Faces that the soft rasterizer does not draw are not seen either.
@@ -41,27 +39,31 @@ pub fn hard_silhouette<B: Backend>(
 ///
 /// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
 pub fn nearest_faces<B: Backend>(
-    vertices: Tensor<B, 2>,
+    vertices: Projected<B>,
     faces: &[[u32; 3]],
     size: impl Into<ImageSize>,
 ) -> Vec<Option<u32>> {
     let size = size.into();
-    let [count, _] = vertices.dims();
-    let vertices: Vec<f64> = vertices.swap_dims(0, 1).into_data().iter().collect();
-    let mut nearest = vec![(0.0, None); size.pixels()];
-    for (k, face) in faces.iter().enumerate() {
-        let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize]));
-        let closeness = closeness(corners);
-        inside_spans(&vertices, face, NEAR, size, |row, start, end| {
-            let y = size.row_centre(row);
-            for column in start..end {
-                let here = closeness([size.column_centre(column), y]);
-                let seen = &mut nearest[row * size.width + column];
-                if here > seen.0 {
-                    *seen = (here, Some(k as u32));
+    let vertices = vertices.tensor();
+    let [views, count, _] = vertices.dims();
+    let vertices: Vec<f64> = vertices.swap_dims(1, 2).into_data().iter().collect();
+    let mut nearest = vec![(0.0, None); views * size.pixels()];
+    let views = nearest.chunks_mut(size.pixels()).zip(vertices.chunks((3 * count).max(1)));
+    for (nearest, vertices) in views {
+        for (k, face) in faces.iter().enumerate() {
+            let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize]));
+            let closeness = closeness(corners);
+            inside_spans(vertices, face, NEAR, size, |row, start, end| {
+                let y = size.row_centre(row);
+                for column in start..end {
+                    let here = closeness([size.column_centre(column), y]);
+                    let seen = &mut nearest[row * size.width + column];
+                    if here > seen.0 {
+                        *seen = (here, Some(k as u32));
+                    }
                 }
-            }
-        });
+            });
+        }
     }
     nearest.into_iter().map(|(_, face)| face).collect()
 }

@@ -8,14 +8,14 @@
 //!
 //! ```
 //! use softrast_tensor::{NdArray, Tensor};
-//! use softrast_raster::SoftRenderer;
+//! use softrast_raster::{Projected, SoftRenderer};
 //! use softrast_softness::Family;
 //!
 //! // x and y in NDC, and the depth, as a camera gives them.
 //! let corners = [[[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]]];
 //! let corners = Tensor::<NdArray, 3>::from_floats(corners, &Default::default());
 //! let renderer = SoftRenderer::new(&[[0, 1, 2]], 3, Family::Logistic, 0.01);
-//! let alpha: Vec<f32> = renderer.silhouette(corners).into_data().iter().collect();
+//! let alpha: Vec<f32> = renderer.silhouette(Projected::new(corners)).into_data().iter().collect();
 //! // The pixel in the middle, and that at the top left.
 //! assert!(alpha[4] > 0.99 && alpha[0] < 0.01);
 //! ```
@@ -43,6 +43,7 @@ mod picture_loss;
 mod pinhole;
 mod profile;
 mod project;
+mod projected;
 pub mod reference;
 mod shading;
 mod silhouette;
@@ -70,6 +71,7 @@ pub use no_adapter::NoAdapter;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
 pub use pinhole::{Pinhole, PinholeError, Pinholes, rotate_by_tangent};
 pub use project::{Cameras, project};
+pub use projected::Projected;
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use soft_renderer::SoftRenderer;
 pub use softrast_kernel::ImageSize;
@@ -81,7 +83,7 @@ pub use view::view_rotation;
 pub use weighting::Weighting;
 pub use width::{Width, WidthSchedule};
 
-/// Parts of the renderers, for callers that prepare tables, run ops on slices, or measure them.
+/// Parts of the renderers, for callers that prepare tables, run ops on slices, or measure them. They take projected vertices as plain tensors.
 pub mod low_level {
     pub use crate::{
         backend::{Call, profile_sum},

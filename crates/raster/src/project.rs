@@ -1,7 +1,7 @@
 use softrast_tensor::Tensor;
 
 use crate::{
-    RasterBackend,
+    Projected, RasterBackend,
     backend::{elementary, primitive},
     ops::ElementaryOp,
 };
@@ -50,8 +50,7 @@ impl<B: RasterBackend, C: Cameras<B>> Cameras<B> for &C {
 /// Perspective projection.
 ///
 /// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates, `cameras` those of each view; see [`Cameras`].
-/// The result is `[views, vertices, 3]`: x and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera depth in world
-/// units.
+/// The result is `[views, vertices, 3]`.
 ///
 /// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
 /// vertex nearer than [`NEAR`](crate::NEAR) is projected as though it were that near, so that nothing divides
@@ -62,7 +61,7 @@ impl<B: RasterBackend, C: Cameras<B>> Cameras<B> for &C {
 /// # Panics
 ///
 /// If the shapes do not fit.
-pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, cameras: impl Cameras<B>) -> Tensor<B, 3> {
+pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, cameras: impl Cameras<B>) -> Projected<B> {
     let matrices = cameras.matrices();
     let ([held, _, three], [views, ..]) = (vertices.dims(), matrices.dims());
     assert!(
@@ -72,5 +71,5 @@ pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, cameras: impl Cameras<B
     );
     // The rasterizer wants one row for each axis, and turning them back is free.
     let inputs = vec![primitive(vertices), primitive(matrices)];
-    elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2)
+    Projected::new(elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2))
 }

@@ -5,8 +5,8 @@ use softrast_softness::Softness;
 use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
 
 use crate::{
-    HostBackend, ImageSize, RasterBackend, Rasterizer, Silhouette, TConorm, Width, cache::Cache,
-    loss::loss_of_images,
+    HostBackend, ImageSize, Projected, RasterBackend, Rasterizer, Silhouette, TConorm, Width,
+    cache::Cache, loss::loss_of_images,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -199,9 +199,10 @@ impl<S: Softness> SoftRenderer<S> {
 
     /// Coverage `[views, height, width]` in [0, 1], top row first, under the renderer's own parameters.
     ///
-    /// `vertices` `[views, vertices, 3]` holds x and y in NDC and the camera depth, as [`project`](crate::project) returns them. It
-    /// receives gradients, to second order on `Autodiff<Autodiff<B>>`.
-    pub fn silhouette<B: RasterBackend>(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
+    /// `vertices` `[views, vertices, 3]` are what [`project`](crate::project) returns. They
+    /// receive gradients, to second order on `Autodiff<Autodiff<B>>`.
+    pub fn silhouette<B: RasterBackend>(&self, vertices: Projected<B>) -> Tensor<B, 3> {
+        let vertices = vertices.tensor();
         let (silhouette, table) = self.own_table(&vertices);
         self.drawn(&silhouette, vertices, table)
     }
@@ -215,13 +216,13 @@ impl<S: Softness> SoftRenderer<S> {
     /// If `phi` has the wrong length.
     pub fn silhouette_with<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         phi: &Tensor<B, 1>,
     ) -> Tensor<B, 3> {
         let values: Vec<f64> = phi.to_data().iter().collect();
         let silhouette = self.prepared::<B>(&values);
         let table = silhouette.table(phi.clone());
-        self.drawn(&silhouette, vertices, table)
+        self.drawn(&silhouette, vertices.tensor(), table)
     }
 
     /// This renderer on images of another size. Both share knots and tables.
@@ -291,7 +292,7 @@ impl<S: Softness> SoftRenderer<S> {
     /// If the target is of another size.
     pub fn mse_loss<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
         self.loss(PixelLoss::SquaredError, vertices, target, None)
@@ -304,7 +305,7 @@ impl<S: Softness> SoftRenderer<S> {
     /// If the target is of another size.
     pub fn iou_loss<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         target: Tensor<B, 3>,
     ) -> Tensor<B, 1> {
         self.loss(PixelLoss::Iou, vertices, target, None)
@@ -318,7 +319,7 @@ impl<S: Softness> SoftRenderer<S> {
     /// If the target or the shares are of another size.
     pub fn weighted_mse_loss<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         target: Tensor<B, 3>,
         counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
@@ -332,7 +333,7 @@ impl<S: Softness> SoftRenderer<S> {
     /// If the target or the shares are of another size.
     pub fn weighted_iou_loss<B: RasterBackend>(
         &self,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         target: Tensor<B, 3>,
         counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
@@ -342,7 +343,7 @@ impl<S: Softness> SoftRenderer<S> {
     fn loss<B: RasterBackend>(
         &self,
         loss: PixelLoss,
-        vertices: Tensor<B, 3>,
+        vertices: Projected<B>,
         target: Tensor<B, 3>,
         counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
@@ -350,6 +351,7 @@ impl<S: Softness> SoftRenderer<S> {
             let counted = counted.map(Tensor::detach);
             return loss_of_images(loss, self.silhouette(vertices), target.detach(), counted);
         }
+        let vertices = vertices.tensor();
         let (silhouette, table) = self.own_table(&vertices);
         silhouette.loss(loss, vertices, table, target, counted)
     }

@@ -3,8 +3,8 @@
 use std::{array, sync::Arc, time::Instant};
 
 use softrast_raster::{
-    Attributes, Background, ColourRenderer, Light, NEAR, RasterBackend, Weighting, lambert,
-    project, vertex_normals, view_rotation,
+    Attributes, Background, ColourRenderer, Light, NEAR, Projected, RasterBackend, Weighting,
+    lambert, project, vertex_normals, view_rotation,
 };
 use softrast_softness::{DepthSoftness, Family};
 use softrast_tensor::{Tensor, numbers};
@@ -38,7 +38,7 @@ pub(crate) struct Coloured<B: RasterBackend> {
 impl<B: RasterBackend> Coloured<B> {
     pub(crate) fn new(scene: &Scene, colour: &Colour) -> Self {
         let (vertices, orbits) = (scene.vertices::<B>(), scene.orbits::<B>());
-        let depths = project(vertices.clone(), orbits.clone()).narrow(2, 2, 1);
+        let depths = project(vertices.clone(), orbits.clone()).tensor().narrow(2, 2, 1);
         let renderer = renderer(scene, colour, &numbers(depths));
         // Lights are drawn in one channel, colours in three; both are seen before black.
         let backgrounds = [3, 1].map(|n| renderer.background(&vec![0.0; n], &Default::default()));
@@ -57,10 +57,11 @@ impl<B: RasterBackend> Coloured<B> {
     /// Draws all views once.
     pub(crate) fn step(&self) -> Step {
         let start = Instant::now();
-        let seen = project(self.vertices.clone(), self.orbits.clone());
+        let seen = project(self.vertices.clone(), self.orbits.clone()).tensor();
         let views = seen.dims()[0];
         // One after the other: all samples of all views take much memory.
-        let images = (0..views).map(|view| self.view(seen.clone().narrow(0, view, 1), view));
+        let images =
+            (0..views).map(|view| self.view(Projected::new(seen.clone().narrow(0, view, 1)), view));
         let (images, shares): (Vec<_>, Vec<_>) = images.unzip();
         let mean_alpha = shares.iter().sum::<f64>() / views as f64;
         let forward_ms = milliseconds::<B>(start);
@@ -68,7 +69,7 @@ impl<B: RasterBackend> Coloured<B> {
     }
 
     /// Red, green and blue `[3, size, size]` on white, and the mean share of the faces.
-    fn view(&self, seen: Tensor<B, 3>, view: usize) -> (Vec<f64>, f64) {
+    fn view(&self, seen: Projected<B>, view: usize) -> (Vec<f64>, f64) {
         let [of_colours, of_light] = &self.backgrounds;
         let drawn = numbers(self.renderer.image(seen.clone(), &self.colours, of_colours));
         let light = self.shade.then(|| {

@@ -46,7 +46,7 @@ impl<B: RasterBackend> Fused<B> {
         let rasterizer = Rasterizer { t_conorm: scene.t_conorm, ..Rasterizer::new(scene.size) };
         let usual = rasterizer.prepare(&scene.faces, scene.softness, &scene.phi::<B>());
         let [pairs, kept] = [&self.silhouette, &usual]
-            .map(|of| of.pairs(project(self.vertices.clone(), self.orbits.clone())));
+            .map(|of| of.pairs(project(self.vertices.clone(), self.orbits.clone()).tensor()));
         (pairs, kept.saturating_sub(pairs) as f64 / kept.max(1) as f64)
     }
 
@@ -87,7 +87,7 @@ impl<B: RasterBackend> Fused<B> {
         orbits: Tensor<C, 2>,
         table: Tensor<C, 2>,
     ) -> Tensor<C, 3> {
-        self.silhouette.coverage_by_table(project(vertices, orbits), table)
+        self.silhouette.coverage_by_table(project(vertices, orbits).tensor(), table)
     }
 }
 

@@ -22,7 +22,7 @@ const PART: usize = 1 << 23;
 pub(crate) fn step(scene: &Scene, quiet: bool) -> Step {
     let start = Instant::now();
     let vertices = scene.vertices::<A>().require_grad();
-    let projected = project(vertices.clone(), scene.orbits::<A>());
+    let projected = project(vertices.clone(), scene.orbits::<A>()).tensor();
     let corners = projected.clone().inner();
     let phi = || scene.phi::<B>();
     let sums = in_parts(scene, quiet, |part| {

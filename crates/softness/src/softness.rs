@@ -32,6 +32,10 @@ use crate::math::{bounded_depth, ln_scale, with_first};
 ///
 /// assert_eq!(Arctan.default_phi(0.02), [0.02_f64.ln()]);
 /// ```
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no softness",
+    note = "`Family`, `EdgeSoftness` and `DepthSoftness` are some; for one of your own implement `Softness::value`, and `Clone` and `Debug`"
+)]
 pub trait Softness: Clone + Debug + Send + Sync + 'static {
     /// Coverage `s(x)` in [0, 1], same shape as `x`; `phi` is `[parameters]`.
     fn value<B: Backend, const D: usize>(&self, phi: Tensor<B, 1>, x: Tensor<B, D>)

@@ -24,8 +24,8 @@ fn main() {
     let seen =
         project(vertices(fox.positions(), &device), Orbit::tensors::<Plain>(&cameras, &device));
 
-    // Between these depths lies the fox; one pixel is 2 / 64 wide.
-    let renderer = ColourRenderer::new(fox.faces(), SIZE, Family::Logistic, 0.005, [1.7, 3.7]);
+    // The fox lies between these planes; one pixel is 2 / 64 wide.
+    let renderer = ColourRenderer::new(fox.faces(), SIZE, Family::Logistic, 0.005, seen.planes());
     let background = renderer.background::<Plain>(&[0.0, 0.0, 0.0], &device);
 
     // Pictures `[6, 4, 64, 64]`, the last channel a mask; here of a fox whose colours follow its shape.
@@ -41,7 +41,7 @@ fn main() {
     for step in 0..=STEPS {
         let leaf = Tensor::<B, 3>::from_inner(colours.clone()).require_grad();
         let attributes = Attributes::of_vertices(leaf.clone(), fox.faces());
-        let image = renderer.image(Tensor::from_inner(seen.clone()), &attributes, &behind);
+        let image = renderer.image(Projected::from_inner(seen.clone()), &attributes, &behind);
         let off = image - Tensor::from_inner(pictures.clone());
         let loss = off.powi_scalar(2).mean();
         if step % 20 == 0 {

@@ -27,7 +27,7 @@ fn main() -> anyhow::Result<()> {
     let method = Method::new("learned", learned);
     let instances = [problem.instance(0)?];
     // `false`: without pictures of the steps.
-    let end = minimize::<_, NdArray>(&problem, &instances, &method, &runs, false, |_, _| Ok(()))?;
+    let end = minimize::<_, NdArray>(&problem, &instances, &method, &runs, |_, _| Ok(()))?;
     println!("IoU loss of the hard image: {:.4}", end.hard_loss[0]);
     Ok(())
 }

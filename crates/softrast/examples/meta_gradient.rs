@@ -17,8 +17,7 @@ type Inner = Autodiff<Outer>;
 fn main() {
     let (mesh, device) = (fox(), Default::default());
     let camera = Orbit { distance: 2.7, elevation_deg: 10.0, azimuth_deg: 0.0, fov_deg: 60.0 };
-    let seen: Tensor<Plain, 3> =
-        project(vertices(mesh.positions(), &device), camera.tensor(&device));
+    let seen = project::<Plain>(vertices(mesh.positions(), &device), camera.tensor(&device));
     let target = hard_silhouette(seen, mesh.faces(), 32);
     let target = Tensor::<Inner, 3>::from_inner(Tensor::from_inner(target));
     let renderer = SoftRenderer::new(mesh.faces(), 32, Family::Logistic, 0.02);

@@ -32,7 +32,7 @@ fn main() -> anyhow::Result<()> {
     let learned = Method::new("learned", ScheduledSoftness::load_own(Arctan, &file)?);
     let poses = [0, 1, 2, 3].map(|seed| pose.instance(seed).expect("one for each seed"));
     for method in [start, learned] {
-        let end = minimize::<_, NdArray>(&pose, &poses, &method, &runs, false, |_, _| Ok(()))?;
+        let end = minimize::<_, NdArray>(&pose, &poses, &method, &runs, |_, _| Ok(()))?;
         println!("{}: IoU loss {:.4}", method.name, end.hard_loss.iter().sum::<f64>() / 4.0);
     }
     Ok(())

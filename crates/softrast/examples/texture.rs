@@ -28,7 +28,7 @@ fn main() {
         [0.0, 60.0, 120.0, 180.0, 240.0, 300.0].map(|azimuth_deg| Orbit { azimuth_deg, ..front });
     let world = vertices::<Plain>(fox.positions(), &device);
     let seen = project(world.clone(), Orbit::tensors(&cameras, &device));
-    let renderer = ColourRenderer::new(fox.faces(), SIZE, Family::Logistic, 0.005, [1.7, 3.7]);
+    let renderer = ColourRenderer::new(fox.faces(), SIZE, Family::Logistic, 0.005, seen.planes());
     // What each vertex throws back of a lamp, drawn once, since neither the shape nor the lamp moves.
     let [towards, colour] = [[0.5, 1.0, -0.5], [1.0; 3]].map(|x| Tensor::from_floats(x, &device));
     let normals = vertex_normals(world.clone(), fox.faces());
@@ -51,7 +51,7 @@ fn main() {
     for step in 0..=STEPS {
         let leaf = Tensor::<B, 3>::from_inner(texture.clone()).require_grad();
         let painted = paint.clone().with_texture(leaf.clone());
-        let image = renderer.image(Tensor::from_inner(seen.clone()), &painted, &behind);
+        let image = renderer.image(Projected::from_inner(seen.clone()), &painted, &behind);
         let lit = image.narrow(1, 0, 3) * Tensor::from_inner(light.clone());
         let loss = mse_loss(lit, Tensor::from_inner(pictures.clone())).mean();
         if step % 20 == 0 {

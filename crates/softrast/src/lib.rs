@@ -1,14 +1,23 @@
 //! Differentiable soft rasterizer on burn whose softness is learned.
 //!
-//! This crate re-exports the libraries of the project under short names; each can be used alone:
+//! | to | there is | example |
+//! |---|---|---|
+//! | draw a silhouette and differentiate it | [`SoftRenderer`](raster::SoftRenderer), [`project`](raster::project) | below, [`silhouette`] |
+//! | read masks, pictures and cameras of a folder as tensors | [`Views`](views::Views) | [`fit_masks`] |
+//! | move vertices by burn's optimisers | [`VertexModel`](inverse::VertexModel), [`Surface`](inverse::Surface) for smoothness | [`fit_masks`] |
+//! | narrow the edge over a run | [`Width`](raster::Width) in pixels, [`ScheduledSoftness`](inverse::ScheduledSoftness) | [`fit_masks`] |
+//! | compare images | [`iou_loss`](raster::iou_loss), [`mse_loss`](raster::mse_loss), [`ssim_loss`](raster::ssim_loss), [`multi_scale_loss`](raster::multi_scale_loss) | [`fit`] |
+//! | draw colours and textures, and differentiate them | [`ColourRenderer`](raster::ColourRenderer), [`Attributes`](raster::Attributes) | [`colour`], [`texture`] |
+//! | light a mesh | [`lambert`](raster::lambert), [`phong`](raster::phong), [`spherical_harmonics`](raster::spherical_harmonics) | [`texture`] |
+//! | find the camera of a mask | [`PoseSearch`](inverse::pose::PoseSearch) | [`pose_from_mask`] |
+//! | use a camera of a file or of one's own | [`Pinhole`](raster::Pinhole), [`Orbit`](raster::Orbit), [`Lens`](views::Lens), [`Cameras`](raster::Cameras) | [`pose_from_mask`] |
+//! | define a softness | [`Softness`](softness::Softness) | [`own_softness`] |
+//! | learn a softness, and keep it in a file | [`learn`](fn@inverse::learn), [`NamedSoftness`](inverse::NamedSoftness) | [`learn`](https://github.com/softrast/softrast/blob/main/crates/softrast/examples/learn.rs), [`own_learned`] |
+//! | differentiate through an optimisation | [`meta`], `Autodiff<Autodiff<_>>` | [`meta_gradient`] |
+//! | read and write meshes | [`Mesh`](mesh::Mesh) | [`fit_masks`] |
 //!
-//! - [`mesh`]: triangle meshes, a careful reader of OBJ, PLY, STL, OFF, GLB and glTF, generators;
-//! - [`softness`]: soft step functions as burn tensor ops;
-//! - [`raster`]: cameras, silhouettes, colours, losses, exact to second order;
-//! - [`meta`]: optimisers and inner loops that can be differentiated;
-//! - [`inverse`]: problems of inverse rendering; `minimize` solves them, `learn` learns a softness on them;
-//!   softnesses over a run, and their files;
-//! - [`views`]: pictures, masks and cameras of nerfstudio, COLMAP and OpenCV, and the visual hull.
+//! Each module is a crate that can be used alone; [`prelude`] has what most programs need. Derivatives are exact to second order. Errors are
+//! returned for what comes from files; wrong shapes panic, with what was found and what was expected.
 //!
 //! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other releases of burn do not fit. The Cargo features
 //! `ndarray` (default), `flex` and `wgpu` choose the backend.
@@ -26,6 +35,16 @@
 //! let gradient = camera.grad(&alpha.mean().backward()).unwrap();
 //! assert_eq!(gradient.dims(), [1, 4]);
 //! ```
+//!
+//! [`silhouette`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/silhouette.rs
+//! [`fit_masks`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/fit_masks.rs
+//! [`fit`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/fit.rs
+//! [`colour`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/colour.rs
+//! [`texture`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/texture.rs
+//! [`pose_from_mask`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/pose_from_mask.rs
+//! [`own_softness`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_softness.rs
+//! [`own_learned`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_learned.rs
+//! [`meta_gradient`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/meta_gradient.rs
 
 pub mod prelude;
 

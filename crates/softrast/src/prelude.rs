@@ -9,9 +9,9 @@ pub use softrast_inverse::{
 pub use softrast_mesh::{Mesh, MeshError};
 pub use softrast_meta::MetaGradient;
 pub use softrast_raster::{
-    Attributes, Background, Cameras, ColourRenderer, Orbit, Pinhole, Pinholes, RasterBackend,
-    SoftRenderer, TConorm, Weighting, Width, hard_silhouette, iou_loss, mse_loss, project,
-    vertices,
+    Attributes, Background, Cameras, ColourRenderer, Orbit, Pinhole, Pinholes, Projected,
+    RasterBackend, SoftRenderer, TConorm, Weighting, Width, hard_silhouette, iou_loss, mse_loss,
+    project, vertices,
 };
 pub use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 pub use softrast_tensor::{Backend, Tensor};

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use softrast_inverse::{PhiLayout, Resolution, ScheduledRenderer, ScheduledSoftness};
-use softrast_raster::{RasterBackend, TConorm, low_level::Rasterizer, reference};
+use softrast_raster::{Projected, RasterBackend, TConorm, low_level::Rasterizer, reference};
 use softrast_tensor::{Autodiff, NdArray, Tensor, numbers, tensor};
 
 use crate::planar_scene::{PlanarScene, Random};
@@ -84,7 +84,7 @@ impl<B: RasterBackend> Renderer<B> {
     /// `[size * size]`.
     pub fn draw(&self, flat: &PlanarScene, weights: &[f64]) -> Drawn {
         drawn::<B>(flat, self.size, weights, |vertices| {
-            self.renderer.at(STEPS).silhouette(vertices)
+            self.renderer.at(STEPS).silhouette(Projected::new(vertices))
         })
     }
 }

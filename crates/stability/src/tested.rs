@@ -153,7 +153,7 @@ pub fn descend<P: InverseProblem>(
     let tolerance = Some(Rasterizer::TOLERANCE);
     let method = Method { tolerance, ..Method::new("tested", softness) };
     let mut end = Descended { hard: Vec::new(), thetas: Vec::new(), numbers: Vec::new() };
-    minimize::<P, Single>(problem, instances, &method, &config, false, |iterate, _| {
+    minimize::<P, Single>(problem, instances, &method, &config, |iterate, _| {
         let theta = numbers(iterate.theta.clone());
         end.numbers.extend(iterate.loss.iter().chain(&iterate.hard_loss).chain(&theta));
         end.hard.push(iterate.hard_loss.clone());

@@ -232,7 +232,7 @@ fn contradictions_are_usage_errors_and_missing_files_are_not() {
         assert!(failure.message.contains(part), "{line}: {failure}");
     }
     let failure = with_mesh("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "--colour").unwrap_err();
-    assert!(failure.code == 2 && failure.message.contains("mesh.obj has none"), "{failure}");
+    assert!(failure.code == 2 && failure.message.contains("mesh.obj has neither"), "{failure}");
 }
 
 #[test]

@@ -87,7 +87,7 @@ impl<B: RasterBackend> Objective<B> {
         let others = views[pairs..].iter().chain(&views[..pairs]);
         let orbits = orbits(views.iter().chain(others).copied(), &vertices.device());
         let shapes = Tensor::cat(vec![vertices.clone(), vertices], 0).swap_dims(1, 2);
-        let drawn = self.silhouette.coverage(project(shapes, orbits), softness.phi.val());
+        let drawn = self.silhouette.coverage(project(shapes, orbits).tensor(), softness.phi.val());
         iou_loss(drawn, targets).mean()
     }
 }

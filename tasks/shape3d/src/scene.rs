@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use softrast_inverse::{Surface, Targets};
 use softrast_mesh::{Edges, Mesh};
-use softrast_raster::{RasterBackend, hard_silhouette, project};
+use softrast_raster::{Projected, RasterBackend, hard_silhouette, project};
 use softrast_tensor::{Tensor, tensor};
 
 use crate::Instance;
@@ -92,14 +92,13 @@ impl<B: RasterBackend> Scene<B> {
         size * away + centre
     }
 
-    /// Vertices `[vertices, 3]` as each camera sees them, `[views, vertices, 3]`: x and y in NDC, and
-    /// the depth.
-    pub fn project(&self, vertices: Tensor<B, 2>) -> Tensor<B, 3> {
+    /// Vertices `[vertices, 3]` as each camera sees them, `[views, vertices, 3]`.
+    pub fn project(&self, vertices: Tensor<B, 2>) -> Projected<B> {
         project(vertices.unsqueeze(), self.orbits.clone())
     }
 
     /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
-    pub fn hard(&self, projected: Tensor<B, 3>) -> Tensor<B, 3> {
+    pub fn hard(&self, projected: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(projected, &self.faces, self.size)
     }
 

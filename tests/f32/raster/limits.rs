@@ -111,7 +111,7 @@ fn gradients_are_finite_on_every_broken_mesh_that_loads() {
         let softness = EdgeSoftness { family: Family::Logistic, squared: false };
         let phi = tensor::<A>(&softness.default_phi(0.02), DType::F32).require_grad();
         let silhouette = Rasterizer::new(SIZE).prepare(&mesh.faces().into(), softness, &phi);
-        let image = silhouette.coverage(project(shaped, orbit), phi.clone());
+        let image = silhouette.coverage(project(shaped, orbit).tensor(), phi.clone());
         assert!(image.to_data().iter::<f64>().all(|a| (0.0..=1.0).contains(&a)), "{path:?}");
         let grads = (image.clone() * image).sum().backward();
         let grad = vertices.grad(&grads).expect("vertices are tracked");
@@ -132,7 +132,7 @@ fn drawn(softness: EdgeSoftness, scale: f64) -> String {
     let orbit = tensor::<N>(&[3.0, 10.0, 90.0, 40.0], DType::F32).reshape([1, 4]);
     let phi = tensor::<N>(&softness.default_phi(scale), DType::F32);
     let silhouette = Rasterizer::new(WIDE).prepare(&fox.faces().into(), softness, &phi);
-    let image = silhouette.coverage(project(vertices, orbit), phi);
+    let image = silhouette.coverage(project(vertices, orbit).tensor(), phi);
     let character = |a: f64| match (10.0 * a).round() as u32 {
         0 => '.',
         10.. => '#',

@@ -25,7 +25,7 @@ fn products(softness: EdgeSoftness, scale: f64, dtype: DType) -> [Vec<f64>; 4] {
     let world = tensor::<NdArray<f32>>(mesh.positions().as_flattened(), dtype);
     let camera = tensor::<NdArray<f32>>(&[2.732, 10.0, 30.0, 60.0], dtype).reshape([1, 4]);
     let projected = project(world.reshape([1, mesh.positions().len() as i64, 3]), camera);
-    let inner = Tensor::<A, 3>::from_inner(projected).require_grad();
+    let inner = Tensor::<A, 3>::from_inner(projected.tensor()).require_grad();
     let inner_phi = tensor::<A>(&softness.default_phi(scale), dtype).require_grad();
     let vertices = Tensor::<AA, 3>::from_inner(inner.clone()).require_grad();
     let phi = Tensor::<AA, 1>::from_inner(inner_phi.clone()).require_grad();

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use softrast_raster::{Attributes, Background, ColourRenderer, NEAR, RasterBackend, Weighting};
+use softrast_raster::{
+    Attributes, Background, ColourRenderer, NEAR, Projected, RasterBackend, Weighting,
+};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, tensor};
@@ -95,7 +97,12 @@ where
     let log_weight = tensor::<Autodiff<B>, 1>(&[log_weight], [1]).require_grad();
     let background = Background { colour: tensor(&[0.0], [1]), log_weight: log_weight.clone() };
     let attributes = Attributes::of_faces(values.clone());
-    let image = renderer.image_with(vertices.clone(), &attributes, [&edge, &depth], &background);
+    let image = renderer.image_with(
+        Projected::new(vertices.clone()),
+        &attributes,
+        [&edge, &depth],
+        &background,
+    );
     let grads = (image.clone() * image.clone()).sum().backward();
     let all = [
         numbers(vertices.grad(&grads).unwrap()),
@@ -255,7 +262,7 @@ fn second_order_is_finite_and_symmetric() {
         let vertices = Tensor::<AA, 3>::from_inner(inner.clone()).require_grad();
         let attributes = Attributes::of_faces(tensor::<AA, 3>(&[0.2, 0.9], [1, 2, 1]));
         let background = renderer.background::<AA>(&[0.5], &Default::default());
-        let image = renderer.image(vertices.clone(), &attributes, &background);
+        let image = renderer.image(Projected::new(vertices.clone()), &attributes, &background);
         let grads = (image.clone() * image).sum().backward();
         let along = vertices.grad(&grads).unwrap() * tensor::<A, 3>(&direction, [1, 6, 3]);
         numbers(inner.grad(&along.sum().backward()).unwrap())

@@ -20,7 +20,7 @@ fn iterates(
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
     let method = Method::new("none", ScheduledSoftness::constant(softness, 0.1));
     let config = problem.defaults();
-    minimize::<_, B>(problem, instances, &method, &config, false, |iterate, _| visit(iterate))?;
+    minimize::<_, B>(problem, instances, &method, &config, |iterate, _| visit(iterate))?;
     Ok(())
 }
 
@@ -79,7 +79,7 @@ fn a_rate_falls_geometrically_to_its_end() {
     let problem = Square { floor: -1e9, seen: true };
     let mut places = Vec::new();
     // So far away that all gradients are alike and Adam takes steps as long as its rate.
-    minimize::<_, B>(&problem, &[1e6], &method, &problem.defaults(), false, |now, _| {
+    minimize::<_, B>(&problem, &[1e6], &method, &problem.defaults(), |now, _| {
         places.push(numbers(now.theta.clone())[0]);
         Ok(())
     })
@@ -137,7 +137,7 @@ fn a_run_that_is_stuck_begins_again_from_another_start_if_there_is_one() {
             scales.push(now.scale);
             Ok(())
         };
-        minimize::<_, B>(&problem, &[start], &method, &config, false, |now, _| visit(now)).unwrap();
+        minimize::<_, B>(&problem, &[start], &method, &config, |now, _| visit(now)).unwrap();
         assert!((places[1] - second).abs() < 1e-6 && places[0] == start, "{places:?}");
         // The first step of an Adam that begins again has the length of the learning rate.
         assert!((places[1] - places[2] - 0.25).abs() < 1e-6, "{places:?}");
@@ -151,6 +151,6 @@ fn a_run_that_is_stuck_begins_again_from_another_start_if_there_is_one() {
 fn runs_with_feedback_are_solved_one_at_a_time() {
     let problem = Square { floor: 0.0, seen: true };
     let (method, config) = (with_feedback(), problem.defaults());
-    let end = minimize::<_, B>(&problem, &START, &method, &config, false, |_, _| Ok(()));
+    let end = minimize::<_, B>(&problem, &START, &method, &config, |_, _| Ok(()));
     assert!(end.unwrap_err().to_string().contains("one instance at a time, found 2"));
 }

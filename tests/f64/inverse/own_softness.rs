@@ -8,7 +8,7 @@ use softrast_inverse::{
     SolveConfig, learn, minimize,
 };
 use softrast_meta::MetaGradient;
-use softrast_raster::low_level::Rasterizer;
+use softrast_raster::{Projected, low_level::Rasterizer};
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, NdArray, Tensor};
 use softrast_tests::{Arctan, lopsided_mesh, vector};
@@ -23,17 +23,10 @@ fn solved<P: InverseProblem>(
 ) -> [f64; 2] {
     let method = Method::new("arctan", softness);
     let mut seen = Vec::new();
-    minimize::<_, B>(
-        problem,
-        &[problem.instance(0).unwrap()],
-        &method,
-        config,
-        false,
-        |iterate, _| {
-            seen.push(iterate.hard_loss[0]);
-            Ok(())
-        },
-    )
+    minimize::<_, B>(problem, &[problem.instance(0).unwrap()], &method, config, |iterate, _| {
+        seen.push(iterate.hard_loss[0]);
+        Ok(())
+    })
     .unwrap();
     [seen[0], seen[seen.len() - 1]]
 }
@@ -108,7 +101,7 @@ fn an_own_softness_is_learned_and_draws_the_same_out_of_its_file() {
     let corners = vector::<B>(&[-0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.6, 1.0]);
     let drawn = |softness: &ScheduledSoftness<Arctan>| {
         let renderer = softness.renderer_at(0.5, Rasterizer::new(16), [[0, 1, 2]].into());
-        renderer.silhouette(corners.clone().reshape([1, 3, 3])).into_data()
+        renderer.silhouette(Projected::new(corners.clone().reshape([1, 3, 3]))).into_data()
     };
     assert_eq!(drawn(&read), drawn(&learned));
 }

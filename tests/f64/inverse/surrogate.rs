@@ -6,7 +6,7 @@ use softrast_inverse::{
     PhiLayout, Resolution, ScaleSchedule, ScheduledRenderer, ScheduledSoftness, Surrogate,
 };
 use softrast_raster::{
-    SoftRenderer,
+    Projected, SoftRenderer,
     low_level::{Rasterizer, Silhouette},
 };
 use softrast_softness::{EdgeSoftness, Family, Softness};
@@ -57,7 +57,7 @@ fn renderer(softness: ScheduledSoftness) -> ScheduledRenderer {
 }
 
 fn image_at(renderer: &ScheduledRenderer, step: usize) -> Vec<f64> {
-    numbers(renderer.at::<B>(step).silhouette(tensor(&CORNERS, [1, 6, 3])))
+    numbers(renderer.at::<B>(step).silhouette(Projected::new(tensor(&CORNERS, [1, 6, 3]))))
 }
 
 fn image(softness: ScheduledSoftness) -> Vec<f64> {
@@ -65,7 +65,7 @@ fn image(softness: ScheduledSoftness) -> Vec<f64> {
 }
 
 fn gradient_at(renderer: &ScheduledRenderer, step: usize) -> Vec<f64> {
-    gradient(|corners| (renderer.at(step).silhouette(corners) * weights()).sum())
+    gradient(|corners| (renderer.at(step).silhouette(Projected::new(corners)) * weights()).sum())
 }
 
 #[test]
@@ -121,8 +121,11 @@ fn a_renderer_at_a_part_of_a_run_has_both_scales_of_that_part() {
         let by_hand = SoftRenderer::new(&faces(), SIZE, LOGISTIC, scale)
             .with_surrogate(LOGISTIC, 3.0 * scale);
         let [found, expected] = [moved, by_hand].map(|renderer| {
-            let image = numbers(renderer.silhouette(tensor::<B, 3>(&CORNERS, [1, 6, 3])));
-            let felt = gradient(|corners| (renderer.silhouette(corners) * weights()).sum());
+            let image =
+                numbers(renderer.silhouette(Projected::new(tensor::<B, 3>(&CORNERS, [1, 6, 3]))));
+            let felt = gradient(|corners| {
+                (renderer.silhouette(Projected::new(corners)) * weights()).sum()
+            });
             [image, felt].concat()
         });
         for (a, b) in found.into_iter().zip(expected) {

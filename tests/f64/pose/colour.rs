@@ -28,7 +28,7 @@ impl<B: RasterBackend> Objective<B> for Three {
         let rasterizer = Rasterizer { tolerance: 1e-9, ..Rasterizer::new(SIZE) };
         let silhouette = rasterizer.prepare(&painted_fox().faces().into(), SOFTNESS, &phi);
         let scene = scene::<B>();
-        let image = scene.image_with(theta, |seen| silhouette.coverage(seen, phi.clone()));
+        let image = scene.image_with(theta, |seen| silhouette.coverage(seen.tensor(), phi.clone()));
         scene.image_loss(image).sum()
     }
 }

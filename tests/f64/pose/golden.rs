@@ -52,7 +52,7 @@ fn targets_and_losses_before_any_step_are_those_measured_before() {
         let softness = EdgeSoftness { family, squared: false };
         let phi = vector::<B>(&softness.default_phi(scale));
         let silhouette = Rasterizer::new(SIZE).prepare(&mesh.faces().into(), softness, &phi);
-        let image = silhouette.coverage(projected.clone(), phi);
+        let image = silhouette.coverage(projected.clone().tensor(), phi);
         let loss = sum(iou_loss(image, target.clone()));
         assert_close(&format!("{family} {scale}"), loss, expected, TOLERANCE);
     }

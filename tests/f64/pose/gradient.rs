@@ -24,7 +24,7 @@ fn losses(
     theta: Tensor<A, 2>,
 ) -> Tensor<A, 1> {
     let phi = EdgeSoftness { family: Family::Logistic, squared: false }.default_phi(0.05);
-    let image = silhouette.coverage(scene.project(theta), vector(&phi));
+    let image = silhouette.coverage(scene.project(theta).tensor(), vector(&phi));
     iou_loss(image, scene.target())
 }
 

@@ -35,7 +35,7 @@ fn view_square(vertex: [f64; 3], [distance, elevation, azimuth, fov]: [f64; 4]) 
 fn projected(vertex: [f64; 3], orbit: [f64; 4]) -> Vec<f64> {
     let device = Default::default();
     let vertices = Tensor::<B, 1>::from_data(vertex, &device).reshape([1, 1, 3]);
-    numbers(project(vertices, Tensor::<B, 1>::from_data(orbit, &device).reshape([1, 4])))
+    numbers(project(vertices, Tensor::<B, 1>::from_data(orbit, &device).reshape([1, 4])).tensor())
 }
 
 #[test]

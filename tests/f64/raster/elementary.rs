@@ -60,7 +60,7 @@ fn parts(x: Tensor<AA, 1>) -> (Tensor<AA, 3>, Tensor<AA, 2>) {
 
 fn projected(x: Tensor<AA, 1>) -> Tensor<AA, 1> {
     let (vertices, orbits) = parts(x);
-    project(vertices, orbits).flatten(0, 2)
+    project(vertices, orbits).tensor().flatten(0, 2)
 }
 
 #[test]

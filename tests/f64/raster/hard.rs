@@ -1,7 +1,7 @@
 //! Which face a pixel shows.
 
-use softrast_raster::nearest_faces;
-use softrast_tensor::NdArray;
+use softrast_raster::{Projected, nearest_faces};
+use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::tensor;
 
 #[test]
@@ -16,13 +16,14 @@ fn of_faces_that_cut_one_another_each_is_seen_where_it_is_nearer() {
         [1.0, 1.0, 4.0],
         [-1.0, 1.0, 1.0],
     ];
-    let vertices = tensor::<NdArray<f64>, 2>(vertices.as_flattened(), [vertices.len(), 3]);
+    let vertices = tensor::<NdArray<f64>, 3>(vertices.as_flattened(), [1, vertices.len(), 3]);
     let faces = [[0, 1, 2], [3, 4, 5], [3, 5, 6]];
-    let row = &nearest_faces(vertices.clone(), &faces, 6)[12..18];
+    let both = Tensor::cat(vec![vertices.clone(), vertices + 50.0], 0);
+    let seen = nearest_faces(Projected::new(both), &faces, 6);
+    let (row, away) = (&seen[12..18], &seen[36..]);
     assert_eq!(row[..2], [Some(2); 2], "above the diagonal");
     assert_eq!(row[4..], [Some(0); 2]);
     assert!(row[2..4].iter().all(|face| matches!(face, Some(1 | 2))), "{row:?}");
-    let away = nearest_faces(vertices + 50.0, &faces, 6);
     assert_eq!(away, [None; 36]);
 }
 
@@ -30,7 +31,7 @@ fn of_faces_that_cut_one_another_each_is_seen_where_it_is_nearer() {
 fn of_equally_near_faces_the_first_is_seen_and_flat_ones_never() {
     let vertices =
         [[-9.0, -9.0, 2.0], [9.0, -9.0, 2.0], [0.0, 9.0, 2.0], [0.0, 9.0, 1.0], [0.0, -9.0, 1.0]];
-    let vertices = tensor::<NdArray<f64>, 2>(vertices.as_flattened(), [vertices.len(), 3]);
+    let vertices = tensor::<NdArray<f64>, 3>(vertices.as_flattened(), [1, vertices.len(), 3]);
     let faces = [[3, 4, 4], [2, 1, 0], [0, 1, 2]];
-    assert_eq!(nearest_faces(vertices, &faces, 3), [Some(1); 9]);
+    assert_eq!(nearest_faces(Projected::new(vertices), &faces, 3), [Some(1); 9]);
 }

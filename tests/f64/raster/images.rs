@@ -1,6 +1,8 @@
 //! Images that are no squares.
 
-use softrast_raster::{ImageSize, TConorm, hard_silhouette, low_level::Rasterizer, reference};
+use softrast_raster::{
+    ImageSize, Projected, TConorm, hard_silhouette, low_level::Rasterizer, reference,
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
@@ -93,7 +95,7 @@ fn a_lower_image_shows_the_middle_of_a_square_one() {
         let phi = vector(&softness.default_phi(0.05 * factor));
         let rasterizer = Rasterizer { tolerance: TOLERANCE, ..Rasterizer::new(size) };
         let soft = rasterizer.prepare(&faces, softness, &phi).coverage(vertices.clone(), phi);
-        [numbers(soft), numbers(hard_silhouette(vertices, &faces, size))]
+        [numbers(soft), numbers(hard_silhouette(Projected::new(vertices), &faces, size))]
     };
     let square = drawn(SIDE.into(), 1.0);
     let rows = SIDE * SIDE / 4..3 * SIDE * SIDE / 4;

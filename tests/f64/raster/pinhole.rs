@@ -44,7 +44,7 @@ fn a_point_is_in_the_pixel_that_was_worked_out_by_hand() {
     let seen = project(vertices::<B>(&[point], &device), Pinholes::new(&[camera], &device));
     // A pixel is 2 / 150 wide; the middle of the image is at (100, 75).
     let expected = [(258.5 - 100.0) / 75.0, (75.0 + 22.75) / 75.0, 5.0];
-    assert_close(&numbers(seen), &expected, 1e-12);
+    assert_close(&numbers(seen.tensor()), &expected, 1e-12);
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn seen(x: Tensor<AA, 1>) -> Tensor<AA, 1> {
         intrinsics: part(21, 4).reshape([1, 4]),
         size: start.size,
     };
-    project(part(0, 9).reshape([1, 3, 3]), &cameras).flatten(0, 2)
+    project(part(0, 9).reshape([1, 3, 3]), &cameras).tensor().flatten(0, 2)
 }
 
 fn point(tangent: f64) -> Vec<f64> {
@@ -211,9 +211,9 @@ proptest! {
         prop_assert_eq!(camera.check(), Ok(()));
         let device = Default::default();
         let vertices = vertices::<B>(&[vertex], &device);
-        let expected = numbers(project(vertices.clone(), orbit.tensor(&device)));
+        let expected = numbers(project(vertices.clone(), orbit.tensor(&device)).tensor());
         let cameras = Pinholes::new(&[camera], &device);
-        assert_close(&numbers(project(vertices.clone(), &cameras)), &expected, 1e-9);
+        assert_close(&numbers(project(vertices.clone(), &cameras).tensor()), &expected, 1e-9);
         let Orbit { distance: d, elevation_deg: e, azimuth_deg: a, fov_deg: f } = camera.orbit().unwrap();
         assert_close(&[d, e, a, f], &[distance, elevation_deg, azimuth_deg, fov_deg], 1e-9);
 

@@ -4,7 +4,7 @@
 //! Source: Liu et al. 2019, Eq. 1 and its aggregate function for silhouettes, as in `sigmoid_alpha_blend` of `PyTorch3D`.
 
 use softrast_mesh::{Mesh, icosphere};
-use softrast_raster::{Orbit, Pinhole, Pinholes, SoftRenderer, project, vertices};
+use softrast_raster::{Orbit, Pinhole, Pinholes, Projected, SoftRenderer, project, vertices};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
@@ -90,7 +90,8 @@ fn theirs(mesh: &Mesh, blur_radius: f64) -> Vec<f64> {
 /// Our silhouette of vertices on the screen, with `sigma` as the scale.
 fn ours(mesh: &Mesh, seen: Tensor<B, 3>) -> Vec<f64> {
     let softness = EdgeSoftness { family: Family::Logistic, squared: true };
-    let image = SoftRenderer::new(mesh.faces(), SIZE, softness, SIGMA).silhouette(seen);
+    let image =
+        SoftRenderer::new(mesh.faces(), SIZE, softness, SIGMA).silhouette(Projected::new(seen));
     numbers(image)
 }
 
@@ -112,7 +113,7 @@ fn a_silhouette_with_the_translated_scale_and_camera_is_that_of_pytorch3d() {
     let camera = Pinhole::from_pytorch3d(&r, t, [focal(); 2], [0.0; 2], SIZE);
     let corners = vertices::<B>(mesh.positions(), &device);
     let seen = project(corners, Pinholes::new(&[camera], &device));
-    assert_same(&ours(&mesh, seen), &theirs);
+    assert_same(&ours(&mesh, seen.tensor()), &theirs);
 }
 
 #[test]
@@ -122,7 +123,7 @@ fn an_orbit_shows_the_same() {
     let orbit = Orbit { distance: 3.0, elevation_deg: 20.0, azimuth_deg, fov_deg: FOV_DEG };
     let device = Default::default();
     let seen = project(vertices::<B>(mesh.positions(), &device), orbit.tensor(&device));
-    assert_same(&ours(&mesh, seen), &theirs(&mesh, f64::INFINITY));
+    assert_same(&ours(&mesh, seen.tensor()), &theirs(&mesh, f64::INFINITY));
 }
 
 #[test]

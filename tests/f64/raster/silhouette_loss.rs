@@ -1,7 +1,7 @@
 //! A loss that is computed along with the silhouette is that of the silhouette, and so are its derivatives.
 
 use proptest::prelude::*;
-use softrast_raster::{SoftRenderer, iou_loss, low_level::Silhouette, mse_loss};
+use softrast_raster::{Projected, SoftRenderer, iou_loss, low_level::Silhouette, mse_loss};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
@@ -20,7 +20,7 @@ type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>, Option<Tensor<AA, 3>>) -
 const LOSSES: [[Loss; 2]; 2] = [
     [
         |renderer, vertices, target, counted| match counted {
-            None => renderer.mse_loss(vertices, target),
+            None => renderer.mse_loss(Projected::new(vertices), target),
             Some(_) => {
                 let (silhouette, table) = by_table(renderer);
                 silhouette.mse_loss_by_table(vertices, table, target, counted)
@@ -30,7 +30,7 @@ const LOSSES: [[Loss; 2]; 2] = [
     ],
     [
         |renderer, vertices, target, counted| match counted {
-            None => renderer.iou_loss(vertices, target),
+            None => renderer.iou_loss(Projected::new(vertices), target),
             Some(_) => {
                 let (silhouette, table) = by_table(renderer);
                 silhouette.iou_loss_by_table(vertices, table, target, counted)
@@ -52,7 +52,7 @@ fn part(
     vertices: Tensor<AA, 3>,
     counted: Option<Tensor<AA, 3>>,
 ) -> Tensor<AA, 3> {
-    let silhouette = renderer.silhouette(vertices);
+    let silhouette = renderer.silhouette(Projected::new(vertices));
     match counted {
         Some(counted) => silhouette * counted,
         None => silhouette,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use softrast_raster::{
-    Attributes, Background, ColourRenderer, RasterBackend, Weighting,
+    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting,
     reference::{self, Scene},
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
@@ -133,7 +133,7 @@ impl<S: Softness> Case<S> {
             log_weight: background.narrow(0, self.channels, 1),
         };
         if let Some(renderer) = renderer {
-            renderer.image_with(vertices, &attributes, [&edge, &depth], &background)
+            renderer.image_with(Projected::new(vertices), &attributes, [&edge, &depth], &background)
         } else {
             let scene = Scene { faces: &self.faces, size: SIZE.into() };
             let phi = [edge, depth];
@@ -293,7 +293,7 @@ fn a_texture_is_seen_upright_and_repeats() {
         let background =
             Background { colour: tensor(&[0.0], [1]), log_weight: tensor(&[-90.0], [1]) };
         let vertices = tensor::<B, 3>(&vertices, [1, 4, 3]);
-        numbers(renderer.image(vertices, &attributes, &background))[..64].to_vec()
+        numbers(renderer.image(Projected::new(vertices), &attributes, &background))[..64].to_vec()
     };
     let image = seen(0.0);
     let at = |row: usize, column: usize| image[8 * row + column];
@@ -358,7 +358,7 @@ fn flat_faces<T: RasterBackend>(
     let attributes = Attributes::of_faces(tensor(colours, [1, colours.len(), 1]));
     let background =
         Background { colour: tensor(&[0.0], [1]), log_weight: tensor(&[log_weight], [1]) };
-    numbers(renderer.image(vertices, &attributes, &background))
+    numbers(renderer.image(Projected::new(vertices), &attributes, &background))
 }
 
 fn own_faces(count: usize) -> Arc<[[u32; 3]]> {
@@ -393,7 +393,7 @@ fn a_pixel_worked_by_hand() {
     let background =
         Background { colour: tensor(&[-2.0], [1]), log_weight: tensor(&[f64::ln(behind)], [1]) };
     let vertices = tensor::<B, 3>(corners.as_flattened(), [1, 6, 3]);
-    let found = numbers(renderer.image(vertices, &attributes, &background));
+    let found = numbers(renderer.image(Projected::new(vertices), &attributes, &background));
     let colour = (first * 4.0 + second - 2.0 * behind) / (first + second + behind);
     assert!((found[0] - colour).abs() < 1e-7, "{} instead of {colour}", found[0]);
     assert!((found[1] - share).abs() < 1e-7, "{} instead of {share}", found[1]);

@@ -1,6 +1,6 @@
 //! Support and knots follow the parameters: the promised error holds whatever happens to them.
 
-use softrast_raster::{SoftRenderer, TConorm, low_level::Rasterizer, reference};
+use softrast_raster::{Projected, SoftRenderer, TConorm, low_level::Rasterizer, reference};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
@@ -23,7 +23,7 @@ fn off(
     softness: EdgeSoftness,
     phi: &[f64],
 ) -> [f64; 2] {
-    let drawn = numbers(renderer.silhouette_with(shaped(vertices), &vector(phi)));
+    let drawn = numbers(renderer.silhouette_with(Projected::new(shaped(vertices)), &vector(phi)));
     let scene = reference::Scene { faces, size: SIZE.into() };
     let t_conorm = TConorm::Probabilistic;
     let sums = reference::sums(scene, shaped(vertices), &softness, t_conorm, vector(phi));
@@ -108,7 +108,7 @@ fn gradients_to_vertices_and_parameters_are_those_of_the_image() {
     let renderer = renderer(softness, &faces, 0.05).with_tolerance(1e-9);
     let loss = |vertices: Tensor<A, 1>, phi: Tensor<A, 1>| {
         let vertices = vertices.clone().reshape([1, vertices.dims()[0] as i64 / 3, 3]);
-        renderer.silhouette_with(vertices, &phi).powi_scalar(2).sum()
+        renderer.silhouette_with(Projected::new(vertices), &phi).powi_scalar(2).sum()
     };
     let both = [vertices, renderer.phi().to_vec()];
     let [at, phi] = [0, 1].map(|k| vector::<A>(&both[k]).require_grad());
@@ -137,7 +137,7 @@ fn parameters_that_are_set_draw_as_in_a_renderer_made_with_them_and_the_surrogat
     let of = |scale| SoftRenderer::new(&faces, SIZE, softness, scale).with_surrogate(softness, 0.3);
     let image = |renderer: &SoftRenderer<EdgeSoftness>| {
         let leaf = Tensor::<A, 3>::from_inner(shaped(&vertices)).require_grad();
-        let image = renderer.silhouette(leaf.clone());
+        let image = renderer.silhouette(Projected::new(leaf.clone()));
         let grads = image.clone().powi_scalar(2).sum().backward();
         [numbers(image), numbers(leaf.grad(&grads).unwrap())].concat()
     };

@@ -64,7 +64,7 @@ fn a_short_solve_shows_a_small_picture() {
     let instances = [task.instance(0).unwrap()];
     let mut psnr = Vec::new();
     let method = Method::new("logistic", softness);
-    minimize::<_, B>(&task, &instances, &method, &config, false, |iterate, _| {
+    minimize::<_, B>(&task, &instances, &method, &config, |iterate, _| {
         psnr.push(-10.0 * iterate.hard_loss[0].log10());
         Ok(())
     })

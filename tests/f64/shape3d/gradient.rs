@@ -36,7 +36,7 @@ impl<B: RasterBackend> Objective<B> for Small {
         let instance = Instance { elevation_deg: 30.0, turn: 3 };
         let scene = Scene::<B>::new(&airplane(), &icosphere(0), &instance, SIZE);
         let vertices = scene.vertices(theta);
-        let image = self.silhouette.coverage(scene.project(vertices.clone()), phi);
+        let image = self.silhouette.coverage(scene.project(vertices.clone()).tensor(), phi);
         scene.image_loss(image) + scene.smoothness_loss(vertices)
     }
 }

@@ -1,4 +1,4 @@
-use softrast_raster::{RasterBackend, mse_loss};
+use softrast_raster::{Projected, RasterBackend, mse_loss};
 use softrast_tensor::{Tensor, tensor};
 
 use super::VertexColours;
@@ -79,7 +79,7 @@ impl<B: RasterBackend> ColouredViews<B> {
     /// Colours are hardly softened, but multiplied by the coverage.
     pub fn image(
         &self,
-        seen: Tensor<B, 3>,
+        seen: Projected<B>,
         distance: Tensor<B, 2>,
         coverage: Tensor<B, 3>,
     ) -> Tensor<B, 4> {
@@ -89,12 +89,12 @@ impl<B: RasterBackend> ColouredViews<B> {
     }
 
     /// The hard image `[views, 4, size, size]` of what is seen, with its hard `coverage`. It has no gradient.
-    pub fn hard_image(&self, seen: Tensor<B, 3>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
+    pub fn hard_image(&self, seen: Projected<B>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
         joined(self.coat.hard(seen, coverage.dims()[1]), coverage)
     }
 
     /// [`ColouredViews::loss`] of the hard colours of what is seen, on `size` × `size` pixels.
-    pub(crate) fn hard_loss(&self, seen: Tensor<B, 3>, size: usize) -> Tensor<B, 1> {
+    pub(crate) fn hard_loss(&self, seen: Projected<B>, size: usize) -> Tensor<B, 1> {
         self.loss(self.coat.hard(seen, size))
     }
 

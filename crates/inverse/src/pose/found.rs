@@ -12,7 +12,7 @@ pub struct FoundPose {
     /// Overlap over union of its hard silhouette and the mask, both of all pixels of the picture, where a pixel of the mask is in from one
     /// half on.
     pub iou: f64,
-    /// How near its colours come to the picture, in decibels, where they are asked for; see [`PaintedView::psnr`].
+    /// How near its colours come to the picture, in decibels, where they are asked for; see [`PaintedView::psnr`](softrast_views::PaintedView::psnr).
     pub psnr: Option<f64>,
 }
 

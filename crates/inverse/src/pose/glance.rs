@@ -2,7 +2,7 @@ use std::borrow::Cow;
 
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, hard_silhouette, iou_loss, project, vertices,
+    HostBackend, Pinhole, Pinholes, Projected, hard_silhouette, iou_loss, project, vertices,
 };
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -94,11 +94,11 @@ impl<'a> Look<'a> {
         cameras: &[Pinhole],
         [left, top, extent]: [f64; 3],
         side: usize,
-    ) -> [Tensor<HostBackend, 3>; 2] {
+    ) -> (Tensor<HostBackend, 3>, Projected<HostBackend>) {
         let cropped = cameras.iter().map(|of| of.cropped([left, top], [extent; 2], side));
         let cropped = Pinholes::new(&cropped.collect::<Vec<_>>(), &Default::default());
         let seen = project(self.corners.clone(), &cropped);
-        [hard_silhouette(seen.clone(), self.mesh.faces(), side), seen]
+        (hard_silhouette(seen.clone(), self.mesh.faces(), side), seen)
     }
 
     /// The image within the picture, and its error.
@@ -112,7 +112,7 @@ impl<'a> Look<'a> {
         let of_views = |image: &[f64]| {
             tensor::<HostBackend, 3>(image.repeat(views), [views, COARSE_SIDE, COARSE_SIDE])
         };
-        let [drawn, seen] = self.drawn(&cameras, self.square, COARSE_SIDE);
+        let (drawn, seen) = self.drawn(&cameras, self.square, COARSE_SIDE);
         // What lies outside of the picture does not count.
         let drawn = drawn * of_views(&self.covered);
         let loss = iou_loss(drawn.clone(), of_views(&self.levels));
@@ -174,7 +174,7 @@ impl<'a> Look<'a> {
         let around = [middle[0] - reach, middle[1] - reach, 2.0 * reach];
         let placed: Vec<Pinhole> =
             rotations.iter().map(|&local| self.place(times(towards, local), ray, depth)).collect();
-        let [drawn, _] = self.drawn(&placed, around, Stencil::SIDE);
+        let (drawn, _) = self.drawn(&placed, around, Stencil::SIDE);
         let drawn = numbers(drawn);
         // Cells of the window along one of the stencil.
         let cell = 2.0 * reach / Stencil::SIDE as f64 / self.pixel();

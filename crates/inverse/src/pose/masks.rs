@@ -3,8 +3,8 @@ use std::sync::Arc;
 use anyhow::Context;
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project, rotate_by_tangent,
-    vertices,
+    HostBackend, Pinhole, Pinholes, Projected, RasterBackend, hard_silhouette, project,
+    rotate_by_tangent, vertices,
 };
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
@@ -240,7 +240,7 @@ impl<B: RasterBackend> MaskScene<B> {
         Pinholes { rotation, translation, intrinsics, size }
     }
 
-    fn project(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    fn project(&self, theta: Tensor<B, 1>) -> Projected<B> {
         project(self.vertices.clone(), self.cameras(theta))
     }
 

@@ -173,6 +173,7 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
     /// # Errors
     ///
     /// Those of [`run`](Self::run); if the mesh has no colours, or no pixel of the view has a colour.
+    #[doc(alias = "run_by_color")]
     pub fn run_by_colour<B: RasterBackend>(
         mut self,
         view: &PaintedView,

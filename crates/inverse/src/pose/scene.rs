@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use softrast_mesh::Mesh;
 use softrast_raster::{
-    HostBackend, Orbit, RasterBackend, hard_silhouette, project, vertices, view_rotation,
+    HostBackend, Orbit, Projected, RasterBackend, hard_silhouette, project, vertices, view_rotation,
 };
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -82,14 +82,14 @@ impl<B: RasterBackend> PoseScene<B> {
         self.targets.full()
     }
 
-    /// The mesh as seen at θ: `[views, vertices, 3]`, x and y in NDC and the depth.
-    pub fn project(&self, theta: Tensor<B, 2>) -> Tensor<B, 3> {
+    /// The mesh as seen at θ, `[views, vertices, 3]`.
+    pub fn project(&self, theta: Tensor<B, 2>) -> Projected<B> {
         let fov = self.fov.clone().unwrap_or_else(|| theta.clone().narrow(1, 3, 1) * 2.0);
         project(self.turned.clone(), Tensor::cat(vec![theta.narrow(1, 0, 3), fov], 1))
     }
 
     /// Hard silhouettes `[views, size, size]` of vertices that [`PoseScene::project`] gave.
-    pub fn hard(&self, projected: Tensor<B, 3>) -> Tensor<B, 3> {
+    pub fn hard(&self, projected: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(projected, &self.faces, self.size)
     }
 

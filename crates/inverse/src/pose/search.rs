@@ -2,7 +2,7 @@ use std::borrow::{Borrow, Cow};
 
 use anyhow::{Context, ensure};
 use softrast_mesh::Mesh;
-use softrast_raster::{HostBackend, Pinhole, RasterBackend, hard_silhouette};
+use softrast_raster::{HostBackend, Pinhole, Projected, RasterBackend, hard_silhouette};
 use softrast_softness::Softness;
 use softrast_tensor::{numbers, tensor};
 
@@ -291,7 +291,7 @@ impl Search {
     ) -> anyhow::Result<Vec<(Pinhole, f64)>> {
         let problem = MaskPoses::new(mesh, poses.clone(), self.optimise_fov);
         let mut best = vec![None; poses.len()];
-        minimize::<_, B>(&problem, &poses, method, stage, false, |iterate: &Iterate, scene| {
+        minimize::<_, B>(&problem, &poses, method, stage, |iterate: &Iterate, scene| {
             let now = scene.found(iterate.theta.clone(), &poses);
             for ((best, camera), &loss) in best.iter_mut().zip(now).zip(&iterate.hard_loss) {
                 if best.is_none_or(|(_, least)| loss < least) {
@@ -367,7 +367,7 @@ fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
     let seen =
         views.iter().flat_map(|&[x, y]| positions.iter().flat_map(move |p| [p[x], p[y], 1.0]));
     let seen = tensor::<HostBackend, 3>(seen.collect(), [views.len(), positions.len(), 3]);
-    let drawn = numbers(hard_silhouette(seen, mesh.faces(), SIDE_VIEW));
+    let drawn = numbers(hard_silhouette(Projected::new(seen), mesh.faces(), SIDE_VIEW));
     drawn.into_iter().map(|level| level > 0.5).collect()
 }
 

@@ -1,10 +1,10 @@
 use std::{cell::RefCell, collections::BTreeMap, sync::Arc};
 
 use softrast_raster::{
-    Attributes, ColourRenderer, HostBackend, RasterBackend, Weighting, nearest_faces, vertices,
+    Attributes, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces, vertices,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
-use softrast_tensor::{Tensor, TensorData, numbers, tensor};
+use softrast_tensor::{Tensor, TensorData, numbers};
 
 const EDGE: EdgeSoftness = EdgeSoftness { family: Family::Uniform, squared: false };
 /// Half the width of the edge of a face, in pixels. A near face outweighs those behind it up to where its softness ends, so this one ends
@@ -47,7 +47,8 @@ impl<B: RasterBackend> VertexColours<B> {
     /// What the mesh shows, `[views, 3, side, side]`, hardly softened: over black where it shows nothing.
     ///
     /// `seen` `[views, vertices, 3]` holds x and y in NDC and the depth, `distance` `[views, 1]` that of each camera.
-    pub fn soft(&self, seen: Tensor<B, 3>, distance: Tensor<B, 2>, side: usize) -> Tensor<B, 4> {
+    pub fn soft(&self, seen: Projected<B>, distance: Tensor<B, 2>, side: usize) -> Tensor<B, 4> {
+        let seen = seen.tensor();
         let [views, count, _] = seen.dims();
         let distance = distance.reshape([views, 1, 1]).expand([views, count, 1]);
         // Perspective is the same in any unit, and in this one all meshes lie between the same planes.
@@ -64,19 +65,21 @@ impl<B: RasterBackend> VertexColours<B> {
                 .with_tolerance(TOLERANCE)
         });
         let background = renderer.background(&[0.0; 3], &seen.device());
-        renderer.image(seen, &self.attributes, &background).narrow(1, 0, 3)
+        renderer.image(Projected::new(seen), &self.attributes, &background).narrow(1, 0, 3)
     }
 
     /// The same without softness: at the centre of each pixel the colour of the nearest face. It has no gradient.
-    pub fn hard(&self, seen: Tensor<B, 3>, size: usize) -> Tensor<B, 4> {
+    pub fn hard(&self, seen: Projected<B>, size: usize) -> Tensor<B, 4> {
+        let nearest = nearest_faces(seen.clone(), &self.faces, size);
+        let seen = seen.tensor();
         let [views, count, _] = seen.dims();
         let options = (&seen.device(), seen.dtype());
         let mut image = vec![0.0; 3 * views * size * size];
         let corners = numbers(seen.clone());
-        for (corners, image) in corners.chunks(3 * count).zip(image.chunks_mut(3 * size * size)) {
-            let view = tensor::<HostBackend, 2>(corners.to_vec(), [count, 3]);
-            for (pixel, face) in nearest_faces(view, &self.faces, size).into_iter().enumerate() {
-                let Some(face) = face else { continue };
+        let views_of_pixels = nearest.chunks(size * size).zip(image.chunks_mut(3 * size * size));
+        for (corners, (nearest, image)) in corners.chunks(3 * count).zip(views_of_pixels) {
+            for (pixel, face) in nearest.iter().enumerate() {
+                let Some(face) = *face else { continue };
                 let face = self.faces[face as usize].map(|vertex| vertex as usize);
                 let centre = |k: usize| (2 * k + 1) as f64 / size as f64 - 1.0;
                 let place = [centre(pixel % size), -centre(pixel / size)];
@@ -105,14 +108,17 @@ fn in_space(corners: [[f64; 3]; 3], [x, y]: [f64; 2]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use softrast_raster::HostBackend;
+    use softrast_tensor::tensor;
+
     use super::*;
 
     /// A floor from depth 1 below the picture to depth 3 above it, black at the near end and white at the far one.
-    fn floor() -> (VertexColours<HostBackend>, Tensor<HostBackend, 3>) {
+    fn floor() -> (VertexColours<HostBackend>, Projected<HostBackend>) {
         let corners = [-9.0, -1.0, 1.0, 9.0, -1.0, 1.0, 3.0, 1.0, 3.0, -3.0, 1.0, 3.0].to_vec();
         let colours = [[0.0; 3], [0.0; 3], [1.0, 0.5, 0.25], [1.0, 0.5, 0.25]];
         let faces = [[0, 1, 2], [0, 2, 3]];
-        (VertexColours::new(&colours, faces.into()), tensor(corners, [1, 4, 3]))
+        (VertexColours::new(&colours, faces.into()), Projected::new(tensor(corners, [1, 4, 3])))
     }
 
     #[test]
@@ -130,8 +136,9 @@ mod tests {
         let (coat, seen) = floor();
         let hard = numbers(coat.hard(seen.clone(), 5));
         for distance in [2.0, 20.0] {
-            let near = seen.clone() * tensor([1.0, 1.0, distance / 2.0].to_vec(), [1, 1, 3]);
-            let soft = numbers(coat.soft(near, tensor(vec![distance], [1, 1]), 5));
+            let scale = tensor([1.0, 1.0, distance / 2.0].to_vec(), [1, 1, 3]);
+            let near = seen.clone().tensor() * scale;
+            let soft = numbers(coat.soft(Projected::new(near), tensor(vec![distance], [1, 1]), 5));
             assert!(soft.iter().zip(&hard).all(|(a, b)| (a - b).abs() < 0.01), "{soft:?} {hard:?}");
         }
     }

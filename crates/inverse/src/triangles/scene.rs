@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use softrast_raster::{RasterBackend, hard_silhouette};
+use softrast_raster::{Projected, RasterBackend, hard_silhouette};
 use softrast_tensor::{Tensor, tensor};
 
 use crate::{Targets, triangles::Instance};
@@ -53,15 +53,15 @@ impl<B: RasterBackend> Scene<B> {
         self.targets.full()
     }
 
-    /// The corners at θ as the rasterizer wants them, `[1, corners, 3]`: x and y in NDC, depth 1.
-    pub fn vertices(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    /// The corners at θ, `[1, corners, 3]`, at depth 1.
+    pub fn vertices(&self, theta: Tensor<B, 1>) -> Projected<B> {
         let count = 3 * self.faces.len();
         let depth = tensor(vec![1.0; count], [1, count, 1]);
-        Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2)
+        Projected::new(Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2))
     }
 
     /// Hard silhouette `[1, size, size]` of corners that [`Scene::vertices`] gave.
-    pub fn hard(&self, vertices: Tensor<B, 3>) -> Tensor<B, 3> {
+    pub fn hard(&self, vertices: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(vertices, &self.faces, self.size)
     }
 

@@ -126,7 +126,7 @@ impl<B: RasterBackend> Scene<B> {
         let start = Instant::now();
         let up = |tensor: &Tensor<B, 2>| Tensor::<Autodiff<B>, 2>::from_inner(tensor.clone());
         let world = Tensor::<Autodiff<B>, 3>::from_inner(self.world.clone()).require_grad();
-        let vertices = project(world.clone(), up(&self.cameras));
+        let vertices = project(world.clone(), up(&self.cameras)).tensor();
         let image = self.silhouette.coverage_by_table(vertices, up(&self.table));
         let loss = mse_loss(image.clone(), Tensor::from_inner(self.target.clone())).mean();
         let gradient = world.grad(&loss.backward()).expect("the image depends on the vertices");
@@ -136,7 +136,7 @@ impl<B: RasterBackend> Scene<B> {
     }
 
     fn pairs(&self) -> usize {
-        self.silhouette.pairs(project(self.world.clone(), self.cameras.clone()))
+        self.silhouette.pairs(project(self.world.clone(), self.cameras.clone()).tensor())
     }
 }
 
@@ -260,7 +260,7 @@ fn plain(workload: &Workload, radius: f32) -> Drawn {
 
     let start = Instant::now();
     let world = workload.world::<A>(DType::F32).require_grad();
-    let vertices = project(world.clone(), workload.cameras::<A>(DType::F32));
+    let vertices = project(world.clone(), workload.cameras::<A>(DType::F32)).tensor();
     let views = vertices.dims()[0];
     let flat: Vec<f32> = vertices.clone().inner().into_data().iter().collect();
     let tensor_of = |values: Vec<f32>, shape: [usize; 3]| {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use softrast_mesh::icosphere;
 use softrast_raster::{
-    Attributes, Background, ColourRenderer, RasterBackend, Weighting, Wgpu, project,
+    Attributes, Background, ColourRenderer, Projected, RasterBackend, Weighting, Wgpu, project,
 };
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, DType, NdArray, Tensor};
@@ -87,10 +87,13 @@ fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Ve
         log_weight: behind.clone().narrow(0, channels, 1),
     };
     let image = match wanted {
-        Wanted::Scene => scene.renderer.image(shaped, &attributes, &background),
-        Wanted::Softness => {
-            scene.renderer.image_with(shaped, &attributes, [edge, depth], &background)
-        }
+        Wanted::Scene => scene.renderer.image(Projected::new(shaped), &attributes, &background),
+        Wanted::Softness => scene.renderer.image_with(
+            Projected::new(shaped),
+            &attributes,
+            [edge, depth],
+            &background,
+        ),
     };
     let shape = image.dims();
     let weights: Vec<f64> =
@@ -156,7 +159,7 @@ fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoft
     let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, 17.3, a, 60.0]).collect();
     let faces: Arc<[[u32; 3]]> = ball.faces().into();
     Scene {
-        vertices: numbers(project(world, tensor(&orbits, [3, 4], DType::F64))),
+        vertices: numbers(project(world, tensor(&orbits, [3, 4], DType::F64)).tensor()),
         views: 3,
         entries: (faces.clone(), positions.len()),
         own: 1,
@@ -312,7 +315,7 @@ fn views_that_no_launch_takes_together_are_drawn_in_parts() {
         let attributes = Attributes::of_vertices(colours, &[[0, 1, 2]]);
         let background = renderer.background(&[0.0], &Default::default());
         let vertices = tensor::<Wgpu, 3>(&part, [count, 3, 3], DType::F32);
-        numbers(renderer.image(vertices, &attributes, &background))
+        numbers(renderer.image(Projected::new(vertices), &attributes, &background))
     };
     assert_eq!(image(0, views)[2 * 65_520..], image(65_520, 20));
 }
@@ -331,7 +334,7 @@ fn an_upstream_that_is_no_number_gives_a_texture_none() {
         .with_texture(texture.clone());
     let vertices = tensor(&scene.vertices, [3, scene.vertices.len() / 9, 3]);
     let background = scene.renderer.background(&[0.3; 3], &vertices.device());
-    let image = scene.renderer.image(vertices, &attributes, &background);
+    let image = scene.renderer.image(Projected::new(vertices), &attributes, &background);
     // One pixel in the middle of the ball.
     let [_, _, height, width] = image.dims();
     let one = image.narrow(2, height / 2, 1).narrow(3, width / 2, 1);

@@ -44,7 +44,7 @@ fn seen(
     let orbits: Vec<f64> = azimuths.iter().flat_map(|&a| [2.732, elevation, a, 60.0]).collect();
     let orbits: Tensor<NdArray<f64>, 2> = tensor(&orbits, [azimuths.len(), 4], DType::F64);
     Scene {
-        vertices: project(world, orbits).into_data().iter().collect(),
+        vertices: project(world, orbits).tensor().into_data().iter().collect(),
         views: azimuths.len(),
         faces: mesh.faces().into(),
         size: size.into(),

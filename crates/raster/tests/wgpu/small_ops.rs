@@ -60,7 +60,7 @@ impl Of {
                 let points = x.clone().narrow(0, 0, coordinates).reshape([sets, POINTS, 3]);
                 let orbits = x.clone().narrow(0, coordinates, 4 * VIEWS).reshape([VIEWS, 4]);
                 // What is far away would hide all else.
-                project(points, orbits).flatten(0, 2).clamp(-1e3, 1e3)
+                project(points, orbits).tensor().flatten(0, 2).clamp(-1e3, 1e3)
             }
             Self::Coverage => TConorm::Probabilistic.coverage(images(0, 2)).flatten(0, 2),
             Self::Iou(one, other) => iou_loss(images(0, one), images(one, other)),
@@ -91,7 +91,7 @@ fn cameras_at_the_poles_are_turned_as_on_the_cpu() {
     fn seen<T: RasterBackend>(elevations: &[f64]) -> Vec<f64> {
         let orbits: Vec<f64> = elevations.iter().flat_map(|&e| [3.0, e, 40.0, 60.0]).collect();
         let orbits = vector::<T>(&orbits).reshape([elevations.len(), 4]);
-        numbers(project(vector::<T>(&[0.3, 0.2, 0.1]).reshape([1, 1, 3]), orbits))
+        numbers(project(vector::<T>(&[0.3, 0.2, 0.1]).reshape([1, 1, 3]), orbits).tensor())
     }
     let elevations = [90.0, -90.0, 270.0, 450.0, 91.0, -91.0, 89.0, 269.0];
     let (exact, cpu) = (seen::<NdArray<f64>>(&elevations), seen::<NdArray<f32>>(&elevations));

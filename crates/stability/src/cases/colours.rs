@@ -2,7 +2,7 @@
 
 use pose::{Args, Range, colour::Coloured};
 use softrast_mesh::icosphere;
-use softrast_raster::{Attributes, ColourRenderer, Weighting, mse_loss};
+use softrast_raster::{Attributes, ColourRenderer, Projected, Weighting, mse_loss};
 use softrast_softness::{DepthSoftness, Family};
 use softrast_tensor::{Autodiff, Tensor, numbers, tensor};
 
@@ -69,8 +69,11 @@ fn two_squares(tested: &Tested, gap: f64) -> [Vec<f64>; 2] {
     let corners = Tensor::<Autodiff<Single>, 3>::from_inner(corners).require_grad();
     let hidden = Tensor::from_inner(tensor::<Single, 3>([[0.0; 4], [1.0; 4]].concat(), [1, 8, 1]));
     let background = renderer.background(&[0.0], &corners.device());
-    let image =
-        renderer.image(corners.clone(), &Attributes::of_vertices(hidden, &faces), &background);
+    let image = renderer.image(
+        Projected::new(corners.clone()),
+        &Attributes::of_vertices(hidden, &faces),
+        &background,
+    );
     let share = image.narrow(1, 0, 1).reshape([1, SIDE, SIDE]);
     let loss = mse_loss(share.clone(), share.ones_like()).sum();
     let gradient = corners.grad(&loss.backward()).map(numbers).unwrap_or_default();

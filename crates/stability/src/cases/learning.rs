@@ -60,7 +60,7 @@ impl<B: RasterBackend> Objective<B> for Triangles {
         // Only the default family decays here, and its one parameter is the logarithm of the scale.
         let wider = self.wider.get(step).copied().unwrap_or(0.0);
         let target = tensor(self.target.clone(), [1, SIDE, SIDE]);
-        mse_loss(self.silhouette.coverage(at_depth_2(theta), phi + wider), target)
+        mse_loss(self.silhouette.coverage(at_depth_2(theta).tensor(), phi + wider), target)
     }
 }
 

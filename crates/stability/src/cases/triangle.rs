@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Targets};
-use softrast_raster::{RasterBackend, hard_silhouette, iou_loss};
+use softrast_raster::{Projected, RasterBackend, hard_silhouette, iou_loss};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -78,7 +78,7 @@ pub fn target() -> Vec<f64> {
 
 fn hard(flat: &PlanarScene, size: usize) -> Vec<f64> {
     let corners = tensor::<Single, 3>(flat.corners.concat(), [1, flat.corners.len(), 3]);
-    numbers(hard_silhouette(corners, &flat.faces, size))
+    numbers(hard_silhouette(Projected::new(corners), &flat.faces, size))
 }
 
 /// Triangles in the image plane that should cover a target; θ is x and y of their corners.
@@ -161,10 +161,10 @@ impl InverseProblem for Triangles {
 }
 
 /// `[1, corners, 3]`.
-pub(super) fn at_depth_2<B: RasterBackend>(theta: Tensor<B, 1>) -> Tensor<B, 3> {
+pub(super) fn at_depth_2<B: RasterBackend>(theta: Tensor<B, 1>) -> Projected<B> {
     let count = theta.dims()[0] / 2;
     let depth = tensor(vec![2.0; count], [1, count, 1]);
-    Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2)
+    Projected::new(Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2))
 }
 
 /// A run from the target triangle itself, moved.

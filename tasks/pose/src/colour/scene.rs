@@ -3,7 +3,7 @@ use softrast_inverse::{
     pose::{ColouredViews, PoseInstance, PoseScene, VertexColours, split_coverage},
 };
 use softrast_mesh::Mesh;
-use softrast_raster::{Orbit, RasterBackend, project, vertices};
+use softrast_raster::{Orbit, Projected, RasterBackend, project, vertices};
 use softrast_softness::Softness;
 use softrast_tensor::Tensor;
 
@@ -62,7 +62,7 @@ impl<B: RasterBackend> Scene<B> {
     pub fn image_with(
         &self,
         theta: Tensor<B, 1>,
-        silhouette: impl Fn(Tensor<B, 3>) -> Tensor<B, 3>,
+        silhouette: impl Fn(Projected<B>) -> Tensor<B, 3>,
     ) -> Tensor<B, 4> {
         let theta = self.silhouettes.by_view(theta);
         let distance = theta.clone().narrow(1, 0, 1);

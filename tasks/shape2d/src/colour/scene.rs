@@ -1,7 +1,9 @@
 use std::sync::Arc;
 
 use softrast_inverse::{SoftnessAt, Targets};
-use softrast_raster::{Attributes, ColourRenderer, RasterBackend, Weighting, nearest_faces};
+use softrast_raster::{
+    Attributes, ColourRenderer, Projected, RasterBackend, Weighting, nearest_faces,
+};
 use softrast_softness::{DepthSoftness, Family, Softness};
 use softrast_tensor::{Tensor, numbers, tensor};
 
@@ -109,9 +111,9 @@ impl<B: RasterBackend> Scene<B> {
         tracked: Option<Tensor<B, 1>>,
     ) -> Tensor<B, 4> {
         let [corners, colours, nearness] = self.parts(theta);
+        let background = renderer.background(&self.background, &corners.device());
         let vertices = self.vertices(corners, nearness);
         let colours = Attributes::of_faces(colours.reshape([1, self.faces.len(), 3]));
-        let background = renderer.background(&self.background, &vertices.device());
         let image = match tracked {
             None => renderer.image(vertices, &colours, &background),
             Some(phi) => {
@@ -126,7 +128,7 @@ impl<B: RasterBackend> Scene<B> {
     /// The hard image at θ, `[1, 3, size, size]`: at each pixel the colour of the nearest triangle. It has no gradient.
     pub fn hard(&self, theta: Tensor<B, 1>) -> Tensor<B, 4> {
         let [corners, colours, nearness] = self.parts(theta);
-        let vertices = self.vertices(corners, nearness).reshape([-1, 3]);
+        let vertices = self.vertices(corners, nearness);
         let (colours, size) = (numbers(colours), self.size);
         let nearest = nearest_faces(vertices, &self.faces, size);
         let level = |k: usize, face: Option<u32>| {
@@ -178,10 +180,11 @@ impl<B: RasterBackend> Scene<B> {
     }
 
     /// What the rasterizer draws, `[1, corners, 3]`.
-    fn vertices(&self, corners: Tensor<B, 1>, nearness: Tensor<B, 1>) -> Tensor<B, 3> {
+    fn vertices(&self, corners: Tensor<B, 1>, nearness: Tensor<B, 1>) -> Projected<B> {
         let count = self.faces.len();
         let depth = (nearness.neg() + PLANES[1]).reshape([count, 1, 1]).expand([count, 3, 1]);
-        Tensor::cat(vec![corners.reshape([count, 3, 2]), depth], 2).reshape([1, 3 * count, 3])
+        let vertices = Tensor::cat(vec![corners.reshape([count, 3, 2]), depth], 2);
+        Projected::new(vertices.reshape([1, 3 * count, 3]))
     }
 }
 

@@ -4,7 +4,9 @@ use anyhow::ensure;
 use softrast_inverse::{InverseProblem, SoftnessAt, SolveConfig, Surface, Targets};
 use softrast_mesh::{Edges, Mesh, MeshError};
 use softrast_meta::Adam;
-use softrast_raster::{HostBackend, Pinhole, Pinholes, RasterBackend, hard_silhouette, project};
+use softrast_raster::{
+    HostBackend, Pinhole, Pinholes, Projected, RasterBackend, hard_silhouette, project,
+};
 use softrast_softness::Softness;
 use softrast_tensor::{Tensor, numbers, tensor};
 use softrast_views::View;
@@ -150,7 +152,7 @@ impl<B: RasterBackend> Scene<B> {
         self.start.clone() + theta.reshape(self.start.dims()) * self.reach
     }
 
-    fn project(&self, theta: Tensor<B, 1>) -> Tensor<B, 3> {
+    fn project(&self, theta: Tensor<B, 1>) -> Projected<B> {
         project(self.vertices(theta).unsqueeze(), &self.cameras)
     }
 }

@@ -313,7 +313,7 @@ fn deformed(
             learning_rate: given.learning_rate().unwrap_or(stage.learning_rate),
         };
         let mut best = f64::INFINITY;
-        on_backend!(backend, B => minimize::<_, B>(&problem, &[()], method, &config, false, |iterate, _| {
+        on_backend!(backend, B => minimize::<_, B>(&problem, &[()], method, &config, |iterate, _| {
             if iterate.hard_loss[0] < best {
                 best = iterate.hard_loss[0];
                 mesh = problem.mesh(&iterate.theta)?;
