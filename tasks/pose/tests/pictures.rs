@@ -446,6 +446,12 @@ fn the_turns_of_a_bottle_are_one_pose() {
     assert!(found["iou"].as_f64().unwrap() > 0.97, "{found}");
     // From the front, or tilted away as far as towards. Rounding decides whether one of its turns counts as another pose too.
     assert!(found["alternatives"].as_array().unwrap().len() <= 3, "{found}");
+    // And it is said that its turn is not known.
+    assert!(
+        found["warnings"].to_string().contains("turned by any angle about (0.00, 1.00, 0.00)"),
+        "{found}"
+    );
+    assert_eq!(found["mesh"]["symmetries"][0]["degrees"], json!(null), "{found}");
 }
 
 /// Specks all over and a gap in the outline: a pose near the right one all the same.
@@ -471,6 +477,7 @@ fn specks_and_gaps_do_not_lead_astray() {
     let truth: Value = serde_json::from_slice(&fs::read(fox("truth.json")).unwrap()).unwrap();
     let off = angle_deg(&found["camera"], &truth["views"][4]);
     assert!(off < 5.0, "{off} degrees off, {found}");
+    assert_eq!(found["mesh"]["symmetries"], json!([]));
 }
 
 /// A ball looks the same from everywhere but for its colours.

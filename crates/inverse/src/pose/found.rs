@@ -2,8 +2,6 @@ use std::borrow::Borrow;
 
 use softrast_raster::Pinhole;
 
-use super::search::angle_deg;
-
 /// A pose that fits a mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundPose {
@@ -27,4 +25,11 @@ impl Borrow<Pinhole> for FoundPose {
     fn borrow(&self) -> &Pinhole {
         &self.camera
     }
+}
+
+/// Angle between the rotations of two cameras.
+pub(super) fn angle_deg(a: &Pinhole, b: &Pinhole) -> f64 {
+    let trace: f64 =
+        a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(x, y)| x * y).sum();
+    ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
 }

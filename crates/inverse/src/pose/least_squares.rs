@@ -220,7 +220,7 @@ mod tests {
             let mask = seen(&truth);
             let near = camera(elevation + 3.0, azimuth - 4.0);
             let (found, [after, before]) = found(&start(&mask, near), false);
-            let off = crate::pose::search::angle_deg(&found, &truth);
+            let off = crate::pose::found::angle_deg(&found, &truth);
             assert!(off < 0.4 && after < 0.05 * before, "{off} degrees, {before} to {after}");
             assert_eq!(found.focal, truth.focal);
         }
@@ -261,7 +261,7 @@ mod tests {
         let near =
             Pinhole::of_orbit(&Orbit { elevation_deg: 13.0, azimuth_deg: 36.0, ..orbit }, SIDE);
         let (found, [after, before]) = found(&start(&seen(&truth), near), true);
-        let off = crate::pose::search::angle_deg(&found, &truth);
+        let off = crate::pose::found::angle_deg(&found, &truth);
         assert!(off < 1.0 && after < 0.1 * before, "{off} degrees, {before} to {after}");
     }
 

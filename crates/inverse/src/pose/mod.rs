@@ -15,6 +15,7 @@ mod problem;
 mod scene;
 mod search;
 mod shifts;
+mod symmetry;
 mod target;
 mod vertex_colours;
 
@@ -25,4 +26,5 @@ pub use masks::{MaskPose, MaskPoses, MaskScene};
 pub use pose_search::PoseSearch;
 pub use problem::PoseProblem;
 pub use scene::{PoseScene, nearest_distance};
+pub use symmetry::{Symmetry, symmetries};
 pub use vertex_colours::VertexColours;

@@ -7,7 +7,7 @@ use softrast_softness::Softness;
 use softrast_tensor::{numbers, tensor};
 
 use super::{
-    found::FoundPose,
+    found::{FoundPose, angle_deg},
     glance::glance,
     least_squares::least_squares,
     masks::{MaskPose, MaskPoses},
@@ -27,7 +27,7 @@ const APART_DEG: f64 = 12.0;
 /// Answers that differ by less are one.
 const ANSWERS_APART_DEG: f64 = 6.0;
 /// Poses are one, however they are turned, if the silhouettes of the mesh from three sides overlap by so much, as those of a vase do.
-const DUPLICATE_IOU: f64 = 0.985;
+pub(super) const DUPLICATE_IOU: f64 = 0.985;
 /// Pixels a side of these.
 const SIDE_VIEW: usize = 48;
 /// Poses of the first look that are improved on few pixels, a little, and the steps of that.
@@ -318,7 +318,7 @@ fn zoomed(camera: &Pinhole) -> impl Iterator<Item = Pinhole> {
 }
 
 /// A mesh without what cannot be told on few pixels.
-fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
+pub(super) fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
     let (_, radius) = bounding_ball(mesh);
     let merged = mesh.clustered(DETAIL * 2.0 * radius);
     let merged = merged.filter(|few| few.area() > LEAST_AREA * mesh.area());
@@ -355,7 +355,7 @@ fn apart<P: Copy + Borrow<Pinhole>>(
 }
 
 /// Silhouettes of a turned mesh along each of its axes then: from the camera, from beside and from above.
-fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
+pub(super) fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
     let (middle, radius) = bounding_ball(mesh);
     let positions = mesh.positions().iter().map(|p| {
         let p = [0, 1, 2].map(|k| (p[k] - middle[k]) / radius);
@@ -372,14 +372,7 @@ fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
 }
 
 /// Overlap over union.
-fn overlap(a: &[bool], b: &[bool]) -> f64 {
+pub(super) fn overlap(a: &[bool], b: &[bool]) -> f64 {
     let count = |of: fn(bool, bool) -> bool| a.iter().zip(b).filter(|&(&a, &b)| of(a, b)).count();
     count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
-}
-
-/// Angle between the rotations of two cameras.
-pub(super) fn angle_deg(a: &Pinhole, b: &Pinhole) -> f64 {
-    let trace: f64 =
-        a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(x, y)| x * y).sum();
-    ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
 }

@@ -8,7 +8,10 @@ use std::{
 use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, seen_by};
-use softrast_inverse::{pose::FoundPose, silhouette_pixels};
+use softrast_inverse::{
+    pose::{FoundPose, Symmetry},
+    silhouette_pixels,
+};
 use softrast_lab::{
     Viewer, contact_sheet, for_page,
     format::{FITS, counted, fit, line, short},
@@ -34,6 +37,8 @@ pub(super) struct Framed {
     pub(super) frame: Frame,
     /// Whether one pose was given to start from, and no other tried.
     pub(super) started: bool,
+    /// Turns after which it has the same silhouettes.
+    pub(super) symmetries: Vec<Symmetry>,
 }
 
 /// A mask and what was found for it, the best first.
@@ -255,7 +260,7 @@ fn table(solved: &[Solved]) -> Table {
 }
 
 fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> Value {
-    let Framed { name, frame, .. } = mesh;
+    let Framed { name, frame, symmetries, .. } = mesh;
     let posed = |one: &Solved, pose: &FoundPose| {
         json!({
             "camera": camera_json(&one.of_file(frame, pose).camera),
@@ -283,7 +288,13 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
         let mean = solved.iter().map(|of| of.poses[0].iou).sum::<f64>() / solved.len() as f64;
         json!({ "mean_iou": mean, "pictures": results })
     };
-    json["mesh"] = json!({ "name": name, "middle": frame.middle, "scale": 1.0 / frame.unit });
+    let turn = |&Symmetry { axis, degrees }: &Symmetry| json!({ "axis": axis, "degrees": degrees });
+    json["mesh"] = json!({
+        "name": name,
+        "middle": frame.middle,
+        "scale": 1.0 / frame.unit,
+        "symmetries": symmetries.iter().map(turn).collect::<Vec<_>>(),
+    });
     json["warnings"] = json!(warnings);
     json
 }

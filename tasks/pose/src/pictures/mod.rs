@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given, MaskFlags, Variant};
-use softrast_inverse::pose::PoseSearch;
+use softrast_inverse::pose::{PoseSearch, Symmetry, symmetries};
 use softrast_lab::Error;
 use softrast_raster::{NEAR, Pinhole, on_backend};
 use softrast_views::{
@@ -182,9 +182,12 @@ pub(crate) fn solve_pictures(
     let best = solved.iter().map(|one| (one.path.display(), one.poses[0].camera));
     let across = faces_across_note(&mesh, best, NEAR);
     let mut warnings = warnings(cameras.is_some(), args.optimise_fov, &solved);
-    warnings.extend(of_mesh.into_iter().chain(notes).chain(across));
+    // A pose that was given tells the turn, and so do colours.
+    let symmetries = if started || args.colour { Vec::new() } else { symmetries(&mesh) };
+    warnings
+        .extend(of_mesh.into_iter().chain(notes).chain(across).chain(symmetry_note(&symmetries)));
     let name = args.mesh.as_ref().map_or("fox".to_owned(), |path| path.display().to_string());
-    let mesh = Framed { mesh, name, frame, started };
+    let mesh = Framed { mesh, name, frame, started, symmetries };
     answer(&mesh, &solved, &overlays, warnings, single)
 }
 
@@ -204,6 +207,21 @@ fn refuse_flags_of_seeds(given: &Given<'_, Args>) -> anyhow::Result<()> {
         ))),
         None => Ok(()),
     }
+}
+
+/// What masks do not tell of a mesh that looks the same after a turn.
+fn symmetry_note(symmetries: &[Symmetry]) -> Option<String> {
+    let turns = symmetries.iter().map(|Symmetry { axis: [x, y, z], degrees }| {
+        let turn = degrees.map_or_else(|| "any angle".to_owned(), |by| format!("{by} degrees"));
+        format!("{turn} about ({x:.2}, {y:.2}, {z:.2})")
+    });
+    let turns = turns.collect::<Vec<_>>().join(", ");
+    (!symmetries.is_empty()).then(|| {
+        format!(
+            "the mesh has the same silhouettes turned by {turns}: masks do not tell these poses apart, and one of them is given (--colour, with a \
+             coloured mesh)"
+        )
+    })
 }
 
 fn warnings(calibrated: bool, optimised: bool, solved: &[Solved]) -> Vec<String> {
