@@ -20,6 +20,8 @@ pub struct Progress {
     stop: &'static AtomicBool,
     /// Steps of all runs of earlier batches.
     before: u64,
+    /// Steps of those that an earlier call of the program has made.
+    skipped: u64,
     /// Runs and steps of this batch.
     runs: usize,
     steps: usize,
@@ -62,11 +64,21 @@ impl Progress {
 
     fn new(target: ProgressDrawTarget, lines: bool, stop: &'static AtomicBool) -> Self {
         let bar = ProgressBar::with_draw_target(Some(0), target);
-        let template = "{prefix} [{bar:32}] step {pos}/{len}, {msg}, {eta} left";
+        let template = "{prefix} [{bar:32}] step {pos}/{len}{msg}";
         let style = ProgressStyle::with_template(template).expect("the template is valid");
         bar.set_style(style.progress_chars("=> "));
         let last_line = Instant::now();
-        Self { bar, lines, last_line, stop, before: 0, runs: 1, steps: 0, prefix: String::new() }
+        Self {
+            bar,
+            lines,
+            last_line,
+            stop,
+            before: 0,
+            skipped: 0,
+            runs: 1,
+            steps: 0,
+            prefix: String::new(),
+        }
     }
 
     /// Says how many steps all runs of all batches have together.
@@ -97,19 +109,28 @@ impl Progress {
     /// [`Error::Interrupted`] when the work should stop here; pass it on.
     pub fn step(&mut self, step: usize, loss: f64) -> anyhow::Result<()> {
         let done = self.before + (step * self.runs) as u64;
-        self.bar.set_message(format!("loss {loss:.4e}"));
         self.bar.set_position(done);
+        let left = self.left(done);
+        self.bar.set_message(format!(", loss {loss:.4e}{left}"));
         if self.lines && self.last_line.elapsed() >= LINE_EVERY {
             self.last_line = Instant::now();
             let steps = self.bar.length().unwrap_or(done);
-            let left = indicatif::HumanDuration(self.bar.eta());
-            eprintln!("{}: step {done}/{steps}, loss {loss:.4e}, {left} left", self.prefix);
+            eprintln!("{}: step {done}/{steps}, loss {loss:.4e}{left}", self.prefix);
         }
         // After the last step the batch is as good as finished, and would be lost.
         if step < self.steps && self.stop.load(Ordering::SeqCst) {
             return Err(Error::Interrupted.into());
         }
         Ok(())
+    }
+
+    /// The time left, once a tenth of the steps is done: the first steps of a program say little about the others.
+    fn left(&self, done: u64) -> String {
+        let steps = self.bar.length().unwrap_or(done) - self.skipped;
+        if 10 * (done - self.skipped) < steps {
+            return String::new();
+        }
+        format!(", {} left", indicatif::HumanDuration(self.bar.eta()))
     }
 
     /// Ends the batch that began last.
@@ -121,6 +142,7 @@ impl Progress {
     /// Passes over steps that an earlier call of the program has made.
     pub fn skip(&mut self, runs: usize, steps: usize) {
         self.before += (runs * steps) as u64;
+        self.skipped += (runs * steps) as u64;
         self.bar.set_position(self.before);
         // They took no time now, so they say nothing about the time left.
         self.bar.reset_eta();
@@ -135,6 +157,16 @@ impl Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_time_left_is_shown_from_a_tenth_of_the_steps_on() {
+        let mut progress = Progress::hidden();
+        progress.expect(300);
+        progress.begin("run".into(), 2, 150).unwrap();
+        progress.skip(1, 100);
+        assert_eq!(progress.left(119), "");
+        assert!(progress.left(120).ends_with(" left"));
+    }
 
     #[test]
     fn a_stopped_batch_ends_after_its_step_unless_that_was_its_last() {

@@ -168,8 +168,9 @@ impl<S: Softness> Silhouette<S> {
         target: Tensor<B, 3>,
         counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
-        let (table, target) = (table.detach(), target.detach());
-        let counted = counted.map(Tensor::detach);
+        // Detaching a leaf leaves its request for a gradient.
+        let (table, target) = (constant(table), constant(target));
+        let counted = counted.map(constant);
         if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
             let coverage = self.coverage_by_table(vertices, table);
             return loss_of_images(loss, coverage, target, counted);
@@ -273,4 +274,8 @@ fn covered<B: RasterBackend>(t_conorm: TConorm, sums: Tensor<B, 3>) -> Tensor<B,
         TConorm::Probabilistic => elementary(ElementaryOp::Coverage, vec![primitive(sums)]),
         _ => t_conorm.coverage(sums),
     }
+}
+
+fn constant<B: RasterBackend, const D: usize>(tensor: Tensor<B, D>) -> Tensor<B, D> {
+    tensor.detach().set_require_grad(false)
 }

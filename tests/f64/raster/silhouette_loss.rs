@@ -159,3 +159,19 @@ fn more_pairs_than_are_kept_are_walked_again() {
         assert_same(&renderer, 3, size, 1, true, weighted);
     }
 }
+
+#[test]
+fn a_target_that_asks_for_a_gradient_is_a_constant() {
+    let renderer = SoftRenderer::new(&[[0, 1, 2]], 6, Family::Logistic, 0.1);
+    let corners = vector::<A>(&[-0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.6, 1.0]);
+    let corners = corners.reshape([1, 3, 3]).require_grad();
+    let target = vector::<A>(&[1.0; 36]).reshape([1, 6, 6]).require_grad();
+    let seen = Projected::new(corners.clone());
+    for loss in [
+        renderer.mse_loss(seen.clone(), target.clone()),
+        renderer.iou_loss(seen.clone(), target.clone()),
+    ] {
+        let gradients = loss.sum().backward();
+        assert!(target.grad(&gradients).is_none() && corners.grad(&gradients).is_some());
+    }
+}

@@ -343,7 +343,7 @@ fn apart<P: Copy + Borrow<Pinhole>>(
         if kept.iter().any(|((other, _), _)| angle_deg(camera, other.borrow()) < degrees) {
             continue;
         }
-        let sides = mesh.map(|mesh| from_three_sides(mesh, camera.rotation));
+        let sides = mesh.map(|mesh| from_three_sides(mesh, bounding_ball(mesh), camera.rotation));
         let alike = |other: &Option<Vec<bool>>| {
             sides.as_ref().zip(other.as_ref()).is_some_and(|(a, b)| overlap(a, b) >= DUPLICATE_IOU)
         };
@@ -354,9 +354,12 @@ fn apart<P: Copy + Borrow<Pinhole>>(
     kept.into_iter().map(|(pose, _)| pose).collect()
 }
 
-/// Silhouettes of a turned mesh along each of its axes then: from the camera, from beside and from above.
-pub(super) fn from_three_sides(mesh: &Mesh, rotation: [[f64; 3]; 3]) -> Vec<bool> {
-    let (middle, radius) = bounding_ball(mesh);
+/// Silhouettes of a mesh that is turned about the middle of a ball, along each of its axes then: from the camera, from beside and from above.
+pub(super) fn from_three_sides(
+    mesh: &Mesh,
+    (middle, radius): ([f64; 3], f64),
+    rotation: [[f64; 3]; 3],
+) -> Vec<bool> {
     let positions = mesh.positions().iter().map(|p| {
         let p = [0, 1, 2].map(|k| (p[k] - middle[k]) / radius);
         rotation.map(|row| (0..3).map(|k| row[k] * p[k]).sum::<f64>())

@@ -36,7 +36,10 @@ pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
     let mesh = &*coarse(mesh);
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut axes = identity.to_vec();
-    for axis in axes_of_inertia(mesh) {
+    let (middle, of_inertia) = inertia(mesh);
+    let away = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] - middle[k]);
+    let radius = mesh.positions().iter().map(|p| dot(away(p), away(p)).sqrt()).fold(0.0, f64::max);
+    for axis in of_inertia {
         if axes.iter().all(|known| dot(*known, axis).abs() < SAME_AXIS) {
             axes.push(axis);
         }
@@ -44,9 +47,10 @@ pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
     let found = axes.into_iter().filter_map(|axis| {
         // The axis first, so that the sides are along and across it.
         let frame = frame(axis);
-        let still = from_three_sides(mesh, frame);
+        let seen = |rotation| from_three_sides(mesh, (middle, radius), rotation);
+        let still = seen(frame);
         let alike = |degrees: f64| {
-            let turned = from_three_sides(mesh, product(frame, turn(axis, degrees.to_radians())));
+            let turned = seen(product(frame, turn(axis, degrees.to_radians())));
             overlap(&still, &turned) >= DUPLICATE_IOU
         };
         if ANY.into_iter().all(alike) {
@@ -97,13 +101,15 @@ fn frame(axis: [f64; 3]) -> [[f64; 3]; 3] {
     [axis, second, cross(axis, second)]
 }
 
-/// The axes along which the surface reaches farthest and least far from its middle, and the one across both.
-fn axes_of_inertia(mesh: &Mesh) -> Vec<[f64; 3]> {
-    let (_, radius) = bounding_ball(mesh);
+/// The middle of the surface, which lies on every axis of symmetry; and the axes along which it reaches farthest and least far from there, and the one
+/// across both.
+fn inertia(mesh: &Mesh) -> ([f64; 3], Vec<[f64; 3]>) {
+    let (near_middle, radius) = bounding_ball(mesh);
     let positions = mesh.positions();
+    let place = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - near_middle[k]) / radius);
     // The middle of each face, by its area.
     let middles = mesh.faces().iter().map(|face| {
-        let [a, b, c] = face.map(|vertex| positions[vertex as usize].map(|x| x / radius));
+        let [a, b, c] = face.map(|vertex| place(positions[vertex as usize]));
         let side = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
         let normal = cross(side(b), side(c));
         (dot(normal, normal).sqrt(), [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0))
@@ -119,16 +125,18 @@ fn axes_of_inertia(mesh: &Mesh) -> Vec<[f64; 3]> {
     });
     let trace: f64 = (0..3).map(|k| covariance[k][k]).sum();
     if !(area > 0.0 && trace > 0.0) {
-        return Vec::new();
+        return (near_middle, Vec::new());
     }
+    let middle = [0, 1, 2].map(|k| near_middle[k] + radius * mean[k]);
     let least = |i: usize, j: usize| (if i == j { trace } else { 0.0 }) - covariance[i][j];
     let far = eigenvector(covariance);
     let near = eigenvector([0, 1, 2].map(|i| [0, 1, 2].map(|j| least(i, j))));
     let across = cross(far, near);
-    match dot(across, across) > 0.5 {
+    let axes = match dot(across, across) > 0.5 {
         true => vec![far, near, unit(across)],
         false => vec![far],
-    }
+    };
+    (middle, axes)
 }
 
 /// The eigenvector of the largest eigenvalue, about.
