@@ -18,7 +18,7 @@ pub(crate) trait Function<const D: usize>: fmt::Debug + Send + Sync + 'static {
     fn value<B: RasterBackend>(&self, inputs: Vec<Tensor<B, 3>>) -> Tensor<B, D>;
 }
 
-/// The same for tensors of any release, of which it sees the numbers.
+/// A [`Function`] for tensors of any release, of which it sees the numbers.
 pub(crate) trait Op: fmt::Debug + Send + Sync {
     /// The value.
     fn forward(&self, inputs: Vec<TensorData>) -> TensorData;

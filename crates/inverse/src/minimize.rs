@@ -119,7 +119,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         })
     }
 
-    /// The same run, whose iterates have images.
+    /// This run, whose iterates have images.
     #[must_use]
     pub fn with_pictures(self) -> Self {
         Self { pictures: true, ..self }

@@ -46,7 +46,7 @@ impl Material {
         }
     }
 
-    /// Of parts that are known to be right.
+    /// A texture of parts that are known to be right.
     pub(crate) fn of(picture: Option<Arc<[u8]>>, factor: [f64; 3]) -> Self {
         Self { picture, factor }
     }

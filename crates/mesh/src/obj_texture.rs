@@ -23,7 +23,7 @@ const MOST_LIBRARIES: usize = 100;
 #[derive(Default)]
 pub(crate) struct Found {
     coordinates: Vec<[f64; 2]>,
-    /// Of each corner of each face, in the order of the file; [`NOWHERE`] for those that have none.
+    /// A place for each corner of each face, in the order of the file; [`NOWHERE`] for those that have none.
     corners: Vec<u32>,
     /// The texts after `mtllib`, each once.
     libraries: Vec<String>,
@@ -269,7 +269,7 @@ struct Look {
 }
 
 impl Look {
-    /// The same without a picture that has options, of a material of this name.
+    /// This library without a picture that has options, of a material of this name.
     fn without_options(mut self, name: &str, warnings: &mut Vec<Trouble>) -> Self {
         if let Some((_, options)) = self.picture.take_if(|(_, name)| name.starts_with('-')) {
             let (options, name) = (shown(&options), shown(name));

@@ -81,7 +81,7 @@ impl Texture {
         Ok(Self { materials, of_faces, ..self })
     }
 
-    /// The same texture, but the colours of the vertices multiply the pictures too, as in glTF files.
+    /// This texture, whose pictures the colours of the vertices multiply, as in glTF files.
     #[must_use]
     pub fn multiplying_colours(self) -> Self {
         Self { multiplies_colours: true, ..self }

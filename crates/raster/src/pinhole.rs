@@ -25,7 +25,7 @@ const ROUNDED: f64 = 1e-3;
 /// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, [150, 200]);
 /// let device = Default::default();
 /// let corners = vertices::<NdArray>(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], &device);
-/// let seen = project(corners, Pinholes::new(&[camera], &device)); // [1, 2, 3]
+/// let seen = project(corners, Pinholes::new(&[camera], &device)).tensor(); // [1, 2, 3]
 /// let x: Vec<f32> = seen.into_data().to_vec().unwrap();
 /// assert!(x[0].abs() < 1e-6 && x[3] > 0.0, "the origin is in the middle, +x to the right");
 /// ```

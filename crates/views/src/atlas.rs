@@ -88,7 +88,7 @@ impl Atlas {
     }
 }
 
-/// The same mesh with the colours of its texture at its vertices, so that these are means over their surroundings; or none where the texture
+/// A mesh with the colours of its texture at its vertices, so that these are means over their surroundings; or none where the texture
 /// has none, and why pictures are not in them.
 ///
 /// A mesh of few faces is cut as by [`Mesh::subdivided`] before, while it has at most so many in the end.
@@ -203,7 +203,7 @@ type Bounds = [[i64; 2]; 2];
 /// Which patches there are, and where on them faces lie.
 struct Layout {
     patches: Vec<Patch>,
-    /// Of each face: its patch, and its corners in texels from the patch's corner above left.
+    /// The patch of each face, and its corners in texels from the patch's corner above left.
     faces: Vec<(usize, [[f64; 2]; 3])>,
 }
 

@@ -14,7 +14,7 @@ use crate::{Method, ScheduledSoftness};
 /// Steps on many pixels unless asked for: by a mask, and by colours. Only silhouettes are brought to their least squares.
 const FINE_STEPS: [usize; 2] = [20, 80];
 
-/// What sees the number of each step and the least loss.
+/// A function that receives the number of each step and the least loss.
 type Visit<'a> = Box<dyn FnMut(usize, f64) -> anyhow::Result<()> + 'a>;
 
 /// The search for the camera from which a mesh has a given silhouette.
@@ -144,7 +144,7 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
         self.search(true).steps(&view.view.mask, true, self.started)
     }
 
-    /// What [`run`](Self::run) would refuse at once.
+    /// Checks what [`run`](Self::run) would refuse at once.
     ///
     /// # Errors
     ///
@@ -161,18 +161,18 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
     ///
     /// # Errors
     ///
-    /// Those of [`check`](Self::check), of what sees the progress and of the device.
+    /// The errors of [`check`](Self::check), of the function that sees the progress and of the device.
     pub fn run<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<FoundPose>> {
         self.found::<B>(&Target::new(mask, None)?)
     }
 
-    /// The same by the colours of a picture too, those of the vertices of the mesh being known: colours tell apart poses that look alike as
+    /// Finds poses by the colours of a picture too, where the vertices of the mesh have colours: they tell apart poses that look alike as
     /// silhouettes. Poses are ranked by the `IoU` loss and the error of colours together; those after the first may look like it as
     /// silhouettes, and have losses that are larger by 0.03 at most. The camera of the view is not read.
     ///
     /// # Errors
     ///
-    /// Those of [`run`](Self::run); if the mesh has no colours, or no pixel of the view has a colour.
+    /// The errors of [`run`](Self::run); if the mesh has no colours, or no pixel of the view has a colour.
     #[doc(alias = "run_by_color")]
     pub fn run_by_colour<B: RasterBackend>(
         mut self,
@@ -187,7 +187,7 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
     ///
     /// # Errors
     ///
-    /// Those of [`run`](Self::run).
+    /// The errors of [`run`](Self::run).
     pub fn starts<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<Pinhole>> {
         let search = self.search(false);
         search.starts::<B>(self.mesh, mask, &self.camera, &self.method, &mut self.visit)

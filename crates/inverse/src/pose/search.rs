@@ -85,7 +85,7 @@ pub(super) fn steps_of_starts(mask: &Picture) -> usize {
     STARTS.1 + Stages::of(!cut_sides(mask).is_empty()).coarse.1
 }
 
-/// What a search refuses at once.
+/// Checks what a search refuses at once.
 pub(super) fn check(
     mesh: &Mesh,
     mask: &Picture,

@@ -209,7 +209,7 @@ fn refuse_flags_of_seeds(given: &Given<'_, Args>) -> anyhow::Result<()> {
     }
 }
 
-/// What masks do not tell of a mesh that looks the same after a turn.
+/// A line on the turns of a mesh that masks do not tell.
 fn symmetry_note(symmetries: &[Symmetry]) -> Option<String> {
     let turns = symmetries.iter().map(|Symmetry { axis: [x, y, z], degrees }| {
         let turn = degrees.map_or_else(|| "any angle".to_owned(), |by| format!("{by} degrees"));

@@ -86,7 +86,7 @@ pub struct Views {
 /// Views on which a result is scored, and which the search does not see.
 #[derive(Clone, Debug)]
 pub enum HoldOut {
-    /// So many of the folder's views, evenly spaced.
+    /// This many of the folder's views, evenly spaced.
     Count(usize),
     /// All views of another file of cameras.
     Cameras(PathBuf),
