@@ -25,8 +25,8 @@ const SIZE: [usize; 2] = [6, 5];
 /// Half of a step of differences.
 const H: f64 = 1e-6;
 
-/// Projected vertices, `[2, 4, 3]`. No pixel is where second derivatives jump: as near to an edge as to its end, or so
-/// near to an edge that the knots of its table crowd.
+/// Projected vertices, `[2, 4, 3]`. No pixel is as near to an edge as to its end, where second derivatives jump, nor so near to an edge that
+/// differences of this step miss them.
 const SEEN: [[f64; 3]; 8] = [
     [-0.613, -0.487, 2.113],
     [0.521, -0.573, 1.807],
