@@ -14,7 +14,7 @@ use softrast_burn::{
     },
 };
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the example has a program around what is tested")]
 #[path = "../examples/fit.rs"]
 mod example;
 

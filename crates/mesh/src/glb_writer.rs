@@ -14,7 +14,7 @@ const FLOATS: u32 = 5126;
 const WHOLE: u32 = 5125;
 const OF_VERTICES: u32 = 34962;
 const OF_INDICES: u32 = 34963;
-/// Of a material without a picture, on a mesh without colours; proportional to light.
+/// The colour of a material without a picture, on a mesh without colours; proportional to light.
 const GREY: f64 = 0.75;
 /// Coordinates are written from the origin on where 32 bits round them by at most this part of the longest side of the mesh.
 const COARSEST: f64 = 1e-5;
