@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use super::{
     float::{Float as _, Vectors},
     lanes::{GROUP, LANES, Lanes, Plain, Work, has_vectors, run},
-    reach::{Reach, grown, in_pixels},
+    reach::{Reach, grown, in_pixels, is_seen_clockwise},
     real::splat,
+    sum::Inputs,
     tasks::task,
 };
 use crate::ImageSize;
@@ -92,19 +93,12 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Lists the faces of each of `count` bands of each view. `vertices` `[views, 3, vertices]` holds x, y in
-    /// NDC and the depth; a face enters the bands that its bounding box grown by `radius` touches.
-    pub(crate) fn new<F: Vectors>(
-        vertices: &[F],
-        vertices_per_view: usize,
-        faces: &[[u32; 3]],
-        size: ImageSize,
-        count: usize,
-        near: f64,
-        radius: f64,
-    ) -> Self {
-        let radius = F::from_f64(0.5 * radius * size.shorter() as f64);
-        let near = F::from_f64(near);
+    /// Lists the faces of each band of each view. A face enters the bands that its bounding box grown by the reach of the profile touches.
+    pub(crate) fn new<F: Vectors>(inputs: &Inputs<F>) -> Self {
+        let Inputs { vertices, faces, size, culls, views, bands: count, .. } = *inputs;
+        let vertices_per_view = vertices.len() / 3 / views.max(1);
+        let radius = F::from_f64(0.5 * inputs.grid.outer * size.shorter() as f64);
+        let near = F::from_f64(inputs.near);
         let view = |vertices: &[F]| {
             let (x, rest) = vertices.split_at(vertices_per_view);
             let (y, z) = rest.split_at(vertices_per_view);
@@ -121,13 +115,25 @@ impl Bands {
             let chunks = faces.par_chunks(AT_ONCE).zip(reaches.par_chunks_mut(AT_ONCE));
             let reach = |(faces, reaches)| {
                 task("reach", || {
+                    let turned = culls.then_some([x, y]);
                     if has_vectors() {
-                        let work = ReachOfFaces::<F::Best> { places, faces, radius, size, reaches };
-                        run::<F::Best, _>(work)
+                        run::<F::Best, _>(ReachOfFaces::<F::Best> {
+                            places,
+                            turned,
+                            faces,
+                            radius,
+                            size,
+                            reaches,
+                        })
                     } else {
-                        let work =
-                            ReachOfFaces::<Plain<F>> { places, faces, radius, size, reaches };
-                        run::<Plain<F>, _>(work)
+                        run::<Plain<F>, _>(ReachOfFaces::<Plain<F>> {
+                            places,
+                            turned,
+                            faces,
+                            radius,
+                            size,
+                            reaches,
+                        })
                     }
                 })
             };
@@ -143,6 +149,8 @@ impl Bands {
 struct ReachOfFaces<'a, L: Lanes> {
     /// Places of the vertices in the image.
     places: &'a [[L::Float; 2]],
+    /// x and y of the vertices in NDC, where back faces are not drawn.
+    turned: Option<[&'a [L::Float]; 2]>,
     faces: &'a [[u32; 3]],
     /// In pixels.
     radius: L::Float,
@@ -155,7 +163,7 @@ impl<L: Lanes> Work for ReachOfFaces<'_, L> {
 
     #[inline(always)]
     fn run(self) -> usize {
-        let Self { places, faces, radius, size, reaches } = self;
+        let Self { places, turned, faces, radius, size, reaches } = self;
         let mut drawn = 0;
         for (faces, reaches) in faces.chunks(LANES).zip(reaches.chunks_mut(LANES)) {
             let mut corners = [[[L::Float::ZERO; LANES]; 3]; 2];
@@ -172,7 +180,11 @@ impl<L: Lanes> Work for ReachOfFaces<'_, L> {
                 let [left, right] = [columns.start[lane] as u32, columns.end[lane] as u32];
                 let [top, bottom] = [rows.start[lane] as u32, rows.end[lane] as u32];
                 // A vertex that is not drawn is at infinity in both.
-                let is_drawn = columns.highest[lane] < L::Float::from_f64(f64::INFINITY);
+                let mut is_drawn = columns.highest[lane] < L::Float::from_f64(f64::INFINITY);
+                if let Some([x, y]) = turned {
+                    is_drawn &=
+                        !is_seen_clockwise(faces[lane].map(|v| [x[v as usize], y[v as usize]]));
+                }
                 drawn += usize::from(is_drawn);
                 if is_drawn && left < right && top < bottom {
                     *reach = Reach { top, bottom, left, right };

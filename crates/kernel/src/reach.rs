@@ -25,6 +25,12 @@ pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: ImageSize) -
     [place(x, size.width), place(-y, size.height)]
 }
 
+/// Whether corners given in NDC, y up, go round clockwise.
+pub(crate) fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
+    let [[ax, ay], [bx, by], [cx, cy]] = corners.map(|corner| corner.map(F::to_f64));
+    (bx - ax) * (cy - ay) < (by - ay) * (cx - ax)
+}
+
 /// How far from its bounding box a face reaches the centres of pixels along an axis of this many, with more than their places are rounded
 /// by.
 #[inline(always)]

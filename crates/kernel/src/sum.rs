@@ -30,6 +30,8 @@ pub struct Inputs<'a, F> {
     pub size: ImageSize,
     /// Depth below which a vertex counts as behind the camera: its faces are not drawn.
     pub near: f64,
+    /// Whether back faces are not drawn: those whose corners are seen clockwise.
+    pub culls: bool,
     /// Number of views.
     pub views: usize,
     /// Bands of a view: [`bands_of_view`](crate::bands_of_view), or for losses [`bands_of_losses`](crate::bands_of_losses).
@@ -42,9 +44,7 @@ impl<F> Inputs<'_, F> {
     where
         F: Vectors,
     {
-        let per_view = self.vertices.len() / 3 / self.views.max(1);
-        let Self { vertices, faces, size, bands, near, .. } = *self;
-        Bands::new(vertices, per_view, faces, size, bands, near, self.grid.outer)
+        Bands::new(self)
     }
 
     /// What a walk over these inputs reads; `tangents` are those of vertices and table, or nothing.

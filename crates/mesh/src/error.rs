@@ -81,6 +81,22 @@ pub enum MeshError {
         /// Index of the vertex, from 0.
         vertex: usize,
     },
+    /// An edge has not two faces that go through it in opposite directions.
+    #[error(
+        "the mesh is not closed: the edge of vertices {} and {} has not two faces that go through it in opposite directions",
+        vertices[0],
+        vertices[1]
+    )]
+    NotClosed {
+        /// Indices of both ends, from 0.
+        vertices: [usize; 2],
+    },
+    /// Faces at a vertex do not make one fan.
+    #[error("the mesh branches: the faces at vertex {vertex} do not make one fan")]
+    Branches {
+        /// Index of the vertex, from 0.
+        vertex: usize,
+    },
     /// There are more or fewer colours than vertices.
     #[error("{found} colours for the {vertices} vertices of the mesh")]
     Colours {

@@ -45,6 +45,8 @@ mod ply;
 mod ply_header;
 mod polygon;
 mod read;
+mod remesh;
+mod solid;
 mod statements;
 mod stl;
 mod stroke;
@@ -62,6 +64,7 @@ pub use fox::{fox, painted_fox};
 pub use icosphere::icosphere;
 pub use material::{Material, from_linear, to_linear};
 pub use mesh::Mesh;
+pub use remesh::{Changes, ClosedSurface};
 pub use texture::Texture;
 
 /// Compiles and runs the README's example.

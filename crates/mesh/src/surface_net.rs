@@ -1,6 +1,6 @@
 //! Turns a solid, given as a function that is negative inside, into one seamless surface.
 
-use crate::{Mesh, MeshError, mesh::norm};
+use crate::mesh::norm;
 
 /// Least slope of a field that a Newton step counts on: flatter fields, as where strokes meet, are
 /// followed in shorter steps.
@@ -14,36 +14,6 @@ pub(crate) struct Grid {
     pub(crate) step: f64,
     /// Number of cubes along x, y and z.
     pub(crate) cubes: [usize; 3],
-}
-
-impl Mesh {
-    /// The surface of a solid within a box (lowest and highest corner, world units), with so many cells along the longest side of that:
-    /// closed, and counterclockwise from outside.
-    ///
-    /// `field` is negative inside the solid, and grows about like a distance. What of the solid reaches the sides of the box is cut off half
-    /// a cell before them.
-    ///
-    /// # Errors
-    ///
-    /// If nothing in the box is inside, or the box has no extent.
-    pub fn of_solid(
-        [low, high]: [[f64; 3]; 2],
-        cells: usize,
-        field: impl Fn([f64; 3]) -> f64,
-    ) -> Result<Self, MeshError> {
-        let sides = [0, 1, 2].map(|k| high[k] - low[k]);
-        let step = sides.iter().copied().fold(0.0, f64::max) / cells.max(1) as f64;
-        if !(step > 0.0 && step.is_finite()) {
-            return Err(MeshError::Empty);
-        }
-        let cubes = sides.map(|side| (side / step).ceil() as usize);
-        let beyond = |p: [f64; 3]| {
-            (0..3).map(|k| (p[k] - high[k]).max(low[k] - p[k])).fold(f64::NEG_INFINITY, f64::max)
-        };
-        let within = |p: [f64; 3]| field(p).max(beyond(p) + 0.5 * step);
-        let (positions, faces) = surface_net(&Grid { low, step, cubes }, within);
-        Self::new(positions, faces)
-    }
 }
 
 /// Vertices and triangles of the surface where `field` is zero, counterclockwise from outside.
@@ -94,16 +64,19 @@ pub(crate) fn surface_net(
 }
 
 impl Grid {
-    fn corners(&self) -> impl Iterator<Item = [usize; 3]> {
+    /// The corners of all cubes.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = [usize; 3]> {
         let [nx, ny, nz] = self.cubes;
         (0..=nz).flat_map(move |z| (0..=ny).flat_map(move |y| (0..=nx).map(move |x| [x, y, z])))
     }
 
-    fn number(&self, [x, y, z]: [usize; 3]) -> usize {
+    /// The place of a corner among all.
+    pub(crate) fn number(&self, [x, y, z]: [usize; 3]) -> usize {
         x + (self.cubes[0] + 1) * (y + (self.cubes[1] + 1) * z)
     }
 
-    fn point(&self, corner: [usize; 3]) -> [f64; 3] {
+    /// Where a corner is.
+    pub(crate) fn point(&self, corner: [usize; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.low[k] + self.step * corner[k] as f64)
     }
 
@@ -185,21 +158,6 @@ fn moved(mut corner: [usize; 3], axis: usize, by: isize) -> [usize; 3] {
 mod tests {
     use super::*;
     use crate::mesh::{cross, dot};
-
-    #[test]
-    fn a_solid_is_a_mesh_and_nothing_is_none() {
-        let bounds = [[-1.5, -1.5, -1.2], [1.5, 1.5, 1.2]];
-        let ball = Mesh::of_solid(bounds, 20, |p| norm(p) - 1.0).unwrap();
-        assert!((ball.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.02);
-        assert!(matches!(Mesh::of_solid(bounds, 20, |_| 1.0), Err(MeshError::Empty)));
-        // A ball that the box cuts off on all sides is closed there.
-        let cut = Mesh::of_solid([[-1.0; 3], [1.0; 3]], 20, |p| norm(p) - 1.2).unwrap();
-        let edges = crate::Edges::new(cut.faces());
-        assert_eq!(edges.ends.len(), edges.hinges.len());
-        let [low, high] = cut.bounds();
-        assert!((0..3).all(|k| (high[k] - 0.95).abs() < 1e-3 && (low[k] + 0.95).abs() < 1e-3));
-        assert!(matches!(Mesh::of_solid([[0.0; 3]; 2], 20, |_| -1.0), Err(MeshError::Empty)));
-    }
 
     #[test]
     fn net_of_a_ball_is_a_sphere_that_looks_outward() {

@@ -95,8 +95,7 @@ impl Workload {
         tolerance: f64,
         dtype: DType,
     ) -> (Silhouette<EdgeSoftness>, Tensor<B, 2>) {
-        let rasterizer =
-            Rasterizer { size: self.size.into(), tolerance, t_conorm: TConorm::Probabilistic };
+        let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(self.size) };
         let silhouette = rasterizer.prepare(&self.faces, self.softness, &self.phi::<B>(dtype));
         let table = silhouette.table(self.phi(dtype));
         (silhouette, table)

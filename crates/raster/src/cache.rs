@@ -40,6 +40,14 @@ impl<K: Clone + PartialEq> Cache<K> {
         table
     }
 
+    /// One of its own that begins with what `changed` makes of the last knots, and with the last table.
+    pub(crate) fn continued(&self, changed: impl FnOnce(&K) -> Option<K>) -> Self {
+        let latest = self.latest();
+        let knots = latest.knots.as_ref().and_then(changed);
+        let table = latest.table.clone().filter(|_| knots.is_some());
+        Self(Arc::new(Mutex::new(Latest { knots, table })))
+    }
+
     /// One that begins with these knots.
     pub(crate) fn beginning_with(knots: K) -> Self {
         Self(Arc::new(Mutex::new(Latest { knots: Some(knots), table: None })))

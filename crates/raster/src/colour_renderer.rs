@@ -59,6 +59,8 @@ const BEHIND: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct ColourRenderer<S = EdgeSoftness> {
     faces: Arc<[[u32; 3]]>,
+    /// Faces that knots are chosen for: as many as there are, or more.
+    room: usize,
     size: ImageSize,
     weighting: Weighting<S>,
     phi: [Vec<f64>; 2],
@@ -75,6 +77,8 @@ struct Prepared<S> {
     phi: [Vec<f64>; 2],
     /// Logarithm of the background's weight that the tables reach.
     log_weight: f64,
+    /// Faces that they serve.
+    room: usize,
     edge: LogCurve<S>,
     depth: DepthCurve,
 }
@@ -125,6 +129,7 @@ impl<S: Softness> ColourRenderer<S> {
         check(&weighting, &phi);
         let tolerance = Rasterizer::TOLERANCE;
         Self {
+            room: faces.len(),
             faces,
             size,
             weighting,
@@ -134,6 +139,25 @@ impl<S: Softness> ColourRenderer<S> {
             cache: Cache::default(),
             #[cfg(feature = "wgpu")]
             topology: Default::default(),
+        }
+    }
+
+    /// This renderer for other faces. Knots and tables stay as long as there are not many more faces than before, so a mesh that changes
+    /// while it is optimised costs nothing but its list of faces.
+    ///
+    /// # Panics
+    ///
+    /// If there are no faces.
+    #[must_use]
+    pub fn with_faces(&self, faces: impl Into<Arc<[[u32; 3]]>>) -> Self {
+        let faces: Arc<[[u32; 3]]> = faces.into();
+        assert!(!faces.is_empty(), "an image needs at least one face");
+        Self {
+            room: faces.len().next_power_of_two(),
+            faces,
+            #[cfg(feature = "wgpu")]
+            topology: Default::default(),
+            ..self.clone()
         }
     }
 
@@ -322,12 +346,12 @@ impl<S: Softness> ColourRenderer<S> {
     fn prepared(&self, phi: &[Vec<f64>; 2], log_weight: f64) -> Prepared<S> {
         assert!(log_weight.is_finite(), "log weight {log_weight}");
         let reused = |last: &Prepared<S>| {
-            (log_weight >= last.log_weight)
+            (log_weight >= last.log_weight && last.room >= self.faces.len())
                 .then(|| last.stretched_to(&self.weighting, phi))
                 .flatten()
         };
-        let (faces, tolerance) = (self.faces.len(), self.tolerance);
-        let choose = || Prepared::new(&self.weighting, phi, faces, tolerance, log_weight);
+        let (room, tolerance) = (self.room, self.tolerance);
+        let choose = || Prepared::new(&self.weighting, phi, room, tolerance, log_weight);
         self.cache.knots(reused, choose)
     }
 }
@@ -338,14 +362,14 @@ impl<S: Softness> Prepared<S> {
     fn new(
         weighting: &Weighting<S>,
         phi: &[Vec<f64>; 2],
-        faces: usize,
+        room: usize,
         tolerance: f64,
         log_weight: f64,
     ) -> Self {
         let device = Default::default();
         let log_weight = log_weight - MARGIN;
         let accuracy = tolerance / 2.0;
-        let least = (accuracy / faces as f64).ln() + log_weight;
+        let least = (accuracy / room as f64).ln() + log_weight;
         let highest = match weighting.depth {
             DepthSoftness::Family(_) => 0.0,
             DepthSoftness::Mlp => {
@@ -363,7 +387,7 @@ impl<S: Softness> Prepared<S> {
         let by_edge = Precision { least: least - highest, floor, ..by_depth };
         let edge = LogCurve::new::<HostBackend>(weighting.edge.clone(), edge, by_edge, &device);
         let depth = DepthCurve::new::<HostBackend>(weighting.depth, depth, by_depth, &device);
-        Self { phi: phi.clone(), log_weight, edge, depth }
+        Self { phi: phi.clone(), log_weight, room, edge, depth }
     }
 
     /// Knots for parameters `phi`, if their softnesses are the prepared ones stretched.

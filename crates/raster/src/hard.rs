@@ -1,8 +1,13 @@
+use std::sync::atomic::{AtomicU8, Ordering};
+
 use rayon::prelude::*;
 use softrast_kernel::inside_spans;
 use softrast_tensor::{Backend, Tensor, TensorData};
 
 use crate::{ImageSize, NEAR, Projected};
+
+/// Faces that one thread takes at once.
+const AT_ONCE: usize = 1 << 10;
 
 /// Hard silhouettes: 1 where the centre of a pixel lies in a face (edges included), else 0.
 ///
@@ -24,6 +29,67 @@ pub fn hard_silhouette<B: Backend>(
     let (device, dtype) = (vertices.device(), vertices.dtype());
     let vertices: Vec<f64> = vertices.swap_dims(1, 2).into_data().iter().collect();
     let image = covered(&vertices, views, faces, size);
+    let shape = [views, size.height, size.width];
+    Tensor::from_data(TensorData::new(image, shape), (&device, dtype))
+}
+
+/// Hard coverage, `[views, height, width]` in [0, 1], top row first: the part of `samples` × `samples` places, evenly spaced in each pixel, that
+/// lie in a face (edges included). It has no gradient. One sample gives [`hard_silhouette`].
+///
+/// # Panics
+///
+/// If `samples` is 0, a face uses a vertex that is not there, or the backend cannot be read synchronously.
+pub fn hard_coverage<B: Backend>(
+    vertices: Projected<B>,
+    faces: &[[u32; 3]],
+    size: impl Into<ImageSize>,
+    samples: usize,
+) -> Tensor<B, 3> {
+    hard_coverage_of(vertices, faces, size.into(), samples, false)
+}
+
+/// [`hard_coverage`], without back faces on request.
+pub(crate) fn hard_coverage_of<B: Backend>(
+    vertices: Projected<B>,
+    faces: &[[u32; 3]],
+    size: ImageSize,
+    samples: usize,
+    culls: bool,
+) -> Tensor<B, 3> {
+    assert!(samples > 0, "hard coverage takes a sample");
+    let vertices = vertices.tensor();
+    let [views, count, _] = vertices.dims();
+    let (device, dtype) = (vertices.device(), vertices.dtype());
+    let vertices: Vec<f64> = vertices.swap_dims(1, 2).into_data().iter().collect();
+    let fine: ImageSize = [samples * size.height, samples * size.width].into();
+    let covers: Vec<AtomicU8> = (0..views * fine.pixels()).map(|_| AtomicU8::new(0)).collect();
+    for (covers, vertices) in covers.chunks(fine.pixels()).zip(vertices.chunks((3 * count).max(1)))
+    {
+        faces.par_iter().with_min_len(AT_ONCE).for_each(|face| {
+            let [a, b, c] = face.map(|v| [vertices[v as usize], vertices[count + v as usize]]);
+            if culls && (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]) {
+                return;
+            }
+            inside_spans(vertices, face, NEAR, fine, |row, start, end| {
+                let places = &covers[row * fine.width + start..row * fine.width + end];
+                // Whoever comes first writes the same.
+                places.iter().for_each(|place| place.store(1, Ordering::Relaxed));
+            });
+        });
+    }
+    let part = 1.0 / (samples * samples) as f32;
+    let rows = covers.par_chunks(samples * fine.width);
+    let image: Vec<f32> = rows
+        .flat_map_iter(|rows| {
+            (0..size.width).map(move |column| {
+                let of_row = |row: &[AtomicU8]| -> u32 {
+                    let places = &row[samples * column..samples * (column + 1)];
+                    places.iter().map(|place| u32::from(place.load(Ordering::Relaxed))).sum()
+                };
+                rows.chunks(fine.width).map(of_row).sum::<u32>() as f32 * part
+            })
+        })
+        .collect();
     let shape = [views, size.height, size.width];
     Tensor::from_data(TensorData::new(image, shape), (&device, dtype))
 }

@@ -64,7 +64,7 @@ pub use colour_renderer::ColourRenderer;
 pub use gpu::Wgpu;
 #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 pub use gpu::adapter_name;
-pub use hard::{hard_silhouette, nearest_faces};
+pub use hard::{hard_coverage, hard_silhouette, nearest_faces};
 pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use no_adapter::NoAdapter;

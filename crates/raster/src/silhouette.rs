@@ -22,6 +22,8 @@ pub struct Rasterizer {
     pub tolerance: f64,
     /// How the coverages of several faces make one.
     pub t_conorm: TConorm,
+    /// Whether back faces are not drawn: those whose corners the camera sees clockwise.
+    pub culls: bool,
 }
 
 impl Rasterizer {
@@ -31,7 +33,7 @@ impl Rasterizer {
     /// A rasterizer for images of `size` pixels, a square or `[height, width]`, with the probabilistic sum and the default tolerance.
     pub fn new(size: impl Into<ImageSize>) -> Self {
         let size = size.into();
-        Self { size, tolerance: Self::TOLERANCE, t_conorm: TConorm::Probabilistic }
+        Self { size, tolerance: Self::TOLERANCE, t_conorm: TConorm::Probabilistic, culls: false }
     }
 
     /// Prepares silhouettes of meshes with these faces, for a softness near the parameters `phi`.
@@ -67,12 +69,23 @@ impl Rasterizer {
         softness: S,
         phi: &[f64],
     ) -> Silhouette<S> {
+        self.prepare_for::<B, H, S>(faces.len(), faces, softness, phi)
+    }
+
+    /// [`Rasterizer::prepare_on`] with knots that serve `room` faces, as many as there are or more.
+    pub(crate) fn prepare_for<B: RasterBackend, H: Backend, S: Softness>(
+        &self,
+        room: usize,
+        faces: &Arc<[[u32; 3]]>,
+        softness: S,
+        phi: &[f64],
+    ) -> Silhouette<S> {
         assert!(self.size.pixels() > 0, "an image needs at least one pixel");
-        let Self { t_conorm, tolerance, .. } = *self;
-        let faces = faces.clone();
-        let profile = Profile::new::<B, H>(&softness, t_conorm, phi, faces.len(), tolerance);
+        let Self { t_conorm, tolerance, culls, .. } = *self;
+        let profile = Profile::new::<B, H>(&softness, t_conorm, phi, room, tolerance);
         let op = ProfileSum {
-            faces,
+            faces: faces.clone(),
+            culls,
             grid: profile.grid(),
             size: self.size,
             near: NEAR,
@@ -200,6 +213,17 @@ impl<S: Softness> Silhouette<S> {
         let profile = self.profile.stretched(factor)?;
         let op = ProfileSum { grid: profile.grid(), ..self.op.clone() };
         Some(Self { softness: self.softness.clone(), profile, op })
+    }
+
+    /// What draws other faces.
+    pub(crate) fn with_faces(&self, faces: Arc<[[u32; 3]]>) -> Self {
+        let op = ProfileSum {
+            faces,
+            #[cfg(feature = "wgpu")]
+            on_gpu: crate::gpu::SumOnGpu::new(self.profile.t_conorm().is_like_depths()),
+            ..self.op.clone()
+        };
+        Self { op, ..self.clone() }
     }
 
     /// Which softness it is.

@@ -6,7 +6,7 @@ use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
 
 use crate::{
     HostBackend, ImageSize, Projected, RasterBackend, Rasterizer, Silhouette, TConorm, Width,
-    cache::Cache, loss::loss_of_images,
+    cache::Cache, hard::hard_coverage_of, loss::loss_of_images,
 };
 
 /// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
@@ -36,9 +36,13 @@ const SAME: f64 = 1e-12;
 pub struct SoftRenderer<S> {
     rasterizer: Rasterizer,
     faces: Arc<[[u32; 3]]>,
+    /// Faces that knots are chosen for: as many as there are, or more.
+    room: usize,
     softness: S,
     phi: Vec<f64>,
     surrogate: Option<Box<Self>>,
+    /// Samples along each side of a pixel, where the image is hard.
+    samples: Option<usize>,
     cache: Cache<Knots<S>>,
 }
 
@@ -48,6 +52,8 @@ struct Knots<S> {
     phi: Vec<f64>,
     /// Whether it is drawn on the CPU, and in which float type.
     drawn: (bool, DType),
+    /// Faces that they serve.
+    room: usize,
     silhouette: Silhouette<S>,
 }
 
@@ -83,7 +89,53 @@ impl<S: Softness> SoftRenderer<S> {
         assert!(rasterizer.size.pixels() > 0, "an image needs at least one pixel");
         assert!(!faces.is_empty(), "a silhouette needs at least one face");
         check(&softness, &phi);
-        Self { rasterizer, faces, softness, phi, surrogate: None, cache: Cache::default() }
+        let (room, cache) = (faces.len(), Cache::default());
+        Self { rasterizer, faces, room, softness, phi, surrogate: None, samples: None, cache }
+    }
+
+    /// This renderer for other faces. Knots and tables stay as long as there are not many more faces than before, so a mesh that changes
+    /// while it is optimised costs nothing but its list of faces.
+    ///
+    /// ```
+    /// use softrast_tensor::NdArray;
+    /// use softrast_raster::{Projected, SoftRenderer, vertices};
+    /// use softrast_softness::Family;
+    ///
+    /// let corners = [[-0.5, -0.5, 2.0], [0.5, -0.5, 2.0], [0.5, 0.5, 2.0], [-0.5, 0.5, 2.0]];
+    /// let corners = vertices::<NdArray>(&corners, &Default::default());
+    /// let one = SoftRenderer::new(&[[0, 1, 2]], 32, Family::Gauss, 0.01);
+    /// let two = one.with_faces([[0, 1, 2], [0, 2, 3]]);
+    /// let [half, whole] = [one, two].map(|r| r.silhouette(Projected::new(corners.clone())).mean().into_scalar());
+    /// assert!((whole / half - 2.0).abs() < 0.1);
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If there are no faces.
+    #[must_use]
+    pub fn with_faces(&self, faces: impl Into<Arc<[[u32; 3]]>>) -> Self {
+        let faces: Arc<[[u32; 3]]> = faces.into();
+        assert!(!faces.is_empty(), "a silhouette needs at least one face");
+        let served = |knots: &Knots<S>| {
+            let serves = knots.room >= faces.len();
+            serves.then(|| Knots {
+                silhouette: knots.silhouette.with_faces(faces.clone()),
+                ..knots.clone()
+            })
+        };
+        let surrogate =
+            self.surrogate.as_ref().map(|wide| Box::new(wide.with_faces(faces.clone())));
+        let (room, cache) = (faces.len().next_power_of_two(), self.cache.continued(served));
+        Self { faces, room, surrogate, cache, ..self.clone() }
+    }
+
+    /// Without back faces: those whose corners the camera sees clockwise. For closed meshes whose faces go counter-clockwise as seen from outside,
+    /// where back faces cost half of the time and widen the outline, which both sides cover softly.
+    ///
+    /// The image is that of the front faces alone. It jumps where a face turns, by what the face covers there.
+    #[must_use]
+    pub fn without_back_faces(self) -> Self {
+        self.changed(|rasterizer| rasterizer.culls = true)
     }
 
     /// With another largest error of a pixel, in (0, 1); see [`Profile::new`](crate::low_level::Profile::new).
@@ -96,6 +148,22 @@ impl<S: Softness> SoftRenderer<S> {
     #[must_use]
     pub fn with_t_conorm(self, t_conorm: TConorm) -> Self {
         self.changed(|rasterizer| rasterizer.t_conorm = t_conorm)
+    }
+
+    /// Shows hard coverage of `samples` × `samples` places in a pixel, and differentiates soft coverage: `soft + (hard - soft)`, of which the
+    /// part in brackets is a constant.
+    ///
+    /// Soft coverage of a mesh is a little wide at its outline, and low where faces are narrower than the edge is soft. A mesh that is fitted
+    /// by it ends inside of what it should be; one that is fitted by this does not. Not in the paper. Source: docs/notes.md, Surrogate gradient.
+    ///
+    /// # Panics
+    ///
+    /// If `samples` is 0.
+    #[must_use]
+    pub fn with_hard_image(mut self, samples: usize) -> Self {
+        assert!(samples > 0, "hard coverage takes a sample");
+        self.samples = Some(samples);
+        self
     }
 
     /// With another softness in the backward pass, of this [`Width`]: a sharp image with a wide gradient. What comes back is not the
@@ -202,9 +270,10 @@ impl<S: Softness> SoftRenderer<S> {
     /// `vertices` `[views, vertices, 3]` are what [`project`](crate::project) returns. They
     /// receive gradients, to second order on `Autodiff<Autodiff<B>>`.
     pub fn silhouette<B: RasterBackend>(&self, vertices: Projected<B>) -> Tensor<B, 3> {
-        let vertices = vertices.tensor();
-        let (silhouette, table) = self.own_table(&vertices);
-        self.drawn(&silhouette, vertices, table)
+        let seen = vertices.clone().tensor();
+        let (silhouette, table) = self.own_table(&seen);
+        let soft = self.drawn(&silhouette, seen, table);
+        self.shown(vertices, soft)
     }
 
     /// [`silhouette`](Self::silhouette) under parameters `phi` `[parameters]`, which receive gradients too, unless there is a surrogate.
@@ -222,7 +291,16 @@ impl<S: Softness> SoftRenderer<S> {
         let values: Vec<f64> = phi.to_data().iter().collect();
         let silhouette = self.prepared::<B>(&values);
         let table = silhouette.table(phi.clone());
-        self.drawn(&silhouette, vertices.tensor(), table)
+        let soft = self.drawn(&silhouette, vertices.clone().tensor(), table);
+        self.shown(vertices, soft)
+    }
+
+    /// The soft image, or hard coverage with its gradient.
+    fn shown<B: RasterBackend>(&self, vertices: Projected<B>, soft: Tensor<B, 3>) -> Tensor<B, 3> {
+        let Some(samples) = self.samples else { return soft };
+        let Rasterizer { size, culls, .. } = self.rasterizer;
+        let hard = hard_coverage_of(vertices, &self.faces, size, samples, culls);
+        soft.clone() + (hard - soft.detach())
     }
 
     /// This renderer on images of another size. Both share knots and tables.
@@ -275,9 +353,10 @@ impl<S: Softness> SoftRenderer<S> {
         let reused =
             |knots: &Knots<S>| (knots.drawn == drawn).then(|| knots.stretched_to(phi)).flatten();
         self.cache.knots(reused, || {
-            let (faces, softness) = (&self.faces, self.softness.clone());
-            let silhouette = self.rasterizer.prepare_on::<B, HostBackend, S>(faces, softness, phi);
-            Knots { phi: phi.to_vec(), drawn, silhouette }
+            let (faces, room, softness) = (&self.faces, self.room, self.softness.clone());
+            let silhouette =
+                self.rasterizer.prepare_for::<B, HostBackend, S>(room, faces, softness, phi);
+            Knots { phi: phi.to_vec(), drawn, room, silhouette }
         })
     }
 
@@ -347,7 +426,7 @@ impl<S: Softness> SoftRenderer<S> {
         target: Tensor<B, 3>,
         counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
-        if self.surrogate.is_some() {
+        if self.surrogate.is_some() || self.samples.is_some() {
             let counted = counted.map(Tensor::detach);
             return loss_of_images(loss, self.silhouette(vertices), target.detach(), counted);
         }

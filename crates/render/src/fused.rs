@@ -28,7 +28,7 @@ impl<B: RasterBackend> Fused<B> {
         let &Scene { size, tolerance, t_conorm, .. } = scene;
         let start = Instant::now();
         let phi = scene.phi::<B>();
-        let rasterizer = Rasterizer { size: size.into(), tolerance, t_conorm };
+        let rasterizer = Rasterizer { tolerance, t_conorm, ..Rasterizer::new(size) };
         let silhouette = rasterizer.prepare(&scene.faces, scene.softness, &phi);
         let table = silhouette.table(phi);
         Self {

@@ -81,6 +81,11 @@ impl PaintedView {
         Self { view, over_black, part, opaque }
     }
 
+    /// Whether its picture is opaque all over, so that pixels count in full or not at all.
+    pub fn is_opaque(&self) -> bool {
+        self.opaque
+    }
+
     /// How near a mesh with colours comes to the view, in decibels, at most 100: `-10 log₁₀` of the mean squared difference of red, green and
     /// blue, each over black, in all pixels that the mesh or what counts of the mask covers at least in part. None if there is no such.
     ///

@@ -30,7 +30,7 @@ pub(crate) struct Objective<B: Backend> {
 
 impl<B: RasterBackend> Objective<B> {
     pub(crate) fn new(t_conorm: TConorm, softness: &SoftStep<B>, device: &B::Device) -> Self {
-        let rasterizer = Rasterizer { size: SIZE.into(), tolerance: TOLERANCE, t_conorm };
+        let rasterizer = Rasterizer { tolerance: TOLERANCE, t_conorm, ..Rasterizer::new(SIZE) };
         let template = Template::new(device);
         let smoothness = Smoothness::new(template.faces(), template.vertices(), device);
         let silhouette =

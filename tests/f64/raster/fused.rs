@@ -22,7 +22,7 @@ fn fused<T: RasterBackend>(
     vertices: Tensor<T, 3>,
     phi: Tensor<T, 1>,
 ) -> Tensor<T, 3> {
-    let rasterizer = Rasterizer { size: SIZE.into(), tolerance: 1e-9, t_conorm };
+    let rasterizer = Rasterizer { tolerance: 1e-9, t_conorm, ..Rasterizer::new(SIZE) };
     rasterizer.prepare(faces, softness, &phi).coverage(vertices, phi)
 }
 

@@ -1,6 +1,8 @@
 //! Support and knots follow the parameters: the promised error holds whatever happens to them.
 
-use softrast_raster::{Projected, SoftRenderer, TConorm, low_level::Rasterizer, reference};
+use softrast_raster::{
+    Projected, SoftRenderer, TConorm, hard_coverage, low_level::Rasterizer, reference,
+};
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::{numbers, vector};
@@ -156,4 +158,71 @@ fn parameters_that_are_set_draw_as_in_a_renderer_made_with_them_and_the_surrogat
 fn parameters_of_another_length_are_refused() {
     let softness = EdgeSoftness { family: Family::Logistic, squared: false };
     renderer(softness, &[[0, 1, 2]], 0.1).set_phi(vec![0.0, 0.0]);
+}
+
+#[test]
+fn without_back_faces_there_are_only_front_faces() {
+    let (vertices, faces) = triangles(5, 40);
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let corner = |v: u32| [vertices[3 * v as usize], vertices[3 * v as usize + 1]];
+    let is_front = |face: &&[u32; 3]| {
+        let [[ax, ay], [bx, by], [cx, cy]] = face.map(corner);
+        (bx - ax) * (cy - ay) >= (by - ay) * (cx - ax)
+    };
+    let front: Vec<[u32; 3]> = faces.iter().filter(is_front).copied().collect();
+    assert!(front.len() > 5 && front.len() < faces.len() - 5);
+    let drawn = |renderer: SoftRenderer<EdgeSoftness>| {
+        let renderer = renderer.with_tolerance(1e-9);
+        numbers(renderer.silhouette(Projected::new(shaped(&vertices))))
+    };
+    let found = drawn(renderer(softness, &faces, 0.02).without_back_faces());
+    let expected = drawn(renderer(softness, &front, 0.02));
+    assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9));
+    assert_ne!(drawn(renderer(softness, &faces, 0.02)), found);
+}
+
+#[test]
+fn other_faces_are_drawn_as_a_renderer_of_their_own_does_and_keep_the_knots() {
+    let (vertices, faces) = triangles(6, 40);
+    let softness = EdgeSoftness { family: Family::Gamma, squared: false };
+    let all = renderer(softness, &faces, 0.02);
+    all.silhouette(Projected::new(shaped(&vertices)));
+    let drawn = |renderer: &SoftRenderer<EdgeSoftness>| {
+        numbers(renderer.silhouette(Projected::new(shaped(&vertices))))
+    };
+    let few = all.with_faces(&faces[..13]);
+    let known = drawn(&renderer(softness, &faces[..13], 0.02));
+    assert!(drawn(&few).iter().zip(&known).all(|(a, b)| (a - b).abs() <= 2.0 * TOLERANCE));
+    let support = |renderer: &SoftRenderer<EdgeSoftness>| {
+        renderer.prepared::<B>(renderer.phi()).profile().support()
+    };
+    assert_eq!(support(&few), support(&all), "knots for forty faces serve thirteen");
+    // Twenty times as many need a wider support, and the tolerance holds.
+    let many: Vec<[u32; 3]> = faces.iter().cycle().take(20 * faces.len()).copied().collect();
+    let more = all.with_faces(many.clone());
+    let known = drawn(&renderer(softness, &many, 0.02));
+    assert!(support(&more) >= support(&renderer(softness, &many, 0.02)));
+    assert!(drawn(&more).iter().zip(&known).all(|(a, b)| (a - b).abs() <= 2.0 * TOLERANCE));
+    assert_eq!(drawn(&more.with_faces(faces.clone())).len(), SIZE * SIZE);
+}
+
+#[test]
+fn a_hard_image_has_the_gradient_of_the_soft_one() {
+    type A = Autodiff<B>;
+    let (vertices, faces) = triangles(7, 12);
+    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let soft = renderer(softness, &faces, 0.05);
+    let hard = soft.clone().with_hard_image(3);
+    let pass = |renderer: &SoftRenderer<EdgeSoftness>| {
+        let leaf = vector::<A>(&vertices).require_grad();
+        let count = vertices.len() as i64 / 3;
+        let image = renderer.silhouette(Projected::new(leaf.clone().reshape([1, count, 3])));
+        let gradient = leaf.grad(&(image.clone() * 2.0).sum().backward()).unwrap();
+        (numbers(image.inner()), numbers(gradient))
+    };
+    let ((soft_image, soft_gradient), (image, gradient)) = (pass(&soft), pass(&hard));
+    assert_eq!(gradient, soft_gradient);
+    assert_ne!(image, soft_image);
+    let known = hard_coverage(Projected::new(shaped(&vertices)), &faces, SIZE, 3);
+    assert!(image.iter().zip(numbers(known)).all(|(a, b)| (a - b).abs() < 1e-12));
 }

@@ -23,7 +23,7 @@ fn images(
 ) -> (Vec<f64>, Vec<f64>, f64) {
     let phi = vector::<B>(phi);
     let vertices = vector::<B>(vertices).reshape([1, vertices.len() as i64 / 3, 3]);
-    let rasterizer = Rasterizer { size: SIZE.into(), tolerance, t_conorm };
+    let rasterizer = Rasterizer { tolerance, t_conorm, ..Rasterizer::new(SIZE) };
     let silhouette = rasterizer.prepare(faces, softness, &phi);
     let culled = silhouette.coverage(vertices.clone(), phi.clone());
     let scene = reference::Scene { faces, size: SIZE.into() };

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     bands::{Bands, View, bands_of_view},
     float::{Float, Vectors},
-    reach::{Reach, in_pixels},
+    reach::{Reach, in_pixels, is_seen_clockwise},
     table::Grid,
 };
 
@@ -164,10 +164,4 @@ pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
     let views = inputs.vertices.par_chunks(3 * vertices.max(1)).map(view);
     let (views, logs) = views.unzip();
     Reached { bands: Bands { views, count }, logs, least: part }
-}
-
-/// Whether corners given in NDC, y up, go round clockwise.
-fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
-    let [[ax, ay], [bx, by], [cx, cy]] = corners.map(|corner| corner.map(F::to_f64));
-    (bx - ax) * (cy - ay) < (by - ay) * (cx - ax)
 }

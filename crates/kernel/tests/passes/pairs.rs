@@ -9,7 +9,17 @@ fn pairs_within(radius: f64, vertices: &[f64], views: usize) -> usize {
     let grid = Grid { outer: radius, inner: 1.0, from: [0.0; 2], octaves: 4, far: 0, bits: 2 };
     let faces = &[[0, 1, 2]];
     let size = SIZE.into();
-    f64::pairs(&Inputs { vertices, table: &[], faces, grid, size, near: 0.1, views, bands: 3 })
+    f64::pairs(&Inputs {
+        vertices,
+        table: &[],
+        faces,
+        grid,
+        size,
+        near: 0.1,
+        culls: false,
+        views,
+        bands: 3,
+    })
 }
 
 #[test]

@@ -93,7 +93,17 @@ fn bands_of_any_height_give_the_same_sums() {
     faces.push([599, 600, 601]);
     let (vertices, table, faces) = (&vertices, &table, &faces);
     let sums = |bands| {
-        let inputs = Inputs { vertices, table, faces, grid, size, near: 0.01, views: 1, bands };
+        let inputs = Inputs {
+            vertices,
+            table,
+            faces,
+            grid,
+            size,
+            near: 0.01,
+            culls: false,
+            views: 1,
+            bands,
+        };
         f64::sums(&inputs, &f64::bands(&inputs))
     };
     let expected = sums(size.height);

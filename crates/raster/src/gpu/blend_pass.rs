@@ -68,6 +68,7 @@ pub(super) struct Gradient {
 /// A silhouettes' op whose faces reach as far as those of this one: an edge softness reaches as far as its table.
 pub(super) fn as_sum(op: &SoftBlend) -> ProfileSum {
     ProfileSum {
+        culls: op.culls,
         faces: op.faces.clone(),
         grid: Grid { outer: op.edge.inner, from: [op.edge.from[1]; 2], ..op.edge },
         size: op.size,
@@ -115,7 +116,7 @@ impl<'a> Blend<'a> {
         let pass = Pass::new(sum, vertices, numbers, direction.clone());
         let numbers_of_entry = if op.texture.is_some() { 2 } else { channels };
         let numbers_of_pixel = if direction.is_some() { 2 } else { 1 } * (channels + 1);
-        let pass = pass.with_depths(op, [numbers_of_pixel, 9 + 3 * numbers_of_entry]);
+        let pass = pass.with_depths([numbers_of_pixel, 9 + 3 * numbers_of_entry]);
         let device = pass.vertices.device.clone();
         let same = entry_count == pass.vertex_count && op.entries == op.faces;
         let entries = match same {

@@ -53,8 +53,6 @@ pub(super) struct Pass<'a> {
     pub(super) vertex_count: usize,
     /// Whether what is prepared of faces has their depths.
     depths: bool,
-    /// Whether back faces are not drawn.
-    culls: bool,
     /// Bytes of sums of a pixel.
     of_pixel: usize,
     /// Numbers in the gradient of a face.
@@ -103,7 +101,6 @@ impl<'a> Pass<'a> {
             views,
             vertex_count,
             depths: false,
-            culls: false,
             of_pixel: WORDS,
             of_face: 6,
             far: f32::INFINITY,
@@ -112,9 +109,9 @@ impl<'a> Pass<'a> {
 
     /// For colours: with the depths of faces, where so many numbers of a pixel are added up and a face has so many in
     /// its gradient.
-    pub(super) fn with_depths(self, op: &SoftBlend, [of_pixel, of_face]: [usize; 2]) -> Self {
-        let (far, culls) = (FARTHEST_SEEN as f32, op.culls);
-        Self { depths: true, culls, far, of_pixel: of_pixel * WORDS, of_face, ..self }
+    pub(super) fn with_depths(self, [of_pixel, of_face]: [usize; 2]) -> Self {
+        let far = FARTHEST_SEEN as f32;
+        Self { depths: true, far, of_pixel: of_pixel * WORDS, of_face, ..self }
     }
 
     /// Sums of the profile, flat: `[views * height * width]`.
@@ -241,7 +238,7 @@ impl<'a> Pass<'a> {
             self.far.to_bits(),
             self.op.grid.outer as f32,
             self.depths,
-            self.culls,
+            self.op.culls,
             self.second(),
         );
         Prepared { first_view, views, corners, reaches, slots }

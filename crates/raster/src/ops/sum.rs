@@ -12,6 +12,8 @@ pub struct ProfileSum {
     pub(crate) grid: Grid,
     pub(crate) size: ImageSize,
     pub(crate) near: f64,
+    /// Whether back faces are not drawn.
+    pub(crate) culls: bool,
     /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows. 20 bytes for each face of
     /// each view.
     pub(crate) kept: Option<Arc<OnceLock<Bands>>>,
@@ -43,6 +45,7 @@ impl ProfileSum {
             grid: self.grid,
             size: self.size,
             near: self.near,
+            culls: self.culls,
             views,
             bands: bands_of_view(views, self.size),
         }

@@ -1,58 +1,25 @@
-use std::{cell::RefCell, ffi::OsString, path::PathBuf, sync::Arc};
+use std::{
+    cell::RefCell,
+    ffi::OsString,
+    path::{Path, PathBuf},
+};
 
-use anyhow::{anyhow, ensure};
+use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use softrast_cli::{Answer, Given, MaskFlags};
-use softrast_inverse::{
-    Method, ScheduledSoftness, SolveConfig, baked, minimize, silhouette_pixels,
-};
-use softrast_lab::{Error, Progress, format::counted};
-use softrast_mesh::{Mesh, icosphere};
-use softrast_raster::on_backend;
-use softrast_softness::{EdgeSoftness, Family};
+use softrast_inverse::{RemeshingAdam, baked, silhouette_pixels};
+use softrast_lab::{Error, format::counted, parse::positive};
+use softrast_mesh::Mesh;
 use softrast_views::{
-    CameraFile, PaintedView, View, frame_of_masks, mask_iou, reading_notes, visual_hull,
+    CameraFile, PaintedView, View, find_mask, frame_of_masks, mask_iou, reading_notes,
 };
 
 use super::{
     answer::{Scored, answer, names},
     painted::{self, Colours},
-    problem::FromViews,
+    surface, template,
 };
 use crate::Args;
-
-/// A part of the work.
-#[derive(Clone, Copy)]
-struct Stage {
-    steps: usize,
-    /// Pixels a side.
-    size: usize,
-    learning_rate: f64,
-    /// Whether the softness is so narrow that small faces do not widen the outline, or what was learned for spheres.
-    narrow: bool,
-    /// Whether the mesh has four times as many faces as before.
-    finer: bool,
-}
-
-/// From a sphere to about the right shape.
-const ROUGH: [Stage; 2] = [
-    Stage { steps: 80, size: 64, learning_rate: 0.01, narrow: false, finer: false },
-    Stage { steps: 60, size: 128, learning_rate: 0.004, narrow: false, finer: true },
-];
-/// From about the right shape on.
-const FINE: [Stage; 2] = [
-    Stage { steps: 80, size: 64, learning_rate: 0.004, narrow: true, finer: false },
-    Stage { steps: 60, size: 128, learning_rate: 0.003, narrow: true, finer: false },
-];
-/// Scale of a logistic that is narrow, in NDC of what is looked at. On spot from 20 views the mean `IoU` on 4 others was 0.981 with it,
-/// 0.979 with half, 0.976 with one and a half and 0.962 with what was learned for spheres. Spot is the one mesh that it was chosen on.
-const NARROW: f64 = 0.001;
-/// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
-const CELLS: [usize; 3] = [32, 45, 64];
-/// More cells are worth their time if the mean `IoU` of the hull grows by so much.
-const GROWS: f64 = 0.01;
-/// A mean `IoU` from which a finer mesh is not worth its time.
-const RESTART_ABOVE: f64 = 0.995;
 
 /// Pictures and the cameras that took them.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -66,21 +33,37 @@ pub struct Views {
     #[arg(long, value_name = "N|FILE", requires = "views")]
     pub hold_out: Option<HoldOut>,
 
-    /// What is deformed: the visual hull of the masks, or a sphere, which has no holes [default: hull]
+    /// What becomes the surface: the visual hull of the masks, or a sphere, which has no holes [default: hull]
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
 
-    /// Look for colours too: the mesh gets those of the pictures at its vertices. With --mesh the shape is known, in the world units of the cameras, and stays
+    /// Let the colours of the pictures pull the shape too, and give them to the mesh. With --mesh the shape is known, in the world units of the cameras, and stays
     #[arg(long)]
     pub colour: bool,
 
-    /// How smooth the surface is kept, against the usual
-    #[arg(long, value_name = "FACTOR", requires = "views", value_parser = softrast_lab::parse::positive, allow_negative_numbers = true)]
+    /// Let normals pull the shape: red, green and blue are (n + 1) / 2 of a normal n in the axes of the world, in the pictures, or in those of a folder with
+    /// their names
+    #[arg(long, value_name = "DIR", requires = "views", num_args = 0..=1, conflicts_with_all = ["mesh", "template"])]
+    pub normals: Option<Option<PathBuf>>,
+
+    /// Faces at most [default: as many as the pixels show, up to 200000]
+    #[arg(long, value_name = "N", requires = "views", conflicts_with = "template", value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
+    pub faces: Option<u32>,
+
+    /// How smooth the surface is kept, against the usual, at most 25
+    #[arg(long, value_name = "FACTOR", requires = "views", value_parser = smoothness, allow_negative_numbers = true)]
     pub smooth: Option<f64>,
 
     /// How pictures become masks.
     #[command(flatten)]
     pub masks: MaskFlags,
+}
+
+fn smoothness(text: &str) -> Result<f64, String> {
+    positive(text).and_then(|factor| match factor <= RemeshingAdam::SMOOTHEST {
+        true => Ok(factor),
+        false => Err(format!("expected at most {}", RemeshingAdam::SMOOTHEST)),
+    })
 }
 
 /// Views on which a result is scored, and which the search does not see.
@@ -101,7 +84,7 @@ impl From<OsString> for HoldOut {
     }
 }
 
-/// What is deformed.
+/// What becomes the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Begin {
     /// All that no mask rules out.
@@ -137,15 +120,23 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
              looked for)",
         ));
     }
-    let deforms = args.template.is_some() || flags.start.is_some() || flags.smooth.is_some();
+    let deforms = args.template.is_some()
+        || flags.start.is_some()
+        || flags.smooth.is_some()
+        || flags.faces.is_some();
     if args.mesh.is_some() && deforms {
         return Err(Error::usage(
-            "--template, --start and --smooth say how a shape is found: leave them out where --mesh says what it is",
+            "--template, --start, --smooth and --faces say how a shape is found: leave them out where --mesh says what it is",
         ));
     }
-    if args.detail.is_some() && flags.start != Some(Begin::Sphere) {
+    if args.detail.is_some() {
         return Err(Error::usage(
-            "--detail is about a sphere: with --views it goes with --start sphere",
+            "--detail has no part in --views: the faces of a surface follow from the pixels (--size, --faces)",
+        ));
+    }
+    if args.template.is_none() && (given.names_softness() || given.learning_rate().is_some()) {
+        return Err(Error::usage(
+            "with --views, a softness and a learning rate go with --template: a surface that is remeshed has its own",
         ));
     }
     let cameras = CameraFile::load(folder)?;
@@ -164,6 +155,11 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     let (all, apart) = (read(&cameras)?, test.as_ref().map(read).transpose()?);
     let loaded = || [Some(&all), apart.as_ref()].into_iter().flatten();
     let pictures = loaded().flatten().map(|view| view.picture.clone());
+    let normals = match &flags.normals {
+        Some(folder) => of_normals(&all, folder.as_deref())?,
+        None => Vec::new(),
+    };
+    let pictures = pictures.chain(normals.iter().map(|view| view.picture.clone()));
     given.will_write(names(flags.colour), reads.into_inner().into_iter().chain(pictures))?;
     let note = cameras.note().map(str::to_owned);
     let notes = note.into_iter().chain(loaded().flat_map(|views| reading_notes(views)));
@@ -174,31 +170,54 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         painted.collect::<anyhow::Result<Vec<_>>>()
     };
     let count = if let Some(HoldOut::Count(count)) = flags.hold_out { count } else { 0 };
+    let normals = match normals.is_empty() {
+        true => normals,
+        false => split_held_out(normals, count)?.into_iter().next().unwrap_or_default(),
+    };
     let [train, held_out] = split_held_out(all, count)?;
     let parts = [train, apart.unwrap_or(held_out)];
     let [to_paint, to_compare] = [paint(&parts[0])?, paint(&parts[1])?];
+    let normals = normals.iter().map(PaintedView::load).collect::<anyhow::Result<Vec<_>>>()?;
     let [train, held_out] = parts;
     let clock = std::time::Instant::now();
-    let stages = stages(given, flags);
+    let of_shape = match (&args.mesh, &args.template) {
+        (Some(_), _) => 0,
+        (None, Some(_)) => template::steps(given),
+        (None, None) => surface::steps(given),
+    };
     let of_colours = if flags.colour { painted::config(given).steps } else { 0 };
-    let steps = stages.iter().map(|stage| stage.steps).sum::<usize>() + of_colours;
+    let steps = of_shape + of_colours;
     let mut progress = given.progress(steps)?;
-    let mut mesh = match &args.mesh {
-        Some(path) => Mesh::load(path)?,
-        None => {
+    let mut is_stopped = false;
+    let mut mesh = match (&args.mesh, &args.template) {
+        (Some(path), _) => Mesh::load(path)?,
+        (None, template) => {
             let frame = frame_of_masks(&train)?;
             let framed = |view: &View| View { camera: frame.camera(&view.camera), ..view.clone() };
             let views: Vec<View> = train.iter().map(framed).collect();
-            let start = start(given, flags, &views)?;
-            let found = deformed(given, flags, &stages, start, &views, &mut progress)?;
+            let found = match template {
+                Some(path) => {
+                    let template = (Mesh::load(path)?, flags.smooth.unwrap_or(1.0));
+                    template::deformed(given, template, &views, &mut progress)?
+                }
+                None => {
+                    let shown = [&to_paint, &normals].map(Vec::as_slice);
+                    let found = surface::found(given, flags, &views, shown, &mut progress)?;
+                    is_stopped = found.is_stopped;
+                    found.mesh
+                }
+            };
             frame.mesh_to_world(&found)?
         }
     };
     let mut textured = None;
     if flags.colour {
-        let painted = painted::painted(given, &mesh, &to_paint, |step, loss| {
-            progress.step(steps - of_colours + step, loss)
-        })?;
+        let painted = match is_stopped {
+            true => mesh.clone(),
+            false => painted::painted(given, &mesh, &to_paint, |step, loss| {
+                progress.step(of_shape + step, loss)
+            })?,
+        };
         textured = Some(baked(&mesh, &painted)?);
         mesh = painted;
     }
@@ -216,18 +235,17 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     answer(given, &mesh, textured.as_ref(), &scored, notes, seconds)
 }
 
-/// Parts of the work on the shape, with the steps that were asked for; none if it is known.
-fn stages(given: &Given<'_, Args>, flags: &Views) -> Vec<Stage> {
-    let args = given.args;
-    let from_hull = args.template.is_none() && flags.start.unwrap_or_default() == Begin::Hull;
-    let stages: Vec<Stage> = match (args.mesh.is_some(), from_hull) {
-        (true, _) => Vec::new(),
-        (false, true) => FINE.to_vec(),
-        (false, false) => ROUGH.into_iter().chain([FINE[1]]).collect(),
+/// The views with pictures of their normals: their own, or those of a folder.
+fn of_normals(views: &[View], folder: Option<&Path>) -> anyhow::Result<Vec<View>> {
+    let Some(folder) = folder else { return Ok(views.to_vec()) };
+    let of = |view: &View| {
+        let name = view.picture.to_string_lossy();
+        let found = find_mask(folder, &name).with_context(|| {
+            format!("{}: no picture in {} has the name of {name}", view.name, folder.display())
+        });
+        anyhow::Ok(View { picture: found?, ..view.clone() })
     };
-    let with_steps =
-        |stage: Stage| Stage { steps: given.common.steps.unwrap_or(stage.steps), ..stage };
-    stages.into_iter().map(with_steps).collect()
+    views.iter().map(of).collect()
 }
 
 /// Views to work with, and so many evenly spaced ones that are kept aside.
@@ -246,84 +264,4 @@ fn split_held_out(all: Vec<View>, hold_out: usize) -> anyhow::Result<[Vec<View>;
     let (aside, train): (Vec<_>, Vec<_>) =
         all.into_iter().enumerate().partition(|(k, _)| aside.contains(k));
     Ok([train, aside].map(|part| part.into_iter().map(|(_, view)| view).collect()))
-}
-
-/// The mesh that is deformed, for views of a frame.
-fn start(given: &Given<'_, Args>, flags: &Views, views: &[View]) -> anyhow::Result<Mesh> {
-    let placed = |mesh: Mesh, size: f64| {
-        let place = |p: &[f64; 3]| p.map(|x| size * x);
-        anyhow::Ok(mesh.with_positions(mesh.positions().iter().map(place).collect())?)
-    };
-    match (&given.args.template, flags.start.unwrap_or_default()) {
-        (Some(path), _) => placed(Mesh::load(path)?.normalized(), 0.7),
-        (None, Begin::Sphere) => placed(icosphere(given.args.detail.unwrap_or(3) as u32), 0.6),
-        (None, Begin::Hull) => fitting_hull(views),
-    }
-}
-
-/// The visual hull in as few cells as show what the masks show.
-fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
-    let with = |cells: usize| {
-        let hull = visual_hull(views, cells);
-        let hull =
-            hull.map_err(|why| anyhow!("{why:#} (--invert?); --start sphere needs no hull"))?;
-        let iou = |view: &View| mask_iou(&silhouette_pixels(&hull, &view.camera), &view.mask);
-        let mean = views.iter().map(iou).sum::<f64>() / views.len() as f64;
-        anyhow::Ok((hull, mean))
-    };
-    let (mut mesh, mut iou) = with(CELLS[0])?;
-    for cells in &CELLS[1..] {
-        let (finer, better) = with(*cells)?;
-        if better < iou + GROWS {
-            break;
-        }
-        (mesh, iou) = (finer, better);
-    }
-    Ok(mesh)
-}
-
-/// The start after all stages, for views of a frame: of each the best by its hard images.
-fn deformed(
-    given: &Given<'_, Args>,
-    flags: &Views,
-    stages: &[Stage],
-    start: Mesh,
-    views: &[View],
-    progress: &mut Progress,
-) -> anyhow::Result<Mesh> {
-    let (backend, views): (_, Arc<[View]>) = (given.backend()?, views.into());
-    let asked = given.method()?;
-    let edge = EdgeSoftness { family: Family::Logistic, squared: false };
-    let narrow = Method {
-        name: "logistic".to_owned(),
-        softness: ScheduledSoftness::constant(edge, NARROW),
-        ..asked.clone()
-    };
-    let (mut mesh, mut done) = (start, 0);
-    for (k, stage) in stages.iter().enumerate() {
-        if stage.finer {
-            mesh = mesh.subdivided();
-        }
-        let method = if stage.narrow && !given.names_softness() { &narrow } else { &asked };
-        let problem = FromViews::new(mesh.clone(), views.clone(), flags.smooth.unwrap_or(1.0))?;
-        let last = k + 1 == stages.len();
-        let config = SolveConfig {
-            size: given.common.size.filter(|_| last).unwrap_or(stage.size),
-            steps: stage.steps,
-            learning_rate: given.learning_rate().unwrap_or(stage.learning_rate),
-        };
-        let mut best = f64::INFINITY;
-        on_backend!(backend, B => minimize::<_, B>(&problem, &[()], method, &config, |iterate, _| {
-            if iterate.hard_loss[0] < best {
-                best = iterate.hard_loss[0];
-                mesh = problem.mesh(&iterate.theta)?;
-            }
-            progress.step(done + iterate.step, iterate.loss[0])
-        }))?;
-        done += config.steps;
-        if 1.0 - best >= RESTART_ABOVE {
-            break;
-        }
-    }
-    Ok(mesh)
 }

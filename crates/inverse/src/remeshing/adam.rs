@@ -1,0 +1,243 @@
+use softrast_mesh::{ClosedSurface, Mesh, MeshError};
+use softrast_raster::RasterBackend;
+use softrast_tensor::{Backend, Element, Tensor, TensorData};
+
+use super::geometry::{Neighbours, at, dot, normals};
+
+/// Decay of the mean of gradients, and of their squared lengths.
+const BETA: [f32; 2] = [0.7, 0.9];
+/// A step of a vertex, against the target length of its edges.
+const RATE: f64 = 0.3;
+/// How often the gradient is smoothed, and by which part of the way to the mean of its neighbours.
+const SMOOTHED: (usize, f32) = (2, 0.5);
+/// Part of the way to the mean of its neighbours that a vertex goes along the surface after each step: it keeps triangles even.
+const ALONG: f32 = 0.3;
+/// The same across the surface, at the usual rate; it falls with the rate. With a quarter of it the surface folds.
+const ACROSS: f32 = 0.02;
+/// Steps from one remeshing to the next.
+const EVERY: usize = 3;
+/// Squared lengths of gradients below this count as this: a vertex that nothing pulls stays.
+const LEAST: f32 = 1e-24;
+/// Columns that an optimiser keeps for each vertex: mean gradient, and the mean of its squared length.
+const STATE: usize = 4;
+/// First column of that.
+const MOMENTS: usize = ClosedSurface::OWN;
+/// First column of colours, where there are some: channels, their mean gradients, and the means of their squares.
+const COLOURS: usize = MOMENTS + STATE;
+/// Channels of a colour.
+const CHANNELS: usize = 3;
+/// A step of a channel at the usual rate.
+const RATE_OF_COLOURS: f32 = 0.05;
+
+/// Adam for the vertices of a closed surface that is remeshed as it moves: every third step short edges collapse, long ones are split, and edges are flipped,
+/// towards a target length of edges. The state of the optimiser moves with the vertices.
+///
+/// A step of a vertex is a part of the target length, whatever the scale of the loss: there is one second moment for a vertex, that of the length
+/// of its gradient. The gradient is smoothed over neighbours, and after each step vertices move towards the middle of their neighbours, mostly along the
+/// surface. So a surface can start coarse and far off: begin with long edges and few pixels, then shorten them
+/// ([`set_length`](Self::set_length)).
+///
+/// It goes with any loss of [`vertices`](Self::vertices) and [`faces`](Self::faces). Faces change, so draw them by `with_faces` of a renderer.
+///
+/// ```
+/// use softrast_tensor::{Autodiff, NdArray};
+/// use softrast_inverse::RemeshingAdam;
+/// use softrast_mesh::icosphere;
+///
+/// // From a sphere to an ellipsoid with half the height.
+/// let mut shape = RemeshingAdam::new(&icosphere(2), 0.2)?;
+/// for _ in 0..40 {
+///     let vertices = shape.vertices::<Autodiff<NdArray>>(&Default::default()).require_grad();
+///     let axes = |k| vertices.clone().narrow(2, k, 1).powi_scalar(2);
+///     let off = (axes(0) + axes(1) + axes(2) * 4.0 - 1.0).powi_scalar(2).mean();
+///     let gradient = vertices.grad(&off.backward()).unwrap();
+///     shape.step(gradient);
+/// }
+/// let [low, high] = shape.mesh()?.bounds();
+/// assert!((high[2] - low[2] - 1.0).abs() < 0.1 && high[0] > 0.9);
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
+///
+/// Source: Palfinger 2022, whose remeshing this is, and Adam (Kingma and Ba 2015); numbers are our own.
+#[derive(Clone, Debug)]
+pub struct RemeshingAdam {
+    surface: ClosedSurface,
+    steps: usize,
+    /// Against [`RATE`].
+    rate: f64,
+    most: usize,
+    /// Against [`ACROSS`].
+    smoothing: f64,
+}
+
+impl RemeshingAdam {
+    /// Faces at most, unless asked for others.
+    pub const MOST_FACES: usize = 200_000;
+    /// Most by which a surface is kept smoother than usual: a vertex goes half of the way to the mean of its neighbours then.
+    pub const SMOOTHEST: f64 = 25.0;
+
+    /// The optimiser at the vertices of a mesh, with edges that should have this `length` in its units.
+    ///
+    /// # Errors
+    ///
+    /// If the mesh is not closed, or branches.
+    ///
+    /// # Panics
+    ///
+    /// If `length` is not positive and finite in 32 bits.
+    pub fn new(mesh: &Mesh, length: f64) -> Result<Self, MeshError> {
+        let surface = ClosedSurface::new(mesh, length, STATE)?;
+        Ok(Self { surface, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 })
+    }
+
+    /// The same, with three channels at each vertex, which move with it and begin with this number.
+    pub(crate) fn with_colours(mesh: &Mesh, length: f64, start: f32) -> Result<Self, MeshError> {
+        let surface = ClosedSurface::new(mesh, length, STATE + 3 * CHANNELS)?;
+        let mut shape =
+            Self { surface, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 };
+        let width = shape.surface.width();
+        for row in shape.surface.numbers_mut().chunks_exact_mut(width) {
+            row[COLOURS..COLOURS + CHANNELS].fill(start);
+        }
+        Ok(shape)
+    }
+
+    /// With another largest number of faces.
+    #[must_use]
+    pub fn with_most_faces(mut self, most: usize) -> Self {
+        self.most = most;
+        self
+    }
+
+    /// With a surface that is kept this much smoother than usual.
+    ///
+    /// # Panics
+    ///
+    /// If it is not above 0 and at most [`SMOOTHEST`](Self::SMOOTHEST).
+    #[must_use]
+    pub fn with_smoothing(mut self, smoothing: f64) -> Self {
+        assert!(smoothing > 0.0 && smoothing <= Self::SMOOTHEST, "smoothing by {smoothing}");
+        self.smoothing = smoothing;
+        self
+    }
+
+    /// Takes steps of this part of the usual length from now on: 1 at first, less to settle.
+    ///
+    /// # Panics
+    ///
+    /// If it is not positive and finite.
+    pub fn set_rate(&mut self, rate: f64) {
+        assert!(rate > 0.0 && rate.is_finite(), "a rate of {rate}");
+        self.rate = rate;
+    }
+
+    /// Asks for edges of this length from now on, in the units of the mesh.
+    ///
+    /// # Panics
+    ///
+    /// If it is not positive and finite in 32 bits.
+    pub fn set_length(&mut self, length: f64) {
+        self.surface.set_length(length);
+    }
+
+    /// Vertices of each face, counterclockwise from outside.
+    pub fn faces(&self) -> &[[u32; 3]] {
+        self.surface.faces()
+    }
+
+    /// Positions of the vertices, `[1, vertices, 3]`.
+    pub fn vertices<B: Backend>(&self, device: &B::Device) -> Tensor<B, 3> {
+        let positions = self.positions();
+        let shape = [1, positions.len() / 3, 3];
+        let data = TensorData::new(positions, shape);
+        Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
+    }
+
+    /// The surface as it is.
+    ///
+    /// # Errors
+    ///
+    /// If a position is not finite.
+    pub fn mesh(&self) -> Result<Mesh, MeshError> {
+        self.surface.mesh()
+    }
+
+    /// Takes a step against a gradient to the vertices, `[1, vertices, 3]`, and remeshes the surface after every third.
+    ///
+    /// # Panics
+    ///
+    /// If the gradient has another shape than the vertices.
+    pub fn step<B: RasterBackend>(&mut self, gradient: Tensor<B, 3>) {
+        let expected = [1, self.surface.vertices(), 3];
+        assert_eq!(gradient.dims(), expected, "the gradient to the vertices");
+        self.step_by(gradient.into_data().iter().collect());
+    }
+
+    /// Positions of the vertices, `[vertices, 3]`.
+    pub(crate) fn positions(&self) -> Vec<f32> {
+        self.columns::<3>(0)
+    }
+
+    /// Channels at the vertices, `[vertices, 3]`, of an optimiser that has some.
+    pub(crate) fn colours(&self) -> Vec<f32> {
+        self.columns::<CHANNELS>(COLOURS)
+    }
+
+    /// Takes a step of the channels against a gradient `[vertices, 3]`. They stay in [0, 1].
+    pub(crate) fn step_colours_by(&mut self, gradient: &[f32]) {
+        let rate = RATE_OF_COLOURS * self.rate.sqrt() as f32;
+        let width = self.surface.width();
+        let rows = self.surface.numbers_mut().chunks_exact_mut(width);
+        for (row, gradient) in rows.zip(gradient.chunks_exact(CHANNELS)) {
+            let (colours, moments) = row[COLOURS..].split_at_mut(CHANNELS);
+            let (means, squares) = moments.split_at_mut(CHANNELS);
+            for k in 0..CHANNELS {
+                means[k] += (1.0 - BETA[0]) * (gradient[k] - means[k]);
+                squares[k] += (1.0 - BETA[1]) * (gradient[k] * gradient[k] - squares[k]);
+                let step = rate * means[k] / squares[k].max(LEAST).sqrt();
+                colours[k] = (colours[k] - step).clamp(0.0, 1.0);
+            }
+        }
+    }
+
+    /// Columns of all vertices, `[vertices, N]`.
+    fn columns<const N: usize>(&self, first: usize) -> Vec<f32> {
+        let rows = self.surface.numbers().chunks_exact(self.surface.width());
+        rows.flat_map(|row| row[first..first + N].iter().copied()).collect()
+    }
+
+    /// [`Self::step`] against a gradient `[vertices, 3]`.
+    pub(crate) fn step_by(&mut self, mut gradient: Vec<f32>) {
+        let (faces, positions) = (self.surface.faces(), self.positions());
+        let neighbours = Neighbours::new(faces, positions.len() / 3);
+        for _ in 0..SMOOTHED.0 {
+            let away = neighbours.away(&gradient);
+            gradient.iter_mut().zip(away).for_each(|(g, away)| *g += SMOOTHED.1 * away);
+        }
+        let away = neighbours.away(&positions);
+        let (normals, _) = normals(&positions, faces);
+        self.steps += 1;
+        let power = |beta: f32| 1.0 - beta.powi(self.steps.min(1 << 20) as i32);
+        let corrections = BETA.map(power);
+        let (rate, across) =
+            ((RATE * self.rate) as f32, ACROSS * (self.rate * self.smoothing) as f32);
+        let width = self.surface.width();
+        for (vertex, row) in self.surface.numbers_mut().chunks_exact_mut(width).enumerate() {
+            let [g, away, normal] = [&gradient, &away, &normals].map(|x| at(x, vertex as u32));
+            let moments = &mut row[MOMENTS..MOMENTS + STATE];
+            (0..3).for_each(|k| moments[k] += (1.0 - BETA[0]) * (g[k] - moments[k]));
+            moments[3] += (1.0 - BETA[1]) * (dot(g, g) - moments[3]);
+            let size = (moments[3] / corrections[1]).max(LEAST).sqrt();
+            let mean = [0, 1, 2].map(|k| moments[k] / corrections[0]);
+            let step = rate * row[ClosedSurface::LENGTH] / size;
+            let out = dot(away, normal);
+            for k in 0..3 {
+                let along = away[k] - out * normal[k];
+                row[k] += ALONG * along + across * out * normal[k] - step * mean[k];
+            }
+        }
+        if self.steps.is_multiple_of(EVERY) {
+            self.surface.remesh(self.most);
+        }
+    }
+}

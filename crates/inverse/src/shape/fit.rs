@@ -1,0 +1,228 @@
+use anyhow::ensure;
+use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
+use rayon::prelude::*;
+use softrast_mesh::{Mesh, icosphere};
+
+use super::{stage::Stage, target::Target, view::ViewOfShape};
+use crate::RemeshingAdam;
+
+/// Fewest pixels a side, from a sphere and from a surface that is about right.
+const COARSEST: [usize; 2] = [32, 64];
+/// Length of edges in pixels, in all stages.
+const EDGE_PX: f64 = 2.4;
+/// Part of a stage in which edges shorten to its length.
+const SHORTENS: f64 = 1.0 / 3.0;
+/// Part of the last stage after which the rate falls, and the part of itself that it falls to.
+const SETTLES: [f64; 2] = [0.3, 0.1];
+/// Radius of the sphere, in half the extent of the object.
+const SPHERE: f64 = 0.5;
+/// Steps of a stage for each step of a stage on half as many pixels a side.
+const MORE: f64 = 1.3;
+/// The level that colours begin with.
+const GREY: f32 = 0.5;
+
+/// Finds the surface of an object by the gradient of what views show of it: masks, and where they are known normals and colours.
+///
+/// A closed surface is remeshed as it moves ([`RemeshingAdam`]), first on few pixels with long edges, then on more pixels with shorter ones. Each step
+/// draws one view. The loss of a pixel is the absolute difference of coverage, of normals, and of colours; colours of vertices are found along with the
+/// shape. On the last pixels coverage is hard, with the gradient of soft coverage ([`SoftRenderer::with_hard_image`](softrast_raster::SoftRenderer::with_hard_image)):
+/// soft coverage would leave the surface inside of what it should be. It runs on the CPU, and with the same steps its result is the same.
+///
+/// The object lies around the origin, as in the frame of [`frame_of_masks`](softrast_views::frame_of_masks).
+///
+/// ```
+/// use softrast_inverse::shape::{ShapeFit, ViewOfShape};
+/// # use softrast_mesh::icosphere;
+/// # use softrast_raster::Pinhole;
+/// # use softrast_views::{Picture, View, coloured_pixels};
+/// # let views: Vec<View> = [[0.0, 0.0, 4.0], [4.0, 0.0, 0.0], [0.0, 3.9, 0.5]].map(|eye| {
+/// #     let camera = Pinhole::look_at(eye, [0.0; 3], [0.1, 1.0, 0.0], 40.0, 64);
+/// #     let [.., mask] = coloured_pixels(&icosphere(2), &camera);
+/// #     let mask = Picture::new(mask.iter().map(|&x| x as f32).collect(), 64);
+/// #     View { name: "ball".into(), picture: "".into(), mask, camera, distortion: None, off: 0.0 }
+/// # }).into();
+/// let views = views.iter().map(ViewOfShape::of_mask).collect::<anyhow::Result<Vec<_>>>()?;
+/// let found = ShapeFit::new(views).with_size(32).with_steps(60).run()?;
+/// assert!((found.mesh.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.1);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+#[must_use]
+pub struct ShapeFit<'a> {
+    views: Vec<ViewOfShape>,
+    start: Option<Mesh>,
+    steps: usize,
+    size: usize,
+    most: usize,
+    smoothing: f64,
+    told: Box<Told<'a>>,
+}
+
+/// Called with the number of steps taken, and the loss they led to.
+type Told<'a> = dyn FnMut(usize, f64) -> anyhow::Result<()> + 'a;
+
+/// A surface that was found.
+#[derive(Debug)]
+pub struct FoundShape {
+    /// The surface: closed, nowhere branching, and in the colours of the views if they have some.
+    pub mesh: Mesh,
+    /// The error of `progress` that ended the search early; the mesh is as it was then.
+    pub stopped: Option<anyhow::Error>,
+}
+
+impl<'a> ShapeFit<'a> {
+    /// A search from a sphere, with 500 steps up to 256 × 256 pixels.
+    pub fn new(views: Vec<ViewOfShape>) -> Self {
+        let told = Box::new(|_, _| Ok(()));
+        let (steps, size, most, smoothing) = (500, 256, RemeshingAdam::MOST_FACES, 1.0);
+        Self { views, start: None, steps, size, most, smoothing, told }
+    }
+
+    /// From this surface on, which is about right and closed.
+    pub fn starting_at(self, mesh: Mesh) -> Self {
+        Self { start: Some(mesh), ..self }
+    }
+
+    /// With so many steps in all.
+    pub fn with_steps(self, steps: usize) -> Self {
+        Self { steps, ..self }
+    }
+
+    /// Up to images of `size` × `size` pixels, at least 8. Edges get 2.4 pixels of them long.
+    pub fn with_size(self, size: usize) -> Self {
+        Self { size, ..self }
+    }
+
+    /// With at most so many faces.
+    pub fn with_most_faces(self, most: usize) -> Self {
+        Self { most, ..self }
+    }
+
+    /// With a surface that is kept this much smoother than usual, above 0 and at most [`RemeshingAdam::SMOOTHEST`].
+    pub fn with_smoothing(self, smoothing: f64) -> Self {
+        Self { smoothing, ..self }
+    }
+
+    /// Tells the steps taken and the loss they led to, a mean over pixels. An error ends the search.
+    pub fn progress(self, told: impl FnMut(usize, f64) -> anyhow::Result<()> + 'a) -> Self {
+        Self { told: Box::new(told), ..self }
+    }
+
+    /// Runs the search.
+    ///
+    /// # Errors
+    ///
+    /// If there is no view, or the start is not closed.
+    ///
+    /// # Panics
+    ///
+    /// If `size` is below 8.
+    pub fn run(mut self) -> anyhow::Result<FoundShape> {
+        ensure!(!self.views.is_empty(), "a shape needs a view");
+        assert!(self.size >= 8, "images of {} pixels a side", self.size);
+        let reaches = || self.views.iter().map(ViewOfShape::reach);
+        let reach = reaches().fold(0.0, f64::max);
+        let half = reaches().sum::<f64>() / self.views.len() as f64;
+        let mut levels = self.levels();
+        let length = |size: usize| EDGE_PX * 2.0 * half / size as f64;
+        let has_colours = self.views.iter().any(|view| view.colours.is_some());
+        let mut before = length(levels[levels.len() - 1][0].size);
+        let mut shape = self.shape(half, before, has_colours)?;
+        let steps = steps(self.steps, levels.len());
+        let (mut order, mut random) = (Vec::new(), StdRng::seed_from_u64(0));
+        let (mut done, mut stopped) = (0, None);
+        'stages: for steps in steps {
+            let targets = levels.pop().expect("a level for each stage");
+            let (wanted, is_last) = (length(targets[0].size), levels.is_empty());
+            let mut stage = Stage::new(&self.views, targets, reach, is_last);
+            for step in 0..steps {
+                let part = step as f64 / steps as f64;
+                shape.set_length(before * (wanted / before).powf((part / SHORTENS).min(1.0)));
+                let settled = ((part - SETTLES[0]) / (1.0 - SETTLES[0])).max(0.0);
+                shape.set_rate(if is_last { SETTLES[1].powf(settled) } else { 1.0 });
+                if order.is_empty() {
+                    order = (0..self.views.len()).collect();
+                    order.shuffle(&mut random);
+                }
+                let view = order.pop().expect("there is a view");
+                let pulled = stage.pull(&shape, view);
+                if let Some(colours) = &pulled.colours {
+                    shape.step_colours_by(colours);
+                }
+                shape.step_by(pulled.vertices);
+                done += 1;
+                if let Err(error) = (self.told)(done, pulled.loss) {
+                    stopped = Some(error);
+                    break 'stages;
+                }
+            }
+            before = wanted;
+        }
+        let mesh = shape.mesh()?;
+        if !has_colours {
+            return Ok(FoundShape { mesh, stopped });
+        }
+        let colours = shape.colours();
+        let colours = colours.chunks_exact(3).map(|c| [0, 1, 2].map(|k| f64::from(c[k])));
+        Ok(FoundShape { mesh: mesh.with_colours(colours.collect())?, stopped })
+    }
+
+    /// Targets of all views by stage, those of the last stage first.
+    fn levels(&self) -> Vec<Vec<Target>> {
+        let coarsest = COARSEST[usize::from(self.start.is_some())];
+        let size = self.size;
+        let finest = self.views.par_iter().map(|view| Target::new(view, size)).collect();
+        let mut levels: Vec<Vec<Target>> = vec![finest];
+        loop {
+            let last = &levels[levels.len() - 1];
+            if last[0].size % 2 == 1 || last[0].size < 2 * coarsest {
+                return levels;
+            }
+            let halved = last.par_iter().map(Target::halved).collect();
+            levels.push(halved);
+        }
+    }
+
+    /// The surface at the start, with edges of this length.
+    fn shape(
+        &mut self,
+        half: f64,
+        length: f64,
+        has_colours: bool,
+    ) -> anyhow::Result<RemeshingAdam> {
+        let start = match self.start.take() {
+            Some(mesh) => mesh,
+            None => {
+                let ball = icosphere(3);
+                let place = |p: &[f64; 3]| p.map(|x| SPHERE * half * x);
+                ball.with_positions(ball.positions().iter().map(place).collect())?
+            }
+        };
+        let shape = match has_colours {
+            true => RemeshingAdam::with_colours(&start, length, GREY)?,
+            false => RemeshingAdam::new(&start, length)?,
+        };
+        Ok(shape.with_most_faces(self.most).with_smoothing(self.smoothing))
+    }
+}
+
+/// Steps of each stage.
+fn steps(all: usize, stages: usize) -> Vec<usize> {
+    let weights: Vec<f64> = (0..stages).map(|k| MORE.powi(k as i32)).collect();
+    let sum: f64 = weights.iter().sum();
+    let until = |k: usize| (all as f64 * weights[..k].iter().sum::<f64>() / sum).round() as usize;
+    (0..stages).map(|k| until(k + 1) - until(k)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_steps_are_taken() {
+        for (all, stages) in [(500, 4), (7, 3), (1, 2), (0, 1)] {
+            let steps = steps(all, stages);
+            assert_eq!(steps.iter().sum::<usize>(), all);
+            assert!(steps.is_sorted());
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The loss of images against targets, and its gradient to the images.
+
+use rayon::prelude::*;
+
+use super::target::{Channels, Target};
+
+/// Pixels that one thread takes at once.
+const AT_ONCE: usize = 1 << 13;
+
+/// Adds the absolute differences of coverage and mask, and the gradient to coverage. Both are `[pixels]`.
+pub(super) fn judge_mask(target: &Target, coverage: &[f32], to_coverage: &mut [f32]) -> f64 {
+    let of = |(k, to): (usize, &mut f32)| {
+        let counted = target.counted[k];
+        let off = coverage[k] * counted - target.mask[k];
+        *to += sign(off) * counted;
+        f64::from(off.abs())
+    };
+    to_coverage.par_iter_mut().enumerate().with_min_len(AT_ONCE).map(of).sum()
+}
+
+/// Adds the absolute differences of what three channels show and what is known of it, and the gradients to the channels `[3, pixels]` and to coverage.
+///
+/// A channel c shows `a c` where coverage is a. Where a pixel of the target counts in full or not at all, the outline is not known: there `p a c` is
+/// compared with `a` times what is known, p the part that counts, and coverage is not moved.
+pub(super) fn judge_channels(
+    (target, counted): (&Channels, &[f32]),
+    coverage: &[f32],
+    channels: &[f32],
+    to_channels: &mut [f32],
+    to_coverage: &mut [f32],
+) -> f64 {
+    let count = coverage.len();
+    let planes = channels.chunks(count).zip(to_channels.chunks_mut(count)).zip(&target.levels);
+    let of_plane = |((drawn, to), known): ((&[f32], &mut [f32]), &Vec<f32>)| -> f64 {
+        let each = to.par_iter_mut().zip(&mut *to_coverage).enumerate().with_min_len(AT_ONCE);
+        let of = |(k, (to, to_coverage)): (usize, (&mut f32, &mut f32))| {
+            let (a, c) = (coverage[k], drawn[k]);
+            let off = if target.is_opaque {
+                let off = target.part[k] * a * c - a * known[k];
+                *to += sign(off) * target.part[k] * a;
+                off
+            } else {
+                let off = counted[k] * a * c - known[k];
+                *to += sign(off) * counted[k] * a;
+                *to_coverage += sign(off) * counted[k] * c;
+                off
+            };
+            f64::from(off.abs())
+        };
+        each.map(of).sum()
+    };
+    planes.map(of_plane).sum()
+}
+
+/// -1, 0 or 1.
+#[inline(always)]
+fn sign(x: f32) -> f32 {
+    f32::from(i8::from(x > 0.0) - i8::from(x < 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers from 0 to 1 that seem to follow no rule.
+    fn numbers(count: usize, seed: f32) -> Vec<f32> {
+        (0..count).map(|k| (0.5 + 0.5 * (seed + 2.7 * k as f32).sin()).clamp(0.0, 1.0)).collect()
+    }
+
+    #[test]
+    fn gradients_are_those_of_differences() {
+        const COUNT: usize = 12;
+        for is_opaque in [false, true] {
+            let target = Target {
+                size: 0,
+                mask: numbers(COUNT, 0.1),
+                counted: numbers(COUNT, 0.2),
+                normals: None,
+                colours: Some(Channels {
+                    levels: [0.3, 0.4, 0.5].map(|seed| numbers(COUNT, seed)),
+                    part: numbers(COUNT, 0.6),
+                    is_opaque,
+                }),
+            };
+            let (coverage, channels) = (numbers(COUNT, 0.7), numbers(3 * COUNT, 0.8));
+            let colours = (target.colours.as_ref().unwrap(), target.counted.as_slice());
+            let judged = |coverage: &[f32], channels: &[f32]| {
+                let (mut to_coverage, mut to_channels) = (vec![0.0; COUNT], vec![0.0; 3 * COUNT]);
+                let mut loss = judge_mask(&target, coverage, &mut to_coverage);
+                let (to, more) = (&mut to_channels, &mut to_coverage);
+                loss += judge_channels(colours, coverage, channels, to, more);
+                (loss, to_coverage, to_channels)
+            };
+            let (_, to_coverage, to_channels) = judged(&coverage, &channels);
+            let h = 1e-3;
+            for k in 0..4 * COUNT {
+                let moved = |by: f32| {
+                    let (mut coverage, mut channels) = (coverage.clone(), channels.clone());
+                    if k < COUNT {
+                        coverage[k] += by
+                    } else {
+                        channels[k - COUNT] += by
+                    }
+                    judged(&coverage, &channels).0
+                };
+                let slope = (moved(h) - moved(-h)) / f64::from(2.0 * h);
+                // Where channels move no coverage, the slope has their part too.
+                let found = if k < COUNT { to_coverage[k] } else { to_channels[k - COUNT] };
+                if k >= COUNT || !is_opaque {
+                    assert!((slope - f64::from(found)).abs() < 2e-2, "{k}: {slope} {found}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,75 @@
+use anyhow::Context;
+use softrast_raster::Pinhole;
+use softrast_views::{PaintedView, Picture, View};
+
+/// The square of a view that is drawn is this much larger than its mask.
+const MARGIN: f64 = 1.15;
+
+/// A view of an object whose shape is looked for: its mask, and its normals and colours if there are some.
+#[derive(Clone, Debug)]
+pub struct ViewOfShape {
+    camera: Pinhole,
+    /// The square that is drawn: its left, its top and its extent in pixels.
+    pub(super) square: [f64; 3],
+    pub(super) mask: Picture,
+    pub(super) normals: Option<Shown>,
+    pub(super) colours: Option<Shown>,
+}
+
+/// Three channels of a picture.
+#[derive(Clone, Debug)]
+pub(super) struct Shown {
+    /// Each over black.
+    pub(super) channels: [Picture; 3],
+    /// The part of each pixel that counts.
+    pub(super) part: Picture,
+    /// Whether pixels count in full or not at all.
+    pub(super) is_opaque: bool,
+}
+
+impl Shown {
+    fn of(painted: &PaintedView) -> Self {
+        let (channels, part) = (painted.over_black.clone(), painted.part.clone());
+        Self { channels, part, is_opaque: painted.is_opaque() }
+    }
+}
+
+impl ViewOfShape {
+    /// The mask of a view.
+    ///
+    /// # Errors
+    ///
+    /// If nothing or all of the mask is white, with the name of the view.
+    pub fn of_mask(view: &View) -> anyhow::Result<Self> {
+        view.square()?;
+        let [left, top, extent] = view.mask.square().with_context(|| view.name.clone())?;
+        let beyond = (MARGIN - 1.0) / 2.0 * extent;
+        let square = [left - beyond, top - beyond, MARGIN * extent];
+        let (mask, camera) = (view.mask.clone(), view.camera);
+        Ok(Self { camera, square, mask, normals: None, colours: None })
+    }
+
+    /// With the colours of a picture of the same pixels.
+    #[must_use]
+    pub fn with_colours(self, painted: &PaintedView) -> Self {
+        Self { colours: Some(Shown::of(painted)), ..self }
+    }
+
+    /// With a picture of the same pixels whose red, green and blue are `(n + 1) / 2` of unit normals n in the axes of the world.
+    #[must_use]
+    pub fn with_normals(self, painted: &PaintedView) -> Self {
+        Self { normals: Some(Shown::of(painted)), ..self }
+    }
+
+    /// The camera of its square on `size` × `size` pixels.
+    pub(super) fn camera(&self, size: usize) -> Pinhole {
+        let [left, top, extent] = self.square;
+        self.camera.cropped([left, top], [extent; 2], size)
+    }
+
+    /// Half the extent of the square at the depth of the origin, in world units.
+    pub(super) fn reach(&self) -> f64 {
+        let camera = self.camera(2);
+        camera.translation[2] / camera.focal[0]
+    }
+}

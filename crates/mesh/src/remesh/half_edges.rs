@@ -1,0 +1,135 @@
+use crate::MeshError;
+
+/// No half-edge, or none yet.
+const NONE: u32 = u32::MAX;
+
+/// Faces as half-edges: half-edge h lies in face h / 3 and begins at the corner h % 3 of it.
+pub(super) struct HalfEdges {
+    /// The vertex at which each half-edge begins.
+    pub(super) from: Vec<u32>,
+    /// The half-edge the other way, in the neighbouring face.
+    pub(super) twin: Vec<u32>,
+    /// A half-edge that begins at each vertex.
+    pub(super) of_vertex: Vec<u32>,
+    /// How many edges each vertex has.
+    pub(super) valence: Vec<u32>,
+    /// Whether a face has collapsed.
+    pub(super) is_dead: Vec<bool>,
+    /// Whether a vertex has no face, or has been merged into another.
+    pub(super) is_gone: Vec<bool>,
+}
+
+/// The half-edge after this one in its face.
+#[inline(always)]
+pub(super) fn next(h: u32) -> u32 {
+    if h % 3 == 2 { h - 2 } else { h + 1 }
+}
+
+/// The half-edge before this one in its face.
+#[inline(always)]
+pub(super) fn previous(h: u32) -> u32 {
+    if h.is_multiple_of(3) { h + 2 } else { h - 1 }
+}
+
+impl HalfEdges {
+    /// Half-edges of faces over so many vertices.
+    ///
+    /// # Errors
+    ///
+    /// If an edge has not two faces that go through it in opposite directions, or faces at a vertex do not make one fan.
+    pub(super) fn new(faces: &[[u32; 3]], vertices: usize) -> Result<Self, MeshError> {
+        let from = faces.as_flattened().to_vec();
+        let twin = twins(&from, vertices)?;
+        let (mut of_vertex, mut valence) = (vec![NONE; vertices], vec![0; vertices]);
+        for (h, &vertex) in from.iter().enumerate() {
+            of_vertex[vertex as usize] = h as u32;
+            valence[vertex as usize] += 1;
+        }
+        let is_gone = valence.iter().map(|&count| count == 0).collect();
+        let is_dead = vec![false; faces.len()];
+        let edges = Self { from, twin, of_vertex, valence, is_dead, is_gone };
+        let whole = |vertex: &usize| {
+            let count = edges.valence[*vertex];
+            count == 0 || edges.around(*vertex as u32).count() == count as usize
+        };
+        match (0..vertices).find(|vertex| !whole(vertex)) {
+            Some(vertex) => Err(MeshError::Branches { vertex }),
+            None => Ok(edges),
+        }
+    }
+
+    /// How many faces there have been, dead ones among them.
+    pub(super) fn faces(&self) -> usize {
+        self.is_dead.len()
+    }
+
+    /// Half-edges that begin at a vertex, once around.
+    #[inline(always)]
+    pub(super) fn around(&self, vertex: u32) -> impl Iterator<Item = u32> + '_ {
+        let first = self.of_vertex[vertex as usize];
+        let turn = move |&h: &u32| {
+            let h = self.twin[previous(h) as usize];
+            (h != first).then_some(h)
+        };
+        std::iter::successors(Some(first), turn)
+    }
+
+    /// Makes each other's twins of two half-edges.
+    #[inline(always)]
+    pub(super) fn join(&mut self, g: u32, h: u32) {
+        (self.twin[g as usize], self.twin[h as usize]) = (h, g);
+    }
+
+    /// The faces that are left, over vertices that are left: numbers of others are removed, `[vertices, width]`.
+    pub(super) fn into_faces(self, numbers: &mut Vec<f32>, width: usize) -> Vec<[u32; 3]> {
+        let mut place = vec![NONE; self.is_gone.len()];
+        let mut count = 0;
+        for (vertex, place) in place.iter_mut().enumerate() {
+            if !self.is_gone[vertex] {
+                *place = count as u32;
+                numbers.copy_within(vertex * width..(vertex + 1) * width, count * width);
+                count += 1;
+            }
+        }
+        numbers.truncate(count * width);
+        let left =
+            self.from.as_chunks::<3>().0.iter().zip(&self.is_dead).filter(|(_, dead)| !**dead);
+        left.map(|(face, _)| face.map(|vertex| place[vertex as usize])).collect()
+    }
+}
+
+/// The twin of each half-edge.
+fn twins(from: &[u32], vertices: usize) -> Result<Vec<u32>, MeshError> {
+    let count = from.len() as u32;
+    let ends = |h: u32| [from[h as usize], from[next(h) as usize]];
+    let lower = |h: u32| ends(h).into_iter().min().unwrap_or_default() as usize;
+    // Half-edges by the lower of their ends.
+    let mut starts = vec![0u32; vertices + 1];
+    (0..count).for_each(|h| starts[lower(h) + 1] += 1);
+    (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
+    let (mut waiting, mut filled) = (vec![NONE; from.len()], starts.clone());
+    let mut twin = vec![NONE; from.len()];
+    for h in 0..count {
+        let ([a, b], lower) = (ends(h), lower(h));
+        let slots = starts[lower] as usize..filled[lower] as usize;
+        let is_twin = |&&g: &&u32| twin[g as usize] == NONE && ends(g) == [b, a];
+        match waiting[slots].iter().find(is_twin) {
+            Some(&g) => (twin[g as usize], twin[h as usize]) = (h, g),
+            None => {
+                waiting[filled[lower] as usize] = h;
+                filled[lower] += 1;
+            }
+        }
+    }
+    // Two twins each way between the same vertices could be paired otherwise.
+    let open = (0..count).find(|&h| {
+        let ([a, b], lower) = (ends(h), lower(h));
+        let slots = starts[lower] as usize..filled[lower] as usize;
+        let same = |&&g: &&u32| ends(g) == [a, b] || ends(g) == [b, a];
+        twin[h as usize] == NONE || a == b || waiting[slots].iter().filter(same).count() > 1
+    });
+    match open {
+        Some(h) => Err(MeshError::NotClosed { vertices: ends(h).map(|v| v as usize) }),
+        None => Ok(twin),
+    }
+}

@@ -1,0 +1,306 @@
+//! Remeshing of closed surfaces towards edges of given lengths: short edges collapse, long ones are split, and edges are flipped towards six at each
+//! vertex.
+//!
+//! Source: Botsch and Kobbelt 2004; in an optimisation, Palfinger 2022.
+
+mod collapse;
+mod flip;
+mod half_edges;
+mod split;
+
+use half_edges::HalfEdges;
+
+use crate::{Mesh, MeshError};
+
+/// Edges shorter than this part of their target length collapse.
+const SHORTEST: f32 = 0.8;
+/// No change makes a triangle nearer to a line than this, by [`shape`], unless it was nearer before.
+const THINNEST: f32 = 0.06;
+/// Edges longer than this part of their target length are split.
+const LONGEST: f32 = 4.0 / 3.0;
+
+/// A closed surface whose vertices and faces change, with numbers that belong to its vertices and move with them.
+///
+/// A row of numbers belongs to each vertex: its position, the length that edges around it should have, and whatever else a caller keeps. A vertex that is
+/// made in the middle of an edge has the mean of both ends in all of them, and so has one that two vertices are merged to.
+///
+/// ```
+/// use softrast_mesh::{ClosedSurface, icosphere};
+///
+/// let mut sphere = ClosedSurface::new(&icosphere(2), 0.1, 0)?;
+/// let before = sphere.faces().len();
+/// for _ in 0..5 {
+///     sphere.remesh(10_000);
+/// }
+/// assert!(sphere.faces().len() > 4 * before);
+/// # Ok::<(), softrast_mesh::MeshError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct ClosedSurface {
+    faces: Vec<[u32; 3]>,
+    /// `[vertices, width]`.
+    numbers: Vec<f32>,
+    width: usize,
+}
+
+/// How often a pass over a surface changed it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Changes {
+    /// Edges that became a vertex.
+    pub collapsed: usize,
+    /// Edges that got a vertex in their middle.
+    pub split: usize,
+    /// Edges that now join the two vertices across.
+    pub flipped: usize,
+}
+
+impl ClosedSurface {
+    /// Column of the length that edges around a vertex should have, after those of its position.
+    pub const LENGTH: usize = 3;
+    /// Columns before those of the caller.
+    pub const OWN: usize = 4;
+
+    /// The surface of a mesh, with edges that should have this `length` in its units, and `more` numbers of 0 for each vertex.
+    ///
+    /// # Errors
+    ///
+    /// If an edge has not two faces that go through it in opposite directions, or faces at a vertex do not make one fan.
+    ///
+    /// # Panics
+    ///
+    /// If `length` is not positive and finite in 32 bits.
+    pub fn new(mesh: &Mesh, length: f64, more: usize) -> Result<Self, MeshError> {
+        let width = Self::OWN + more;
+        let mut numbers = vec![0.0; mesh.positions().len() * width];
+        for (row, place) in numbers.chunks_exact_mut(width).zip(mesh.positions()) {
+            (0..3).for_each(|k| row[k] = place[k] as f32);
+        }
+        let mut surface = Self { faces: mesh.faces().to_vec(), numbers, width };
+        surface.set_length(length);
+        HalfEdges::new(&surface.faces, mesh.positions().len())?;
+        Ok(surface)
+    }
+
+    /// Vertices of each face, counterclockwise from outside.
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
+    /// Numbers of all vertices, `[vertices, 4 + more]`: x, y, z, the length of edges, and those of the caller.
+    pub fn numbers(&self) -> &[f32] {
+        &self.numbers
+    }
+
+    /// The same, to be changed. Lengths must stay positive.
+    pub fn numbers_mut(&mut self) -> &mut [f32] {
+        &mut self.numbers
+    }
+
+    /// Numbers of a vertex.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// How many vertices there are.
+    pub fn vertices(&self) -> usize {
+        self.numbers.len() / self.width
+    }
+
+    /// Asks for edges of this length everywhere.
+    ///
+    /// # Panics
+    ///
+    /// If it is not positive and finite in 32 bits.
+    pub fn set_length(&mut self, length: f64) {
+        let length = length as f32;
+        assert!(length > 0.0 && length.is_finite(), "edges of length {length}");
+        self.numbers.chunks_exact_mut(self.width).for_each(|row| row[Self::LENGTH] = length);
+    }
+
+    /// The surface as a mesh.
+    ///
+    /// # Errors
+    ///
+    /// If a position is not finite.
+    pub fn mesh(&self) -> Result<Mesh, MeshError> {
+        let rows = self.numbers.chunks_exact(self.width);
+        let positions = rows.map(|row| [0, 1, 2].map(|k| f64::from(row[k])));
+        Mesh::new(positions.collect(), self.faces.clone())
+    }
+
+    /// One pass over all edges: collapses those below four fifths of their target length, the mean of both ends; splits those above four thirds, while there are
+    /// no more than `most` faces; flips those where the numbers of edges at the four vertices around come nearer to six.
+    ///
+    /// The surface stays closed and of its genus. No change turns a face by more than 60 degrees, makes a needle of it, or makes two edges between the same
+    /// vertices.
+    pub fn remesh(&mut self, most: usize) -> Changes {
+        let count = self.vertices();
+        let mut edges = HalfEdges::new(&self.faces, count).expect("a closed surface stays closed");
+        let changes = Changes {
+            collapsed: edges.collapse_short(&mut self.numbers, self.width),
+            split: edges.split_long(&mut self.numbers, self.width, most),
+            flipped: edges.flip(&self.numbers, self.width),
+        };
+        self.faces = edges.into_faces(&mut self.numbers, self.width);
+        changes
+    }
+}
+
+/// Place of a vertex.
+#[inline(always)]
+fn place(numbers: &[f32], width: usize, vertex: u32) -> [f32; 3] {
+    let start = vertex as usize * width;
+    [numbers[start], numbers[start + 1], numbers[start + 2]]
+}
+
+/// The target length of an edge, and its length.
+#[inline(always)]
+fn lengths(numbers: &[f32], width: usize, [a, b]: [u32; 2]) -> [f32; 2] {
+    let target = |v: u32| numbers[v as usize * width + ClosedSurface::LENGTH];
+    let along = difference(place(numbers, width, b), place(numbers, width, a));
+    [0.5 * (target(a) + target(b)), dot(along, along).sqrt()]
+}
+
+#[inline(always)]
+fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Twice the area of a triangle, along its normal.
+#[inline(always)]
+fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
+    let (u, v) = (difference(b, a), difference(c, a));
+    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+}
+
+/// How far a triangle is from a line: twice its area in the sum of its squared sides, at most 0.29 for one with equal sides.
+#[inline(always)]
+fn shape(corners: [[f32; 3]; 3]) -> f32 {
+    let [a, b, c] = corners;
+    let sides = [difference(b, a), difference(c, b), difference(a, c)];
+    let n = normal(corners);
+    dot(n, n).sqrt() / sides.into_iter().map(|side| dot(side, side)).sum::<f32>()
+}
+
+/// Whether the angle between two vectors has a cosine above this; a vector of no length has none.
+#[inline(always)]
+fn are_within(a: [f32; 3], b: [f32; 3], cosine: f32) -> bool {
+    // Products of squares of small triangles would leave the range of an f32.
+    let across = dot(a, b);
+    across > cosine * dot(a, a).sqrt() * dot(b, b).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::icosphere;
+
+    /// Vertices - edges + faces, of a surface whose edges have two faces each.
+    fn euler(surface: &ClosedSurface) -> i64 {
+        surface.vertices() as i64 - surface.faces().len() as i64 / 2
+    }
+
+    fn checked(surface: &ClosedSurface) {
+        HalfEdges::new(&surface.faces, surface.vertices()).expect("closed");
+        let mesh = surface.mesh().unwrap();
+        for [a, b, c] in mesh.triangles() {
+            let narrow = |p: [f64; 3]| p.map(|x| x as f32);
+            let n = normal([narrow(a), narrow(b), narrow(c)]);
+            assert!(dot(n, n) > 0.0, "a face has no area");
+        }
+    }
+
+    #[test]
+    fn edges_come_near_to_their_length() {
+        for length in [0.04, 0.15, 0.5] {
+            let mut surface = ClosedSurface::new(&icosphere(3), length, 0).unwrap();
+            (0..12).for_each(|_| _ = surface.remesh(100_000));
+            checked(&surface);
+            assert_eq!(euler(&surface), 2);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for face in surface.faces() {
+                for k in 0..3 {
+                    let [_, found] = lengths(surface.numbers(), 4, [face[k], face[(k + 1) % 3]]);
+                    (sum, count) = (sum + f64::from(found), count + 1.0);
+                    assert!(f64::from(found) < 1.5 * length, "{found} for {length}");
+                }
+            }
+            assert!((0.75..1.25).contains(&(sum / count / length)), "{}", sum / count / length);
+        }
+    }
+
+    #[test]
+    fn a_torus_stays_one() {
+        let torus = |p: [f64; 3]| {
+            let around = p[0].hypot(p[1]) - 0.7;
+            around.hypot(p[2]) - 0.2
+        };
+        let mesh = Mesh::of_solid([[-1.0; 3], [1.0; 3]], 30, torus).unwrap();
+        let mut surface = ClosedSurface::new(&mesh, 0.05, 2).unwrap();
+        for length in [0.05, 0.3, 0.04, 0.2] {
+            surface.set_length(length);
+            (0..5).for_each(|_| _ = surface.remesh(100_000));
+            checked(&surface);
+            assert_eq!(euler(&surface), 0);
+        }
+    }
+
+    #[test]
+    fn numbers_of_new_vertices_are_means() {
+        let mut surface = ClosedSurface::new(&icosphere(2), 0.1, 1).unwrap();
+        surface.numbers_mut().chunks_exact_mut(5).for_each(|row| row[4] = 3.0 * row[0] - row[2]);
+        (0..4).for_each(|_| _ = surface.remesh(100_000));
+        for row in surface.numbers().chunks_exact(5) {
+            assert!((row[4] - 3.0 * row[0] + row[2]).abs() < 1e-5, "{row:?}");
+        }
+    }
+
+    #[test]
+    fn no_more_faces_than_are_allowed() {
+        let mut surface = ClosedSurface::new(&icosphere(2), 0.01, 0).unwrap();
+        (0..10).for_each(|_| _ = surface.remesh(1000));
+        assert!(surface.faces().len() <= 1000 && surface.faces().len() > 990);
+        checked(&surface);
+    }
+
+    #[test]
+    fn lengths_may_differ_from_place_to_place() {
+        let mut surface = ClosedSurface::new(&icosphere(3), 0.1, 0).unwrap();
+        for _ in 0..10 {
+            for row in surface.numbers_mut().chunks_exact_mut(4) {
+                row[3] = if row[2] > 0.0 { 0.03 } else { 0.2 };
+            }
+            surface.remesh(100_000);
+        }
+        checked(&surface);
+        let above = |face: &&[u32; 3]| place(surface.numbers(), 4, face[0])[2] > 0.0;
+        let fine = surface.faces().iter().filter(above).count();
+        assert!(fine > 20 * (surface.faces().len() - fine), "{fine}");
+    }
+
+    #[test]
+    fn open_and_branching_surfaces_are_refused() {
+        let ball = icosphere(1);
+        let refused = |faces: Vec<[u32; 3]>| {
+            let mesh = Mesh::new(ball.positions().to_vec(), faces).unwrap();
+            ClosedSurface::new(&mesh, 0.1, 0).unwrap_err().to_string()
+        };
+        let open = ball.faces()[1..].to_vec();
+        assert!(refused(open).starts_with("the mesh is not closed"));
+        let mut turned = ball.faces().to_vec();
+        turned[0].swap(0, 1);
+        assert!(refused(turned).starts_with("the mesh is not closed"));
+        // Two tetrahedra that share a vertex.
+        let of = |v: [u32; 4]| {
+            let [a, b, c, d] = v;
+            [[a, b, c], [a, c, d], [a, d, b], [b, d, c]]
+        };
+        let touching = [of([0, 1, 2, 3]), of([0, 4, 5, 6])].concat();
+        assert!(refused(touching).contains("vertex 0"));
+    }
+}

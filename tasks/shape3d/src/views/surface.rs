@@ -1,0 +1,98 @@
+//! The surface that views show, from their hull or from a sphere.
+
+use anyhow::{anyhow, ensure};
+use softrast_cli::Given;
+use softrast_inverse::{
+    shape::{ShapeFit, ViewOfShape},
+    silhouette_pixels,
+};
+use softrast_lab::{Error, Progress, program::say, was_interrupted};
+use softrast_mesh::Mesh;
+use softrast_views::{PaintedView, View, mask_iou, visual_hull};
+
+use super::{Begin, Views};
+use crate::Args;
+
+/// Steps that move the surface.
+const STEPS: usize = 500;
+/// Pixels a side of the square of a view, at the end.
+const SIZE: usize = 256;
+/// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
+const CELLS: [usize; 3] = [32, 45, 64];
+/// More cells are worth their time if the mean `IoU` of the hull grows by so much.
+const GROWS: f64 = 0.01;
+/// How many steps are taken.
+pub(super) fn steps(given: &Given<'_, Args>) -> usize {
+    given.common.steps.unwrap_or(STEPS)
+}
+
+/// A surface that was found.
+pub(super) struct Found {
+    pub(super) mesh: Mesh,
+    /// Whether the user ended the search early.
+    pub(super) is_stopped: bool,
+}
+
+/// The surface, of views of a frame; `shown` are their colours and their normals, each of all views or of none. Where the user stops it, it is as it was then.
+pub(super) fn found(
+    given: &Given<'_, Args>,
+    flags: &Views,
+    views: &[View],
+    [colours, normals]: [&[PaintedView]; 2],
+    progress: &mut Progress,
+) -> anyhow::Result<Found> {
+    let of_view = |(k, view): (usize, &View)| {
+        let mut of = ViewOfShape::of_mask(view)?;
+        if let Some(colours) = colours.get(k) {
+            of = of.with_colours(colours);
+        }
+        Ok(normals.get(k).map_or(of.clone(), |normals| of.with_normals(normals)))
+    };
+    let of_views = views.iter().enumerate().map(of_view).collect::<anyhow::Result<_>>()?;
+    let (steps, size) = (steps(given), given.common.size.unwrap_or(SIZE));
+    ensure!(size >= 8, Error::usage("--size must be at least 8 with --views"));
+    let mut taken = 0;
+    let mut fit = ShapeFit::new(of_views).with_steps(steps).with_size(size);
+    if flags.start.unwrap_or_default() == Begin::Hull {
+        fit = fit.starting_at(fitting_hull(views)?);
+    }
+    if let Some(most) = flags.faces {
+        fit = fit.with_most_faces(most as usize);
+    }
+    let found = fit
+        .with_smoothing(flags.smooth.unwrap_or(1.0))
+        .progress(|step, loss| {
+            taken = step;
+            progress.step(step, loss)
+        })
+        .run()?;
+    let is_stopped = found.stopped.is_some();
+    if let Some(why) = found.stopped {
+        if !was_interrupted(&why) {
+            return Err(why);
+        }
+        say(&format!("stopped after {taken} of {steps} steps: the mesh is as it was then"));
+    }
+    Ok(Found { mesh: found.mesh, is_stopped })
+}
+
+/// The visual hull in as few cells as show what the masks show.
+fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
+    let with = |cells: usize| {
+        let hull = visual_hull(views, cells);
+        let hull =
+            hull.map_err(|why| anyhow!("{why:#} (--invert?); --start sphere needs no hull"))?;
+        let iou = |view: &View| mask_iou(&silhouette_pixels(&hull, &view.camera), &view.mask);
+        let mean = views.iter().map(iou).sum::<f64>() / views.len() as f64;
+        anyhow::Ok((hull, mean))
+    };
+    let (mut mesh, mut iou) = with(CELLS[0])?;
+    for cells in &CELLS[1..] {
+        let (finer, better) = with(*cells)?;
+        if better < iou + GROWS {
+            break;
+        }
+        (mesh, iou) = (finer, better);
+    }
+    Ok(mesh)
+}
