@@ -97,6 +97,40 @@ impl Grid {
         self.cells()
     }
 
+    /// The table `[rows, 4]` of a profile, which gives its value at a signed distance in NDC (positive inside) and its slope there: a cubic through
+    /// both at the ends of each cell, and a straight line in the cell at the edge of the face. Beyond the ends it is constant.
+    ///
+    /// ```
+    /// use softrast_kernel::Grid;
+    ///
+    /// let grid = Grid { outer: 0.2, inner: 0.2, from: [0.0; 2], octaves: 16, far: 0, bits: 3 };
+    /// let table = grid.table(|d| [d, 1.0]);
+    /// assert_eq!(table.len(), 4 * grid.rows());
+    /// assert_eq!(table[4 * grid.tail()], -0.2); // the constant of the tail outside
+    /// ```
+    pub fn table(&self, profile: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
+        let knots = self.knots();
+        let mut table = Vec::with_capacity(4 * self.rows());
+        for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
+            let at = |y: f64| profile(sign * self.distance(side, y));
+            for cell in knots.windows(2) {
+                let [[start, slope], [end, end_slope]] = [at(cell[0]), at(cell[1])];
+                let rise = end - start;
+                let by_place =
+                    |slope: f64, y: f64| sign * slope * self.rate(side, y) * (cell[1] - cell[0]);
+                // At the edge a distance moves infinitely fast with its square.
+                table.extend(if cell[0] == 0.0 {
+                    [start, rise, 0.0, 0.0]
+                } else {
+                    let [a, b] = [by_place(slope, cell[0]), by_place(end_slope, cell[1])];
+                    [start, a, 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise]
+                });
+            }
+            table.extend([at(1.0)[0], 0.0, 0.0, 0.0]);
+        }
+        table
+    }
+
     /// Ends of the cells of one side in y, ascending, `cells + 1` numbers from 0 to 1.
     pub fn knots(&self) -> Vec<f64> {
         let per_octave = 1u32 << self.bits;
