@@ -122,7 +122,36 @@ mod ndarray {
     }
 }
 #[cfg(feature = "flex")]
-impl RasterBackend for softrast_tensor::Flex {}
+mod flex {
+    use bytemuck::checked::try_cast_slice;
+    use softrast_tensor::{Element, Flex, FloatTensor};
+
+    use super::RasterBackend;
+
+    impl RasterBackend for Flex {
+        fn numbers<F: Element>(tensor: &FloatTensor<Self>) -> Option<&[F]> {
+            let (start, end) = tensor.layout().contiguous_offsets()?;
+            let numbers = try_cast_slice(tensor.bytes()).ok()?;
+            (tensor.dtype() == F::dtype()).then(|| &numbers[start..end])
+        }
+    }
+
+    #[test]
+    fn numbers_are_read_where_they_lie() {
+        use softrast_tensor::Tensor;
+
+        let rows = Tensor::<Flex, 2>::from_floats([[1.0, 2.0], [3.0, 4.0]], &Default::default());
+        let second = crate::backend::primitive(rows.clone().narrow(0, 1, 1));
+        let found = Flex::numbers::<f32>(&second).expect("a row lies in one piece");
+        assert_eq!(found, [3.0, 4.0]);
+        let whole = crate::backend::primitive(rows.clone());
+        let whole = Flex::numbers::<f32>(&whole).expect("as do all rows").as_ptr();
+        assert_eq!(found.as_ptr(), whole.wrapping_add(2), "the numbers were copied");
+        assert!(Flex::numbers::<f64>(&second).is_none());
+        let columns = crate::backend::primitive(rows.transpose());
+        assert!(Flex::numbers::<f32>(&columns).is_none());
+    }
+}
 
 /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what each pass over all views visits.
 pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usize {
