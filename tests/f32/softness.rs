@@ -28,7 +28,7 @@ fn near(scale: f64) -> impl Iterator<Item = f64> {
 fn softnesses() -> impl Iterator<Item = EdgeSoftness> {
     Family::ALL
         .into_iter()
-        .flat_map(|family| [false, true].map(|squared| EdgeSoftness { family, squared }))
+        .flat_map(|family| [EdgeSoftness::new, EdgeSoftness::squared].map(|edge| edge(family)))
 }
 
 #[track_caller]
@@ -118,7 +118,7 @@ proptest! {
         scale in (-27.6_f64..6.9).prop_map(f64::exp),
         x in prop::collection::vec(-1e6_f64..1e6, 1..20),
     ) {
-        let softness = EdgeSoftness { family, squared };
+        let softness = if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
         let phi = softness.default_phi(scale);
         check(softness, scale, &x);
         let x: Vec<_> = x.iter().map(|x| x * scale / 1e5).collect();

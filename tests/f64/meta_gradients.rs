@@ -164,7 +164,7 @@ fn fused_errors<S: Softness>(softness: S, phi: &[f64], tolerance: f64) -> [f64; 
 // Of the errors of a table of cubics that of the second derivative is the largest.
 #[test]
 fn both_ways_to_draw_have_the_same_meta_gradient() {
-    let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+    let edge = EdgeSoftness::new(Family::Logistic);
     let moving = Method::new("logistic", ScheduledSoftness::decay(edge, SCALE, SCALE / 2.0));
     let learning = moving.learning_tolerance(true);
     assert_eq!(learning, 1e-3);

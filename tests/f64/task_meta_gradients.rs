@@ -101,7 +101,7 @@ fn check<P: InverseProblem>(
     [scale, first, last]: [f64; 3],
     problem: impl Fn() -> P,
 ) {
-    let edge = |family| EdgeSoftness { family, squared: false };
+    let edge = |family| EdgeSoftness::new(family);
     let logistic = edge(Family::Logistic);
     for softness in [
         ScheduledSoftness::constant(logistic, scale),
@@ -122,7 +122,7 @@ fn check_surrogate<P: InverseProblem>(
     [_, first, last]: [f64; 3],
     problem: impl Fn() -> P,
 ) {
-    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let logistic = EdgeSoftness::new(Family::Logistic);
     let softness = ScheduledSoftness::decay(logistic, first, last).with_surrogate_scale(0.2);
     let outer_loss = OuterLoss::Fixed;
     Case { name, problem: &problem, size, softness, outer_loss }.check();

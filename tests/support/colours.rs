@@ -21,7 +21,7 @@ const CHANNELS: usize = 3;
 /// If one of them does not depend on what it is the gradient to.
 pub fn colours<B: RasterBackend>() -> Outputs {
     let fox = fox();
-    let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+    let edge = EdgeSoftness::new(Family::Logistic);
     let depth = DepthSoftness::Family(Family::Exp);
     let weighting = Weighting { edge, depth, planes: [1.7, 3.8] };
     let phi = [edge.default_phi(0.01), depth.default_phi(0.02)];

@@ -26,7 +26,7 @@ pub fn outputs<B: RasterBackend>() -> Outputs {
     type Second<B> = Autodiff<Autodiff<B>>;
 
     // A network, because its tail is not 0.
-    let softness = EdgeSoftness { family: Family::Mlp, squared: false };
+    let softness = EdgeSoftness::new(Family::Mlp);
     let fox = fox();
     let phi = softness.default_phi(0.02);
     let phi = tensor::<B, 1>(&phi, [phi.len()]);

@@ -51,7 +51,8 @@ impl ToleranceCase {
     pub fn random(seed: u64) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
         let family = Family::ALL[random.random_range(0..Family::ALL.len())];
-        let softness = EdgeSoftness { family, squared: random.random() };
+        let edge = if random.random() { EdgeSoftness::squared } else { EdgeSoftness::new };
+        let softness = edge(family);
         let images = random.random_range(1..4);
         Self {
             scene: random.random(),
@@ -91,8 +92,9 @@ impl ToleranceCase {
     /// `rounding` is that of a distance, absolute (NDC) and relative; `of_sums` that of a coverage.
     fn deviations_on<B: RasterBackend>(&self, rounding: f64, of_sums: f64) -> Vec<Deviation> {
         let t_conorm: TConorm = self.t_conorm.parse().expect("a T-conorm");
-        let scale =
-            |width: f64| 10f64.powf(if self.softness.squared { 2.0 * width } else { width });
+        let scale = |width: f64| {
+            10f64.powf(if self.softness.scale_is_squared() { 2.0 * width } else { width })
+        };
         let faces: Vec<[u32; 3]> =
             (0..self.faces as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
         let mut renderer = SoftRenderer::new(&faces, SIZE, self.softness, scale(self.widths[0]))

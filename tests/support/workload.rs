@@ -10,7 +10,7 @@ use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{Autodiff, Backend, Tensor, numbers, tensor};
 
 /// The logistic of the signed squared distance.
-const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
+const SOFTNESS: EdgeSoftness = EdgeSoftness::squared(Family::Logistic);
 /// Its scale in NDC².
 const SCALE: f64 = 1e-4;
 /// Distance (world units), elevation and field of view (degrees) of every camera.

@@ -113,7 +113,7 @@ impl Playground {
 /// Parameters of the softness with these, stretched to a width in NDC.
 fn of_width(edge: EdgeSoftness, phi: &[f64], width: f64) -> Vec<f64> {
     let ratio = width / edge.width(phi);
-    edge.with_scale_values(phi, if edge.squared { ratio * ratio } else { ratio })
+    edge.with_scale_values(phi, if edge.scale_is_squared() { ratio * ratio } else { ratio })
 }
 
 /// Derivatives of the coverage at the pixels of a `grid` by each corner, `[grid * grid, corners, 2]`.

@@ -132,7 +132,8 @@ impl SoftnessChoice {
     }
 
     fn of_family(&self) -> anyhow::Result<ScheduledSoftness> {
-        let edge = EdgeSoftness { family: self.name.parse::<Family>()?, squared: self.squared };
+        let edge = if self.squared { EdgeSoftness::squared } else { EdgeSoftness::new };
+        let edge = edge(self.name.parse::<Family>()?);
         let [least, largest] = WIDTHS;
         let scale = |width: f64| {
             ensure!(

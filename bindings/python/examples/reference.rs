@@ -14,7 +14,7 @@ type Outer = Autodiff<Plain>;
 type Inner = Autodiff<Outer>;
 
 const SIZE: [usize; 2] = [12, 10];
-const LOGISTIC: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const LOGISTIC: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 
 fn main() {
     silhouettes();

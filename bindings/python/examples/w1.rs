@@ -19,7 +19,7 @@ fn main() {
     };
     let cameras: Vec<_> = (0..24).map(orbit).collect();
     let cameras = Orbit::tensors::<B>(&cameras, &device);
-    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let softness = EdgeSoftness::squared(Family::Logistic);
     let renderer = SoftRenderer::new(mesh.faces(), 64, softness, 1e-4);
     let target = Tensor::<B, 3>::zeros([24, 64, 64], &device);
     let mut times = Vec::new();

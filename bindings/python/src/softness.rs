@@ -29,7 +29,8 @@ impl Softness {
                 "the scale of a softness is {scale}, expected a positive number"
             )));
         }
-        let softness = EdgeSoftness { family, squared };
+        let softness =
+            if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
         guarded(py, || Self(ScheduledSoftness::constant(softness, scale)))
     }
 
@@ -79,7 +80,7 @@ impl Softness {
     /// Whether the family sees the signed square of the distance.
     #[getter]
     fn squared(&self) -> bool {
-        self.0.softness.squared
+        self.0.softness.scale_is_squared()
     }
 
     /// Whether its gradient to vertices is that of another softness.

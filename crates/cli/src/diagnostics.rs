@@ -19,7 +19,7 @@ pub(crate) fn diagnostics(softness: &ScheduledSoftness, size: usize, runs: &[Run
     let surrogate = softness.surrogate_at(0.0, size);
     let surrogate = surrogate.map(|Surrogate { softness, phi }| softness.scale(&phi));
     let found = [
-        too_wide(softness.softness.squared, runs),
+        too_wide(softness.softness.scale_is_squared(), runs),
         too_narrow(surrogate, size, runs),
         past_the_best(runs),
     ];
@@ -113,7 +113,7 @@ mod tests {
         };
         let curve = points.into_iter().enumerate().map(point).collect();
         let run = Run { curve, ..Run::default() };
-        let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+        let edge = EdgeSoftness::new(Family::Logistic);
         let softness = ScheduledSoftness::constant(edge, 1e-8);
         let softness = if surrogate { softness.with_surrogate_scale(1e-8) } else { softness };
         diagnostics(&softness, 32, &[run])

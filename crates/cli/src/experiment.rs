@@ -122,7 +122,7 @@ impl<T: Task> TaskExperiment<T> {
             (false, Some(_)) => "feedback",
         };
         set("schedule", schedule.into());
-        set("squared", softness.softness.squared.into());
+        set("squared", softness.softness.scale_is_squared().into());
         for (name, part) in [("scale", 0.0), ("scale_end", 1.0)] {
             set(name, softness.scale_at(part, size).into());
             if let Some(Surrogate { softness, phi }) = softness.surrogate_at(part, size) {

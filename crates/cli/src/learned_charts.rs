@@ -42,14 +42,14 @@ pub(crate) fn learned_charts(
     )];
     if learned.schedule.is_some() {
         let series = both.map(|(name, softness)| {
-            let squared = softness.softness.squared;
+            let squared = softness.softness.scale_is_squared();
             let width = |scale: f64| pixels * if squared { scale.sqrt() } else { scale };
             let scale =
                 |step: usize| [step as f64, width(softness.scale_at(layout.progress(step), size))];
             let points = (0..layout.steps().max(1)).map(scale).collect();
             Series { name: name.into(), points, ..Series::default() }
         });
-        let name = if learned.softness.squared { "root of the scale" } else { "scale" };
+        let name = if learned.softness.scale_is_squared() { "root of the scale" } else { "scale" };
         let scale = Axis::logarithmic(&format!("{name} (pixels)"));
         let (along, caption) = match learned.feedback {
             None => ("inner step", "The scale of the softness over the inner steps."),

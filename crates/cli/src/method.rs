@@ -117,7 +117,8 @@ impl MethodArgs {
         let searched = searched.filter(|_| !self.is_scaled());
         let [first, last] =
             self.scales(&searched.map_or(*scales, |searched| scales.with(searched)));
-        let edge = EdgeSoftness { family, squared: self.squared };
+        let edge = if self.squared { EdgeSoftness::squared } else { EdgeSoftness::new };
+        let edge = edge(family);
         let mut softness = match first == last {
             true => ScheduledSoftness::constant(edge, first),
             false => ScheduledSoftness::decay(edge, first, last),
@@ -240,8 +241,10 @@ pub fn is_preset(task: &str, softness: Result<ScheduledSoftness, SoftnessFileErr
 /// A network, and its weights, in the place of a softness.
 fn network_like(softness: EdgeSoftness, phi: &[f64]) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
     let scale = softness.scale(phi);
-    let network = EdgeSoftness { family: Family::Mlp, ..softness };
-    let plain = EdgeSoftness { squared: false, ..softness };
+    let squared = softness.scale_is_squared();
+    let edge = if squared { EdgeSoftness::squared } else { EdgeSoftness::new };
+    let network = edge(Family::Mlp);
+    let plain = EdgeSoftness::new(softness.family);
     let weights = mlp_like(plain, &softness.with_scale_values(phi, scale.recip()));
     let weights = weights.ok_or_else(|| {
         Error::usage(

@@ -120,7 +120,7 @@ fn difference(one: &[f64], other: &[f64]) -> f64 {
 
 /// How far the curve of a family is from a function at best, over its scale.
 fn distance(family: Family, function: &[f64]) -> f64 {
-    let softness = EdgeSoftness { family, squared: false };
+    let softness = EdgeSoftness::new(family);
     let at = |log: f64| difference(&values(softness, &softness.default_phi(log.exp())), function);
     let (mut low, mut high) = (-3.0, 3.0);
     for _ in 0..60 {

@@ -21,7 +21,7 @@ const SYMMETRIC: f64 = 1e-4;
 /// Weights `[56]` of an MLP softness that is a logistic of scale 1, to 3e-3.
 pub fn distilled_mlp() -> Vec<f64> {
     static FITTED: LazyLock<Vec<f64>> = LazyLock::new(|| {
-        let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+        let logistic = EdgeSoftness::new(Family::Logistic);
         mlp_like(logistic, &logistic.default_phi(1.0)).unwrap_or_default()
     });
     FITTED.clone()
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn a_symmetric_softness_has_an_mlp_like_it_and_another_has_none() {
         let like = |family: Family| {
-            let softness = EdgeSoftness { family, squared: false };
+            let softness = EdgeSoftness::new(family);
             mlp_like(softness, &family.default_phi(1.0))
         };
         let gauss = vector::<HostBackend>(&Family::Gauss.default_phi(1.0));

@@ -144,7 +144,7 @@ fn sharp<P: InverseProblem>(problem: &P, size: usize, config: &LearnConfig) -> S
         Some(OuterLoss::Pixels) => NEARLY_HARD_PX,
         _ => SHARP_PX,
     };
-    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let logistic = EdgeSoftness::new(Family::Logistic);
     let softness = ScheduledSoftness::constant(logistic, pixels * 2.0 / size as f64);
     let layout = PhiLayout::new(softness, problem.own_phi(), 0, size);
     let phi = layout.start();

@@ -21,7 +21,7 @@ const KNOTS: usize = 3;
 /// use softrast_softness::{EdgeSoftness, Family};
 ///
 /// // φ of an Exp is the logarithm of its scale and a shift.
-/// let exp = EdgeSoftness { family: Family::Exp, squared: false };
+/// let exp = EdgeSoftness::new(Family::Exp);
 /// let softness = ScheduledSoftness::decay(exp, 0.5, 0.125).with_surrogate_scale(1.0);
 /// let layout = PhiLayout::new(softness, vec![7.0], 300, 64);
 /// let [first, last, ratio] = [0.5_f64, 0.125, 2.0].map(f64::ln);

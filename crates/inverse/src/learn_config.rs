@@ -193,7 +193,7 @@ mod tests {
 
     /// A softness with one parameter or many.
     fn start(family: Family, has_surrogate: bool) -> ScheduledSoftness {
-        let start = ScheduledSoftness::constant(EdgeSoftness { family, squared: false }, 0.1);
+        let start = ScheduledSoftness::constant(EdgeSoftness::new(family), 0.1);
         if has_surrogate { start.with_surrogate_scale(0.2) } else { start }
     }
 
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_rate_that_falls_is_learned_from_by_what_runs_return_and_not_with_feedback() {
-        let decay = EdgeSoftness { family: Family::Gauss, squared: false };
+        let decay = EdgeSoftness::new(Family::Gauss);
         let softness =
             ScheduledSoftness { rate_end: Some(0.2), ..ScheduledSoftness::decay(decay, 0.1, 0.01) };
         let plain = LearnConfig::default();
@@ -243,7 +243,7 @@ mod tests {
     fn feedback_is_learned_by_differences_of_what_runs_return() {
         let config = LearnConfig { feedback: true, ..LearnConfig::default() };
         assert!(resolved(&config, Family::Gauss).is_err(), "a scale that stays has no path");
-        let gauss = EdgeSoftness { family: Family::Gauss, squared: false };
+        let gauss = EdgeSoftness::new(Family::Gauss);
         let moving = ScheduledSoftness::decay(gauss, 0.1, 0.01);
         let found = config.resolved(&moving, 0).unwrap();
         assert_eq!(found.outer_loss, Some(OuterLoss::Returned));

@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn a_scale_that_moves_is_drawn_less_exactly_unless_derivatives_are_taken() {
-        let softness = EdgeSoftness { family: Family::Gauss, squared: false };
+        let softness = EdgeSoftness::new(Family::Gauss);
         let moving = Method::new("gauss", ScheduledSoftness::decay(softness, 0.1, 0.001));
         assert_eq!((moving.tolerance(), moving.learning_tolerance(false)), (1e-2, 1e-2));
         assert_eq!(moving.learning_tolerance(true), LEARNING_TOLERANCE);

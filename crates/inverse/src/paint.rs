@@ -66,7 +66,7 @@ pub fn paint(
     let seen = project(corners, Pinholes::new(&cameras, &device));
     let renderer = renderer(&framed, &faces, size, numbers(seen.clone().tensor().narrow(2, 2, 1)))?;
     let background = renderer.background::<B>(&[0.0; 3], &device);
-    let surface = Surface::<B>::new(&Edges::new(&faces), count);
+    let surface = Surface::<B>::of_edges(&Edges::new(&faces), count, &Default::default());
 
     let start = tensor(mean.map(|channel| vec![channel; count]).concat(), [3 * count]);
     let inner = InnerLoop { optimizer: Adam::new(learning_rate), steps };
@@ -121,7 +121,7 @@ fn renderer(
     let [low, high] = mesh.bounds();
     let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
     ensure!(longest > 0.0, "the mesh has no extent: all its vertices are in one place");
-    let edge = EdgeSoftness { family: Family::Uniform, squared: false };
+    let edge = EdgeSoftness::new(Family::Uniform);
     let depth = DepthSoftness::Family(Family::Exp);
     let scales = [EDGE_PX * 2.0 / size as f64, DEPTH * longest / (planes[1] - planes[0])];
     let phi = [edge.default_phi(scales[0]), depth.default_phi(scales[1])];

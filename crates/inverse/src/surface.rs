@@ -1,6 +1,10 @@
 use softrast_mesh::{Edges, Mesh};
 use softrast_raster::{edge_length, flatness, normal_consistency};
-use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData, tensor};
+use softrast_tensor::{
+    Backend, IndexingUpdateOp, Int, Tensor, TensorData,
+    burn::{self, module::Module},
+    tensor_on,
+};
 
 /// The connections of a surface, for losses that keep it smooth. Each takes `vertices` `[1, vertices, 3]` in world units, as
 /// [`project`](softrast_raster::project) does, and gives `[1]`; other shapes panic.
@@ -11,14 +15,14 @@ use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData, tensor
 /// use softrast_mesh::icosphere;
 ///
 /// let sphere = icosphere(1);
-/// let surface = Surface::<NdArray>::of(&sphere);
+/// let surface = Surface::<NdArray>::new(&sphere, &Default::default());
 /// let vertices = softrast_raster::vertices(sphere.positions(), &Default::default());
 /// let bend = surface.normal_consistency(vertices.clone()).into_scalar();
 /// assert!((0.0..0.2).contains(&bend));
 /// let stretched = surface.edge_length(vertices, 0.5).into_scalar();
 /// assert!(stretched < 0.1);
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Module, Debug)]
 pub struct Surface<B: Backend> {
     /// Both ends of every edge, in both directions: `[3, 2 edges]` each, the same for every axis.
     from: Tensor<B, 2, Int>,
@@ -35,12 +39,12 @@ pub struct Surface<B: Backend> {
 
 impl<B: Backend> Surface<B> {
     /// The surface of a mesh.
-    pub fn of(mesh: &Mesh) -> Self {
-        Self::new(&Edges::new(mesh.faces()), mesh.positions().len())
+    pub fn new(mesh: &Mesh, device: &B::Device) -> Self {
+        Self::of_edges(&Edges::new(mesh.faces()), mesh.positions().len(), device)
     }
 
-    /// Of as many `vertices`, joined by these edges.
-    pub fn new(edges: &Edges, vertices: usize) -> Self {
+    /// The surface of this many `vertices`, joined by these edges.
+    pub fn of_edges(edges: &Edges, vertices: usize, device: &B::Device) -> Self {
         let forth = edges.ends.iter().copied();
         let back = edges.ends.iter().map(|&[a, b]| [b, a]);
         let pairs: Vec<[u32; 2]> = forth.chain(back).collect();
@@ -50,16 +54,16 @@ impl<B: Backend> Surface<B> {
         }
         let share = degree.iter().map(|&d| if d > 0.0 { 1.0 / d } else { 0.0 }).collect();
         let used = degree.iter().map(|&d: &f64| d.min(1.0)).collect();
-        let of_pairs = |k: usize| indices(pairs.iter().map(|pair| pair[k]));
+        let of_pairs = |k: usize| indices(pairs.iter().map(|pair| pair[k]), device);
         let ends = (0..2).flat_map(|k| edges.ends.iter().map(move |ends| ends[k]));
         let hinges = (0..4).flat_map(|k| edges.hinges.iter().map(move |hinge| hinge[k]));
         Self {
             from: of_pairs(0),
             to: of_pairs(1),
-            ends: (!edges.ends.is_empty()).then(|| indices(ends)),
-            hinges: (!edges.hinges.is_empty()).then(|| indices(hinges)),
-            share: tensor(share, [1, vertices]),
-            used: tensor(used, [1, vertices]),
+            ends: (!edges.ends.is_empty()).then(|| indices(ends, device)),
+            hinges: (!edges.hinges.is_empty()).then(|| indices(hinges, device)),
+            share: tensor_on(share, [1, vertices], device),
+            used: tensor_on(used, [1, vertices], device),
         }
     }
 
@@ -115,8 +119,11 @@ fn gathered<B: Backend>(
 }
 
 /// Vertex numbers as a tensor `[3, numbers]`, the same for every axis.
-fn indices<B: Backend>(numbers: impl Iterator<Item = u32>) -> Tensor<B, 2, Int> {
+fn indices<B: Backend>(
+    numbers: impl Iterator<Item = u32>,
+    device: &B::Device,
+) -> Tensor<B, 2, Int> {
     let numbers: Vec<i64> = numbers.map(i64::from).collect();
     let shape = [3, numbers.len()];
-    Tensor::from_data(TensorData::new(numbers.repeat(3), shape), &Default::default())
+    Tensor::from_data(TensorData::new(numbers.repeat(3), shape), device)
 }

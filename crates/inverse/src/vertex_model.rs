@@ -1,43 +1,49 @@
+use std::sync::Arc;
+
 use softrast_mesh::{Mesh, MeshError};
 use softrast_tensor::{
-    Backend, Tensor,
+    AutodiffBackend, Backend, Tensor,
     burn::{
         self,
         module::{Module, Param},
+        optim::{GradientsParams, Optimizer},
     },
     numbers,
 };
 
-/// The vertices of a mesh as a module of burn, for burn's own optimisers: they are its one parameter, `[1, vertices, 3]` in world units.
+use crate::Surface;
+
+/// A mesh whose vertices move, as a module of burn, for burn's own optimisers: they are its one parameter, `[1, vertices, 3]` in world units.
 ///
 /// ```
 /// use softrast_inverse::VertexModel;
 /// use softrast_mesh::{Mesh, icosphere};
-/// use softrast_tensor::{
-///     Autodiff, NdArray,
-///     burn::optim::{AdamConfig, GradientsParams, Optimizer},
-/// };
+/// use softrast_tensor::{Autodiff, NdArray, burn::optim::AdamConfig};
 ///
 /// type B = Autodiff<NdArray>;
-/// let mesh = icosphere(1);
-/// let mut shape = VertexModel::<B>::new(&mesh, &Default::default());
+/// let mut shape = VertexModel::<B>::new(&icosphere(1), &Default::default());
 /// let mut adam = AdamConfig::new().init();
-/// let loss = shape.vertices().powi_scalar(2).mean();
-/// let gradients = GradientsParams::from_grads(loss.backward(), &shape);
-/// shape = adam.step(0.01, shape, gradients);
-/// let smaller = shape.mesh(&mesh).unwrap();
+/// let loss = shape.vertices().powi_scalar(2).mean() + shape.surface().flatness(shape.vertices()) * 1e-3;
+/// shape = shape.step(&mut adam, 0.01, loss);
 /// let size = |mesh: &Mesh| mesh.positions().iter().flatten().map(|x| x.abs()).sum::<f64>();
-/// assert!(size(&smaller) < size(&mesh));
+/// assert!(size(&shape.mesh().unwrap()) < size(&icosphere(1)));
 /// ```
 #[derive(Module, Debug)]
 pub struct VertexModel<B: Backend> {
     vertices: Param<Tensor<B, 3>>,
+    surface: Surface<B>,
+    #[module(skip)]
+    mesh: Arc<Mesh>,
 }
 
 impl<B: Backend> VertexModel<B> {
     /// The vertices where they are in the mesh.
     pub fn new(mesh: &Mesh, device: &B::Device) -> Self {
-        Self { vertices: Param::from_tensor(softrast_raster::vertices(mesh.positions(), device)) }
+        Self {
+            vertices: Param::from_tensor(softrast_raster::vertices(mesh.positions(), device)),
+            surface: Surface::new(mesh, device),
+            mesh: Arc::new(mesh.clone()),
+        }
     }
 
     /// The vertices `[1, vertices, 3]`, as [`project`](softrast_raster::project) takes them.
@@ -45,17 +51,60 @@ impl<B: Backend> VertexModel<B> {
         self.vertices.val()
     }
 
+    /// The faces (corners as vertex numbers), as renderers take them.
+    pub fn faces(&self) -> &[[u32; 3]] {
+        self.mesh.faces()
+    }
+
+    /// The losses that keep a surface smooth and its edges even.
+    pub fn surface(&self) -> &Surface<B> {
+        &self.surface
+    }
+
+    /// The [`Surface::laplacian`] of the vertices, `[1]`.
+    pub fn laplacian(&self) -> Tensor<B, 1> {
+        self.surface.laplacian(self.vertices())
+    }
+
     /// The mesh with its vertices where they are now.
     ///
     /// # Errors
     ///
     /// If a vertex is not finite in 32-bit floats.
-    ///
-    /// # Panics
-    ///
-    /// If the mesh has another number of vertices.
-    pub fn mesh(&self, of: &Mesh) -> Result<Mesh, MeshError> {
+    pub fn mesh(&self) -> Result<Mesh, MeshError> {
         let positions = numbers(self.vertices());
-        of.with_positions(positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
+        self.mesh.with_positions(positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
+    }
+}
+
+impl<B: AutodiffBackend> VertexModel<B> {
+    /// The model after a step of an optimiser of burn down the gradient of a `loss` `[1]`.
+    ///
+    /// It is what a loop of burn has in its place:
+    ///
+    /// ```
+    /// # use softrast_inverse::VertexModel;
+    /// # use softrast_mesh::icosphere;
+    /// # use softrast_tensor::{Autodiff, NdArray, numbers};
+    /// use softrast_tensor::burn::optim::{AdamConfig, GradientsParams, Optimizer};
+    ///
+    /// # let start = VertexModel::<Autodiff<NdArray>>::new(&icosphere(0), &Default::default());
+    /// let (shape, mut adam) = (start.clone(), AdamConfig::new().init());
+    /// let loss = shape.vertices().powi_scalar(2).mean();
+    /// let gradients = GradientsParams::from_grads(loss.backward(), &shape);
+    /// let shape = adam.step(0.01, shape, gradients);
+    /// # let loss = start.vertices().powi_scalar(2).mean();
+    /// # let other = start.step(&mut AdamConfig::new().init(), 0.01, loss);
+    /// # assert_eq!(numbers(shape.vertices()), numbers(other.vertices()));
+    /// ```
+    #[must_use]
+    pub fn step(
+        self,
+        optimizer: &mut impl Optimizer<Self, B>,
+        learning_rate: f64,
+        loss: Tensor<B, 1>,
+    ) -> Self {
+        let gradients = GradientsParams::from_grads(loss.backward(), &self);
+        optimizer.step(learning_rate, self, gradients)
     }
 }

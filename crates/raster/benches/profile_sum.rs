@@ -92,7 +92,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// The same scene under an MLP that reaches as far.
 fn under_mlp(workload: &Workload) -> Workload {
-    let softness = EdgeSoftness { family: Family::Mlp, ..workload.softness };
+    let softness = EdgeSoftness::squared(Family::Mlp);
     let reach = |workload: &Workload| {
         let (silhouette, _) = workload.prepare::<B>(Rasterizer::TOLERANCE, DType::F32);
         silhouette.profile().support()[0]

@@ -12,7 +12,7 @@ use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{Backend, DType, Tensor, TensorData};
 
 /// A logistic of the signed squared distance: `width` is the root of its scale, in NDC.
-pub(crate) const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: true };
+pub(crate) const SOFTNESS: EdgeSoftness = EdgeSoftness::squared(Family::Logistic);
 
 /// A mesh, its views and how soft it is.
 pub(crate) struct Workload {

@@ -27,6 +27,20 @@ pub struct Orbit {
 }
 
 impl Orbit {
+    /// This camera and others at the same height, evenly spaced around the vertical axis: this many `views`.
+    ///
+    /// ```
+    /// use softrast_raster::Orbit;
+    ///
+    /// let front = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 0.0, fov_deg: 40.0 };
+    /// let azimuths: Vec<f64> = front.around(4).iter().map(|camera| camera.azimuth_deg).collect();
+    /// assert_eq!(azimuths, [0.0, 90.0, 180.0, 270.0]);
+    /// ```
+    pub fn around(&self, views: usize) -> Vec<Self> {
+        let azimuth = |k: usize| self.azimuth_deg + 360.0 * k as f64 / views as f64;
+        (0..views).map(|k| Self { azimuth_deg: azimuth(k), ..*self }).collect()
+    }
+
     /// The numbers as [`project`](crate::project) takes them, `[1, 4]`.
     pub fn tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 2> {
         Self::tensors(std::slice::from_ref(self), device)

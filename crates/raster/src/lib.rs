@@ -69,7 +69,7 @@ pub use limits::NEAR;
 pub use loss::{edge_length, flatness, iou_loss, mse_loss, normal_consistency};
 pub use no_adapter::NoAdapter;
 pub use picture_loss::{huber_loss, l1_loss, multi_scale_loss, ssim_loss};
-pub use pinhole::{Pinhole, PinholeError, Pinholes, rotate_by_tangent};
+pub use pinhole::{Pinhole, PinholeError, Pinholes, PyTorch3dCamera, rotate_by_tangent};
 pub use project::{Cameras, project};
 pub use projected::Projected;
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};

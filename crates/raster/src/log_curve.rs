@@ -124,7 +124,7 @@ impl DepthCurve {
             DepthSoftness::Family(Family::Exp) => Self::Exponential,
             DepthSoftness::Family(family) => {
                 // The distance from the plane is in units of that between the planes.
-                let softness = EdgeSoftness { family, squared: false };
+                let softness = EdgeSoftness::new(family);
                 Self::Family(LogCurve::new::<B>(softness, phi, precision, device))
             }
             DepthSoftness::Mlp => Self::Mlp,
@@ -178,7 +178,8 @@ mod tests {
     fn every_family_keeps_the_precision_that_is_asked_for() {
         for family in Family::ALL {
             for squared in [false, true] {
-                let softness = EdgeSoftness { family, squared };
+                let softness =
+                    if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
                 let phi = softness.default_phi(if squared { 1e-4 } else { 1e-2 });
                 let floor = floor(&softness);
                 let precision = Precision { accuracy: 5e-6, least: -27.0, floor };
@@ -198,7 +199,7 @@ mod tests {
 
     #[test]
     fn weights_beyond_the_range_of_floats_have_a_place() {
-        let softness = EdgeSoftness { family: Family::Exp, squared: false };
+        let softness = EdgeSoftness::new(Family::Exp);
         let phi = softness.default_phi(1e-4);
         let precision = Precision { accuracy: 1e-6, least: -1e4, floor: 0.0 };
         let curve = LogCurve::new::<NdArray<f64>>(softness, &phi, precision, &Default::default());

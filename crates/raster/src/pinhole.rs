@@ -43,6 +43,20 @@ pub struct Pinhole {
     pub size: ImageSize,
 }
 
+/// A camera as PyTorch3D's `PerspectiveCameras` has it: for row vectors (`X R + T`), with axes x left, y up and z ahead; see
+/// [`Pinhole::from_pytorch3d`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PyTorch3dCamera {
+    /// R, row by row, from world to camera axes.
+    pub r: [[f64; 3]; 3],
+    /// T, in world units.
+    pub t: [f64; 3],
+    /// Focal lengths along x and y, in NDC: the shorter side of the image is 2.
+    pub focal_length: [f64; 2],
+    /// The principal point, x and y in NDC; 0 is the middle of the image.
+    pub principal_point: [f64; 2],
+}
+
 /// What is wrong with a [`Pinhole`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PinholeError {
@@ -86,7 +100,7 @@ impl Pinhole {
     }
 
     /// The camera of an orbit, for an image of this size.
-    pub fn of_orbit(orbit: &Orbit, size: impl Into<ImageSize>) -> Self {
+    pub fn from_orbit(orbit: &Orbit, size: impl Into<ImageSize>) -> Self {
         let [elevation, azimuth] = [orbit.elevation_deg, orbit.azimuth_deg].map(f64::to_radians);
         let ((se, ce), (sa, ca)) = (elevation.sin_cos(), azimuth.sin_cos());
         // As with `view_rotation`: past a pole the view rolls by half a turn.
@@ -140,15 +154,18 @@ impl Pinhole {
         [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
     }
 
-    /// From PyTorch3D's `R` and `T`, for row vectors (`X R + T`) and axes x left, y up and z ahead, with the focal lengths and the
-    /// principal point in its NDC, as `PerspectiveCameras` has them.
-    pub fn from_pytorch3d(
-        r: &[[f64; 3]; 3],
-        t: [f64; 3],
-        focal_ndc: [f64; 2],
-        principal_ndc: [f64; 2],
-        size: impl Into<ImageSize>,
-    ) -> Self {
+    /// The camera of PyTorch3D's `PerspectiveCameras`, for an image of this size.
+    ///
+    /// ```
+    /// use softrast_raster::{Pinhole, PyTorch3dCamera};
+    ///
+    /// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 64);
+    /// let theirs: PyTorch3dCamera = camera.to_pytorch3d();
+    /// assert_eq!(theirs.t, [0.0, 0.0, 3.0]);
+    /// assert_eq!(Pinhole::from_pytorch3d(&theirs, 64).translation, camera.translation);
+    /// ```
+    pub fn from_pytorch3d(camera: &PyTorch3dCamera, size: impl Into<ImageSize>) -> Self {
+        let &PyTorch3dCamera { r, t, focal_length, principal_point } = camera;
         let size = size.into();
         let (half, signs) = (size.shorter() as f64 / 2.0, [-1.0, -1.0, 1.0]);
         let row = |k: usize| [0, 1, 2].map(|j| signs[k] * r[j][k]);
@@ -156,23 +173,23 @@ impl Pinhole {
         Self {
             rotation: [row(0), row(1), row(2)],
             translation: [0, 1, 2].map(|k| signs[k] * t[k]),
-            focal: focal_ndc.map(|f| half * f),
-            centre: [0, 1].map(|k| middle[k] - half * principal_ndc[k]),
+            focal: focal_length.map(|f| half * f),
+            centre: [0, 1].map(|k| middle[k] - half * principal_point[k]),
             size,
         }
     }
 
-    /// `R`, `T`, focal lengths and principal point as [`Pinhole::from_pytorch3d`] takes them.
-    pub fn to_pytorch3d(&self) -> ([[f64; 3]; 3], [f64; 3], [f64; 2], [f64; 2]) {
+    /// The arguments of PyTorch3D's `PerspectiveCameras` for this camera.
+    pub fn to_pytorch3d(&self) -> PyTorch3dCamera {
         let (half, signs) = (self.size.shorter() as f64 / 2.0, [-1.0, -1.0, 1.0]);
         let row = |j: usize| [0, 1, 2].map(|k| signs[k] * self.rotation[k][j]);
         let middle = [self.size.width, self.size.height].map(|pixels| pixels as f64 / 2.0);
-        (
-            [row(0), row(1), row(2)],
-            [0, 1, 2].map(|k| signs[k] * self.translation[k]),
-            self.focal.map(|f| f / half),
-            [0, 1].map(|k| (middle[k] - self.centre[k]) / half),
-        )
+        PyTorch3dCamera {
+            r: [row(0), row(1), row(2)],
+            t: [0, 1, 2].map(|k| signs[k] * self.translation[k]),
+            focal_length: self.focal.map(|f| f / half),
+            principal_point: [0, 1].map(|k| (middle[k] - self.centre[k]) / half),
+        }
     }
 
     /// Where it stands, in world units.
@@ -181,14 +198,21 @@ impl Pinhole {
         [0, 1, 2].map(|k| -(0..3).map(|row| r[row][k] * t[row]).sum::<f64>())
     }
 
-    /// A point of the world along its axes.
-    pub fn seen(&self, point: [f64; 3]) -> [f64; 3] {
+    /// A point of the world in camera axes: x right, y down, z ahead, in world units.
+    ///
+    /// ```
+    /// use softrast_raster::Pinhole;
+    ///
+    /// let camera = Pinhole::look_at([0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 64);
+    /// assert_eq!(camera.transform([0.0; 3]), [0.0, 0.0, 3.0]);
+    /// ```
+    pub fn transform(&self, point: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| dot(self.rotation[k], point) + self.translation[k])
     }
 
     /// Column and row of the pixel where it sees a point, and the depth.
     pub fn pixel(&self, point: [f64; 3]) -> [f64; 3] {
-        let [x, y, z] = self.seen(point);
+        let [x, y, z] = self.transform(point);
         let ([fx, fy], [cx, cy]) = (self.focal, self.centre);
         [fx * x / z + cx, fy * y / z + cy, z]
     }

@@ -59,7 +59,8 @@ struct Knots<S> {
 
 impl<S: Softness> SoftRenderer<S> {
     /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under a softness
-    /// of this [`Width`] (a number is its scale), the probabilistic sum and [`Rasterizer::TOLERANCE`].
+    /// of this [`Width`] (a number is its scale), the probabilistic sum and [`Rasterizer::TOLERANCE`]. See [`reach`](Self::reach) for a softness with
+    /// heavy tails.
     ///
     /// # Panics
     ///
@@ -228,16 +229,18 @@ impl<S: Softness> SoftRenderer<S> {
 
     /// The distance from a face up to which it is drawn, in NDC: beyond, its softness is below what the tolerance lets be left out.
     ///
-    /// The image is 2 wide, so a heavy tail may have every face drawn at every pixel, which takes its time. A larger tolerance, or a softness
-    /// that ends sooner, is then the remedy:
+    /// The image is 2 wide, so a heavy tail may have every face drawn at every pixel, which takes many times longer. The remedy is a softness that
+    /// ends ([`Truncated`](softrast_softness::Truncated)), or a larger tolerance where that is enough:
     ///
     /// ```
     /// use softrast_tensor::NdArray;
     /// use softrast_raster::SoftRenderer;
-    /// use softrast_softness::Family;
+    /// use softrast_softness::{Family, Truncated};
     ///
     /// let reach = |family| SoftRenderer::new(&[[0, 1, 2]], 64, family, 0.01).reach::<NdArray>();
     /// assert!(reach(Family::Cauchy) > 2.0 && reach(Family::Gauss) < 0.1);
+    /// let ended = Truncated::new(Family::Cauchy, 4.0);
+    /// assert!(SoftRenderer::new(&[[0, 1, 2]], 64, ended, 0.01).reach::<NdArray>() < 0.05);
     /// let looser = SoftRenderer::new(&[[0, 1, 2]], 64, Family::Cauchy, 0.01).with_tolerance(1e-2);
     /// assert!(looser.reach::<NdArray>() < 2.0);
     /// ```

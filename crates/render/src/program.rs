@@ -18,6 +18,7 @@ use softrast_lab::{
 use softrast_raster::{
     BackendChoice, RasterBackend, compiled_backends, low_level::Rasterizer, on_backend,
 };
+use softrast_softness::Softness;
 
 use crate::{
     args::Args,
@@ -92,7 +93,7 @@ fn draw(args: &Args, inputs: &Inputs) -> anyhow::Result<Output> {
         "views": scene.views(),
         "size": scene.size,
         "softness": scene.softness.family.to_string(),
-        "squared": scene.softness.squared,
+        "squared": scene.softness.scale_is_squared(),
         "phi": scene.phi,
         "t_conorm": scene.colour.is_none().then(|| scene.t_conorm.to_string()),
         "colour": scene.colour.as_ref().map(|colour| colour.paint.to_string()),

@@ -80,7 +80,7 @@ impl Scene {
         let camera = |&azimuth_deg: &f64| {
             let (distance, elevation_deg, fov_deg) = (args.distance, args.elevation, args.fov);
             let orbit = Orbit { distance, elevation_deg, azimuth_deg, fov_deg };
-            (format!("azimuth {azimuth_deg}"), Pinhole::of_orbit(&orbit, args.size))
+            (format!("azimuth {azimuth_deg}"), Pinhole::from_orbit(&orbit, args.size))
         };
         let across = faces_across_note(&mesh, args.azimuths.iter().map(camera), NEAR);
         Ok(Self {
@@ -138,7 +138,8 @@ fn softness(args: &Args) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
             Ok((file.softness, file.phi_at(1.0, across)))
         }
         &NameOrFile::Name(family) => {
-            let softness = EdgeSoftness { family, squared: args.squared };
+            let edge = if args.squared { EdgeSoftness::squared } else { EdgeSoftness::new };
+            let softness = edge(family);
             let narrow = HALF_PIXEL * 2.0 / across as f64;
             let scale = args.scale.unwrap_or(if args.squared { narrow * narrow } else { narrow });
             Ok((softness, softness.default_phi(scale)))

@@ -77,11 +77,7 @@ fn a_softness_file_whose_scale_moves_is_drawn_as_at_its_last_step() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = mesh(folder.path());
     let [out, file] = ["sphere.png", "learned.json"].map(|name| folder.path().join(name));
-    let decay = ScheduledSoftness::decay(
-        EdgeSoftness { family: Family::Logistic, squared: false },
-        0.3,
-        0.02,
-    );
+    let decay = ScheduledSoftness::decay(EdgeSoftness::new(Family::Logistic), 0.3, 0.02);
     decay.save(&file).unwrap();
     let words = |softness: [&str; 2]| {
         let common = [&mesh, "--size", "32", "--json", "--out", out.to_str().unwrap()];

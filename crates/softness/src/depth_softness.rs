@@ -84,7 +84,7 @@ impl DepthSoftness {
     ) -> Tensor<B, D> {
         match self {
             Self::Family(family) => {
-                let softness = EdgeSoftness { family, squared: false };
+                let softness = EdgeSoftness::new(family);
                 softness.log_value(phi, nearness - 1.0)
             }
             Self::Mlp => network(&phi, nearness).clamp_min(OPAQUE).log(),

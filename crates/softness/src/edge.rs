@@ -5,10 +5,17 @@ use crate::{Family, Softness, softness::curve};
 
 /// A family applied to the signed distance of an edge, or to its signed square.
 ///
-/// `x` of [`Softness`] is here the signed distance d in NDC, positive inside. If `squared`, the
-/// family sees `d |d|`, so that its scale is in NDC²; otherwise it sees d.
+/// `x` of [`Softness`] is here the signed distance d in NDC, positive inside. The family sees d of [`EdgeSoftness::new`], and `d |d|`, with a
+/// scale in NDC², of [`EdgeSoftness::squared`].
 ///
 /// Source: Liu et al. 2019, Eq. 1 (squared); Wu et al. 2024, Sec. 4.1.
+///
+/// ```
+/// use softrast_softness::{EdgeSoftness, Family, Softness};
+///
+/// let [plain, squared] = [EdgeSoftness::new, EdgeSoftness::squared].map(|edge| edge(Family::Logistic));
+/// assert!(!plain.scale_is_squared() && squared.scale_is_squared());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(
     deny_unknown_fields,
@@ -17,11 +24,20 @@ use crate::{Family, Softness, softness::curve};
 pub struct EdgeSoftness {
     /// The shape of the step.
     pub family: Family,
-    /// Whether the family sees the signed square of the distance.
-    pub squared: bool,
+    squared: bool,
 }
 
 impl EdgeSoftness {
+    /// The family on the signed distance d, with a scale in NDC.
+    pub const fn new(family: Family) -> Self {
+        Self { family, squared: false }
+    }
+
+    /// The family on the signed square `d |d|` of the distance, with a scale in NDC².
+    pub const fn squared(family: Family) -> Self {
+        Self { family, squared: true }
+    }
+
     /// What the family sees of the distance `d`.
     fn argument<B: Backend, const D: usize>(&self, d: Tensor<B, D>) -> Tensor<B, D> {
         if self.squared { d.clone() * d.abs() } else { d }
@@ -74,7 +90,7 @@ impl Softness for EdgeSoftness {
         self.family.logarithms()
     }
 
-    /// In NDC, or NDC² if `squared`.
+    /// In NDC, or NDC² of a squared distance.
     fn scale(&self, phi: &[f64]) -> f64 {
         self.family.scale(phi)
     }

@@ -4,14 +4,14 @@
 //! is optically. Its parameters are one explicit vector φ, so that an optimiser sees nothing else.
 //! One of your own has one method; the ones that come with the crate are in [`families`], and a
 //! [`Family`] is one chosen by name. An [`EdgeSoftness`] applies it to the distance or to its signed
-//! square; [`support`] gives how far from the edge it still changes; a [`SoftStep`] puts it into a
-//! network. A [`DepthSoftness`] gives how much a face counts by its depth.
+//! square; [`support`] gives how far from the edge it still changes; `SoftStep` (feature `burn`) puts it into a
+//! network; [`Truncated`] ends a heavy tail. A [`DepthSoftness`] gives how much a face counts by its depth.
 //!
 //! ```
 //! use softrast_tensor::{DType, NdArray, Tensor};
 //! use softrast_softness::{EdgeSoftness, Family, Softness};
 //!
-//! let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+//! let softness = EdgeSoftness::new(Family::Logistic);
 //! let options = (&Default::default(), DType::F64);
 //! let phi = Tensor::<NdArray, 1>::from_data(&softness.default_phi(0.02)[..], options.clone());
 //! let distance = Tensor::<_, 1>::from_data([-0.02, 0.0, 0.02], options);
@@ -32,9 +32,11 @@ mod family;
 mod math;
 mod mirrored;
 mod network;
+#[cfg(feature = "burn")]
 mod soft_step;
 mod softness;
 mod support;
+mod truncated;
 
 pub use depth_softness::{DepthSoftness, UnknownDepthSoftness};
 pub use edge::EdgeSoftness;
@@ -42,9 +44,11 @@ pub use family::{Family, UnknownFamily};
 pub use math::OPAQUE;
 pub use mirrored::Mirrored;
 pub use network::initial_mlp;
+#[cfg(feature = "burn")]
 pub use soft_step::SoftStep;
 pub use softness::Softness;
 pub use support::{Support, settled_beyond, support};
+pub use truncated::Truncated;
 
 /// Compiles and runs the README's example.
 #[cfg(doctest)]

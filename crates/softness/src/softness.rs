@@ -32,6 +32,10 @@ use crate::math::{bounded_depth, ln_scale, with_first};
 ///
 /// assert_eq!(Arctan.default_phi(0.02), [0.02_f64.ln()]);
 /// ```
+///
+/// This one has heavy tails: its coverage falls with one over the distance, so that every face reaches every pixel. An image then takes many times
+/// longer, and is opaque all over unless its scale is tiny. A renderer's `reach` is the distance in NDC up to which faces are drawn;
+/// [`Truncated`](crate::Truncated) ends the tails.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no softness",
     note = "`Family`, `EdgeSoftness` and `DepthSoftness` are some; for one of your own implement `Softness::value`, and `Clone` and `Debug`"

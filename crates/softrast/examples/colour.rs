@@ -1,53 +1,34 @@
-//! Finds the colours of the vertices of a fox from pictures of it.
+//! Finds the colours of the vertices of a fox from pictures of it, with burn's own Adam.
 //!
 //! `cargo run --release -p softrast --example colour`
 
-use softrast::{
-    mesh::fox,
-    meta::{Adam, Optimizer},
-    prelude::*,
-    tensor::{Autodiff, NdArray},
-};
+use softrast::tensor::burn::{module::Param, optim::*};
+use softrast::tensor::{Autodiff, NdArray};
+use softrast::{mesh::fox, prelude::*};
 
-type Plain = NdArray;
-type B = Autodiff<Plain>;
-
-const SIZE: usize = 64;
-const STEPS: usize = 80;
+type B = Autodiff<NdArray>;
 
 fn main() {
-    let device = Default::default();
+    let (fox, device) = (fox(), Default::default());
     let front = Orbit { distance: 2.7, elevation_deg: 15.0, azimuth_deg: 0.0, fov_deg: 60.0 };
-    let cameras =
-        [0.0, 60.0, 120.0, 180.0, 240.0, 300.0].map(|azimuth_deg| Orbit { azimuth_deg, ..front });
-    let fox = fox();
-    let seen =
-        project(vertices(fox.positions(), &device), Orbit::tensors::<Plain>(&cameras, &device));
-
-    // The fox lies between these planes; one pixel is 2 / 64 wide.
-    let renderer = ColourRenderer::new(fox.faces(), SIZE, Family::Logistic, 0.005, seen.planes());
-    let background = renderer.background::<Plain>(&[0.0, 0.0, 0.0], &device);
-
-    // Pictures `[6, 4, 64, 64]`, the last channel a mask; here of a fox whose colours follow its shape.
+    let cameras = Orbit::tensors(&front.around(6), &device);
+    let seen = project(vertices::<B>(fox.positions(), &device), cameras);
+    let renderer = ColourRenderer::new(fox.faces(), 64, Family::Logistic, 0.005, seen.planes());
+    let black = renderer.background(&[0.0; 3], &device);
+    let draw = |colours: Tensor<B, 3>| {
+        renderer.image(seen.clone(), &Attributes::of_vertices(colours, fox.faces()), &black)
+    };
+    // Pictures [6, 4, 64, 64], the last channel a mask; here of a fox whose colours follow its shape.
     let painted = fox.positions().iter().map(|p| p.map(|x| 0.5 + 0.5 * (6.0 * x).sin()));
-    let painted = vertices::<Plain>(&painted.collect::<Vec<_>>(), &device);
-    let pictures =
-        renderer.image(seen.clone(), &Attributes::of_vertices(painted, fox.faces()), &background);
+    let pictures = draw(vertices(&painted.collect::<Vec<_>>(), &device));
 
-    let behind = renderer.background::<B>(&[0.0, 0.0, 0.0], &device);
-    let mut colours = vertices::<Plain>(&vec![[0.5; 3]; fox.positions().len()], &device); // [1, V, 3]
-    let adam = Adam::new(0.05);
-    let mut state = adam.init(&colours);
-    for step in 0..=STEPS {
-        let leaf = Tensor::<B, 3>::from_inner(colours.clone()).require_grad();
-        let attributes = Attributes::of_vertices(leaf.clone(), fox.faces());
-        let image = renderer.image(Projected::from_inner(seen.clone()), &attributes, &behind);
-        let off = image - Tensor::from_inner(pictures.clone());
-        let loss = off.powi_scalar(2).mean();
-        if step % 20 == 0 {
-            println!("step {step:2}: mean squared error {:.6}", loss.clone().into_scalar());
-        }
-        let gradient = leaf.grad(&loss.backward()).expect("the image depends on it");
-        (colours, state) = adam.step(colours, gradient, state);
+    let grey = vec![[0.5; 3]; fox.positions().len()];
+    let mut colours = Param::from_tensor(vertices::<B>(&grey, &device)); // [1, V, 3]
+    let mut adam = AdamConfig::new().init();
+    for step in 0..=80 {
+        let loss = mse_loss(draw(colours.val()), pictures.clone()).mean();
+        println!("step {step:2}: mean squared error {:.6}", loss.clone().into_scalar());
+        let gradients = GradientsParams::from_grads(loss.backward(), &colours);
+        colours = adam.step(0.05, colours, gradients);
     }
 }

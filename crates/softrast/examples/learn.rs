@@ -10,7 +10,7 @@ fn main() -> anyhow::Result<()> {
     let problem = PoseProblem::new(&Mesh::new(stretched.collect(), ball.faces().to_vec())?);
     let runs = SolveConfig { size: 32, steps: 30, learning_rate: 2.0 };
 
-    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let logistic = EdgeSoftness::new(Family::Logistic);
     let start = Method::new("start", ScheduledSoftness::decay(logistic, 0.3, 0.05));
     let estimator = Some(MetaGradient::default()); // exact, through all steps
     let config = LearnConfig { estimator, updates: 20, outer_rate: 0.2, ..LearnConfig::default() };
@@ -26,7 +26,6 @@ fn main() -> anyhow::Result<()> {
 
     let method = Method::new("learned", learned);
     let instances = [problem.instance(0)?];
-    // `false`: without pictures of the steps.
     let end = minimize::<_, NdArray>(&problem, &instances, &method, &runs, |_, _| Ok(()))?;
     println!("IoU loss of the hard image: {:.4}", end.hard_loss[0]);
     Ok(())

@@ -8,12 +8,8 @@ use softrast::{mesh::fox, prelude::*, tensor::NdArray};
 struct Arctan;
 
 impl Softness for Arctan {
-    fn value<B: Backend, const D: usize>(
-        &self,
-        phi: Tensor<B, 1>,
-        x: Tensor<B, D>,
-    ) -> Tensor<B, D> {
-        (x / phi.exp().reshape([1; D])).atan() * std::f64::consts::FRAC_1_PI + 0.5
+    fn value<B: Backend, const D: usize>(&self, p: Tensor<B, 1>, x: Tensor<B, D>) -> Tensor<B, D> {
+        (x / p.exp().reshape([1; D])).atan() * std::f64::consts::FRAC_1_PI + 0.5
     }
 }
 

@@ -4,23 +4,24 @@
 //! |---|---|---|
 //! | draw a silhouette and differentiate it | [`SoftRenderer`](raster::SoftRenderer), [`project`](raster::project) | below, [`silhouette`] |
 //! | read masks, pictures and cameras of a folder as tensors | [`Views`](views::Views) | [`fit_masks`] |
-//! | move vertices by burn's optimisers | [`VertexModel`](inverse::VertexModel), [`Surface`](inverse::Surface) for smoothness | [`fit_masks`] |
+//! | move vertices by burn's optimisers | [`VertexModel`](inverse::VertexModel), with the losses of a [`Surface`](inverse::Surface) | [`fit_masks`] |
 //! | narrow the edge over a run | [`Width`](raster::Width) in pixels, [`ScheduledSoftness`](inverse::ScheduledSoftness) | [`fit_masks`] |
-//! | compare images | [`iou_loss`](raster::iou_loss), [`mse_loss`](raster::mse_loss), [`ssim_loss`](raster::ssim_loss), [`multi_scale_loss`](raster::multi_scale_loss) | [`fit`] |
+//! | compare images | [`iou_loss`](raster::iou_loss), [`mse_loss`](raster::mse_loss), [`ssim_loss`](raster::ssim_loss), [`multi_scale_loss`](raster::multi_scale_loss) | [`fit_masks`], [`colour`] |
 //! | draw colours and textures, and differentiate them | [`ColourRenderer`](raster::ColourRenderer), [`Attributes`](raster::Attributes) | [`colour`], [`texture`] |
 //! | light a mesh | [`lambert`](raster::lambert), [`phong`](raster::phong), [`spherical_harmonics`](raster::spherical_harmonics) | [`texture`] |
 //! | find the camera of a mask | [`PoseSearch`](inverse::pose::PoseSearch) | [`pose_from_mask`] |
 //! | use a camera of a file or of one's own | [`Pinhole`](raster::Pinhole), [`Orbit`](raster::Orbit), [`Lens`](views::Lens), [`Cameras`](raster::Cameras) | [`pose_from_mask`] |
-//! | define a softness | [`Softness`](softness::Softness) | [`own_softness`] |
+//! | define a softness | [`Softness`](softness::Softness), [`Truncated`](softness::Truncated) for heavy tails | [`own_softness`] |
 //! | learn a softness, and keep it in a file | [`learn`](fn@inverse::learn), [`NamedSoftness`](inverse::NamedSoftness) | [`learn`](https://github.com/softrast/softrast/blob/main/crates/softrast/examples/learn.rs), [`own_learned`] |
 //! | differentiate through an optimisation | [`meta`], `Autodiff<Autodiff<_>>` | [`meta_gradient`] |
 //! | read and write meshes | [`Mesh`](mesh::Mesh) | [`fit_masks`] |
 //!
-//! Each module is a crate that can be used alone; [`prelude`] has what most programs need. Derivatives are exact to second order. Errors are
+//! The [`guide`] goes from an image to a fitted mesh. Each module is a crate that can be used alone; [`prelude`] has what most programs need. Derivatives are exact to second order. Errors are
 //! returned for what comes from files; wrong shapes panic, with what was found and what was expected.
 //!
 //! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other releases of burn do not fit. The Cargo features
-//! `ndarray` (default), `flex` and `wgpu` choose the backend.
+//! `ndarray` (default), `flex` and `wgpu` choose the backend. [`inverse`], [`views`] and [`meta`] are in the feature `inverse`, which builds burn's modules
+//! and optimisers and the readers of pictures too; images of meshes and their derivatives need no feature but the backend.
 //!
 //! ```
 //! use softrast::{mesh::fox, prelude::*, tensor::{Autodiff, NdArray}};
@@ -38,7 +39,6 @@
 //!
 //! [`silhouette`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/silhouette.rs
 //! [`fit_masks`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/fit_masks.rs
-//! [`fit`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/fit.rs
 //! [`colour`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/colour.rs
 //! [`texture`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/texture.rs
 //! [`pose_from_mask`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/pose_from_mask.rs
@@ -46,12 +46,20 @@
 //! [`own_learned`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_learned.rs
 //! [`meta_gradient`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/meta_gradient.rs
 
+// Without the feature `inverse` the map still names what is in it.
+#![cfg_attr(not(feature = "inverse"), allow(rustdoc::broken_intra_doc_links))]
+
+#[cfg(feature = "inverse")]
+#[doc = include_str!("guide.md")]
+pub mod guide {}
 pub mod prelude;
 
+#[cfg(feature = "inverse")]
 #[doc(inline)]
 pub use softrast_inverse as inverse;
 #[doc(inline)]
 pub use softrast_mesh as mesh;
+#[cfg(feature = "inverse")]
 #[doc(inline)]
 pub use softrast_meta as meta;
 #[doc(inline)]
@@ -60,6 +68,7 @@ pub use softrast_raster as raster;
 pub use softrast_softness as softness;
 #[doc(inline)]
 pub use softrast_tensor as tensor;
+#[cfg(feature = "inverse")]
 #[doc(inline)]
 pub use softrast_views as views;
 

@@ -84,7 +84,7 @@ impl Tested {
 
     /// The softness at `scale`, in NDC; one that decays ends there, ten times as narrow as it began. A file has a scale of its own.
     pub fn at(&self, scale: f64) -> ScheduledSoftness {
-        let edge = EdgeSoftness { family: self.family, squared: false };
+        let edge = EdgeSoftness::new(self.family);
         match &self.file {
             Some((_, file)) => (**file).clone(),
             None if self.decays => ScheduledSoftness::decay(edge, DECAY * scale, scale),

@@ -1,7 +1,8 @@
 //! Tensors, backends and automatic differentiation of softrast: those of burn 0.21.
 //!
 //! This is the only crate of the project that names burn, so that another release, or tensors of our own, are a change of one file.
-//! The types are burn's own: a tensor of burn 0.21 is a tensor here. Networks use burn's modules and optimisers through [`burn`].
+//! The types are burn's own: a tensor of burn 0.21 is a tensor here. Networks use burn's modules and optimisers through
+//! `burn`, the whole of it, which the Cargo feature of that name compiles.
 //!
 //! The Cargo features `ndarray`, `flex` and `wgpu` compile the backends of these names.
 //!
@@ -15,31 +16,31 @@
 
 mod plain;
 
+#[cfg(feature = "burn")]
 #[doc(no_inline)]
 pub use burn;
+#[doc(no_inline)]
+pub use burn_autodiff::Autodiff;
 #[cfg(feature = "flex")]
 #[doc(no_inline)]
-pub use burn::backend::Flex;
+pub use burn_flex::Flex;
 #[cfg(feature = "ndarray")]
 #[doc(no_inline)]
-pub use burn::backend::{NdArray, ndarray::NdArrayTensor};
+pub use burn_ndarray::{NdArray, NdArrayTensor};
 #[doc(no_inline)]
-pub use burn::{
-    backend::Autodiff,
-    tensor::{
-        Bool, DType, Element, ElementConversion, FloatDType, IndexingUpdateOp, Int, Shape, Slice,
-        Tensor, TensorData, TensorMetadata, TensorPrimitive, Transaction, activation,
-        backend::{AutodiffBackend, Backend},
-        ops::{FloatTensor, FloatTensorOps},
-        read_sync, try_read_sync,
-    },
+pub use burn_tensor::{
+    Bool, DType, Element, ElementConversion, FloatDType, IndexingUpdateOp, Int, Shape, Slice,
+    Tensor, TensorData, TensorMetadata, TensorPrimitive, Transaction, activation,
+    backend::{AutodiffBackend, Backend},
+    ops::{FloatTensor, FloatTensorOps},
+    read_sync, try_read_sync,
 };
 pub use plain::{numbers, tensor, tensor_on, vector};
 
 /// Types that register an op with a backward pass of its own.
 pub mod autodiff {
     #[doc(no_inline)]
-    pub use burn::backend::autodiff::{
+    pub use burn_autodiff::{
         checkpoint::{base::Checkpointer, strategy::CheckpointStrategy},
         grads::Gradients,
         ops::{Backward, Ops, OpsKind},

@@ -20,7 +20,7 @@ const LEAST_DEPTH: f64 = 1e-2;
 /// let placed = map.mesh_to_world(&ball)?;
 /// assert_eq!(Frame::of_mesh(&placed).middle, map.middle);
 /// let camera = Pinhole::look_at([4e5, 5e6, 110.0], map.middle, [0.0, 1.0, 0.0], 40.0, 64);
-/// let seen = map.camera(&camera).seen([0.0; 3]);
+/// let seen = map.camera(&camera).transform([0.0; 3]);
 /// assert!((seen[2] - 5.0).abs() < 1e-9, "ten world units ahead are five");
 /// # Ok::<(), softrast_mesh::MeshError>(())
 /// ```
@@ -44,7 +44,8 @@ impl Frame {
     /// depth. So cameras may stand far off or between the parts of the mesh.
     pub fn of_cameras<'a>(mesh: &Mesh, cameras: impl IntoIterator<Item = &'a Pinhole>) -> Self {
         let corners: Vec<[f64; 3]> = mesh.triangles().flatten().collect();
-        let unit = |camera: &Pinhole| unit_of_depths(corners.iter().map(|&p| camera.seen(p)[2]));
+        let unit =
+            |camera: &Pinhole| unit_of_depths(corners.iter().map(|&p| camera.transform(p)[2]));
         let least = cameras.into_iter().map(unit).fold(f64::INFINITY, f64::min);
         Self { unit: if least.is_finite() { least } else { 1.0 }, ..Self::of_mesh(mesh) }
     }
@@ -82,7 +83,7 @@ impl Frame {
     /// A camera of the world in the frame.
     #[must_use]
     pub fn camera(&self, camera: &Pinhole) -> Pinhole {
-        Pinhole { translation: camera.seen(self.middle).map(|x| x / self.unit), ..*camera }
+        Pinhole { translation: camera.transform(self.middle).map(|x| x / self.unit), ..*camera }
     }
 
     /// A camera of the frame in the world.

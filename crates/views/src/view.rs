@@ -133,7 +133,8 @@ fn first_and_more<'a>(mut names: impl ExactSizeIterator<Item = &'a String>) -> S
 /// How many faces of a mesh cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those across
 /// [`NEAR`](softrast_raster::NEAR) are not drawn.
 pub fn faces_across(mesh: &Mesh, camera: &Pinhole, depth: f64) -> usize {
-    let ahead: Vec<bool> = mesh.positions().iter().map(|&p| camera.seen(p)[2] >= depth).collect();
+    let ahead: Vec<bool> =
+        mesh.positions().iter().map(|&p| camera.transform(p)[2] >= depth).collect();
     let crosses = |face: &&[u32; 3]| {
         let before = face.iter().filter(|&&v| ahead[v as usize]).count();
         before > 0 && before < face.len()

@@ -96,7 +96,7 @@ impl InverseProblem for Occlusion {
         _softness: &SoftnessAt<'_, B, impl Softness>,
     ) -> Tensor<B, 4> {
         let [edge, depth] = SHARP.map(|scale| vector(&Family::Logistic.default_phi(scale)));
-        let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+        let softness = EdgeSoftness::new(Family::Logistic);
         let edges = scene.fixed_edges(0, &softness, edge);
         let sharp = DepthSoftness::Family(Family::Logistic);
         in_rows(scene.image(scene.by_view(theta), edges, sharp, depth))

@@ -241,7 +241,8 @@ pub(crate) fn softness(
             Ok((file.softness, file.phi_at(1.0, crate::SIZE)))
         }
         &NameOrFile::Name(family) => {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             Ok((softness, softness.default_phi(scale.unwrap_or(default_scale(softness)))))
         }
     }
@@ -250,7 +251,7 @@ pub(crate) fn softness(
 /// Scale of a family for the probabilistic sum. Source: docs/notes.md, Reconstruction; families that are not named there
 /// take that of the logistic.
 fn default_scale(softness: EdgeSoftness) -> f64 {
-    match (softness.family, softness.squared) {
+    match (softness.family, softness.scale_is_squared()) {
         (Family::Uniform | Family::Gauss, false) => 10_f64.powf(-1.5),
         // Its tails are long, and a wider one covers the whole picture.
         (Family::Mlp, false) => 10_f64.powf(-2.5),
@@ -276,7 +277,7 @@ mod tests {
     fn a_softness_file_whose_scale_moves_begins_as_at_its_last_step() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("softness.json");
-        let edge = EdgeSoftness { family: Family::Gauss, squared: false };
+        let edge = EdgeSoftness::new(Family::Gauss);
         ScheduledSoftness::decay(edge, 0.3, 0.02).save(&path).unwrap();
         let (found, phi) = softness(&NameOrFile::File(path), None, false).unwrap();
         assert_eq!(found, edge);

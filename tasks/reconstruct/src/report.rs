@@ -3,6 +3,7 @@ use softrast_lab::{
     plot::{Axis, Plot, Series},
     report::{Beside, Report, Table},
 };
+use softrast_softness::Softness;
 
 use crate::{Epoch, Header, Time, score::with_mean};
 
@@ -66,7 +67,8 @@ fn figures(header: &Header) -> [(&'static str, String); 13] {
     let mut time = Time::default();
     header.epochs.iter().for_each(|epoch| time.add(&epoch.time));
     let part = |seconds: f64| 100.0 * seconds / time.all.max(1e-9);
-    let squared = if settings.softness.squared { " of the squared distance" } else { "" };
+    let squared =
+        if settings.softness.scale_is_squared() { " of the squared distance" } else { "" };
     [
         ("shapes", settings.data.to_string()),
         ("network", format!("{} widths", settings.width.name())),

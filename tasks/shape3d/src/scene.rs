@@ -63,7 +63,7 @@ impl<B: RasterBackend> Scene<B> {
             log_odds: tensor(start.iter().map(log_odds).collect(), [count, 3]),
             sign: tensor(start.iter().map(sign).collect(), [count, 3]),
             orbits,
-            surface: Surface::new(&edges, count),
+            surface: Surface::of_edges(&edges, count, &Default::default()),
             faces: template.faces().into(),
             targets: Targets::new(target),
             size,

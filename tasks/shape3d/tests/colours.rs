@@ -33,7 +33,7 @@ fn pictures(folder: &Path, opaque: bool) {
         let elevation_deg = [-50.0, 0.0, 50.0][k % 3];
         let orbit =
             Orbit { distance: 4.0, elevation_deg, azimuth_deg: 31.0 * k as f64, fov_deg: 40.0 };
-        let camera = Pinhole::of_orbit(&orbit, [size[1], size[0]]);
+        let camera = Pinhole::from_orbit(&orbit, [size[1], size[0]]);
         let [red, green, blue, covered] = coloured_pixels(&ball(), &camera);
         let byte = |x: f64| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
         let at = |x: u32, y: u32| y as usize * size[0] + x as usize;

@@ -62,7 +62,8 @@ fn scene() -> Vec<[f64; 3]> {
 fn no_scale_is_too_narrow_or_too_wide_for_finite_numbers() {
     for family in Family::ALL {
         for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             for scale in [1e-14, 1e-9, 1e-7, 1e-5, 1e-2, 1.0, 1e3] {
                 let [image, vertices, phi] =
                     render::<NdArray<f32>>(&scene(), softness, scale, DType::F32);
@@ -82,7 +83,7 @@ fn f32_agrees_with_f64() {
         norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
     };
     for family in [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp] {
-        let softness = EdgeSoftness { family, squared: false };
+        let softness = EdgeSoftness::new(family);
         let single = render::<NdArray<f32>>(&scene(), softness, 0.05, DType::F32);
         let double = render::<NdArray<f32>>(&scene(), softness, 0.05, DType::F64);
         for (k, (single, double)) in single.iter().zip(&double).enumerate() {
@@ -108,7 +109,7 @@ fn gradients_are_finite_on_every_broken_mesh_that_loads() {
         let vertices = tensor::<A>(positions, DType::F32).require_grad();
         let orbit = tensor::<A>(&[2.732, 10.0, 30.0, 60.0], DType::F32).reshape([1, 4]);
         let shaped = vertices.clone().reshape([1, mesh.positions().len() as i64, 3]);
-        let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+        let softness = EdgeSoftness::new(Family::Logistic);
         let phi = tensor::<A>(&softness.default_phi(0.02), DType::F32).require_grad();
         let silhouette = Rasterizer::new(SIZE).prepare(&mesh.faces().into(), softness, &phi);
         let image = silhouette.coverage(project(shaped, orbit).tensor(), phi.clone());
@@ -144,9 +145,9 @@ fn drawn(softness: EdgeSoftness, scale: f64) -> String {
 
 #[test]
 fn a_fox_looks_like_one() {
-    let sharp = EdgeSoftness { family: Family::Logistic, squared: false };
+    let sharp = EdgeSoftness::new(Family::Logistic);
     assert_eq!(drawn(sharp, 0.002), SHARP);
-    assert_eq!(drawn(EdgeSoftness { squared: true, ..sharp }, 0.01), SOFT);
+    assert_eq!(drawn(EdgeSoftness::squared(sharp.family), 0.01), SOFT);
 }
 
 const SHARP: &str = concat!(

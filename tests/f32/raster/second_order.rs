@@ -54,7 +54,8 @@ fn second_order_products_in_f32_agree_with_f64() {
     let bounds = [5e-5, 5e-5, 1e-2, 1e-4];
     for family in [Family::Logistic, Family::Gauss, Family::Exp, Family::Mlp] {
         for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             let scale = if squared { 1e-3 } else { 0.03 };
             let single = products(softness, scale, DType::F32);
             let double = products(softness, scale, DType::F64);

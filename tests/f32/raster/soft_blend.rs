@@ -27,7 +27,7 @@ struct Look {
 }
 
 const SOFT: Look = Look {
-    edge: EdgeSoftness { family: Family::Logistic, squared: false },
+    edge: EdgeSoftness::new(Family::Logistic),
     scale: 0.05,
     depth: EXP,
     depth_scale: 0.05,
@@ -234,7 +234,7 @@ fn faces_of_all_kinds_are_drawn_under_every_softness() {
     ];
     for family in Family::ALL {
         for scale in [1e-9, 1e-3, 0.1, 1e3] {
-            let look = Look { edge: EdgeSoftness { family, squared: false }, scale, ..SOFT };
+            let look = Look { edge: EdgeSoftness::new(family), scale, ..SOFT };
             // Each chooses its knots once, for all weights.
             let [of_all, of_sound, exact] = [7, 5, 5].map(|count| renderer(count, look));
             for log_weight in [0.0, -10.0, -1000.0] {

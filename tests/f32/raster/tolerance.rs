@@ -44,7 +44,8 @@ fn every_number_of_a_table_fits_the_float_type() {
     let families = Family::ALL.into_par_iter().enumerate();
     families.flat_map(|(at, it)| [(at, it, false), (at + 1, it, true)]).for_each(
         |(at, family, squared)| {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             for (beside, t_conorm) in t_conorms.into_iter().enumerate() {
                 // The steepest always, and one of the others in turn: each softness meets all, and so does each T-conorm.
                 for (scale, tolerance) in [steepest, others[(at + beside) % others.len()]] {

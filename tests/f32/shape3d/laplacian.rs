@@ -6,7 +6,8 @@ use softrast_tensor::NdArray;
 use softrast_tests::tensor;
 
 fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {
-    let surface = Surface::<NdArray>::new(&Edges::new(faces), vertices.len());
+    let surface =
+        Surface::<NdArray>::of_edges(&Edges::new(faces), vertices.len(), &Default::default());
     surface.laplacian(tensor(&vertices.concat(), [1, vertices.len(), 3])).into_scalar()
 }
 

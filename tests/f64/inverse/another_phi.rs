@@ -13,7 +13,7 @@ type B = NdArray<f64>;
 
 #[test]
 fn a_problem_follows_another_softness_than_it_was_made_for() {
-    let logistic = EdgeSoftness { family: Family::Logistic, squared: false };
+    let logistic = EdgeSoftness::new(Family::Logistic);
     let method = Method::new("start", ScheduledSoftness::constant(logistic, 0.1));
     let runs = SolveConfig { size: 12, steps: 3, learning_rate: 2.0 };
     let problem = PoseProblem::new(&icosphere(0));

@@ -17,7 +17,7 @@ fn iterates(
     instances: &[f64],
     mut visit: impl FnMut(&Iterate) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let method = Method::new("none", ScheduledSoftness::constant(softness, 0.1));
     let config = problem.defaults();
     minimize::<_, B>(problem, instances, &method, &config, |iterate, _| visit(iterate))?;
@@ -73,7 +73,7 @@ fn a_step_ends_where_it_is_allowed_to() {
 
 #[test]
 fn a_rate_falls_geometrically_to_its_end() {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let constant = ScheduledSoftness::constant(softness, 0.1);
     let method = Method::new("none", ScheduledSoftness { rate_end: Some(0.01), ..constant });
     let problem = Square { floor: -1e9, seen: true };
@@ -112,7 +112,7 @@ fn nothing_to_solve_is_an_error() {
 
 /// A scale that moves with feedback, on a path of one step.
 fn with_feedback() -> Method {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let feedback = Feedback {
         steps: 3,
         passage: 0.0,

@@ -14,7 +14,7 @@ const SIZE: usize = 32;
 
 fn camera(elevation_deg: f64, azimuth_deg: f64) -> Pinhole {
     let orbit = Orbit { distance: 3.0, elevation_deg, azimuth_deg, fov_deg: 50.0 };
-    Pinhole::of_orbit(&orbit, 48)
+    Pinhole::from_orbit(&orbit, 48)
 }
 
 /// A ball whose colours follow its shape.

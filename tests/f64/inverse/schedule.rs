@@ -19,7 +19,8 @@ fn a_schedule_joins_its_knots_above_the_floor() {
 }
 
 fn gauss(squared: bool) -> EdgeSoftness {
-    EdgeSoftness { family: Family::Gauss, squared }
+    let edge = if squared { EdgeSoftness::squared } else { EdgeSoftness::new };
+    edge(Family::Gauss)
 }
 
 #[track_caller]
@@ -65,9 +66,9 @@ fn a_softness_without_a_schedule_stays() {
 #[test]
 fn a_schedule_multiplies_the_scale_of_the_parameters_above_a_floor_in_pixels() {
     let schedule = ScaleSchedule { knots: vec![-2.0, -5.0, -6.0], floor_px: 0.5 };
-    let network = EdgeSoftness { family: Family::Mlp, squared: false };
+    let network = EdgeSoftness::new(Family::Mlp);
     for softness in [gauss(false), gauss(true), network] {
-        let floor: f64 = if softness.squared { 1.0 / 4096.0 } else { 1.0 / 64.0 };
+        let floor: f64 = if softness.scale_is_squared() { 1.0 / 4096.0 } else { 1.0 / 64.0 };
         let phi = softness.default_phi(2.0);
         let base = ScheduledSoftness::constant(softness, 2.0);
         let moving = ScheduledSoftness { schedule: Some(schedule.clone()), ..base };
@@ -77,7 +78,8 @@ fn a_schedule_multiplies_the_scale_of_the_parameters_above_a_floor_in_pixels() {
             let tensor = ScaleSchedule::scale(&vector::<B>(&schedule.knots), floor, part);
             assert_eq!(numbers(tensor), [moving.scale_at(part, 64)]);
             assert_eq!(moving.phi_at(part, 64), softness.with_scale_values(&phi, scale));
-            let width = if softness.squared { (2.0 * scale).sqrt() } else { 2.0 * scale };
+            let width =
+                if softness.scale_is_squared() { (2.0 * scale).sqrt() } else { 2.0 * scale };
             assert_near(moving.width_at(part, 64), width);
         }
         // The knots take the place of a family's scale; a network has none.

@@ -22,7 +22,7 @@ const CORNERS: [f64; 18] = [
     -0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.6, 1.0, -0.2, -0.7, 1.0, 0.8, 0.2, 1.0, -0.3, 0.5, 1.0,
 ];
 
-const LOGISTIC: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const LOGISTIC: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 
 fn faces() -> Arc<[[u32; 3]]> {
     Arc::new([[0, 1, 2], [3, 4, 5]])

@@ -27,7 +27,7 @@ fn instance(quads: Vec<Quad>, target: &[f64], start: &[f64]) -> (Problem, Instan
 /// must be finite.
 fn assert_finite(name: &str, (problem, instance): &(Problem, Instance), size: usize) {
     let scene = Scene::<A>::new(problem, std::slice::from_ref(instance), size);
-    let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+    let edge = EdgeSoftness::new(Family::Logistic);
     let families = Family::ALL.map(DepthSoftness::Family);
     for depth in families.into_iter().chain([DepthSoftness::Mlp]) {
         for scale in [1e-9, 1e-3, 0.1, 1e6] {
@@ -74,7 +74,7 @@ fn quads_out_of_view_alone_and_on_one_pixel_give_finite_numbers() {
 fn one_quad_alone_is_drawn_as_it_is() {
     let (problem, instance) = instance(vec![quad(0.0, RED)], &[0.7], &[1.2]);
     let scene = Scene::<B>::new(&problem, &[instance], 16);
-    let edge = EdgeSoftness { family: Family::Exp, squared: false };
+    let edge = EdgeSoftness::new(Family::Exp);
     let phi = edge.default_phi(1e-4);
     let edges = scene.edges(&edge, tensor(&phi, [2]));
     let depth = DepthSoftness::Family(Family::Exp);

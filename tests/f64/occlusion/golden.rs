@@ -34,7 +34,7 @@ fn the_target_of_seed_0_shows_three_quads_and_so_does_a_narrow_softness() {
     let expected = include_str!("seed0.txt").trim_end();
     assert_eq!(found, expected, "found:\n{found}");
 
-    let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+    let edge = EdgeSoftness::new(Family::Logistic);
     let depth = DepthSoftness::Family(Family::Logistic);
     let theta = tensor::<B, 2>(&instance.target, [1, 3]);
     let drawn = |depth_scale: f64| {

@@ -90,7 +90,7 @@ impl Case {
 }
 
 fn logistic_edges(problem: Problem, depth: DepthSoftness) -> Case {
-    Case { problem, edge: EdgeSoftness { family: Family::Logistic, squared: false }, depth }
+    Case { problem, edge: EdgeSoftness::new(Family::Logistic), depth }
 }
 
 #[test]
@@ -108,6 +108,6 @@ fn derivatives_match_central_differences_for_the_depth_network() {
 #[test]
 fn derivatives_match_central_differences_for_eight_quads() {
     let depth = DepthSoftness::Family(Family::Exp);
-    let edge = EdgeSoftness { family: Family::Gauss, squared: true };
+    let edge = EdgeSoftness::squared(Family::Gauss);
     Case { problem: Problem::TRANSFER, edge, depth }.check();
 }

@@ -12,7 +12,7 @@ use softrast_tests::numbers;
 use crate::differences::check_gradient_to;
 
 const SIZE: usize = 24;
-const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 
 /// Three cameras around the fox in colours, whose fields of view are optimised too.
 struct Three;

@@ -49,7 +49,7 @@ fn targets_and_losses_before_any_step_are_those_measured_before() {
         (Family::Gamma, 0.1, 14.617),
         (Family::Gamma, 1e-2, 15.084),
     ] {
-        let softness = EdgeSoftness { family, squared: false };
+        let softness = EdgeSoftness::new(family);
         let phi = vector::<B>(&softness.default_phi(scale));
         let silhouette = Rasterizer::new(SIZE).prepare(&mesh.faces().into(), softness, &phi);
         let image = silhouette.coverage(projected.clone().tensor(), phi);

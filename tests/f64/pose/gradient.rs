@@ -23,7 +23,7 @@ fn losses(
     silhouette: &Silhouette<EdgeSoftness>,
     theta: Tensor<A, 2>,
 ) -> Tensor<A, 1> {
-    let phi = EdgeSoftness { family: Family::Logistic, squared: false }.default_phi(0.05);
+    let phi = EdgeSoftness::new(Family::Logistic).default_phi(0.05);
     let image = silhouette.coverage(scene.project(theta).tensor(), vector(&phi));
     iou_loss(image, scene.target())
 }
@@ -33,7 +33,7 @@ fn losses(
 fn check(optimise_fov: bool) {
     let instances = [0, 1, 2].map(|seed| PoseInstance::seeded(seed, [15.0, 35.0]));
     let scene = PoseScene::<A>::new(&fox(), &instances, SIZE, optimise_fov);
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let phi = vector::<A>(&softness.default_phi(0.05));
     let rasterizer = Rasterizer { tolerance: 1e-9, ..Rasterizer::new(SIZE) };
     let silhouette = rasterizer.prepare(&fox().faces().into(), softness, &phi);

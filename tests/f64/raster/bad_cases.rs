@@ -24,7 +24,7 @@ static OF_ONE_FACE: LazyLock<Vec<Silhouette<EdgeSoftness>>> =
 const SCALES: [f64; 4] = [1e-12, 1e-3, 0.1, 1e3];
 
 fn cases() -> impl Iterator<Item = (EdgeSoftness, f64)> {
-    let edges = Family::ALL.into_iter().map(|family| EdgeSoftness { family, squared: false });
+    let edges = Family::ALL.into_iter().map(EdgeSoftness::new);
     edges.flat_map(|edge| SCALES.map(|scale| (edge, scale)))
 }
 
@@ -128,7 +128,7 @@ fn hidden_faces_leave_no_trace() {
 fn far_and_broken_coordinates_give_finite_numbers() {
     assert_finite("off screen", &[[40.0, 40.0, 2.0], [41.0, 40.0, 2.0], [40.0, 41.0, 2.0]]);
     assert_finite("all around", &[[-1e6, -1e6, 2.0], [1e6, -1e6, 2.0], [0.0, 1e6, 2.0]]);
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let faces: Arc<[[u32; 3]]> = vec![[0, 1, 2]].into();
     let phi = vector::<B>(&softness.default_phi(0.1));
     for broken in [f64::NAN, f64::INFINITY, 1e300, -1e12] {
@@ -143,7 +143,7 @@ fn far_and_broken_coordinates_give_finite_numbers() {
 #[test]
 fn many_faces_on_a_pixel_add_up_exactly() {
     let face = [[-0.9, -0.9, 2.0], [0.9, -0.9, 2.0], [0.0, 0.9, 2.0]];
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let (one, _) = render(&face, &prepare(1, softness, 0.3), softness, 0.3);
     let stack: Vec<_> = (0..1000).flat_map(|_| face).collect();
     let (many, _) = render(&stack, &prepare(1000, softness, 0.3), softness, 0.3);
@@ -154,7 +154,7 @@ fn many_faces_on_a_pixel_add_up_exactly() {
 
 #[test]
 fn a_scene_with_one_pixel_is_drawn() {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let faces: Arc<[[u32; 3]]> = vec![[0, 1, 2]].into();
     let phi = vector::<B>(&softness.default_phi(0.1));
     let corners = [-0.5, -0.5, 2.0, 0.5, -0.5, 2.0, 0.0, 0.5, 2.0];

@@ -102,7 +102,7 @@ fn every_t_conorm_agrees_with_the_reference_to_second_order() {
         TConorm::SchweizerSklar(-1.0),
     ];
     for conorm in conorms {
-        let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+        let softness = EdgeSoftness::new(Family::Logistic);
         assert_close(&conorm.to_string(), compare(softness, conorm, 0.05));
     }
 }
@@ -111,7 +111,8 @@ fn every_t_conorm_agrees_with_the_reference_to_second_order() {
 fn every_family_agrees_with_the_reference_to_second_order() {
     for family in Family::ALL {
         for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             let scale = if squared { 0.01 } else { 0.05 };
             let errors = compare(softness, TConorm::Probabilistic, scale);
             assert_close(&format!("{family}, squared {squared}"), errors);

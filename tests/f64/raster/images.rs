@@ -62,7 +62,7 @@ fn any_image_agrees_with_the_reference_to_second_order() {
         .flat_map(|view| one.iter().map(move |x| x * (1.0 - 0.1 * f64::from(view))))
         .collect();
     for (family, size) in [(Family::Logistic, [7, 16]), (Family::Exp, [16, 5])] {
-        let softness = EdgeSoftness { family, squared: false };
+        let softness = EdgeSoftness::new(family);
         let phi = softness.default_phi(SCALE);
         let fused = |vertices, phi: Tensor<AA, 1>| {
             let rasterizer = Rasterizer { tolerance: TOLERANCE, ..Rasterizer::new(size) };
@@ -86,7 +86,7 @@ fn any_image_agrees_with_the_reference_to_second_order() {
 fn a_lower_image_shows_the_middle_of_a_square_one() {
     const SIDE: usize = 16;
     let (values, faces) = triangles(7, 12);
-    let softness = EdgeSoftness { family: Family::Gauss, squared: false };
+    let softness = EdgeSoftness::new(Family::Gauss);
     // The lower image has half as many rows, so that a pixel of it is twice as large.
     let drawn = |size: ImageSize, factor: f64| {
         let along = |(k, x): (usize, &f64)| if k % 3 < 2 { factor * x } else { *x };

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use softrast_raster::{
-    Orbit, Pinhole, PinholeError, Pinholes, project, rotate_by_tangent, vertices,
+    Orbit, Pinhole, PinholeError, Pinholes, PyTorch3dCamera, project, rotate_by_tangent, vertices,
 };
 use softrast_tensor::{Autodiff, NdArray, Tensor};
 use softrast_tests::numbers;
@@ -60,17 +60,17 @@ fn conventions_of_others_are_the_matrices_that_were_worked_out_by_hand() {
     ];
     assert_close(&camera.to_opengl().concat(), &matrix.concat(), 1e-12);
     // Columns are left, up and ahead; NDC of 150 pixels.
-    let (r, t, focal, principal) = camera.to_pytorch3d();
+    let PyTorch3dCamera { r, t, focal_length, principal_point } = camera.to_pytorch3d();
     let expected = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]];
     assert_close(&r.concat(), &expected.concat(), 1e-12);
     assert_close(&t, &[-0.5, 0.25, 4.0], 1e-12);
-    assert_close(&focal, &[220.0 / 75.0, 2.8], 1e-12);
-    assert_close(&principal, &[-0.06, 3.25 / 75.0], 1e-12);
+    assert_close(&focal_length, &[220.0 / 75.0, 2.8], 1e-12);
+    assert_close(&principal_point, &[-0.06, 3.25 / 75.0], 1e-12);
     assert_eq!(camera.orbit(), None);
 
     // At azimuth 90 and elevation 0 an orbit stands at +x and looks along -x: right is -z there.
     let orbit = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 90.0, fov_deg: 90.0 };
-    let side = Pinhole::of_orbit(&orbit, 64);
+    let side = Pinhole::from_orbit(&orbit, 64);
     let expected = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]];
     assert_close(&side.rotation.concat(), &expected.concat(), 1e-12);
     assert_close(&side.translation, &[0.0, 0.0, 3.0], 1e-12);
@@ -186,8 +186,7 @@ proptest! {
 
         let opengl = Pinhole::from_opengl(&camera.to_opengl(), focal, centre, size);
         assert_close(&flat(&opengl), &flat(&camera), 1e-12);
-        let (r, t, focal, principal) = camera.to_pytorch3d();
-        let pytorch3d = Pinhole::from_pytorch3d(&r, t, focal, principal, size);
+        let pytorch3d = Pinhole::from_pytorch3d(&camera.to_pytorch3d(), size);
         assert_close(&flat(&pytorch3d), &flat(&camera), 1e-12);
 
         // A part of the image, enlarged: the same point at its place there.
@@ -207,7 +206,7 @@ proptest! {
         vertex in [-2.0..2.0, -2.0..2.0, -2.0..2.0],
     ) {
         let orbit = Orbit { distance, elevation_deg, azimuth_deg, fov_deg };
-        let camera = Pinhole::of_orbit(&orbit, size);
+        let camera = Pinhole::from_orbit(&orbit, size);
         prop_assert_eq!(camera.check(), Ok(()));
         let device = Default::default();
         let vertices = vertices::<B>(&[vertex], &device);

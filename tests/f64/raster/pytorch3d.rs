@@ -4,7 +4,9 @@
 //! Source: Liu et al. 2019, Eq. 1 and its aggregate function for silhouettes, as in `sigmoid_alpha_blend` of `PyTorch3D`.
 
 use softrast_mesh::{Mesh, icosphere};
-use softrast_raster::{Orbit, Pinhole, Pinholes, Projected, SoftRenderer, project, vertices};
+use softrast_raster::{
+    Orbit, Pinhole, Pinholes, Projected, PyTorch3dCamera, SoftRenderer, project, vertices,
+};
 use softrast_softness::{EdgeSoftness, Family};
 use softrast_tensor::{NdArray, Tensor};
 use softrast_tests::numbers;
@@ -89,7 +91,7 @@ fn theirs(mesh: &Mesh, blur_radius: f64) -> Vec<f64> {
 
 /// Our silhouette of vertices on the screen, with `sigma` as the scale.
 fn ours(mesh: &Mesh, seen: Tensor<B, 3>) -> Vec<f64> {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let softness = EdgeSoftness::squared(Family::Logistic);
     let image =
         SoftRenderer::new(mesh.faces(), SIZE, softness, SIGMA).silhouette(Projected::new(seen));
     numbers(image)
@@ -110,7 +112,9 @@ fn a_silhouette_with_the_translated_scale_and_camera_is_that_of_pytorch3d() {
     assert!((0.1..0.9).contains(&covered), "{covered}");
 
     let ((r, t), device) = (view(), Default::default());
-    let camera = Pinhole::from_pytorch3d(&r, t, [focal(); 2], [0.0; 2], SIZE);
+    let (focal_length, principal_point) = ([focal(); 2], [0.0; 2]);
+    let camera = PyTorch3dCamera { r, t, focal_length, principal_point };
+    let camera = Pinhole::from_pytorch3d(&camera, SIZE);
     let corners = vertices::<B>(mesh.positions(), &device);
     let seen = project(corners, Pinholes::new(&[camera], &device));
     assert_same(&ours(&mesh, seen.tensor()), &theirs);

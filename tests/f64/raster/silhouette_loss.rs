@@ -139,7 +139,7 @@ proptest! {
         own: bool,
         weighted: bool,
     ) {
-        let softness = EdgeSoftness { family, squared };
+        let softness = if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
         let scale = 10f64.powf(if squared { 2.0 * width } else { width });
         let (_, faces) = triangles(seed, 20);
         let renderer = SoftRenderer::new(&faces, size, softness, scale).with_tolerance(1e-4);
@@ -151,7 +151,7 @@ proptest! {
 fn more_pairs_than_are_kept_are_walked_again() {
     // 400 faces that reach most pixels: up to 400 * 32 * 64 / 8 chunks in a band.
     let size = [64, 64];
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let (_, faces) = triangles(3, 20);
     let many = faces.repeat(20);
     let renderer = SoftRenderer::new(&many, size, softness, 0.1);

@@ -195,7 +195,7 @@ fn assert_same(name: &str, [found, expected]: [Vec<Vec<f64>>; 2], bounds: [f64; 
     }
 }
 
-const LOGISTIC: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const LOGISTIC: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const EXP: DepthSoftness = DepthSoftness::Family(Family::Exp);
 
 #[test]
@@ -321,12 +321,12 @@ fn a_texture_is_seen_upright_and_repeats() {
 
 #[test]
 fn every_edge_softness_agrees_with_the_reference() {
-    let squared = Family::ALL.map(|family| EdgeSoftness { family, squared: true });
+    let squared = Family::ALL.map(EdgeSoftness::squared);
     // The kernel is told a table and no family. What squares the distance is the same for all, and has a test over all in fused.rs.
     let squared = squared.into_iter().step_by(3);
-    let plain = Family::ALL.into_iter().map(|family| EdgeSoftness { family, squared: false });
+    let plain = Family::ALL.into_iter().map(EdgeSoftness::new);
     for edge in plain.chain(squared) {
-        let EdgeSoftness { family, squared } = edge;
+        let (family, squared) = (edge.family, edge.scale_is_squared());
         let phi = [edge.default_phi(if squared { 0.01 } else { 0.05 }), EXP.default_phi(0.1)];
         let case = Case::random(3, 20, weighting(edge, EXP), phi);
         // The curvature of the law of Levy all but vanishes next to the edge, and then rises faster than any other.
@@ -471,7 +471,7 @@ fn the_blend_is_that_of_soft_ras_and_pytorch3d_where_theirs_has_no_floor() {
         for (k, z) in vertices.iter_mut().skip(2).step_by(3).enumerate() {
             *z = depth(k / 3);
         }
-        let edge = EdgeSoftness { family: Family::Logistic, squared: true };
+        let edge = EdgeSoftness::squared(Family::Logistic);
         let weighting = Weighting { edge, depth: EXP, planes };
         let phi = [edge.default_phi(sigma), EXP.default_phi(gamma)];
         let renderer = ColourRenderer::with_weighting(faces.clone(), 16, weighting, phi.clone())
@@ -571,7 +571,7 @@ fn narrow_softnesses_give_the_hard_image() {
 #[test]
 fn permuting_the_faces_changes_nothing_above_rounding() {
     for (edge, seed) in [(Family::Logistic, 1), (Family::Uniform, 2), (Family::Cauchy, 3)] {
-        let edge = EdgeSoftness { family: edge, squared: false };
+        let edge = EdgeSoftness::new(edge);
         let phi = [edge.default_phi(0.1), EXP.default_phi(0.1)];
         let mut case = Case::random(seed, 24, weighting(edge, EXP), phi);
         let before = numbers(case.image(case.inputs::<B>(), true));
@@ -600,10 +600,8 @@ fn no_pixel_is_off_by_more_than_the_tolerance() {
     let depths = [EXP, DepthSoftness::Family(Family::Logistic), DepthSoftness::Mlp];
     for seed in 0..40 {
         let k = seed as usize;
-        let edge = EdgeSoftness {
-            family: Family::ALL[k % Family::ALL.len()],
-            squared: k.is_multiple_of(2),
-        };
+        let edge = [EdgeSoftness::squared, EdgeSoftness::new][k % 2];
+        let edge = edge(Family::ALL[k % Family::ALL.len()]);
         let depth = depths[k % 3];
         let phi = [edge.default_phi([0.003, 0.03, 0.1][k % 3]), depth.default_phi(0.1)];
         let mut case = Case::random(seed, 60, weighting(edge, depth), phi);
@@ -636,7 +634,7 @@ fn a_tolerance_below_rounding_is_as_exact_as_can_be() {
 #[test]
 fn a_softness_that_ends_leaves_the_rest_to_a_background_that_weighs_next_to_nothing() {
     for family in [Family::Uniform, Family::Wigner, Family::ExpForward] {
-        let edge = EdgeSoftness { family, squared: false };
+        let edge = EdgeSoftness::new(family);
         let phi = [edge.default_phi(0.05), EXP.default_phi(0.1)];
         let mut case = Case::random(6, 12, weighting(edge, EXP), phi);
         (case.background[3], case.tolerance) = (-1000.0, 1e-6);

@@ -42,7 +42,7 @@ fn renderer(softness: EdgeSoftness, faces: &[[u32; 3]], scale: f64) -> SoftRende
 #[test]
 fn no_pixel_is_off_by_more_than_the_tolerance_where_a_face_covers_before_its_edge() {
     // The law begins outside, so that the optical depth has a pole there, away from the edge and from the end of the support.
-    let softness = EdgeSoftness { family: Family::Exp, squared: true };
+    let softness = EdgeSoftness::squared(Family::Exp);
     let (vertices, faces) = triangles(553, 20);
     let scale = |width: f64| 10f64.powf(2.0 * width);
     let width = -2.128_356_450_252_82;
@@ -64,7 +64,8 @@ fn a_softness_that_is_only_stretched_keeps_its_knots() {
     let (_, faces) = triangles(1, 20);
     for family in [Family::Logistic, Family::Exp, Family::Gamma, Family::Mlp] {
         for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             let renderer = renderer(softness, &faces, 0.01);
             let [outer, inner] = renderer.prepared::<B>(renderer.phi()).profile().support();
             let wider = softness.with_scale_values(renderer.phi(), 4.0);
@@ -89,7 +90,7 @@ fn a_softness_that_is_only_stretched_keeps_its_knots() {
 #[test]
 fn a_support_that_does_not_end_is_chosen_anew_before_faces_could_leave_it() {
     let (_, faces) = triangles(1, 3);
-    let softness = EdgeSoftness { family: Family::Reciprocal, squared: false };
+    let softness = EdgeSoftness::new(Family::Reciprocal);
     let used = renderer(softness, &faces, 0.1).with_tolerance(1e-9);
     let is_endless = |renderer: &SoftRenderer<EdgeSoftness>, scale: f64| {
         let silhouette = renderer.prepared::<B>(&softness.default_phi(scale));
@@ -106,7 +107,7 @@ fn a_support_that_does_not_end_is_chosen_anew_before_faces_could_leave_it() {
 fn gradients_to_vertices_and_parameters_are_those_of_the_image() {
     type A = Autodiff<B>;
     let (vertices, faces) = triangles(2, 6);
-    let softness = EdgeSoftness { family: Family::Gamma, squared: false };
+    let softness = EdgeSoftness::new(Family::Gamma);
     let renderer = renderer(softness, &faces, 0.05).with_tolerance(1e-9);
     let loss = |vertices: Tensor<A, 1>, phi: Tensor<A, 1>| {
         let vertices = vertices.clone().reshape([1, vertices.dims()[0] as i64 / 3, 3]);
@@ -135,7 +136,7 @@ fn gradients_to_vertices_and_parameters_are_those_of_the_image() {
 fn parameters_that_are_set_draw_as_in_a_renderer_made_with_them_and_the_surrogate_stays() {
     type A = Autodiff<B>;
     let (vertices, faces) = triangles(4, 12);
-    let softness = EdgeSoftness { family: Family::Gauss, squared: false };
+    let softness = EdgeSoftness::new(Family::Gauss);
     let of = |scale| SoftRenderer::new(&faces, SIZE, softness, scale).with_surrogate(softness, 0.3);
     let image = |renderer: &SoftRenderer<EdgeSoftness>| {
         let leaf = Tensor::<A, 3>::from_inner(shaped(&vertices)).require_grad();
@@ -156,14 +157,14 @@ fn parameters_that_are_set_draw_as_in_a_renderer_made_with_them_and_the_surrogat
 #[test]
 #[should_panic(expected = "has 1 parameters, found 2")]
 fn parameters_of_another_length_are_refused() {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     renderer(softness, &[[0, 1, 2]], 0.1).set_phi(vec![0.0, 0.0]);
 }
 
 #[test]
 fn without_back_faces_there_are_only_front_faces() {
     let (vertices, faces) = triangles(5, 40);
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let corner = |v: u32| [vertices[3 * v as usize], vertices[3 * v as usize + 1]];
     let is_front = |face: &&[u32; 3]| {
         let [[ax, ay], [bx, by], [cx, cy]] = face.map(corner);
@@ -184,7 +185,7 @@ fn without_back_faces_there_are_only_front_faces() {
 #[test]
 fn other_faces_are_drawn_as_a_renderer_of_their_own_does_and_keep_the_knots() {
     let (vertices, faces) = triangles(6, 40);
-    let softness = EdgeSoftness { family: Family::Gamma, squared: false };
+    let softness = EdgeSoftness::new(Family::Gamma);
     let all = renderer(softness, &faces, 0.02);
     all.silhouette(Projected::new(shaped(&vertices)));
     let drawn = |renderer: &SoftRenderer<EdgeSoftness>| {
@@ -210,7 +211,7 @@ fn other_faces_are_drawn_as_a_renderer_of_their_own_does_and_keep_the_knots() {
 fn a_hard_image_has_the_gradient_of_the_soft_one() {
     type A = Autodiff<B>;
     let (vertices, faces) = triangles(7, 12);
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let soft = renderer(softness, &faces, 0.05);
     let hard = soft.clone().with_hard_image(3);
     let pass = |renderer: &SoftRenderer<EdgeSoftness>| {

@@ -56,7 +56,8 @@ fn the_tolerance_itself_is_kept_by_every_family_at_the_default() {
     for family in Family::ALL {
         for squared in [false, true] {
             for width in [1e-6, 1e-3, 1.0, 10.0] {
-                let softness = EdgeSoftness { family, squared };
+                let softness =
+                    if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
                 let scale = if squared { width * width } else { width };
                 let mut renderer = SoftRenderer::new(&[[0, 1, 2]; 500], SIZE, softness, scale);
                 let mut phi = renderer.phi().to_vec();
@@ -77,7 +78,7 @@ fn the_tolerance_itself_is_kept_by_every_family_at_the_default() {
 
 #[test]
 fn heavy_tails_under_a_steep_t_conorm_get_the_knots_that_they_need() {
-    let softness = EdgeSoftness { family: Family::Reciprocal, squared: false };
+    let softness = EdgeSoftness::new(Family::Reciprocal);
     let phi = softness.default_phi(10f64.powf(-1.910_500_4));
     let tolerance = 10f64.powf(-6.260_48);
     let (culled, exact, error) =
@@ -90,7 +91,7 @@ fn heavy_tails_under_a_steep_t_conorm_get_the_knots_that_they_need() {
 
 #[test]
 fn a_face_counts_for_more_beside_another_where_coverage_steepens() {
-    let softness = EdgeSoftness { family: Family::CubicHermite, squared: false };
+    let softness = EdgeSoftness::new(Family::CubicHermite);
     let (phi, tolerance) = (softness.default_phi(1.0), 10f64.powf(-5.166_573_731_664_093));
     let yager = TConorm::Yager(0.545_809_260_379_082_7);
     let (culled, exact, error) = images(&triangles(0, 2), softness, yager, &phi, tolerance);
@@ -106,7 +107,7 @@ fn permuting_the_faces_changes_nothing_above_rounding() {
     let mut shuffled = faces.to_vec();
     shuffled.rotate_left(13);
     shuffled.reverse();
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let phi = softness.default_phi(0.05);
     let image = |faces: Arc<[[u32; 3]]>| {
         images(&(vertices.clone(), faces), softness, TConorm::Probabilistic, &phi, 1e-5).0

@@ -18,7 +18,7 @@ type B = NdArray<f64>;
 
 const SIZE: usize = 12;
 const TRIANGLES: usize = 7;
-const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const SCALE: f64 = 0.08;
 
 /// The loss of a few triangles against the landscape.

@@ -17,7 +17,7 @@ type B = NdArray<f64>;
 
 const SIZE: usize = 16;
 const TRIANGLES: usize = 12;
-const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const SCALE: f64 = 0.08;
 /// The whole loss of a few triangles against the letters.
 struct Small {

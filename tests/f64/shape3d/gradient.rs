@@ -16,7 +16,7 @@ use crate::differences::{check_gradient, check_meta_gradient};
 type B = NdArray<f64>;
 
 const SIZE: usize = 12;
-const SOFTNESS: EdgeSoftness = EdgeSoftness { family: Family::Logistic, squared: false };
+const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const SCALE: f64 = 0.05;
 /// The whole loss of a small sphere against the airplane.
 struct Small {

@@ -25,13 +25,13 @@ const DISTANCES: [f64; 18] = [
 fn cases() -> Vec<(EdgeSoftness, Vec<f64>)> {
     let families = Family::ALL
         .into_iter()
-        .flat_map(|family| [false, true].map(|squared| EdgeSoftness { family, squared }));
+        .flat_map(|family| [EdgeSoftness::new, EdgeSoftness::squared].map(|edge| edge(family)));
     let mut cases: Vec<_> =
         families.map(|softness| (softness, softness.default_phi(SCALE))).collect();
     for shape in [0.3_f64, 1.0, 2.7, 6.0] {
         for family in [Family::Gamma, Family::GammaForward] {
             let phi = vec![SCALE.ln(), shape.ln(), 0.05];
-            cases.push((EdgeSoftness { family, squared: false }, phi));
+            cases.push((EdgeSoftness::new(family), phi));
         }
     }
     cases
@@ -39,7 +39,11 @@ fn cases() -> Vec<(EdgeSoftness, Vec<f64>)> {
 
 fn distances(softness: EdgeSoftness) -> Vec<f64> {
     let x = DISTANCES.map(|u| u * SCALE);
-    if softness.squared { x.map(|x| x.abs().sqrt().copysign(x)).to_vec() } else { x.to_vec() }
+    if softness.scale_is_squared() {
+        x.map(|x| x.abs().sqrt().copysign(x)).to_vec()
+    } else {
+        x.to_vec()
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -137,7 +141,7 @@ fn families_rise_from_outside_to_inside() {
 #[test]
 fn automatic_derivatives_are_right_at_the_edge_itself() {
     for family in Family::ALL {
-        let softness = EdgeSoftness { family, squared: false };
+        let softness = EdgeSoftness::new(family);
         let phi = family.default_phi(SCALE);
         for (curve, derivative) in [(Curve::Value, Curve::Density), (Curve::Depth, Curve::Hazard)] {
             let (slope, _, curvature) = second_order(curve, softness, &phi, &[0.0]);

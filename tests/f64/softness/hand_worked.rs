@@ -36,7 +36,7 @@ fn families_take_their_hand_worked_values() {
         let found = numbers(family.value(vector(&family.default_phi(scale)), x));
         assert_relative(found[0], expected, 1e-14, family.name());
 
-        let squared = EdgeSoftness { family, squared: true };
+        let squared = EdgeSoftness::squared(family);
         let d = vector(&[(u.abs() * scale).sqrt().copysign(u)]);
         let found = numbers(squared.value(vector(&squared.default_phi(scale)), d));
         assert_relative(found[0], expected, 1e-14, family.name());

@@ -12,14 +12,14 @@ type B = NdArray<f64>;
 fn the_exponential_of_the_logarithm_is_the_value() {
     let x = [-0.4, -0.11, -0.02, 0.0, 0.03, 0.2, 0.7];
     for family in Family::ALL {
-        for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
+        for edge in [EdgeSoftness::new, EdgeSoftness::squared] {
+            let softness = edge(family);
             let phi = vector::<B>(&softness.default_phi(0.1));
             let log = numbers(softness.log_value(phi.clone(), vector(&x)));
             let value = numbers(softness.value(phi, vector(&x)));
             for ((x, log), value) in x.iter().zip(log).zip(value) {
                 let off = (log.exp() - value).abs();
-                let name = format!("{family}, squared {squared}, x = {x}");
+                let name = format!("{softness:?}, x = {x}");
                 assert!(off <= 1.1 * OPAQUE, "{name}: exp({log}) and {value}");
                 assert!(log <= 0.0, "{name}: {log}");
             }
@@ -31,7 +31,7 @@ fn the_exponential_of_the_logarithm_is_the_value() {
 fn tails_that_underflow_keep_their_logarithm() {
     let log = |family: Family| -> f64 {
         let phi = vector::<B>(&family.default_phi(1e-3));
-        let softness = EdgeSoftness { family, squared: false };
+        let softness = EdgeSoftness::new(family);
         softness.log_value(phi, vector(&[-2.0])).into_scalar()
     };
     assert!((log(Family::Logistic) + 2000.0).abs() < 1e-9);
@@ -47,9 +47,8 @@ fn tails_that_underflow_keep_their_logarithm() {
 fn a_mirrored_family_is_the_family_of_the_mirrored_law() {
     let x = [-0.4, -0.11, -0.02, 0.0, 0.03, 0.2, 0.7];
     for family in Family::ALL {
-        for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
-            let other = EdgeSoftness { family: family.mirrored(), squared };
+        for edge in [EdgeSoftness::new, EdgeSoftness::squared] {
+            let (softness, other) = (edge(family), edge(family.mirrored()));
             let phi = vector::<B>(&softness.default_phi(0.1));
             let depths = Mirrored(softness).depth_and_hazard(phi.clone(), vector(&x));
             let expected = other.depth_and_hazard(phi, vector(&x));

@@ -11,7 +11,8 @@ fn a_scaled_softness_is_seen_at_the_distance_in_scales() {
     let x = vector::<B>(&[-0.3, -0.02, 0.1]);
     for family in Family::ALL {
         for squared in [false, true] {
-            let softness = EdgeSoftness { family, squared };
+            let softness =
+                if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             let phi = vector(&softness.default_phi(1.0));
             let wide = softness.with_scale(phi.clone(), vector(&[0.09]));
             let found = softness.value(wide, x.clone());

@@ -9,7 +9,7 @@ use softrast_tensor::{
 type B = Autodiff<NdArray<f64>>;
 
 fn step() -> SoftStep<B> {
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     SoftStep::new(softness, &softness.default_phi(0.5), DType::F64, &Default::default())
 }
 

@@ -8,6 +8,7 @@ use softrast_lab::{
     report::{Beside, Report},
     seeds, was_interrupted,
 };
+use softrast_softness::Softness;
 
 use super::{
     ended,
@@ -208,7 +209,7 @@ fn is_valid(setting: &Setting) -> bool {
 /// apart, as widths in NDC: a decade if `squared` is true.
 fn scales_around(softness: &ScheduledSoftness, size: usize) -> Vec<f64> {
     let [scale, end] = [0.0, 1.0].map(|part| softness.scale_at(part, size));
-    let ratio = if softness.softness.squared { RATIO * RATIO } else { RATIO };
+    let ratio = if softness.softness.scale_is_squared() { RATIO * RATIO } else { RATIO };
     let (low, high) = (scale.min(end), scale.max(end));
     let steps = ((high / low).ln() / ratio.ln() - 1e-9).ceil().min(STEPS);
     if steps < 1.0 {
@@ -252,7 +253,10 @@ mod tests {
     use super::*;
 
     fn around(squared: bool, first: f64, last: f64) -> Vec<f64> {
-        let softness = EdgeSoftness { family: Family::Gauss, squared };
+        let softness = {
+            let edge = if squared { EdgeSoftness::squared } else { EdgeSoftness::new };
+            edge(Family::Gauss)
+        };
         scales_around(&ScheduledSoftness::decay(softness, first, last), 64)
     }
 

@@ -139,7 +139,7 @@ impl<'a> Look<'a> {
             losses = error;
             for (camera, image) in cameras.iter_mut().zip(drawn.chunks(COARSE_SIDE * COARSE_SIDE)) {
                 let now = moments(image);
-                let [x, y, z] = camera.seen(self.middle);
+                let [x, y, z] = camera.transform(self.middle);
                 // Nothing is seen where the mesh is far out: as it was.
                 let larger = if now.area > 0.0 { (now.area / target.area).sqrt() } else { 1.0 };
                 let off = [0, 1].map(|k| {

@@ -197,7 +197,7 @@ mod tests {
 
     fn camera(elevation_deg: f64, azimuth_deg: f64) -> Pinhole {
         let orbit = Orbit { distance: 3.2, elevation_deg, azimuth_deg, fov_deg: 45.0 };
-        Pinhole::of_orbit(&orbit, SIDE)
+        Pinhole::from_orbit(&orbit, SIDE)
     }
 
     fn start(mask: &Picture, start: Pinhole) -> MaskPose {
@@ -257,9 +257,9 @@ mod tests {
         // Nobody can tell the focal length of a lens of a tenth of a degree: zoom and depth together change nothing.
         let orbit =
             Orbit { distance: 1800.0, elevation_deg: 10.0, azimuth_deg: 40.0, fov_deg: 0.1 };
-        let truth = Pinhole::of_orbit(&orbit, SIDE);
+        let truth = Pinhole::from_orbit(&orbit, SIDE);
         let near =
-            Pinhole::of_orbit(&Orbit { elevation_deg: 13.0, azimuth_deg: 36.0, ..orbit }, SIDE);
+            Pinhole::from_orbit(&Orbit { elevation_deg: 13.0, azimuth_deg: 36.0, ..orbit }, SIDE);
         let (found, [after, before]) = found(&start(&seen(&truth), near), true);
         let off = crate::pose::found::angle_deg(&found, &truth);
         assert!(off < 1.0 && after < 0.1 * before, "{off} degrees, {before} to {after}");

@@ -95,7 +95,7 @@ pub(super) fn check(
     mask.view_square()?;
     let (middle, radius) = bounding_ball(mesh);
     ensure!(radius > 0.0, "the mesh has no extent: all its vertices are in one place");
-    let [_, _, depth] = camera.seen(middle);
+    let [_, _, depth] = camera.transform(middle);
     ensure!(
         !started || depth > radius,
         "the start is inside the mesh, or has it behind: the middle of the mesh is {depth:.3} ahead, and must be more than {radius:.3}, as \

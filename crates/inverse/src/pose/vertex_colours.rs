@@ -6,7 +6,7 @@ use softrast_raster::{
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Tensor, TensorData, numbers};
 
-const EDGE: EdgeSoftness = EdgeSoftness { family: Family::Uniform, squared: false };
+const EDGE: EdgeSoftness = EdgeSoftness::new(Family::Uniform);
 /// Half the width of the edge of a face, in pixels. A near face outweighs those behind it up to where its softness ends, so this one ends
 /// soon (docs/notes.md, Colour).
 const EDGE_PX: f64 = 0.1;

@@ -146,7 +146,7 @@ mod tests {
         assert!(
             error(&surrogate).ends_with(r#"has a surrogate called "straight", expected "bent""#)
         );
-        let gauss = EdgeSoftness { family: Family::Gauss, squared: false };
+        let gauss = EdgeSoftness::new(Family::Gauss);
         let family = ScheduledSoftness::constant(gauss, 0.1).text("a.json").unwrap();
         assert!(error(&family).ends_with(r#"is called "gauss", expected "bent""#));
         let nameless = r#"{"softness": null, "phi": [0, 0]}"#;

@@ -330,7 +330,7 @@ mod tests {
     use crate::DepthSoftnessFile;
 
     fn example(family: Family) -> ScheduledSoftness {
-        let softness = EdgeSoftness { family, squared: true };
+        let softness = EdgeSoftness::squared(family);
         let schedule = ScaleSchedule { knots: vec![-3.5, -6.2], floor_px: 0.05 };
         ScheduledSoftness {
             softness,

@@ -63,7 +63,7 @@ impl Stage {
         let depths = || cameras.iter().map(|camera| camera.translation[2]);
         let near = (depths().fold(f64::INFINITY, f64::min) - reach).max(NEAR);
         let planes = [near, depths().fold(near, f64::max) + reach];
-        let edge = EdgeSoftness { family: Family::CubicHermite, squared: false };
+        let edge = EdgeSoftness::new(Family::CubicHermite);
         let scale = EDGE_PX * 2.0 / size as f64;
         let depth = DEPTH * reach / (planes[1] - planes[0]);
         // The surface brings its own faces.

@@ -139,7 +139,7 @@ fn renderer(
     depth: DepthSoftness,
     planes: [f64; 2],
 ) -> ColourRenderer {
-    let edge = EdgeSoftness { family, squared: false };
+    let edge = EdgeSoftness::new(family);
     let weighting = Weighting { edge, depth, planes };
     let phi = [edge.default_phi(0.03), depth.default_phi(0.05)];
     ColourRenderer::with_weighting(faces.clone(), size, weighting, phi).with_tolerance(1e-6)

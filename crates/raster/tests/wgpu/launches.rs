@@ -44,7 +44,7 @@ fn step<T: RasterBackend>(
 
 fn take_steps(pose: bool, size: usize) {
     let Some(log) = std::env::var_os(LOG) else { return };
-    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let softness = EdgeSoftness::squared(Family::Logistic);
     let renderer = SoftRenderer::new(icosphere(2).faces(), size, softness, 1e-3);
     let target = Tensor::zeros([3, size, size], &Default::default());
     for _ in 0..STEPS {

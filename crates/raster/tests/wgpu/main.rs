@@ -76,7 +76,7 @@ fn a_straight_edge_is_the_softness_itself() {
     // The edge x = 0 of a triangle that covers the left half of the image and much beside it.
     let corners = [0.0, -50.0, 2.0, 0.0, 50.0, 2.0, -50.0, 0.0, 2.0];
     let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.2), [1], DType::F32);
     let vertices = tensor::<Wgpu, 3>(&corners, [1, 3, 3], DType::F32);
     let silhouette = Rasterizer::new(8).prepare(&faces, softness, &phi);
@@ -94,7 +94,7 @@ fn random_triangles_agree_with_the_reference() {
         return;
     }
     for family in [Family::Logistic, Family::Exp] {
-        let scene = random(EdgeSoftness { family, squared: false }, 0.05);
+        let scene = random(EdgeSoftness::new(family), 0.05);
         let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Reference);
         let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Fused);
         found.assert_close(&expected, &family.to_string());
@@ -106,11 +106,11 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
     if !adapter() {
         return;
     }
-    let squared = EdgeSoftness { family: Family::Logistic, squared: true };
+    let squared = EdgeSoftness::squared(Family::Logistic);
     let sphere = seen(&icosphere(2), (17.3, &[4.1, 108.3, 211.9]), 32, squared, 1e-3);
     let fox = seen(&fox(), (17.3, &[171.7]), 50, squared, 1e-3);
     // A tail that is not 0 on the far side.
-    let tail = random(EdgeSoftness { family: Family::Mlp, squared: false }, 0.05);
+    let tail = random(EdgeSoftness::new(Family::Mlp), 0.05);
     // No squares.
     let azimuths = [4.1, 108.3, 211.9];
     let [low, high] = [[20, 43], [51, 30]]
@@ -145,7 +145,7 @@ fn more_views_than_a_launch_takes_are_drawn_in_parts() {
     };
     let vertices: Vec<f64> = (0..views).flat_map(triangle).flatten().collect();
     let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let image = |first: usize, count: usize| -> Vec<f64> {
         let phi = tensor::<Wgpu, 1>(&softness.default_phi(0.1), [1], DType::F32);
         let part = &vertices[9 * first..9 * (first + count)];
@@ -161,7 +161,7 @@ fn the_same_numbers_come_out_every_time() {
     if !adapter() {
         return;
     }
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let sphere = seen(&icosphere(1), (17.3, &[0.0, 30.0]), 24, softness, 0.02);
     let cut = Scene { size: 150.into(), ..random(softness, 0.05) };
     for scene in [sphere, cut] {
@@ -189,7 +189,7 @@ fn every_t_conorm_gives_the_same_image_as_on_the_cpu() {
     if !adapter() {
         return;
     }
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let scene = seen(&icosphere(2), (17.3, &[4.1, 108.3]), 40, softness, 0.03);
     let t_conorms = [
         TConorm::Probabilistic,
@@ -218,7 +218,7 @@ fn more_large_faces_than_can_be_cut_are_drawn_whole() {
         return;
     }
     // A stack of one triangle: two parts of each would take more slots than there are.
-    let (count, softness) = (2100, EdgeSoftness { family: Family::Logistic, squared: false });
+    let (count, softness) = (2100, EdgeSoftness::new(Family::Logistic));
     let corners = [[-1.9, -0.9, 2.0], [1.9, -0.9, 2.0], [0.0, 0.9, 2.0]].concat();
     let faces: Arc<[[u32; 3]]> = vec![[0, 1, 2]; count].into();
     let scene =
@@ -235,7 +235,7 @@ fn broken_vertices_give_finite_numbers() {
     if !adapter() {
         return;
     }
-    let softness = EdgeSoftness { family: Family::Logistic, squared: false };
+    let softness = EdgeSoftness::new(Family::Logistic);
     let mut scene = random(softness, 0.05);
     let broken = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e30, -1e30];
     for (face, value) in broken.into_iter().enumerate() {

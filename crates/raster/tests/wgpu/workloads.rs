@@ -31,7 +31,7 @@ fn assert_exact(KnownRow { name, workload, row }: &KnownRow) {
 
 fn assert_agrees_with_the_kernel(KnownRow { name, workload, .. }: KnownRow) {
     let Workload { mesh, azimuths_deg, size } = workload;
-    let softness = EdgeSoftness { family: Family::Logistic, squared: true };
+    let softness = EdgeSoftness::squared(Family::Logistic);
     let scene = seen(&mesh, (0.0, &azimuths_deg), size, softness, 1e-4);
     let expected = Products::new::<NdArray<f64>>(&scene, DType::F64, Path::Table);
     let found = Products::new::<Wgpu>(&scene, DType::F32, Path::Table);

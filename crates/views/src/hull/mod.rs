@@ -156,7 +156,7 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
         "the cameras do not tell how far away the object is: give views from at least two directions",
     )?;
     let middle = [0, 1, 2].map(|k| origin[k] + middle[k]);
-    let depth = |view: &View| view.camera.seen(middle)[2];
+    let depth = |view: &View| view.camera.transform(middle)[2];
     let reach_of = |Cone { view, white, .. }: &Cone<'_>| {
         let [fx, fy] = view.camera.focal;
         // Half the diagonal of the mask.
@@ -164,7 +164,7 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     };
     let reach = cones.iter().map(reach_of).fold(0.0, f64::max);
     for view in cones.iter().map(|cone| cone.view) {
-        let seen = view.camera.seen(middle);
+        let seen = view.camera.transform(middle);
         let away = (0..3).map(|k| seen[k].powi(2)).sum::<f64>().sqrt();
         ensure!(
             away > 0.5 * reach,

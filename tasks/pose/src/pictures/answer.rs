@@ -404,7 +404,7 @@ fn of_camera(pose: &FoundPose, frame: &Frame) -> Table {
     }
     pairs.push(["t".to_owned(), row(&camera.translation)]);
     pairs.push(["Camera stands at".to_owned(), row(&camera.eye())]);
-    let distance = camera.seen(frame.middle).iter().map(|x| x * x).sum::<f64>().sqrt();
+    let distance = camera.transform(frame.middle).iter().map(|x| x * x).sum::<f64>().sqrt();
     pairs.push(["Distance to the middle of the mesh".to_owned(), short(distance)]);
     pairs.push([
         "fx, fy, cx, cy in pixels".to_owned(),

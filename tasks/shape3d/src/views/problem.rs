@@ -143,7 +143,7 @@ impl<B: RasterBackend> Scene<B> {
             start: tensor(start.positions().concat(), [count, 3]),
             reach: *reach,
             cameras: Pinholes::new(&cameras, &Default::default()),
-            surface: Surface::new(&edges, count),
+            surface: Surface::of_edges(&edges, count, &Default::default()),
             targets: Targets::of_masks(looks().map(|(view, &square)| (&view.mask, square)), size),
         }
     }

@@ -64,7 +64,7 @@ pub(super) fn deformed(
     let start = template.with_positions(template.positions().iter().map(place).collect())?;
     let (backend, views): (_, Arc<[View]>) = (given.backend()?, views.into());
     let asked = given.method()?;
-    let edge = EdgeSoftness { family: Family::Logistic, squared: false };
+    let edge = EdgeSoftness::new(Family::Logistic);
     let narrow = Method {
         name: "logistic".to_owned(),
         softness: ScheduledSoftness::constant(edge, NARROW),
