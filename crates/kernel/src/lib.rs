@@ -44,7 +44,7 @@
 //!     let lists = f64::bands(&inputs);
 //!     [f64::sums(&inputs, &lists), f64::sums_vjp(&inputs, &lists, &upstream, [true, false])]
 //! };
-//! let (h, [less, more]) = (1e-5, [at(&moved(-1e-5)), at(&moved(1e-5))]);
+//! let (h, [less, more]) = (1e-7, [at(&moved(-1e-7)), at(&moved(1e-7))]);
 //! for (found, [less, more]) in [(&jvp, [&less[0], &more[0]]), (&second, [&less[1], &more[1]])] {
 //!     for (k, found) in found.iter().enumerate() {
 //!         let expected = (more[k] - less[k]) / (2.0 * h);

@@ -4,7 +4,7 @@
 //! is optically. Its parameters are one explicit vector φ, so that an optimiser sees nothing else.
 //! One of your own has one method; the ones that come with the crate are in [`families`], and a
 //! [`Family`] is one chosen by name. An [`EdgeSoftness`] applies it to the distance or to its signed
-//! square; [`support`] gives how far from the edge it still changes; `SoftStep` (feature `burn`) puts it into a
+//! square; [`support`] gives how far from the edge it still changes; `SoftStep` (feature `modules`) puts it into a
 //! network; [`Truncated`] ends a heavy tail. A [`DepthSoftness`] gives how much a face counts by its depth.
 //!
 //! ```
@@ -32,7 +32,7 @@ mod family;
 mod math;
 mod mirrored;
 mod network;
-#[cfg(feature = "burn")]
+#[cfg(feature = "modules")]
 mod soft_step;
 mod softness;
 mod support;
@@ -44,7 +44,7 @@ pub use family::{Family, UnknownFamily};
 pub use math::OPAQUE;
 pub use mirrored::Mirrored;
 pub use network::initial_mlp;
-#[cfg(feature = "burn")]
+#[cfg(feature = "modules")]
 pub use soft_step::SoftStep;
 pub use softness::Softness;
 pub use support::{Support, settled_beyond, support};

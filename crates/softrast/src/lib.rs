@@ -50,8 +50,7 @@
 #![cfg_attr(not(feature = "inverse"), allow(rustdoc::broken_intra_doc_links))]
 
 #[cfg(feature = "inverse")]
-#[doc = include_str!("guide.md")]
-pub mod guide {}
+pub mod guide;
 pub mod prelude;
 
 #[cfg(feature = "inverse")]

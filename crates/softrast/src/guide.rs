@@ -1,0 +1,101 @@
+//! Fit a shape to masks, one step at a time, in Rust.
+//!
+//! The programs in full are the [examples], each below 40 lines. What is below runs as it stands.
+//!
+//! # An image and its gradient
+//!
+//! A camera [`project`]s vertices `[1, V, 3]` in world units to [`Projected`] ones `[views, V, 3]`, and a [`SoftRenderer`] draws these: coverage
+//! `[views, H, W]` in [0, 1], top row first. Both are ordinary tensor ops, so gradients reach vertices, cameras and softness.
+//!
+//! ```
+//! use softrast::{mesh::fox, prelude::*, tensor::{Autodiff, NdArray}};
+//!
+//! type B = Autodiff<NdArray>;
+//! let (fox, device) = (fox(), Default::default()); // or Mesh::load("my.obj")?
+//! let front = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 0.0, fov_deg: 60.0 };
+//! let cameras = Orbit::tensors::<B>(&front.around(3), &device).require_grad(); // [3, 4]
+//! let renderer = SoftRenderer::new(fox.faces(), [24, 32], Family::Gauss, Width::pixels(1.0));
+//! let image = renderer.silhouette(project(vertices(fox.positions(), &device), cameras.clone()));
+//! assert_eq!(image.dims(), [3, 24, 32]);
+//! let by_cameras = cameras.grad(&image.mean().backward()).unwrap();
+//! assert_eq!(by_cameras.dims(), [3, 4]);
+//! ```
+//!
+//! [`Family`] names the softness, [`Width`] how far it blurs an edge: in pixels, or as a scale in NDC, where the shorter side of an image is 2 long.
+//!
+//! # A fit
+//!
+//! A [`VertexModel`] is a mesh whose vertices are the parameter of a module of burn, so that burn's optimisers move them. [`Views`] reads masks `[views, H, W]`
+//! and cameras of a folder; here both are made. A width that narrows finds the shape first and its edges later.
+//!
+//! ```
+//! # use softrast::{mesh::{fox, icosphere}, prelude::*, tensor::{Autodiff, NdArray, burn::optim::AdamConfig}};
+//! # type B = Autodiff<NdArray>;
+//! # let (fox, device) = (fox(), Default::default());
+//! # let front = Orbit { distance: 2.7, elevation_deg: 20.0, azimuth_deg: 0.0, fov_deg: 60.0 };
+//! let cameras = Orbit::tensors::<B>(&front.around(3), &device); // or views.cameras(&device)
+//! let seen = project(vertices(fox.positions(), &device), cameras.clone());
+//! let masks = hard_silhouette(seen, fox.faces(), [24, 32]); // or views.masks(&device)
+//!
+//! let mut shape = VertexModel::new(&icosphere(2), &device);
+//! let width = Width::pixels(2.0).to(0.3);
+//! let mut renderer = SoftRenderer::new(shape.faces(), [24, 32], Family::Gauss, width.at(0.0));
+//! let mut adam = AdamConfig::new().init();
+//! let mut losses: Vec<f32> = Vec::new();
+//! for step in 0..40 {
+//!     renderer.set_width(width.at(f64::from(step) / 39.0));
+//!     let image = renderer.silhouette(project(shape.vertices(), cameras.clone()));
+//!     let loss = iou_loss(image, masks.clone()).mean() + shape.laplacian() * 0.01;
+//!     losses.push(loss.clone().into_scalar());
+//!     shape = shape.step(&mut adam, 0.02, loss);
+//! }
+//! assert!(losses[39] < 0.5 * losses[0]);
+//! let mesh: Mesh = shape.mesh()?; // mesh.save("fit.obj")?
+//! # Ok::<(), softrast::mesh::MeshError>(())
+//! ```
+//!
+//! The image is a tensor, so any loss of your own goes in the place of [`iou_loss`]. Other losses of the surface are those of [`Surface`].
+//!
+//! # A softness of your own
+//!
+//! One method makes a [`Softness`]; renderers, schedules, files and learning take it like those of the crate. Tails that fall slowly reach far: then every face
+//! is drawn at every pixel, which takes many times longer. [`SoftRenderer::reach`] is the distance in NDC, and [`Truncated`] the remedy.
+//!
+//! ```
+//! use softrast::{prelude::*, tensor::NdArray};
+//!
+//! #[derive(Clone, Debug)]
+//! struct Arctan;
+//!
+//! impl Softness for Arctan {
+//!     fn value<B: Backend, const D: usize>(&self, phi: Tensor<B, 1>, x: Tensor<B, D>) -> Tensor<B, D> {
+//!         (x / phi.exp().reshape([1; D])).atan() / std::f64::consts::PI + 0.5
+//!     }
+//! }
+//!
+//! let width = Width::pixels(1.0);
+//! let endless = SoftRenderer::new(&[[0, 1, 2]], 64, Arctan, width);
+//! assert!(endless.reach::<NdArray>() > 2.0, "past all of the image");
+//! let ended = SoftRenderer::new(&[[0, 1, 2]], 64, Truncated::new(Arctan, 3.0), width);
+//! assert!(ended.reach::<NdArray>() < 0.1, "3 pixels");
+//! ```
+//!
+//! # Colours, and twice
+//!
+//! A [`ColourRenderer`] draws colours, textures and light, with gradients to all of them. On `Autodiff<Autodiff<_>>` every gradient has a gradient of its own, as for
+//! a meta-gradient through an optimisation: the example `meta_gradient` is one by hand, and [`learn`](fn@crate::inverse::learn) does it at large.
+//!
+//! [examples]: https://github.com/softrast/softrast/tree/main/crates/softrast/examples
+//! [`project`]: crate::raster::project
+//! [`Projected`]: crate::raster::Projected
+//! [`SoftRenderer`]: crate::raster::SoftRenderer
+//! [`SoftRenderer::reach`]: crate::raster::SoftRenderer::reach
+//! [`ColourRenderer`]: crate::raster::ColourRenderer
+//! [`Width`]: crate::raster::Width
+//! [`iou_loss`]: crate::raster::iou_loss
+//! [`Family`]: crate::softness::Family
+//! [`Softness`]: crate::softness::Softness
+//! [`Truncated`]: crate::softness::Truncated
+//! [`VertexModel`]: crate::inverse::VertexModel
+//! [`Surface`]: crate::inverse::Surface
+//! [`Views`]: crate::views::Views
