@@ -19,7 +19,7 @@
 //! let vertices = [-0.5, 0.5, 0.0, -0.5, -0.4, 0.5, 1.0, 1.0, 1.0];
 //! let (faces, size, views) = ([[0, 1, 2]], [8, 8].into(), 1);
 //! let bands = bands_of_view(views, size);
-//! let inputs = Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, views, bands };
+//! let inputs = Inputs { vertices: &vertices, table: &table, faces: &faces, grid, size, near: 0.01, culls: false, views, bands };
 //! let lists = f64::bands(&inputs); // serve all passes over the same vertices
 //!
 //! // Forward: the sums [views, height, width].

@@ -55,6 +55,8 @@ const LINES: &[(&str, &str)] = &[
         "views.png is an input of this run",
     ),
     ("--views fox --masks masks --template mine.obj --out new", ""),
+    ("--views fox --normals masks --out new", ""),
+    ("--views fox --normals masks --out masks", "views.png is an input of this run"),
     (
         "--views fox --masks masks --template mine.obj --out masks",
         "views.png is an input of this run",

@@ -90,14 +90,18 @@ impl RemeshingAdam {
         Ok(Self { surface, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 })
     }
 
-    /// The same, with three channels at each vertex, which move with it and begin with this number.
-    pub(crate) fn with_colours(mesh: &Mesh, length: f64, start: f32) -> Result<Self, MeshError> {
+    /// The same, with a colour at each vertex, which moves with it and begins as this one.
+    pub(crate) fn with_colours(
+        mesh: &Mesh,
+        length: f64,
+        colour: [f32; CHANNELS],
+    ) -> Result<Self, MeshError> {
         let surface = ClosedSurface::new(mesh, length, STATE + 3 * CHANNELS)?;
         let mut shape =
             Self { surface, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 };
         let width = shape.surface.width();
         for row in shape.surface.numbers_mut().chunks_exact_mut(width) {
-            row[COLOURS..COLOURS + CHANNELS].fill(start);
+            row[COLOURS..COLOURS + CHANNELS].copy_from_slice(&colour);
         }
         Ok(shape)
     }

@@ -8,6 +8,11 @@ use crate::RemeshingAdam;
 
 /// Fewest pixels a side, from a sphere and from a surface that is about right.
 const COARSEST: [usize; 2] = [32, 64];
+/// Fewest and most pixels a side at the end, unless others are asked for.
+const LEAST: f64 = 64.0;
+const MOST: f64 = 256.0;
+/// They are a multiple of this, so that they can be halved.
+const EVEN: f64 = 32.0;
 /// Length of edges in pixels, in all stages.
 const EDGE_PX: f64 = 2.4;
 /// Part of a stage in which edges shorten to its length.
@@ -18,8 +23,6 @@ const SETTLES: [f64; 2] = [0.3, 0.1];
 const SPHERE: f64 = 0.5;
 /// Steps of a stage for each step of a stage on half as many pixels a side.
 const MORE: f64 = 1.3;
-/// The level that colours begin with.
-const GREY: f32 = 0.5;
 
 /// Finds the surface of an object by the gradient of what views show of it: masks, and where they are known normals and colours.
 ///
@@ -70,10 +73,13 @@ pub struct FoundShape {
 }
 
 impl<'a> ShapeFit<'a> {
-    /// A search from a sphere, with 500 steps up to 256 × 256 pixels.
+    /// A search from a sphere, with 500 steps, on as many pixels as the pictures have around the object, up to 256 × 256.
     pub fn new(views: Vec<ViewOfShape>) -> Self {
         let told = Box::new(|_, _| Ok(()));
-        let (steps, size, most, smoothing) = (500, 256, RemeshingAdam::MOST_FACES, 1.0);
+        let pixels = views.iter().map(ViewOfShape::pixels).fold(0.0, f64::max);
+        // Whole numbers of pixels on a few levels.
+        let size = ((pixels / EVEN).round() * EVEN).clamp(LEAST, MOST) as usize;
+        let (steps, most, smoothing) = (500, RemeshingAdam::MOST_FACES, 1.0);
         Self { views, start: None, steps, size, most, smoothing, told }
     }
 
@@ -126,7 +132,8 @@ impl<'a> ShapeFit<'a> {
         let length = |size: usize| EDGE_PX * 2.0 * half / size as f64;
         let has_colours = self.views.iter().any(|view| view.colours.is_some());
         let mut before = length(levels[levels.len() - 1][0].size);
-        let mut shape = self.shape(half, before, has_colours)?;
+        let colour = has_colours.then(|| mean_colour(&levels[levels.len() - 1]));
+        let mut shape = self.shape(half, before, colour)?;
         let steps = steps(self.steps, levels.len());
         let (mut order, mut random) = (Vec::new(), StdRng::seed_from_u64(0));
         let (mut done, mut stopped) = (0, None);
@@ -187,7 +194,7 @@ impl<'a> ShapeFit<'a> {
         &mut self,
         half: f64,
         length: f64,
-        has_colours: bool,
+        colour: Option<[f32; 3]>,
     ) -> anyhow::Result<RemeshingAdam> {
         let start = match self.start.take() {
             Some(mesh) => mesh,
@@ -197,12 +204,20 @@ impl<'a> ShapeFit<'a> {
                 ball.with_positions(ball.positions().iter().map(place).collect())?
             }
         };
-        let shape = match has_colours {
-            true => RemeshingAdam::with_colours(&start, length, GREY)?,
-            false => RemeshingAdam::new(&start, length)?,
+        let shape = match colour {
+            Some(colour) => RemeshingAdam::with_colours(&start, length, colour)?,
+            None => RemeshingAdam::new(&start, length)?,
         };
         Ok(shape.with_most_faces(self.most).with_smoothing(self.smoothing))
     }
+}
+
+/// The mean colour of all that counts of some targets.
+fn mean_colour(targets: &[Target]) -> [f32; 3] {
+    let colours = || targets.iter().filter_map(|target| target.colours.as_ref());
+    let counts: f32 = colours().flat_map(|colours| &colours.part).sum();
+    let sum = |k: usize| colours().flat_map(|colours| &colours.levels[k]).sum::<f32>();
+    [0, 1, 2].map(|k| (sum(k) / counts.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0))
 }
 
 /// Steps of each stage.

@@ -67,6 +67,11 @@ impl ViewOfShape {
         self.camera.cropped([left, top], [extent; 2], size)
     }
 
+    /// Pixels of the picture a side of its square.
+    pub(super) fn pixels(&self) -> f64 {
+        self.square[2]
+    }
+
     /// Half the extent of the square at the depth of the origin, in world units.
     pub(super) fn reach(&self) -> f64 {
         let camera = self.camera(2);

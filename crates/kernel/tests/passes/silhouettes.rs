@@ -33,6 +33,7 @@ fn passes<F: Kernels>(size: [usize; 2], views: usize, far: u32) -> Vec<F> {
         grid,
         size,
         near: 0.01,
+        culls: false,
         views,
         bands: 2,
     };

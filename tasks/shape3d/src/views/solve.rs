@@ -185,10 +185,11 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         (None, Some(_)) => template::steps(given),
         (None, None) => surface::steps(given),
     };
-    let of_colours = if flags.colour { painted::config(given).steps } else { 0 };
+    // A surface that is looked for brings its colours.
+    let paints = flags.colour && (args.mesh.is_some() || args.template.is_some());
+    let of_colours = if paints { painted::config(given).steps } else { 0 };
     let steps = of_shape + of_colours;
     let mut progress = given.progress(steps)?;
-    let mut is_stopped = false;
     let mut mesh = match (&args.mesh, &args.template) {
         (Some(path), _) => Mesh::load(path)?,
         (None, template) => {
@@ -202,9 +203,7 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
                 }
                 None => {
                     let shown = [&to_paint, &normals].map(Vec::as_slice);
-                    let found = surface::found(given, flags, &views, shown, &mut progress)?;
-                    is_stopped = found.is_stopped;
-                    found.mesh
+                    surface::found(given, flags, &views, shown, &mut progress)?
                 }
             };
             frame.mesh_to_world(&found)?
@@ -212,11 +211,11 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
     };
     let mut textured = None;
     if flags.colour {
-        let painted = match is_stopped {
-            true => mesh.clone(),
-            false => painted::painted(given, &mesh, &to_paint, |step, loss| {
+        let painted = match paints {
+            true => painted::painted(given, &mesh, &to_paint, |step, loss| {
                 progress.step(of_shape + step, loss)
             })?,
+            false => mesh.clone(),
         };
         textured = Some(baked(&mesh, &painted)?);
         mesh = painted;

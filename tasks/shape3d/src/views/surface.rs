@@ -1,6 +1,6 @@
 //! The surface that views show, from their hull or from a sphere.
 
-use anyhow::{anyhow, ensure};
+use anyhow::anyhow;
 use softrast_cli::Given;
 use softrast_inverse::{
     shape::{ShapeFit, ViewOfShape},
@@ -15,8 +15,6 @@ use crate::Args;
 
 /// Steps that move the surface.
 const STEPS: usize = 500;
-/// Pixels a side of the square of a view, at the end.
-const SIZE: usize = 256;
 /// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
 const CELLS: [usize; 3] = [32, 45, 64];
 /// More cells are worth their time if the mean `IoU` of the hull grows by so much.
@@ -26,13 +24,6 @@ pub(super) fn steps(given: &Given<'_, Args>) -> usize {
     given.common.steps.unwrap_or(STEPS)
 }
 
-/// A surface that was found.
-pub(super) struct Found {
-    pub(super) mesh: Mesh,
-    /// Whether the user ended the search early.
-    pub(super) is_stopped: bool,
-}
-
 /// The surface, of views of a frame; `shown` are their colours and their normals, each of all views or of none. Where the user stops it, it is as it was then.
 pub(super) fn found(
     given: &Given<'_, Args>,
@@ -40,7 +31,7 @@ pub(super) fn found(
     views: &[View],
     [colours, normals]: [&[PaintedView]; 2],
     progress: &mut Progress,
-) -> anyhow::Result<Found> {
+) -> anyhow::Result<Mesh> {
     let of_view = |(k, view): (usize, &View)| {
         let mut of = ViewOfShape::of_mask(view)?;
         if let Some(colours) = colours.get(k) {
@@ -49,10 +40,14 @@ pub(super) fn found(
         Ok(normals.get(k).map_or(of.clone(), |normals| of.with_normals(normals)))
     };
     let of_views = views.iter().enumerate().map(of_view).collect::<anyhow::Result<_>>()?;
-    let (steps, size) = (steps(given), given.common.size.unwrap_or(SIZE));
-    ensure!(size >= 8, Error::usage("--size must be at least 8 with --views"));
-    let mut taken = 0;
-    let mut fit = ShapeFit::new(of_views).with_steps(steps).with_size(size);
+    let (steps, mut taken) = (steps(given), 0);
+    let mut fit = ShapeFit::new(of_views).with_steps(steps);
+    if let Some(size) = given.common.size {
+        if size < 8 {
+            return Err(Error::usage("--size must be at least 8 with --views"));
+        }
+        fit = fit.with_size(size);
+    }
     if flags.start.unwrap_or_default() == Begin::Hull {
         fit = fit.starting_at(fitting_hull(views)?);
     }
@@ -66,14 +61,13 @@ pub(super) fn found(
             progress.step(step, loss)
         })
         .run()?;
-    let is_stopped = found.stopped.is_some();
     if let Some(why) = found.stopped {
         if !was_interrupted(&why) {
             return Err(why);
         }
         say(&format!("stopped after {taken} of {steps} steps: the mesh is as it was then"));
     }
-    Ok(Found { mesh: found.mesh, is_stopped })
+    Ok(found.mesh)
 }
 
 /// The visual hull in as few cells as show what the masks show.
