@@ -31,6 +31,12 @@ pub(crate) fn remember_process() {
     LOADED_BY.get_or_init(process::id);
 }
 
+/// How many threads draw in this process.
+#[pyfunction]
+pub(crate) fn threads(py: Python<'_>) -> PyResult<usize> {
+    guarded(py, rayon::current_num_threads)
+}
+
 /// Threads for a process that was forked: it has none of those that the other one started, and would wait for them for ever.
 fn own_threads() -> Result<Option<Arc<ThreadPool>>, String> {
     let id = process::id();

@@ -22,8 +22,9 @@ mod _native {
     #[pymodule_export]
     use crate::{
         colour::{ColourRenderer, PreparedColour},
+        guard::threads,
         meshes::{fox, icosphere, load_mesh, save_mesh},
-        op::{Op, orbit_matrix, perspective},
+        op::{Op, iou_loss, mse_loss, orbit_matrix, perspective},
         renderer::{Prepared, Renderer, hard_silhouette},
         softness::{Softness, families, learned_names},
     };

@@ -37,6 +37,8 @@ enum Kind {
     Perspective,
     /// Sums to coverage of the same shape, under the probabilistic sum.
     Coverage,
+    /// Images `[views, height, width]` and targets `[1 or views, height, width]` to losses `[views]`.
+    Loss(ElementaryOp),
     /// φ `[P]` to a table `[rows, 4]`.
     Table { of: Taped, parameters: usize, rows: usize },
     /// Sums to coverage of the same shape, under any T-conorm.
@@ -111,6 +113,18 @@ pub(crate) fn orbit_matrix() -> Op {
 #[pyfunction]
 pub(crate) fn perspective() -> Op {
     Op(Kind::Perspective)
+}
+
+/// The op from images `[views, height, width]` and targets `[1 or views, height, width]` to mean squared differences `[views]`.
+#[pyfunction]
+pub(crate) fn mse_loss() -> Op {
+    Op(Kind::Loss(ElementaryOp::SquaredError))
+}
+
+/// The op from images `[views, height, width]` and targets `[1 or views, height, width]` to one less the overlap over the union, `[views]`.
+#[pyfunction]
+pub(crate) fn iou_loss() -> Op {
+    Op(Kind::Loss(ElementaryOp::Iou))
 }
 
 #[pymethods]
@@ -232,7 +246,7 @@ fn contiguous<'a, F: Element>(arrays: &'a [PyReadonlyArrayDyn<'_, F>]) -> PyResu
 impl Kind {
     fn inputs(&self) -> usize {
         match self {
-            Self::Sum { .. } | Self::Perspective => 2,
+            Self::Sum { .. } | Self::Perspective | Self::Loss(_) => 2,
             Self::Blend(blend) => 4 + usize::from(blend.texture.is_some()),
             _ => 1,
         }
@@ -266,6 +280,13 @@ impl Kind {
                 }
                 _ => return None,
             },
+            (Self::Loss(_), [image, target]) => {
+                let (&[views @ 1..=usize::MAX, ..], &[held, ..]) = (&image[..], &target[..]) else {
+                    return None;
+                };
+                let fits = image.len() == 3 && target.get(1..) == image.get(1..);
+                (fits && (held == 1 || held == views)).then(|| vec![views])?
+            }
             (Self::Table { parameters, rows, .. }, [phi]) => {
                 (phi == &[*parameters]).then(|| vec![*rows, 4])?
             }
@@ -302,6 +323,7 @@ impl Kind {
             Self::OrbitMatrix => of(ElementaryOp::OrbitMatrix),
             Self::Perspective => of(ElementaryOp::Perspective),
             Self::Coverage => of(ElementaryOp::Coverage),
+            Self::Loss(loss) => of(*loss),
             Self::Table { of, .. } | Self::AnyCoverage(of) => {
                 let shape = match pass {
                     Pass::Forward => self.shape(&dims[..1]),

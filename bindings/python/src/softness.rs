@@ -10,6 +10,9 @@ use crate::{
     guard::{guarded, refused},
 };
 
+/// What errors name in the place of a file.
+const PICKLE: &str = "a pickled softness";
+
 /// A soft step with its parameters φ: how much a face covers a pixel at a signed distance (NDC, positive inside).
 ///
 /// `Softness("logistic", scale=0.01)` is a family at a scale in NDC; with `squared=True` it sees the signed square of the distance and the
@@ -49,6 +52,18 @@ impl Softness {
     /// Writes a JSON file at `path`, whole or not at all.
     fn save(&self, py: Python<'_>, path: std::path::PathBuf) -> PyResult<()> {
         guarded(py, || self.0.save(path))?.map_err(refused)
+    }
+
+    /// Its JSON text and what reads it, for pickle and copies.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = self.0.text(PICKLE).map_err(refused)?;
+        Ok((py.get_type::<Self>().getattr("_parsed")?, (text,)))
+    }
+
+    /// The softness of a JSON text, for pickle.
+    #[staticmethod]
+    fn _parsed(text: &str) -> PyResult<Self> {
+        ScheduledSoftness::parse(text, PICKLE).map(Self).map_err(refused)
     }
 
     /// The same softness with other parameters, `[P]`, without a schedule and without a surrogate.

@@ -3,6 +3,9 @@
 import ast
 import importlib
 import inspect
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,7 +18,7 @@ PLAIN = {"families", "learned_names"}
 
 
 def public():
-    for name in ("softrast", "softrast.torch", "softrast.jax", "softrast.pytorch3d"):
+    for name in ("softrast", "softrast.torch", "softrast.jax", "softrast.nn", "softrast.pytorch3d"):
         try:
             module = importlib.import_module(name)
         except ImportError:
@@ -62,3 +65,38 @@ def test_the_stub_has_what_the_compiled_half_has():
                     assert arguments == list(inspect.signature(real).parameters), method.name
         elif isinstance(node, ast.FunctionDef):
             assert [argument.arg for argument in node.args.args] == list(inspect.signature(found).parameters), node.name
+
+
+def test_the_package_states_its_version_backend_and_threads():
+    environment = {**os.environ, "RAYON_NUM_THREADS": "3"}
+    said = subprocess.run([sys.executable, "-m", "softrast"], env=environment, stdout=subprocess.PIPE, text=True, check=True).stdout
+    assert said.startswith(f"softrast {softrast.__version__}\nbackend: CPU\nthreads: 3 ") and "numpy: " in said
+
+
+def test_types_are_right_by_mypy(tmp_path):
+    pytest.importorskip("mypy")
+    used = tmp_path / "used.py"
+    used.write_text(USED)
+    checked = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(used)], stdout=subprocess.PIPE, text=True,
+    )
+    assert checked.returncode == 0, checked.stdout
+
+
+# A user's script; each line of it must have a type.
+USED = """
+import numpy as np
+from numpy.typing import NDArray
+
+import softrast
+
+positions, faces, colours = softrast.fox()
+renderer = softrast.Renderer(faces, (48, 64), softrast.Softness("logistic", 0.01), tolerance=1e-4)
+cameras: NDArray[np.float64] = softrast.pinhole(np.eye(3), np.eye(3), np.zeros(3), (48, 64), "opencv")
+seen = softrast.project(positions, softrast.orbit(2.7, 20.0, 30.0))
+alpha: NDArray[np.float64] = softrast.silhouette(renderer, seen, renderer.phi)
+painter = softrast.ColourRenderer(faces, 64, softrast.Softness.learned("pose"), [1.7, 3.7])
+height: int = painter.size[0]
+image = softrast.blend(painter, seen, positions, background=[0.0, 0.0, 0.0])
+bound: float = renderer.error_bound + image.max() + alpha.max() + cameras.max()
+"""

@@ -15,79 +15,17 @@ from typing import Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple
 import numpy as _np
 from numpy.typing import ArrayLike as _ArrayLike
 
-from . import _native, _shapes
+from . import _cameras, _native, _passes, _shapes
 from ._native import Softness, __version__, families, learned_names
+from ._renderers import ColourRenderer, Renderer, Size as _Size
 
 __all__ = [
     "ColourRenderer", "Renderer", "Softness", "blend", "families", "fox", "hard_silhouette", "icosphere", "learned_names", "load_mesh",
-    "orbit", "project", "save_mesh", "silhouette",
+    "orbit", "pinhole", "project", "save_mesh", "silhouette",
 ]
 
-_Size = _Union[int, _Sequence[int]]
 _Path = _Union[str, "_os.PathLike[str]"]
 _Mesh = _Tuple[_np.ndarray, _np.ndarray, _Optional[_np.ndarray]]
-
-
-class Renderer(_native.Renderer):
-    """What a silhouette depends on beside the vertices and φ.
-
-    `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. `softness` is a
-    `Softness`, at `progress` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
-    surrogate. `tolerance` (0 to 1) bounds the error of any pixel. `t_conorm` combines the coverages of faces: "probabilistic",
-    "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p".
-
-    Raises `ValueError` if one of them is out of range.
-    """
-
-    def __new__(
-        cls, faces: _ArrayLike, size: _Size, softness: Softness, *, progress: float = 0.0, tolerance: float = 1e-5,
-        t_conorm: str = "probabilistic",
-    ) -> Renderer:
-        _shapes.softness(softness)
-        renderer = super().__new__(cls, _shapes.faces(faces), _shapes.size(size), softness, progress, tolerance, t_conorm)
-        renderer._tables = {}
-        return renderer
-
-    def _own(self, dtype) -> _Tuple[_native.Prepared, _np.ndarray]:
-        """What draws under the renderer's own φ, and its table in a float type."""
-        kept = self._tables.get(dtype)
-        if kept is None:
-            prepared = self.prepared(self.phi)
-            kept = self._tables[dtype] = prepared, prepared.table().forward([self.phi]).astype(dtype)
-        return kept
-
-    def _felt(self, dtype) -> _Optional[_Tuple[_native.Prepared, _np.ndarray]]:
-        """The same of the surrogate, if there is one."""
-        key = "surrogate", dtype
-        if key not in self._tables:
-            found = self.surrogate()
-            self._tables[key] = found and (found[1], found[1].table().forward([found[0]]).astype(dtype))
-        return self._tables[key]
-
-
-class ColourRenderer(_native.ColourRenderer):
-    """What an image in colours depends on beside vertices, attributes, background and φ.
-
-    `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. A face weighs what
-    `softness`, a `Softness` at `progress` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
-    of a family, or "depth_mlp". `planes` are a near and a far depth in world units, around the mesh; they do not cut. `depth_scale` is in
-    units of the distance between them: with "exp" a face counts e times as much as one that lies so far behind it. `tolerance` (0 to 1)
-    bounds the error of any pixel, as a part of the range of what is shown. `cull_back_faces` leaves out faces whose corners the camera
-    sees clockwise: for closed meshes whose faces go counter-clockwise as seen from outside, in half of the time.
-
-    Raises `ValueError` if one of them is out of range, or the softness has a surrogate.
-    """
-
-    def __new__(
-        cls, faces: _ArrayLike, size: _Size, softness: Softness, planes: _Sequence[float], *, progress: float = 0.0, depth: str = "exp",
-        depth_scale: float = 0.05, tolerance: float = 1e-5, cull_back_faces: bool = False,
-    ) -> ColourRenderer:
-        _shapes.softness(softness)
-        planes = _shapes.planes(planes)
-        return super().__new__(
-            cls, _shapes.faces(faces), _shapes.size(size), softness, planes, progress, depth, depth_scale, tolerance,
-            cull_back_faces,
-        )
 
 
 def load_mesh(path: _Path) -> _Mesh:
@@ -124,19 +62,35 @@ def orbit(
     return _np.stack(_np.broadcast_arrays(*map(_np.atleast_1d, (distance, elevation_deg, azimuth_deg, fov_deg))), -1).astype(_np.float64)
 
 
+def pinhole(K: _ArrayLike, R: _ArrayLike, t: _ArrayLike, size: _Size, convention: str = "opencv") -> _np.ndarray:
+    """Cameras `[views, 3, 4]` (float64) of matrices `K` `[3, 3]` and poses `R` `[3, 3]`, `t` `[3]`, each with views first if there are several.
+
+    `size` is that of the image: a number of pixels, or `(height, width)`. `K` is in pixels with the centre of the first pixel at (0, 0), as OpenCV
+    has it; COLMAP's cx and cy are larger by 0.5. `t` is in world units. `convention` names the axes of the camera and what R and t do:
+
+    - "opencv": `R X + t`, x right, y down, z ahead;
+    - "opengl": `R X + t`, x right, y up, z behind: the view matrix, which is the inverse of a camera-to-world matrix;
+    - "pytorch3d": `X R + t`, x left, y up, z ahead.
+
+    Raises `ValueError` for another convention, or shapes that do not fit.
+    """
+    return _cameras.pinhole(_np, *(_np.asarray(x, _np.float64) for x in (K, R, t)), size, convention)
+
+
 def project(vertices: _ArrayLike, cameras: _ArrayLike) -> _np.ndarray:
     """World vertices `[V, 3]` or `[1 or views, V, 3]` as cameras see them, `[views, V, 3]`.
 
-    `cameras` are orbits `[views, 4]` or matrices `[views, 3, 4]`, of which two rows give x and y in NDC times the depth, the third the
+    `cameras` are orbits `[1 or views, 4]` or matrices `[1 or views, 3, 4]`, of which two rows give x and y in NDC times the depth, the third the
     depth. The result has x and y in NDC and the depth in world units, in the float type of the vertices.
     """
     vertices = _shapes.floats(vertices, "vertices")
     cameras = _np.ascontiguousarray(_shapes.floats(cameras, "cameras"), vertices.dtype)
     vertices = vertices[None] if vertices.ndim == 2 else vertices
-    _shapes.project(vertices.shape, cameras.shape)
+    views = _shapes.project(vertices.shape, cameras.shape)
     if cameras.ndim == 2:
         cameras = _native.orbit_matrix().forward([cameras])
-    return _native.perspective().forward([_np.ascontiguousarray(vertices), cameras]).swapaxes(1, 2)
+    cameras = _np.broadcast_to(cameras, (views, 3, 4))
+    return _native.perspective().forward([_np.ascontiguousarray(x) for x in (vertices, cameras)]).swapaxes(1, 2)
 
 
 def silhouette(renderer: Renderer, vertices: _ArrayLike, phi: _Optional[_ArrayLike] = None) -> _np.ndarray:
@@ -145,15 +99,10 @@ def silhouette(renderer: Renderer, vertices: _ArrayLike, phi: _Optional[_ArrayLi
     A face with a corner nearer than 0.01 world units, or beyond 1e6 NDC, is not drawn.
     """
     vertices = _shapes.floats(vertices, "vertices")
-    _shapes.vertices(vertices.shape, renderer.least_vertices)
-    if phi is None:
-        prepared, table = renderer._own(vertices.dtype)
-    else:
-        phi = _shapes.vector(phi, "phi")
-        prepared = renderer.prepared(phi)
-        table = prepared.table().forward([phi]).astype(vertices.dtype)
-    sums = prepared.sum().forward([_np.ascontiguousarray(vertices.swapaxes(1, 2)), table])
-    return prepared.coverage().forward([sums])
+    _shapes.vertices(vertices.shape, renderer._least)
+    drawn = renderer._scene._drawing(renderer._scene.phi if phi is None else _shapes.vector(phi, "phi"))
+    sums = drawn.op.forward([_np.ascontiguousarray(vertices.swapaxes(1, 2)), drawn.table(vertices.dtype)])
+    return drawn.coverage.forward([sums])
 
 
 def hard_silhouette(vertices: _ArrayLike, faces: _ArrayLike, size: _Size) -> _np.ndarray:
@@ -182,7 +131,7 @@ def blend(
     at the far plane. `phi` `[P]` and `phi_depth` `[Q]` are parameters of the softnesses by edge and by depth, or the renderer's own.
     """
     vertices = _shapes.floats(vertices, "vertices")
-    _shapes.vertices(vertices.shape, renderer.least_vertices)
+    _shapes.vertices(vertices.shape, renderer._least)
     dtype = vertices.dtype
     attributes = _shapes.floats(attributes, "attributes").astype(dtype)
     attributes = attributes[None] if attributes.ndim == 2 else attributes
@@ -199,12 +148,11 @@ def blend(
         _shapes.vector(own if given is None else given, name)
         for given, own, name in [(phi, renderer.phi, "phi"), (phi_depth, renderer.phi_depth, "phi_depth")]
     )
-    for array, name in [(attributes, "attributes"), (background, "background"), (texture, "texture")]:
-        _shapes.finite(array is None or bool(_np.isfinite(array).all()), name)
-    prepared = renderer.prepared(phi, phi_depth, log_weight, corners, None if texture is None else texture.shape[:2])
-    tables = prepared.tables().forward([_np.concatenate([phi, phi_depth])]).astype(dtype)
-    behind = _np.append(_np.broadcast_to(background, channels), log_weight).astype(dtype)
-    inputs = [vertices.swapaxes(1, 2), attributes, tables, behind]
+    _shapes.parameters("phi", phi.shape, len(renderer._phi[0]))
+    size = None if texture is None else texture.shape[:2]
     if texture is not None:
-        inputs.append(_np.pad(texture.reshape(-1, channels), ((0, 0), (0, 4 - channels))))
-    return prepared.blend().forward([_np.ascontiguousarray(array) for array in inputs])
+        texture = _np.pad(texture.reshape(-1, channels), ((0, 0), (0, 4 - channels)))
+    behind = _np.append(_np.broadcast_to(background, channels), log_weight).astype(dtype)
+    function = renderer._blend(corners, size)
+    inputs = [vertices.swapaxes(1, 2), attributes, _np.concatenate([phi, phi_depth]), behind, *([] if texture is None else [texture])]
+    return function.forward([_np.ascontiguousarray(array) for array in inputs])[0]

@@ -74,12 +74,26 @@ def vertices(shape, least):
 
 
 def project(points, cameras):
-    """World vertices and cameras that go together."""
+    """How many views there are, of world vertices and cameras that go together."""
     points, cameras = list(points), list(cameras)
     if len(cameras) not in (2, 3) or cameras[1:] not in ([4], [3, 4]) or cameras[0] == 0:
         raise ValueError(f"cameras must be orbits [views, 4] or matrices [views, 3, 4], found {cameras}")
-    if len(points) != 3 or points[2] != 3 or points[0] not in (1, cameras[0]):
+    if len(points) != 3 or points[2] != 3 or points[0] == 0 or points[0] != 1 and cameras[0] not in (1, points[0]):
         raise ValueError(f"vertices must be [V, 3] or [1 or {cameras[0]}, V, 3], found {points}")
+    return max(points[0], cameras[0])
+
+
+def parameters(name, shape, count):
+    """Parameters of a softness that has this many."""
+    if list(shape) != [count]:
+        raise ValueError(f"{name} must be [{count}], found {list(shape)}")
+
+
+def images(image, target):
+    """An image and what it is compared with."""
+    image, target = list(image), list(target)
+    if len(image) != 3 or image[0] == 0 or len(target) != 3 or target[1:] != image[1:] or target[0] not in (1, image[0]):
+        raise ValueError(f"image must be [views, height, width] and target [1 or views, height, width], found {image} and {target}")
 
 
 def attributes(shape, views, least, texture):

@@ -32,7 +32,7 @@ def cameras(
     `principal_point` are in its NDC, x left: a number, `[N]` or `[N, 2]`, as `PerspectiveCameras(in_ndc=True)` has them.
     `FoVPerspectiveCameras(fov=f)` with an aspect ratio of 1 has the focal length `1 / tan(f / 2)`.
     """
-    _st._tensors(R=R, T=T)
+    R, T = _st._floats(R, "R"), _st._floats(T, "T")
     if R.dim() != 3 or R.shape[1:] != (3, 3) or T.shape != (R.shape[0], 3) or R.shape[0] == 0:
         raise ValueError(f"R must be [N, 3, 3] and T [N, 3], found {list(R.shape)} and {list(T.shape)}")
     along = _torch.cat([R.transpose(1, 2), T.to(R.dtype)[..., None]], 2)

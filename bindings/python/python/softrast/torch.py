@@ -1,86 +1,47 @@
 """The functions of `softrast` for PyTorch, differentiable twice, on the CPU.
 
-Gradients reach vertices, cameras, attributes, background, texture and φ. A third derivative raises an error. Arguments, shapes and units
-are those of `softrast`, with tensors in the place of arrays.
+Gradients reach vertices, cameras, attributes, background, texture and φ, in reverse and in forward mode: `torch.autograd`, `torch.func.grad`,
+`vmap`, `jacrev`, `jacfwd`, `jvp` and `hessian` work, and `torch.compile(fullgraph=True)` with first derivatives. A third derivative raises
+an error. Arguments, shapes and units are those of `softrast`, with tensors in the place of arrays; float16 and bfloat16 are converted to float32,
+and so are the results.
 """
 
 from __future__ import annotations
 
-from typing import Optional as _Optional, Union as _Union
+from typing import List as _List, Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple, Union as _Union
 
-import numpy as _np
 import torch as _torch
 
 import softrast as _softrast
 
-from . import _native, _shapes
+from . import _cameras, _ops, _passes, _shapes
 
-__all__ = ["blend", "from_clip", "hard_silhouette", "orbit", "project", "silhouette"]
+__all__ = [
+    "blend", "from_clip", "hard_silhouette", "hvp", "iou_loss", "jvp", "mse_loss", "orbit", "pinhole", "project", "silhouette", "silhouettes",
+    "value_and_grad",
+]
 
 _Number = _Union[float, _torch.Tensor]
 
 # As near as the rasterizer draws, in world units.
 _NEAR = 0.01
+_HALVES = (_torch.float16, _torch.bfloat16)
+# Plain strings, which torch.compile reads.
+_ORBIT_MATRIX, _PERSPECTIVE = _passes.ORBIT_MATRIX.handle, _passes.PERSPECTIVE.handle
+_LOSSES = {"mse": ("mse_loss", _passes.MSE_LOSS.handle), "iou": ("iou_loss", _passes.IOU_LOSS.handle)}
 
 
-def _array(tensor):
-    return tensor.detach().contiguous().numpy()
-
-
-def _parts(flat, shapes):
-    sizes = [int(_np.prod(shape)) for shape in shapes]
-    return [part.view(shape) for part, shape in zip(_torch.from_numpy(flat).split(sizes), shapes)]
-
-
-def _spread(parts, wanted):
-    """The parts at the places that are wanted, None elsewhere."""
-    parts = iter(parts)
-    return tuple(next(parts) if want else None for want in wanted)
-
-
-class _Value(_torch.autograd.Function):
-    @staticmethod
-    def forward(ctx, op, *inputs):
-        ctx.op = op.keeping() if any(ctx.needs_input_grad) else op
-        ctx.save_for_backward(*inputs)
-        return _torch.from_numpy(ctx.op.forward([_array(x) for x in inputs]))
-
-    @staticmethod
-    def backward(ctx, upstream):
-        wanted = list(ctx.needs_input_grad[1:])
-        gradients = _Vjp.apply(ctx.op, wanted, upstream, *ctx.saved_tensors)
-        return (None, *_spread(gradients, wanted))
-
-
-class _Vjp(_torch.autograd.Function):
-    @staticmethod
-    def forward(ctx, op, wanted, upstream, *inputs):
-        ctx.op, ctx.along = op, wanted
-        ctx.save_for_backward(upstream, *inputs)
-        flat = op.vjp([_array(x) for x in inputs], _array(upstream), wanted)
-        return tuple(_parts(flat, [x.shape for x, want in zip(inputs, wanted) if want]))
-
-    @staticmethod
-    @_torch.autograd.function.once_differentiable
-    def backward(ctx, *directions):
-        upstream, *inputs = ctx.saved_tensors
-        to_upstream, *to_inputs = ctx.needs_input_grad[2:]
-        wanted = [*to_inputs, to_upstream]
-        arrays = [_array(x) for x in inputs]
-        flat = ctx.op.vjp_of_vjp(arrays, _array(upstream), [_array(x) for x in directions], ctx.along, wanted)
-        shapes = [x.shape for x, want in zip([*inputs, upstream], wanted) if want]
-        *gradients, gradient = _spread(_parts(flat, shapes), wanted)
-        return (None, None, gradient, *gradients)
-
-
-def _tensors(**tensors):
-    for name, x in tensors.items():
-        if not isinstance(x, _torch.Tensor):
-            raise ValueError(f"{name} must be a tensor, found {type(x).__name__}: convert it with torch.as_tensor")
-        if x.device.type != "cpu":
-            raise ValueError(f"{name} must lie on the CPU, found {x.device}: move it with cpu()")
-        if x.dtype not in (_torch.float32, _torch.float64):
-            raise ValueError(f"{name} must be float32 or float64, found {x.dtype}: convert it with to()")
+def _floats(x: _torch.Tensor, name: str) -> _torch.Tensor:
+    """A tensor of float32 or float64 on the CPU."""
+    if not isinstance(x, _torch.Tensor):
+        raise ValueError(f"{name} must be a tensor, found {type(x).__name__}: convert it with torch.as_tensor")
+    if x.device.type != "cpu":
+        raise ValueError(f"{name} must lie on the CPU, found {x.device}: move it with cpu()")
+    if x.dtype in _HALVES:
+        return x.float()
+    if x.dtype not in (_torch.float32, _torch.float64):
+        raise ValueError(f"{name} must be float32 or float64, found {x.dtype}: convert it with to()")
+    return x
 
 
 def orbit(distance: _Number, elevation_deg: _Number = 0.0, azimuth_deg: _Number = 0.0, fov_deg: _Number = 60.0) -> _torch.Tensor:
@@ -95,18 +56,28 @@ def orbit(distance: _Number, elevation_deg: _Number = 0.0, azimuth_deg: _Number 
     return _torch.stack(tensors, -1)
 
 
+def pinhole(
+    K: _torch.Tensor, R: _torch.Tensor, t: _torch.Tensor, size: _softrast._Size, convention: str = "opencv",
+) -> _torch.Tensor:
+    """Cameras `[views, 3, 4]` of matrices `K` and poses `R`, `t`, differentiable in all three; see `softrast.pinhole`."""
+    R = _floats(R, "R")
+    K, t = (_floats(x, name).to(R.dtype) for x, name in ((K, "K"), (t, "t")))
+    return _cameras.pinhole(_torch, K, R, t, size, convention)
+
+
 def project(vertices: _torch.Tensor, cameras: _torch.Tensor) -> _torch.Tensor:
     """World vertices `[V, 3]` or `[1 or views, V, 3]` as cameras see them, `[views, V, 3]`: x and y in NDC, depth in world units.
 
-    `cameras` are orbits `[views, 4]` or matrices `[views, 3, 4]`; see `softrast.project`.
+    `cameras` are orbits `[1 or views, 4]` or matrices `[1 or views, 3, 4]`; see `softrast.project`.
     """
-    _tensors(vertices=vertices, cameras=cameras)
+    vertices, cameras = _floats(vertices, "vertices"), _floats(cameras, "cameras")
     vertices = vertices[None] if vertices.dim() == 2 else vertices
-    _shapes.project(vertices.shape, cameras.shape)
+    views = _shapes.project(vertices.shape, cameras.shape)
     cameras = cameras.to(vertices.dtype)
     if cameras.dim() == 2:
-        cameras = _Value.apply(_native.orbit_matrix(), cameras)
-    return _Value.apply(_native.perspective(), vertices, cameras).transpose(1, 2)
+        cameras = _ops.value("orbit_matrix", _ORBIT_MATRIX, [cameras])[0]
+    cameras = cameras.expand(views, 3, 4)
+    return _ops.value("project", _PERSPECTIVE, [vertices, cameras])[0].transpose(1, 2)
 
 
 def from_clip(clip: _torch.Tensor, size: _softrast._Size) -> _torch.Tensor:
@@ -116,7 +87,7 @@ def from_clip(clip: _torch.Tensor, size: _softrast._Size) -> _torch.Tensor:
     w must be that of a perspective projection: the depth ahead of the camera. Images have their top row first, those of nvdiffrast the bottom
     row.
     """
-    _tensors(clip=clip)
+    clip = _floats(clip, "clip")
     if clip.dim() != 3 or clip.shape[2] != 4 or clip.shape[0] == 0:
         raise ValueError(f"clip must be [views, V, 4] with at least one view, found {list(clip.shape)}")
     height, width = _shapes.size(size)
@@ -127,39 +98,43 @@ def from_clip(clip: _torch.Tensor, size: _softrast._Size) -> _torch.Tensor:
     return _torch.stack([clip[..., 0] * over * (width / shorter), clip[..., 1] * over * (height / shorter), w], -1)
 
 
-def _sums(prepared, vertices, phi):
-    """Sums `[views, height, width]` for vertices `[views, 3, V]`; `phi` is a tensor, or a table of numbers."""
-    if isinstance(phi, _torch.Tensor):
-        table = _Value.apply(prepared.table(), phi).to(vertices.dtype)
-    else:
-        table = _torch.from_numpy(phi)
-    return _Value.apply(prepared.sum(), vertices, table)
+def _scene(
+    renderer: _softrast.Renderer, vertices: _torch.Tensor, phi: _Optional[_torch.Tensor],
+) -> _Tuple[str, _List[_torch.Tensor]]:
+    """The name of a renderer's function and its inputs: vertices `[views, 3, V]` and, if it is given, φ."""
+    vertices = _floats(vertices, "vertices")
+    _shapes.vertices(vertices.shape, renderer._least)
+    inputs = [vertices.transpose(1, 2).contiguous()]
+    if phi is None:
+        return renderer._by_own_name, inputs
+    phi = _floats(phi, "phi")
+    _shapes.parameters("phi", phi.shape, renderer._parameters)
+    return renderer._by_phi_name, [*inputs, phi]
 
 
 def silhouette(renderer: _softrast.Renderer, vertices: _torch.Tensor, phi: _Optional[_torch.Tensor] = None) -> _torch.Tensor:
     """Coverage `[views, height, width]` in [0, 1] of projected `vertices` `[views, V, 3]`, under φ `[P]` or the renderer's own.
 
     Support and knots follow the values of φ. The table of φ is computed in float64 and rounded to the type of the vertices. Where the softness
-    has a surrogate, the gradient to the vertices is that of the surrogate, and there is none to φ.
+    has a surrogate, the gradient to the vertices is that of the surrogate, and the gradient to φ is 0.
     """
-    _tensors(vertices=vertices)
-    _shapes.vertices(vertices.shape, renderer.least_vertices)
-    kind = _np.dtype(str(vertices.dtype).split(".")[-1])
-    if phi is None:
-        prepared, phi = renderer._own(kind)
-    else:
-        _tensors(phi=phi)
-        prepared = renderer.prepared(phi.detach().double().numpy())
-    vertices, felt = vertices.transpose(1, 2).contiguous(), renderer._felt(kind)
-    if felt is None:
-        sums = _sums(prepared, vertices, phi)
-    else:
-        sums = _sums(prepared, vertices.detach(), phi.detach() if isinstance(phi, _torch.Tensor) else phi)
-        if vertices.requires_grad:
-            # Nothing is added but the gradient.
-            wide = _sums(felt[0], vertices, felt[1])
-            sums = sums + (wide - wide.detach())
-    return _Value.apply(prepared.coverage(), sums)
+    name, inputs = _scene(renderer, vertices, phi)
+    return _ops.value("silhouette", name, inputs)[0]
+
+
+def silhouettes(
+    renderers: _Sequence[_softrast.Renderer], vertices: _Sequence[_torch.Tensor], *, packed: bool = False,
+) -> _torch.Tensor:
+    """Coverage of several meshes, each with its renderer and its projected vertices `[views, V, 3]`; all images are of one size.
+
+    `[meshes, views, height, width]` with zeros behind the views of a mesh that has fewer than others, or `[all views, height, width]` if
+    `packed`. Raises `ValueError` if there is no mesh, or numbers of renderers and vertices or sizes of images differ.
+    """
+    if len(renderers) != len(vertices) or not renderers or len({renderer.size for renderer in renderers}) > 1:
+        sizes = [renderer.size for renderer in renderers]
+        raise ValueError(f"silhouettes need a renderer for each mesh, of one size, found {len(vertices)} meshes and renderers of {sizes}")
+    images = [silhouette(renderer, corners) for renderer, corners in zip(renderers, vertices)]
+    return _torch.cat(images) if packed else _torch.nn.utils.rnn.pad_sequence(images, batch_first=True)
 
 
 def hard_silhouette(vertices: _torch.Tensor, faces: _softrast._ArrayLike, size: _softrast._Size) -> _torch.Tensor:
@@ -167,8 +142,99 @@ def hard_silhouette(vertices: _torch.Tensor, faces: _softrast._ArrayLike, size: 
 
     `faces` are `[F, 3]`, an array or a tensor; `size` is a number of pixels, or `(height, width)`.
     """
-    _tensors(vertices=vertices)
-    return _torch.from_numpy(_softrast.hard_silhouette(_array(vertices), faces, size)).to(vertices.dtype)
+    vertices = _floats(vertices, "vertices")
+    return _torch.from_numpy(_softrast.hard_silhouette(vertices.detach().contiguous().numpy(), faces, size)).to(vertices.dtype)
+
+
+def mse_loss(image: _torch.Tensor, target: _torch.Tensor) -> _torch.Tensor:
+    """Mean squared difference of each view, `[views]`, of an `image` `[views, height, width]` and a `target` `[1 or views, height, width]`."""
+    return _loss("mse", image, target)
+
+
+def iou_loss(image: _torch.Tensor, target: _torch.Tensor) -> _torch.Tensor:
+    """One less the overlap over the union of each view, `[views]` in [0, 1]: `1 - sum(p t) / (sum(p + t - p t) + 1e-6)`.
+
+    Both images are coverages in [0, 1], of the shapes of `mse_loss`. Two empty images have the loss 1.
+    """
+    return _loss("iou", image, target)
+
+
+def _loss(name: str, image: _torch.Tensor, target: _torch.Tensor) -> _torch.Tensor:
+    image, target = _floats(image, "image"), _floats(target, "target")
+    _shapes.images(image.shape, target.shape)
+    kind, handle = _LOSSES[name]
+    return _ops.value(kind, handle, [image, target.to(image.dtype)])[0]
+
+
+def jvp(
+    renderer: _softrast.Renderer, vertices: _torch.Tensor, direction: _torch.Tensor, phi: _Optional[_torch.Tensor] = None,
+    phi_direction: _Optional[_torch.Tensor] = None,
+) -> _Tuple[_torch.Tensor, _torch.Tensor]:
+    """The `silhouette` and its derivative along a `direction` `[views, V, 3]` of the vertices and `[P]` of φ, both `[views, height, width]`.
+
+    Both have first derivatives, under `torch.compile` too.
+    """
+    name, inputs = _scene(renderer, vertices, phi)
+    directions = [_along(direction, vertices).transpose(1, 2)]
+    if phi is not None:
+        directions.append(None if phi_direction is None else _floats(phi_direction, "phi_direction").to(inputs[1].dtype))
+    image, *kept = _ops.value("silhouette", name, inputs)
+    return image, _ops.jvp("silhouette", name, inputs, kept, directions)
+
+
+def value_and_grad(
+    renderer: _softrast.Renderer, vertices: _torch.Tensor, target: _torch.Tensor, loss: str = "mse", phi: _Optional[_torch.Tensor] = None,
+) -> _Tuple[_torch.Tensor, _torch.Tensor]:
+    """Losses `[views]` of the `silhouette` against a `target` `[1 or views, height, width]`, and their gradient `[views, V, 3]` to the vertices.
+
+    `loss` is "mse" or "iou". Both results have first derivatives, under `torch.compile` too, which cannot differentiate a backward pass.
+    """
+    losses, gradient, _ = _judged(renderer, vertices, target, loss, phi, None)
+    return losses, gradient
+
+
+def hvp(
+    renderer: _softrast.Renderer, vertices: _torch.Tensor, target: _torch.Tensor, direction: _torch.Tensor, loss: str = "mse",
+    phi: _Optional[_torch.Tensor] = None,
+) -> _Tuple[_torch.Tensor, _torch.Tensor, _torch.Tensor]:
+    """Losses and gradient as `value_and_grad` has them, and the product `[views, V, 3]` of the Hessian by the vertices with a `direction`.
+
+    `direction` is `[views, V, 3]`. The results have no derivatives.
+    """
+    with _torch.no_grad():
+        return _judged(renderer, vertices, target, loss, phi, direction)
+
+
+def _along(direction: _torch.Tensor, vertices: _torch.Tensor) -> _torch.Tensor:
+    direction = _floats(direction, "direction")
+    if direction.shape != vertices.shape:
+        raise ValueError(f"direction must be {list(vertices.shape)} as the vertices are, found {list(direction.shape)}")
+    return direction.to(_floats(vertices, "vertices").dtype)
+
+
+def _judged(renderer, vertices, target, loss, phi, direction):
+    """Losses, their gradient and, along a direction, its change."""
+    if loss not in _LOSSES:
+        raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, found {loss!r}")
+    kind, handle = _LOSSES[loss]
+    name, inputs = _scene(renderer, vertices, phi)
+    wanted = [True, *[False] * (len(inputs) - 1)]
+    image, *kept = _ops.value("silhouette", name, inputs)
+    target = _floats(target, "target").to(image.dtype)
+    _shapes.images(image.shape, target.shape)
+    pair = [image, target]
+    (losses,) = _ops.value(kind, handle, pair)
+    each = _torch.ones_like(losses)
+    (by_image,) = _ops.vjp(kind, handle, pair, [], each, [True, False])
+    (gradient,) = _ops.vjp("silhouette", name, inputs, kept, by_image, wanted)
+    if direction is None:
+        return losses, gradient.transpose(1, 2), None
+    along = [_along(direction, vertices).transpose(1, 2).contiguous(), *[None] * (len(inputs) - 1)]
+    moved = _ops.jvp("silhouette", name, inputs, kept, along)
+    (bent,) = _ops.vjp_of_vjp(kind, handle, pair, [], each, [moved, None], [True, False, False])
+    (first,) = _ops.vjp("silhouette", name, inputs, kept, bent, wanted)
+    (second,) = _ops.vjp_of_vjp("silhouette", name, inputs, kept, by_image, along, [*wanted, False])
+    return losses, gradient.transpose(1, 2), (first + second).transpose(1, 2)
 
 
 def blend(
@@ -182,33 +248,33 @@ def blend(
     width, channels]`; `background` is a number or `[channels]`; see `softrast.blend`. All of them, `log_weight` (a number or `[1]`), `phi`
     `[P]` and `phi_depth` `[Q]` receive gradients of both orders.
     """
-    numbers = {"background": background, "log_weight": log_weight}
-    given = {name: x for name, x in numbers.items() if isinstance(x, _torch.Tensor)}
-    if texture is not None:
-        given["texture"] = texture
-    _tensors(vertices=vertices, attributes=attributes, **given)
-    _shapes.vertices(vertices.shape, renderer.least_vertices)
+    vertices, attributes = _floats(vertices, "vertices"), _floats(attributes, "attributes")
     dtype = vertices.dtype
+    _shapes.vertices(vertices.shape, renderer._least)
     attributes = attributes[None] if attributes.dim() == 2 else attributes
-    corners = None if corners is None else _shapes.faces(corners, "corners")
-    least = renderer.least_vertices if corners is None else corners.max(initial=-1) + 1
+    texture = None if texture is None else _floats(texture, "texture").to(dtype)
+    least, name = renderer._least, renderer._plain_name
+    if corners is not None or texture is not None:
+        corners = None if corners is None else _shapes.faces(corners, "corners")
+        least = least if corners is None else corners.max(initial=-1) + 1
+        name = renderer._blend(corners, None if texture is None else (texture.shape[0], texture.shape[1])).handle
     channels = _shapes.attributes(attributes.shape, vertices.shape[0], least, None if texture is None else tuple(texture.shape))
-    background = _torch.as_tensor(background, dtype=dtype)
+    background = _number(background, "background", dtype)
     _shapes.background(background.shape, channels)
-    log_weight = _torch.as_tensor(renderer.log_weight if log_weight is None else log_weight, dtype=dtype)
+    log_weight = _number(renderer._log_weight if log_weight is None else log_weight, "log_weight", dtype)
     if log_weight.numel() != 1:
         raise ValueError(f"log_weight must be a number or [1], found {list(log_weight.shape)}")
-    phi = _torch.from_numpy(renderer.phi) if phi is None else phi
-    phi_depth = _torch.from_numpy(renderer.phi_depth) if phi_depth is None else phi_depth
-    _tensors(phi=phi, phi_depth=phi_depth)
-    for name, x in [("attributes", attributes), ("background", background), ("texture", texture)]:
-        _shapes.finite(x is None or bool(x.isfinite().all()), name)
-    values = [x.detach().double().numpy() for x in (phi, phi_depth)]
-    size = None if texture is None else tuple(texture.shape[:2])
-    prepared = renderer.prepared(*values, log_weight.item(), corners, size)
-    tables = _Value.apply(prepared.tables(), _torch.cat([phi.double(), phi_depth.double()])).to(dtype)
+    both = []
+    for x, own, of in ((phi, renderer._phi[0], "phi"), (phi_depth, renderer._phi[1], "phi_depth")):
+        x = _torch.tensor(own, dtype=_torch.float64) if x is None else _floats(x, of).double()
+        _shapes.parameters(of, x.shape, len(own))
+        both.append(x)
     behind = _torch.cat([background.expand(channels), log_weight.reshape(1)])
-    inputs = [vertices.transpose(1, 2).contiguous(), attributes.to(dtype), tables, behind]
+    inputs = [vertices.transpose(1, 2).contiguous(), attributes.to(dtype), _torch.cat(both), behind]
     if texture is not None:
-        inputs.append(_torch.nn.functional.pad(texture.to(dtype).reshape(-1, channels), (0, 4 - channels)))
-    return _Value.apply(prepared.blend(), *inputs)
+        inputs.append(_torch.nn.functional.pad(texture.reshape(-1, channels), (0, 4 - channels)))
+    return _ops.value("blend", name, inputs)[0]
+
+
+def _number(x: _Number, name: str, dtype: _torch.dtype) -> _torch.Tensor:
+    return _floats(x, name).to(dtype) if isinstance(x, _torch.Tensor) else _torch.tensor(x, dtype=dtype)

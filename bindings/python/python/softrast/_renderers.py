@@ -1,0 +1,252 @@
+"""Renderers: faces, image size, softness, tolerance, and the knots that they keep."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from typing import Any, Dict, Optional, Sequence, Tuple, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native, _passes, _shapes
+from ._native import Softness
+
+Size = Union[int, Sequence[int]]
+
+# Knots stay while no parameter of a softness has moved by more than this. Terms at a fixed distance then move by less than the rounding,
+# 1e-3 of the tolerance, with which knots are chosen: a culled term is exp(-x) with x below 40.
+_HELD = 2e-5
+# Parameters whose tables are kept.
+_DRAWINGS = 64
+
+
+class Drawing:
+    """The ops that draw under some φ, and the tables of φ by float type."""
+
+    def __init__(self, ops: Tuple[Any, ...], phi: NDArray[np.float64]) -> None:
+        self.ops, self.phi = ops, phi
+        self.op, self.tables, self.coverage = ops
+        self._by_type: Dict[Any, NDArray[Any]] = {}
+
+    def table(self, dtype: Any) -> NDArray[Any]:
+        found = self._by_type.get(dtype)
+        if found is None:
+            found = self._by_type[dtype] = self.tables.forward([self.phi]).astype(dtype)
+        return found
+
+
+class Knots:
+    """The latest drawings, by the values that knots follow: φ, and a few others in one vector behind it.
+
+    Values that are within `_HELD` of those that knots were chosen for have the same knots, so that images are smooth there.
+    """
+
+    def __init__(self) -> None:
+        self._drawings: OrderedDict[Any, Drawing] = OrderedDict()
+        self._chosen: Dict[Any, Tuple[NDArray[np.float64], Tuple[Any, ...]]] = {}
+        self._lock = threading.RLock()
+
+    def drawing(self, choose: Any, phi: Any, others: Sequence[float] = (), of: Any = None) -> Drawing:
+        """The drawing for φ; `choose()` are ops with new knots, and `of` is all else that they depend on."""
+        phi = np.array(phi, np.float64)
+        values = np.append(phi, others)
+        key = values.tobytes(), of
+        with self._lock:
+            found = self._drawings.get(key)
+            if found is None:
+                chosen = self._chosen.get(of)
+                if chosen is None or chosen[0].shape != values.shape or not np.abs(chosen[0] - values).max(initial=0.0) <= _HELD:
+                    # One set of knots is enough: the others can be chosen again.
+                    self._chosen = {of: (values, choose())}
+                    chosen = self._chosen[of]
+                found = self._drawings[key] = Drawing(chosen[1], phi)
+                if len(self._drawings) > _DRAWINGS:
+                    self._drawings.popitem(last=False)
+            return found
+
+
+class Silhouettes:
+    """The part of a `Renderer` that its functions hold: no function keeps the renderer alive."""
+
+    def __init__(self, native: _native.Renderer) -> None:
+        self._native, self._knots, self._recent = native, Knots(), _passes.Recent()
+        self.phi, self.size = native.phi, native.size
+        surrogate = native.surrogate()
+        self._felt = None if surrogate is None else Drawing(self._ops(surrogate[1]), surrogate[0])
+
+    def _drawing(self, phi: Any) -> Drawing:
+        return self._knots.drawing(lambda: self._ops(self._native.prepared(np.asarray(phi, np.float64))), phi)
+
+    def _surrogate_drawing(self) -> Optional[Drawing]:
+        return self._felt
+
+    @staticmethod
+    def _ops(prepared: _native.Prepared) -> Tuple[Any, ...]:
+        return prepared.sum(), prepared.table(), prepared.coverage()
+
+
+class Colours:
+    """The part of a `ColourRenderer` that its functions hold."""
+
+    def __init__(self, native: _native.ColourRenderer) -> None:
+        self._native, self._knots, self._recent = native, Knots(), _passes.Recent()
+        self.size, self.parameters = native.size, len(native.phi)
+
+    def _drawing(self, phi: Any, log_weight: float, corners: Optional[NDArray[np.int64]], texture: Optional[Tuple[int, int]]) -> Drawing:
+        def choose() -> Tuple[Any, ...]:
+            of = self.parameters
+            prepared = self._native.prepared(phi[:of].astype(np.float64), phi[of:].astype(np.float64), log_weight, corners, texture)
+            return prepared.blend(), prepared.tables(), None
+
+        return self._knots.drawing(choose, phi, [log_weight], (None if corners is None else corners.tobytes(), texture))
+
+
+class Renderer:
+    """What a silhouette depends on beside the vertices and φ.
+
+    `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. `softness` is a
+    `Softness`, at `progress` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
+    surrogate. `tolerance` (0 to 1) bounds the error of any pixel. `t_conorm` combines the coverages of faces: "probabilistic",
+    "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p".
+
+    A renderer can be copied and pickled. It keeps its knots while no parameter of φ moves by more than 2e-5, so that images are smooth in φ there.
+
+    Raises `ValueError` if one of them is out of range.
+    """
+
+    def __init__(
+        self, faces: ArrayLike, size: Size, softness: Softness, *, progress: float = 0.0, tolerance: float = 1e-5,
+        t_conorm: str = "probabilistic",
+    ) -> None:
+        _shapes.softness(softness)
+        self._settings = {
+            "faces": _shapes.faces(faces), "size": _shapes.size(size), "softness": softness, "progress": progress, "tolerance": tolerance,
+            "t_conorm": t_conorm,
+        }
+        self._native = _native.Renderer(*self._settings.values())
+        self._scene = Silhouettes(self._native)
+        # Plain attributes: torch.compile reads no others.
+        self._least, self._parameters, self._surrogate = self._native.least_vertices, len(self._scene.phi), self._scene._felt is not None
+        self._by_own, self._by_phi = (_passes.named(_passes.Silhouette(self._scene, own)) for own in (True, False))
+        self._by_own_name, self._by_phi_name = self._by_own.handle, self._by_phi.handle
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """Faces `[F, 3]`, a copy."""
+        return self._settings["faces"].copy()
+
+    @property
+    def phi(self) -> NDArray[np.float64]:
+        """Parameters φ `[P]`, float64: those that are drawn with where no others are given."""
+        return self._native.phi
+
+    @property
+    def size(self) -> Tuple[int, int]:
+        """Height and width of the image, in pixels."""
+        return self._native.size
+
+    @property
+    def error_bound(self) -> float:
+        """The largest error of a pixel under φ, in coverage: the tolerance, or more where no table can follow the softness to it."""
+        return self._native.error_bound
+
+    @property
+    def least_vertices(self) -> int:
+        """How many vertices the faces ask for."""
+        return self._least
+
+    def __repr__(self) -> str:
+        return repr(self._native)
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return _made, (type(self), self._settings)
+
+
+class ColourRenderer:
+    """What an image in colours depends on beside vertices, attributes, background and φ.
+
+    `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. A face weighs what
+    `softness`, a `Softness` at `progress` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
+    of a family, or "depth_mlp". `planes` are a near and a far depth in world units, around the mesh; they do not cut. `depth_scale` is in
+    units of the distance between them: with "exp" a face counts e times as much as one that lies so far behind it. `tolerance` (0 to 1)
+    bounds the error of any pixel, as a part of the range of what is shown. `cull_back_faces` leaves out faces whose corners the camera
+    sees clockwise: for closed meshes whose faces go counter-clockwise as seen from outside, in half of the time.
+
+    A renderer can be copied and pickled. It keeps its knots while φ and the background's weight move by 2e-5 at most, as a `Renderer` does.
+
+    Raises `ValueError` if one of them is out of range, or the softness has a surrogate.
+    """
+
+    def __init__(
+        self, faces: ArrayLike, size: Size, softness: Softness, planes: Sequence[float], *, progress: float = 0.0, depth: str = "exp",
+        depth_scale: float = 0.05, tolerance: float = 1e-5, cull_back_faces: bool = False,
+    ) -> None:
+        _shapes.softness(softness)
+        self._settings = {
+            "faces": _shapes.faces(faces), "size": _shapes.size(size), "softness": softness, "planes": _shapes.planes(planes),
+            "progress": progress, "depth": depth, "depth_scale": depth_scale, "tolerance": tolerance, "cull_back_faces": cull_back_faces,
+        }
+        self._native = _native.ColourRenderer(*self._settings.values())
+        self._scene = Colours(self._native)
+        # Plain attributes: torch.compile reads no others.
+        self._least, self._log_weight = self._native.least_vertices, self._native.log_weight
+        self._phi = tuple(map(float, self._native.phi)), tuple(map(float, self._native.phi_depth))
+        self._functions: Dict[Any, _passes.Blend] = {}
+        self._plain_name = self._blend(None, None).handle
+
+    def _blend(self, corners: Optional[NDArray[np.int64]], texture: Optional[Tuple[int, int]]) -> _passes.Blend:
+        """The function for these corners `[F, 3]` of attributes, or None, and rows and columns of a texture, or None."""
+        key = None if corners is None else corners.tobytes(), texture
+        if key not in self._functions:
+            self._functions[key] = _passes.named(_passes.Blend(self._scene, corners, texture))
+        return self._functions[key]
+
+    @property
+    def phi(self) -> NDArray[np.float64]:
+        """Parameters φ of the softness by edge, `[P]`, float64: those that are drawn with where no others are given."""
+        return self._native.phi
+
+    @property
+    def phi_depth(self) -> NDArray[np.float64]:
+        """Parameters φ of the softness by depth, `[Q]`, float64: those that are drawn with where no others are given."""
+        return self._native.phi_depth
+
+    @property
+    def log_weight(self) -> float:
+        """Logarithm of the weight of a background that is given none: a thousandth of a face at the far plane."""
+        return self._native.log_weight
+
+    @property
+    def size(self) -> Tuple[int, int]:
+        """Height and width of the image, in pixels."""
+        return self._native.size
+
+    @property
+    def error_bound(self) -> float:
+        """The largest error of a pixel under φ, as a part of the range of what is shown, in front of a background of the default weight.
+
+        It is the tolerance, or more where no table can follow a softness to it.
+        """
+        return self._native.error_bound
+
+    @property
+    def face_count(self) -> int:
+        """How many faces there are."""
+        return self._native.face_count
+
+    @property
+    def least_vertices(self) -> int:
+        """How many vertices the faces ask for."""
+        return self._least
+
+    def __repr__(self) -> str:
+        return repr(self._native)
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return _made, (type(self), self._settings)
+
+
+def _made(kind: Any, settings: Dict[str, Any]) -> Any:
+    """A renderer of these settings, for pickle."""
+    return kind(**settings)
