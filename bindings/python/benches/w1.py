@@ -2,7 +2,8 @@
 vertices. Beside it the published formula `1 - prod(1 - sigmoid(-dists / sigma))` in plain torch ops, over all pairs of pixel and face.
 
 `python bindings/python/benches/w1.py [target/release/examples/w1]`, in an environment with the wheel and torch. With the path of the example
-`w1` its step in Rust is timed in turn with ours, so that both have the same neighbours on the machine.
+`w1` its step in Rust is timed in turn with ours, so that both have the same neighbours on the machine. The last line is of the same step under
+`torch.compile(fullgraph=True)`, in turn with eager mode.
 """
 
 import subprocess
@@ -54,9 +55,26 @@ corners = torch.from_numpy(faces)
 target = torch.zeros(VIEWS, SIZE, SIZE)
 
 
+def loss(vertices):
+    return (st.silhouette(renderer, st.project(vertices, cameras)) - target).pow(2).mean()
+
+
 def ours():
     vertices.grad = None
-    (st.silhouette(renderer, st.project(vertices, cameras)) - target).pow(2).mean().backward()
+    loss(vertices).backward()
+
+
+def compare_compiled():
+    start, compiled = time.perf_counter(), torch.compile(loss, fullgraph=True)
+
+    def step():
+        vertices.grad = None
+        compiled(vertices).backward()
+
+    step()
+    spent = time.perf_counter() - start
+    ratios = [median(step, 100) / median(ours, 100) for _ in range(7)]
+    print(f"compiled in {spent:.1f} s; ratio to eager mode, round by round:", *(f"{ratio:.2f}" for ratio in ratios))
 
 
 def theirs_of_one_view():
@@ -78,6 +96,8 @@ steps = [step for step, _ in rounds]
 print(f"softrast {np.median(steps):.2f} ms")
 if sys.argv[1:]:
     print("Rust {:.2f} ms; ratio, round by round:".format(np.median([rust for _, rust in rounds])), *(f"{a / b:.2f}" for a, b in rounds))
+    compare_compiled()
     sys.exit()
 plain = VIEWS * median(theirs_of_one_view, 2)
 print(f"the formula in torch ops, 24 times one view, {plain:.1f} s; ratio {1e3 * plain / np.median(steps):.0f}")
+compare_compiled()

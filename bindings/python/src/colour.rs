@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// What an image in colours depends on beside vertices, attributes, background and φ.
-#[pyclass(frozen, module = "softrast._native", subclass)]
+#[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct ColourRenderer {
     renderer: softrast_raster::ColourRenderer,
     faces: std::sync::Arc<[[u32; 3]]>,

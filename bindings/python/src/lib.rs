@@ -8,6 +8,7 @@ mod colour;
 mod guard;
 mod meshes;
 mod op;
+mod pose;
 mod renderer;
 mod softness;
 mod taped;
@@ -25,6 +26,7 @@ mod _native {
         guard::threads,
         meshes::{fox, icosphere, load_mesh, save_mesh},
         op::{Op, iou_loss, mse_loss, orbit_matrix, perspective},
+        pose::{find_pose, load_mask},
         renderer::{Prepared, Renderer, hard_silhouette},
         softness::{Softness, families, learned_names},
     };

@@ -27,14 +27,7 @@ pub(crate) fn save_mesh(
     faces: PyReadonlyArray2<'_, i64>,
     colours: Option<PyReadonlyArray2<'_, f64>>,
 ) -> PyResult<()> {
-    let positions = triples(&positions, "positions")?;
-    let faces = triples(&faces, "faces")?;
-    let face = |(k, face): (usize, &[i64; 3])| {
-        let wrong = || refused(format!("face {k} is {face:?}, expected three vertex numbers"));
-        let number = |corner: i64| u32::try_from(corner).map_err(|_| wrong());
-        Ok([number(face[0])?, number(face[1])?, number(face[2])?])
-    };
-    let faces = faces.iter().enumerate().map(face).collect::<PyResult<Vec<_>>>()?;
+    let (positions, faces) = (triples(&positions, "positions")?, numbers(&faces)?);
     let colours = colours.map(|colours| triples(&colours, "colours")).transpose()?;
     let write = || -> Result<(), MeshError> {
         let mesh = Mesh::new(positions, faces)?;
@@ -70,6 +63,24 @@ fn parts<'py>(py: Python<'py>, mesh: &Mesh) -> PyResult<Parts<'py>> {
     let faces: Vec<i64> = mesh.faces().as_flattened().iter().map(|&v| i64::from(v)).collect();
     let faces = PyArray1::from_vec(py, faces).reshape([mesh.faces().len(), 3])?;
     Ok((rows(mesh.positions())?, faces, mesh.colours().map(rows).transpose()?))
+}
+
+/// The mesh of positions `[V, 3]` and faces `[F, 3]`.
+pub(crate) fn mesh_of(
+    positions: &PyReadonlyArray2<'_, f64>,
+    faces: &PyReadonlyArray2<'_, i64>,
+) -> PyResult<Mesh> {
+    Mesh::new(triples(positions, "positions")?, numbers(faces)?).map_err(refused)
+}
+
+/// Faces as vertex numbers.
+fn numbers(faces: &PyReadonlyArray2<'_, i64>) -> PyResult<Vec<[u32; 3]>> {
+    let face = |(k, face): (usize, &[i64; 3])| {
+        let wrong = || refused(format!("face {k} is {face:?}, expected three vertex numbers"));
+        let number = |corner: i64| u32::try_from(corner).map_err(|_| wrong());
+        Ok([number(face[0])?, number(face[1])?, number(face[2])?])
+    };
+    triples(faces, "faces")?.iter().enumerate().map(face).collect()
 }
 
 /// The rows of an array `[N, 3]`.

@@ -28,7 +28,7 @@ pub(crate) struct Op(Kind);
 #[derive(Clone)]
 enum Kind {
     /// Vertices `[views, 3, V]` and a table to sums `[views, height, width]`.
-    Sum { op: FusedOp, rows: usize, least_vertices: usize, size: [usize; 2] },
+    Sum { op: Box<FusedOp>, rows: usize, least_vertices: usize, size: [usize; 2] },
     /// Vertices, attributes, tables, a background and maybe a texture to an image in colours.
     Blend(Box<Blend>),
     /// Orbits `[views, 4]` to matrices `[views, 3, 4]`.
@@ -62,7 +62,7 @@ impl Op {
         size: [usize; 2],
     ) -> Self {
         let rows = silhouette.profile().knots();
-        Self(Kind::Sum { op: silhouette.op(), rows, least_vertices, size })
+        Self(Kind::Sum { op: Box::new(silhouette.op()), rows, least_vertices, size })
     }
 
     pub(crate) fn table(silhouette: &Silhouette<EdgeSoftness>, parameters: usize) -> Self {
@@ -133,7 +133,7 @@ impl Op {
     fn keeping(&self) -> Self {
         Self(match &self.0 {
             Kind::Sum { op, rows, least_vertices, size } => Kind::Sum {
-                op: op.keeping(),
+                op: Box::new(op.keeping()),
                 rows: *rows,
                 least_vertices: *least_vertices,
                 size: *size,

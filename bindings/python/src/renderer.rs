@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// What an image depends on beside vertices and φ; it chooses supports and knots.
-#[pyclass(frozen, module = "softrast._native", subclass)]
+#[pyclass(frozen, module = "softrast._native")]
 pub(crate) struct Renderer {
     renderer: SoftRenderer<EdgeSoftness>,
     faces: usize,

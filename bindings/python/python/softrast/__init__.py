@@ -10,18 +10,19 @@ image has that of its vertices. Whatever is wrong is a `ValueError` of one line.
 from __future__ import annotations
 
 import os as _os
-from typing import Optional as _Optional, Sequence as _Sequence, Tuple as _Tuple, Union as _Union
+from typing import Optional as _Optional, Tuple as _Tuple, Union as _Union
 
 import numpy as _np
 from numpy.typing import ArrayLike as _ArrayLike
 
-from . import _cameras, _native, _passes, _shapes
+from . import _cameras, _native, _shapes
 from ._native import Softness, __version__, families, learned_names
+from ._pose import FoundPose, Pose, find_pose, load_mask
 from ._renderers import ColourRenderer, Renderer, Size as _Size
 
 __all__ = [
-    "ColourRenderer", "Renderer", "Softness", "blend", "families", "fox", "hard_silhouette", "icosphere", "learned_names", "load_mesh",
-    "orbit", "pinhole", "project", "save_mesh", "silhouette",
+    "ColourRenderer", "FoundPose", "Pose", "Renderer", "Softness", "blend", "families", "find_pose", "fox", "hard_silhouette", "icosphere",
+    "learned_names", "load_mask", "load_mesh", "orbit", "pinhole", "project", "save_mesh", "silhouette",
 ]
 
 _Path = _Union[str, "_os.PathLike[str]"]

@@ -1,7 +1,7 @@
 """The compiled half of the package. All arrays of an op are C-contiguous and of one float type, float32 or float64."""
 
 import os
-from typing import List, Optional, Sequence, Tuple, Union, final
+from typing import Callable, List, Optional, Sequence, Tuple, Union, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class Softness:
     @property
     def learning_rate(self) -> Optional[float]: ...
 
+@final
 class Renderer:
     def __new__(
         cls, faces: NDArray[np.int64], size: Sequence[int], softness: Softness, progress: float, tolerance: float, t_conorm: str
@@ -55,6 +56,7 @@ class Prepared:
     @property
     def support(self) -> Tuple[float, float]: ...
 
+@final
 class ColourRenderer:
     def __new__(
         cls, faces: NDArray[np.int64], size: Sequence[int], softness: Softness, planes: Sequence[float], progress: float, depth: str,
@@ -99,6 +101,11 @@ def mse_loss() -> Op: ...
 def iou_loss() -> Op: ...
 def threads() -> int: ...
 def hard_silhouette(vertices: NDArray[np.float64], faces: NDArray[np.int64], size: Sequence[int]) -> NDArray[np.float32]: ...
+def load_mask(path: _Path) -> NDArray[np.float32]: ...
+def find_pose(
+    positions: NDArray[np.float64], faces: NDArray[np.int64], mask: NDArray[np.float32], lens: Sequence[float],
+    start: Optional[Tuple[List[List[float]], List[float]]], visit: Optional[Callable[[int, int, float], object]]
+) -> List[Tuple[List[List[float]], List[float], float]]: ...
 def families() -> List[str]: ...
 def learned_names() -> List[str]: ...
 def load_mesh(path: _Path) -> _Mesh: ...

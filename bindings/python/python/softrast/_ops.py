@@ -320,20 +320,25 @@ def _back_of(order):
 
 
 def _register(kind, order):
-    op = torch.library.custom_op(
-        f"softrast::{kind}{order}", lambda tensors, function, along, wanted: _computed(order, function, tensors, _which(along), _which(wanted)),
-        mutates_args=(), schema=_SCHEMA, device_types="cpu",
-    )
-    op.register_fake(functools.partial(_fake, order))
-    op.register_autograd(_back_of(order), setup_context=_setup)
+    name = kind + order
+    _LIBRARY.define(name + _SCHEMA)
+    compute = lambda tensors, function, along, wanted: _computed(order, function, tensors, _which(along), _which(wanted))
+    _LIBRARY.impl(name, compute, "CPU")
+    full = f"softrast::{name}"
+    torch.library.register_fake(full, functools.partial(_fake, order), lib=_LIBRARY)
+    torch.library.register_autograd(full, _back_of(order), setup_context=_setup, lib=_LIBRARY)
+    op = getattr(torch.ops.softrast, name)
 
-    @op.register_vmap
     def mapped(info, dims, tensors, function, along, wanted):
         found, dims = _mapped(lambda tensors: op(tensors, function, along, wanted), _passes.function(function), info, dims[0], tensors)
         return list(found), list(dims)
 
+    torch.library.register_vmap(full, mapped, lib=_LIBRARY)
+
 
 if _COMPILES:
+    # Not `custom_op`: its checks of every call take as long as a small image.
+    _LIBRARY = torch.library.Library("softrast", "DEF")
     for _kind in _NAMES:
         for _order in ("", "_vjp", "_jvp", "_vjp_of_vjp"):
             _register(_kind, _order)
