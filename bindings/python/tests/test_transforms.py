@@ -1,4 +1,4 @@
-"""What torch makes of the ops: function transforms, both modes of differentiation, compilation, and their checks."""
+"""Function transforms of torch, both modes of differentiation, compilation, and the checks that torch has for ops."""
 
 import time
 

@@ -77,7 +77,7 @@ def _apart(of, tensors):
 
 
 def _computed(order, name, tensors, along, wanted):
-    """What an op computes, on the host."""
+    """The results of an op, computed on the host."""
     of = _passes.function(name)
     arrays = [tensor.detach().contiguous().numpy() for tensor in tensors]
     inputs, kept, rest = _apart(of, arrays)

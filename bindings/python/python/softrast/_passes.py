@@ -178,22 +178,21 @@ class Silhouette:
         sums = self.renderer._recent.op(drawn.op, [vertices]).forward([vertices, drawn.table(vertices.dtype)])
         return [drawn.coverage.forward([sums]), sums]
 
-    def _felt(self, inputs):
+    def _differentiated(self, inputs):
         """The op of the sums as they are differentiated, coverage of the sums, and whether φ has gradients."""
         vertices, drawn = inputs[0], self.renderer._drawing(self._phi(inputs))
-        felt = self.renderer._surrogate_drawing() or drawn
-        op = self.renderer._recent.op(felt.op, [vertices])
-        learns = not self.own and felt is drawn
-        return _Tabled(op, 1, felt.tables, felt.table(vertices.dtype), felt.phi), drawn.coverage, learns
+        of = self.renderer.surrogate or drawn
+        op = self.renderer._recent.op(of.op, [vertices])
+        return _Tabled(op, 1, of.tables, of.table(vertices.dtype), of.phi), drawn.coverage, not self.own and of is drawn
 
     def vjp(self, inputs, kept, upstream, wanted):
-        sums, coverage, learns = self._felt(inputs)
+        sums, coverage, learns = self._differentiated(inputs)
         (to_sums,) = _vjp(coverage, kept, upstream, [True])
         found = sums.vjp([inputs[0], None], to_sums, [wanted[0], learns and wanted[1]])
         return self._found(inputs, found, wanted)
 
     def vjp_of_vjp(self, inputs, kept, upstream, directions, wanted):
-        sums, coverage, learns = self._felt(inputs)
+        sums, coverage, learns = self._differentiated(inputs)
         scene, wants = [inputs[0], None], [wanted[0], learns and wanted[1]]
         (to_sums,) = _vjp(coverage, kept, upstream, [True])
         along = [directions[0], directions[1] if learns else None]
@@ -227,7 +226,7 @@ class Blend:
 
     def _op(self, inputs):
         vertices, phi, behind = inputs[0], inputs[2], inputs[3]
-        drawn = self.renderer._drawing(phi, float(behind[-1]), self.corners, self.texture)
+        drawn = self.renderer._drawing(phi, float(behind[-1]), self)
         table = drawn.table(vertices.dtype)
         op = self.renderer._recent.op(drawn.op, [*inputs[:2], table, *inputs[3:]])
         return _Tabled(op, 2, drawn.tables, table, drawn.phi)

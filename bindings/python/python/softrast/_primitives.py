@@ -32,7 +32,7 @@ def _lead(of, array):
 
 
 def _computed(order, of, along, wanted, arrays):
-    """What a primitive computes of one scene, on the host."""
+    """The results of a primitive for one scene, computed on the host."""
     inputs, kept, rest = _apart(of, arrays)
     if order == "value":
         return of.forward(inputs)

@@ -73,13 +73,10 @@ class Silhouettes:
         self._native, self._knots, self._recent = native, Knots(), _passes.Recent()
         self.phi, self.size = native.phi, native.size
         surrogate = native.surrogate()
-        self._felt = None if surrogate is None else Drawing(self._ops(surrogate[1]), surrogate[0])
+        self.surrogate = None if surrogate is None else Drawing(self._ops(surrogate[1]), surrogate[0])
 
     def _drawing(self, phi: Any) -> Drawing:
         return self._knots.drawing(lambda: self._ops(self._native.prepared(np.asarray(phi, np.float64))), phi)
-
-    def _surrogate_drawing(self) -> Optional[Drawing]:
-        return self._felt
 
     @staticmethod
     def _ops(prepared: _native.Prepared) -> Tuple[Any, ...]:
@@ -93,17 +90,17 @@ class Colours:
         self._native, self._knots, self._recent = native, Knots(), _passes.Recent()
         self.size, self.parameters = native.size, len(native.phi)
 
-    def _drawing(self, phi: Any, log_weight: float, corners: Optional[NDArray[np.int64]], texture: Optional[Tuple[int, int]]) -> Drawing:
+    def _drawing(self, phi: Any, log_weight: float, function: _passes.Blend) -> Drawing:
         def choose() -> Tuple[Any, ...]:
-            of = self.parameters
-            prepared = self._native.prepared(phi[:of].astype(np.float64), phi[of:].astype(np.float64), log_weight, corners, texture)
+            both = np.split(np.asarray(phi, np.float64), [self.parameters])
+            prepared = self._native.prepared(*both, log_weight, function.corners, function.texture)
             return prepared.blend(), prepared.tables(), None
 
-        return self._knots.drawing(choose, phi, [log_weight], (None if corners is None else corners.tobytes(), texture))
+        return self._knots.drawing(choose, phi, [log_weight], function.handle)
 
 
 class Renderer:
-    """What a silhouette depends on beside the vertices and φ.
+    """Silhouettes of meshes with these faces: all that an image depends on except vertices and φ.
 
     `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. `softness` is a
     `Softness`, at `progress` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
@@ -127,7 +124,7 @@ class Renderer:
         self._native = _native.Renderer(*self._settings.values())
         self._scene = Silhouettes(self._native)
         # Plain attributes: torch.compile reads no others.
-        self._least, self._parameters, self._surrogate = self._native.least_vertices, len(self._scene.phi), self._scene._felt is not None
+        self._least, self._parameters = self._native.least_vertices, len(self._scene.phi)
         self._by_own, self._by_phi = (_passes.named(_passes.Silhouette(self._scene, own)) for own in (True, False))
         self._by_own_name, self._by_phi_name = self._by_own.handle, self._by_phi.handle
 
@@ -164,7 +161,7 @@ class Renderer:
 
 
 class ColourRenderer:
-    """What an image in colours depends on beside vertices, attributes, background and φ.
+    """Colours of meshes with these faces: all that an image depends on except vertices, attributes, background and φ.
 
     `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. A face weighs what
     `softness`, a `Softness` at `progress` (0 to 1) of its run, says of the distance to its edge, times what `depth` says of its depth: the name
