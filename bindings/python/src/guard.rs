@@ -18,12 +18,16 @@ static FORKED: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// Works without the interpreter's lock; a panic becomes an error.
 pub(crate) fn guarded<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let caught = || catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(&*panic));
-    let done = py.detach(|| match own_threads()? {
-        None => caught(),
-        Some(threads) => threads.install(caught),
-    });
-    done.map_err(PyValueError::new_err)
+    py.detach(|| caught(work)).map_err(PyValueError::new_err)
+}
+
+/// Works on threads that this process has; a panic becomes its message.
+pub(crate) fn caught<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, String> {
+    let work = || catch_unwind(AssertUnwindSafe(work)).map_err(|panic| message(&*panic));
+    match own_threads()? {
+        None => work(),
+        Some(threads) => threads.install(work),
+    }
 }
 
 /// To be called as the library is loaded.

@@ -1,6 +1,15 @@
 //! Masks, and the camera from which a mesh has the silhouette of one.
 
-use std::path::PathBuf;
+use std::{
+    path::PathBuf,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{self, RecvTimeoutError},
+    },
+    thread,
+    time::Duration,
+};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -10,9 +19,12 @@ use softrast_tensor::NdArray;
 use softrast_views::Picture;
 
 use crate::{
-    guard::{guarded, refused},
+    guard::{caught, guarded, refused},
     meshes::mesh_of,
 };
+
+/// Time after which Ctrl-C is seen.
+const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
 
 /// R row by row, t, and overlap over union.
 type Found = ([[f64; 3]; 3], [f64; 3], f64);
@@ -50,29 +62,41 @@ pub(crate) fn find_pose(
     let camera =
         Pinhole { rotation, translation, focal: [fx, fy], centre: [cx, cy], size: mask.size() };
     camera.check().map_err(refused)?;
-    let mut raised = None;
-    let found = guarded(py, || {
-        let search = PoseSearch::new(&mesh, camera);
-        let search = if start.is_some() { search.starting_at(&camera) } else { search };
-        let steps = search.steps(&mask);
-        // Ctrl-C is seen at each step, which takes milliseconds.
-        let seen = |step: usize, loss: f64| {
-            let shown = Python::attach(|py| {
-                py.check_signals()?;
-                visit
-                    .as_ref()
-                    .map_or(Ok(()), |visit| visit.call1(py, (step, steps, loss)).map(drop))
-            });
-            shown.map_err(|error| {
-                raised = Some(error);
-                anyhow::anyhow!("the search was ended")
+    let (shown, mut seen) = mpsc::channel();
+    let ended = Arc::new(AtomicBool::new(false));
+    let started = start.is_some();
+    // On a thread of its own, which ends at its next step: what comes before the first one takes seconds for a large mesh.
+    let search = thread::spawn({
+        let ended = ended.clone();
+        move || {
+            caught(move || {
+                let search = PoseSearch::new(&mesh, camera);
+                let search = if started { search.starting_at(&camera) } else { search };
+                let steps = search.steps(&mask);
+                let each = move |step: usize, loss: f64| {
+                    anyhow::ensure!(!ended.load(Ordering::Relaxed), "the search was ended");
+                    Ok(shown.send((step, steps, loss))?)
+                };
+                search.progress(each).run::<NdArray>(&mask).map_err(|error| format!("{error:#}"))
             })
-        };
-        search.progress(seen).run::<NdArray>(&mask).map_err(|error| format!("{error:#}"))
-    })?;
-    if let Some(error) = raised {
-        return Err(error);
+        }
+    });
+    loop {
+        let (step, again) = py.detach(move || (seen.recv_timeout(BETWEEN_SIGNALS), seen));
+        seen = again;
+        let visited = py.check_signals().and_then(|()| match (&visit, step) {
+            (Some(visit), Ok(step)) => visit.call1(py, step).map(drop),
+            _ => Ok(()),
+        });
+        if let Err(error) = visited {
+            ended.store(true, Ordering::Relaxed);
+            return Err(error);
+        }
+        if step == Err(RecvTimeoutError::Disconnected) {
+            break;
+        }
     }
-    let poses = found.map_err(refused)?;
+    let found = py.detach(|| search.join()).map_err(|_| refused("the search has no result"))?;
+    let poses = found.and_then(|found| found).map_err(refused)?;
     Ok(poses.iter().map(|pose| (pose.camera.rotation, pose.camera.translation, pose.iou)).collect())
 }

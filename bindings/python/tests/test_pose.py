@@ -80,7 +80,8 @@ def test_an_error_of_the_progress_ends_the_search_and_is_raised():
     assert steps == [1, 2, 3]
 
 
-def test_ctrl_c_ends_a_search():
+@pytest.mark.parametrize("after", [0.2, 3.0])
+def test_ctrl_c_ends_a_search(after):
     script = f"""
 import signal, sys, numpy as np, softrast
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background is started with it ignored
@@ -96,12 +97,11 @@ except KeyboardInterrupt:
 """
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "ready\n"
-    time.sleep(0.5)
+    time.sleep(after)
     start = time.perf_counter()
     process.send_signal(signal.SIGINT)
     assert process.wait(timeout=60) == 7
-    # One second on an idle machine.
-    assert time.perf_counter() - start < 10.0
+    assert time.perf_counter() - start < 1.0
 
 
 @pytest.mark.parametrize("call, message", [

@@ -73,7 +73,7 @@ def find_pose(
     skew. All directions are tried, or `start` alone, which is an `R` and a `t`. `progress` receives the number of each step, which starts at 1
     and never falls, the largest number that it may reach, and the least loss.
 
-    Ctrl-C ends the search within a step, and so does an error of `progress`, which is raised again. Raises `ValueError` if nothing or all of the
+    Ctrl-C ends the call, and so does an error of `progress`, which is raised again; no pose is returned then. Raises `ValueError` if nothing or all of the
     mask is inside, the mesh has no extent, the start does not see it, or an argument is out of range.
     """
     positions, faces = _shapes.rows(mesh[0], "positions"), _shapes.faces(mesh[1])
