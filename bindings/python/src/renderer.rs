@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use softrast_raster::{
-    HostBackend, ImageSize, Projected, SoftRenderer, TConorm,
+    HostBackend, Projected, SoftRenderer, TConorm,
     low_level::{Rasterizer, Silhouette},
 };
 use softrast_softness::{EdgeSoftness, Softness as _};
@@ -47,6 +47,7 @@ impl Renderer {
         progress: f64,
         tolerance: f64,
         t_conorm: &str,
+        cull_back_faces: bool,
     ) -> PyResult<Self> {
         let t_conorm: TConorm = t_conorm.parse().map_err(refused)?;
         check_tolerance(tolerance)?;
@@ -54,7 +55,8 @@ impl Renderer {
         let faces = corners(&faces)?;
         let (least_vertices, count) = (least(&faces), faces.len());
         check_progress(progress)?;
-        let rasterizer = Rasterizer { size: ImageSize::from(size), tolerance, t_conorm };
+        let rasterizer =
+            Rasterizer { culls: cull_back_faces, tolerance, t_conorm, ..Rasterizer::new(size) };
         let renderer = guarded(py, || softness.0.renderer_at(progress, rasterizer, faces))?;
         Ok(Self { renderer, faces: count, t_conorm, least_vertices, size })
     }

@@ -222,3 +222,11 @@ def test_renderers_state_their_error():
     # Powers below 1 of a law that begins rise faster than knots follow.
     steep = softrast.Renderer(faces, 16, softrast.Softness("uniform", 1e-3, squared=True), tolerance=1e-7, t_conorm="yager:0.3")
     assert steep.error_bound > 1e-7
+
+
+def test_silhouettes_without_back_faces_are_those_of_front_faces():
+    faces = [[0, 1, 2], [0, 2, 1]]
+    draw = lambda faces, **more: softrast.silhouette(softrast.Renderer(faces, 8, softrast.Softness("logistic", 0.1), **more), CORNERS)
+    front, back, both = draw(faces[:1]), draw(faces[1:]), draw(faces, cull_back_faces=True)
+    assert np.abs(both - front).max() < 2e-5 or np.abs(both - back).max() < 2e-5
+    assert np.abs(draw(faces) - both).max() > 1e-3

@@ -9,7 +9,6 @@ use super::{
     lanes::{GROUP, LANES, Lanes, Plain, Work, has_vectors, run},
     reach::{Reach, grown, in_pixels, is_seen_clockwise},
     real::splat,
-    sum::Inputs,
     tasks::task,
 };
 use crate::ImageSize;
@@ -84,6 +83,19 @@ impl View {
     }
 }
 
+/// Faces that are drawn, and where.
+#[derive(Clone, Copy)]
+pub(crate) struct Drawn<'a> {
+    pub(crate) faces: &'a [[u32; 3]],
+    pub(crate) size: ImageSize,
+    /// Depth below which a vertex counts as behind the camera.
+    pub(crate) near: f64,
+    /// How far outside a face reaches, in NDC.
+    pub(crate) radius: f64,
+    /// Whether back faces are not drawn.
+    pub(crate) culls: bool,
+}
+
 /// Which faces reach which rows, of all views.
 #[derive(Debug)]
 pub struct Bands {
@@ -93,12 +105,17 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Lists the faces of each band of each view. A face enters the bands that its bounding box grown by the reach of the profile touches.
-    pub(crate) fn new<F: Vectors>(inputs: &Inputs<F>) -> Self {
-        let Inputs { vertices, faces, size, culls, views, bands: count, .. } = *inputs;
-        let vertices_per_view = vertices.len() / 3 / views.max(1);
-        let radius = F::from_f64(0.5 * inputs.grid.outer * size.shorter() as f64);
-        let near = F::from_f64(inputs.near);
+    /// Lists the faces of each of `count` bands of each view. `vertices` `[views, 3, vertices]` holds x, y in
+    /// NDC and the depth; a face enters the bands that its bounding box, grown by the radius, touches.
+    pub(crate) fn new<F: Vectors>(
+        vertices: &[F],
+        vertices_per_view: usize,
+        drawn: Drawn<'_>,
+        count: usize,
+    ) -> Self {
+        let Drawn { faces, size, culls, .. } = drawn;
+        let radius = F::from_f64(0.5 * drawn.radius * size.shorter() as f64);
+        let near = F::from_f64(drawn.near);
         let view = |vertices: &[F]| {
             let (x, rest) = vertices.split_at(vertices_per_view);
             let (y, z) = rest.split_at(vertices_per_view);

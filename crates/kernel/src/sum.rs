@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{
-    bands::{Bands, View},
+    bands::{Bands, Drawn, View},
     float::{Float, Vectors},
     gather::{Part, gather as gather_corners},
     lanes::{Plain, has_vectors},
@@ -44,7 +44,10 @@ impl<F> Inputs<'_, F> {
     where
         F: Vectors,
     {
-        Bands::new(self)
+        let per_view = self.vertices.len() / 3 / self.views.max(1);
+        let Self { vertices, faces, size, near, culls, .. } = *self;
+        let drawn = Drawn { faces, size, near, radius: self.grid.outer, culls };
+        Bands::new(vertices, per_view, drawn, self.bands)
     }
 
     /// What a walk over these inputs reads; `tangents` are those of vertices and table, or nothing.

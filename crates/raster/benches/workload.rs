@@ -4,7 +4,7 @@ use std::{env, path::Path, sync::Arc};
 
 use softrast_mesh::{Mesh, fox, icosphere};
 use softrast_raster::{
-    RasterBackend, TConorm,
+    RasterBackend,
     low_level::{Rasterizer, Silhouette},
     project,
 };

@@ -1,16 +1,17 @@
+mod knots;
+mod losses;
+
 use std::sync::Arc;
 
-use softrast_kernel::PixelLoss;
 use softrast_softness::Softness;
-use softrast_tensor::{Backend, DType, Element, Tensor, TensorData};
+use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
+use self::knots::Knots;
+pub(crate) use self::knots::stretch;
 use crate::{
     HostBackend, ImageSize, Projected, RasterBackend, Rasterizer, Silhouette, TConorm, Width,
-    cache::Cache, hard::hard_coverage_of, loss::loss_of_images,
+    cache::Cache, hard::hard_coverage_of,
 };
-
-/// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
-const SAME: f64 = 1e-12;
 
 /// Draws soft silhouettes of one mesh topology.
 ///
@@ -44,17 +45,6 @@ pub struct SoftRenderer<S> {
     /// Samples along each side of a pixel, where the image is hard.
     samples: Option<usize>,
     cache: Cache<Knots<S>>,
-}
-
-/// Support and knots for the parameters `phi`.
-#[derive(Clone, Debug)]
-struct Knots<S> {
-    phi: Vec<f64>,
-    /// Whether it is drawn on the CPU, and in which float type.
-    drawn: (bool, DType),
-    /// Faces that they serve.
-    room: usize,
-    silhouette: Silhouette<S>,
 }
 
 impl<S: Softness> SoftRenderer<S> {
@@ -363,81 +353,6 @@ impl<S: Softness> SoftRenderer<S> {
         })
     }
 
-    /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of the
-    /// [`silhouette`](Self::silhouette). Gradients reach the vertices alone, to second order.
-    ///
-    /// On the CPU, under the probabilistic sum and without a surrogate, it is one op that computes the gradient along with the image. It
-    /// takes two thirds to nine tenths of the time of two ops.
-    ///
-    /// # Panics
-    ///
-    /// If the target is of another size.
-    pub fn mse_loss<B: RasterBackend>(
-        &self,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, target, None)
-    }
-
-    /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
-    ///
-    /// # Panics
-    ///
-    /// If the target is of another size.
-    pub fn iou_loss<B: RasterBackend>(
-        &self,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, target, None)
-    }
-
-    /// [`mse_loss`](Self::mse_loss) where a share of each pixel counts, `[1 or views, height, width]` in [0, 1]: the coverage is multiplied by
-    /// it. Without one, all of every pixel counts.
-    ///
-    /// # Panics
-    ///
-    /// If the target or the shares are of another size.
-    pub fn weighted_mse_loss<B: RasterBackend>(
-        &self,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::SquaredError, vertices, target, counted)
-    }
-
-    /// [`iou_loss`](Self::iou_loss), likewise.
-    ///
-    /// # Panics
-    ///
-    /// If the target or the shares are of another size.
-    pub fn weighted_iou_loss<B: RasterBackend>(
-        &self,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        self.loss(PixelLoss::Iou, vertices, target, counted)
-    }
-
-    fn loss<B: RasterBackend>(
-        &self,
-        loss: PixelLoss,
-        vertices: Projected<B>,
-        target: Tensor<B, 3>,
-        counted: Option<Tensor<B, 3>>,
-    ) -> Tensor<B, 1> {
-        if self.surrogate.is_some() || self.samples.is_some() {
-            let counted = counted.map(Tensor::detach);
-            return loss_of_images(loss, self.silhouette(vertices), target.detach(), counted);
-        }
-        let vertices = vertices.tensor();
-        let (silhouette, table) = self.own_table(&vertices);
-        silhouette.loss(loss, vertices, table, target, counted)
-    }
-
     fn drawn<B: RasterBackend>(
         &self,
         silhouette: &Silhouette<S>,
@@ -468,32 +383,6 @@ impl<S: Softness> SoftRenderer<S> {
         self.surrogate = self.surrogate.map(|surrogate| Box::new(surrogate.changed(change)));
         self
     }
-}
-
-impl<S: Softness> Knots<S> {
-    /// Knots for parameters `phi`, if their softness is that of these stretched.
-    fn stretched_to(&self, phi: &[f64]) -> Option<Self> {
-        if self.phi == phi {
-            return Some(self.clone());
-        }
-        let widened = stretch(self.silhouette.softness(), &self.phi, phi)?;
-        let silhouette = self.silhouette.stretched(widened)?;
-        Some(Self { phi: phi.to_vec(), silhouette, ..*self })
-    }
-}
-
-impl<S: Softness> PartialEq for Knots<S> {
-    fn eq(&self, other: &Self) -> bool {
-        self.phi == other.phi && self.silhouette.profile() == other.silhouette.profile()
-    }
-}
-
-/// By how much a step with parameters `now` is stretched against one with those `before`, if that is all that they differ by.
-pub(crate) fn stretch(softness: &impl Softness, before: &[f64], now: &[f64]) -> Option<f64> {
-    let factor = softness.scale(now) / softness.scale(before);
-    let stretched = softness.with_scale_values(before, factor);
-    let same = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * b.abs().max(1.0);
-    stretched.iter().zip(now).all(same).then(|| softness.width(now) / softness.width(before))
 }
 
 fn check(softness: &impl Softness, phi: &[f64]) {

@@ -140,7 +140,7 @@ fn flags_that_do_not_go_together_are_refused() {
         (["--detail", "3"], "--detail"),
         (["--learning-rate", "0.1"], "--template"),
         (["--softness", "gauss"], "--template"),
-        (["--smooth", "26"], "at most 25"),
+        (["--smooth", "6"], "at most 5"),
         (["--faces", "5"], "100"),
         (["--size", "4"], "8"),
     ] {

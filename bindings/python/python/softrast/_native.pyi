@@ -35,7 +35,8 @@ class Softness:
 @final
 class Renderer:
     def __new__(
-        cls, faces: NDArray[np.int64], size: Sequence[int], softness: Softness, progress: float, tolerance: float, t_conorm: str
+        cls, faces: NDArray[np.int64], size: Sequence[int], softness: Softness, progress: float, tolerance: float, t_conorm: str,
+        cull_back_faces: bool,
     ) -> Renderer: ...
     def prepared(self, phi: _Numbers) -> Prepared: ...
     def surrogate(self) -> Optional[Tuple[NDArray[np.float64], Prepared]]: ...

@@ -105,7 +105,8 @@ class Renderer:
     `faces` `[F, 3]` are vertex numbers from 0. `size` is a number of pixels for a square, or `(height, width)`. `softness` is a
     `Softness`, at `progress` (0 to 1) of its run; if it has a surrogate, the image is its own and the gradient to the vertices that of the
     surrogate. `tolerance` (0 to 1) bounds the error of any pixel. `t_conorm` combines the coverages of faces: "probabilistic",
-    "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p".
+    "einstein", "hamacher:p", "frank:p", "yager:p", "aczel_alsina:p", "dombi:p" or "schweizer_sklar:p". `cull_back_faces` leaves out
+    faces whose corners the camera sees clockwise: for closed meshes, where they cost half of the time and widen the outline.
 
     A renderer can be copied and pickled. It keeps its knots while no parameter of φ moves by more than 2e-5, so that images are smooth in φ there.
 
@@ -114,12 +115,12 @@ class Renderer:
 
     def __init__(
         self, faces: ArrayLike, size: Size, softness: Softness, *, progress: float = 0.0, tolerance: float = 1e-5,
-        t_conorm: str = "probabilistic",
+        t_conorm: str = "probabilistic", cull_back_faces: bool = False,
     ) -> None:
         _shapes.softness(softness)
         self._settings = {
             "faces": _shapes.faces(faces), "size": _shapes.size(size), "softness": softness, "progress": progress, "tolerance": tolerance,
-            "t_conorm": t_conorm,
+            "t_conorm": t_conorm, "cull_back_faces": cull_back_faces,
         }
         self._native = _native.Renderer(*self._settings.values())
         self._scene = Silhouettes(self._native)

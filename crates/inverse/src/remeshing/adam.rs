@@ -2,7 +2,7 @@ use softrast_mesh::{ClosedSurface, Mesh, MeshError};
 use softrast_raster::RasterBackend;
 use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
-use super::geometry::{Neighbours, at, dot, normals};
+use super::geometry::{Neighbours, area, at, dot, normals};
 
 /// Decay of the mean of gradients, and of their squared lengths.
 const BETA: [f32; 2] = [0.7, 0.9];
@@ -16,6 +16,8 @@ const ALONG: f32 = 0.3;
 const ACROSS: f32 = 0.02;
 /// Steps from one remeshing to the next.
 const EVERY: usize = 3;
+/// Edges are so much longer than those of the most faces: not all faces have equal sides.
+const ROOM: f64 = 1.2;
 /// Squared lengths of gradients below this count as this: a vertex that nothing pulls stays.
 const LEAST: f32 = 1e-24;
 /// Columns that an optimiser keeps for each vertex: mean gradient, and the mean of its squared length.
@@ -26,6 +28,8 @@ const MOMENTS: usize = ClosedSurface::OWN;
 const COLOURS: usize = MOMENTS + STATE;
 /// Channels of a colour.
 const CHANNELS: usize = 3;
+/// Part of the way to the mean of its neighbours that a colour goes in each step: what no view shows takes the colours around it.
+const BLUR: f32 = 0.05;
 /// A step of a channel at the usual rate.
 const RATE_OF_COLOURS: f32 = 0.05;
 
@@ -62,6 +66,8 @@ const RATE_OF_COLOURS: f32 = 0.05;
 #[derive(Clone, Debug)]
 pub struct RemeshingAdam {
     surface: ClosedSurface,
+    /// Asked for edges.
+    length: f64,
     steps: usize,
     /// Against [`RATE`].
     rate: f64,
@@ -87,7 +93,7 @@ impl RemeshingAdam {
     /// If `length` is not positive and finite in 32 bits.
     pub fn new(mesh: &Mesh, length: f64) -> Result<Self, MeshError> {
         let surface = ClosedSurface::new(mesh, length, STATE)?;
-        Ok(Self { surface, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 })
+        Ok(Self { surface, length, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 })
     }
 
     /// The same, with a colour at each vertex, which moves with it and begins as this one.
@@ -98,7 +104,7 @@ impl RemeshingAdam {
     ) -> Result<Self, MeshError> {
         let surface = ClosedSurface::new(mesh, length, STATE + 3 * CHANNELS)?;
         let mut shape =
-            Self { surface, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 };
+            Self { surface, length, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 };
         let width = shape.surface.width();
         for row in shape.surface.numbers_mut().chunks_exact_mut(width) {
             row[COLOURS..COLOURS + CHANNELS].copy_from_slice(&colour);
@@ -106,7 +112,7 @@ impl RemeshingAdam {
         Ok(shape)
     }
 
-    /// With another largest number of faces.
+    /// With another largest number of faces: edges get as long as it asks for.
     #[must_use]
     pub fn with_most_faces(mut self, most: usize) -> Self {
         self.most = most;
@@ -142,6 +148,7 @@ impl RemeshingAdam {
     /// If it is not positive and finite in 32 bits.
     pub fn set_length(&mut self, length: f64) {
         self.surface.set_length(length);
+        self.length = length;
     }
 
     /// Vertices of each face, counterclockwise from outside.
@@ -174,7 +181,7 @@ impl RemeshingAdam {
     pub fn step<B: RasterBackend>(&mut self, gradient: Tensor<B, 3>) {
         let expected = [1, self.surface.vertices(), 3];
         assert_eq!(gradient.dims(), expected, "the gradient to the vertices");
-        self.step_by(gradient.into_data().iter().collect());
+        self.step_by(gradient.into_data().iter().collect(), None);
     }
 
     /// Positions of the vertices, `[vertices, 3]`.
@@ -187,31 +194,14 @@ impl RemeshingAdam {
         self.columns::<CHANNELS>(COLOURS)
     }
 
-    /// Takes a step of the channels against a gradient `[vertices, 3]`. They stay in [0, 1].
-    pub(crate) fn step_colours_by(&mut self, gradient: &[f32]) {
-        let rate = RATE_OF_COLOURS * self.rate.sqrt() as f32;
-        let width = self.surface.width();
-        let rows = self.surface.numbers_mut().chunks_exact_mut(width);
-        for (row, gradient) in rows.zip(gradient.chunks_exact(CHANNELS)) {
-            let (colours, moments) = row[COLOURS..].split_at_mut(CHANNELS);
-            let (means, squares) = moments.split_at_mut(CHANNELS);
-            for k in 0..CHANNELS {
-                means[k] += (1.0 - BETA[0]) * (gradient[k] - means[k]);
-                squares[k] += (1.0 - BETA[1]) * (gradient[k] * gradient[k] - squares[k]);
-                let step = rate * means[k] / squares[k].max(LEAST).sqrt();
-                colours[k] = (colours[k] - step).clamp(0.0, 1.0);
-            }
-        }
-    }
-
     /// Columns of all vertices, `[vertices, N]`.
     fn columns<const N: usize>(&self, first: usize) -> Vec<f32> {
         let rows = self.surface.numbers().chunks_exact(self.surface.width());
         rows.flat_map(|row| row[first..first + N].iter().copied()).collect()
     }
 
-    /// [`Self::step`] against a gradient `[vertices, 3]`.
-    pub(crate) fn step_by(&mut self, mut gradient: Vec<f32>) {
+    /// [`Self::step`] against a gradient to the vertices, and one to colours if there are some, `[vertices, 3]` each. Colours stay in [0, 1].
+    pub(crate) fn step_by(&mut self, mut gradient: Vec<f32>, colours: Option<Vec<f32>>) {
         let (faces, positions) = (self.surface.faces(), self.positions());
         let neighbours = Neighbours::new(faces, positions.len() / 3);
         for _ in 0..SMOOTHED.0 {
@@ -219,6 +209,7 @@ impl RemeshingAdam {
             gradient.iter_mut().zip(away).for_each(|(g, away)| *g += SMOOTHED.1 * away);
         }
         let away = neighbours.away(&positions);
+        let blurred = colours.as_ref().map(|_| neighbours.away(&self.colours()));
         let (normals, _) = normals(&positions, faces);
         self.steps += 1;
         let power = |beta: f32| 1.0 - beta.powi(self.steps.min(1 << 20) as i32);
@@ -240,8 +231,37 @@ impl RemeshingAdam {
                 row[k] += ALONG * along + across * out * normal[k] - step * mean[k];
             }
         }
+        if let (Some(gradient), Some(blurred)) = (colours, blurred) {
+            self.step_colours(&gradient, &blurred);
+        }
         if self.steps.is_multiple_of(EVERY) {
+            self.surface.set_length(self.length.max(self.least_length()));
             self.surface.remesh(self.most);
+            self.surface.set_length(self.length);
+        }
+    }
+
+    /// Edges of the surface if it had the most faces that it may have, all with equal sides, and a little more.
+    fn least_length(&self) -> f64 {
+        let positions = self.positions();
+        let area: f64 = self.faces().iter().map(|&face| area(&positions, face)).sum();
+        ROOM * (4.0 / 3f64.sqrt() * area / self.most as f64).sqrt()
+    }
+
+    /// Takes a step of the colours against a gradient, and a part of the way to the means of their neighbours.
+    fn step_colours(&mut self, gradient: &[f32], away: &[f32]) {
+        let rate = RATE_OF_COLOURS * self.rate.sqrt() as f32;
+        let width = self.surface.width();
+        for (vertex, row) in self.surface.numbers_mut().chunks_exact_mut(width).enumerate() {
+            let [gradient, away] = [gradient, away].map(|x| at(x, vertex as u32));
+            let (colours, moments) = row[COLOURS..].split_at_mut(CHANNELS);
+            let (means, squares) = moments.split_at_mut(CHANNELS);
+            for k in 0..CHANNELS {
+                means[k] += (1.0 - BETA[0]) * (gradient[k] - means[k]);
+                squares[k] += (1.0 - BETA[1]) * (gradient[k] * gradient[k] - squares[k]);
+                let step = rate * means[k] / squares[k].max(LEAST).sqrt();
+                colours[k] = (colours[k] + BLUR * away[k] - step).clamp(0.0, 1.0);
+            }
         }
     }
 }

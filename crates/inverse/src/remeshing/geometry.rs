@@ -133,6 +133,12 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// The area of a face.
+pub(crate) fn area(vertices: &[f32], face: [u32; 3]) -> f64 {
+    let normal = normal(face.map(|v| at(vertices, v)));
+    0.5 * f64::from(dot(normal, normal).sqrt())
+}
+
 /// Twice the area of a triangle, along its normal.
 #[inline(always)]
 fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
@@ -151,7 +157,7 @@ mod tests {
 
     #[test]
     fn normals_of_a_sphere_point_outwards() {
-        let ball = icosphere(2);
+        let ball = icosphere(4);
         let vertices = flat(ball.positions());
         let (found, _) = normals(&vertices, ball.faces());
         assert!(found.iter().zip(&vertices).all(|(n, p)| (n - p).abs() < 0.02));

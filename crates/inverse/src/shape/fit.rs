@@ -21,6 +21,8 @@ const SHORTENS: f64 = 1.0 / 3.0;
 const SETTLES: [f64; 2] = [0.3, 0.1];
 /// Radius of the sphere, in half the extent of the object.
 const SPHERE: f64 = 0.5;
+/// Smoothness of a surface that colours pull, against that of one that they do not.
+const BY_COLOURS: f64 = 5.0;
 /// Steps of a stage for each step of a stage on half as many pixels a side.
 const MORE: f64 = 1.3;
 
@@ -73,6 +75,9 @@ pub struct FoundShape {
 }
 
 impl<'a> ShapeFit<'a> {
+    /// Most by which a surface is kept smoother than usual.
+    pub const SMOOTHEST: f64 = RemeshingAdam::SMOOTHEST / BY_COLOURS;
+
     /// A search from a sphere, with 500 steps, on as many pixels as the pictures have around the object, up to 256 × 256.
     pub fn new(views: Vec<ViewOfShape>) -> Self {
         let told = Box::new(|_, _| Ok(()));
@@ -103,8 +108,13 @@ impl<'a> ShapeFit<'a> {
         Self { most, ..self }
     }
 
-    /// With a surface that is kept this much smoother than usual, above 0 and at most [`RemeshingAdam::SMOOTHEST`].
+    /// With a surface that is kept this much smoother than usual.
+    ///
+    /// # Panics
+    ///
+    /// If it is not above 0 and at most [`SMOOTHEST`](Self::SMOOTHEST).
     pub fn with_smoothing(self, smoothing: f64) -> Self {
+        assert!(smoothing > 0.0 && smoothing <= Self::SMOOTHEST, "smoothing by {smoothing}");
         Self { smoothing, ..self }
     }
 
@@ -152,10 +162,7 @@ impl<'a> ShapeFit<'a> {
                 }
                 let view = order.pop().expect("there is a view");
                 let pulled = stage.pull(&shape, view);
-                if let Some(colours) = &pulled.colours {
-                    shape.step_colours_by(colours);
-                }
-                shape.step_by(pulled.vertices);
+                shape.step_by(pulled.vertices, pulled.colours);
                 done += 1;
                 if let Err(error) = (self.told)(done, pulled.loss) {
                     stopped = Some(error);
@@ -208,7 +215,10 @@ impl<'a> ShapeFit<'a> {
             Some(colour) => RemeshingAdam::with_colours(&start, length, colour)?,
             None => RemeshingAdam::new(&start, length)?,
         };
-        Ok(shape.with_most_faces(self.most).with_smoothing(self.smoothing))
+        // What colours say of a surface is noisy, and normals say it better.
+        let by_colours = colour.is_some() && self.views.iter().all(|view| view.normals.is_none());
+        let usual = if by_colours { BY_COLOURS } else { 1.0 };
+        Ok(shape.with_most_faces(self.most).with_smoothing(usual * self.smoothing))
     }
 }
 

@@ -133,6 +133,7 @@ impl ClosedSurface {
     ///
     /// The surface stays closed and of its genus. No change turns a face by more than 60 degrees, makes a needle of it, or makes two edges between the same
     /// vertices.
+    #[expect(clippy::missing_panics_doc, reason = "a closed surface stays closed")]
     pub fn remesh(&mut self, most: usize) -> Changes {
         let count = self.vertices();
         let mut edges = HalfEdges::new(&self.faces, count).expect("a closed surface stays closed");

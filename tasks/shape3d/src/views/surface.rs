@@ -10,7 +10,7 @@ use softrast_lab::{Error, Progress, program::say, was_interrupted};
 use softrast_mesh::Mesh;
 use softrast_views::{PaintedView, View, mask_iou, visual_hull};
 
-use super::{Begin, Views};
+use super::flags::{Begin, Views};
 use crate::Args;
 
 /// Steps that move the surface.
