@@ -3,6 +3,7 @@
 //! Source: Laurentini 1994.
 
 use anyhow::{Context, ensure};
+use rayon::prelude::*;
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
 
@@ -27,12 +28,12 @@ const WITNESSES: usize = 2;
 ///
 /// The errors of [`frame_of_masks`]; and if no solid has these masks.
 pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
-    let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
+    let cones = views.par_iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
     let (centre, reach) = region(&cones)?;
     let field =
         |p: [f64; 3]| cones.iter().map(|cone| cone.distance(p)).fold(-reach, f64::max).min(reach);
     let strict = solid(centre, reach, cells, field)?;
-    let lacking: Vec<Vec<bool>> = cones.iter().map(|cone| cone.lacking(&strict)).collect();
+    let lacking: Vec<Vec<bool>> = cones.par_iter().map(|cone| cone.lacking(&strict)).collect();
     if lacking.iter().filter(|cells| cells.contains(&true)).count() < WITNESSES {
         return Ok(strict);
     }
@@ -129,7 +130,7 @@ fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
 /// If there is no view, a mask is empty or full, the cameras do not look at one thing from two directions at least, or a camera is inside
 /// the object or has it behind it: with the name of the view.
 pub fn frame_of_masks(views: &[View]) -> anyhow::Result<Frame> {
-    let cones = views.iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
+    let cones = views.par_iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
     let (middle, unit) = region(&cones)?;
     Ok(Frame { middle, unit })
 }

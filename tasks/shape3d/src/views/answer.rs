@@ -6,9 +6,9 @@ use image::RgbImage;
 use serde_json::{Value, json};
 use softrast_cli::{Answer, Given, seen_by};
 use softrast_lab::{
-    Viewer, contact_sheet, for_page,
+    Viewer, contact_sheet,
     format::{counted, fit, line},
-    overlay, png,
+    png,
     program::Output,
     report::{Beside, Labelled, Report, Table},
 };
@@ -34,7 +34,8 @@ const SHOWN: usize = 12;
 /// A view, how well the result fits it, and whether it was held out.
 pub(super) struct Scored {
     pub(super) view: View,
-    pub(super) silhouette: Vec<f64>,
+    /// The silhouette over the mask, for a page.
+    pub(super) overlay: RgbImage,
     pub(super) iou: f64,
     /// If colours were asked for.
     pub(super) colours: Option<Colours>,
@@ -50,17 +51,6 @@ impl Scored {
     fn scores(&self) -> String {
         let psnr = self.psnr().map(|psnr| format!(", PSNR {psnr:.2} dB")).unwrap_or_default();
         format!("IoU {:.4}{psnr}{}", self.iou, if self.held_out { ", held out" } else { "" })
-    }
-
-    /// The silhouette over the mask.
-    fn overlay(&self) -> RgbImage {
-        let View { mask, camera, .. } = &self.view;
-        for_page(overlay(&self.silhouette, mask.pixels(), camera.size.width))
-    }
-
-    /// Picture and result in colour.
-    fn pair(&self) -> Option<[RgbImage; 2]> {
-        Some(self.colours.as_ref()?.pair(self.view.camera.size))
     }
 }
 
@@ -91,8 +81,9 @@ struct Pictures {
 
 impl Pictures {
     fn new(scored: &[Scored]) -> anyhow::Result<Self> {
-        let overlays: Vec<RgbImage> = shown(scored).map(Scored::overlay).collect();
-        let pairs: Vec<[RgbImage; 2]> = shown(scored).filter_map(Scored::pair).collect();
+        let overlays: Vec<RgbImage> = shown(scored).map(|one| one.overlay.clone()).collect();
+        let pairs: Vec<[RgbImage; 2]> =
+            shown(scored).filter_map(|one| Some(one.colours.as_ref()?.pair.clone())).collect();
         let views = png(&contact_sheet(&overlays, 4.min(overlays.len())))?;
         let colours = || png(&contact_sheet(pairs.as_flattened(), 4));
         let colours = (!pairs.is_empty()).then(colours).transpose()?;

@@ -20,24 +20,20 @@ const SIZE: usize = 128;
 pub(super) struct Colours {
     /// In decibels.
     pub(super) psnr: Option<f64>,
-    /// The picture, then the result: red, green and blue over black, one after the other.
-    planes: [Vec<f64>; 2],
+    /// The picture and the result over black, for a page.
+    pub(super) pair: [RgbImage; 2],
 }
 
 impl Colours {
     pub(super) fn new(view: &PaintedView, mesh: &Mesh) -> Self {
+        let ImageSize { height, width } = view.view.camera.size;
+        let image = |planes: Vec<f64>| for_page(rgb_from_planes(&planes, width, height));
         let drawn = coloured_pixels(mesh, &view.view.camera);
         let psnr = view.psnr_of(&drawn);
         let picture = view.over_black.iter().flat_map(|channel| channel.pixels());
-        let picture = picture.map(|&x| f64::from(x)).collect();
+        let picture = image(picture.map(|&x| f64::from(x)).collect());
         let [red, green, blue, _] = drawn;
-        Self { psnr, planes: [picture, [red, green, blue].concat()] }
-    }
-
-    /// The picture and the result, for a page.
-    pub(super) fn pair(&self, size: ImageSize) -> [RgbImage; 2] {
-        let image = |planes: &Vec<f64>| rgb_from_planes(planes, size.width, size.height);
-        self.planes.each_ref().map(|planes| for_page(image(planes)))
+        Self { psnr, pair: [picture, image([red, green, blue].concat())] }
     }
 }
 

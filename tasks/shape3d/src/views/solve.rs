@@ -6,7 +6,7 @@ use std::{
 use anyhow::{Context, ensure};
 use softrast_cli::{Answer, Given};
 use softrast_inverse::{baked, silhouette_pixels};
-use softrast_lab::{Error, format::counted};
+use softrast_lab::{Error, for_page, format::counted, overlay};
 use softrast_mesh::Mesh;
 use softrast_views::{
     CameraFile, PaintedView, View, find_mask, frame_of_masks, mask_iou, reading_notes,
@@ -152,7 +152,8 @@ fn solved(given: &Given<'_, Args>, flags: &Views, folder: &PathBuf) -> anyhow::R
         let silhouette = silhouette_pixels(&mesh, &view.camera);
         let iou = mask_iou(&silhouette, &view.mask);
         let colours = painted.get(k).map(|view| Colours::new(view, &mesh));
-        Scored { view: view.clone(), silhouette, iou, colours, held_out }
+        let overlay = for_page(overlay(&silhouette, view.mask.pixels(), view.camera.size.width));
+        Scored { view: view.clone(), overlay, iou, colours, held_out }
     };
     let train = train.iter().enumerate().map(|view| score(view, &to_paint, false));
     let held_out = held_out.iter().enumerate().map(|view| score(view, &to_compare, true));
