@@ -10,7 +10,7 @@ use crate::{
     guard::{guarded, refused},
 };
 
-/// What errors name in the place of a file.
+/// The name that errors give in the place of a file.
 const PICKLE: &str = "a pickled softness";
 
 /// A soft step with its parameters φ: how much a face covers a pixel at a signed distance (NDC, positive inside).

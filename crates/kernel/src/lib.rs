@@ -91,7 +91,7 @@ pub use kernels::Kernels;
 pub use lanes::{Float, use_vectors};
 pub use loss::{EMPTY, Judged, PixelLoss, bands_of_losses};
 pub use nearest::Nearest;
-pub use reach::{FAR_AWAY, inside_spans};
+pub use reach::{FAR_AWAY, inside_spans, is_seen_clockwise};
 pub use real::Dual;
 pub use sum::Inputs;
 pub use table::Grid;

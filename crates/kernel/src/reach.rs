@@ -26,7 +26,7 @@ pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: ImageSize) -
 }
 
 /// Whether corners given in NDC, y up, go round clockwise.
-pub(crate) fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
+pub fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
     let [[ax, ay], [bx, by], [cx, cy]] = corners.map(|corner| corner.map(F::to_f64));
     (bx - ax) * (cy - ay) < (by - ay) * (cx - ax)
 }

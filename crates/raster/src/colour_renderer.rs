@@ -1,24 +1,19 @@
+mod op;
+mod prepared;
+
 use std::sync::Arc;
 
-use softrast_kernel::blend::TEXEL_CHANNELS;
-use softrast_softness::{DepthSoftness, EdgeSoftness, Family, OPAQUE, Softness};
+use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Backend, Element, Tensor, TensorData, vector};
 
+pub use self::prepared::WeightTables;
+use self::{op::soft_blend, prepared::Prepared};
 use crate::{
-    Attributes, Background, HostBackend, ImageSize, NEAR, Projected, RasterBackend, Rasterizer,
-    Weighting, Width,
-    backend::{fused, primitive},
-    cache::Cache,
-    curve::precise,
-    log_curve::{DepthCurve, LogCurve, Precision},
-    ops::FusedOp,
-    ops::blend::SoftBlend,
-    soft_renderer::stretch,
+    Attributes, Background, HostBackend, ImageSize, Projected, RasterBackend, Rasterizer,
+    Weighting, Width, cache::Cache, curve::precise, ops::FusedOp, ops::blend::SoftBlend,
     weighting::floor,
 };
 
-/// How far the logarithm of the background's weight may fall below the one that tables were made for.
-const MARGIN: f64 = 3.0;
 /// The background's part of what a face at the far plane weighs, where nothing else is asked for.
 const BEHIND: f64 = 1e-3;
 
@@ -69,18 +64,6 @@ pub struct ColourRenderer<S = EdgeSoftness> {
     cache: Cache<Prepared<S>>,
     #[cfg(feature = "wgpu")]
     topology: crate::gpu::Topology,
-}
-
-/// Knots for the parameters `phi`.
-#[derive(Clone, Debug)]
-struct Prepared<S> {
-    phi: [Vec<f64>; 2],
-    /// Logarithm of the background's weight that the tables reach.
-    log_weight: f64,
-    /// Faces that they serve.
-    room: usize,
-    edge: LogCurve<S>,
-    depth: DepthCurve,
 }
 
 impl ColourRenderer {
@@ -356,87 +339,6 @@ impl<S: Softness> ColourRenderer<S> {
     }
 }
 
-impl<S: Softness> Prepared<S> {
-    /// Half of the tolerance goes to culling, the other half to interpolation: an error of the logarithms of both factors of a weight by a
-    /// quarter of it each would do, were they all of one sign; together they move a mean by at most half as much as they are.
-    fn new(
-        weighting: &Weighting<S>,
-        phi: &[Vec<f64>; 2],
-        room: usize,
-        tolerance: f64,
-        log_weight: f64,
-    ) -> Self {
-        let device = Default::default();
-        let log_weight = log_weight - MARGIN;
-        let accuracy = tolerance / 2.0;
-        let least = (accuracy / room as f64).ln() + log_weight;
-        let highest = match weighting.depth {
-            DepthSoftness::Family(_) => 0.0,
-            DepthSoftness::Mlp => {
-                let ends = DepthSoftness::mlp_at_ends(vector::<HostBackend>(&phi[1]));
-                let ends: Vec<f64> = ends.into_data().iter().collect();
-                let [near, far] = weighting.planes;
-                // Only how far the table reaches depends on this.
-                let nearest = (far - NEAR) / (far - near);
-                (ends[0] * nearest).max(ends[1]).max(OPAQUE).ln()
-            }
-        };
-        let [edge, depth] = phi;
-        let by_depth = Precision { accuracy, least, floor: 0.0 };
-        let floor = floor(&weighting.edge);
-        let by_edge = Precision { least: least - highest, floor, ..by_depth };
-        let edge = LogCurve::new::<HostBackend>(weighting.edge.clone(), edge, by_edge, &device);
-        let depth = DepthCurve::new::<HostBackend>(weighting.depth, depth, by_depth, &device);
-        Self { phi: phi.clone(), log_weight, room, edge, depth }
-    }
-
-    /// Knots for parameters `phi`, if their softnesses are the prepared ones stretched.
-    fn stretched_to(&self, weighting: &Weighting<S>, phi: &[Vec<f64>; 2]) -> Option<Self> {
-        if self.phi == *phi {
-            return Some(self.clone());
-        }
-        let [edge, depth] = &self.phi;
-        let edge = self.edge.stretched(stretch(&weighting.edge, edge, &phi[0])?)?;
-        let depth = match (self.depth, weighting.depth) {
-            (DepthCurve::Family(curve), DepthSoftness::Family(family)) => {
-                DepthCurve::Family(curve.stretched(stretch(&family, depth, &phi[1])?)?)
-            }
-            (DepthCurve::Exponential, _) => DepthCurve::Exponential,
-            (curve, _) if *depth == phi[1] => curve,
-            _ => return None,
-        };
-        Some(Self { phi: phi.clone(), edge, depth, ..*self })
-    }
-
-    fn tables<B: Backend>(&self, [edge, depth]: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
-        tables(self.edge.table(edge), self.depth.table(depth))
-    }
-}
-
-impl<S: Softness> PartialEq for Prepared<S> {
-    fn eq(&self, other: &Self) -> bool {
-        let curves = |of: &Self| (of.edge.grid(), of.depth);
-        self.phi == other.phi && curves(self) == curves(other)
-    }
-}
-
-/// Makes the tables of an op that runs on slices.
-#[doc(hidden)]
-#[derive(Clone, Debug)]
-pub struct WeightTables<S = EdgeSoftness>(Prepared<S>);
-
-impl<S: Softness> WeightTables<S> {
-    /// Rows of both tables.
-    pub fn rows(&self) -> usize {
-        self.0.edge.grid().rows() + self.0.depth.grid().rows()
-    }
-
-    /// Both tables, `[rows, 4]`, of parameters of the softnesses by edge and by depth.
-    pub fn of<B: Backend>(&self, phi: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
-        self.0.tables(phi)
-    }
-}
-
 /// The logarithm of the background's weight.
 fn number<B: Backend>(background: &Background<B>) -> f64 {
     let numbers = background.log_weight.to_data().iter().collect::<Vec<f64>>();
@@ -450,67 +352,7 @@ fn check(weighting: &Weighting<impl Softness>, phi: &[Vec<f64>; 2]) {
     assert_eq!(found, expected, "parameters of the softnesses by edge and by depth");
 }
 
-/// Blends the attributes of the faces of each pixel by their weights: the one op under every soft image in colour.
-///
-/// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth; `tables` are those of the curves that `op` was made for. The
-/// result is `[views, channels + 1, height, width]`, the last channel being the faces' share.
-///
-/// # Panics
-///
-/// If the shapes do not fit or the float types differ.
-fn soft_blend<B: RasterBackend>(
-    op: SoftBlend,
-    vertices: Tensor<B, 3>,
-    attributes: &Attributes<B>,
-    tables: Tensor<B, 2>,
-    background: &Background<B>,
-) -> Tensor<B, 4> {
-    let [views, count, three] = vertices.dims();
-    assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
-    let largest = op.faces.iter().flatten().max().map_or(0, |&v| v as usize + 1);
-    assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
-    let (values, channels) = (attributes.values.clone(), attributes.channels());
-    let [own, ..] = values.dims();
-    assert!(own == 1 || own == views, "attributes of {own} views, but there are {views}");
-    assert_eq!(op.entries.len(), op.faces.len(), "faces that have attributes");
-    assert_eq!(background.colour.dims(), [channels], "channels of the background");
-    let texture = attributes.texture.clone().map(texels);
-    let of_texture = texture.as_ref().map_or(vertices.dtype(), Tensor::dtype);
-    let types = [values.dtype(), tables.dtype(), background.colour.dtype(), of_texture];
-    assert_eq!(
-        types,
-        [vertices.dtype(); 4],
-        "attributes, tables, background and texture differ in float type"
-    );
-    let behind = Tensor::cat(vec![background.colour.clone(), background.log_weight.clone()], 0);
-    let mut inputs = vec![
-        primitive(vertices.swap_dims(1, 2)),
-        primitive(values),
-        primitive(tables),
-        primitive(behind),
-    ];
-    inputs.extend(texture.map(primitive));
-    fused(&FusedOp::SoftBlend(op), inputs)
-}
-
-/// A texture as the op takes it: `[texels, 4]`.
-fn texels<B: Backend>(texture: Tensor<B, 3>) -> Tensor<B, 2> {
-    let [height, width, channels] = texture.dims();
-    let rows = texture.reshape([height * width, channels]);
-    if channels == TEXEL_CHANNELS {
-        return rows;
-    }
-    let options = (&rows.device(), rows.dtype());
-    let rest = Tensor::zeros([height * width, TEXEL_CHANNELS - channels], options);
-    Tensor::cat(vec![rows, rest], 1)
-}
-
 fn texture_size<B: Backend>(texture: &Tensor<B, 3>) -> [usize; 2] {
     let [height, width, _] = texture.dims();
     [height, width]
-}
-
-/// Both tables as the op takes them, `[rows, 4]`.
-fn tables<B: Backend>(edge: Tensor<B, 2>, depth: Tensor<B, 2>) -> Tensor<B, 2> {
-    Tensor::cat(vec![edge, depth], 0)
 }

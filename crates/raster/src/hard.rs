@@ -1,7 +1,7 @@
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use rayon::prelude::*;
-use softrast_kernel::inside_spans;
+use softrast_kernel::{inside_spans, is_seen_clockwise};
 use softrast_tensor::{Backend, Tensor, TensorData};
 
 use crate::{ImageSize, NEAR, Projected};
@@ -66,8 +66,8 @@ pub(crate) fn hard_coverage_of<B: Backend>(
     for (covers, vertices) in covers.chunks(fine.pixels()).zip(vertices.chunks((3 * count).max(1)))
     {
         faces.par_iter().with_min_len(AT_ONCE).for_each(|face| {
-            let [a, b, c] = face.map(|v| [vertices[v as usize], vertices[count + v as usize]]);
-            if culls && (b[0] - a[0]) * (c[1] - a[1]) < (b[1] - a[1]) * (c[0] - a[0]) {
+            let corner = |v: u32| [vertices[v as usize], vertices[count + v as usize]];
+            if culls && is_seen_clockwise(face.map(corner)) {
                 return;
             }
             inside_spans(vertices, face, NEAR, fine, |row, start, end| {

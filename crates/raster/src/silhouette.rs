@@ -215,7 +215,7 @@ impl<S: Softness> Silhouette<S> {
         Some(Self { softness: self.softness.clone(), profile, op })
     }
 
-    /// What draws other faces.
+    /// A silhouette of other faces.
     pub(crate) fn with_faces(&self, faces: Arc<[[u32; 3]]>) -> Self {
         let op = ProfileSum {
             faces,

@@ -71,6 +71,8 @@ impl PaintedView {
         let known = levels.map(|(&mask, &opacity)| mask * f32::from(u8::from(opacity > 0.0)));
         let part = match opaque {
             true => within(&view.mask),
+            // Copies share their pixels.
+            false if known.clone().eq(view.mask.pixels().iter().copied()) => view.mask.clone(),
             false => Picture::new(known.collect(), width),
         };
         let over_black = colours.map(|channel| {

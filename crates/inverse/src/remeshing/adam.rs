@@ -12,7 +12,7 @@ const RATE: f64 = 0.3;
 const SMOOTHED: (usize, f32) = (2, 0.5);
 /// Part of the way to the mean of its neighbours that a vertex goes along the surface after each step: it keeps triangles even.
 const ALONG: f32 = 0.3;
-/// The same across the surface, at the usual rate; it falls with the rate. With a quarter of it the surface folds.
+/// A part of that way across the surface, at the usual rate; it falls with the rate. With a quarter of it the surface folds.
 const ACROSS: f32 = 0.02;
 /// Steps from one remeshing to the next.
 const EVERY: usize = 3;
@@ -96,7 +96,7 @@ impl RemeshingAdam {
         Ok(Self { surface, length, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 })
     }
 
-    /// The same, with a colour at each vertex, which moves with it and begins as this one.
+    /// An optimiser with a colour at each vertex, which moves with it and begins as this one.
     pub(crate) fn with_colours(
         mesh: &Mesh,
         length: f64,

@@ -45,7 +45,7 @@ pub(super) struct Pulled {
     pub(super) loss: f64,
     /// `[vertices, 3]`.
     pub(super) vertices: Vec<f32>,
-    /// The same of the colours of vertices, where they are looked for.
+    /// The gradient to the colours of vertices, where they are looked for.
     pub(super) colours: Option<Vec<f32>>,
 }
 
@@ -163,7 +163,7 @@ impl Stage {
     }
 }
 
-/// What a view shows of a surface beside its coverage.
+/// Channels that a view shows of a surface, beside its coverage.
 struct Drawn {
     /// Numbers at vertices, `[1, vertices, channels]`.
     channels: Tensor<B, 3>,

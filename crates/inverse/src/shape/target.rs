@@ -49,7 +49,7 @@ impl Target {
         Self { size, mask, counted, normals, colours }
     }
 
-    /// The same on half as many pixels along each side.
+    /// The target on half as many pixels along each side.
     pub(super) fn halved(&self) -> Self {
         let half = |levels: &Vec<f32>| halved(levels, self.size);
         let channels = |of: &Channels| Channels {

@@ -91,7 +91,7 @@ impl ClosedSurface {
         &self.numbers
     }
 
-    /// The same, to be changed. Lengths must stay positive.
+    /// Numbers of all vertices, to be changed. Lengths must stay positive.
     pub fn numbers_mut(&mut self) -> &mut [f32] {
         &mut self.numbers
     }

@@ -17,7 +17,7 @@ pub struct Views {
     #[arg(long, value_name = "N|FILE", requires = "views")]
     pub hold_out: Option<HoldOut>,
 
-    /// What becomes the surface: the visual hull of the masks, or a sphere, which has no holes [default: hull]
+    /// Start of the surface: the visual hull of the masks, or a sphere, which has no holes [default: hull]
     #[arg(long, value_enum, requires = "views", conflicts_with = "template")]
     pub start: Option<Begin>,
 
@@ -68,7 +68,7 @@ impl From<OsString> for HoldOut {
     }
 }
 
-/// What becomes the surface.
+/// Start of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Begin {
     /// All that no mask rules out.
