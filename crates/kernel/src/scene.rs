@@ -43,6 +43,8 @@ pub(crate) struct BandRef<'a, T: Real> {
     pub(crate) table: Table<'a, T>,
     pub(crate) view: &'a View,
     pub(crate) band: usize,
+    /// Faces that a walk visits, of those of the band.
+    pub(crate) numbers: &'a [u32],
     /// Which list of the faces of the band a walk begins with.
     pub(crate) first_list: usize,
 }
@@ -175,7 +177,8 @@ impl<'a, T: Real> Scene<'a, T> {
             &numbers[index * length..(index + 1) * length]
         };
         let [vertices, tangents] = [self.vertices, self.tangents].map(of_view);
-        BandRef { vertices, tangents, table: self.table, view, band, first_list: 0 }
+        let numbers = view.faces(band);
+        BandRef { vertices, tangents, table: self.table, view, band, numbers, first_list: 0 }
     }
 
     /// Length of a row of a band: that of the image, and a group for what reaches beyond.

@@ -1,19 +1,25 @@
 //! `S = Σ profile(d)` over the faces of a pixel, its gradient, and the gradient of that.
 
+use std::{borrow::Cow, ops::Range};
+
 use rayon::prelude::*;
 
 use super::{
     bands::{Bands, Drawn, View},
     float::{Float, Vectors},
     gather::{Part, gather as gather_corners},
-    lanes::{Plain, has_vectors},
+    lanes::{self, Plain, has_vectors},
+    reach::{Reach, within},
     real::{self, Dual, Real, Table},
-    scene::Scene,
+    scene::{BandRef, Scene},
     table::Grid,
     tasks::task,
     walk::{Gradient, Image, TableGradient, walk},
 };
 use crate::ImageSize;
+
+/// Faces are chosen by what they pull where one in this many pixels, or more, has no upstream.
+const MOST_PULLED: usize = 4;
 
 /// The inputs of sums of a profile, in one float type.
 #[derive(Clone, Copy)]
@@ -154,8 +160,43 @@ fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, length: usize) -> Vec
     padded
 }
 
+/// Faces of a band that reach a pixel whose upstream is not 0; nothing where most pixels have one, and the choice would cost more than it saves.
+fn pulled<F: lanes::Float>(
+    upstream: &[F],
+    faces: &[u32],
+    reaches: &[Reach],
+    rows: Range<usize>,
+) -> Option<Vec<u32>> {
+    let zeros = upstream.iter().filter(|&&g| g == F::ZERO).count();
+    if zeros < upstream.len() / MOST_PULLED {
+        return None;
+    }
+    // How many pixels above and to the left of each have an upstream.
+    let (width, height) = (upstream.len() / rows.len().max(1), rows.len());
+    let stride = width + 1;
+    let mut counts = vec![0u32; stride * (height + 1)];
+    for (row, upstream) in upstream.chunks_exact(width.max(1)).enumerate() {
+        let (above, below) = counts.split_at_mut((row + 1) * stride);
+        let above = &above[row * stride..];
+        let mut of_row = 0;
+        for column in 0..width {
+            of_row += u32::from(upstream[column] != F::ZERO);
+            below[column + 1] = above[column + 1] + of_row;
+        }
+    }
+    let is_pulled = |&&face: &&u32| {
+        let reach = reaches[face as usize];
+        let own = within(rows.clone(), reach);
+        let until = |row: usize, column: u32| counts[(row - rows.start) * stride + column as usize];
+        until(own.end, reach.right) + until(own.start, reach.left)
+            != until(own.end, reach.left) + until(own.start, reach.right)
+    };
+    Some(faces.iter().filter(is_pulled).copied().collect())
+}
+
 /// Results of a band: for each face the gradient to x and y of its three corners, that to the table, and rows of the image.
-struct Walked<F> {
+struct Walked<'a, F> {
+    faces: Cow<'a, [u32]>,
     corners: Vec<[F; 6]>,
     table: Vec<[F; 4]>,
     image: Vec<F>,
@@ -176,17 +217,25 @@ fn gradient<T: Real>(
     let table_rows = if wrt_table { scene.grid.rows() } else { 0 };
     let in_band = |index: usize, band: usize| {
         let view = &bands.views[index];
-        let place = scene.place(view, index, views, band);
-        let rows = place.rows();
+        let whole = scene.place(view, index, views, band);
+        let rows = whole.rows();
+        let of_band = index * pixels + rows.start * width..index * pixels + rows.end * width;
+        let upstream = &upstream[of_band];
+        let some = match T::DUAL || wrt_table {
+            true => None,
+            false => pulled(upstream, whole.numbers, &view.reaches, rows),
+        };
+        let faces = some.map_or(Cow::Borrowed(whole.numbers), Cow::Owned);
+        let place = BandRef { numbers: &faces, ..whole };
         // Of floats, the image is a pass of its own. Of dual numbers it comes along, which costs little.
         let length = if T::DUAL { place.length(scene) } else { 0 };
         let mut walked = Walked {
-            corners: vec![[zero; 6]; view.faces(band).len()],
+            corners: vec![[zero; 6]; faces.len()],
             table: vec![[zero; 4]; table_rows],
             image: vec![place.empty(&scene.grid); length],
+            faces: Cow::default(),
         };
-        let of_band = index * pixels + rows.start * width..index * pixels + rows.end * width;
-        let upstream = &pad(&upstream[of_band], scene, place.length(scene));
+        let upstream = &pad(upstream, scene, place.length(scene));
         let gradient = Gradient::new(scene, upstream, &mut walked.corners);
         let image = Image { image: &mut walked.image, tail: place.tail(&scene.grid) };
         let table = TableGradient::new(upstream, &mut walked.table);
@@ -209,6 +258,7 @@ fn gradient<T: Real>(
                 all.1.finish(tail);
             }
         }
+        walked.faces = faces;
         walked
     };
     let count = scene.vertices.len();
@@ -242,18 +292,18 @@ fn gather<T: Real>(
     scene: &Scene<T>,
     view: &View,
     upstream: &[real::Float<T>],
-    walked: Vec<Walked<real::Float<T>>>,
+    walked: Vec<Walked<'_, real::Float<T>>>,
     vertices: &mut [real::Float<T>],
 ) -> (Vec<[real::Float<T>; 4]>, Vec<real::Float<T>>) {
     let zero = real::Float::<T>::ZERO;
     let mut table = vec![[zero; 4]; walked.first().map_or(0, |band| band.table.len())];
     let mut image = Vec::with_capacity(walked.iter().map(|band| band.image.len()).sum());
     let factor = real::Float::<T>::ONE;
-    let part = |(band, walked)| {
-        let Walked { corners, .. }: &Walked<_> = walked;
-        Part { faces: view.faces(band), corners, factor }
+    let part = |walked| {
+        let Walked { faces, corners, .. }: &Walked<_> = walked;
+        Part { faces, corners, factor }
     };
-    let parts: Vec<_> = walked.iter().enumerate().map(part).collect();
+    let parts: Vec<_> = walked.iter().map(part).collect();
     gather_corners(scene.faces, &parts, vertices);
     for walked in walked {
         for (total, part) in table.iter_mut().zip(&walked.table) {

@@ -113,7 +113,7 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
     fn run(mut self) -> usize {
         let mut list = List::new();
         let mut visited = self.place.first_list;
-        let lists = self.place.view.faces(self.place.band).chunks(LISTED);
+        let lists = self.place.numbers.chunks(LISTED);
         for numbers in lists.skip(self.place.first_list) {
             list.fill(self.scene, &self.place, numbers);
             if !self.visitor.begins(&list) {

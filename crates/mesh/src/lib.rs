@@ -64,7 +64,7 @@ pub use fox::{fox, painted_fox};
 pub use icosphere::icosphere;
 pub use material::{Material, from_linear, to_linear};
 pub use mesh::Mesh;
-pub use remesh::{Changes, ClosedSurface};
+pub use remesh::{Changes, ClosedSurface, SurfaceGeometry};
 pub use texture::Texture;
 
 /// Compiles and runs the README's example.

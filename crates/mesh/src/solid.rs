@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use crate::{Mesh, MeshError, surface_net::Grid};
 
 /// A vertex keeps away from both corners of its edge by this part of it, so that no two fall together.
@@ -25,7 +27,7 @@ impl Mesh {
     pub fn of_solid(
         [low, high]: [[f64; 3]; 2],
         cells: usize,
-        field: impl Fn([f64; 3]) -> f64,
+        field: impl Fn([f64; 3]) -> f64 + Sync,
     ) -> Result<Self, MeshError> {
         let sides = [0, 1, 2].map(|k| high[k] - low[k]);
         let step = sides.iter().copied().fold(0.0, f64::max) / cells.max(1) as f64;
@@ -43,11 +45,12 @@ impl Mesh {
 }
 
 /// Vertices and triangles of the surface where `field` is zero.
-fn surface(grid: &Grid, field: impl Fn([f64; 3]) -> f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-    let samples: Vec<f64> = grid.corners().map(|corner| field(grid.point(corner))).collect();
+fn surface(grid: &Grid, field: impl Fn([f64; 3]) -> f64 + Sync) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let corners: Vec<[usize; 3]> = grid.corners().collect();
+    let samples: Vec<f64> = corners.par_iter().map(|&corner| field(grid.point(corner))).collect();
     let (mut positions, mut faces) = (Vec::new(), Vec::new());
     let mut vertices: HashMap<[usize; 2], u32> = HashMap::new();
-    for cube in grid.corners().filter(|cube| (0..3).all(|k| cube[k] < grid.cubes[k])) {
+    for cube in corners.into_iter().filter(|cube| (0..3).all(|k| cube[k] < grid.cubes[k])) {
         let corner = |bits: usize| [0, 1, 2].map(|k| cube[k] + (bits >> k & 1));
         let numbers: [usize; 8] = std::array::from_fn(|bits| grid.number(corner(bits)));
         let inside = numbers.map(|number| samples[number] < 0.0);

@@ -8,9 +8,9 @@ use crate::Frame;
 
 /// Samples along each side of a pixel, where there are not too many of them.
 const SAMPLES: usize = 4;
-/// Rows of samples that are drawn together.
-const BAND: usize = 64;
-/// Samples of an image at most, at 32 bytes each. Larger pictures have fewer in a pixel, but one.
+/// Rows of pixels that are drawn together.
+const BAND: usize = 16;
+/// Samples of an image at most. Larger pictures have fewer in a pixel, but one.
 const MOST_SAMPLES: usize = 1 << 24;
 
 /// What a camera sees of a mesh with colours, without softness: red, green and blue over black, then the part of each pixel that the mesh
@@ -22,12 +22,14 @@ const MOST_SAMPLES: usize = 1 << 24;
 pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     let pixels = camera.size.pixels();
     let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
-    let (width, height) = (each * camera.size.width, each * camera.size.height);
-    let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * height];
+    let (columns, rows) = (camera.size.width, camera.size.height);
     let near = NEAR * Frame::of_cameras(mesh, [camera]).unit;
     let seen: Vec<[f64; 3]> = mesh.positions().iter().map(|&p| camera.pixel(p)).collect();
-    nearest.par_chunks_mut((BAND * width).max(1)).enumerate().for_each(|(band, nearest)| {
-        let first = band * BAND;
+    let share = 1.0 / (each * each) as f64;
+    let of_band = |band: usize| {
+        let (first, end) = (each * band * BAND, each * rows.min((band + 1) * BAND));
+        let width = each * columns;
+        let mut nearest = vec![[f64::INFINITY, 0.0, 0.0, 0.0]; width * (end - first)];
         for face in mesh.faces() {
             let corners = face.map(|v| {
                 let [x, y, z] = seen[v as usize];
@@ -35,8 +37,7 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
                 [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
             });
             let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
-            let rows = first..(first + BAND).min(height);
-            samples(corners, near, width, rows, |x, y, depth, weights| {
+            samples(corners, near, width, first..end, |x, y, depth, weights| {
                 let sample = &mut nearest[(y - first) * width + x];
                 if depth < sample[0] {
                     let [r, g, b] = [0, 1, 2].map(|k| {
@@ -46,17 +47,20 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
                 }
             });
         }
-    });
-    let share = 1.0 / (each * each) as f64;
-    let mut image = [(); 4].map(|()| vec![0.0; pixels]);
-    for (k, [depth, r, g, b]) in nearest.into_iter().enumerate().filter(|(_, s)| s[0].is_finite()) {
-        debug_assert!(depth > 0.0, "depth {depth}");
-        let pixel = k / width / each * camera.size.width + k % width / each;
-        for (channel, value) in image.iter_mut().zip([r, g, b, 1.0]) {
-            channel[pixel] += share * value;
+        let mut band = vec![[0.0; 4]; columns * (end - first) / each];
+        for (k, [depth, r, g, b]) in
+            nearest.into_iter().enumerate().filter(|(_, s)| s[0].is_finite())
+        {
+            debug_assert!(depth > 0.0, "depth {depth}");
+            let pixel = &mut band[k / width / each * columns + k % width / each];
+            for (channel, value) in pixel.iter_mut().zip([r, g, b, 1.0]) {
+                *channel += share * value;
+            }
         }
-    }
-    image
+        band
+    };
+    let bands: Vec<Vec<[f64; 4]>> = (0..rows.div_ceil(BAND)).into_par_iter().map(of_band).collect();
+    [0, 1, 2, 3].map(|k| bands.iter().flatten().map(|pixel| pixel[k]).collect())
 }
 
 /// Shows each sample of some rows inside of a triangle to `show`: its column and row, its depth, and the weights of the corners in space.

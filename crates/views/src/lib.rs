@@ -37,7 +37,7 @@ pub use cameras::{CameraFile, Distortion, Lens, PoseFile, colmap_pose, find_mask
 pub use coloured_pixels::coloured_pixels;
 pub use cut_sides::cut_sides;
 pub use frame::{Frame, bounding_ball};
-pub use hull::{frame_of_masks, visual_hull};
+pub use hull::{VisualHull, frame_of_masks, visual_hull};
 pub use mask_parts::mask_parts;
 pub use mask_rules::MaskRules;
 pub use painted_view::PaintedView;

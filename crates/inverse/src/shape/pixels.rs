@@ -9,16 +9,21 @@ const AT_ONCE: usize = 1 << 13;
 
 /// Adds the absolute differences of coverage and mask, and the gradient to coverage. Both are `[pixels]`.
 pub(super) fn judge_mask(target: &Target, coverage: &[f32], to_coverage: &mut [f32]) -> f64 {
-    let of = |(k, to): (usize, &mut f32)| {
-        let counted = target.counted[k];
-        let off = coverage[k] * counted - target.mask[k];
-        *to += sign(off) * counted;
-        f64::from(off.abs())
+    let of = |(part, to): (usize, &mut [f32])| {
+        let pixels = part * AT_ONCE..part * AT_ONCE + to.len();
+        let (counted, mask) = (&target.counted[pixels.clone()], &target.mask[pixels.clone()]);
+        let (coverage, mut loss) = (&coverage[pixels], 0.0);
+        for k in 0..to.len() {
+            let off = coverage[k] * counted[k] - mask[k];
+            to[k] += sign(off) * counted[k];
+            loss += f64::from(off.abs());
+        }
+        loss
     };
-    to_coverage.par_iter_mut().enumerate().with_min_len(AT_ONCE).map(of).sum()
+    to_coverage.par_chunks_mut(AT_ONCE).enumerate().map(of).sum()
 }
 
-/// Adds the absolute differences of what three channels show and what is known of it, and the gradients to the channels `[3, pixels]` and to coverage.
+/// Adds the absolute differences of three drawn channels and the known ones, and the gradients to the channels `[3, pixels]` and to coverage.
 ///
 /// A channel c shows `a c` where coverage is a. Where a pixel of the target counts in full or not at all, the outline is not known: there `p a c` is
 /// compared with `a` times what is known, p the part that counts, and coverage is not moved.
@@ -32,22 +37,29 @@ pub(super) fn judge_channels(
     let count = coverage.len();
     let planes = channels.chunks(count).zip(to_channels.chunks_mut(count)).zip(&target.levels);
     let of_plane = |((drawn, to), known): ((&[f32], &mut [f32]), &Vec<f32>)| -> f64 {
-        let each = to.par_iter_mut().zip(&mut *to_coverage).enumerate().with_min_len(AT_ONCE);
-        let of = |(k, (to, to_coverage)): (usize, (&mut f32, &mut f32))| {
-            let (a, c) = (coverage[k], drawn[k]);
-            let off = if target.is_opaque {
-                let off = target.part[k] * a * c - a * known[k];
-                *to += sign(off) * target.part[k] * a;
-                off
-            } else {
-                let off = counted[k] * a * c - known[k];
-                *to += sign(off) * counted[k] * a;
-                *to_coverage += sign(off) * counted[k] * c;
-                off
-            };
-            f64::from(off.abs())
+        let each = to.par_chunks_mut(AT_ONCE).zip(to_coverage.par_chunks_mut(AT_ONCE));
+        let of = |(part, (to, to_coverage)): (usize, (&mut [f32], &mut [f32]))| {
+            let pixels = part * AT_ONCE..part * AT_ONCE + to.len();
+            let (coverage, drawn) = (&coverage[pixels.clone()], &drawn[pixels.clone()]);
+            let (known, counted) = (&known[pixels.clone()], &counted[pixels.clone()]);
+            let (part, mut loss) = (&target.part[pixels], 0.0);
+            for k in 0..to.len() {
+                let (a, c) = (coverage[k], drawn[k]);
+                let off = if target.is_opaque {
+                    let off = part[k] * a * c - a * known[k];
+                    to[k] += sign(off) * part[k] * a;
+                    off
+                } else {
+                    let off = counted[k] * a * c - known[k];
+                    to[k] += sign(off) * counted[k] * a;
+                    to_coverage[k] += sign(off) * counted[k] * c;
+                    off
+                };
+                loss += f64::from(off.abs());
+            }
+            loss
         };
-        each.map(of).sum()
+        each.enumerate().map(of).sum()
     };
     planes.map(of_plane).sum()
 }

@@ -12,10 +12,7 @@ use super::{
     target::Target,
     view::ViewOfShape,
 };
-use crate::{
-    RemeshingAdam,
-    remeshing::{normals, normals_pulled_back},
-};
+use crate::RemeshingAdam;
 
 type B = Autodiff<HostBackend>;
 
@@ -89,12 +86,12 @@ impl Stage {
         let faces: Arc<[[u32; 3]]> = shape.faces().into();
         self.silhouettes = self.silhouettes.with_faces(faces.clone());
         self.colours = self.colours.with_faces(faces.clone());
-        let positions = shape.positions();
-        let vertices = leaf(positions.clone(), 3);
+        let geometry = shape.geometry();
+        let vertices = leaf(geometry.positions().to_vec(), 3);
         let cameras = Pinholes::new(&[self.cameras[view]], &device);
         let seen = project(vertices.clone(), cameras);
         let coverage = self.silhouettes.silhouette(seen.clone());
-        let drawn = self.drawn(shape, &positions, &faces, seen);
+        let drawn = self.drawn(shape, &faces, seen);
 
         let (target, covered) = (&self.targets[view], floats(coverage.clone().inner()));
         let pixels = covered.len();
@@ -123,18 +120,15 @@ impl Stage {
         };
         let mut to_vertices = gradient(&vertices);
         let mut colours = None;
-        if let Some(Drawn { channels, normals, .. }) = &drawn {
-            let rows = gradient(channels);
-            let rows = || rows.chunks_exact(channels.dims()[2]);
-            if let Some(normals) = normals {
-                let halves: Vec<f32> =
-                    rows().flat_map(|row| [0, 1, 2].map(|k| 0.5 * row[k])).collect();
-                let pulled = normals_pulled_back(&positions, &faces, normals, &halves);
+        if let Some(Drawn { channels, .. }) = &drawn {
+            let (rows, width) = (gradient(channels), channels.dims()[2]);
+            if self.has_normals {
+                let mut halves = triples(&rows, width, 0);
+                halves.iter_mut().for_each(|half| *half *= 0.5);
+                let pulled = geometry.pulled_back(&faces, &halves);
                 to_vertices.iter_mut().zip(pulled).for_each(|(to, pulled)| *to += pulled);
             }
-            colours = self
-                .has_colours
-                .then(|| rows().flat_map(|row| &row[row.len() - CHANNELS..]).copied().collect());
+            colours = self.has_colours.then(|| triples(&rows, width, width - CHANNELS));
         }
         Pulled { loss: loss / pixels as f64, vertices: to_vertices, colours }
     }
@@ -143,13 +137,12 @@ impl Stage {
     fn drawn(
         &self,
         shape: &RemeshingAdam,
-        positions: &[f32],
         faces: &Arc<[[u32; 3]]>,
         seen: Projected<B>,
     ) -> Option<Drawn> {
-        let normals = self.has_normals.then(|| normals(positions, faces));
+        let normals = shape.geometry().normals();
+        let halves = self.has_normals.then(|| normals.iter().map(|n| 0.5 * n).collect());
         let colours = self.has_colours.then(|| shape.colours());
-        let halves = normals.as_ref().map(|(normals, _)| normals.iter().map(|n| 0.5 * n).collect());
         let (numbers, count) = match (halves, colours) {
             (Some(numbers), None) | (None, Some(numbers)) => (numbers, CHANNELS),
             (Some(halves), Some(colours)) => (beside(&halves, &colours), 2 * CHANNELS),
@@ -159,7 +152,7 @@ impl Stage {
         let channels = leaf(numbers, count);
         let attributes = Attributes::new(channels.clone(), faces.clone());
         let image = self.colours.image(seen, &attributes, &background);
-        Some(Drawn { channels, normals, image })
+        Some(Drawn { channels, image })
     }
 }
 
@@ -167,9 +160,18 @@ impl Stage {
 struct Drawn {
     /// Numbers at vertices, `[1, vertices, channels]`.
     channels: Tensor<B, 3>,
-    /// Normals, and the lengths of their sums.
-    normals: Option<(Vec<f32>, Vec<f32>)>,
     image: Tensor<B, 4>,
+}
+
+/// Three columns of rows of this width, `[rows, 3]`.
+fn triples(numbers: &[f32], width: usize, first: usize) -> Vec<f32> {
+    if width == CHANNELS {
+        return numbers.to_vec();
+    }
+    let mut all = vec![0.0; numbers.len() / width * CHANNELS];
+    let rows = numbers.chunks_exact(width).zip(all.as_chunks_mut::<CHANNELS>().0);
+    rows.for_each(|(row, to)| to.copy_from_slice(&row[first..first + CHANNELS]));
+    all
 }
 
 /// Rows of three of one list, each followed by one of the other.

@@ -57,7 +57,7 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
         let mut list = List::new();
         let mut shown = Shown::new(blend.numbers);
         let mut block = Block::nothing();
-        for (k, numbers) in self.place.view.faces(self.place.band).chunks(LISTED).enumerate() {
+        for (k, numbers) in self.place.numbers.chunks(LISTED).enumerate() {
             list.fill(&blend.scene, &self.place, numbers);
             self.take((&list, numbers, k * LISTED), &mut shown, &mut block);
             self.visitor.ends(&blend.scene, &shown, k * LISTED);

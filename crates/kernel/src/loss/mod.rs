@@ -226,14 +226,14 @@ impl<L: Lanes> Band<'_, '_, L> {
         room.kept.clear();
         room.at.clear();
         room.corners.clear();
-        room.corners.resize(place.view.faces(place.band).len(), [0, 1, 2]);
+        room.corners.resize(place.numbers.len(), [0, 1, 2]);
         room.image.clear();
         room.image.resize(length, place.empty(&scene.grid));
         let tail = place.tail(&scene.grid);
         let Room { kept, at, corners, image, .. } = &mut **room;
         let image = Image { image, tail };
         let listed = walk(scene, *place, &mut Keep { image, kept, at, corners });
-        if listed * LISTED < place.view.faces(place.band).len() {
+        if listed * LISTED < place.numbers.len() {
             let place = BandRef { first_list: listed, ..*place };
             walk(scene, place, &mut Image { image: &mut room.image, tail });
         }
@@ -295,7 +295,7 @@ impl<L: Lanes> Band<'_, '_, L> {
     #[inline(always)]
     fn pull<const COUNT: usize>(&mut self, listed: usize) -> Vec<Vec<[L::Float; 6]>> {
         let Self { scene, place, room, .. } = self;
-        let faces = place.view.faces(place.band).len();
+        let faces = place.numbers.len();
         let mut gradients = vec![vec![[L::Float::ZERO; 6]; faces]; COUNT];
         let (mut sums, mut last) = ([CornerSums::nothing(); COUNT], None);
         for (k, (kept, &(at, face))) in room.kept.iter().zip(&room.at).enumerate() {

@@ -4,6 +4,7 @@ use crate::MeshError;
 const NONE: u32 = u32::MAX;
 
 /// Faces as half-edges: half-edge h lies in face h / 3 and begins at the corner h % 3 of it.
+#[derive(Clone, Debug)]
 pub(super) struct HalfEdges {
     /// The vertex at which each half-edge begins.
     pub(super) from: Vec<u32>,
@@ -80,22 +81,49 @@ impl HalfEdges {
         (self.twin[g as usize], self.twin[h as usize]) = (h, g);
     }
 
-    /// The faces that are left, over vertices that are left: numbers of others are removed, `[vertices, width]`.
-    pub(super) fn into_faces(self, numbers: &mut Vec<f32>, width: usize) -> Vec<[u32; 3]> {
-        let mut place = vec![NONE; self.is_gone.len()];
-        let mut count = 0;
-        for (vertex, place) in place.iter_mut().enumerate() {
-            if !self.is_gone[vertex] {
-                *place = count as u32;
-                numbers.copy_within(vertex * width..(vertex + 1) * width, count * width);
-                count += 1;
+    /// Vertices of each face.
+    pub(super) fn corners(&self) -> &[[u32; 3]] {
+        self.from.as_chunks().0
+    }
+
+    /// Leaves out dead faces and vertices that are gone, and the numbers of those, `[vertices, width]`.
+    pub(super) fn compact(&mut self, numbers: &mut Vec<f32>, width: usize) {
+        let vertex_of = places(&self.is_gone);
+        let face_of = places(&self.is_dead);
+        for (vertex, &place) in vertex_of.iter().enumerate().filter(|(_, place)| **place != NONE) {
+            let (to, h) = (place as usize, self.of_vertex[vertex]);
+            numbers.copy_within(vertex * width..(vertex + 1) * width, to * width);
+            self.of_vertex[to] = 3 * face_of[h as usize / 3] + h % 3;
+            self.valence[to] = self.valence[vertex];
+        }
+        for (face, &place) in face_of.iter().enumerate().filter(|(_, place)| **place != NONE) {
+            for k in 0..3 {
+                let (h, to) = (3 * face + k, 3 * place as usize + k);
+                let twin = self.twin[h];
+                self.from[to] = vertex_of[self.from[h] as usize];
+                self.twin[to] = 3 * face_of[twin as usize / 3] + twin % 3;
             }
         }
-        numbers.truncate(count * width);
-        let left =
-            self.from.as_chunks::<3>().0.iter().zip(&self.is_dead).filter(|(_, dead)| !**dead);
-        left.map(|(face, _)| face.map(|vertex| place[vertex as usize])).collect()
+        let count = |places: &[u32]| places.iter().filter(|place| **place != NONE).count();
+        let (vertices, faces) = (count(&vertex_of), count(&face_of));
+        numbers.truncate(vertices * width);
+        self.of_vertex.truncate(vertices);
+        self.valence.truncate(vertices);
+        self.from.truncate(3 * faces);
+        self.twin.truncate(3 * faces);
+        self.is_gone = vec![false; vertices];
+        self.is_dead = vec![false; faces];
     }
+}
+
+/// Where each of a list comes to lie without those that are left out, which have no place.
+fn places(left_out: &[bool]) -> Vec<u32> {
+    let mut count = 0;
+    let mut place = |&out: &bool| {
+        count += u32::from(!out);
+        if out { NONE } else { count - 1 }
+    };
+    left_out.iter().map(&mut place).collect()
 }
 
 /// The twin of each half-edge.

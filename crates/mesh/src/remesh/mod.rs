@@ -5,9 +5,11 @@
 
 mod collapse;
 mod flip;
+mod geometry;
 mod half_edges;
 mod split;
 
+pub use geometry::SurfaceGeometry;
 use half_edges::HalfEdges;
 
 use crate::{Mesh, MeshError};
@@ -37,7 +39,7 @@ const LONGEST: f32 = 4.0 / 3.0;
 /// ```
 #[derive(Clone, Debug)]
 pub struct ClosedSurface {
-    faces: Vec<[u32; 3]>,
+    edges: HalfEdges,
     /// `[vertices, width]`.
     numbers: Vec<f32>,
     width: usize,
@@ -61,6 +63,7 @@ impl ClosedSurface {
     pub const OWN: usize = 4;
 
     /// The surface of a mesh, with edges that should have this `length` in its units, and `more` numbers of 0 for each vertex.
+    /// Vertices without a face are left out.
     ///
     /// # Errors
     ///
@@ -75,15 +78,17 @@ impl ClosedSurface {
         for (row, place) in numbers.chunks_exact_mut(width).zip(mesh.positions()) {
             (0..3).for_each(|k| row[k] = place[k] as f32);
         }
-        let mut surface = Self { faces: mesh.faces().to_vec(), numbers, width };
+        let mut edges = HalfEdges::new(mesh.faces(), mesh.positions().len())?;
+        // Vertices without a face would stay where they are.
+        edges.compact(&mut numbers, width);
+        let mut surface = Self { edges, numbers, width };
         surface.set_length(length);
-        HalfEdges::new(&surface.faces, mesh.positions().len())?;
         Ok(surface)
     }
 
     /// Vertices of each face, counterclockwise from outside.
     pub fn faces(&self) -> &[[u32; 3]] {
-        &self.faces
+        self.edges.corners()
     }
 
     /// Numbers of all vertices, `[vertices, 4 + more]`: x, y, z, the length of edges, and those of the caller.
@@ -94,6 +99,20 @@ impl ClosedSurface {
     /// Numbers of all vertices, to be changed. Lengths must stay positive.
     pub fn numbers_mut(&mut self) -> &mut [f32] {
         &mut self.numbers
+    }
+
+    /// N columns of all vertices from this one on, `[vertices, N]`.
+    ///
+    /// # Panics
+    ///
+    /// If there are fewer columns.
+    pub fn columns<const N: usize>(&self, first: usize) -> Vec<f32> {
+        let mut all = vec![0.0; N * self.vertices()];
+        let rows = self.numbers.chunks_exact(self.width);
+        for (to, row) in all.as_chunks_mut::<N>().0.iter_mut().zip(rows) {
+            to.copy_from_slice(&row[first..first + N]);
+        }
+        all
     }
 
     /// Numbers of a vertex.
@@ -125,7 +144,7 @@ impl ClosedSurface {
     pub fn mesh(&self) -> Result<Mesh, MeshError> {
         let rows = self.numbers.chunks_exact(self.width);
         let positions = rows.map(|row| [0, 1, 2].map(|k| f64::from(row[k])));
-        Mesh::new(positions.collect(), self.faces.clone())
+        Mesh::new(positions.collect(), self.faces().to_vec())
     }
 
     /// One pass over all edges: collapses those below four fifths of their target length, the mean of both ends; splits those above four thirds, while there are
@@ -133,16 +152,14 @@ impl ClosedSurface {
     ///
     /// The surface stays closed and of its genus. No change turns a face by more than 60 degrees, makes a needle of it, or makes two edges between the same
     /// vertices.
-    #[expect(clippy::missing_panics_doc, reason = "a closed surface stays closed")]
     pub fn remesh(&mut self, most: usize) -> Changes {
-        let count = self.vertices();
-        let mut edges = HalfEdges::new(&self.faces, count).expect("a closed surface stays closed");
+        let Self { edges, numbers, width } = self;
         let changes = Changes {
-            collapsed: edges.collapse_short(&mut self.numbers, self.width),
-            split: edges.split_long(&mut self.numbers, self.width, most),
-            flipped: edges.flip(&self.numbers, self.width),
+            collapsed: edges.collapse_short(numbers, *width),
+            split: edges.split_long(numbers, *width, most),
+            flipped: edges.flip(numbers, *width),
         };
-        self.faces = edges.into_faces(&mut self.numbers, self.width);
+        edges.compact(numbers, *width);
         changes
     }
 }
@@ -207,7 +224,7 @@ mod tests {
     }
 
     fn checked(surface: &ClosedSurface) {
-        HalfEdges::new(&surface.faces, surface.vertices()).expect("closed");
+        HalfEdges::new(surface.faces(), surface.vertices()).expect("closed");
         let mesh = surface.mesh().unwrap();
         for [a, b, c] in mesh.triangles() {
             let narrow = |p: [f64; 3]| p.map(|x| x as f32);

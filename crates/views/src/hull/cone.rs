@@ -120,9 +120,20 @@ fn distances(on: &[bool]) -> Vec<f64> {
         }
     }
     let nearest = |k: usize| {
-        let (row, x) = (&along[k / SIDE * SIDE..][..SIDE], (k % SIDE) as f64);
-        let squares = row.iter().enumerate().map(|(at, d)| (at as f64 - x).powi(2) + d * d);
-        squares.fold(f64::INFINITY, f64::min).sqrt()
+        let (row, x) = (&along[k / SIDE * SIDE..][..SIDE], k % SIDE);
+        let mut least = row[x] * row[x];
+        // From the near ones to the far ones, as long as one of them may be nearer.
+        for off in 1..SIDE {
+            let square = (off * off) as f64;
+            if square >= least {
+                break;
+            }
+            let left = x.checked_sub(off).map(|at| row[at]);
+            for d in left.into_iter().chain(row.get(x + off).copied()) {
+                least = least.min(square + d * d);
+            }
+        }
+        least.sqrt()
     };
     (0..on.len()).map(nearest).collect()
 }

@@ -28,29 +28,61 @@ const WITNESSES: usize = 2;
 ///
 /// The errors of [`frame_of_masks`]; and if no solid has these masks.
 pub fn visual_hull(views: &[View], cells: usize) -> anyhow::Result<Mesh> {
-    let cones = views.par_iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
-    let (centre, reach) = region(&cones)?;
-    let field =
-        |p: [f64; 3]| cones.iter().map(|cone| cone.distance(p)).fold(-reach, f64::max).min(reach);
-    let strict = solid(centre, reach, cells, field)?;
-    let lacking: Vec<Vec<bool>> = cones.par_iter().map(|cone| cone.lacking(&strict)).collect();
-    if lacking.iter().filter(|cells| cells.contains(&true)).count() < WITNESSES {
-        return Ok(strict);
+    VisualHull::new(views)?.mesh(cells)
+}
+
+/// What masks rule out, to make [`visual_hull`]s of several numbers of cells of it.
+pub struct VisualHull<'a> {
+    cones: Vec<Cone<'a>>,
+    centre: [f64; 3],
+    reach: f64,
+}
+
+impl<'a> VisualHull<'a> {
+    /// Prepares the masks of these views.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`frame_of_masks`].
+    pub fn new(views: &'a [View]) -> anyhow::Result<Self> {
+        let cones = views.par_iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
+        let (centre, reach) = region(&cones)?;
+        Ok(Self { cones, centre, reach })
     }
-    let slack = 2.0 * reach / cells.max(1) as f64;
-    solid(centre, reach, cells, |p: [f64; 3]| {
-        let [mut farthest, mut second] = [-reach; 2];
-        for distance in cones.iter().map(|cone| cone.distance(p)) {
-            second = second.max(farthest.min(distance));
-            farthest = farthest.max(distance);
+
+    /// The [`visual_hull`] of so many cells.
+    ///
+    /// # Errors
+    ///
+    /// If no solid has these masks.
+    pub fn mesh(&self, cells: usize) -> anyhow::Result<Mesh> {
+        let Self { cones, centre, reach } = self;
+        let (centre, reach) = (*centre, *reach);
+        let field = |p: [f64; 3]| {
+            cones.iter().map(|cone| cone.distance(p)).fold(-reach, f64::max).min(reach)
+        };
+        let strict = solid(centre, reach, cells, field)?;
+        let lacking: Vec<Vec<bool>> = cones.par_iter().map(|cone| cone.lacking(&strict)).collect();
+        if lacking.iter().filter(|cells| cells.contains(&true)).count() < WITNESSES {
+            return Ok(strict);
         }
-        let lacks = |(cone, cells): &(&Cone, &Vec<bool>)| cone.cell(p).is_some_and(|k| cells[k]);
-        let is_ruled_out_once = farthest > 0.0 && second < slack;
-        match is_ruled_out_once && cones.iter().zip(&lacking).filter(lacks).count() >= WITNESSES {
-            true => second,
-            false => farthest.min(reach),
-        }
-    })
+        let slack = 2.0 * reach / cells.max(1) as f64;
+        solid(centre, reach, cells, |p: [f64; 3]| {
+            let [mut farthest, mut second] = [-reach; 2];
+            for distance in cones.iter().map(|cone| cone.distance(p)) {
+                second = second.max(farthest.min(distance));
+                farthest = farthest.max(distance);
+            }
+            let lacks =
+                |(cone, cells): &(&Cone, &Vec<bool>)| cone.cell(p).is_some_and(|k| cells[k]);
+            let is_ruled_out_once = farthest > 0.0 && second < slack;
+            match is_ruled_out_once && cones.iter().zip(&lacking).filter(lacks).count() >= WITNESSES
+            {
+                true => second,
+                false => farthest.min(reach),
+            }
+        })
+    }
 }
 
 /// The solid in a cube where a field is negative, without specks; a box around it has so many cells along its longest side.
@@ -58,7 +90,7 @@ fn solid(
     centre: [f64; 3],
     reach: f64,
     cells: usize,
-    field: impl Fn([f64; 3]) -> f64,
+    field: impl Fn([f64; 3]) -> f64 + Sync,
 ) -> anyhow::Result<Mesh> {
     // Where there is something at all.
     let step = 2.0 * reach / COARSE as f64;
@@ -66,11 +98,12 @@ fn solid(
         let cell = [k % COARSE, k / COARSE % COARSE, k / COARSE / COARSE];
         [0, 1, 2].map(|i| centre[i] - reach + (cell[i] as f64 + 0.5) * step)
     };
-    let inside = (0..COARSE.pow(3)).map(at).filter(|&p| field(p) < 0.5 * step);
+    let inside = (0..COARSE.pow(3)).into_par_iter().map(at).filter(|&p| field(p) < 0.5 * step);
     let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let [low, high] = inside.fold(none, |[low, high], p| {
-        [[0, 1, 2].map(|k| low[k].min(p[k])), [0, 1, 2].map(|k| high[k].max(p[k]))]
-    });
+    let around = |[low, high]: [[f64; 3]; 2], [lower, higher]: [[f64; 3]; 2]| {
+        [[0, 1, 2].map(|k| low[k].min(lower[k])), [0, 1, 2].map(|k| high[k].max(higher[k]))]
+    };
+    let [low, high] = inside.map(|p| [p; 2]).reduce(|| none, around);
     ensure!(
         low[0] <= high[0],
         "no solid has these masks: cameras and pictures do not belong together, or masks are inverted"

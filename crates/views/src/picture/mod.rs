@@ -116,16 +116,25 @@ impl Picture {
     #[must_use]
     pub fn despeckled(&self) -> Self {
         let (width, height) = (self.width, self.levels.len() / self.width);
-        let majority = |k: usize| {
-            let (x, y) = (k % width, k / width);
-            let around = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
-            let all = around(y, height).flat_map(|y| around(x, width).map(move |x| y * width + x));
-            let (sum, count) =
-                all.fold((0.0, 0.0), |(sum, count), k| (sum + self.levels[k], count + 1.0));
-            let most = sum >= 0.5 * count;
-            if (self.levels[k] >= 0.5) == most { self.levels[k] } else { f32::from(u8::from(most)) }
-        };
-        Self { levels: (0..self.levels.len()).map(majority).collect(), ..self.clone() }
+        let mut levels = self.levels.to_vec();
+        for (y, levels) in levels.chunks_exact_mut(width).enumerate() {
+            let rows = &self.levels[y.saturating_sub(1) * width..(y + 2).min(height) * width];
+            for (x, level) in levels.iter_mut().enumerate() {
+                let around = x.saturating_sub(1)..(x + 2).min(width);
+                let (mut sum, mut count) = (0.0, 0.0);
+                for row in rows.chunks_exact(width) {
+                    for &level in &row[around.clone()] {
+                        sum += level;
+                        count += 1.0;
+                    }
+                }
+                let most = sum >= 0.5 * count;
+                if (*level >= 0.5) != most {
+                    *level = f32::from(u8::from(most));
+                }
+            }
+        }
+        Self { levels: levels.into(), ..self.clone() }
     }
 }
 

@@ -18,15 +18,15 @@ impl Picture {
         let white = |x: usize, y: usize| {
             x < self.width && y < height && self.levels[y * self.width + x] >= 0.5
         };
-        let firmly = |[x, y]: &[usize; 2]| {
+        let firmly = |[x, y]: [usize; 2]| {
             let around = (0..9).map(|k| ((x + k % 3).wrapping_sub(1), (y + k / 3).wrapping_sub(1)));
             around.filter(|&(x, y)| white(x, y)).count() >= 5
         };
         let all = || {
-            let pixels = (0..self.levels.len()).map(|k| [k % self.width, k / self.width]);
-            pixels.filter(|&[x, y]| white(x, y))
+            let pixels = (0..self.levels.len()).filter(|&k| self.levels[k] >= 0.5);
+            pixels.map(|k| [k % self.width, k / self.width])
         };
-        let [low, high] = bounds(all().filter(firmly)).or_else(|| bounds(all()))?;
+        let [low, high] = bounds(all(), firmly).or_else(|| bounds(all(), |_| true))?;
         let extent = [0, 1].map(|k| (high[k] - low[k] + 1) as f64);
         let longest = extent[0].max(extent[1]);
         let corner = [0, 1].map(|k| low[k] as f64 + (extent[k] - longest) / 2.0);
@@ -56,8 +56,7 @@ impl Picture {
         let (height, cell) = (self.levels.len() / self.width, extent / side as f64);
         let columns = shares(self.width, left, cell, side);
         let rows = shares(height, top, cell, side);
-        let mean = |level: &dyn Fn(usize) -> f64| means(&columns, &rows, self.width, level);
-        [mean(&|at| f64::from(self.levels[at])), mean(&|_| 1.0)]
+        [means(&columns, &rows, self.width, &self.levels), covered(&columns, &rows)]
     }
 
     /// The image `[size * size]`, top row first, 0 black to 1 white.
@@ -77,29 +76,50 @@ impl Picture {
     }
 }
 
-/// Least and largest of places, along each axis.
-fn bounds(mut places: impl Iterator<Item = [usize; 2]>) -> Option<[[usize; 2]; 2]> {
-    let first = places.next()?;
-    Some(places.fold([first; 2], |[low, high], at| {
-        [[0, 1].map(|k| low[k].min(at[k])), [0, 1].map(|k| high[k].max(at[k]))]
-    }))
+/// Least and largest of the places that count, along each axis.
+fn bounds(
+    places: impl Iterator<Item = [usize; 2]>,
+    counts: impl Fn([usize; 2]) -> bool,
+) -> Option<[[usize; 2]; 2]> {
+    let [mut low, mut high] = [[usize::MAX; 2], [0; 2]];
+    for at in places {
+        // Within the bounds it changes nothing.
+        let is_within = (0..2).all(|k| low[k] <= at[k] && at[k] <= high[k]);
+        if !is_within && counts(at) {
+            (low, high) = ([0, 1].map(|k| low[k].min(at[k])), [0, 1].map(|k| high[k].max(at[k])));
+        }
+    }
+    (low[0] != usize::MAX).then_some([low, high])
 }
 
-/// Means over cells, row by row, of what a picture of this width has at each place.
-fn means(
-    columns: &[Shares],
-    rows: &[Shares],
-    width: usize,
-    level: impl Fn(usize) -> f64,
-) -> Vec<f64> {
-    let cells = rows.iter().flat_map(|row| columns.iter().map(move |column| (row, column)));
-    let mean = |(row, column): (&Shares, &Shares)| {
-        let along = |&(y, share): &(usize, f64)| {
-            share * column.iter().map(|&(x, part)| part * level(y * width + x)).sum::<f64>()
-        };
-        row.iter().map(along).sum()
+/// Means over cells, row by row, of levels `[height * width]`.
+fn means(columns: &[Shares], rows: &[Shares], width: usize, levels: &[f32]) -> Vec<f64> {
+    let mut means = vec![0.0; rows.len() * columns.len()];
+    // Rows of the picture over the cells of a row: the last one may begin the next row of cells too.
+    let (mut last, mut along) = (None, vec![0.0; columns.len()]);
+    for (row, means) in rows.iter().zip(means.chunks_mut(columns.len().max(1))) {
+        for &(y, share) in row {
+            if last != Some(y) {
+                let levels = &levels[y * width..(y + 1) * width];
+                let sum = |column: &Shares| {
+                    column.iter().map(|&(x, part)| part * f64::from(levels[x])).sum::<f64>()
+                };
+                along.iter_mut().zip(columns).for_each(|(along, column)| *along = sum(column));
+                last = Some(y);
+            }
+            means.iter_mut().zip(&along).for_each(|(mean, along)| *mean += share * along);
+        }
+    }
+    means
+}
+
+/// The part of each cell that is within the picture, row by row.
+fn covered(columns: &[Shares], rows: &[Shares]) -> Vec<f64> {
+    let sums = |cells: &[Shares]| -> Vec<f64> {
+        cells.iter().map(|cell| cell.iter().map(|(_, share)| share).sum()).collect()
     };
-    cells.map(mean).collect()
+    let (columns, rows) = (sums(columns), sums(rows));
+    rows.iter().flat_map(|row| columns.iter().map(move |column| row * column)).collect()
 }
 
 /// Which picture elements a cell holds, and what share of it they fill.

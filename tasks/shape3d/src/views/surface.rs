@@ -2,23 +2,17 @@
 
 use anyhow::anyhow;
 use softrast_cli::Given;
-use softrast_inverse::{
-    shape::{ShapeFit, ViewOfShape},
-    silhouette_pixels,
-};
+use softrast_inverse::shape::{ShapeFit, ViewOfShape, fitting_hull};
 use softrast_lab::{Error, Progress, program::say, was_interrupted};
 use softrast_mesh::Mesh;
-use softrast_views::{PaintedView, View, mask_iou, visual_hull};
+use softrast_views::{PaintedView, View};
 
 use super::flags::{Begin, Views};
 use crate::Args;
 
 /// Steps that move the surface.
 const STEPS: usize = 500;
-/// Cells of the visual hull along its longest side, from few to many: thin parts need more of them.
-const CELLS: [usize; 3] = [32, 45, 64];
-/// More cells are worth their time if the mean `IoU` of the hull grows by so much.
-const GROWS: f64 = 0.01;
+
 /// How many steps are taken.
 pub(super) fn steps(given: &Given<'_, Args>) -> usize {
     given.common.steps.unwrap_or(STEPS)
@@ -49,7 +43,10 @@ pub(super) fn found(
         fit = fit.with_size(size);
     }
     if flags.start.unwrap_or_default() == Begin::Hull {
-        fit = fit.starting_at(fitting_hull(views)?);
+        let hull = fitting_hull(views);
+        let hull =
+            hull.map_err(|why| anyhow!("{why:#} (--invert?); --start sphere needs no hull"))?;
+        fit = fit.starting_at(hull);
     }
     if let Some(most) = flags.faces {
         fit = fit.with_most_faces(most as usize);
@@ -68,25 +65,4 @@ pub(super) fn found(
         say(&format!("stopped after {taken} of {steps} steps: the mesh is as it was then"));
     }
     Ok(found.mesh)
-}
-
-/// The visual hull in as few cells as show what the masks show.
-fn fitting_hull(views: &[View]) -> anyhow::Result<Mesh> {
-    let with = |cells: usize| {
-        let hull = visual_hull(views, cells);
-        let hull =
-            hull.map_err(|why| anyhow!("{why:#} (--invert?); --start sphere needs no hull"))?;
-        let iou = |view: &View| mask_iou(&silhouette_pixels(&hull, &view.camera), &view.mask);
-        let mean = views.iter().map(iou).sum::<f64>() / views.len() as f64;
-        anyhow::Ok((hull, mean))
-    };
-    let (mut mesh, mut iou) = with(CELLS[0])?;
-    for cells in &CELLS[1..] {
-        let (finer, better) = with(*cells)?;
-        if better < iou + GROWS {
-            break;
-        }
-        (mesh, iou) = (finer, better);
-    }
-    Ok(mesh)
 }

@@ -1,8 +1,7 @@
-use softrast_mesh::{ClosedSurface, Mesh, MeshError};
+use rayon::prelude::*;
+use softrast_mesh::{ClosedSurface, Mesh, MeshError, SurfaceGeometry};
 use softrast_raster::RasterBackend;
 use softrast_tensor::{Backend, Element, Tensor, TensorData};
-
-use super::geometry::{Neighbours, area, at, dot, normals};
 
 /// Decay of the mean of gradients, and of their squared lengths.
 const BETA: [f32; 2] = [0.7, 0.9];
@@ -30,6 +29,8 @@ const COLOURS: usize = MOMENTS + STATE;
 const CHANNELS: usize = 3;
 /// Part of the way to the mean of its neighbours that a colour goes in each step: what no view shows takes the colours around it.
 const BLUR: f32 = 0.05;
+/// Vertices that one thread takes at once.
+const AT_ONCE: usize = 1 << 11;
 /// A step of a channel at the usual rate.
 const RATE_OF_COLOURS: f32 = 0.05;
 
@@ -66,6 +67,7 @@ const RATE_OF_COLOURS: f32 = 0.05;
 #[derive(Clone, Debug)]
 pub struct RemeshingAdam {
     surface: ClosedSurface,
+    geometry: SurfaceGeometry,
     /// Asked for edges.
     length: f64,
     steps: usize,
@@ -92,8 +94,7 @@ impl RemeshingAdam {
     ///
     /// If `length` is not positive and finite in 32 bits.
     pub fn new(mesh: &Mesh, length: f64) -> Result<Self, MeshError> {
-        let surface = ClosedSurface::new(mesh, length, STATE)?;
-        Ok(Self { surface, length, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 })
+        Ok(Self::of_surface(ClosedSurface::new(mesh, length, STATE)?, length))
     }
 
     /// An optimiser with a colour at each vertex, which moves with it and begins as this one.
@@ -103,13 +104,18 @@ impl RemeshingAdam {
         colour: [f32; CHANNELS],
     ) -> Result<Self, MeshError> {
         let surface = ClosedSurface::new(mesh, length, STATE + 3 * CHANNELS)?;
-        let mut shape =
-            Self { surface, length, steps: 0, rate: 1.0, most: Self::MOST_FACES, smoothing: 1.0 };
+        let mut shape = Self::of_surface(surface, length);
         let width = shape.surface.width();
         for row in shape.surface.numbers_mut().chunks_exact_mut(width) {
             row[COLOURS..COLOURS + CHANNELS].copy_from_slice(&colour);
         }
         Ok(shape)
+    }
+
+    fn of_surface(surface: ClosedSurface, length: f64) -> Self {
+        let geometry = SurfaceGeometry::new(surface.faces(), surface.columns::<3>(0));
+        let (rate, most, smoothing) = (1.0, Self::MOST_FACES, 1.0);
+        Self { surface, geometry, length, steps: 0, rate, most, smoothing }
     }
 
     /// With another largest number of faces: edges get as long as it asks for.
@@ -158,7 +164,7 @@ impl RemeshingAdam {
 
     /// Positions of the vertices, `[1, vertices, 3]`.
     pub fn vertices<B: Backend>(&self, device: &B::Device) -> Tensor<B, 3> {
-        let positions = self.positions();
+        let positions = self.geometry.positions().to_vec();
         let shape = [1, positions.len() / 3, 3];
         let data = TensorData::new(positions, shape);
         Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
@@ -184,67 +190,71 @@ impl RemeshingAdam {
         self.step_by(gradient.into_data().iter().collect(), None);
     }
 
-    /// Positions of the vertices, `[vertices, 3]`.
-    pub(crate) fn positions(&self) -> Vec<f32> {
-        self.columns::<3>(0)
+    /// Positions and normals.
+    pub(crate) fn geometry(&self) -> &SurfaceGeometry {
+        &self.geometry
     }
 
     /// Channels at the vertices, `[vertices, 3]`, of an optimiser that has some.
     pub(crate) fn colours(&self) -> Vec<f32> {
-        self.columns::<CHANNELS>(COLOURS)
-    }
-
-    /// Columns of all vertices, `[vertices, N]`.
-    fn columns<const N: usize>(&self, first: usize) -> Vec<f32> {
-        let rows = self.surface.numbers().chunks_exact(self.surface.width());
-        rows.flat_map(|row| row[first..first + N].iter().copied()).collect()
+        self.surface.columns::<CHANNELS>(COLOURS)
     }
 
     /// [`Self::step`] against a gradient to the vertices, and one to colours if there are some, `[vertices, 3]` each. Colours stay in [0, 1].
     pub(crate) fn step_by(&mut self, mut gradient: Vec<f32>, colours: Option<Vec<f32>>) {
-        let (faces, positions) = (self.surface.faces(), self.positions());
-        let neighbours = Neighbours::new(faces, positions.len() / 3);
         for _ in 0..SMOOTHED.0 {
-            let away = neighbours.away(&gradient);
+            let away = self.geometry.umbrella(&gradient);
             gradient.iter_mut().zip(away).for_each(|(g, away)| *g += SMOOTHED.1 * away);
         }
-        let away = neighbours.away(&positions);
-        let blurred = colours.as_ref().map(|_| neighbours.away(&self.colours()));
-        let (normals, _) = normals(&positions, faces);
         self.steps += 1;
+        if let Some(gradient) = colours {
+            let blurred = self.geometry.umbrella(&self.colours());
+            self.step_colours(&gradient, &blurred);
+        }
+        self.step_vertices(&gradient);
+        if self.steps.is_multiple_of(EVERY) {
+            self.surface.set_length(self.length.max(self.least_length()));
+            self.surface.remesh(self.most);
+            self.surface.set_length(self.length);
+            self.geometry =
+                SurfaceGeometry::new(self.surface.faces(), self.surface.columns::<3>(0));
+        } else {
+            self.geometry.move_to(self.surface.faces(), self.surface.columns::<3>(0));
+        }
+    }
+
+    /// Takes a step of the vertices against a gradient, and a part of the way to the means of their neighbours.
+    fn step_vertices(&mut self, gradient: &[f32]) {
+        let Self { surface, geometry, .. } = self;
+        let away = geometry.umbrella(geometry.positions());
         let power = |beta: f32| 1.0 - beta.powi(self.steps.min(1 << 20) as i32);
         let corrections = BETA.map(power);
         let (rate, across) =
             ((RATE * self.rate) as f32, ACROSS * (self.rate * self.smoothing) as f32);
-        let width = self.surface.width();
-        for (vertex, row) in self.surface.numbers_mut().chunks_exact_mut(width).enumerate() {
-            let [g, away, normal] = [&gradient, &away, &normals].map(|x| at(x, vertex as u32));
+        let width = surface.width();
+        let rows = surface.numbers_mut().par_chunks_exact_mut(width).with_min_len(AT_ONCE);
+        rows.enumerate().for_each(|(vertex, row)| {
+            let (g, away) = (at(gradient, vertex), at(&away, vertex));
+            let normal = at(geometry.normals(), vertex);
             let moments = &mut row[MOMENTS..MOMENTS + STATE];
-            (0..3).for_each(|k| moments[k] += (1.0 - BETA[0]) * (g[k] - moments[k]));
+            for k in 0..3 {
+                moments[k] += (1.0 - BETA[0]) * (g[k] - moments[k]);
+            }
             moments[3] += (1.0 - BETA[1]) * (dot(g, g) - moments[3]);
             let size = (moments[3] / corrections[1]).max(LEAST).sqrt();
-            let mean = [0, 1, 2].map(|k| moments[k] / corrections[0]);
-            let step = rate * row[ClosedSurface::LENGTH] / size;
+            let mean = [moments[0], moments[1], moments[2]];
+            let step = rate * row[ClosedSurface::LENGTH] / (size * corrections[0]);
             let out = dot(away, normal);
             for k in 0..3 {
                 let along = away[k] - out * normal[k];
                 row[k] += ALONG * along + across * out * normal[k] - step * mean[k];
             }
-        }
-        if let (Some(gradient), Some(blurred)) = (colours, blurred) {
-            self.step_colours(&gradient, &blurred);
-        }
-        if self.steps.is_multiple_of(EVERY) {
-            self.surface.set_length(self.length.max(self.least_length()));
-            self.surface.remesh(self.most);
-            self.surface.set_length(self.length);
-        }
+        });
     }
 
     /// Edges of the surface if it had the most faces that it may have, all with equal sides, and a little more.
     fn least_length(&self) -> f64 {
-        let positions = self.positions();
-        let area: f64 = self.faces().iter().map(|&face| area(&positions, face)).sum();
+        let area = self.geometry.area(self.faces());
         ROOM * (4.0 / 3f64.sqrt() * area / self.most as f64).sqrt()
     }
 
@@ -252,8 +262,9 @@ impl RemeshingAdam {
     fn step_colours(&mut self, gradient: &[f32], away: &[f32]) {
         let rate = RATE_OF_COLOURS * self.rate.sqrt() as f32;
         let width = self.surface.width();
-        for (vertex, row) in self.surface.numbers_mut().chunks_exact_mut(width).enumerate() {
-            let [gradient, away] = [gradient, away].map(|x| at(x, vertex as u32));
+        let rows = self.surface.numbers_mut().par_chunks_exact_mut(width).with_min_len(AT_ONCE);
+        rows.enumerate().for_each(|(vertex, row)| {
+            let (gradient, away) = (at(gradient, vertex), at(away, vertex));
             let (colours, moments) = row[COLOURS..].split_at_mut(CHANNELS);
             let (means, squares) = moments.split_at_mut(CHANNELS);
             for k in 0..CHANNELS {
@@ -262,6 +273,17 @@ impl RemeshingAdam {
                 let step = rate * means[k] / squares[k].max(LEAST).sqrt();
                 colours[k] = (colours[k] + BLUR * away[k] - step).clamp(0.0, 1.0);
             }
-        }
+        });
     }
+}
+
+/// The three numbers of a vertex.
+#[inline(always)]
+fn at(numbers: &[f32], vertex: usize) -> [f32; 3] {
+    [numbers[3 * vertex], numbers[3 * vertex + 1], numbers[3 * vertex + 2]]
+}
+
+#[inline(always)]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
