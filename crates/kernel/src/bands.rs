@@ -1,4 +1,4 @@
-//! Which faces reach which rows: the list that culling leaves.
+//! Lists of the faces whose support reaches each band of rows, as culling leaves them.
 
 use std::ops::Range;
 
@@ -19,12 +19,12 @@ const MOST_ROWS: usize = 64;
 const FEW_VIEWS: usize = 4;
 /// No band has more rows: a list has eight bits for them.
 const ROWS: usize = 255;
-/// Faces or vertices that one thread takes at once.
+/// Faces or vertices per rayon task.
 const AT_ONCE: usize = 1 << 14;
-/// Work of a face in each row, beside its groups of pixels.
+/// Work of a face in each row, in addition to its groups of pixels.
 const ROW_OF_FACE: i64 = 1;
 
-/// Bands that each of some views is cut into. Bits must not depend on the number of threads, so neither may this.
+/// Number of bands that each view is cut into. Independent of the number of threads, so that the bits of results are too.
 pub fn bands_of_view(views: usize, size: ImageSize) -> usize {
     let rows = if views < FEW_VIEWS { MOST_ROWS / 2 } else { MOST_ROWS };
     size.height.div_ceil(rows)
@@ -40,14 +40,14 @@ pub(crate) struct View {
     entries: Vec<u32>,
     /// Pixels that each face may reach; none for a face that is not drawn.
     pub(crate) reaches: Vec<Reach>,
-    /// Faces that are drawn at all, on the image or beside it.
+    /// Number of faces that are drawn, on the image or outside of it.
     pub(crate) drawn: usize,
-    /// How far outside each face reaches, in NDC; nothing where all faces reach as far.
+    /// Distance outside each face that its support reaches, in NDC; empty if it is the same for all faces.
     pub(crate) radii: Vec<f32>,
 }
 
 impl View {
-    /// Lists faces by the pixels that each reaches, in `count` bands that are about as much work. `drawn` faces are drawn at all.
+    /// Lists the faces by the pixels that each reaches, in `count` bands of about equal work. `drawn` is the number of faces drawn.
     pub(crate) fn new(
         reaches: Vec<Reach>,
         radii: Vec<f32>,
@@ -90,13 +90,13 @@ pub(crate) struct Drawn<'a> {
     pub(crate) size: ImageSize,
     /// Depth below which a vertex counts as behind the camera.
     pub(crate) near: f64,
-    /// How far outside a face reaches, in NDC.
+    /// Distance outside a face that its support reaches, in NDC.
     pub(crate) radius: f64,
     /// Whether back faces are not drawn.
     pub(crate) culls: bool,
 }
 
-/// Which faces reach which rows, of all views.
+/// The faces that reach each band of rows, for all views.
 #[derive(Debug)]
 pub struct Bands {
     pub(crate) views: Vec<View>,
@@ -240,7 +240,7 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
     if count == 1 {
         return vec![0, size.height as u32];
     }
-    // Work that begins and work that ends at each row.
+    // Work that starts and work that ends at each row.
     let changes = |reaches: &[Reach]| {
         task("work", || {
             let mut changes = vec![0i64; size.height + 1];
@@ -270,12 +270,12 @@ fn starts(reaches: &[Reach], count: usize, size: ImageSize) -> Vec<u32> {
     let mut starts = vec![0];
     for band in 1..count {
         let last = starts[band - 1];
-        // An even share of what is left; enough rows for the others, and not too many.
+        // An even share of the remaining work; enough rows for the other bands, and at most `ROWS`.
         let left = count - band;
         let done = if last == 0 { 0 } else { until[last - 1] };
         let share = done + (all - done) / (left as i64 + 1);
         let row = until.partition_point(|&until| until <= share);
-        // A list takes as many rows of a face at once as there are lanes.
+        // A list takes one row of a face per lane at once.
         let row = if row < last + LANES * 3 / 2 { last + LANES } else { row };
         let most = (last + ROWS).min(size.height - left);
         let least = size.height.saturating_sub(left * ROWS);
@@ -316,7 +316,7 @@ fn by_band(reaches: &[Reach], band_of: &[u32], count: usize) -> (Vec<u32>, Vec<u
     (offsets, entries)
 }
 
-/// Sorts some faces, the first of which has this number.
+/// Sorts some faces, the first of which has number `first`.
 fn some_by_band(
     reaches: &[Reach],
     first: u32,
@@ -389,7 +389,7 @@ mod tests {
 
     #[test]
     fn every_face_is_listed_in_the_bands_that_it_reaches_and_in_no_other() {
-        // More than one thread takes at once, and some that reach nothing.
+        // More faces than one task takes, and some that reach nothing.
         let mut reaches = reaches(256, 40_000);
         reaches.iter_mut().step_by(7).for_each(|reach| *reach = Reach::NOTHING);
         let view = View::new(reaches.clone(), Vec::new(), 0, 8, size(256));

@@ -1,7 +1,7 @@
 //! Projected triangles, eight at a time: their edges, and the pixels of a row that their support can reach.
 //!
-//! Lengths are in pixels, x to the right and y down, from the centre of a pixel near the face: so places of
-//! pixels are whole numbers, and next to the face the digits of its corners are kept.
+//! Lengths are in pixels, x to the right and y down, relative to the centre of a pixel near the face: pixel centres are whole numbers, and
+//! the corners of the face keep their digits.
 #![allow(clippy::needless_range_loop)]
 
 use super::{
@@ -15,9 +15,9 @@ use super::{
 const POINT: f64 = 1e-30;
 /// Edges whose slope is below this bound no column.
 const FLAT: f64 = 1e-3;
-/// Triangles lower than this part of their longest edge count as slivers.
+/// Triangles lower than this fraction of their longest edge count as slivers.
 const SLIVER: f64 = 1e-3;
-/// What makes up for the rounding of a column, in pixels.
+/// Margin for the rounding of a column, in pixels.
 const MARGIN: f64 = 0.01;
 
 /// Triangles prepared for distances, one a lane; corner k starts edge k, and all turn the same way.
@@ -32,16 +32,16 @@ pub(crate) struct Faces<T: Real> {
     edge_y: T::Threes,
     /// One over the squared length of each edge; 0 for an edge that is a point.
     inverse: T::Threes,
-    /// In which lanes corners 1 and 2 have changed places, bit by bit.
+    /// Bit mask of the lanes in which corners 1 and 2 are swapped.
     turned: u32,
-    /// Which lanes hold slivers or triangles without area.
+    /// Bit mask of the lanes that hold slivers or triangles without area.
     slivers: u32,
-    /// Which lanes hold triangles with an area.
+    /// Bit mask of the lanes that hold triangles with an area.
     solid: u32,
 }
 
 impl<T: Real> Faces<T> {
-    /// Stands where no faces are yet.
+    /// A placeholder before any face is prepared.
     pub(crate) fn nothing() -> Self {
         let threes = T::Threes::default();
         Self {
@@ -70,14 +70,14 @@ impl<T: Real> Faces<T> {
     }
 }
 
-/// One of them.
+/// A face of [`Faces`].
 #[derive(Clone, Copy)]
 pub(crate) struct Face<'a, T: Real> {
     faces: &'a Faces<T>,
     lane: usize,
 }
 
-/// An edge, in all lanes or another in each.
+/// An edge, the same in all lanes or one per lane.
 pub(crate) struct Edge<T> {
     /// Its first corner.
     pub(crate) x: T,
@@ -90,13 +90,13 @@ pub(crate) struct Edge<T> {
 }
 
 impl<T: Real> Face<'_, T> {
-    /// The corners as they were given, by their places here.
+    /// The original number of each corner here.
     #[inline(always)]
     pub(crate) fn corners(&self) -> [usize; 3] {
         if self.faces.turned >> self.lane & 1 == 1 { [0, 2, 1] } else { [0, 1, 2] }
     }
 
-    /// Whether it has an area.
+    /// Whether the face has an area.
     #[inline(always)]
     pub(crate) fn is_solid(&self) -> bool {
         self.faces.solid >> self.lane & 1 == 1
@@ -124,13 +124,13 @@ impl<T: Real> Face<'_, T> {
         }
     }
 
-    /// One edge for each pixel: the third, the second or the first, where the masks hold.
+    /// One edge per pixel: the third, the second or the first, where the masks hold.
     #[inline(always)]
     pub(crate) fn chosen_by(&self, [_, second, third]: [Mask<T>; 3]) -> Edge<T> {
         self.chosen(T::Lanes::which(second, third))
     }
 
-    /// One edge for each pixel.
+    /// One edge per pixel.
     #[inline(always)]
     pub(crate) fn chosen(&self, which: Which<T>) -> Edge<T> {
         let (faces, lane) = (self.faces, self.lane);
@@ -146,17 +146,16 @@ impl<T: Real> Face<'_, T> {
 
 /// Rows that triangles may reach, column by column: bounds of their edges.
 pub(crate) struct Spans<T: Real> {
-    // Edge k asks for x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two is
-    // out of reach.
+    // Edge k requires x >= low[k] + tilt[k] * y and x <= high[k] + tilt[k] * y; one of the two bounds is out of reach.
     low: [[Float<T>; LANES]; 3],
     high: [[Float<T>; LANES]; 3],
     tilt: [[Float<T>; LANES]; 3],
 }
 
-/// Prepares triangles with these corners, one in each lane, for pixels no farther outside than the `radius` of each. `half` is the number
-/// of pixels in a unit of NDC.
+/// Prepares triangles with these corners, one per lane, for pixels within the `radius` of each. `half` is the number of pixels in a unit of
+/// NDC.
 ///
-/// Meshes have faces of a few pixels, so that what a face costs before its first pixel counts.
+/// The faces of a mesh often cover few pixels, so the setup cost per face matters.
 #[inline(always)]
 pub(crate) fn prepare<T: Real>(
     x: [T; 3],
@@ -194,8 +193,8 @@ pub(crate) fn prepare<T: Real>(
         let start = (across_x * x[k].value() + across_y * y[k].value()).neg();
         (lines[0][k], lines[1][k], lines[2][k]) = (start, across_x, across_y);
 
-        // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is of no use for an edge
-        // that is all but horizontal, or for a face without area.
+        // ex (py - y) - ey (px - x) >= -radius |e|, solved for px. The bound is useless for a nearly horizontal edge, or for a face without
+        // area.
         let flat = splat::<T::Lanes>(FLAT * FLAT) * ex * ex;
         let useful = flat.less(ey * ey);
         let tilt = (ex * Lanes::recip(pick(useful, ey, splat(1.0)))).only(useful);

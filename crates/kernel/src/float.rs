@@ -34,8 +34,7 @@ macro_rules! float {
             }
             #[inline(always)]
             fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self) {
-                // Exponent and leading mantissa bits count the cells; what remains is the place
-                // within the cell.
+                // Exponent and leading mantissa bits count the cells; the remaining bits are the position within the cell.
                 let raw = self.to_bits();
                 let first = ($bias - octaves) << bits;
                 let index = ((raw >> ($mantissa - bits)) as i32).wrapping_sub(first as i32);
@@ -86,11 +85,11 @@ macro_rules! float {
 float!(f32, u32, 23, 127, F32x8, exp, power);
 float!(f64, u64, 52, 1023, Plain<f64>, f64::exp, f64::exp);
 
-/// `e^x` without a branch or a call, so that loops over it become vectors; to 2 units in the last
-/// place. It ends at 0 and infinity as it should, and NaN stays.
+/// `e^x` without a branch or a call, so that loops over it are vectorized; accurate to 2 units in the last place. Underflows to 0,
+/// overflows to infinity, and keeps NaN.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
-    // Beyond these the result is 0 or infinite; NaN is not moved.
+    // Beyond these bounds the result is 0 or infinite; NaN stays.
     let held = if x < -104.0 { -104.0 } else { x };
     let held = if held > 89.0 { 89.0 } else { held };
     // Adding this leaves the nearest whole number in the low bits.
@@ -99,20 +98,20 @@ fn exp(x: f32) -> f32 {
     let whole = shifted - MAGIC;
     // ln 2 in two parts, the first of which has bits to spare.
     let rest = held - whole * 0.693_359_4 + whole * 2.121_944_4e-4;
-    // In pairs, and pairs of pairs: a chain of products would have each wait for the one before.
+    // Evaluated in pairs, and pairs of pairs: a chain of products would have long dependencies.
     let square = rest * rest;
     let low = rest + square * (0.5 + rest * (1.0 / 6.0));
     let high = (1.0 / 24.0 + rest * (1.0 / 120.0)) + square * (1.0 / 720.0 + rest * (1.0 / 5040.0));
     let power = 1.0 + (low + square * square * high);
-    // 2^whole in two factors, since one alone would leave the range of exponents.
+    // 2^whole as two factors, since one factor would leave the range of exponents.
     let exponent = shifted.to_bits().wrapping_sub(MAGIC.to_bits()) as i32;
     let half = exponent >> 1;
     let two_to = |n: i32| f32::from_bits(((n + 127) << 23) as u32);
     power * two_to(half) * two_to(exponent - half)
 }
 
-/// `e^x` for `x` up to 88, with a relative error of at most 1.2e-7 (1 + |x|) and two thirds of the steps of [`exp`]; 0 below -87.34, so that nothing
-/// is denormal. Beyond 88 anything may come out, and NaN of NaN.
+/// `e^x` for `x` up to 88, with a relative error of at most 1.2e-7 (1 + |x|) and two thirds of the steps of [`exp`]; 0 below -87.34, so
+/// that no result is denormal. Unspecified beyond 88; NaN stays.
 #[inline(always)]
 fn power(x: f32) -> f32 {
     let binary = x * std::f32::consts::LOG2_E;
@@ -163,7 +162,7 @@ mod tests {
         for k in -1_040_000..887_229 {
             let x = k as f32 * 1e-4;
             let (found, exact) = (f64::from(exp(x)), f64::from(x).exp());
-            // Below the smallest normal number there are fewer places.
+            // Denormal numbers have fewer digits.
             let unit = (exact * f64::from(f32::EPSILON)).max(f64::from(f32::from_bits(1)));
             assert!((found - exact).abs() <= 2.0 * unit, "e^{x}: {found:e} instead of {exact:e}");
         }

@@ -1,15 +1,15 @@
-//! Adds up the gradients that faces give to their vertices.
+//! Accumulates the gradients of faces into their vertices.
 
 use rayon::prelude::*;
 
 use super::{lanes::Float, tasks::task};
 
-/// Faces that are passed over together.
+/// Faces per block; a task skips the blocks without vertices in its range.
 const AT_ONCE: usize = 1 << 12;
-/// Ranges of vertices that threads may take, and fewest vertices of one.
+/// Number of vertex ranges that threads may take, and the fewest vertices of a range.
 const RANGES: usize = 16;
 const LEAST: usize = 1 << 13;
-/// Ranges are taken one by one where a face is looked at by no more of them on the average, as where vertices lie in the order of faces.
+/// Ranges are separate tasks if on average at most this many of them visit a block, as where vertices are in the order of faces.
 const MOST_LOOKS: usize = 2;
 
 /// Numbers for the x and y of the three corners of some faces, and a factor of all of them.
@@ -20,9 +20,9 @@ pub(crate) struct Part<'a, F> {
     pub(crate) factor: F,
 }
 
-/// Adds parts to the first two rows of `vertices`, `[3, vertices]`, one after the other.
+/// Adds parts to the first two rows of `vertices`, `[3, vertices]`, in order.
 ///
-/// Each range of vertices is a task of its own where few faces have vertices in several of them. A vertex's sum has the same order anyway.
+/// Each range of vertices is a separate task if few faces have vertices in several ranges. The order of each vertex's sum is the same.
 pub(crate) fn gather<F: Float>(faces: &[[u32; 3]], parts: &[Part<F>], vertices: &mut [F]) {
     let (x, rest) = vertices.split_at_mut(vertices.len() / 3);
     let own = x.len().div_ceil(RANGES).max(LEAST);
@@ -30,7 +30,7 @@ pub(crate) fn gather<F: Float>(faces: &[[u32; 3]], parts: &[Part<F>], vertices: 
         true => faces.par_chunks(AT_ONCE).map(span).collect(),
         false => Vec::new(),
     };
-    // How many faces all ranges look at together.
+    // Number of visits of blocks by all ranges together.
     let ranges = |&[least, largest]: &[u32; 2]| (largest as usize / own + 1) - least as usize / own;
     let looks = spans.iter().map(ranges).sum::<usize>();
     if looks > MOST_LOOKS * spans.len() || spans.is_empty() {
@@ -49,7 +49,7 @@ fn span(faces: &[[u32; 3]]) -> [u32; 2] {
     corners.fold([u32::MAX, 0], |[least, largest], &v| [least.min(v), largest.max(v)])
 }
 
-/// Adds parts to the vertices from `first` on. `spans` are those of each [`AT_ONCE`] faces, or nothing where all of them matter.
+/// Adds parts to the vertices from `first` on. `spans` are the spans of each [`AT_ONCE`] faces, or empty if all faces are visited.
 fn add<F: Float>(
     faces: &[[u32; 3]],
     parts: &[Part<F>],
@@ -75,7 +75,7 @@ fn add<F: Float>(
             }
             for (&face, corners) in own.iter().zip(corners) {
                 for (&vertex, xy) in faces[face as usize].iter().zip(corners.chunks_exact(2)) {
-                    // Those before the first wrap around to beyond the last.
+                    // Vertices before the first wrap around to beyond the last.
                     let at = (vertex as usize).wrapping_sub(first);
                     if let Some(x) = x.get_mut(at) {
                         *x += xy[0] * factor;

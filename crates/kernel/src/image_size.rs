@@ -1,9 +1,9 @@
 /// Height and width of an image in pixels.
 ///
-/// NDC are the same along both axes: the shorter side of the image is [-1, 1], the longer one reaches farther, its middle at 0. One pixel
-/// is `2 / shorter` wide and high.
+/// NDC have the same scale along both axes: the shorter side of the image is [-1, 1], the longer one extends farther, with its middle at 0.
+/// One pixel is `2 / shorter` wide and high.
 ///
-/// A number stands for a square, `[height, width]` for any other image.
+/// A number converts to a square image, `[height, width]` to any other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageSize {
     /// Rows.

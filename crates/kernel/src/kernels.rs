@@ -6,13 +6,13 @@ use crate::{
 
 /// Floats that passes run on: `f32` and `f64`.
 pub trait Kernels: Float {
-    /// The lists of the faces that reach each band of rows: they serve all passes over the same vertices.
+    /// The lists of the faces that reach each band of rows, valid for all passes over the same vertices.
     fn bands(inputs: &Inputs<Self>) -> Bands;
 
-    /// Sums of the profile, `[views, height, width]`. `bands` are those of these inputs.
+    /// Sums of the profile, `[views, height, width]`. `bands` must be those of `inputs`.
     fn sums(inputs: &Inputs<Self>, bands: &Bands) -> Vec<Self>;
 
-    /// Gradients of `Σ upstream · sums` to vertices and table, as they are wanted, flat and in this order.
+    /// Gradients of `Σ upstream · sums` with respect to vertices and table, those that are `wanted`, concatenated in this order.
     fn sums_vjp(
         inputs: &Inputs<Self>,
         bands: &Bands,
@@ -20,8 +20,8 @@ pub trait Kernels: Float {
         wanted: [bool; 2],
     ) -> Vec<Self>;
 
-    /// Pullback of `direction` (like the result of [`Kernels::sums_vjp`], which consists of what is `along`) through it: gradients to
-    /// vertices, tables and upstream, as they are wanted, flat and in this order.
+    /// Pullback of `direction` through [`Kernels::sums_vjp`]; `direction` has the layout of its result with `along` wanted. Gradients with
+    /// respect to vertices, table and upstream, those that are wanted, concatenated in this order.
     fn sums_vjp_of_vjp(
         inputs: &Inputs<Self>,
         bands: &Bands,
@@ -31,7 +31,7 @@ pub trait Kernels: Float {
         wanted: [bool; 3],
     ) -> Vec<Self>;
 
-    /// Losses `[views]`, and the gradient of each to its vertices, `[views, 3, vertices]`, if it is wanted: else it is 0.
+    /// Losses `[views]`, and the gradient of each with respect to its vertices, `[views, 3, vertices]`: zeros if it is not wanted.
     fn losses(
         inputs: &Inputs<Self>,
         bands: &Bands,
@@ -40,18 +40,18 @@ pub trait Kernels: Float {
         with_gradient: bool,
     ) -> [Vec<Self>; 2];
 
-    /// Number of pixel-face pairs over all views that one pass visits; the table is not read.
+    /// Number of pixel-face pairs that one pass visits, over all views; the table is not read.
     fn pairs(inputs: &Inputs<Self>) -> usize;
 
-    /// Prepares the data that passes in colour over these inputs share. `sums`: whether those of the image are kept, channels and share of each
-    /// pixel in fours, and one number more.
+    /// Prepares the data shared by colour passes over these inputs. `sums`: whether the sums of the image are cached, channels and share of
+    /// each pixel rounded up to fours, and one number more.
     fn kept(inputs: &blend::Inputs<Self>, sums: bool) -> Kept<Self>;
 
-    /// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` is of these inputs.
+    /// The image `[views, channels + 1, height, width]`: blended channels, then the faces' share. `kept` must be that of `inputs`.
     fn blend(inputs: &blend::Inputs<Self>, kept: &Kept<Self>) -> Vec<Self>;
 
-    /// Gradients of `Σ upstream · image` to vertices, attributes, tables, background and texture, as they are wanted, flat and in this
-    /// order.
+    /// Gradients of `Σ upstream · image` with respect to vertices, attributes, tables, background and texture, those that are wanted,
+    /// concatenated in this order.
     fn blend_vjp(
         inputs: &blend::Inputs<Self>,
         kept: &Kept<Self>,
@@ -59,8 +59,8 @@ pub trait Kernels: Float {
         wanted: [bool; 5],
     ) -> Vec<Self>;
 
-    /// Pullback of `direction` (like the result of [`Kernels::blend_vjp`], which consists of what is `along`) through it: gradients to the
-    /// inputs and to the upstream, as they are wanted, flat and in this order.
+    /// Pullback of `direction` through [`Kernels::blend_vjp`]; `direction` has the layout of its result with `along` wanted. Gradients with
+    /// respect to the inputs and the upstream, those that are wanted, concatenated in this order.
     fn blend_vjp_of_vjp(
         inputs: &blend::Inputs<Self>,
         kept: &Kept<Self>,
@@ -73,7 +73,7 @@ pub trait Kernels: Float {
 
 macro_rules! kernels {
     ($float:ty) => {
-        // Functions that are not generic, so that they are compiled here and not again in every crate that draws.
+        // Functions without generics, compiled in this crate instead of in each crate that draws.
         impl Kernels for $float {
             fn bands(inputs: &Inputs<Self>) -> Bands {
                 inputs.bands()

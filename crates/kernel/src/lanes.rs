@@ -1,10 +1,9 @@
-//! Floats, and eight of them that are computed together.
+//! Scalar floats, and vectors of eight floats.
 //!
-//! Every operation is one that all machines round alike, and none is contracted. So explicit vectors (`x86`, `wasm`) and plain arrays
+//! All machines round each of these operations alike, and none is contracted, so explicit vectors (`x86`, `wasm`) and plain arrays
 //! ([`Plain`]) give the same bits.
 //!
-//! Loops run over numbers of lanes: an iterator's closure is a function without the features of its caller, and is not turned
-//! into vectors.
+//! Loops run over lane indices: the closure of an iterator is compiled without the target features of its caller, and is not vectorized.
 #![allow(clippy::needless_range_loop, clippy::assign_op_pattern)]
 
 pub(super) mod plain;
@@ -23,10 +22,10 @@ pub(crate) use plain::Plain;
 
 /// Numbers in a vector.
 pub(crate) const LANES: usize = 8;
-/// Neighbours of a row that always come together: half a vector.
+/// Neighbouring pixels of a row that are processed together: half a vector.
 pub(crate) const GROUP: usize = LANES / 2;
 
-/// An array of what an expression says of each lane. Written out, since a compiler takes ten times as long over so many little loops.
+/// An array of the values of an expression in each lane. Unrolled, since a compiler takes ten times as long over many small loops.
 #[cfg(not(target_family = "wasm"))]
 macro_rules! lanes {
     ($i:ident => $value:expr) => {
@@ -39,7 +38,7 @@ macro_rules! lanes {
         }),*]
     };
 }
-/// The same, in the fewest bytes: a page has to be loaded.
+/// An array of the values of an expression in each lane, as a loop: this keeps the module of a page small.
 #[cfg(target_family = "wasm")]
 macro_rules! lanes {
     ($i:ident => $value:expr) => {{
@@ -50,7 +49,7 @@ macro_rules! lanes {
 }
 pub(crate) use lanes;
 
-/// `f32` or `f64`, with the view of their bits that the profile table is indexed by.
+/// `f32` or `f64`, with access to the bits that index the profile table.
 pub trait Float:
     Copy
     + Send
@@ -76,9 +75,8 @@ pub trait Float:
     fn of_whole(value: i32) -> Self;
     /// To double precision.
     fn to_f64(self) -> f64;
-    /// Where `self`, at least `2^-octaves`, lies among cells of which each octave holds `2^bits`, from there on:
-    /// the cell's index, the place in it from 0 to 1, and the inverse of its width. Infinity and NaN lie in one of more than
-    /// `octaves << bits`.
+    /// The position of `self`, at least `2^-octaves`, among cells that start there, `2^bits` in each octave: the index of the cell, the
+    /// position in the cell from 0 to 1, and the inverse of its width. For infinity and NaN the index is at least `octaves << bits`.
     fn cell(self, octaves: u32, bits: u32) -> (i32, Self, Self);
     /// Square root.
     fn sqrt(self) -> Self;
@@ -96,7 +94,7 @@ pub trait Float:
     fn sin_cos(self) -> (Self, Self);
 }
 
-/// Floats of which a machine may have vectors.
+/// Floats for which a machine may have vectors.
 pub(crate) trait Vectors: Float {
     /// The best vectors of a machine that has them; see [`has_vectors`].
     type Best: Lanes<Float = Self>;
@@ -115,28 +113,28 @@ pub(crate) trait Lanes:
 {
     /// One of the numbers.
     type Float: Float;
-    /// Whether something holds, lane by lane.
+    /// Lane-wise condition.
     type Mask: Copy;
     /// Whole numbers.
     type Index: Copy;
-    /// Which of three numbers each lane takes.
+    /// Selection of one of three numbers in each lane.
     type Which: Copy;
     /// Whether this needs AVX2.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     const NEEDS_AVX2: bool;
-    /// Whether what uses this is compiled for machines with AVX2 as well.
+    /// Whether code generic over this type is also compiled for machines with AVX2.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     const GAINS_AVX2: bool;
 
-    /// The same number in all lanes.
+    /// `value` in all lanes.
     fn splat(value: Self::Float) -> Self;
     /// The numbers of an array.
     fn of(values: &[Self::Float; LANES]) -> Self;
     /// The numbers as an array.
     fn array(self) -> [Self::Float; LANES];
-    /// Two groups of neighbours.
+    /// A vector of two groups of neighbours.
     fn of_groups(low: &[Self::Float; GROUP], high: &[Self::Float; GROUP]) -> Self;
-    /// Adds the first half to one group of numbers, then the second to another or the same.
+    /// Adds the first half to one group of numbers, then the second half to another group or the same.
     fn add_to_groups(self, numbers: &mut [Self::Float], at: [u32; 2]);
 
     /// `1 / self`.
@@ -175,13 +173,13 @@ pub(crate) trait Lanes:
     fn pick(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// `self` where the mask holds, else 0.
     fn only(self, mask: Self::Mask) -> Self;
-    /// The third where the second mask holds, else the second where the first does, else the first.
+    /// Selects the third number where the second mask holds, else the second where the first mask does, else the first.
     fn which(second: Self::Mask, third: Self::Mask) -> Self::Which;
-    /// Where that is the first, the second and the third.
+    /// The lanes that select the first, the second and the third number.
     fn where_each(second: Self::Mask, third: Self::Mask) -> [Self::Mask; 3];
     /// One of the first three numbers for each lane.
     fn chosen(numbers: &[Self::Float; 4], which: Self::Which) -> Self;
-    /// Writes three columns and zeros as rows, one for each lane.
+    /// Writes three columns and zeros as rows, one per lane.
     fn to_rows(columns: [Self; 3], to: &mut [[Self::Float; 4]; LANES]);
     /// A mask as bits, the first lane lowest.
     fn bits(mask: Self::Mask) -> u32;
@@ -191,27 +189,27 @@ pub(crate) trait Lanes:
     fn nearest(self) -> Self::Index;
     /// Nearest whole numbers as floats, for numbers in [0, 2^22].
     fn rounded(self) -> Self;
-    /// Writes the lanes where the mask holds one behind the other, and says how many there are. What stands behind them is overwritten.
+    /// Packs the lanes where the mask holds, and returns their number. The rest of the arrays is overwritten.
     fn pack(keep: Self::Mask, numbers: [Self::Index; 2], to: [&mut [u32; LANES]; 2]) -> usize;
-    /// Places of the pixels of two groups from the origin of their face, from those of the first pixels: column, and row times 2^24.
+    /// Pixels of two groups relative to the origin of their face, given the first pixel of each: column, and row times 2^24.
     fn pixels(places: &[u32; 2]) -> (Self, Self);
 
     /// See [`Float::cell`].
     fn cell(self, octaves: u32, bits: u32) -> (Self::Index, Self, Self);
-    /// The same whole number in all lanes.
+    /// `value` in all lanes.
     fn index(value: i32) -> Self::Index;
     /// The whole numbers of an array.
     fn indices(values: &[i32; LANES]) -> Self::Index;
     /// Whole numbers as an array.
     fn index_array(index: Self::Index) -> [i32; LANES];
-    /// Sums and differences of whole numbers.
+    /// `a + b`.
     fn plus(a: Self::Index, b: Self::Index) -> Self::Index;
     /// `a - b`.
     fn minus(a: Self::Index, b: Self::Index) -> Self::Index;
     /// `yes` where the mask holds, else `no`.
     fn pick_index(mask: Self::Mask, yes: Self::Index, no: Self::Index) -> Self::Index;
-    /// Places in a table of two sides with so many cells each, and a tail behind the last of each; where the mask holds on its second
-    /// side. Cells beyond the last are the tail.
+    /// Rows of a table that has two sides with `cells` cells each, and a tail after each side. `second` selects the second side. Cells
+    /// beyond the last become the tail.
     fn places(cell: Self::Index, cells: i32, second: Self::Mask) -> Places;
     /// Rows of a table of `count`, by their numbers.
     fn numbered(rows: &[u32; LANES], count: usize) -> Places;
@@ -248,16 +246,16 @@ pub(crate) trait Lanes:
     }
 }
 
-/// Something that is computed with vectors, and compiled for the machines that have better ones.
+/// A computation with vectors, which is also compiled for machines with better ones.
 pub(crate) trait Work {
-    /// What comes of it.
+    /// The result.
     type Output;
-    /// Does it. To be inlined, like all that it calls.
+    /// Runs the computation. Must be inlined, like everything it calls.
     fn run(self) -> Self::Output;
 }
 
-/// Does some work with vectors `L`, compiled for AVX2 where they gain from it and this machine has it. Products and sums are
-/// never contracted, so that the bits are the same.
+/// Runs some work with vectors `L`, compiled for AVX2 if `L` gains from it and this machine has it. Products and sums are never contracted,
+/// so the bits are the same.
 pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
@@ -266,7 +264,7 @@ pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
             work.run()
         }
         if L::NEEDS_AVX2 {
-            // SAFETY: the feature was detected before there were such vectors.
+            // SAFETY: vectors that need AVX2 exist only after the feature was detected.
             #[allow(unsafe_code)]
             return unsafe { avx2(work) };
         }
@@ -281,14 +279,14 @@ pub(crate) fn run<L: Lanes, W: Work>(work: W) -> W::Output {
 
 static PORTABLE: AtomicBool = AtomicBool::new(false);
 
-/// Whether passes use the vectors of this machine where it has better ones than arrays, as they do at first; in the whole process. The bits are
-/// the same, which is what tests ask.
+/// Sets whether passes use the machine's vectors instead of arrays, for the whole process; they do by default. The bits are the same, which
+/// tests check.
 pub fn use_vectors(yes: bool) {
     PORTABLE.store(!yes, Ordering::Relaxed);
 }
 
-/// Whether this machine has vectors that are better than arrays: AVX2, which is asked for at run time, or those of WebAssembly, for which
-/// all of a program is compiled or nothing.
+/// Whether this machine has better vectors than arrays: AVX2, detected at run time, or those of WebAssembly, fixed at compile time for the
+/// whole program.
 pub(crate) fn has_vectors() -> bool {
     #[cfg(target_arch = "x86_64")]
     let has_them = is_x86_feature_detected!("avx2");
@@ -300,9 +298,9 @@ pub(crate) fn has_vectors() -> bool {
 /// Rows of a table, one for each lane.
 #[derive(Clone, Copy)]
 pub(crate) struct Places {
-    /// Each below `rows`; of vectors as explicit as in `x86`, bytes from the first row.
+    /// Row numbers, each below `rows`; byte offsets from the first row for explicit vectors such as those of `x86`.
     at: [u32; LANES],
-    /// What the table has at least.
+    /// Lower bound of the number of rows of the table.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
     rows: usize,
 }

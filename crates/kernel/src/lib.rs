@@ -1,10 +1,10 @@
 //! Soft rasterization of triangles on the CPU, over slices of `f32` or `f64`: it depends on no tensor library.
 //!
-//! Two ops: sums of a profile of the distance over [`Inputs`] (silhouettes), and means of colours over [`blend::Inputs`].
-//! [`Kernels`] runs their passes: the result, its gradient, and the gradient of that. `softrast-raster` makes ops of tensors of them.
-//! [`Nearest`] measures how far sets of points are from one another.
+//! Two ops: sums of a profile of the distance over [`Inputs`] (silhouettes), and means of colours over [`blend::Inputs`]. [`Kernels`] runs
+//! their passes: the result, its gradient, and the gradient of that. `softrast-raster` wraps them as ops on tensors. [`Nearest`] measures
+//! distances between sets of points.
 //!
-//! # A silhouette, and what can be had of it
+//! # Example: a silhouette and its derivatives
 //!
 //! The profile of a softness `s` is its optical depth `-ln(1 - s)`: the coverage of a pixel is `1 - exp(-sum)`.
 //!
@@ -27,17 +27,17 @@
 //! let coverage: Vec<f64> = sums.iter().map(|sum| 1.0 - (-sum).exp()).collect();
 //! assert!(coverage[8 * 4 + 4] > 0.95 && coverage[0] < 0.01);
 //!
-//! // vjp: gradients of the sum of `upstream * sums` to the vertices [views, 3, vertices], and not to the table.
+//! vjp: gradients of the sum of `upstream * sums` with respect to the vertices [views, 3, vertices], and not to the table.
 //! let upstream: Vec<f64> = coverage.iter().map(|a| 1.0 - a).collect();
 //! let gradient = f64::sums_vjp(&inputs, &lists, &upstream, [true, false]);
 //!
-//! // The gradient of `direction * gradient`: to the vertices, the second derivative times the direction; to upstream, the jvp.
+//! The gradient of `direction * gradient`: for the vertices, the second derivative times the direction; for upstream, the jvp.
 //! let direction = [0.3, -0.1, 0.2, 0.5, -0.4, 0.1, 0.0, 0.0, 0.0];
 //! let along = [true, false]; // the direction is one of vertices, as the gradient is
 //! let second = f64::sums_vjp_of_vjp(&inputs, &lists, &upstream, &direction, along, [true, false, false]);
 //! let jvp = f64::sums_vjp_of_vjp(&inputs, &lists, &upstream, &direction, along, [false, false, true]);
 //!
-//! // They are what differences say.
+//! Both agree with finite differences.
 //! let moved = |h: f64| -> [f64; 9] { std::array::from_fn(|k| vertices[k] + h * direction[k]) };
 //! let at = |vertices: &[f64; 9]| {
 //!     let inputs = Inputs { vertices, ..inputs };
@@ -56,7 +56,7 @@
 //! assert!((by_gradient - by_jvp).abs() < 1e-9);
 //! ```
 //!
-//! # How
+//! # Implementation
 //!
 //! One traversal serves every pass. A view is cut into bands of rows; each band lists the faces
 //! whose support reaches it and walks their pixels in blocks of a row. Bands are independent, so

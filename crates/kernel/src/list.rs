@@ -1,4 +1,4 @@
-//! The pixels that faces may reach, as a list of chunks that a walk takes one after the other.
+//! The pixels that faces may reach, as a list of chunks in the order of a walk.
 #![allow(clippy::needless_range_loop)]
 
 use super::{
@@ -10,11 +10,11 @@ use super::{
     scene::{BandRef, Scene},
 };
 
-/// Faces that are listed together: what is prepared of them stays near the processor.
+/// Faces per list: their prepared data stays in cache.
 pub(crate) const LISTED: usize = 64;
-/// Chunks behind the last on which nothing depends.
+/// Unused chunks after the last one, which look-ahead may read.
 pub(crate) const AHEAD: usize = 4;
-/// Groups behind those of a face that are written without asking.
+/// Groups after those of a face that are written unconditionally.
 const MORE: usize = 2 * LANES + 2 * AHEAD;
 
 /// Some faces of a band and their pixels: groups of neighbours of a row, two groups of one face in a chunk.
@@ -22,11 +22,11 @@ pub(crate) struct List<T: Real> {
     blocks: [Faces<T>; LISTED / LANES],
     /// Whether some of them are slivers.
     pub(crate) slivers: bool,
-    /// Where the first pixel of each group lies, from the origin of its face: column, and row times 2^24. There is more room than groups.
+    /// Position of the first pixel of each group relative to the origin of its face: column, and row times 2^24. May be longer than needed.
     places: Vec<u32>,
-    /// Its position in the band.
+    /// Position of each group in the band.
     at: Vec<u32>,
-    /// Which face of the list it belongs to.
+    /// Index in the list of the face of each group.
     owners: Vec<u8>,
     chunks: usize,
 }
@@ -52,7 +52,7 @@ impl<T: Real> List<T> {
         self.blocks[owner / LANES % (LISTED / LANES)].face(owner)
     }
 
-    /// Its chunks, those of a face one behind the other, and then so `many` of [`AHEAD`] on which nothing depends.
+    /// The chunks, grouped by face, followed by `many` unused ones, at most [`AHEAD`].
     #[inline(always)]
     pub(crate) fn chunks(&self, many: usize) -> impl Iterator<Item = Chunk<'_>> {
         let count = self.chunks + many;
@@ -63,12 +63,12 @@ impl<T: Real> List<T> {
         groups.map(|(places, (&at, owners))| Chunk { places, at, owner: owners[0] as usize })
     }
 
-    /// How many chunks it has.
+    /// Number of chunks.
     pub(crate) fn len(&self) -> usize {
         self.chunks
     }
 
-    /// Makes room for so many groups.
+    /// Makes room for `groups` groups.
     #[cold]
     #[inline(never)]
     fn grow(&mut self, groups: usize) {
@@ -79,7 +79,7 @@ impl<T: Real> List<T> {
 
     /// Prepares up to [`LISTED`] faces of a band, given by their numbers, and lists their pixels.
     pub(crate) fn fill(&mut self, scene: &Scene<T>, place: &BandRef<T>, numbers: &[u32]) {
-        // One function for all walks: inlined into each, it takes a minute to compile.
+        // One function for all walks: inlining it into each would add a minute to compilation.
         run::<T::Lanes, _>(Fill { list: self, scene, place, numbers });
     }
 
@@ -127,7 +127,7 @@ impl<T: Real> List<T> {
                     let mut at = plus(plus(index(corner), rows_apart), start);
                     let mut from_origin = plus(plus(index((row << 24) as i32), rows_below), start);
                     loop {
-                        // Most rows have one group or two, and nobody can foresee which.
+                        // Most rows have one group or two, which a branch predictor cannot foresee.
                         for _ in 0..2 {
                             *eight(owners, listed) = [owner; LANES];
                             let to = [eight(places, listed), eight(ats, listed)];
@@ -144,7 +144,7 @@ impl<T: Real> List<T> {
                     y += splat(LANES as f64);
                     corner += (LANES * stride) as i32;
                 }
-                // An odd group is joined by one on which nothing depends. Written always, since nobody can foresee whether it counts.
+                // An odd group is paired with an unused one. It is written unconditionally, since the branch would be unpredictable.
                 (places[listed], ats[listed]) = (0, nowhere);
                 listed += listed % 2;
             }
@@ -189,13 +189,13 @@ pub(crate) fn of_pixels<T: Real>(numbers: &[Float<T>], [low, high]: [u32; 2]) ->
     T::Lanes::of_groups(group(numbers, low), group(numbers, high))
 }
 
-/// Room for [`LANES`] numbers.
+/// The [`LANES`] numbers at `at`.
 #[inline(always)]
 fn eight<F>(numbers: &mut [F], at: usize) -> &mut [F; LANES] {
     (&mut numbers[at..at + LANES]).try_into().expect("as many numbers as lanes")
 }
 
-/// Rows from the first one, one for each lane.
+/// Row numbers from the first row, one per lane.
 #[inline(always)]
 pub(crate) fn rows_from_origin<L: Lanes>() -> L {
     let number = L::Float::from_f64;

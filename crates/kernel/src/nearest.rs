@@ -2,16 +2,15 @@ use rayon::prelude::*;
 
 /// Points in a range of at most this length are compared one by one.
 const LEAF: usize = 16;
-/// Points that look for their nearest ones together: neighbours have much of the way in common, and
-/// their distances to a point are straight vector code.
+/// Points searched together: neighbours share much of the traversal, and their distances to a point are vectorized.
 const GROUP: usize = 8;
 
-/// Points sorted so that the nearest one is found without looking at all: a k-d tree.
+/// Points sorted so that the nearest one is found without visiting all: a k-d tree.
 ///
 /// The middle point of a range splits it along one axis: those before it are not beyond it, those
 /// after it are not before it. Source: Bentley 1975.
 pub struct Nearest {
-    /// Neighbours in this order are neighbours in space, by and large.
+    /// Neighbours in this order are mostly neighbours in space.
     points: Vec<[f64; 3]>,
     /// Axis of the split at each point that splits.
     axes: Vec<u8>,
@@ -22,7 +21,7 @@ pub struct Nearest {
 type Bounds = [[f64; 3]; 2];
 
 impl Nearest {
-    /// The tree of these points `[x, y, z]`, finite, in any one unit; there may be none.
+    /// The tree of `points` `[x, y, z]`, finite, in any one unit; may be empty.
     pub fn new(mut points: Vec<[f64; 3]>) -> Self {
         let mut axes = vec![0; points.len()];
         split(&mut points, &mut axes);
@@ -30,8 +29,8 @@ impl Nearest {
         Self { points, axes, bounds }
     }
 
-    /// Mean over these points of the squared distance to the nearest of others, in the square of their unit: 0 if there are none of these,
-    /// infinite if there is no other.
+    /// Mean over these points of the squared distance to the nearest of `others`, in the square of their unit: 0 if there are no points
+    /// here, infinite if `others` is empty.
     pub fn mean_squared_distance(&self, others: &Self) -> f64 {
         // Collected, then summed in order: the sum does not depend on the number of threads.
         let groups = self.points.par_chunks(GROUP);
@@ -49,12 +48,12 @@ impl Nearest {
     }
 }
 
-/// Points that look for their nearest ones together; if they are few, the last one several times.
+/// Points searched together; if there are fewer than [`GROUP`], the last one is repeated.
 struct Group {
     /// By axis.
     at: [[f64; GROUP]; 3],
     bounds: Bounds,
-    /// Squared distance of each to the nearest point met, and the largest of them.
+    /// Squared distance of each point to the nearest one visited, and the largest of these.
     best: [f64; GROUP],
     worst: f64,
 }
@@ -70,8 +69,8 @@ impl Group {
         }
     }
 
-    /// `outside` is how far the group is from the box of these points along each axis: a lower
-    /// bound that leaves out whole ranges, however far all points are.
+    /// `outside` is the distance of the group from the box of these points along each axis: a lower bound that excludes whole ranges,
+    /// however far all points are.
     ///
     /// Source: Arya and Mount 1993 (incremental distance).
     fn search(&mut self, points: &[[f64; 3]], axes: &[u8], outside: [f64; 3]) {
@@ -101,7 +100,7 @@ impl Group {
         for k in 0..GROUP {
             let [x, y, z] = [0, 1, 2].map(|axis| self.at[axis][k] - q[axis]);
             let squared = x * x + y * y + z * z;
-            // Not `f64::min`, which looks for NaN as well.
+            // Not `f64::min`, which also handles NaN.
             self.best[k] = if squared < self.best[k] { squared } else { self.best[k] };
         }
     }
@@ -151,7 +150,7 @@ mod tests {
         for count in [1, 15, 16, 17, 34, 500] {
             let points = draw(count);
             let tree = Nearest::new(points.clone());
-            // Beside the points, and far from all of them; alone, and with others near or far.
+            // Groups near the points and far from them; alone and mixed.
             let far = |p: &[f64; 3]| p.map(|x| 40.0 * x - 300.0);
             let near = draw(100);
             let all: Vec<[f64; 3]> = near.iter().copied().chain(near.iter().map(far)).collect();

@@ -10,22 +10,22 @@ use super::{
 /// Closest points of a triangle's boundary to eight pixels.
 #[derive(Clone, Copy)]
 pub(crate) struct Closest<T: Real> {
-    /// Squared distance to it, in pixels.
+    /// Squared distance to the closest point, in pixels².
     pub(crate) distance2: T,
-    /// From it to the pixel.
+    /// Offset from the closest point to the pixel.
     pub(crate) dx: T,
     pub(crate) dy: T,
-    /// Its barycentric weights.
+    /// Barycentric weights of the closest point.
     pub(crate) weights: [T; 3],
-    /// Where the pixel lies in the triangle, edges included.
+    /// The pixels that lie in the triangle, edges included.
     pub(crate) inside: Mask<T>,
-    /// Its place on its edge, 0 to 1, and where that is the first, the second and the third.
+    /// Position of the closest point on its edge, 0 to 1, and the pixels for which this is the first, the second and the third edge.
     pub(crate) along: T,
     pub(crate) edges: [Mask<T>; 3],
 }
 
 impl<T: Real> Closest<T> {
-    /// Stands where no point is yet.
+    /// A placeholder before any point is known.
     #[inline(always)]
     pub(crate) fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
@@ -42,11 +42,11 @@ impl<T: Real> Closest<T> {
     }
 }
 
-/// Closest boundary points to the pixels at `px`, `py`, by projection onto edges. No inverted matrix, no division:
-/// slivers, points and pixels on an edge all give finite numbers.
+/// Closest boundary points to the pixels at `px`, `py`, by projection onto edges. No inverted matrix, no division: slivers, points and
+/// pixels on an edge all give finite numbers.
 ///
-/// Without `SLIVERS`, only onto the edge whose line has the least signed distance: it holds the closest point. docs/notes.md, Nearest
-/// edge, has the proof. Rounding confuses edges only where they are all but parallel.
+/// Without `SLIVERS`, only the edge whose line has the least signed distance is used: it holds the closest point (proof: docs/notes.md,
+/// Nearest edge). Rounding confuses edges only where they are nearly parallel.
 #[inline(always)]
 pub(crate) fn closest<T: Real, const SLIVERS: bool>(
     face: Face<T>,
@@ -75,7 +75,7 @@ pub(crate) fn closest<T: Real, const SLIVERS: bool>(
         point = Point::of(face.chosen(T::Lanes::which(second, third)), px, py);
         side = point.side;
     }
-    // Not from the lines: they do not hold a pixel that lies on an edge to the last bit.
+    // Not from the lines: they are inexact for a pixel that lies on an edge.
     let inside = splat::<T::Lanes>(0.0).at_most(side);
     // Corner k starts edge k and ends edge k - 1.
     let edges = T::Lanes::where_each(second, third);
@@ -91,10 +91,10 @@ pub(crate) fn closest<T: Real, const SLIVERS: bool>(
     Closest { distance2, dx, dy, weights, inside, along, edges }
 }
 
-/// The gradient of a sum to the corners of a face, chunk by chunk.
+/// The gradient of a sum with respect to the corners of a face, chunk by chunk.
 ///
-/// The closest point is where it is closest, so the squared distance moves as though the point stayed on its edge where it is: by -2 times
-/// the way from it to the pixel, shared by the corners as the point is.
+/// The closest point minimises the distance, so the squared distance changes as if the point kept its position on its edge: by -2 times the
+/// offset from it to the pixel, distributed over the corners by the barycentric weights of the point.
 #[derive(Clone, Copy)]
 pub(crate) struct CornerSums<L>([L; 6]);
 
@@ -104,8 +104,8 @@ impl<L: Lanes> CornerSums<L> {
         Self([splat(0.0); 6])
     }
 
-    /// Adds the way from the closest points to the pixels times the derivatives by the squared distance, `x` and `y`; `second` and
-    /// `third` are the weights of the points on these corners.
+    /// Adds the offsets from the closest points to the pixels times the derivatives with respect to the squared distance, `x` and `y`;
+    /// `second` and `third` are the weights of the points on these corners.
     #[inline(always)]
     pub(crate) fn add<T: Real<Lanes = L>>(&mut self, [x, y]: [T; 2], [second, third]: [T; 2]) {
         self.0[0] += x.output();
@@ -116,14 +116,14 @@ impl<L: Lanes> CornerSums<L> {
         self.0[5] += (y * third).output();
     }
 
-    /// Adds it to the x and y of the three corners of a face, in NDC, and begins again. `order` says where each was given, `half` is the
-    /// number of pixels in a unit.
+    /// Adds the sums to the x and y of the three corners of a face, in NDC, and resets them. `order` are the original numbers of the
+    /// corners, `half` is the number of pixels in a unit.
     #[inline(always)]
     pub(crate) fn flush(&mut self, order: [usize; 3], half: f64, corners: &mut [L::Float; 6]) {
         let sums = std::mem::replace(self, Self::nothing()).0;
         // From pixels, with y down, to NDC.
         let [right, down] = [-2.0, 2.0].map(|k| L::Float::from_f64(k * half));
-        // The first corner has what the others leave.
+        // The first corner gets the remainder.
         let of_corner = [
             [sums[0] - sums[2] - sums[4], sums[1] - sums[3] - sums[5]],
             [sums[2], sums[3]],
@@ -141,9 +141,9 @@ struct Point<T: Real> {
     distance2: T,
     dx: T,
     dy: T,
-    /// Its place on the edge, 0 to 1.
+    /// Position on the edge, 0 to 1.
     along: T,
-    /// Twice the area of the triangle that edge and pixel make: above 0 on the inner side.
+    /// Twice the area of the triangle of edge and pixel: above 0 on the inner side.
     side: T::Lanes,
 }
 
@@ -178,7 +178,7 @@ mod tests {
         lanes::{LANES, Plain},
     };
 
-    /// Distances from pixels to triangles by both ways, and what both say of the inside.
+    /// Distances from pixels to triangles with and without `SLIVERS`, and both results for the inside.
     fn both<F: Float>(
         triangle: [[f64; 2]; 3],
         pixels: &[[f64; 2]],
@@ -206,7 +206,7 @@ mod tests {
         let mut stout = 0;
         for k in 0..600 {
             let [a, b] = [[wave(k), wave(2 * k + 7)], [wave(5 * k + 1), wave(7 * k + 3)]];
-            // The third corner comes as near to the first edge as triangles that are no slivers allow.
+            // The third corner comes as close to the first edge as triangles that are no slivers allow.
             let height = 10f64.powf(-3.5 * (k as f64 / 600.0));
             let along = 1.5 * wave(11 * k);
             let (x, y) = (b[0] - a[0], b[1] - a[1]);

@@ -1,4 +1,4 @@
-//! How many pixel-face pairs a walk visits: its work, without its arithmetic.
+//! Number of pixel-face pairs that a walk visits: its work, without its arithmetic.
 
 use rayon::prelude::*;
 

@@ -1,16 +1,15 @@
-//! Where faces lie in the image: decided face by face, on plain floats.
+//! Positions of faces in the image, computed per face on plain floats.
 
 use std::ops::Range;
 
 use super::float::Float;
 use crate::ImageSize;
 
-/// Projected coordinates beyond this (NDC) are not drawn: a table reaches no farther.
+/// Projected coordinates beyond this (NDC) are not drawn; it also bounds the support of a table.
 pub const FAR_AWAY: f64 = 1e6;
 
-/// Where a vertex lies in the image: column and row, whole numbers at the centres of
-/// pixels, the top row first. Infinite for a vertex whose faces are not drawn: one nearer than
-/// `near`, behind the camera, not finite, or farther than 1e6 NDC away.
+/// Position of a vertex in the image: column and row, whole numbers at pixel centres, the top row first. Infinite if its faces are not
+/// drawn: for a vertex nearer than `near`, behind the camera, not finite, or farther than 1e6 NDC away.
 #[inline(always)]
 pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: ImageSize) -> [F; 2] {
     let far = F::from_f64(FAR_AWAY);
@@ -25,14 +24,14 @@ pub(crate) fn in_pixels<F: Float>([x, y, z]: [F; 3], near: F, size: ImageSize) -
     [place(x, size.width), place(-y, size.height)]
 }
 
-/// Whether corners given in NDC, y up, go round clockwise.
+/// Whether corners given in NDC, y up, are in clockwise order.
 pub fn is_seen_clockwise<F: Float>(corners: [[F; 2]; 3]) -> bool {
     let [[ax, ay], [bx, by], [cx, cy]] = corners.map(|corner| corner.map(F::to_f64));
     (bx - ax) * (cy - ay) < (by - ay) * (cx - ax)
 }
 
-/// How far from its bounding box a face reaches the centres of pixels along an axis of this many, with more than their places are rounded
-/// by.
+/// Distance from the bounding box of a face up to which it reaches pixel centres along an axis of `side` pixels, with a margin above the
+/// rounding of positions.
 #[inline(always)]
 pub(crate) fn grown<F: Float>(radius: F, side: usize) -> F {
     radius + F::from_f64(side as f64 * 1e-6) + F::from_f64(0.5)
@@ -51,8 +50,8 @@ impl Reach {
     /// No pixel.
     pub(crate) const NOTHING: Self = Self { top: 0, bottom: 0, left: 0, right: 0 };
 
-    /// Pixels of an image no farther than `radius` pixels from the bounding box of three
-    /// corners, given as [`in_pixels`] does; `None` where one of them is not drawn.
+    /// Pixels of an image no farther than `radius` pixels from the bounding box of three corners, given as by [`in_pixels`]; `None` if a
+    /// corner is not drawn.
     #[inline(always)]
     pub(crate) fn around<F: Float>(
         corners: [[F; 2]; 3],
@@ -95,7 +94,7 @@ pub fn inside_spans<F: Float>(
     size: ImageSize,
     mut fill: impl FnMut(usize, usize, usize),
 ) {
-    // Exact decisions: the edge functions of the corners as given, in f64.
+    // Exact: the edge functions of the original corners, in f64.
     let count = vertices.len() / 3;
     let corners = face.map(|v| [0, 1, 2].map(|axis| vertices[axis * count + v as usize].to_f64()));
     let Some(reach) = Reach::around(corners.map(|at| in_pixels(at, near, size)), 0.0, size) else {

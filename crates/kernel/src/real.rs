@@ -15,15 +15,15 @@ pub(crate) trait Real:
     type Lanes: Lanes;
     /// One number of each edge or corner of [`LANES`] faces, in memory.
     type Threes: Copy + Default;
-    /// Whether numbers have tangents. Then the tangents are what a kernel gives back.
+    /// Whether numbers have tangents. Then a kernel returns the tangents.
     const DUAL: bool;
-    /// Numbers with these tangents, which are left aside where there are none.
+    /// Numbers with these tangents, which are ignored by types without tangents.
     fn new(value: Self::Lanes, tangent: Self::Lanes) -> Self;
     /// Numbers that do not depend on any input.
     fn constant(value: Self::Lanes) -> Self;
-    /// The numbers without their derivatives.
+    /// The values without their derivatives.
     fn value(self) -> Self::Lanes;
-    /// What a kernel gives back of a result: the derivatives if there are any, else the values.
+    /// The part of a result that a kernel returns: the derivatives if there are any, else the values.
     fn output(self) -> Self::Lanes;
     /// `factor * self` for a factor that does not depend on any input.
     fn scale(self, factor: Self::Lanes) -> Self;
@@ -31,7 +31,7 @@ pub(crate) trait Real:
     fn inverse(self) -> Self;
     /// `e` to this power.
     fn exponential(self) -> Self;
-    /// `e` to this power, as [`Lanes::power`] has it.
+    /// `e` to this power, computed by [`Lanes::power`].
     fn power_of_e(self) -> Self;
     /// Natural logarithm.
     fn logarithm(self) -> Self;
@@ -39,26 +39,26 @@ pub(crate) trait Real:
     fn choose(mask: Mask<Self>, yes: Self, no: Self) -> Self;
     /// `self` where the mask holds, else 0.
     fn masked(self, mask: Mask<Self>) -> Self;
-    /// No less than 0 and no more than 1.
+    /// Clamped to [0, 1].
     fn clamped(self) -> Self;
     /// Writes the numbers of each lane.
     fn write_threes(columns: [Self; 3], to: &mut Self::Threes);
-    /// Number `k` of those of a lane, in all lanes.
+    /// Number `k` of lane `lane`, in all lanes.
     fn of_three(threes: &Self::Threes, lane: usize, k: usize) -> Self;
-    /// One of those of a lane for each lane.
+    /// One of the three numbers of lane `lane`, selected in each lane.
     fn chosen(threes: &Self::Threes, lane: usize, which: Which<Self>) -> Self;
-    /// Rows of a table, column by column. `tangents` belongs to dual numbers.
+    /// Rows of a table, column by column. `tangents` are used by dual numbers only.
     fn rows(table: Table<Self>, at: &Places) -> [Self; 4];
 }
 
 /// One float of a [`Real`].
 pub(crate) type Float<T> = <<T as Real>::Lanes as Lanes>::Float;
-/// Which lanes of a [`Real`].
+/// Lane-wise condition of a [`Real`].
 pub(crate) type Mask<T> = <<T as Real>::Lanes as Lanes>::Mask;
-/// Which of three numbers each lane of a [`Real`] takes.
+/// Selection of one of three numbers in each lane of a [`Real`].
 pub(crate) type Which<T> = <<T as Real>::Lanes as Lanes>::Which;
 
-/// Rows of a profile table, and their tangents where numbers have any.
+/// Rows of a profile table, and their tangents if the numbers have any.
 pub(crate) struct Table<'a, T: Real> {
     pub(crate) values: &'a [[Float<T>; 4]],
     pub(crate) tangents: &'a [[Float<T>; 4]],
@@ -276,7 +276,7 @@ impl<L: Lanes> Real for Dual<L> {
     }
 }
 
-/// The same known number in all lanes.
+/// The constant `value` in all lanes.
 #[inline(always)]
 pub(crate) fn splat<L: Lanes>(value: f64) -> L {
     L::splat(super::float::Float::from_f64(value))

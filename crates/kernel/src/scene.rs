@@ -1,4 +1,4 @@
-//! What a traversal reads: the inputs of the op in one number type, cut into bands.
+//! Inputs of a traversal: those of the op in one number type, cut into bands.
 
 use std::ops::Range;
 
@@ -13,11 +13,11 @@ use super::{
 };
 use crate::ImageSize;
 
-/// Everything a traversal reads, in one number type.
+/// All inputs of a traversal, in one number type.
 pub(crate) struct Scene<'a, T: Real> {
     /// `[views, 3, vertices]`: x and y in NDC, depth.
     pub(crate) vertices: &'a [Float<T>],
-    /// Their tangents, where numbers have any.
+    /// Tangents of the vertices, if the numbers have any.
     pub(crate) tangents: &'a [Float<T>],
     pub(crate) faces: &'a [[u32; 3]],
     /// Cubic coefficients of each cell, `[grid.rows()]`.
@@ -32,12 +32,12 @@ pub(crate) struct Scene<'a, T: Real> {
     heights: Vec<Float<T>>,
 }
 
-/// Which band of which view.
+/// A band of a view.
 #[derive(Clone, Copy)]
 pub(crate) struct BandRef<'a, T: Real> {
     /// `[3, vertices]`.
     pub(crate) vertices: &'a [Float<T>],
-    /// The same, or nothing.
+    /// Tangents of the vertices, `[3, vertices]`, or empty.
     pub(crate) tangents: &'a [Float<T>],
     /// `[grid.rows()]`.
     pub(crate) table: Table<'a, T>,
@@ -50,8 +50,8 @@ pub(crate) struct BandRef<'a, T: Real> {
 }
 
 impl<T: Real> BandRef<'_, T> {
-    /// Prepares up to [`LANES`] faces of the band, given by their numbers; the last one fills them up. Each is seen from the first
-    /// column that it reaches, and the first row in this band.
+    /// Prepares up to [`LANES`] faces of the band, given by their numbers; the last one is repeated. The origin of each is the first column
+    /// that it reaches, and its first row in this band.
     #[inline(always)]
     pub(crate) fn faces(
         &self,
@@ -105,12 +105,12 @@ impl<T: Real> BandRef<'_, T> {
         self.view.rows(self.band)
     }
 
-    /// Numbers of the band: its rows, and a group for pixels on which nothing depends.
+    /// Length of the band's buffers: its rows, and a group of unused pixels.
     pub(crate) fn length(&self, scene: &Scene<T>) -> usize {
         self.rows().len() * scene.stride() + GROUP
     }
 
-    /// The constant outside the support.
+    /// The constant of the profile outside its support.
     #[inline(always)]
     pub(crate) fn tail(&self, grid: &Grid) -> T {
         let tail = grid.tail();
@@ -118,14 +118,14 @@ impl<T: Real> BandRef<'_, T> {
         T::new(T::Lanes::splat(self.table.values[tail][0]), T::Lanes::splat(tangent))
     }
 
-    /// A pixel that no face reaches.
+    /// The sum at a pixel that no face reaches.
     pub(crate) fn empty(&self, grid: &Grid) -> Float<T> {
         let rows = if T::DUAL { self.table.tangents } else { self.table.values };
         rows[grid.tail()][0] * Float::<T>::from_f64(self.view.drawn as f64)
     }
 }
 
-/// Places in pixels from an origin, with their tangents; pixels are so many in a unit.
+/// Positions in pixels relative to an origin, with their tangents; `half` is the number of pixels in a unit.
 #[inline(always)]
 fn placed<T: Real>(
     values: &[Float<T>; LANES],
@@ -181,7 +181,7 @@ impl<'a, T: Real> Scene<'a, T> {
         BandRef { vertices, tangents, table: self.table, view, band, numbers, first_list: 0 }
     }
 
-    /// Length of a row of a band: that of the image, and a group for what reaches beyond.
+    /// Length of a row of a band: that of the image, and a group for pixels beyond its end.
     pub(crate) fn stride(&self) -> usize {
         self.size.width + GROUP
     }

@@ -26,22 +26,22 @@ const MOST_PULLED: usize = 4;
 pub struct Inputs<'a, F> {
     /// `[views, 3, vertices]`: x and y in NDC, depth in world units.
     pub vertices: &'a [F],
-    /// `[grid.rows(), 4]`: the profile as cubics, constant first, in the place of the squared distance within its cell.
+    /// `[grid.rows(), 4]`: the profile as cubics, constant first, in the position of the squared distance within its cell.
     pub table: &'a [F],
     /// Vertices of each face.
     pub faces: &'a [[u32; 3]],
-    /// Where the cells of the table lie.
+    /// Layout of the cells of the table.
     pub grid: Grid,
     /// Height and width of the image.
     pub size: ImageSize,
     /// Depth below which a vertex counts as behind the camera: its faces are not drawn.
     pub near: f64,
-    /// Whether back faces are not drawn: those whose corners are seen clockwise.
+    /// Whether back faces, whose corners appear in clockwise order, are culled.
     pub culls: bool,
     /// Number of views.
     pub views: usize,
-    /// Bands of a view: [`bands_of_view`](crate::bands_of_view), or for losses [`bands_of_losses`](crate::bands_of_losses).
-    /// One to the number of rows, and none of more than 255 rows on the average.
+    /// Bands of a view: [`bands_of_view`](crate::bands_of_view), or for losses [`bands_of_losses`](crate::bands_of_losses). From one to the
+    /// number of rows, with at most 255 rows per band on average.
     pub bands: usize,
 }
 
@@ -56,7 +56,7 @@ impl<F> Inputs<'_, F> {
         Bands::new(vertices, per_view, drawn, self.bands)
     }
 
-    /// What a walk over these inputs reads; `tangents` are those of vertices and table, or nothing.
+    /// The scene of a walk over these inputs; `tangents` are those of vertices and table, or empty.
     pub(crate) fn scene<'s, T>(&'s self, tangents: [&'s [F]; 2]) -> Scene<'s, T>
     where
         T: Real,
@@ -94,8 +94,8 @@ pub(crate) fn vjp<F: Vectors>(
 
 /// See [`Kernels::sums_vjp_of_vjp`](crate::Kernels::sums_vjp_of_vjp).
 ///
-/// The Hessian is symmetric, so the first two are the derivative of the gradient along the
-/// direction, and the third is the derivative of the image along it: one walk with dual numbers.
+/// The Hessian is symmetric, so the first two gradients are the derivative of the gradient along the direction, and the third is the
+/// derivative of the image along it: one walk with dual numbers.
 pub(crate) fn vjp_of_vjp<F: Vectors>(
     inputs: &Inputs<F>,
     bands: &Bands,
@@ -142,7 +142,7 @@ fn image<T: Real>(scene: &Scene<T>, bands: &Bands) -> Vec<real::Float<T>> {
     image
 }
 
-/// Rows of a band as they stand in the image.
+/// Copies rows of a band to the image.
 fn trim<T: Real>(padded: &[real::Float<T>], image: &mut [real::Float<T>], scene: &Scene<T>) {
     let width = scene.size.width;
     for (row, padded) in image.chunks_exact_mut(width).zip(padded.chunks(scene.stride())) {
@@ -150,7 +150,7 @@ fn trim<T: Real>(padded: &[real::Float<T>], image: &mut [real::Float<T>], scene:
     }
 }
 
-/// Rows of the image as they stand in a band, followed by zeros.
+/// Copies rows of the image to a band, followed by zeros.
 fn pad<T: Real>(rows: &[real::Float<T>], scene: &Scene<T>, length: usize) -> Vec<real::Float<T>> {
     let mut padded = vec![real::Float::<T>::ZERO; length];
     let width = scene.size.width;
@@ -202,9 +202,9 @@ struct Walked<'a, F> {
     image: Vec<F>,
 }
 
-/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` to vertices and table, and the sums, as they are wanted, flat
-/// and in this order. The third row of each view's vertices is 0, because a silhouette does not see
-/// depth. Of dual numbers all that comes back are tangents.
+/// Runs a walk with gradients over all bands: gradients of `Σ upstream S` with respect to vertices and table, and the sums, those that are
+/// wanted, concatenated in this order. The third row of each view's vertices is 0, because a silhouette does not depend on depth. For dual
+/// numbers all results are tangents.
 fn gradient<T: Real>(
     scene: &Scene<T>,
     bands: &Bands,

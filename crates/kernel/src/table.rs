@@ -1,4 +1,4 @@
-//! Where a squared distance lies in a profile table.
+//! Position of a squared distance in a profile table.
 
 use super::{
     float::Float,
@@ -6,20 +6,19 @@ use super::{
     real::{Mask, Real, splat},
 };
 
-/// Largest rate at which a place in a cell moves with the squared distance, in pixels⁻². Reached only
-/// next to the edge under a softness narrower than f32 can tell from a step.
+/// Largest rate at which a position in a cell changes with the squared distance, in pixels⁻². Reached only next to the edge, with a
+/// softness that f32 cannot distinguish from a step.
 const STEEPEST: f64 = 1e30;
 
-/// Places of the cells of a profile table: two one-sided tables over the squared distance that
-/// meet at the edge of the face.
+/// Layout of the cells of a profile table: two one-sided tables over the squared distance that meet at the edge of the face.
 ///
-/// A side has cells from one distance to another, `y` being the part of the way between their squares; it is constant before and beyond.
-/// With `y` and `c = 2^-octaves`, places are read off the bits of the float `z = y (1 - c) + c`: each of
-/// the octaves of z from c to 1 holds `2^bits` cells, and the last cell is the constant tail `y >= 1`. So the look-up needs no
-/// transcendental function, no square root, and no case for the first cell, at the edge.
+/// A side has cells between two distances; `y` is the fraction of the way between their squares. The profile is constant before and beyond.
+/// With `y` and `c = 2^-octaves`, positions are the bits of the float `z = y (1 - c) + c`: each of the octaves of z from c to 1 holds
+/// `2^bits` cells, and the last cell is the constant tail `y >= 1`. The look-up therefore needs no transcendental function, no square root,
+/// and no special case for the first cell, at the edge.
 ///
-/// With `far`, the octave of z from 1/2 to 1 is cut like that from its other end: with `C = 2^-(far + 1)`, the `far` octaves
-/// of `(1 - z) (1 - 2 C) + C` below 1/2 hold `2^bits` cells each. It serves profiles that rise without bound towards the end of their
+/// With `far`, the octave of z from 1/2 to 1 is divided likewise from its other end: with `C = 2^-(far + 1)`, the `far` octaves of
+/// `(1 - z) (1 - 2 C) + C` below 1/2 hold `2^bits` cells each. This suits profiles that increase without bound towards the end of their
 /// support.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
@@ -27,13 +26,13 @@ pub struct Grid {
     pub outer: f64,
     /// Distance inside the face beyond which the profile is constant, in NDC.
     pub inner: f64,
-    /// Distances outside and inside the face up to which the profile is what it is at the edge, in NDC; only with `far`.
+    /// Distances outside and inside the face up to which the profile has its value at the edge, in NDC; only with `far`.
     pub from: [f64; 2],
-    /// Octaves that are resolved.
+    /// Octaves resolved from the edge on.
     pub octaves: u32,
-    /// Octaves before the end that are resolved; 0 for none.
+    /// Octaves resolved before the end; 0 for none.
     pub far: u32,
-    /// Cells in an octave, as a power of two.
+    /// Cells per octave, as a power of two.
     pub bits: u32,
 }
 
@@ -44,19 +43,19 @@ impl Grid {
         (octaves as usize) << self.bits
     }
 
-    /// Where the places start: `2^-octaves`, and with `far` the same of the other end.
+    /// Start of the positions: `2^-octaves`, and with `far` that of the positions from the other end.
     fn starts(&self) -> [f64; 2] {
         [self.octaves, self.far + 1].map(|octaves| f64::exp2(-f64::from(octaves)))
     }
 
-    /// The distance on a side, outer or inner, at the part `y` of the way between the squares of its ends.
+    /// The distance on a side, outer or inner, at the fraction `y` of the way between the squares of its ends.
     pub fn distance(&self, side: usize, y: f64) -> f64 {
         let [from, to] = self.ends(side);
         // Without rounding where a side starts at the edge.
         if from == 0.0 { to * y.sqrt() } else { (from * from + y * (to * to - from * from)).sqrt() }
     }
 
-    /// The derivative of [`Grid::distance`] by `y`.
+    /// The derivative of [`Grid::distance`] with respect to `y`.
     pub fn rate(&self, side: usize, y: f64) -> f64 {
         let [from, to] = self.ends(side);
         (to - from) * (to + from) / (2.0 * self.distance(side, y))
@@ -71,13 +70,13 @@ impl Grid {
         (distance - from) * (distance + from) / ((to - from) * (to + from))
     }
 
-    /// Where the cells of a side begin and end.
+    /// Distances at which the cells of a side start and end.
     fn ends(&self, side: usize) -> [f64; 2] {
         [self.from[side], [self.outer, self.inner][side]]
     }
 
-    /// For each side the factor from squared distances, of which `unit` squared are one of the grid's, to places without their start; and
-    /// what that makes of the distance where the cells begin.
+    /// For each side the factor from squared distances to positions relative to their start, and the product of this factor and the squared
+    /// distance where the cells start. `unit` is the length of a unit of the grid.
     pub fn lookups(&self, unit: f64) -> [[f64; 2]; 2] {
         let [start, _] = self.starts();
         [0, 1].map(|side| {
@@ -97,8 +96,8 @@ impl Grid {
         self.cells()
     }
 
-    /// The table `[rows, 4]` of a profile, which gives its value at a signed distance in NDC (positive inside) and its slope there: a cubic through
-    /// both at the ends of each cell, and a straight line in the cell at the edge of the face. Beyond the ends it is constant.
+    /// The table `[rows, 4]` of a profile, a function from a signed distance in NDC (positive inside) to its value and slope: a cubic
+    /// through both at the ends of each cell, and a straight line in the cell at the edge of the face. Beyond the ends it is constant.
     ///
     /// ```
     /// use softrast_kernel::Grid;
@@ -118,7 +117,7 @@ impl Grid {
                 let rise = end - start;
                 let by_place =
                     |slope: f64, y: f64| sign * slope * self.rate(side, y) * (cell[1] - cell[0]);
-                // At the edge a distance moves infinitely fast with its square.
+                // At the edge the derivative of a distance with respect to its square is infinite.
                 table.extend(if cell[0] == 0.0 {
                     [start, rise, 0.0, 0.0]
                 } else {
@@ -131,7 +130,7 @@ impl Grid {
         table
     }
 
-    /// Ends of the cells of one side in y, ascending, `cells + 1` numbers from 0 to 1.
+    /// Ends of the cells of one side in y, ascending: `cells + 1` numbers from 0 to 1.
     pub fn knots(&self) -> Vec<f64> {
         let per_octave = 1u32 << self.bits;
         let octave = |start: f64| {
@@ -146,7 +145,7 @@ impl Grid {
             return octaves(self.octaves, 1).chain([1.0]).map(y).collect();
         }
         let from_far: Vec<f64> = octaves(self.far + 1, 2).chain([0.5]).collect();
-        // Without the digits that 1 - z would lose.
+        // Avoids the cancellation in 1 - z.
         let far = from_far.into_iter().rev().map(|v| {
             let rest = (v - end) / (1.0 - 2.0 * end);
             1.0 - rest / (1.0 - start)
@@ -158,14 +157,14 @@ impl Grid {
 /// A [`Grid`] prepared for look-ups.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lookup<F> {
-    /// From squared distances to z, without its start.
+    /// Factor from squared distances to z, relative to its start.
     inverse_outer: F,
     inverse_inner: F,
-    /// Scaled squared distances at which the cells begin.
+    /// Scaled squared distances at which the cells start.
     before_outer: F,
     before_inner: F,
     start: F,
-    /// From `1 - z` to what the cells before the end lie in, and the start of that.
+    /// Factor from `1 - z` to positions from the far end, and the start of these.
     shrunk: F,
     end: F,
     octaves: u32,
@@ -174,17 +173,17 @@ pub(crate) struct Lookup<F> {
     cells: i32,
 }
 
-/// Places of squared distances in a table.
+/// Positions of squared distances in a table.
 pub(crate) struct TablePosition<T: Real> {
     pub(crate) row: Places,
-    /// Places within the cells, in [0, 1].
+    /// Positions within the cells, in [0, 1].
     pub(crate) t: T,
-    /// Rates at which they change with the squared distance.
+    /// Derivatives of these positions with respect to the squared distance.
     pub(crate) rate: T::Lanes,
 }
 
 impl<F: Float> Lookup<F> {
-    /// For distances of which `unit` are one unit of the grid's.
+    /// A look-up for distances in units of which `unit` make one unit of the grid.
     pub(crate) fn new(grid: &Grid, unit: f64) -> Self {
         let [start, end] = grid.starts();
         let [outer, inner] = grid.lookups(unit).map(|side| side.map(F::from_f64));
@@ -209,8 +208,8 @@ impl<F: Float> Lookup<F> {
         self.far > 0
     }
 
-    /// Places of squared distances (not negative; NaN counts as far away) on the inner side where the mask holds. Without
-    /// `FAR` none may be counted from the far end.
+    /// Positions of squared distances (not negative; NaN counts as infinite), on the inner side where `inside` holds. Without `FAR` no cell
+    /// may be counted from the far end.
     #[inline(always)]
     pub(crate) fn place<T: Real, const FAR: bool>(
         &self,
@@ -249,7 +248,7 @@ impl<F: Float> Lookup<F> {
             let shrunk = T::Lanes::splat(self.shrunk);
             let rest = rest * shrunk + T::Lanes::splat(self.end);
             let (cell, place, far_rate) = rest.cell(self.far + 1, self.bits);
-            // Counted from its end; one that starts at the middle is not reached.
+            // Counted from the end; the cell that starts at the middle is never reached.
             let last = T::Lanes::minus(index(self.cells - 1), cell);
             let far = half.less(z);
             let far_row = pick_index(z.less(one), last, index(self.cells));
@@ -258,7 +257,7 @@ impl<F: Float> Lookup<F> {
             rate = pick(far, far_rate * shrunk, rate);
         }
         let row = T::Lanes::places(row, self.cells, inside);
-        // In the tail the cubic is constant. A place that does not change keeps overflow out of it.
+        // The cubic of the tail is constant. A constant position there avoids overflow.
         let mut moves = (scaled.output() * rate).only(z.less(one));
         let mut rate = (rate * inverse).min(splat(STEEPEST));
         if let Some(begun) = begun {
@@ -273,7 +272,7 @@ mod tests {
     use super::*;
     use crate::lanes::{LANES, Plain};
 
-    /// Row and place within the cell of `y` outside.
+    /// Row, and position within the cell, of `y` on the outer side.
     fn place<F: Float>(grid: &Grid, y: F) -> (usize, f64) {
         let inside = [false; LANES];
         let (lookup, y) = (Lookup::new(grid, 1.0), Plain::splat(y));
@@ -302,7 +301,7 @@ mod tests {
                 assert!((0.0..=1.0 + 1e-6).contains(&t), "y {y} row {row} t {t}");
                 let width = knots[row + 1] - knots[row];
                 let wanted = (y - knots[row]) / width;
-                // Three units in the last place of the float that the place is read from: of z, or of 1 - z, which has lost its digits.
+                // Three units in the last place of the float that holds the position: z, or 1 - z, which has lost digits.
                 let far = grid.far > 0 && y > 0.5;
                 let size = if far { 1.0 } else { y + f64::exp2(-f64::from(grid.octaves)) };
                 let rounded = 1.5 * f64::from(f32::EPSILON) * size / width;

@@ -1,4 +1,4 @@
-//! How long the tasks of each phase take: what more cores would make of a step follows from that.
+//! Durations of the tasks of each phase: they determine the time of a step on more cores.
 
 use std::{
     sync::{
@@ -11,7 +11,7 @@ use std::{
 static RECORDS: AtomicBool = AtomicBool::new(false);
 static TASKS: Mutex<Vec<(&'static str, Duration)>> = Mutex::new(Vec::new());
 
-/// Does a task of a phase, whose tasks may run in parallel. The time is recorded within [`recorded_tasks`].
+/// Runs a task of a phase, whose tasks may run in parallel. Its duration is recorded within [`recorded_tasks`].
 #[doc(hidden)]
 #[inline]
 pub fn task<R>(phase: &'static str, work: impl FnOnce() -> R) -> R {
@@ -25,7 +25,7 @@ pub fn task<R>(phase: &'static str, work: impl FnOnce() -> R) -> R {
     done
 }
 
-/// Does some work, and lists the tasks of all of the process meanwhile, in the order in which they ended, each with its phase.
+/// Runs some work, and lists the tasks of the whole process meanwhile, in the order of their ends, each with its phase.
 #[doc(hidden)]
 pub fn recorded_tasks<R>(work: impl FnOnce() -> R) -> (R, Vec<(&'static str, Duration)>) {
     let tasks = || std::mem::take(&mut *TASKS.lock().unwrap_or_else(|held| held.into_inner()));

@@ -1,4 +1,4 @@
-//! The walk over the pixel-face pairs of a band: silhouettes, their gradients and their losses are visitors of it.
+//! The walk over the pixel-face pairs of a band. Silhouettes, their gradients and their losses are its visitors.
 
 use super::{
     face::Face,
@@ -10,24 +10,24 @@ use super::{
     table::TablePosition as Cell,
 };
 
-/// Room for chunks whose geometry is known: a power of two. Visits follow [`AHEAD`] chunks behind: while one waits for the table, the
-/// arithmetic of the other goes on.
+/// Capacity for chunks whose geometry is known: a power of two. Visits follow [`AHEAD`] chunks behind, so that arithmetic overlaps the
+/// latency of table look-ups.
 const RING: usize = 8;
 
-/// Chunks whose gradients are added up lane by lane: fewer terms in a row keep more digits.
+/// Chunks whose gradients are accumulated per lane: shorter sums keep more digits.
 pub(crate) const TOGETHER: usize = 16;
 
 /// A face and eight pixels.
 pub(crate) struct Pair<T: Real> {
-    /// Where the two groups of pixels lie in the band.
+    /// Positions of the two groups of pixels in the band.
     pub(crate) at: [u32; 2],
     /// Number of the face in the band.
     pub(crate) face: usize,
-    /// From the closest point to the pixel.
+    /// Offset from the closest point to the pixel.
     pub(crate) offset: [T; 2],
     /// Weights of the closest point on the second and the third corner.
     pub(crate) weights: [T; 2],
-    /// Place in the cell of the table, how it changes with the squared distance, the row of the cell, and its cubic.
+    /// Position in the cell of the table, its derivative with respect to the squared distance, the row of the cell, and its cubic.
     pub(crate) t: T,
     pub(crate) rate: T::Lanes,
     pub(crate) row: Places,
@@ -35,14 +35,14 @@ pub(crate) struct Pair<T: Real> {
 }
 
 impl<T: Real> Pair<T> {
-    /// The profile.
+    /// The value of the profile.
     #[inline(always)]
     pub(crate) fn value(&self) -> T {
         let [a, b, c, d] = self.cubic;
         a + self.t * (b + self.t * (c + self.t * d))
     }
 
-    /// The derivative of the profile by the squared distance, times a factor that depends on no input.
+    /// The derivative of the profile with respect to the squared distance, times a factor that depends on no input.
     #[inline(always)]
     pub(crate) fn slope(&self, factor: T::Lanes) -> T {
         let [_, b, c, d] = self.cubic;
@@ -53,7 +53,7 @@ impl<T: Real> Pair<T> {
 
 /// An operation on the pairs of a band.
 pub(crate) trait Visitor<T: Real> {
-    /// Whether it reads offsets, weights and rates of pairs, and takes faces; else these are 0, and no face is shown.
+    /// Whether the visitor uses offsets, weights, rates and faces; if not, the walk sets the numbers to 0 and calls no [`Visitor::face`].
     const MOVES: bool;
 
     /// Whether the chunks of this list are visited; if not, the walk ends before it.
@@ -63,10 +63,10 @@ pub(crate) trait Visitor<T: Real> {
         true
     }
 
-    /// Takes a pair. Those of a face follow each other.
+    /// Visits a pair. Pairs of a face are consecutive.
     fn pair(&mut self, pair: &Pair<T>);
 
-    /// Has taken all pairs of a face, or up to [`TOGETHER`] of them; the face has this number in the band.
+    /// Called after all pairs of a face, or up to [`TOGETHER`] of them; `number` is that of the face in the band.
     #[inline(always)]
     fn face(&mut self, number: usize, face: Face<T>) {
         let _ = (number, face);
@@ -90,7 +90,7 @@ impl<T: Real, A: Visitor<T>, B: Visitor<T>> Visitor<T> for (A, B) {
     }
 }
 
-/// Shows the pairs of a band to a visitor: the number of lists of faces that were visited, counted from the first of the band.
+/// Walks over the pairs of a band; returns the number of lists of faces visited, counted from the first of the band.
 pub(crate) fn walk<T: Real>(
     scene: &Scene<T>,
     place: BandRef<T>,
@@ -99,7 +99,7 @@ pub(crate) fn walk<T: Real>(
     run::<T::Lanes, _>(Walk { scene, place, visitor })
 }
 
-/// A [`walk`], to be compiled for the vectors at hand.
+/// A [`walk`], compiled for the vectors at hand.
 struct Walk<'a, 's, T: Real, V> {
     scene: &'a Scene<'s, T>,
     place: BandRef<'a, T>,
@@ -131,7 +131,7 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
     }
 }
 
-/// Chunks whose geometry is known: closest points, their weights, and their places in the table.
+/// Chunks whose geometry is known: closest points, their weights, and their positions in the table.
 struct Ring<T: Real> {
     at: [[u32; 2]; RING],
     owner: [usize; RING],
@@ -143,10 +143,10 @@ struct Ring<T: Real> {
 }
 
 impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
-    /// Takes the chunks of a list, whose first face is number `first` of the band.
+    /// Walks over the chunks of a list, whose first face is number `first` of the band.
     #[inline(always)]
     fn take<const FAR: bool, const SLIVERS: bool>(&mut self, list: &List<T>, first: usize) {
-        // Copies that nothing can write to: else they are read again for each chunk, since visitors write.
+        // Copies that nothing can write to; otherwise they would be read again for each chunk, since visitors write.
         let (lookup, table) = (self.scene.lookup, self.place.table);
         let zero = T::constant(splat(0.0));
         let mut ring = Ring {
@@ -206,7 +206,7 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
     }
 }
 
-/// Adds `profile - tail` to the pixels of a band, `[rows, stride]` and a group more.
+/// Adds `profile - tail` to the pixels of a band, `[rows, stride]` and one group more.
 pub(crate) struct Image<'a, T: Real> {
     pub(crate) image: &'a mut [Float<T>],
     pub(crate) tail: T,
@@ -221,7 +221,7 @@ impl<T: Real> Visitor<T> for Image<'_, T> {
     }
 }
 
-/// Adds the gradient of `Σ upstream S` to x and y of the three corners of each face of a band.
+/// Adds the gradient of `Σ upstream S` with respect to x and y of the corners of each face of a band.
 pub(crate) struct Gradient<'a, T: Real> {
     upstream: &'a [Float<T>],
     half: f64,
@@ -255,11 +255,11 @@ impl<T: Real> Visitor<T> for Gradient<'_, T> {
     }
 }
 
-/// Adds the gradient of `Σ upstream S` to the rows of the table.
+/// Adds the gradient of `Σ upstream S` with respect to the rows of the table.
 pub(crate) struct TableGradient<'a, T: Real> {
     upstream: &'a [Float<T>],
     rows: &'a mut [[Float<T>; 4]],
-    /// Sums of `upstream` over the pairs, each of which replaced a tail.
+    /// Sums of `upstream` over the pairs, each of which replaces a tail.
     visited: T::Lanes,
 }
 
@@ -268,7 +268,7 @@ impl<'a, T: Real> TableGradient<'a, T> {
         Self { upstream, rows, visited: splat(0.0) }
     }
 
-    /// Takes the tails that pairs have replaced off row `tail`.
+    /// Subtracts the tails that pairs have replaced from row `tail`.
     pub(crate) fn finish(self, tail: usize) {
         self.rows[tail][0] += -self.visited.sum();
     }

@@ -1,4 +1,4 @@
-//! One band of one view in colour: its sums, its image, and its gradient.
+//! The colour pass of one band of one view: its sums, its image, and its gradient.
 #![allow(clippy::needless_range_loop)]
 
 use std::sync::OnceLock;
@@ -19,12 +19,12 @@ use crate::{
     scene::BandRef,
 };
 
-/// Logarithm of the largest ratio of two weights that floats of 32 and of 64 bits add up without losing the sum.
+/// Logarithm of the largest ratio of two weights whose sum keeps both, in f32 and in f64.
 const RANGE: [f64; 2] = [60.0, 600.0];
 
 /// Sums over the faces at the pixels of a band.
 pub(super) struct BandSums<F> {
-    /// Logarithms that weights are relative to: none is so much larger or smaller than that of a pixel's sum that it could not be told.
+    /// Logarithms that weights are relative to, per pixel: close enough to the logarithm of the pixel's sum for the range of floats.
     largest: Vec<F>,
     /// Sums of the weights, then of each channel.
     sums: Quads<F>,
@@ -32,7 +32,7 @@ pub(super) struct BandSums<F> {
 
 /// Results of a band.
 pub(super) struct Walked<F> {
-    /// Rows of the image, plane by plane, as they stand in the image.
+    /// Rows of the image, plane by plane, in the layout of the image.
     pub(super) image: Vec<Vec<F>>,
     pub(super) faces: Vec<F>,
     pub(super) tables: [Vec<[F; 4]>; 2],
@@ -47,12 +47,12 @@ pub(super) struct Band<'a, 's, T: Real> {
     pub(super) views: usize,
     pub(super) view: usize,
     pub(super) band: usize,
-    /// Logarithm of the largest weight by depth of each face.
+    /// Logarithm of the largest depth weight of each face.
     pub(super) logs: &'a [f32],
-    /// Logarithm of what may be left out of a pixel of each face, as a part of the weights there.
+    /// Logarithm of the relative weight below which a face is culled at a pixel.
     pub(super) least: f64,
     pub(super) kept: Option<&'a OnceLock<BandSums<Float<T>>>>,
-    /// `[channels + 1, height, width]`, and what gradients are wanted.
+    /// `[channels + 1, height, width]`, and which gradients are wanted.
     pub(super) upstream: Option<(&'a [Float<T>], [bool; 5])>,
 }
 
@@ -66,13 +66,13 @@ impl<T: Real> Work for Band<'_, '_, T> {
         let zero = <Float<T> as float::Float>::ZERO;
         let length = self.place().length(scene);
         let padded = length.next_multiple_of(LANES);
-        // Those that are kept have no tangents.
+        // Cached sums have no tangents.
         let kept = self.kept.filter(|_| !T::DUAL);
         let own;
         let BandSums { largest, sums } = match kept {
             Some(kept) => {
                 if kept.get().is_none() {
-                    // Another walk may have been as quick; its sums are the same.
+                    // Another walk may have set it first, with the same sums.
                     let _ = kept.set(self.summed(length));
                 }
                 kept.get().expect("it was set")
@@ -88,7 +88,7 @@ impl<T: Real> Work for Band<'_, '_, T> {
         let of_pixels = if upstream.is_some() { length } else { 0 };
         let mut pixels = Quads::new(QUAD, of_pixels, T::DUAL);
         let mut limits = vec![zero; of_pixels.next_multiple_of(LANES)];
-        // What each channel of the background gets.
+        // Gradient of each channel of the background.
         let mut background = vec![splat::<T::Lanes>(0.0); channels + 1];
         let mut seen = vec![T::constant(splat(0.0)); channels + 1];
         let log_weight = blend.behind(channels);
@@ -182,7 +182,7 @@ impl<T: Real> Band<'_, '_, T> {
         let behind = blend.background[0][blend.channels];
         let number = <Float<T> as float::Float>::from_f64;
         let length = length.next_multiple_of(LANES);
-        // No weight is larger than this, and the background is always there: so one number does for all pixels.
+        // Upper bound of all weights; the background is always there. If the two are close enough, one number serves all pixels.
         let faces = self.of_view.faces(self.band).iter();
         let highest = faces.map(|&face| self.logs[face as usize]).fold(f32::MIN, f32::max);
         let highest = number(f64::from(highest));
@@ -238,7 +238,7 @@ impl<T: Real> Band<'_, '_, T> {
         padded
     }
 
-    /// The band's rows as they stand in the image.
+    /// The band's rows in the layout of the image.
     fn trimmed(&self, padded: &[Float<T>]) -> Vec<Float<T>> {
         let scene = &self.blend.scene;
         let (width, rows) = (scene.size.width, self.of_view.rows(self.band).len());

@@ -1,6 +1,6 @@
-//! Blocks of chunks on their way from pixels to weights.
+//! Blocks of chunks, processed from pixels to weights.
 //!
-//! Each step is a function of its own, which all walks share: code that is inlined into each of them takes minutes to compile.
+//! Each step is a separate function shared by all walks: inlining it into each of them takes minutes to compile.
 #![allow(clippy::needless_range_loop)]
 
 use super::{
@@ -17,13 +17,13 @@ use crate::{
     table::TablePosition,
 };
 
-/// Chunks that are taken through each step together: the chains of one wait for each other, those of several do not.
+/// Chunks processed together in each step: the dependency chains of several chunks overlap.
 pub(super) const BLOCK: usize = 8;
 
-/// Pairs of faces and eight pixels each, on their way through the steps of a walk.
+/// Pairs of faces and eight pixels each, between the steps of a walk.
 pub(super) struct Block<T: Real> {
     pub(super) count: usize,
-    /// Where pixels lie in the band, seen from the origin of their face, and which face of the list that is.
+    /// Positions of the pixels in the band, relative to the origin of their face, and the face's index in the list.
     pub(super) at: [[u32; 2]; BLOCK],
     pub(super) places: [[u32; 2]; BLOCK],
     pub(super) owner: [usize; BLOCK],
@@ -32,14 +32,14 @@ pub(super) struct Block<T: Real> {
     /// Depths of the points, and their barycentric weights on the face itself.
     pub(super) depth: [T; BLOCK],
     pub(super) weights: [[T; 3]; BLOCK],
-    /// Places in the table of the edge softness.
+    /// Positions in the table of the edge softness.
     pub(super) edge_t: [T; BLOCK],
     pub(super) edge_row: [Places; BLOCK],
     /// Logarithms of the softnesses.
     pub(super) log_edge: [T; BLOCK],
     pub(super) log_depth: [T; BLOCK],
-    /// For visitors that pull: points, how the place in the table moves with the squared distance, the derivative of the logarithm by that
-    /// distance, and what depths count.
+    /// For visitors with gradients: points, the derivative of the table position with respect to the squared distance, the derivative of
+    /// the logarithm with respect to that distance, and depth weights.
     pub(super) point: [Point<T>; BLOCK],
     edge_rate: [T::Lanes; BLOCK],
     pub(super) edge_slope: [T; BLOCK],
@@ -71,7 +71,7 @@ impl<T: Real> Block<T> {
 }
 
 impl<T: Real> Block<T> {
-    /// Takes the block from its pixels to the logarithms of its weights; with what visitors need that pull, if they do.
+    /// Computes the logarithms of the weights from the pixels; with the intermediates of gradients, if visitors need them.
     #[inline(always)]
     pub(super) fn weigh<const PULLS: bool>(
         &mut self,
@@ -89,7 +89,7 @@ impl<T: Real> Block<T> {
     }
 }
 
-/// Closest points of the boundaries, and places in the table of the edge softness.
+/// Computes closest points of the boundaries, and positions in the table of the edge softness.
 struct Measure<'a, 's, T: Real, const PULLS: bool, const FAR: bool, const SLIVERS: bool> {
     blend: &'a Blend<'s, T>,
     list: &'a List<T>,
@@ -110,7 +110,7 @@ impl<T: Real, const PULLS: bool, const FAR: bool, const SLIVERS: bool> Work
         for k in 0..block.count.min(BLOCK) {
             let (px, py) = T::Lanes::pixels(&block.places[k]);
             let closest = closest::<T, SLIVERS>(list.face(block.owner[k]), px, py);
-            // The table is that of the mirrored softness, so that its inner side is outside the face.
+            // The table holds the mirrored softness: its inner side is outside the face.
             let outside = zero.less(pick(closest.inside, zero, splat(1.0)));
             let TablePosition { row, t, rate } = lookup.place::<T, FAR>(closest.distance2, outside);
             (block.edge_row[k], block.edge_t[k]) = (row, t);
@@ -124,7 +124,7 @@ impl<T: Real, const PULLS: bool, const FAR: bool, const SLIVERS: bool> Work
     }
 }
 
-/// Points of the faces, their depths, and logarithms of softnesses.
+/// Computes points of the faces, their depths, and logarithms of softnesses.
 struct Weigh<'a, 's, T: Real, const PULLS: bool> {
     blend: &'a Blend<'s, T>,
     table: Table<'a, T>,
@@ -157,7 +157,7 @@ impl<T: Real, const PULLS: bool> Weigh<'_, '_, T, PULLS> {
                 own[k] = constant[k].lanes() + x[k].lanes().scale(px) + y[k].lanes().scale(py);
             }
             let point = Point::new(&block.closest[slot], list.face(owner), own, face.some);
-            // 1 / z is what interpolates linearly on the screen.
+            // 1 / z interpolates linearly on the screen.
             let [r0, r1, r2] = face.per_depth;
             let [l0, l1, l2] = point.barycentric;
             let parts = [l0 * r0.lanes(), l1 * r1.lanes(), l2 * r2.lanes()];

@@ -1,4 +1,4 @@
-//! How much a point counts by its depth, and how that changes.
+//! Weights of points by depth, and their derivatives.
 
 use crate::{
     lanes::{Lanes, Places},
@@ -6,14 +6,14 @@ use crate::{
     table::{Grid, Lookup, TablePosition},
 };
 
-/// Where the logarithm of a weight by depth comes from.
+/// Source of the logarithm of a depth weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DepthGrid {
-    /// A table of its negative over the squared distance from the near plane; what is nearer than that plane is the outer side.
+    /// A table of the negative logarithm over the squared distance from the near plane; nearer depths are on the outer side.
     Table(Grid),
-    /// One row that holds `a` and `c`: the logarithm of the weight at `x`, the nearness less 1, is `a x + c`, but between [`LEAST`] and 0.
+    /// One row that holds `a` and `c`: with x = nearness - 1, the logarithm of the weight is `a x + c`, at least [`LEAST`] and at most 0.
     Exponential,
-    /// One row that holds `a` and `c`: the weight is `a z` of a nearness z above 0, `-c z` of one below it, and never less than `floor`.
+    /// One row that holds `a` and `c`: the weight is `a z` for a nearness z above 0, `-c z` below it, and at least `floor`.
     Line {
         /// The least weight.
         floor: f64,
@@ -40,14 +40,14 @@ pub(super) struct DepthLookup<'a, T: Real> {
     table: Table<'a, T>,
 }
 
-/// What points count by their depth.
+/// Depth weights of points.
 #[derive(Clone, Copy)]
 pub(super) enum DepthAt<T: Real> {
-    /// From a table: the logarithm of the weight, its derivative by the place, and the place in the table.
+    /// From a table: the logarithm of the weight, its derivative with respect to the position, and the position in the table.
     Table { log: T, slope: T, t: T, row: Places },
-    /// From an exponential: the logarithm, its derivative, the place, and where the logarithm is above and below its bounds.
+    /// From an exponential: the logarithm, its derivative, the position, and the lanes where the logarithm is above and below its bounds.
     Exponential { log: T, slope: T, x: T, within: [Mask<T>; 2] },
-    /// From a line: the logarithm, and what its derivatives need.
+    /// From a line: the logarithm, and the intermediates of its derivatives.
     Line { log: T, per_weight: T, nearness: T, slope: T, near: Mask<T> },
 }
 
@@ -65,14 +65,14 @@ impl<'a, T: Real> DepthLookup<'a, T> {
         self.grid.rows()
     }
 
-    /// A number of the one row, in all lanes.
+    /// A number of the single row, in all lanes.
     #[inline(always)]
     fn number(&self, column: usize) -> T {
         let Table { values, tangents } = self.table;
         everywhere(values.as_flattened(), tangents.as_flattened(), column)
     }
 
-    /// What points at `x` count: their nearness less 1.
+    /// Depth weights of points at `x`, their nearness less 1.
     #[inline(always)]
     pub(super) fn at(&self, x: T) -> DepthAt<T> {
         let zero = splat::<T::Lanes>(0.0);
@@ -111,7 +111,7 @@ impl<'a, T: Real> DepthLookup<'a, T> {
 }
 
 impl<T: Real> DepthAt<T> {
-    /// Stands where no point is yet.
+    /// A placeholder before any point is known.
     #[inline(always)]
     pub(super) fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
@@ -128,7 +128,7 @@ impl<T: Real> DepthAt<T> {
         }
     }
 
-    /// Its derivative by the nearness.
+    /// The derivative of the logarithm with respect to the nearness.
     #[inline(always)]
     pub(super) fn slope(&self) -> T {
         match self {
@@ -137,7 +137,7 @@ impl<T: Real> DepthAt<T> {
         }
     }
 
-    /// Adds to the gradient of the table, of a function with this derivative by the logarithm.
+    /// Adds to the gradient of the table; `by_log` is the derivative with respect to the logarithm.
     #[inline(always)]
     pub(super) fn pull(&self, by_log: T, table: &mut [[Float<T>; 4]]) {
         let zero = T::constant(splat(0.0));
@@ -160,7 +160,7 @@ impl<T: Real> DepthAt<T> {
     }
 }
 
-/// A cubic and its derivative at `t`. In pairs: a chain of products would have each wait for the one before.
+/// A cubic and its derivative at `t`. Evaluated in pairs: a chain of products would have long dependencies.
 #[inline(always)]
 pub(super) fn cubic<T: Real>([a, b, c, d]: [T; 4], t: T) -> [T; 2] {
     let square = t * t;
@@ -169,7 +169,7 @@ pub(super) fn cubic<T: Real>([a, b, c, d]: [T; 4], t: T) -> [T; 2] {
     [value, slope]
 }
 
-/// Adds to the gradient of the rows of a table, of a function with this derivative by the value at the place `t` in them.
+/// Adds to the gradient of the rows of a table; `by_value` is the derivative with respect to the value at the position `t` in them.
 #[inline(always)]
 pub(super) fn pull_row<T: Real>(by_value: T, t: T, row: &Places, table: &mut [[Float<T>; 4]]) {
     let first = by_value * t;

@@ -1,8 +1,8 @@
-//! Colours of faces that share pixels, weighted by their edges and depths: the image, its gradient, and the gradient of that.
+//! Blending of the colours of faces that share pixels, weighted by edge and depth: the image, its gradient, and the gradient of that.
 //!
-//! `C = (Σ wⱼ cⱼ + w c) / (Σ wⱼ + w)` with `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, both from tables. Each band is walked for the sums, and once
-//! more for the gradient; where weights of a pixel may differ by more than floats can hold, first for the largest of each pixel. As in
-//! the sums of profiles, all is written once for any `Real`.
+//! `C = (Σ wⱼ cⱼ + w c) / (Σ wⱼ + w)` with `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, both from tables. Each band is walked once for the sums and once
+//! more for the gradient; before that, for the largest weight of each pixel if the weights may exceed the range of floats. As in the sums
+//! of profiles, the code is generic over `Real`.
 #![allow(clippy::needless_range_loop)]
 
 mod band;
@@ -43,10 +43,10 @@ use super::{
     tasks::task,
 };
 
-/// What passes over the same inputs share.
+/// Data shared by passes over the same inputs.
 pub struct Kept<F> {
     reached: Reached,
-    /// Sums of each band of each view, once an image has been drawn; nothing where no pass follows that would need them.
+    /// Sums of each band of each view, set by the first pass that draws an image; empty if no later pass needs them.
     sums: Vec<OnceLock<BandSums<F>>>,
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn vjp_of_vjp<F: Vectors>(
     gradient
 }
 
-/// What the bands of a view, and then all views, give back. Of dual numbers all are tangents.
+/// Results of a band, of the bands of a view, or of all views. Results of dual numbers are tangents.
 struct Passed<F> {
     /// `[views, channels + 1, height, width]`, view by view.
     images: Vec<Vec<F>>,
@@ -157,7 +157,7 @@ impl<F: float::Float> Passed<F> {
     }
 }
 
-/// Runs all bands, with their gradients if there is an upstream; everything is added up in the order of views and bands.
+/// Runs all bands, with their gradients if there is an upstream; sums are taken in the order of views and bands.
 fn passes<T: Real>(
     inputs: &Inputs<Float<T>>,
     blend: &Blend<T>,
@@ -219,12 +219,12 @@ fn passes<T: Real>(
     passed
 }
 
-/// Adds numbers to as many.
+/// Adds `part` to `total`, element by element.
 fn add<F: float::Float>(total: &mut [F], part: &[F]) {
     total.iter_mut().zip(part).for_each(|(total, &part)| *total += part);
 }
 
-/// The same where there may be no total yet.
+/// Adds `part` to `total`, which may still be empty.
 fn added<F: float::Float>(total: &mut Vec<F>, part: Vec<F>) {
     match total.is_empty() {
         true => *total = part,

@@ -1,4 +1,4 @@
-//! The point of a face nearest to a pixel, and what moves it.
+//! The point of a face nearest to a pixel, and its gradient with respect to the corners.
 
 use crate::{
     face::Face,
@@ -7,11 +7,11 @@ use crate::{
     real::{Float, Mask, Real, splat},
 };
 
-/// Faces whose doubled area (NDC²) is no more than this have no inside that counts: their points are those of their boundary. No pixel's
-/// centre lies in such a face but by chance, and dividing by its area would leave the range of f32.
+/// Faces whose doubled area (NDC²) is at most this have no interior: their nearest points are on the boundary. A pixel centre hardly ever
+/// lies in such a face, and dividing by its area would leave the range of f32.
 pub const AREA: f64 = 1e-15;
 
-/// Barycentric weights on the screen of a face, `constant + x px + y py` each, in all lanes; and whether its area is large enough to divide
+/// Barycentric weights of a face on the screen, `constant + x px + y py` each, in all lanes; and whether its area is large enough to divide
 /// by. `least_area` is [`AREA`] in pixels.
 #[inline(always)]
 pub(super) fn planes<T: Real>(face: Face<T>, least_area: Float<T>) -> ([[T; 3]; 3], bool) {
@@ -19,7 +19,7 @@ pub(super) fn planes<T: Real>(face: Face<T>, least_area: Float<T>) -> ([[T; 3]; 
     let [mut constant, mut x, mut y] = [[zero; 3]; 3];
     let mut area = zero;
     for k in 0..3 {
-        // The doubled area of pixel and edge, which lies across from corner k + 2.
+        // The doubled area of the triangle of pixel and edge, opposite corner k + 2.
         let edge = face.edge(k);
         let corner = (k + 2) % 3;
         constant[corner] = edge.to_y * edge.x - edge.to_x * edge.y;
@@ -38,23 +38,22 @@ pub(super) fn planes<T: Real>(face: Face<T>, least_area: Float<T>) -> ([[T; 3]; 
 /// Nearest points of a face to eight pixels: the pixels themselves where they lie in it, else the closest points of its boundary.
 #[derive(Clone, Copy)]
 pub(super) struct Point<T: Real> {
-    /// The closest point of the boundary: the way from there to the pixel, the place on its edge, its barycentric weights, and which edge
-    /// that is.
+    /// The closest point of the boundary: the offset from it to the pixel, its position on its edge, its barycentric weights, and its edge.
     offset: [T; 2],
     along: T,
     weights: [T; 3],
     edges: [Mask<T>; 3],
     /// Barycentric weights of the nearest point of the face, on the screen.
     pub(super) barycentric: [T; 3],
-    /// Where the nearest point is the pixel itself.
+    /// The pixels that are their own nearest point.
     within: Mask<T>,
-    /// The edge of the closest point, and one over its squared length.
+    /// The vector of the closest point's edge, and one over its squared length.
     edge: [T; 2],
     inverse: T,
 }
 
 impl<T: Real> Point<T> {
-    /// Stands where no point is yet.
+    /// A placeholder before any point is known.
     #[inline(always)]
     pub(super) fn nothing() -> Self {
         let zero = T::constant(splat(0.0));
@@ -71,8 +70,8 @@ impl<T: Real> Point<T> {
         }
     }
 
-    /// Nearest points of a face. `closest` are the closest points of its boundary, `own` the barycentric weights of the pixels themselves, and `some`
-    /// says whether these can be told.
+    /// Nearest points of a face. `closest` are the closest points of its boundary, `own` the barycentric weights of the pixels themselves,
+    /// valid if `some`.
     #[inline(always)]
     pub(super) fn new(closest: &Closest<T>, face: Face<T>, own: [T; 3], some: bool) -> Self {
         let Closest { dx, dy, along, weights, inside, edges, .. } = *closest;
@@ -96,12 +95,13 @@ impl<T: Real> Point<T> {
         }
     }
 
-    /// Gradient to x and y of the three corners in pixels, of a function with these derivatives by the squared distance and by the
-    /// barycentric weights, which have these slopes along x and y.
+    /// Gradient with respect to x and y of the three corners in pixels, given the derivatives of a function with respect to the squared
+    /// distance and to the barycentric weights. `planes_x` and `planes_y` are the slopes of these weights along x and y.
     ///
-    /// The closest point of the boundary is where it is closest, so the squared distance moves as though the point stayed on its edge
-    /// where it is. A pixel `p = Σ λₖ aₖ` stays while corner m moves by δ, and with it all that lies at p by `λₘ δ`; so `λₖ` changes by
-    /// `-λₘ ∇λₖ · δ`. A point of an edge e, at the place t, moves along by `(δ · d + ..) / |e|²`, d being from it to the pixel.
+    /// The closest point of the boundary minimises the distance, so the squared distance changes as if the point kept its position on its
+    /// edge. If corner m moves by δ, a pixel `p = Σ λₖ aₖ` stays but the material point at p moves by `λₘ δ`; `λₖ` therefore changes by
+    /// `-λₘ ∇λₖ · δ`. A point at position t of an edge e moves along it by `(δ · d + ..) / |e|²`, where d is the offset from it to the
+    /// pixel.
     #[inline(always)]
     pub(super) fn pulled(
         &self,
@@ -113,10 +113,10 @@ impl<T: Real> Point<T> {
         let [w0, w1, w2] = by_weights;
         let Self { offset: [dx, dy], along, weights, edges, .. } = *self;
         let [on_first, on_second, on_third] = edges;
-        // Of the pixel itself.
+        // For the pixel itself.
         let field_x = w0 * planes_x[0] + w1 * planes_x[1] + w2 * planes_x[2];
         let field_y = w0 * planes_y[0] + w1 * planes_y[1] + w2 * planes_y[2];
-        // Of a point of an edge that is not held at one of its ends.
+        // For a point of an edge that is not clamped to one of its ends.
         let slide = (w1 - w0).masked(on_first) + (w2 - w1).masked(on_second);
         let slide = slide + (w0 - w2).masked(on_third);
         let free = slide.masked(splat::<T::Lanes>(0.0).less(along.value()));
@@ -137,8 +137,8 @@ impl<T: Real> Point<T> {
     }
 }
 
-/// What pushes the first corner of an edge one way and its second the other does to the corners. A function, since closures have not the
-/// features of their callers.
+/// Distributes a push, against the first corner of an edge and towards its second, over the corners of the face. A function, since closures
+/// lack the target features of their callers.
 #[inline(always)]
 fn turned<T: Real>([first, second, third]: [Mask<T>; 3], push: T) -> [T; 3] {
     let (first, second, third) = (push.masked(first), push.masked(second), push.masked(third));

@@ -1,4 +1,4 @@
-//! The visitor of a walk that adds up gradients.
+//! The visitor of a walk that accumulates gradients.
 #![allow(clippy::needless_range_loop)]
 
 use super::{
@@ -19,33 +19,33 @@ use crate::{
     scene::Scene,
 };
 
-/// Numbers of a face that a gradient has beside those of its attributes: x and y of three corners, then their depths.
+/// Numbers per face of a gradient in addition to those of its attributes: x and y of three corners, then their depths.
 pub(super) const CORNER_NUMBERS: usize = 9;
 
-/// Gradients of `Σ upstream · image` to a band's faces and to the tables.
+/// Gradients of `Σ upstream · image` with respect to a band's faces and to the tables.
 pub(super) struct Pull<'a, T: Real> {
-    /// Four numbers of each pixel. 0: the logarithm that weights are relative to; 1: one over the sum of all weights; 2: `Σ upstream · image` over the channels,
-    /// less the upstream of the faces' share; 3: the logarithm of a weight that may be left out of the sum.
+    /// Four numbers per pixel. 0: the logarithm that weights are relative to; 1: one over the sum of all weights; 2: `Σ upstream · image`
+    /// over the channels, minus the upstream of the faces' share; 3: the logarithm of the weight below which a face is culled.
     pub(super) pixels: &'a Quads<Float<T>>,
-    /// Number 3 of the pixels side by side: each chunk reads it, to be skipped.
+    /// Number 3 of the pixels, contiguous: each chunk reads it to decide whether it is skipped.
     pub(super) limits: &'a [Float<T>],
     /// The upstream by channels, without tangents.
     pub(super) upstream: &'a Quads<Float<T>>,
-    /// For each face of the band [`CORNER_NUMBERS`] numbers, then three for each number of an attribute if the gradient to the attributes is wanted.
+    /// For each face of the band [`CORNER_NUMBERS`] numbers, then three per number of an attribute if the attributes' gradient is wanted.
     pub(super) faces: &'a mut [Float<T>],
     pub(super) stride: usize,
-    /// Gradients to the tables of edge and depth, if they are wanted.
+    /// Gradients of the tables of edge and depth, if they are wanted.
     pub(super) tables: Option<&'a mut [Vec<[Float<T>; 4]>; 2]>,
     pub(super) corners: [T::Lanes; CORNER_NUMBERS],
     pub(super) attributes: Vec<[T::Lanes; 3]>,
-    /// Gradient to the texels, if it is wanted.
+    /// Gradient of the texels, if it is wanted.
     pub(super) texels: Option<&'a mut TexelSums<Float<T>>>,
-    /// The face of the list whose pairs are being added up.
+    /// The face of the list whose pairs are being summed.
     pub(super) owner: Option<usize>,
 }
 
 impl<T: Real> Pull<'_, T> {
-    /// Adds to the gradient of a number of the attributes, of a function with this derivative by it at the point of a pair.
+    /// Adds to the gradient of a number of the attributes; `by_number` is the derivative with respect to it at the point of a pair.
     #[inline(always)]
     fn pull_attribute(&mut self, number: usize, by_number: T, weights: [T; 3]) {
         if let Some(sums) = self.attributes.get_mut(number) {
@@ -55,7 +55,7 @@ impl<T: Real> Pull<'_, T> {
         }
     }
 
-    /// Adds what the pairs of a face have added up to.
+    /// Adds the sums over the pairs of a face to its gradient.
     #[inline(always)]
     fn flush(&mut self, scene: &Scene<T>, shown: &Shown<T>, first: usize) {
         let Some(owner) = self.owner else { return };
@@ -76,7 +76,7 @@ impl<T: Real> Pull<'_, T> {
     }
 }
 
-/// Whether a mask holds nowhere.
+/// Whether a mask holds in no lane.
 #[inline(always)]
 fn nowhere<L: Lanes>(mask: L::Mask) -> bool {
     L::bits(mask) == 0
@@ -87,7 +87,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
 
     #[inline(always)]
     fn skips(&self, face: &FaceAttributes<T>, at: [u32; 2]) -> bool {
-        // Now that the sums are known, what is hidden by nearer faces is known too.
+        // The sums are known now, and with them the faces that nearer faces hide.
         let log = T::Lanes::splat(face.log);
         nowhere::<T::Lanes>(of_pixels::<T>(self.limits, at).less(log))
     }
@@ -96,7 +96,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
     fn take(&mut self, blend: &Blend<T>, shown: &Shown<T>, block: &Block<T>, first: usize) {
         let zero = T::constant(splat(0.0));
         let count = block.count.min(BLOCK);
-        // Those that count somewhere.
+        // The pairs that count at some pixel.
         let (mut live, mut some) = ([0; BLOCK], 0);
         for k in 0..count {
             let log = block.log_edge[k].value() + block.log_depth[k].value();
@@ -105,7 +105,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
             some += usize::from(!nowhere::<T::Lanes>(limit.less(log)));
         }
         let live = &live[..some.min(BLOCK)];
-        // Shares of the image: all of a weight, and the part that the edge softness makes before its floor is taken off.
+        // Shares of the image: of the weight, and of its part before the floor of the edge softness is subtracted.
         let (mut shares, mut images) = ([[zero; 2]; BLOCK], [zero; BLOCK]);
         for &k in live {
             let k = k % BLOCK;
@@ -128,7 +128,7 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
             }
             let face = &shown.faces[owner % LISTED];
             let attributes = shown.attributes(owner);
-            // How the objective changes with the attributes of the three corners, were the point there, and what it is at the point.
+            // The derivatives with respect to the attributes of the corners, as if the point were there, and the value at the point.
             let mut at_corners = [zero; 3];
             let (here, there);
             if let Some(texture) = &blend.texture {
@@ -164,13 +164,13 @@ impl<T: Real> Visitor<T> for Pull<'_, T> {
                 there = between(weights, at_corners);
                 here = there;
             }
-            // A share draws the image from what it is towards what the face shows.
+            // A share moves the image from its value towards that of the face.
             let draw = here - images[k];
             let (by_edge, by_depth) = (of_edge * draw, share * draw);
             let by_place = by_depth * block.by_depth[k].slope();
-            // The nearness falls as the depth grows.
+            // The nearness decreases with depth.
             let by_z = by_place.scale(T::Lanes::splat(blend.per_range).neg());
-            // d z / d λₖ = -z² / zₖ, and the weights on the face are λₖ z / zₖ: so both change by λₖ as by its share of 1 / z.
+            // d z / d λₖ = -z² / zₖ, and the weights on the face are λₖ z / zₖ: both depend on λₖ through its share of 1 / z.
             let mut by_part = [zero; 3];
             for k in 0..3 {
                 by_part[k] = depth * (share * (at_corners[k] - there) - depth * by_z);

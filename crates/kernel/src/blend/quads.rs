@@ -1,4 +1,4 @@
-//! Numbers of the pixels of a band, four of a pixel side by side: a visit reads or adds to all of them at once.
+//! Numbers of the pixels of a band, in quads of four per pixel: a visit reads or updates a quad at once.
 
 use crate::{
     float::Float,
@@ -9,7 +9,7 @@ use crate::{
 /// Numbers of a pixel that lie side by side.
 pub(super) const QUAD: usize = 4;
 
-/// Some numbers for each pixel, by fours, with tangents where numbers have any. As long as a band, and filled up to whole vectors.
+/// Some numbers per pixel, in quads, with tangents if the numbers have any. Has the length of a band, padded to whole vectors.
 pub(super) struct Quads<F> {
     values: Vec<[F; QUAD]>,
     tangents: Vec<[F; QUAD]>,
@@ -17,7 +17,7 @@ pub(super) struct Quads<F> {
 }
 
 impl<F: Float> Quads<F> {
-    /// Zeros: this many numbers for each pixel of a band of this length, with tangents or without.
+    /// Zeros: `numbers` numbers for each pixel of a band of length `length`, with tangents or without.
     pub(super) fn new(numbers: usize, length: usize, tangents: bool) -> Self {
         let length = length.next_multiple_of(LANES);
         let count = numbers.div_ceil(QUAD) * length;
@@ -33,7 +33,7 @@ impl<F: Float> Quads<F> {
         }
     }
 
-    /// Quads of a pixel.
+    /// Number of quads per pixel.
     pub(super) fn count(&self) -> usize {
         self.values.len() / self.length
     }

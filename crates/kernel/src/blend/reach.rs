@@ -1,4 +1,4 @@
-//! How far each face counts: the further, the more it counts by its depth.
+//! Support of each face: it increases with the face's depth weight.
 
 use rayon::prelude::*;
 
@@ -13,13 +13,13 @@ use crate::{
     table::Grid,
 };
 
-/// Stands in for a face that counts everywhere, in NDC.
+/// Radius of a face that counts everywhere, in NDC.
 const EVERYWHERE: f64 = 4e6;
 
-/// Vertices or faces that one thread takes at once.
+/// Vertices or faces per rayon task.
 const AT_ONCE: usize = 4096;
 
-/// A table with its knots, in plain numbers.
+/// A table with its knots, as scalars.
 struct Curve<'a, F> {
     grid: Grid,
     knots: Vec<f64>,
@@ -27,13 +27,13 @@ struct Curve<'a, F> {
 }
 
 impl<F: Float> Curve<'_, F> {
-    /// The value of a row at a place in it.
+    /// The value of a row at a position in it.
     fn value(&self, row: usize, t: f64) -> f64 {
         let [a, b, c, d] = self.rows[row].map(Float::to_f64);
         a + t * (b + t * (c + t * d))
     }
 
-    /// The value at a distance on one side, the outer one if it is below 0.
+    /// The value at a signed distance: on the outer side if it is below 0, else on the inner side.
     fn at(&self, x: f64) -> f64 {
         let side = usize::from(x >= 0.0);
         let first = side * (self.grid.cells() + 1);
@@ -47,10 +47,10 @@ impl<F: Float> Curve<'_, F> {
     }
 }
 
-/// How far outside a face an edge softness is above a threshold.
+/// Distance outside a face up to which an edge softness is above a threshold.
 struct EdgeReach<'a, F> {
     curve: Curve<'a, F>,
-    /// From each knot on, the largest logarithm there is.
+    /// For each knot, the largest logarithm from there on.
     most: Vec<f64>,
 }
 
@@ -76,7 +76,7 @@ impl<'a, F: Float> EdgeReach<'a, F> {
         Self { curve, most }
     }
 
-    /// The distance in NDC beyond which no logarithm is above `least`; None if none is above it anywhere.
+    /// The distance in NDC beyond which no logarithm is above `least`; `None` if none is above it anywhere.
     fn of(&self, least: f64) -> Option<f64> {
         if least >= 0.0 {
             return None;
@@ -87,20 +87,20 @@ impl<'a, F: Float> EdgeReach<'a, F> {
     }
 }
 
-/// What faces reach.
+/// Faces by band, and their depth weights.
 pub(super) struct Reached {
     pub(super) bands: Bands,
-    /// Logarithm of the largest weight by depth of each face of each view.
+    /// Logarithm of the largest depth weight of each face of each view.
     pub(super) logs: Vec<Vec<f32>>,
-    /// Logarithm of what may be left out of a pixel of each face, as a part of the weights there.
+    /// Logarithm of the relative weight below which a face is culled at a pixel.
     pub(super) least: f64,
 }
 
 /// The faces of each band of each view.
 ///
-/// A face is left out of a pixel where its weight is at most `tolerance / faces` times the background's, so that all that is left out
-/// there adds up to at most `tolerance` times the background's weight. That is below the sum W of all weights: and leaving out a
-/// weight w of a colour c changes `C = Σ w c / W` by `w |c - C| / W`.
+/// A face is culled at a pixel where its weight is at most `tolerance / faces` times the background's, so that all culled weights together
+/// are at most `tolerance` times the background's weight, which is below the sum W of all weights. Culling a weight w of a colour c changes
+/// `C = Σ w c / W` by `w |c - C| / W`.
 pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
     let (edge_rows, depth_rows) = inputs.split_tables(inputs.tables);
     let edge = EdgeReach::new(inputs.edge, edge_rows, inputs.floor);
@@ -133,8 +133,8 @@ pub(super) fn bands<F: Vectors>(inputs: &Inputs<F>) -> Reached {
     let view = |numbers: &[F]| {
         let (x, rest) = numbers.split_at(vertices);
         let (y, z) = rest.split_at(vertices);
-        // Both where a vertex is and how far a face counts that is as near as it. The nearest corner of a face, or for a line the
-        // farthest, counts most of all its points.
+        // Position of a vertex, and the support of a face at its depth. The nearest corner of a face, or the farthest for a line, has the
+        // largest weight of all its points.
         let place = |k: usize| {
             let drawn = z[k] >= near && z[k] <= far;
             let log = if drawn { log_weight(z[k].to_f64()) } else { f64::NEG_INFINITY };

@@ -13,15 +13,15 @@ use crate::{
     table::Grid,
 };
 
-/// Above its floor by no more than this part of it, an edge softness is 0: rounding leaves as much.
+/// An edge softness that exceeds its floor by at most this fraction of it is 0: rounding errors are as large.
 pub const NOTHING: f64 = 1e-4;
 
-/// The logarithm of an edge softness from which on it counts, above its floor by more than rounding leaves; minus infinity without a floor.
+/// The logarithm of an edge softness above which it exceeds its floor by more than rounding errors; minus infinity without a floor.
 pub fn counts_from(floor: f64) -> f64 {
     (floor / (1.0 - NOTHING)).ln()
 }
 
-/// Weights below these, relative to what weights of a pixel are relative to, are 0: far less than the range leaves of a sum.
+/// Relative weights below these (f32, f64) are flushed to 0; they are far below the rounding error of the sum.
 const VANISHING: [f64; 2] = [1e-36, 1e-300];
 
 /// The inputs of means of colours, in one float type.
@@ -29,13 +29,13 @@ const VANISHING: [f64; 2] = [1e-36, 1e-300];
 pub struct Inputs<'a, F> {
     /// `[views, 3, vertices]`: x and y in NDC, depth.
     pub vertices: &'a [F],
-    /// `[1 or views, entries, channels]`, or with a texture places on it, `[1 or views, entries, 2]`.
+    /// `[1 or views, entries, channels]`; with a texture, coordinates on it, `[1 or views, entries, 2]`.
     pub attributes: &'a [F],
-    /// `[rows, 4]`: minus the logarithms of the weights by edge, then of those by depth.
+    /// `[rows, 4]`: minus the logarithms of the edge weights, then of the depth weights.
     pub tables: &'a [F],
     /// `[channels + 1]`: the colour, then the logarithm of the weight.
     pub background: &'a [F],
-    /// `[rows, columns, 4]`, or nothing.
+    /// `[rows, columns, 4]`, or empty.
     pub texture: &'a [F],
     /// Rows and columns of the texture, if there is one.
     pub texture_size: Option<[usize; 2]>,
@@ -43,9 +43,9 @@ pub struct Inputs<'a, F> {
     pub faces: &'a [[u32; 3]],
     /// Entries of the attributes at the corners of each face.
     pub entries: &'a [[u32; 3]],
-    /// Cells of the edge softness, mirrored: the inner side is outside a face.
+    /// Layout of the table of the edge softness, mirrored: the inner side is outside a face.
     pub edge: Grid,
-    /// Where weights by depth come from.
+    /// Source of the depth weights.
     pub depth: DepthGrid,
     /// The floor of the edge softness.
     pub floor: f64,
@@ -53,27 +53,27 @@ pub struct Inputs<'a, F> {
     pub planes: [f64; 2],
     /// Height and width of the image.
     pub size: ImageSize,
-    /// Least depth of all corners of a face that is drawn, in world units.
+    /// Least depth in world units; a face with a corner below it is not drawn.
     pub near: f64,
-    /// Greatest depth of them.
+    /// Greatest depth in world units; a face with a corner beyond it is not drawn.
     pub far: f64,
-    /// What all that is left out of a pixel may add up to, in weights of the background.
+    /// Bound of the sum of all weights culled at a pixel, relative to the background's weight.
     pub tolerance: f64,
-    /// Whether back faces are not drawn: those whose corners are seen clockwise.
+    /// Whether back faces, whose corners appear in clockwise order, are culled.
     pub culls: bool,
     /// Number of views.
     pub views: usize,
-    /// Whether all views have the same attributes.
+    /// Whether all views share the attributes.
     pub shared: bool,
 }
 
 impl<'a, F: float::Float> Inputs<'a, F> {
-    /// Channels of the image, but for the faces' share.
+    /// Channels of the image, except the faces' share.
     pub(crate) fn channels(&self) -> usize {
         self.background.len() - 1
     }
 
-    /// Numbers of an entry of the attributes.
+    /// Numbers per entry of the attributes.
     fn numbers(&self) -> usize {
         if self.texture_size.is_some() { 2 } else { self.channels() }
     }
@@ -84,7 +84,7 @@ impl<'a, F: float::Float> Inputs<'a, F> {
         rows.split_at(self.edge.rows().min(rows.len()))
     }
 
-    /// What a walk reads; `tangents` are those of vertices, attributes, tables, background and texture, or nothing.
+    /// The inputs of a walk; `tangents` are those of vertices, attributes, tables, background and texture, or empty.
     pub(super) fn blend<'s, T>(&'s self, tangents: [&'s [F]; 5]) -> Blend<'s, T>
     where
         T: Real,
@@ -122,22 +122,22 @@ impl<'a, F: float::Float> Inputs<'a, F> {
     }
 }
 
-/// What is meant for this float type, of 32 or of 64 bits.
+/// The constant for this float type, f32 or f64.
 pub(super) fn of_type<F>([single, double]: [f64; 2]) -> f64 {
     if size_of::<F>() == size_of::<f64>() { double } else { single }
 }
 
-/// Everything a walk reads, in one number type.
+/// All inputs of a walk, in one number type.
 pub(super) struct Blend<'a, T: Real> {
     pub(super) scene: Scene<'a, T>,
     pub(super) attributes: [&'a [Float<T>]; 2],
     pub(super) entries: &'a [[u32; 3]],
     /// Channels of the image, without the faces' share.
     pub(super) channels: usize,
-    /// Of an entry of the attributes.
+    /// Numbers per entry of the attributes.
     pub(super) numbers: usize,
     pub(super) texture: Option<Texture<'a, T>>,
-    /// Attributes of a view that has its own.
+    /// Length of the attributes of a view, 0 if all views share them.
     pub(super) per_view: usize,
     pub(super) depth: DepthLookup<'a, T>,
     pub(super) near: Float<T>,
@@ -153,18 +153,18 @@ pub(super) struct Blend<'a, T: Real> {
 }
 
 impl<T: Real> Blend<'_, T> {
-    /// A gradient to the texels of the texture, if it is wanted, else to none.
+    /// A gradient of the texels of the texture, if it is wanted, else of none.
     pub(super) fn no_texels(&self, wanted: bool) -> TexelSums<Float<T>> {
         let texels = self.texture.as_ref().filter(|_| wanted).map(|texture| texture.size);
         TexelSums::new(texels.map_or(0, |[height, width]| height * width))
     }
 
-    /// Where the attributes of a view begin.
+    /// Index of the first attribute of a view.
     pub(super) fn first_attribute(&self, view: usize) -> usize {
         view * self.per_view
     }
 
-    /// A number of the background: a channel, or behind them the logarithm of the weight.
+    /// A number of the background: a channel, or after the channels the logarithm of the weight.
     #[inline(always)]
     pub(super) fn behind(&self, channel: usize) -> T {
         everywhere(self.background[0], self.background[1], channel)

@@ -1,4 +1,4 @@
-//! The faces of a list as colours need them: numbers that all of their pairs share.
+//! The faces of a list for colour passes: numbers shared by all pairs of a face.
 #![allow(clippy::needless_range_loop)]
 
 use super::{point::planes, scene::Blend};
@@ -34,18 +34,18 @@ impl<T: Real> Number<T> {
     }
 }
 
-/// Numbers that all pairs of a face share, beside its edges.
+/// Numbers shared by all pairs of a face, except its edges.
 #[derive(Clone, Copy)]
 pub(super) struct FaceAttributes<T: Real> {
     /// Barycentric weights on the screen: `constant + x px + y py` each.
     pub(super) planes: [[Number<T>; 3]; 3],
-    /// Whether its area is large enough to divide by.
+    /// Whether the area is large enough to divide by.
     pub(super) some: bool,
-    /// The corners as they were given, by their places here.
+    /// The original number of each corner here.
     pub(super) order: [usize; 3],
     /// One over the depth of each corner.
     pub(super) per_depth: [Number<T>; 3],
-    /// Logarithm of its largest weight by depth.
+    /// Logarithm of the largest depth weight.
     pub(super) log: Float<T>,
 }
 
@@ -66,7 +66,7 @@ impl<T: Real> Shown<T> {
 }
 
 impl<T: Real> FaceAttributes<T> {
-    /// Stands where no face is yet.
+    /// A placeholder before any face is known.
     fn nothing() -> Self {
         let one = Number::ONE;
         Self {
@@ -89,7 +89,7 @@ impl<T: Real> Shown<T> {
         }
     }
 
-    /// Takes face `owner` of the list, number `number` of the scene.
+    /// Sets face `owner` of the list, number `number` of the scene.
     #[inline(always)]
     pub(super) fn set(
         &mut self,

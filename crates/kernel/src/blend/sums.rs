@@ -1,4 +1,4 @@
-//! Visitors of a walk that look at weights: the largest of each pixel, and their sums.
+//! Visitors of a walk that compute the largest weight of each pixel, and the sums of weights.
 #![allow(clippy::needless_range_loop)]
 
 use super::{
@@ -15,16 +15,16 @@ use crate::{
     real::{Float, Real, splat},
 };
 
-/// Stands for the logarithm of a weight of 0.
+/// The logarithm used for a weight of 0.
 const HIDDEN: f64 = -1e30;
 
-/// A number at a point, from its numbers at the corners.
+/// Interpolates a number at a point from its values at the corners.
 #[inline(always)]
 pub(super) fn between<T: Real>([w0, w1, w2]: [T; 3], [c0, c1, c2]: [T; 3]) -> T {
     w0 * c0 + w1 * c1 + w2 * c2
 }
 
-/// Where a texture is seen.
+/// Coordinates of a point on the texture.
 #[inline(always)]
 pub(super) fn place_on_texture<T: Real>(weights: [T; 3], attributes: &[[Number<T>; 3]]) -> [T; 2] {
     let [[u0, u1, u2], [v0, v1, v2], ..] = attributes else {
@@ -36,7 +36,7 @@ pub(super) fn place_on_texture<T: Real>(weights: [T; 3], attributes: &[[Number<T
     ]
 }
 
-/// Finds the logarithm of the largest weight of each pixel.
+/// Computes the logarithm of the largest weight of each pixel.
 pub(super) struct Largest<'a, T: Real> {
     pub(super) largest: &'a mut [Float<T>],
 }
@@ -49,7 +49,7 @@ impl<T: Real> Visitor<T> for Largest<'_, T> {
         for k in 0..block.count.min(BLOCK) {
             let log_edge = block.log_edge[k].value();
             let log = log_edge + block.log_depth[k].value();
-            // A face that does not count must make nothing else vanish.
+            // A face that does not count must not make others vanish.
             let some = T::Lanes::splat(blend.counts_from).less(log_edge);
             let logs = <T::Lanes as Lanes>::pick(some, log, splat(HIDDEN)).array();
             for (half, at) in block.at[k].into_iter().enumerate() {
@@ -62,15 +62,15 @@ impl<T: Real> Visitor<T> for Largest<'_, T> {
     }
 }
 
-/// Adds up weights, and weights times attributes.
+/// Sums weights, and weights times attributes.
 pub(super) struct Sums<'a, T: Real> {
     pub(super) largest: &'a [Float<T>],
-    /// The weights, then what each channel adds up to.
+    /// The sum of the weights, then that of each channel.
     pub(super) sums: &'a mut Quads<Float<T>>,
 }
 
 impl<T: Real> Sums<'_, T> {
-    /// Adds what channel after channel shows, weighted, and before them the weight.
+    /// Adds the weight, and the weighted channels.
     #[inline(always)]
     fn add(&mut self, at: [u32; 2], weight: T, weights: [T; 3], attributes: &[[Number<T>; 3]]) {
         let first = attribute(attributes, 0, weights);
@@ -107,7 +107,7 @@ impl<T: Real> Visitor<T> for Sums<'_, T> {
         for k in 0..count {
             let largest = of_pixels::<T>(self.largest, block.at[k]);
             let [weight, _] = blend.weight(block.log_edge[k], block.log_depth[k], largest);
-            // Numbers so small that they lose digits take a hundred times as long to multiply.
+            // Products of denormal numbers take a hundred times as long.
             weights[k] = weight.masked(T::Lanes::splat(blend.vanishing).less(weight.value()));
         }
         for k in 0..count {
@@ -119,7 +119,7 @@ impl<T: Real> Visitor<T> for Sums<'_, T> {
             };
             let mut seen =
                 texture.sample(place_on_texture(block.weights[k], attributes)).channels();
-            // A texture has as many numbers as a quad, of which the image may have fewer.
+            // A texel has as many channels as a quad, the image may have fewer.
             for channel in blend.channels..TEXEL_CHANNELS {
                 seen[channel % TEXEL_CHANNELS] = zero;
             }

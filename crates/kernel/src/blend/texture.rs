@@ -1,4 +1,4 @@
-//! A texture, sampled between its texels at the points of faces.
+//! A texture, sampled bilinearly at points of faces.
 
 use crate::{
     float::Float as _,
@@ -9,28 +9,28 @@ use crate::{
 /// Numbers of a texel in memory; a texture may have fewer channels.
 pub const TEXEL_CHANNELS: usize = 4;
 
-/// Texels that a gradient has memory for at once.
+/// Texels per allocation of a gradient.
 const RUN: usize = 64;
 
-/// Texels by rows, the top one first.
+/// Texels in row-major order, the top row first.
 pub(super) struct Texture<'a, T: Real> {
     /// Rows and columns.
     pub(super) size: [usize; 2],
     pub(super) texels: Table<'a, T>,
 }
 
-/// Places on a texture, between four texels: above left, above right, below left and below right of them.
+/// Positions on a texture, between four texels: above left, above right, below left and below right.
 pub(super) struct Sample<T: Real> {
     rows: [[u32; LANES]; 4],
     texels: [[T; TEXEL_CHANNELS]; 4],
-    /// From the left texels to the right ones, and from the upper to the lower ones, in [0, 1].
+    /// Fractions from the left to the right texels, and from the upper to the lower ones, in [0, 1].
     right: T,
     down: T,
     size: [usize; 2],
 }
 
 impl<T: Real> Texture<'_, T> {
-    /// The texture at `u` to the right and `v` up, each from 0 to 1, and again and again beyond.
+    /// Samples the texture at `u` to the right and `v` up, from 0 to 1; it repeats beyond.
     #[inline(always)]
     pub(super) fn sample(&self, [u, v]: [T; 2]) -> Sample<T> {
         let [height, width] = self.size;
@@ -56,7 +56,7 @@ impl<T: Real> Texture<'_, T> {
     }
 }
 
-/// What lies at or below numbers, and which of `count` places that repeat these are and the ones behind them.
+/// The floor of each number, and the indices of the two texels around it, modulo `count`.
 #[inline(always)]
 fn around<L: Lanes>(x: L, count: usize) -> (L, [[u32; LANES]; 2]) {
     let numbers = x.array();
@@ -71,7 +71,7 @@ fn around<L: Lanes>(x: L, count: usize) -> (L, [[u32; LANES]; 2]) {
 }
 
 impl<T: Real> Sample<T> {
-    /// The shares of the four texels.
+    /// The weights of the four texels.
     #[inline(always)]
     fn shares(&self) -> [T; 4] {
         let one = T::constant(splat(1.0));
@@ -79,7 +79,7 @@ impl<T: Real> Sample<T> {
         [left * above, self.right * above, left * self.down, self.right * self.down]
     }
 
-    /// The channels there.
+    /// The interpolated channels.
     #[inline(always)]
     pub(super) fn channels(&self) -> [T; TEXEL_CHANNELS] {
         let [s0, s1, s2, s3] = self.shares();
@@ -91,7 +91,7 @@ impl<T: Real> Sample<T> {
         channels
     }
 
-    /// `Σ upstream · channels`, and its derivatives by u and v.
+    /// `Σ upstream · channels`, and its derivatives with respect to u and v.
     #[inline(always)]
     pub(super) fn pulled(&self, upstream: [T::Lanes; TEXEL_CHANNELS]) -> [T; 3] {
         let zero = T::constant(splat(0.0));
@@ -111,7 +111,7 @@ impl<T: Real> Sample<T> {
         [here, by_x.scale(splat(width as f64)), by_y.scale(splat(height as f64))]
     }
 
-    /// Adds to the gradient of the texels, of `share · Σ upstream · channels`.
+    /// Adds the gradient of `share · Σ upstream · channels` to that of the texels.
     #[inline(always)]
     pub(super) fn pull_texels(
         &self,
@@ -134,14 +134,14 @@ impl<T: Real> Sample<T> {
     }
 }
 
-/// A gradient of texels, most of which may be 0.
+/// A gradient of texels, allocated sparsely.
 pub(super) struct TexelSums<F> {
     runs: Vec<Option<Box<[[F; TEXEL_CHANNELS]; RUN]>>>,
     texels: usize,
 }
 
 impl<F: crate::Float> TexelSums<F> {
-    /// Of so many texels, all 0.
+    /// A gradient of `texels` texels, all 0.
     pub(super) fn new(texels: usize) -> Self {
         Self { runs: (0..texels.div_ceil(RUN)).map(|_| None).collect(), texels }
     }
@@ -158,7 +158,7 @@ impl<F: crate::Float> TexelSums<F> {
         }
     }
 
-    /// Adds those of another part of the same image.
+    /// Adds the gradient of another part of the same image.
     pub(super) fn add_all(&mut self, other: Self) {
         for (own, other) in self.runs.iter_mut().zip(other.runs) {
             let (Some(sums), Some(more)) = (&mut *own, &other) else {
@@ -172,7 +172,7 @@ impl<F: crate::Float> TexelSums<F> {
         }
     }
 
-    /// All of them, `[texels, 4]`.
+    /// The gradient of all texels, `[texels, 4]`.
     pub(super) fn dense(&self) -> Vec<F> {
         let mut all = Vec::with_capacity(self.runs.len() * RUN * TEXEL_CHANNELS);
         for run in &self.runs {

@@ -1,4 +1,4 @@
-//! The walk over the pixel-face pairs of a band in colour, block by block. What is done with them is up to a visitor.
+//! The walk over the pixel-face pairs of a band in colour, block by block, for a visitor.
 //!
 //! Loops run over numbers of corners and channels, as in `lanes`, so that all of them become vectors.
 #![allow(clippy::needless_range_loop)]
@@ -16,22 +16,22 @@ use crate::{
     scene::{BandRef, Scene},
 };
 
-/// What is done to every pair.
+/// An operation on every pair.
 pub(super) trait Visitor<T: Real> {
-    /// Whether it reads what blocks hold for those that pull.
+    /// Whether the visitor needs the intermediates of gradients in blocks.
     const PULLS: bool;
 
-    /// Whether pairs of a face at these places of the band count for nothing.
+    /// Whether pairs of a face at these positions of the band are negligible.
     #[inline(always)]
     fn skips(&self, face: &FaceAttributes<T>, at: [u32; 2]) -> bool {
         let _ = (face, at);
         false
     }
 
-    /// Takes pairs of a list whose first face is number `first` of the band. Those of a face follow each other.
+    /// Visits pairs of a list whose first face is number `first` of the band. Pairs of a face are consecutive.
     fn take(&mut self, blend: &Blend<T>, shown: &Shown<T>, block: &Block<T>, first: usize);
 
-    /// Has taken all pairs of a list whose first face is number `first` of the band.
+    /// Called after all pairs of a list whose first face is number `first` of the band.
     #[inline(always)]
     fn ends(&mut self, scene: &Scene<T>, shown: &Shown<T>, first: usize) {
         let _ = (scene, shown, first);
@@ -43,7 +43,7 @@ pub(super) struct Walk<'a, 's, T: Real, V> {
     pub(super) blend: &'a Blend<'s, T>,
     pub(super) place: BandRef<'a, T>,
     pub(super) view: usize,
-    /// Logarithm of the largest weight by depth of each face.
+    /// Logarithm of the largest depth weight of each face.
     pub(super) logs: &'a [f32],
     pub(super) visitor: &'a mut V,
 }
@@ -66,7 +66,7 @@ impl<T: Real, V: Visitor<T>> Work for Walk<'_, '_, T, V> {
 }
 
 impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
-    /// Takes the pairs of a list, given with the numbers of its faces in the scene and that of its first face in the band, block by block.
+    /// Walks over the pairs of a list block by block, given the numbers of its faces in the scene and that of its first face in the band.
     #[inline(always)]
     fn take(
         &mut self,
@@ -103,8 +103,8 @@ impl<T: Real, V: Visitor<T>> Walk<'_, '_, T, V> {
 }
 
 impl<T: Real> Blend<'_, T> {
-    /// Weights of pairs relative to those of the logarithm `largest`: all of it, and the part that the edge softness makes before its
-    /// floor is taken off.
+    /// Weights of pairs relative to those of the logarithm `largest`: the weight, and its part before the floor of the edge softness is
+    /// subtracted.
     #[inline(always)]
     pub(super) fn weight(&self, log_edge: T, log_depth: T, largest: T::Lanes) -> [T; 2] {
         let by_depth = log_depth - T::constant(largest);
@@ -113,7 +113,7 @@ impl<T: Real> Blend<'_, T> {
             return [whole, whole];
         }
         let rest = T::Lanes::splat(Float::<T>::ONE / (Float::<T>::ONE - self.floor));
-        // A face that does not count may be nearer than all that do: then this is anything, and masked.
+        // A face that does not count may be nearer than all that do; its weight is then arbitrary, and masked.
         let floor = by_depth.power_of_e().scale(T::Lanes::splat(self.floor));
         let some = T::Lanes::splat(self.counts_from).less(log_edge.value());
         [(whole - floor).scale(rest).masked(some), whole.scale(rest).masked(some)]

@@ -4,7 +4,7 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 
 use super::{Float, GROUP, LANES, Lanes, Places, lanes};
 
-/// A vector as an array: what every machine has.
+/// A vector as an array, for every machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain<F>([F; LANES]);
 
@@ -37,7 +37,7 @@ impl<F: Float> Lanes for Plain<F> {
     type Index = [i32; LANES];
     type Which = [[bool; LANES]; 2];
     const NEEDS_AVX2: bool = false;
-    // Floats of 32 bits have vectors of their own there.
+    // f32 has explicit vectors for AVX2.
     const GAINS_AVX2: bool = size_of::<F>() == 8;
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! Eight `f32` in two vectors of WebAssembly.
 //!
-//! Browsers check a module as a whole, so this is there where it is compiled for vectors (`-C target-feature=+simd128`), and nothing is
-//! asked at run time. It is tested by the page in `web`: its steps are those of a computer.
+//! Browsers validate a module as a whole, so this is compiled in only with `-C target-feature=+simd128`, without detection at run time. The
+//! page in `web` tests it: its steps have the same bits as those of native code.
 
 use std::{
     arch::wasm32::*,
@@ -169,7 +169,7 @@ impl Lanes for F32x8 {
         f32x4_extract_lane::<0>(two) + f32x4_extract_lane::<1>(two)
     }
 
-    // As of plain floats: adding a large number leaves the integer in the low bits.
+    // As for plain floats: adding a large number leaves the integer in the low bits.
     #[inline(always)]
     fn nearest(self) -> [v128; 2] {
         let shift = [f32x4_splat(8_388_608.0); 2];
@@ -189,7 +189,7 @@ impl Lanes for F32x8 {
             let mask = i32x4_bitmask(keep[half]) as usize % KEPT.len();
             let order = cast(KEPT[mask]);
             for (numbers, to) in numbers.iter().zip(&mut to) {
-                // The second half begins at most at the fifth place.
+                // The second half starts at the fifth position at most.
                 if let Some(group) = to[count..].first_chunk_mut::<GROUP>() {
                     *group = cast(i8x16_swizzle(numbers[half], order));
                 }

@@ -1,7 +1,7 @@
 //! Eight `f32` in a vector of AVX2.
 //!
-//! Values of this type come to be only behind a check that the machine has AVX2
-//! ([`has_vectors`](super::has_vectors)), and all is inlined into functions that are compiled for it.
+//! Values of this type are created only after a check that the machine has AVX2 ([`has_vectors`](super::has_vectors)), and everything is
+//! inlined into functions compiled for it.
 #![allow(unsafe_code)]
 
 use std::{
@@ -13,7 +13,7 @@ use super::{GROUP, LANES, Lanes, Places};
 
 /// Bytes of a row of a table, as a power of two.
 const ROW: i32 = 4;
-/// Cells of a side of a table whose places in bytes fit 31 bits.
+/// Most cells per side of a table for which byte offsets fit 31 bits.
 const MOST_CELLS: i32 = 1 << 25;
 
 /// Eight `f32`.
@@ -45,8 +45,8 @@ impl AddAssign for F32x8 {
     }
 }
 
-// SAFETY, of every block below that says nothing else: the intrinsics need AVX2 alone, and without it
-// nothing of this type is ever made. Memory is reached through arrays and slices of the right length.
+// SAFETY, for every block below without another comment: the intrinsics need only AVX2, and without it no value of this type exists. Memory
+// is accessed through arrays and slices of the right length.
 impl Lanes for F32x8 {
     type Float = f32;
     type Mask = __m256;
@@ -232,7 +232,7 @@ impl Lanes for F32x8 {
     fn cell(self, octaves: u32, bits: u32) -> (__m256i, Self, Self) {
         unsafe {
             let raw = _mm256_castps_si256(self.0);
-            // Shifts by a number for each lane are one instruction inside, those by one number for all two.
+            // Shifts by a number per lane are one instruction, shifts by one number for all lanes are two.
             let cells = _mm256_srlv_epi32(raw, _mm256_set1_epi32(23 - bits as i32));
             let first = (127 - octaves as i32) << bits;
             let index = _mm256_sub_epi32(cells, _mm256_set1_epi32(first));
@@ -406,7 +406,7 @@ static KEPT: [[u8; LANES]; 256] = {
     all
 };
 
-/// How many lanes those are.
+/// Number of these lanes.
 static COUNT: [u8; 256] = {
     let mut all = [0; 256];
     let mut mask = 0usize;

@@ -1,6 +1,6 @@
-//! Losses of silhouettes and their gradients to the vertices, in one pass over the bands.
+//! Losses of silhouettes and their gradients with respect to the vertices, in one pass over the bands.
 //!
-//! The forward pass caches what the gradient needs of each pair, so that nothing is computed twice.
+//! The forward pass caches the per-pair intermediates of the gradient, so that nothing is computed twice.
 
 mod pixel;
 
@@ -26,16 +26,16 @@ use super::{
 };
 use crate::ImageSize;
 
-/// Chunks of a band that are kept, of 140 bytes in f32 and 268 in f64: a thread keeps 4.6 or 8.8 MB at most. Lists that do not fit are walked
-/// twice. A power of two, as vectors grow.
+/// Most chunks cached per band, of 140 bytes in f32 and 268 in f64: at most 4.6 or 8.8 MB per thread. Lists beyond that are walked twice. A
+/// power of two, like the capacities of a growing vector.
 const KEPT: usize = 1 << 15;
 
-/// Pixels of a band, so that what is kept of it stays near the processor.
+/// Pixels of a band, so that its cached data stays in the processor's cache.
 const PIXELS: usize = 1 << 12;
 /// Fewest rows of a band on the average in images that have more.
 const LEAST_ROWS: usize = 16;
 
-/// Bands that each of some views is cut into.
+/// Number of bands that each view is cut into.
 pub fn bands_of_losses(views: usize, size: ImageSize) -> usize {
     let rows = PIXELS.div_ceil(size.width.max(1)).max(LEAST_ROWS);
     size.height.div_ceil(rows).max(bands_of_view(views, size))
@@ -44,14 +44,14 @@ pub fn bands_of_losses(views: usize, size: ImageSize) -> usize {
 /// Images that silhouettes are compared with, each `[1 or views, height, width]`.
 #[derive(Clone, Copy)]
 pub struct Judged<'a, F> {
-    /// The image that coverage is compared with.
+    /// The image that the coverage is compared with.
     pub target: &'a [F],
-    /// The share of each pixel that counts, unless all do: coverage is multiplied by it.
+    /// The weight of each pixel, which multiplies its coverage; 1 if absent.
     pub counted: Option<&'a [F]>,
 }
 
 impl<'a, F> Judged<'a, F> {
-    /// Both images, cut to some pixels of a view.
+    /// Both images, restricted to some pixels of a view.
     fn part(self, view: usize, pixels: usize, range: Range<usize>) -> Self {
         let of = |image: &'a [F]| {
             let first = if image.len() > pixels { view * pixels } else { 0 };
@@ -110,10 +110,10 @@ fn of_views<L: Lanes>(
     [losses, gradient]
 }
 
-/// Results of a band: its sums over pixels, and parts of the gradient to x and y of the three corners of each of its faces.
+/// Results of a band: its sums over pixels, and parts of the gradient with respect to x and y of the corners of each of its faces.
 struct Walked<F> {
     sums: [F; PARTS],
-    /// Whether the band is all of its view: then there is one part, which has its factor already.
+    /// Whether the band is its whole view: then there is one part, which already includes its factor.
     whole: bool,
     parts: Vec<Vec<[F; 6]>>,
 }
@@ -143,20 +143,20 @@ fn gather<L: Lanes>(
     value
 }
 
-/// What is kept of eight pixels and a face: where the closest point lies from there, times the rate at which the profile changes with the
-/// squared distance, and its weights on the second and the third corner.
+/// Cached data of eight pixels and a face: the offset from the closest point to the pixel, times the rate at which the profile changes with
+/// the squared distance, and the point's weights on the second and the third corner.
 #[derive(Clone, Copy)]
 struct Kept<L> {
     offset: [L; 2],
     weights: [L; 2],
 }
 
-/// Memory that bands use one after the other.
+/// Buffers that bands reuse.
 struct Room<L: Lanes> {
     kept: Vec<Kept<L>>,
-    /// Of each chunk, its places in the band and its face, as a number of the band.
+    /// For each chunk its positions in the band, and the number of its face in the band.
     at: Vec<([u32; 2], u32)>,
-    /// Of each face, its corners as they were given, by their places there.
+    /// For each face the original numbers of its corners.
     corners: Vec<[usize; 3]>,
     image: Vec<L::Float>,
     target: Vec<L::Float>,
@@ -165,18 +165,18 @@ struct Room<L: Lanes> {
 }
 
 thread_local! {
-    /// The room of the last band of this thread: asking the system for memory in every step takes longer than some steps.
+    /// The buffers of the last band of this thread: allocating them in every step takes longer than some steps.
     static ROOM: RefCell<Option<Box<dyn Any>>> = const { RefCell::new(None) };
 }
 
 impl<L: Lanes> Room<L> {
-    /// That of the last band, if it was of these numbers.
+    /// The buffers of the last band if their float type is the same, else new ones.
     fn taken() -> Box<Self> {
         let last = ROOM.take().and_then(|room| room.downcast().ok());
         last.unwrap_or_else(|| Box::new(Self::new()))
     }
 
-    /// Leaves it to the next band.
+    /// Returns the buffers for the next band.
     fn leave(self: Box<Self>) {
         ROOM.set(Some(self));
     }
@@ -196,7 +196,7 @@ struct Band<'a, 's, L: Lanes> {
     judged: Judged<'a, L::Float>,
     loss: PixelLoss,
     with_gradient: bool,
-    /// Whether the view has no other.
+    /// Whether the band is its whole view.
     whole: bool,
     room: &'a mut Room<L>,
 }
@@ -218,7 +218,7 @@ impl<L: Lanes> Work for Band<'_, '_, L> {
 }
 
 impl<L: Lanes> Band<'_, '_, L> {
-    /// Draws the band and keeps what its gradient needs, of the first lists of faces: their number.
+    /// Draws the band and caches the intermediates of its gradient for the first lists of faces; returns their number.
     #[inline(always)]
     fn draw(&mut self) -> usize {
         let Self { scene, place, room, .. } = self;
@@ -240,8 +240,8 @@ impl<L: Lanes> Band<'_, '_, L> {
         listed
     }
 
-    /// Sums over the pixels, which leaves the derivatives by the sums of profiles in the parts; in the first of them alone, with their
-    /// factors, where the band is all of its view.
+    /// Sums over the pixels. Writes the derivatives with respect to the sums of profiles to the parts; if the band is its whole view, only
+    /// to the first part, with all factors included.
     #[inline(always)]
     fn compare(&mut self) -> [L::Float; PARTS] {
         let (width, stride) = (self.scene.size.width, self.scene.stride());
@@ -262,7 +262,7 @@ impl<L: Lanes> Band<'_, '_, L> {
         for part in [&mut *first, &mut *second] {
             part.resize(image.len(), L::Float::ZERO);
         }
-        // What belongs to no pixel is covered by nothing, and adds nothing to the sums.
+        // Numbers that belong to no pixel have coverage 0, and add nothing to the sums.
         let rows = self.judged.target.len() / width.max(1);
         let beside = |numbers: &mut [L::Float]| {
             numbers[rows * stride..].fill(L::Float::ZERO);
@@ -291,7 +291,7 @@ impl<L: Lanes> Band<'_, '_, L> {
         sums
     }
 
-    /// The gradients of the sums of so many parts times the sums of profiles, to the corners of the faces.
+    /// The gradients of the sums of `COUNT` parts times the sums of profiles, with respect to the corners of the faces.
     #[inline(always)]
     fn pull<const COUNT: usize>(&mut self, listed: usize) -> Vec<Vec<[L::Float; 6]>> {
         let Self { scene, place, room, .. } = self;
@@ -324,8 +324,8 @@ impl<L: Lanes> Band<'_, '_, L> {
     }
 }
 
-/// Adds the sums of each part to the corners of a face, given as the face has them. A function, since closures have not the features of
-/// their callers.
+/// Adds the sums of each part to the corners of a face, in the original order. A function, since closures lack the target features of their
+/// callers.
 #[inline(always)]
 fn flush<L: Lanes>(
     face: u32,
@@ -339,7 +339,7 @@ fn flush<L: Lanes>(
     }
 }
 
-/// Draws pairs and keeps them for the gradient, while there is room.
+/// Draws pairs and caches them for the gradient, while there is room.
 struct Keep<'a, L: Lanes> {
     image: Image<'a, L>,
     kept: &'a mut Vec<Kept<L>>,

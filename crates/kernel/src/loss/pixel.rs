@@ -1,24 +1,24 @@
-//! Losses of silhouettes pixel by pixel, and what the gradient to the sums of profiles is made of.
+//! Per-pixel losses of silhouettes, and their derivatives with respect to the sums of profiles.
 
 use crate::{float::Float, lanes::Lanes, real::splat};
 
-/// Keeps the ratio of two empty images defined.
+/// Keeps the ratio of two empty images finite.
 pub const EMPTY: f64 = 1e-6;
 
-/// What compares a silhouette with its target.
+/// The loss between a silhouette and its target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelLoss {
     /// The mean over pixels of the squared difference.
     SquaredError,
-    /// One less the overlap over the union, of soft images: `1 - Σ c t / (Σ (c + t - c t) + 1e-6)`.
+    /// One minus the intersection over union of soft images: `1 - Σ c t / (Σ (c + t - c t) + 1e-6)`.
     Iou,
 }
 
-/// Sums over pixels that a loss is made of, and derivatives by the sum of profiles at each pixel that its gradient is made of: two at most.
+/// Number of sums over pixels in a loss, and of derivatives at each pixel in its gradient: two at most.
 pub(super) const PARTS: usize = 2;
 
 impl PixelLoss {
-    /// The loss of a view, and the factors of the parts of its gradient, from its sums over so many pixels.
+    /// The loss of a view, and the factors of the parts of its gradient, from its sums over `pixels` pixels.
     pub(super) fn of_sums<F: Float>(
         self,
         [first, second]: [F; PARTS],
@@ -40,7 +40,7 @@ impl PixelLoss {
     }
 }
 
-/// Sums of profiles over the pixels of a band, what they are compared with, and the share of each pixel that counts, unless all do.
+/// Sums of profiles over the pixels of a band, the target, and the weight of each pixel, 1 if absent.
 #[derive(Clone, Copy)]
 pub(super) struct Compared<'a, F> {
     pub(super) sums: &'a [F],
@@ -49,10 +49,10 @@ pub(super) struct Compared<'a, F> {
 }
 
 impl<F: Float> Compared<'_, F> {
-    /// Eight pixels, number `k` of such groups: the coverage `w (1 - exp(-sum))` of the share `w` that counts, its derivative by the sum, and the
+    /// Group `k` of eight pixels: the coverage `w (1 - exp(-sum))` for the weight `w`, its derivative with respect to the sum, and the
     /// target.
     ///
-    /// Not an iterator: the closure of one is compiled without the vectors of its caller, and each operation becomes a call.
+    /// Not an iterator: its closure would be compiled without the vectors of its caller, and each operation would become a call.
     #[inline(always)]
     fn pixels<L: Lanes<Float = F>>(&self, k: usize) -> [L; 3] {
         let rest = L::of(&self.sums.as_chunks().0[k]).neg().exp();
@@ -68,7 +68,7 @@ impl<F: Float> Compared<'_, F> {
     }
 }
 
-/// `Σ (c - t)²` for coverages `c` and targets `t`, lane by lane; `part` becomes half its derivatives by the sums.
+/// `Σ (c - t)²` for coverages `c` and targets `t`, lane by lane; `part` becomes half its derivatives with respect to the sums.
 #[inline(always)]
 pub(super) fn squared_error<L: Lanes>(
     compared: Compared<L::Float>,
@@ -84,7 +84,7 @@ pub(super) fn squared_error<L: Lanes>(
     [total, splat(0.0)]
 }
 
-/// `Σ c t` and `Σ (c + t - c t)` for coverages `c` and targets `t`, lane by lane, and the derivatives of each by the sums.
+/// `Σ c t` and `Σ (c + t - c t)` for coverages `c` and targets `t`, lane by lane, and the derivatives of each with respect to the sums.
 #[inline(always)]
 pub(super) fn overlap_and_union<L: Lanes>(
     compared: Compared<L::Float>,

@@ -1,4 +1,4 @@
-//! Every instruction set that walks are compiled for gives the same bits.
+//! Colour passes give the same bits with every instruction set that walks are compiled for.
 
 use softrast_kernel::{
     Grid, ImageSize, Kernels,
@@ -10,7 +10,7 @@ use crate::assert_same_with_and_without_vectors;
 const VERTICES: usize = 40;
 const FACES: u32 = 50;
 
-/// All that the three passes give, over random triangles, some of them points or without area.
+/// Results of the three passes over random triangles, some of them points or without area.
 fn passes<F: Kernels>(
     channels: usize,
     views: usize,
@@ -71,7 +71,7 @@ fn passes<F: Kernels>(
     all.extend(F::blend_vjp(&inputs, kept, &upstream, [true; 5]));
     all.extend(F::blend_vjp(&inputs, kept, &upstream, [true, false, false, false, false]));
     all.extend(F::blend_vjp_of_vjp(&inputs, kept, &upstream, &direction, [true; 5], [true; 6]));
-    // The sums of an image serve the gradient as well.
+    // The cached sums of an image also serve the gradient.
     let kept = &F::kept(&inputs, true);
     let again =
         [F::blend(&inputs, kept), F::blend_vjp(&inputs, kept, &upstream, [true; 5])].concat();
@@ -89,7 +89,7 @@ fn assert_same_bits<F: Kernels>() {
         bits: 2,
     });
     let line = DepthGrid::Line { floor: 1e-7 };
-    // A background that weighs little asks for the largest weight of each pixel.
+    // A background of little weight requires the largest weight of each pixel.
     for (channels, views, log_weight, floor, depth, texture) in [
         (2, 1, -2.0, 0.0, table, None),
         (7, 4, -1.0, 1e-7, line, None),

@@ -1,4 +1,4 @@
-//! The passes as those see them that call them with slices.
+//! The passes, called with slices.
 
 mod colours;
 mod pairs;
@@ -8,10 +8,10 @@ use std::sync::Mutex;
 
 use softrast_kernel::{Kernels, use_vectors};
 
-/// One test at a time turns vectors off.
+/// Only one test at a time turns vectors off.
 static VECTORS: Mutex<()> = Mutex::new(());
 
-/// Asserts that numbers are finite, and the same to the last bit with the vectors of this machine and with plain arrays.
+/// Asserts that numbers are finite, and the same bits with the vectors of this machine and with plain arrays.
 fn assert_same_with_and_without_vectors<F: Kernels>(name: &str, numbers: impl Fn() -> Vec<F>) {
     let _alone = VECTORS.lock().expect("no test failed with vectors turned off");
     let fast = numbers();

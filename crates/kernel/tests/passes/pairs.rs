@@ -1,4 +1,4 @@
-//! How many pixel-face pairs a walk visits.
+//! Number of pixel-face pairs that a walk visits.
 
 use softrast_kernel::{Grid, Inputs, Kernels as _};
 
@@ -30,7 +30,7 @@ fn a_wide_radius_visits_every_pixel_of_every_view() {
 
 #[test]
 fn a_narrow_radius_visits_the_pixels_of_the_face() {
-    // Half of a square of 20 x 20 pixels, and what the margin for rounding adds.
+    // Half of a square of 20 x 20 pixels, plus the margin for rounding.
     let visited = pairs_within(1e-6, &TRIANGLE, 1);
     assert!((190..=230).contains(&visited), "{visited}");
 }

@@ -1,4 +1,4 @@
-//! Every instruction set that walks are compiled for gives the same bits.
+//! Silhouette passes give the same bits with every instruction set that walks are compiled for.
 
 use softrast_kernel::{Grid, ImageSize, Inputs, Judged, Kernels, PixelLoss};
 
@@ -7,7 +7,7 @@ use crate::assert_same_with_and_without_vectors;
 const VERTICES: usize = 60;
 const FACES: u32 = 90;
 
-/// All that the three passes give, over random triangles of all kinds, some of them slivers, points or without area.
+/// Results of the three passes over random triangles, some of them slivers, points or without area.
 fn passes<F: Kernels>(size: [usize; 2], views: usize, far: u32) -> Vec<F> {
     let grid = Grid { outer: 0.3, inner: 0.2, from: [0.0; 2], octaves: 12, far, bits: 2 };
     let wave = |k: usize, step: f64| (step * k as f64).sin();
@@ -47,7 +47,7 @@ fn passes<F: Kernels>(size: [usize; 2], views: usize, far: u32) -> Vec<F> {
     let along = &direction[..vertices.len()];
     let (along_vertices, wanted) = ([true, false], [true, false, true]);
     all.extend(F::sums_vjp_of_vjp(&inputs, bands, &upstream, along, along_vertices, wanted));
-    // Sums as small as those of a softness, whose exponentials are finite.
+    // Sums as small as those of a softness, so that exponentials are finite.
     let small: Vec<F> = table.iter().map(|&x| x * F::from_f64(0.01)).collect();
     let inputs = Inputs { table: &small, ..inputs };
     for loss in [PixelLoss::SquaredError, PixelLoss::Iou] {
