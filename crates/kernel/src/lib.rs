@@ -27,17 +27,17 @@
 //! let coverage: Vec<f64> = sums.iter().map(|sum| 1.0 - (-sum).exp()).collect();
 //! assert!(coverage[8 * 4 + 4] > 0.95 && coverage[0] < 0.01);
 //!
-//! vjp: gradients of the sum of `upstream * sums` with respect to the vertices [views, 3, vertices], and not to the table.
+//! // vjp: gradients of the sum of `upstream * sums` with respect to the vertices [views, 3, vertices], and not to the table.
 //! let upstream: Vec<f64> = coverage.iter().map(|a| 1.0 - a).collect();
 //! let gradient = f64::sums_vjp(&inputs, &lists, &upstream, [true, false]);
 //!
-//! The gradient of `direction * gradient`: for the vertices, the second derivative times the direction; for upstream, the jvp.
+//! // The gradient of `direction * gradient`: for the vertices, the second derivative times the direction; for upstream, the jvp.
 //! let direction = [0.3, -0.1, 0.2, 0.5, -0.4, 0.1, 0.0, 0.0, 0.0];
 //! let along = [true, false]; // the direction is one of vertices, as the gradient is
 //! let second = f64::sums_vjp_of_vjp(&inputs, &lists, &upstream, &direction, along, [true, false, false]);
 //! let jvp = f64::sums_vjp_of_vjp(&inputs, &lists, &upstream, &direction, along, [false, false, true]);
 //!
-//! Both agree with finite differences.
+//! // Both agree with finite differences.
 //! let moved = |h: f64| -> [f64; 9] { std::array::from_fn(|k| vertices[k] + h * direction[k]) };
 //! let at = |vertices: &[f64; 9]| {
 //!     let inputs = Inputs { vertices, ..inputs };

@@ -1,11 +1,11 @@
-//! A step of silhouettes on `Flex` against one on `NdArray`, in turn, so that both meet the same machine.
+//! Times of a silhouette step on `Flex` and on `NdArray`, measured alternately so that both see the same load.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench backends --features flex
 //! ```
 //!
-//! A step is all that an optimisation does: projection, image, loss, gradient to the world vertices, in f32. Printed are medians, and the
-//! median of the ratios of neighbours.
+//! A step is an iteration of an optimisation: projection, image, loss, gradient with respect to the world vertices, in f32. Prints medians,
+//! and the median of the ratios of adjacent steps.
 
 #[allow(dead_code, reason = "the other benchmark uses the rest")]
 mod workload;
@@ -34,7 +34,7 @@ fn main() {
     }
 }
 
-/// Takes a step, and gives its milliseconds.
+/// A step that returns its time in milliseconds.
 fn step<B: RasterBackend>(workload: &Workload) -> impl Fn() -> f64 {
     let size = workload.size;
     let (silhouette, table) = workload.prepare::<B>(Rasterizer::TOLERANCE, DType::F32);

@@ -1,15 +1,15 @@
-//! Times of a step in colour against one of silhouettes, over the same scene.
+//! Times of a colour step and of a silhouette step over the same scene.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench blend            # all
-//! cargo bench -p softrast-raster --bench blend -- W1      # what has W1 in its name
+//! cargo bench -p softrast-raster --bench blend -- W1      # those with W1 in their names
 //! ```
 //!
-//! A step is all that an optimisation does: projection, image, mean squared difference, gradient to the world vertices, and in colour to
-//! the colours of the vertices too. Medians in `f32`, in turn; the edge softness is that of the silhouettes, and the planes lie around the
-//! mesh. Under a depth softness that hardly tells one depth from another, all faces reach as far as those of a silhouette of another
-//! tolerance, so that both visit the same pairs. The last columns are the step at the default scale, where near faces reach farther, with all
-//! faces and with front faces alone.
+//! A step is an iteration of an optimisation: projection, image, mean squared difference, gradient with respect to the world vertices, and
+//! in colour also to the vertex colours. Medians in `f32`, measured alternately; the edge softness is that of the silhouettes, and the
+//! planes lie around the mesh. With a depth softness so wide that depths hardly matter, all faces have the support of a silhouette of
+//! another tolerance, so both visit the same pairs. The last columns are the step at the default scale, where near faces have a larger
+//! support, with all faces and with front faces only.
 
 #[allow(dead_code, reason = "the other benchmark uses the rest")]
 mod coloured;
@@ -34,11 +34,11 @@ type A = Autodiff<B>;
 
 /// Steps of each kind.
 const STEPS: usize = 40;
-/// A scale of the depth softness under which all depths between the planes count much the same.
+/// A scale of the depth softness with which all depths between the planes have nearly the same weight.
 const FLAT: f64 = 10.0;
 
 fn main() {
-    // Cargo adds a flag of its own.
+    // Cargo adds the flag `--bench`.
     let filter = std::env::args().skip(1).find(|word| word != "--bench");
     println!("{}", machine::machine());
     println!(
@@ -79,7 +79,7 @@ fn main() {
     }
 }
 
-/// Milliseconds of each, measured in turn.
+/// Median milliseconds of each step, measured alternately.
 fn medians<const N: usize>(steps: [&dyn Fn(); N]) -> [f64; N] {
     let mut times = [const { Vec::new() }; N];
     for _ in 0..STEPS {
@@ -105,7 +105,7 @@ struct Silhouettes {
 
 impl Silhouettes {
     fn new(workload: &Workload) -> Self {
-        // The background of a picture weighs a thousandth, and half of the tolerance goes to culling here as there.
+        // The background of an image has a weight of a thousandth, and half of the tolerance goes to culling in both.
         let tolerance = 1e-3 * (-1.0 / FLAT).exp() * Rasterizer::TOLERANCE;
         let (size, softness) = (workload.size, workload.softness);
         let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(size) };
@@ -119,7 +119,7 @@ impl Silhouettes {
         }
     }
 
-    /// The image and its gradient to the world vertices.
+    /// The gradient with respect to the world vertices, through the image.
     fn step(&self) -> Tensor<B, 3> {
         let world = Tensor::<A, 3>::from_inner(self.world.clone()).require_grad();
         let seen = project(world.clone(), Tensor::from_inner(self.cameras.clone()));

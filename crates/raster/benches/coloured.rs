@@ -8,7 +8,7 @@ use softrast_tensor::{Autodiff, DType, Tensor};
 
 use crate::workload::{Workload, disk, tensor};
 
-/// Around a mesh that a camera sees from 2.732 away.
+/// Depths around a mesh at distance 2.732.
 const PLANES: [f64; 2] = [1.7, 3.8];
 /// Channels.
 pub(crate) const COLOURS: usize = 3;
@@ -25,7 +25,7 @@ pub(crate) struct Coloured<B: RasterBackend> {
 }
 
 impl<B: RasterBackend> Coloured<B> {
-    /// Under the edge softness of the workload and a depth softness of this scale, in units of the distance between the planes.
+    /// The workload with its edge softness, and a depth softness of this scale in units of the distance between the planes.
     pub(crate) fn new(workload: &Workload, depth_scale: f64, dtype: DType) -> Self {
         let world = workload.world::<B>(dtype);
         let [_, vertices, _] = world.dims();
@@ -61,7 +61,7 @@ impl<B: RasterBackend> Coloured<B> {
         self
     }
 
-    /// The image alone, `[views, channels + 1, height, width]`.
+    /// The image, without gradients: `[views, channels + 1, height, width]`.
     pub(crate) fn image(&self) -> Tensor<B, 4> {
         let seen = project(self.world.clone(), self.cameras.clone());
         let device = &self.world.device();
@@ -69,7 +69,7 @@ impl<B: RasterBackend> Coloured<B> {
         self.renderer.image(seen, &self.colours, &background)
     }
 
-    /// The image, its gradients to the world vertices and to their colours, and the milliseconds that both took.
+    /// The image, its gradients with respect to the world vertices and their colours, and the milliseconds of both.
     pub(crate) fn step(&self) -> (Tensor<B, 4>, [Tensor<B, 3>; 2], f64) {
         let start = Instant::now();
         let tracked = |tensor: &Tensor<B, 3>| {

@@ -1,13 +1,13 @@
-//! Times of whole steps on a GPU, and on the CPU beside it.
+//! Times of whole steps on a GPU and on the CPU.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu              # a table
 //! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- --json    # and a line of JSON
-//! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- W1        # what has W1 in its name
+//! cargo bench -p softrast-raster --no-default-features --features wgpu --bench gpu -- W1        # those with W1 in their names
 //! ```
 //!
-//! A step is all that an optimisation does but its update: projection, image, mean squared difference to a disk (of colours to black), gradient to
-//! the world vertices. Steps follow each other as they do in a run that shows nothing: the GPU is waited for once in a while.
+//! A step is an iteration of an optimisation except its update: projection, image, mean squared difference to a disk (of colours to black),
+//! gradient with respect to the world vertices. Steps are queued as in a run without output: the CPU seldom waits for the GPU.
 
 mod machine;
 #[allow(dead_code, reason = "other benchmarks measure more of a workload")]
@@ -62,13 +62,13 @@ fn main() {
     }
 }
 
-/// Prints a row of the table, and says the same in JSON.
+/// Prints a row of the table, and returns it as JSON.
 fn shown(name: &str, [gpu, cpu]: [f64; 2]) -> String {
     println!("{name:<56} {gpu:>10.3} {cpu:>10.3}");
     format!("{{\"workload\":\"{name}\",\"gpu_ms\":{gpu},\"cpu_ms\":{cpu}}}")
 }
 
-/// A step, to be taken again and again: it gives the gradient, which nothing has waited for.
+/// A step that can be repeated: it returns the gradient without waiting for it.
 type Step<T> = Box<dyn Fn() -> Tensor<T, 3>>;
 
 fn silhouette<T: RasterBackend>(workload: &Workload) -> Step<T> {
@@ -109,7 +109,7 @@ fn median<T: RasterBackend>(step: impl Fn() -> Step<T>) -> f64 {
     let timed = |steps: u32| {
         let start = Instant::now();
         let gradients: Vec<_> = (0..steps).map(|_| step()).collect();
-        // What comes last has come after all else.
+        // The last gradient is ready after all others.
         let last = gradients.into_iter().next_back().expect("a step");
         let _ = last.narrow(1, 0, 1).into_data();
         start.elapsed()

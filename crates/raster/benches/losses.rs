@@ -1,11 +1,11 @@
-//! A step whose loss is one op with the silhouette against one whose loss is apart, in turn, so that both meet the same machine.
+//! Times of a step with the fused loss of silhouettes and of one with a separate loss, measured alternately under the same load.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench losses
 //! ```
 //!
-//! A step is all that an optimisation does: projection, image, loss, gradient to the world vertices, in f32. Printed are medians, and the
-//! median of the ratios of neighbours.
+//! A step is an iteration of an optimisation: projection, image, loss, gradient with respect to the world vertices, in f32. Prints medians,
+//! and the median of the ratios of adjacent steps.
 
 #[allow(dead_code, reason = "the other benchmark uses the rest")]
 mod workload;

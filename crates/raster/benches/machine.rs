@@ -1,8 +1,8 @@
-//! Where the numbers come from.
+//! Description of the machine that a benchmark runs on.
 
 use std::fs;
 
-/// Processor, threads in use and load averages, as the system tells them.
+/// Processor, threads in use and load averages, as reported by the system.
 pub(crate) fn machine() -> String {
     let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let cpuinfo = read("/proc/cpuinfo");

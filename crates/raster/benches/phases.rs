@@ -1,14 +1,14 @@
-//! Predicts a step on more cores from the time of each of its phases on one thread and from their tasks.
+//! Predicts the time of a step on more cores from its phases and their tasks, measured on one thread.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench phases            # all
-//! cargo bench -p softrast-raster --bench phases -- W1      # what has W1 in its name
+//! cargo bench -p softrast-raster --bench phases -- W1      # those with W1 in their names
 //! ```
 //!
-//! A step is projection, squared error to a disk in the op, and gradient to the world vertices, in `f32`; in colour (W3) the image in three
-//! channels, its loss, and gradients to vertices and colours. All run on one thread here. Tasks of a phase may run in parallel, phases follow each other,
-//! and what is in no task counts as one. N threads that take tasks in their order end a phase after a time that is known, and a step
-//! after the sum of these: that is the speed-up that is printed. It leaves out what threads cost and what memory they share.
+//! A step is projection, squared error to a disk in the op, and gradient with respect to the world vertices, in `f32`; in colour (W3) the
+//! image in three channels, its loss, and gradients with respect to vertices and colours. All run on one thread here. Tasks of a phase may
+//! run in parallel, phases are sequential, and work outside of tasks counts as one task. The prediction schedules the tasks of each phase
+//! in order on N threads and sums the phases; the ratio of the times is the speed-up. Costs of threads and shared memory are excluded.
 
 #[allow(dead_code, reason = "other benchmarks use the rest")]
 mod coloured;
@@ -34,15 +34,15 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 type B = NdArray<f32>;
 type A = Autodiff<B>;
 
-/// Steps of which the one in the middle is shown.
+/// Number of steps; the median is printed.
 const STEPS: usize = 15;
 const THREADS: [usize; 3] = [2, 8, 16];
 
-/// Tasks of a step with their phases, and the time of all of it.
+/// Tasks of a step with their phases, and the time of the whole step.
 type Recorded = (Vec<(&'static str, Duration)>, Duration);
 
 fn main() {
-    // Cargo adds a flag of its own.
+    // Cargo adds the flag `--bench`.
     let filter = std::env::args().skip(1).find(|word| word != "--bench");
     println!("{}", machine::machine());
     let colours = Workload { name: "W3 (W2 in colours)".to_owned(), ..Workload::w2() };
@@ -120,7 +120,7 @@ fn show(name: &str, (tasks, time): &Recorded) {
     }
 }
 
-/// When so many threads have done all tasks, if each takes the next one as soon as it is free.
+/// Time of all tasks on `threads` threads, each of which takes the next task as soon as it is free.
 fn in_parallel(tasks: &[Duration], threads: usize) -> Duration {
     let mut free = vec![Duration::ZERO; threads];
     for &task in tasks {

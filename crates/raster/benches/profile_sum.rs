@@ -2,15 +2,14 @@
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench profile_sum            # all, about four minutes
-//! cargo bench -p softrast-raster --bench profile_sum -- W1      # what has W1 in its name
+//! cargo bench -p softrast-raster --bench profile_sum -- W1      # those with W1 in their names
 //! ```
 //!
-//! Everything goes through the public burn API in `f32`. The first rows start at projected vertices:
-//! `forward` is the sum, `vjp` the backward pass of `Σ w · sum` to the vertices, `vjp_of_vjp` the
-//! backward pass of `Σ u · vjp`. `scalar` is the plain version in `scalar.rs`. A `step` is all that an
-//! optimisation does: projection, image, mean squared difference, gradient to the world vertices.
-//! Throughput counts pixel-face pairs that the op visits. Widths are those of a logistic of the squared
-//! distance, in NDC. A complete run writes the medians to `docs/studies/speed.md`.
+//! All calls use the public burn API in `f32`. The first rows start at projected vertices: `forward` is the sum, `vjp` the backward pass of
+//! `Σ w · sum` with respect to the vertices, `vjp_of_vjp` the backward pass of `Σ u · vjp`. `scalar` is the plain version in `scalar.rs`. A
+//! `step` is an iteration of an optimisation: projection, image, mean squared difference, gradient with respect to the world vertices.
+//! Throughput counts pixel-face pairs that the op visits. Widths are those of a logistic of the squared distance, in NDC. A complete run
+//! writes the medians to `docs/studies/speed.md`.
 
 mod machine;
 mod record;
@@ -46,18 +45,17 @@ type B = NdArray<f32>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
-/// Cells with more pairs than this take seconds a pass, and are left out; the plain version is much
-/// earlier.
+/// Cells with more pairs than this take seconds per pass, and are skipped; the plain version is skipped much earlier.
 const MOST_PAIRS: usize = 60_000_000;
 const MOST_PLAIN_PAIRS: usize = 4_000_000;
 
-/// Each measurement runs unrecorded for `WARM_UP`, then as `SAMPLES` samples that take `MEASUREMENT` together.
+/// Each measurement runs unrecorded for `WARM_UP`, then as `SAMPLES` samples that take `MEASUREMENT` in total.
 const WARM_UP: Duration = Duration::from_millis(150);
 const MEASUREMENT: Duration = Duration::from_millis(500);
 const SAMPLES: usize = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Cargo adds a flag of its own.
+    // Cargo adds the flag `--bench`.
     let filter = std::env::args().skip(1).find(|word| word != "--bench");
     let machine = machine();
     let bench = Bench { record: Record::default(), pools: [1, 2].map(pool), filter };
@@ -90,7 +88,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The same scene under an MLP that reaches as far.
+/// The scene with an MLP softness of the same support.
 fn under_mlp(workload: &Workload) -> Workload {
     let softness = EdgeSoftness::squared(Family::Mlp);
     let reach = |workload: &Workload| {
@@ -141,7 +139,7 @@ impl Op {
         self.silhouette.sums(self.vertices.clone(), self.table.clone())
     }
 
-    /// The tape of `Σ upstream · sums`: what to differentiate, and by what.
+    /// The tape of `Σ upstream · sums`: the loss, and the vertices to differentiate with respect to.
     fn taped(&self) -> (Tensor<A, 1>, Tensor<A, 3>) {
         let vertices = Tensor::<A, 3>::from_inner(self.vertices.clone()).require_grad();
         let table = Tensor::from_inner(self.table.clone());
@@ -170,15 +168,15 @@ fn pool(threads: usize) -> ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started")
 }
 
-/// What is measured on one thread and on two, and what was.
+/// Runs measurements on one thread and on two, and records them.
 struct Bench {
     record: Record,
     pools: [ThreadPool; 2],
-    /// A part of the names of the measurements to make; all without it.
+    /// A substring of the names of the measurements to run; all if absent.
     filter: Option<String>,
 }
 
-/// Where a time goes on the page.
+/// Position of a time on the page.
 struct Cell<'a> {
     row: &'a str,
     pairs: usize,
@@ -195,7 +193,7 @@ const COLUMNS: [[&str; 2]; 5] = [
 const PLAIN: [&str; 2] = ["scalar forward, 1 thread", "scalar vjp, 1 thread"];
 
 impl Bench {
-    /// Times `run` on what `prepare` makes, which is not timed.
+    /// Times `run` on the result of `prepare`, which is not timed.
     fn time<I, O>(&self, group: &str, cell: Cell, prepare: impl Fn() -> I, run: impl Fn(I) -> O) {
         let Cell { row, pairs, column } = cell;
         let name = format!("{group}/{row}, {column}");
@@ -247,7 +245,7 @@ impl Bench {
         }
     }
 
-    /// Whole steps: with a table that is there, and with one that every step makes anew.
+    /// Whole steps: with a fixed table, and with a table computed in each step.
     fn step(&self, group: &str, row: &str, workload: &Workload) {
         let step = Step::new(workload);
         let pairs = step.op.pairs();
@@ -310,7 +308,7 @@ impl Bench {
     }
 }
 
-/// A workload as an optimisation sees it.
+/// A workload as a step of an optimisation.
 struct Step {
     op: Op,
     phi: Tensor<B, 1>,
@@ -342,7 +340,7 @@ impl Step {
     }
 }
 
-/// One workload for the plain version, with the support of the fused one.
+/// A workload for the plain version, with the support of the fused one.
 struct Plain<'a> {
     scalar: Scalar<'a>,
     vertices: Vec<f32>,

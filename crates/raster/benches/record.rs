@@ -1,4 +1,4 @@
-//! Medians of what was measured, and the page that shows them.
+//! Medians of measurements, and the page that shows them.
 
 use std::{cell::RefCell, collections::BTreeMap, error::Error, fs, path::Path, time::Duration};
 
@@ -19,7 +19,7 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// Notes the mean time of some iterations.
+    /// Records the mean time of some iterations.
     pub(crate) fn note(
         &self,
         row: &str,

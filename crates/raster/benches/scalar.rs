@@ -1,10 +1,9 @@
-//! The same op written plainly: one file, one thread, `f32`, no vectors, no table.
+//! A plain implementation of the op: one file, one thread, `f32`, no vectors, no table.
 //!
-//! What anyone would write first, and what times are quoted against: for each face the pixels of
-//! its bounding box grown by the radius, the closest point of its boundary, and the optical depth
-//! of a logistic of the signed squared distance by `exp` and `ln_1p`.
+//! The baseline of quoted times, written as directly as possible: for each face the pixels of its bounding box grown by the radius, the
+//! closest point of its boundary, and the optical depth of a logistic of the signed squared distance by `exp` and `ln_1p`.
 
-/// What to draw and how far a face reaches.
+/// The faces to draw and their support.
 pub(crate) struct Scalar<'a> {
     pub(crate) faces: &'a [[u32; 3]],
     pub(crate) size: usize,
@@ -14,7 +13,7 @@ pub(crate) struct Scalar<'a> {
     pub(crate) radius: f32,
 }
 
-/// Signed squared distance of a pixel, the vector to it from the closest point, and where that is.
+/// Signed squared distance of a pixel, the vector to it from the closest point, and the position of that point.
 struct Closest {
     signed2: f32,
     delta: [f32; 2],
@@ -71,7 +70,7 @@ impl Scalar<'_> {
         }
     }
 
-    /// Sums of the optical depth, `[views, size, size]`; `vertices` `[views, count, 3]`.
+    /// Sums of the optical depth, `[views, size, size]`; `vertices` is `[views, count, 3]`.
     pub(crate) fn forward(&self, vertices: &[f32], count: usize) -> Vec<f32> {
         let pixels = self.size * self.size;
         let mut sums = vec![0.0; vertices.len() / 3 / count * pixels];
@@ -84,7 +83,7 @@ impl Scalar<'_> {
         sums
     }
 
-    /// Gradient of `Σ upstream · sums` to the vertices, shaped like them.
+    /// Gradient of `Σ upstream · sums` with respect to the vertices, shaped like them.
     pub(crate) fn gradient(&self, vertices: &[f32], count: usize, upstream: &[f32]) -> Vec<f32> {
         let mut grad = vec![0.0; vertices.len()];
         let views = vertices.chunks(3 * count).zip(grad.chunks_mut(3 * count));

@@ -1,4 +1,4 @@
-//! The scenes that are measured.
+//! The scenes of the benchmarks.
 
 use std::{env, path::Path, sync::Arc};
 
@@ -14,7 +14,7 @@ use softrast_tensor::{Backend, DType, Tensor, TensorData};
 /// A logistic of the signed squared distance: `width` is the root of its scale, in NDC.
 pub(crate) const SOFTNESS: EdgeSoftness = EdgeSoftness::squared(Family::Logistic);
 
-/// A mesh, its views and how soft it is.
+/// A mesh, its views and the width of its softness.
 pub(crate) struct Workload {
     pub(crate) name: String,
     pub(crate) faces: Arc<[[u32; 3]]>,
@@ -49,7 +49,7 @@ impl Workload {
         Self::new("W1 (sphere, 24 views of 64 px)", &sphere, &azimuths, 64)
     }
 
-    /// A cow of 5,856 faces in one view of 256 x 256; where it is missing, our fox of 2,856.
+    /// A cow of 5,856 faces in one view of 256 x 256; if its file is missing, our fox of 2,856.
     pub(crate) fn w2() -> Self {
         match known("spot.obj") {
             Some(spot) => Self::new("W2 (spot, 256 px)", &spot, &[180.0], 256),
@@ -78,7 +78,7 @@ impl Workload {
         tensor(&self.orbits, [self.orbits.len() / 4, 4], dtype)
     }
 
-    /// Vertices as the op takes them, `[views, vertices, 3]`.
+    /// Vertices as inputs of the op, `[views, vertices, 3]`.
     pub(crate) fn projected<B: RasterBackend>(&self, dtype: DType) -> Tensor<B, 3> {
         project(self.world(dtype), self.cameras(dtype)).tensor()
     }
@@ -89,7 +89,7 @@ impl Workload {
         tensor(&phi, [phi.len()], dtype)
     }
 
-    /// The silhouette and its table, made for a tolerance.
+    /// The silhouette and its table for a tolerance.
     pub(crate) fn prepare<B: RasterBackend>(
         &self,
         tolerance: f64,
@@ -102,7 +102,7 @@ impl Workload {
     }
 }
 
-/// A tensor of these values.
+/// A tensor of `values`.
 pub(crate) fn tensor<B: Backend, const D: usize>(
     values: &[f64],
     shape: [usize; D],

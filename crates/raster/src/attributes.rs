@@ -3,11 +3,10 @@ use std::sync::Arc;
 use softrast_kernel::blend::TEXEL_CHANNELS;
 use softrast_tensor::{Backend, Tensor};
 
-/// What faces show: numbers at their corners, as many channels as you like, interpolated between them in perspective.
+/// Vertex or face attributes: numbers at the corners of faces, with any number of channels, interpolated in perspective.
 ///
-/// Colours are one case. Normals or the depth of the vertices are others, and so are places on a texture, which is shown in their stead
-/// ([`with_texture`](Self::with_texture)); where each corner of each face has an
-/// entry of its own, so are barycentric coordinates.
+/// Colours are one use. Others are normals, the depth of the vertices, or texture coordinates, for which the texture is drawn instead
+/// ([`with_texture`](Self::with_texture)); with a separate entry for each corner of each face, also barycentric coordinates.
 ///
 /// ```
 /// use softrast_tensor::{NdArray, Tensor};
@@ -29,7 +28,7 @@ impl<B: Backend> Attributes<B> {
     ///
     /// # Panics
     ///
-    /// If there is no channel, or a face has an entry that is not there.
+    /// If there is no channel, or an entry of a face is out of range.
     pub fn new(values: Tensor<B, 3>, entries: Arc<[[u32; 3]]>) -> Self {
         let [_, count, channels] = values.dims();
         assert!(channels > 0, "attributes need a channel, found {:?}", values.dims());
@@ -42,12 +41,12 @@ impl<B: Backend> Attributes<B> {
     ///
     /// # Panics
     ///
-    /// If there is no channel, or a face uses a vertex that has none.
+    /// If there is no channel, or a vertex of a face has no entry.
     pub fn of_vertices(values: Tensor<B, 3>, faces: &[[u32; 3]]) -> Self {
         Self::new(values, faces.into())
     }
 
-    /// One entry for each face, the same all over it: `[1 or views, faces, channels]`.
+    /// One entry per face, constant over the face: `[1 or views, faces, channels]`.
     ///
     /// # Panics
     ///
@@ -61,7 +60,7 @@ impl<B: Backend> Attributes<B> {
     ///
     /// # Panics
     ///
-    /// If there is no channel, or the entries are not three for each face.
+    /// If there is no channel, or the number of entries is not a multiple of three.
     pub fn of_corners(values: Tensor<B, 3>) -> Self {
         let [_, corners, _] = values.dims();
         assert!(corners.is_multiple_of(3), "{corners} entries are not three for each face");
@@ -69,16 +68,17 @@ impl<B: Backend> Attributes<B> {
         Self::new(values, entries)
     }
 
-    /// Shows a picture `[height, width, channels]`, the top row first: the numbers, two for each entry, are places on it.
+    /// Textures the faces with a picture `[height, width, channels]`, the top row first; the two numbers of each entry are coordinates on
+    /// it.
     ///
     /// The first, u, goes from 0 at the left end to 1 at the right one, the second, v, from 0 at the bottom to 1 at the top, as in an OBJ
-    /// file; beyond them the picture repeats. Between the centres of texels colours are interpolated linearly, which is not smoothed where
-    /// a texel is much smaller than a pixel. Both the picture and the places receive gradients. Places are finite, and no larger
-    /// than the float type tells texels apart.
+    /// file; beyond them the picture repeats. Colours are interpolated bilinearly between the centres of texels, without mip-mapping where
+    /// a texel is much smaller than a pixel. Gradients reach the picture and the coordinates. Coordinates must be finite, and small enough
+    /// for the float type to resolve texels.
     ///
     /// # Panics
     ///
-    /// If entries have not two numbers, or the picture has no texel, more than 2^26 of them, or not 1 to 4 channels.
+    /// If entries do not have two numbers, or the picture has no texel, more than 2^26 of them, or not 1 to 4 channels.
     #[must_use]
     pub fn with_texture(self, texture: Tensor<B, 3>) -> Self {
         let [.., numbers] = self.values.dims();
@@ -93,7 +93,7 @@ impl<B: Backend> Attributes<B> {
         Self { texture: Some(texture), ..self }
     }
 
-    /// The numbers, `[1 or views, entries, channels]`; places on a texture if there is one.
+    /// The numbers, `[1 or views, entries, channels]`; texture coordinates if there is a texture.
     pub fn values(&self) -> &Tensor<B, 3> {
         &self.values
     }
@@ -103,7 +103,7 @@ impl<B: Backend> Attributes<B> {
         self.texture.as_ref()
     }
 
-    /// Channels of what is seen.
+    /// Channels of the image.
     pub fn channels(&self) -> usize {
         let values = match &self.texture {
             Some(texture) => texture,

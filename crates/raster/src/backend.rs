@@ -1,4 +1,4 @@
-//! Fused ops as a burn backend extension: each with its gradient and the gradient of that.
+//! Fused ops as a burn backend extension, each with its gradient and its second derivative.
 
 use softrast_kernel::{Kernels as _, PixelLoss};
 use softrast_tensor::{
@@ -19,27 +19,27 @@ fn slice<F: Element>(data: &TensorData) -> &[F] {
 
 /// A backend that runs fused ops.
 ///
-/// By default they run on the host, which serves every CPU backend. The implementation for `Autodiff<B>` makes them differentiable
-/// twice: each pass differentiates by the next one of `B`. A third order panics. Saved for the backward pass are
-/// the inputs, and which faces reach which rows.
+/// By default they run on the host, for all CPU backends. The implementation for `Autodiff<B>` makes them twice differentiable: the
+/// derivative of each pass is the next pass of `B`. A third order panics. The backward pass reuses the inputs and intermediates such as the
+/// faces per row.
 #[diagnostic::on_unimplemented(
     message = "softrast does not draw on the backend `{Self}`",
     note = "it draws on `NdArray`, `Flex` and `softrast_raster::Wgpu`, and on `Autodiff` of these, of the features ndarray, flex and wgpu",
     note = "`Wgpu` of burn itself is another type where its feature `fusion` is on"
 )]
 pub trait RasterBackend: Backend {
-    /// Whether ops and little tensors are as quick on the CPU anyway: false where a tensor lies
-    /// behind a queue, and what is computed of it in many little ops should come in one piece.
+    /// Whether small ops on small tensors are as fast as on the CPU: false for backends whose tensors are behind a queue, for which
+    /// sequences of small ops should run as one op.
     const ON_HOST: bool = true;
 
-    /// The numbers of a tensor where they lie, row by row, if that is possible.
+    /// The numbers of a tensor in place, in row-major order, if the backend can access them.
     fn numbers<F: Element>(tensor: &FloatTensor<Self>) -> Option<&[F]> {
         let _ = tensor;
         None
     }
 
-    /// Runs a pass of an op. Backends whose tensors do not lie on the host run all but [`FusedOp::SilhouetteLoss`]. WebAssembly has f32 alone, so that a page
-    /// is smaller to load.
+    /// Runs a pass of an op. Backends whose tensors are not on the host run all ops except [`FusedOp::SilhouetteLoss`]. On WebAssembly only
+    /// f32 is supported, which makes the module of a page smaller.
     fn run(op: &FusedOp, pass: &Pass, tensors: Vec<FloatTensor<Self>>) -> FloatTensor<Self> {
         match tensors[0].dtype() {
             DType::F32 => on_host::<Self, f32>(op, pass, tensors),
@@ -153,7 +153,7 @@ mod flex {
     }
 }
 
-/// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what each pass over all views visits.
+/// Number of pixel-face pairs after culling for `vertices` `[views, vertices, 3]`: each pass over all views visits them.
 pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usize {
     let [views, _, _] = vertices.dims();
     let data = vertices.swap_dims(1, 2).into_data();
@@ -165,11 +165,11 @@ pub(crate) fn pairs<B: Backend>(op: &ProfileSum, vertices: Tensor<B, 3>) -> usiz
     }
 }
 
-/// Sums `profile(d)` over the faces of each pixel: the one op under every silhouette.
+/// Sums `profile(d)` over the faces of each pixel: the op of every silhouette.
 ///
-/// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth, which only decides
-/// whether a face is drawn. `table` comes from [`Profile::table`](crate::low_level::Profile::table) of the profile that `op` was made for:
-/// `[rows, 4]`. The result is `[views, height, width]`, top row first.
+/// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth, which only determines whether a face is drawn. `table` is
+/// `[rows, 4]`, computed by [`Profile::table`](crate::low_level::Profile::table) of the profile that `op` was created for. The result is
+/// `[views, height, width]`, top row first.
 ///
 /// # Panics
 ///
@@ -183,7 +183,7 @@ pub fn profile_sum<B: RasterBackend>(
     fused(&op, inputs)
 }
 
-/// The sums of `seen` with the gradient of those of `wide` to the vertices; see [`RasterBackend::straight_through`].
+/// The sums of `seen` with the vertex gradient of those of `wide`; see [`RasterBackend::straight_through`].
 ///
 /// # Panics
 ///
@@ -209,7 +209,7 @@ fn sum_call<B: RasterBackend>(
     (FusedOp::ProfileSum(op.clone()), inputs)
 }
 
-/// Panics unless vertices and table are for this op.
+/// Panics unless vertices and table fit this op.
 fn check<B: RasterBackend>(op: &ProfileSum, vertices: &Tensor<B, 3>, table: &Tensor<B, 2>) {
     let [_, count, three] = vertices.dims();
     assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
@@ -220,8 +220,8 @@ fn check<B: RasterBackend>(op: &ProfileSum, vertices: &Tensor<B, 3>, table: &Ten
     assert!(largest <= count, "a face uses vertex {}, but there are {count}", largest - 1);
 }
 
-/// How silhouettes of the probabilistic sum differ from a target `[1 or views, height, width]`, `[views]`, where a share of each pixel counts
-/// (likewise), or all of it. Only where tensors lie on the host, and only the vertices may need a gradient.
+/// Loss `[views]` between silhouettes of the probabilistic sum and a target `[1 or views, height, width]`, with optional pixel weights of
+/// the same shape. Only for tensors on the host; only the vertices may require a gradient.
 ///
 /// # Panics
 ///
@@ -250,7 +250,7 @@ pub(crate) fn silhouette_loss<B: RasterBackend>(
     fused(&FusedOp::SilhouetteLoss(op), inputs)
 }
 
-/// The result of an op that is written for any number.
+/// The result of an elementary op.
 pub(crate) fn elementary<B: RasterBackend, const D: usize>(
     op: ElementaryOp,
     inputs: Vec<FloatTensor<B>>,
@@ -266,7 +266,7 @@ pub(crate) fn fused<B: RasterBackend, const D: usize>(
     of_primitive(B::run(op, &Pass::Forward, inputs))
 }
 
-/// What stands for a tensor below burn's own type.
+/// The backend primitive of a tensor.
 pub(crate) fn primitive<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> FloatTensor<B> {
     tensor.into_primitive().tensor()
 }
@@ -313,11 +313,11 @@ impl<B: RasterBackend, C: CheckpointStrategy> RasterBackend for Autodiff<B, C> {
     }
 }
 
-/// A pass whose own derivative is the next pass.
+/// Autodiff operation of a pass, whose derivative is the next pass.
 #[derive(Debug)]
 struct Recorded;
 
-/// What a pass ran on: the op, the pass and its tensors.
+/// Arguments of a pass: the op, the pass and its tensors.
 type State<B> = (FusedOp, Pass, Vec<FloatTensor<B>>);
 
 impl<B: RasterBackend, const N: usize> Backward<B, N> for Recorded {
@@ -352,7 +352,7 @@ fn recorded<B: RasterBackend, C: CheckpointStrategy, const N: usize>(
     recorded_as::<B, C, N>(op, pass, tensors, |op, tensors| B::run(op, pass, tensors))
 }
 
-/// The result of `work`, recorded as that of a pass: its gradient is that of the pass.
+/// The result of `work`, recorded as the result of a pass, so that its gradient is that of the pass.
 fn recorded_as<B: RasterBackend, C: CheckpointStrategy, const N: usize>(
     op: &FusedOp,
     pass: &Pass,

@@ -1,19 +1,18 @@
-//! Which backend a program computes on, chosen at run time; library code is generic.
+//! The backend of a program, chosen at run time; library code is generic.
 
 use std::fmt;
 
 use crate::NoAdapter;
 
-/// Where little things are computed whatever backend draws: parameters, supports, figures. On the
-/// CPU, in floats of 32 bits; with `ndarray` or `wgpu` it also has floats of 64 bits.
+/// Backend for small computations, whatever backend draws: parameters, supports, metrics. On the CPU, in f32; with `ndarray` or `wgpu` it
+/// also supports f64.
 #[cfg(any(feature = "ndarray", feature = "wgpu"))]
 pub type HostBackend = softrast_tensor::NdArray<f32>;
-/// Where little things are computed whatever backend draws: parameters, supports, figures. On the
-/// CPU, in floats of 32 bits.
+/// Backend for small computations, whatever backend draws: parameters, supports, metrics. On the CPU, in f32.
 #[cfg(not(any(feature = "ndarray", feature = "wgpu")))]
 pub type HostBackend = softrast_tensor::Flex;
 
-/// A backend that programs compute on, in floats of 32 bits.
+/// A backend that programs compute on, in f32.
 ///
 /// [`compiled_backends!`](crate::compiled_backends) lists those of a program, and
 /// [`on_backend!`](crate::on_backend) goes from the choice to a type.
@@ -28,7 +27,7 @@ pub enum BackendChoice {
 }
 
 impl BackendChoice {
-    /// All that there are.
+    /// All backends.
     pub const ALL: [Self; 3] = [Self::NdArray, Self::Flex, Self::Wgpu];
 
     /// Name on the command line, and of the feature that compiles it in.
@@ -40,7 +39,7 @@ impl BackendChoice {
         }
     }
 
-    /// Name and float type, for results.
+    /// Name and float type, for result tables.
     pub fn title(self) -> &'static str {
         match self {
             Self::NdArray => "ndarray f32",
@@ -49,7 +48,7 @@ impl BackendChoice {
         }
     }
 
-    /// The backend that was asked for, or the first of those compiled in.
+    /// The requested backend, or the first of those compiled in.
     ///
     /// # Errors
     ///
@@ -71,8 +70,8 @@ impl BackendChoice {
         Ok(choice)
     }
 
-    /// Sets the backend up. Call it before the first tensor, which would panic where it cannot be. In a
-    /// browser, where that is asynchronous, the page does it with burn's `init_setup_async`.
+    /// Sets the backend up. Call it before the first tensor is created, which would panic if setup fails. In a browser setup is
+    /// asynchronous: the page calls burn's `init_setup_async` instead.
     ///
     /// # Errors
     ///
@@ -92,10 +91,10 @@ impl fmt::Display for BackendChoice {
     }
 }
 
-/// A program cannot compute on what was asked for.
+/// The requested backend is not available.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoBackend {
-    /// Nothing has this name.
+    /// No backend has this name.
     #[error("there is no backend {0:?}: expected ndarray, flex or wgpu")]
     Unknown(String),
     /// Its feature was off when the program was built.
@@ -104,9 +103,9 @@ pub enum NoBackend {
         names(compiled)
     )]
     Missing {
-        /// What was asked for.
+        /// The requested backend.
         asked: BackendChoice,
-        /// What there is.
+        /// The backends compiled in.
         compiled: &'static [BackendChoice],
     },
 }
@@ -115,8 +114,7 @@ fn names(choices: &[BackendChoice]) -> String {
     choices.iter().map(|choice| choice.name()).collect::<Vec<_>>().join(" and ")
 }
 
-/// The backends whose features (`ndarray`, `flex`, `wgpu`) are on in the crate that asks, as
-/// `&'static [BackendChoice]`.
+/// The backends whose features (`ndarray`, `flex`, `wgpu`) are on in the calling crate, as `&'static [BackendChoice]`.
 #[macro_export]
 macro_rules! compiled_backends {
     () => {
@@ -131,14 +129,14 @@ macro_rules! compiled_backends {
     };
 }
 
-/// Does `$work` with `$Backend` standing for the chosen backend: `on_backend!(choice, B => draw::<B>())`.
+/// Evaluates `$work` with `$Backend` as an alias of the chosen backend: `on_backend!(choice, B => draw::<B>())`.
 ///
-/// Compiled once for each of `ndarray`, `flex` and `wgpu` whose feature is on in the crate that asks,
-/// whatever features others have turned on in this one.
+/// Compiled once for each of `ndarray`, `flex` and `wgpu` whose feature is on in the calling crate, regardless of features that other
+/// crates turn on in this one.
 ///
 /// # Panics
 ///
-/// If the choice is not one of [`compiled_backends!`](crate::compiled_backends) there.
+/// If the choice is not one of [`compiled_backends!`](crate::compiled_backends) of the calling crate.
 #[macro_export]
 macro_rules! on_backend {
     ($choice:expr, $Backend:ident => $work:expr) => {

@@ -2,7 +2,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use softrast_tensor::TensorData;
 
-/// The knots that were chosen last and the table that was made last. Clones share them.
+/// The most recently chosen knots and the most recent table. Clones share them.
 #[derive(Debug)]
 pub(crate) struct Cache<K>(Arc<Mutex<Latest<K>>>);
 
@@ -13,23 +13,23 @@ struct Latest<K> {
 }
 
 impl<K: Clone + PartialEq> Cache<K> {
-    /// The knots that `reused` makes of the last ones, or those that `choose` finds.
+    /// The knots that `reused` derives from the last ones, else those that `choose` returns.
     pub(crate) fn knots(
         &self,
         reused: impl FnOnce(&K) -> Option<K>,
         choose: impl FnOnce() -> K,
     ) -> K {
         if let Some(knots) = self.latest().knots.as_ref().and_then(reused) {
-            // The chosen ones stay, so that no rounding piles up.
+            // The chosen knots stay cached, so that rounding errors do not accumulate.
             return knots;
         }
-        // Without the lock: other threads of a pool may take up work in between, and ask for the same.
+        // Without the lock: meanwhile, other threads of a pool may take up work and need it.
         let knots = choose();
         self.latest().knots = Some(knots.clone());
         knots
     }
 
-    /// The table at these knots, which `make` makes unless it was the last.
+    /// The table at these knots: the cached one, or that of `make`.
     pub(crate) fn table(&self, knots: &K, make: impl FnOnce() -> TensorData) -> TensorData {
         let latest = self.latest().table.clone().filter(|(of, _)| of == knots);
         if let Some((_, table)) = latest {
@@ -40,7 +40,7 @@ impl<K: Clone + PartialEq> Cache<K> {
         table
     }
 
-    /// One of its own that begins with what `changed` makes of the last knots, and with the last table.
+    /// A separate cache with the last table, and the knots that `changed` derives from the last ones.
     pub(crate) fn continued(&self, changed: impl FnOnce(&K) -> Option<K>) -> Self {
         let latest = self.latest();
         let knots = latest.knots.as_ref().and_then(changed);
@@ -48,7 +48,7 @@ impl<K: Clone + PartialEq> Cache<K> {
         Self(Arc::new(Mutex::new(Latest { knots, table })))
     }
 
-    /// One that begins with these knots.
+    /// A cache that contains these knots.
     pub(crate) fn beginning_with(knots: K) -> Self {
         Self(Arc::new(Mutex::new(Latest { knots: Some(knots), table: None })))
     }

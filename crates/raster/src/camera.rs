@@ -1,6 +1,6 @@
 use softrast_tensor::{Backend, Tensor, numbers, tensor_on};
 
-/// A line of sight, or an up across it, that is not longer than this has no direction, in world units.
+/// A viewing direction, or an up vector across it, of at most this length has no direction, in world units.
 const SHORTEST: f64 = 1e-12;
 
 /// A camera that looks at the origin, with y up.
@@ -18,16 +18,16 @@ const SHORTEST: f64 = 1e-12;
 pub struct Orbit {
     /// Distance from the origin, in world units.
     pub distance: f64,
-    /// Angle above the ground.
+    /// Angle above the horizontal plane.
     pub elevation_deg: f64,
-    /// Angle around the vertical axis: at 0 the camera stands at -z with +x on the left, at 90 at +x.
+    /// Angle around the vertical axis: at 0 the camera is at -z with +x on its left, at 90 at +x.
     pub azimuth_deg: f64,
     /// Whole field of view along the shorter side of the image; below 180.
     pub fov_deg: f64,
 }
 
 impl Orbit {
-    /// This camera and others at the same height, evenly spaced around the vertical axis: this many `views`.
+    /// This camera and others of the same elevation, evenly spaced around the vertical axis: `views` in total.
     ///
     /// ```
     /// use softrast_raster::Orbit;
@@ -41,12 +41,12 @@ impl Orbit {
         (0..views).map(|k| Self { azimuth_deg: azimuth(k), ..*self }).collect()
     }
 
-    /// The numbers as [`project`](crate::project) takes them, `[1, 4]`.
+    /// The camera as a tensor for [`project`](crate::project), `[1, 4]`.
     pub fn tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 2> {
         Self::tensors(std::slice::from_ref(self), device)
     }
 
-    /// The numbers of a camera for each view, `[views, 4]`.
+    /// One camera per view as a tensor, `[views, 4]`.
     pub fn tensors<B: Backend>(cameras: &[Self], device: &B::Device) -> Tensor<B, 2> {
         tensor_on(
             cameras.iter().flat_map(|camera| camera.numbers()).collect(),
@@ -55,7 +55,7 @@ impl Orbit {
         )
     }
 
-    /// The cameras that such a tensor `[views, 4]` stands for.
+    /// The cameras of a tensor `[views, 4]`.
     ///
     /// # Panics
     ///
@@ -77,7 +77,7 @@ impl Orbit {
     }
 }
 
-/// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: the vertices of a mesh, for [`project`](crate::project).
+/// Points in world units as a tensor `[1, points, 3]`, in the float type of the backend: mesh vertices, for [`project`](crate::project).
 pub fn vertices<B: Backend>(positions: &[[f64; 3]], device: &B::Device) -> Tensor<B, 3> {
     tensor_on(positions.concat(), [1, positions.len(), 3], device)
 }
@@ -90,7 +90,7 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i])
 }
 
-/// `a / |a|`; `otherwise` is what is wrong where that is no direction.
+/// `a / |a|`; panics with the message `otherwise` if `a` has no direction.
 pub(crate) fn unit(a: [f64; 3], otherwise: &str) -> [f64; 3] {
     let length = dot(a, a).sqrt();
     assert!(length > SHORTEST, "{otherwise}");

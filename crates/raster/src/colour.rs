@@ -1,6 +1,6 @@
 use softrast_tensor::{Backend, Bool, Tensor, TensorData, numbers};
 
-/// What a face shares a pixel with where it covers it little: the colour behind all faces.
+/// The background, blended with the faces at every pixel.
 #[derive(Clone, Debug)]
 pub struct Background<B: Backend> {
     /// Its colour `[channels]`.
@@ -9,8 +9,7 @@ pub struct Background<B: Backend> {
     pub log_weight: Tensor<B, 1>,
 }
 
-/// Normalised depth, same shape: 1 at the near plane, 0 at the far plane, a straight line between
-/// and beyond.
+/// Normalised depth, of the same shape: 1 at the near plane, 0 at the far plane, linear between and beyond.
 ///
 /// Source: docs/notes.md, Colour.
 ///
@@ -25,17 +24,14 @@ pub fn nearness<B: Backend, const D: usize>(
     (depth.neg() + far) * (far - near).recip()
 }
 
-/// Colours of pixels that several faces share: `[views, channels, pixels]`.
+/// Blended colours of pixels: `[views, channels, pixels]`.
 ///
-/// `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)`, where the weight `wⱼ` of a face is that of its edge times
-/// that of its depth, and the background has the weight w. `log_weight` `[views, faces, pixels]`
-/// holds `ln wⱼ` and may be far below what an exponential can hold; `colour` is `[views, faces,
-/// channels, pixels]`. Nothing depends on the order of the faces, and gradients of any order are
-/// exact.
+/// `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)`, where the weight `wⱼ` of a face is its edge weight times its depth weight, and w is the weight of
+/// the background. `log_weight` `[views, faces, pixels]` holds `ln wⱼ`, which may be far below the range of an exponential; `colour` is
+/// `[views, faces, channels, pixels]`. The result does not depend on the order of the faces, and gradients of any order are exact.
 ///
-/// Source: Wu et al. 2024, Eq. 4. Not in the paper: the background, without which a pixel far from
-/// all faces is 0/0. Not offered: the running rescale of the released code, which depends
-/// on the order of the faces, with a gradient that is not its own (docs/notes.md, Colour).
+/// Source: Wu et al. 2024, Eq. 4. Not in the paper: the background, without which a pixel far from all faces is 0/0. The running rescale of
+/// the released code is not provided: it depends on the order of the faces, and its gradient is inexact (docs/notes.md, Colour).
 ///
 /// # Panics
 ///
@@ -60,12 +56,11 @@ pub fn blend<B: Backend>(
     seen + of_background * background.colour.clone().reshape([1, channels, 1])
 }
 
-/// Colours without softness, `[views, channels, pixels]`: at each pixel that of the nearest face.
+/// Colours without softness, `[views, channels, pixels]`: the colour of the nearest face at each pixel.
 ///
-/// `distance` `[views, faces, pixels]` is the signed distance to each face, which covers a pixel
-/// from 0 on, `depth` is `[views, faces]` and `colour` `[views, faces, channels, pixels]`. Of
-/// equally near faces the first is seen; where there is none, `background` `[channels]`. The result
-/// has no gradient. Used for targets and metrics.
+/// `distance` `[views, faces, pixels]` is the signed distance to each face, which covers a pixel from 0 on; `depth` is `[views, faces]`,
+/// `colour` `[views, faces, channels, pixels]`. The first of equally near faces is used; pixels without a face have the colour `background`
+/// `[channels]`. The result has no gradient. Used for targets and metrics.
 ///
 /// Source: docs/notes.md, Colour.
 ///
@@ -85,7 +80,8 @@ pub fn hard_colour<B: Backend>(
     assert_eq!(colour.dims(), [views, faces, channels, pixels], "shape of the colours");
     let device = colour.device();
     let nearest = nearest_faces(distance, depth);
-    // One place in all colours for each number of the image: many times faster to gather on the CPU than along an axis. A GPU is sent more.
+    // A flat index into the colours for each number of the image: on the CPU many times faster than a gather along an axis. A GPU is sent
+    // more.
     let place = |k: usize| {
         let (view, channel, pixel) = (k / pixels / channels, k / pixels % channels, k % pixels);
         let face = nearest[view * pixels + pixel].unwrap_or(0);

@@ -14,25 +14,25 @@ use crate::{
     weighting::floor,
 };
 
-/// The background's part of what a face at the far plane weighs, where nothing else is asked for.
+/// Default weight of the background, relative to a face at the far plane.
 const BEHIND: f64 = 1e-3;
 
-/// Draws soft colours of one mesh topology, under any softness of the edge.
+/// Draws soft colour images of one mesh topology, for any edge softness.
 ///
-/// At each pixel it takes the mean of what all faces show, and of a background behind them. A face weighs as much as it covers the pixel
-/// (its edge softness), times what its depth counts (its depth softness): `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` with `wⱼ = s(dⱼ) b(zⱼ)`. So
-/// an image changes smoothly as faces move, also where one comes in front of another. [`reference::blended`](crate::reference::blended) has the definition in full.
+/// Each pixel is the weighted mean of all faces and a background. The weight of a face is its edge softness (how much it covers the pixel)
+/// times its depth softness: `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` with `wⱼ = s(dⱼ) b(zⱼ)`. The image therefore changes smoothly as faces
+/// move, also where one passes in front of another. [`reference::blended`](crate::reference::blended) is the full definition.
 ///
-/// No pixel is off by more than the tolerance times the range of what is shown, in exact arithmetic: tables of both softnesses are made to
-/// measure, and what is left out of a pixel is bounded by the background's weight. Where no table can meet the tolerance,
-/// [`error_bound`](Self::error_bound) is larger and states the error that is left. In floats of 32 bits, logarithms of weights have an error
-/// of 1e-7 of themselves. An edge softness that is 0 from some distance on is known to 1e-11, so its background should weigh no less than
-/// 1e-6 of the nearest faces. One that never comes to be negligible, as the network, has every face drawn at every pixel.
+/// The error of a pixel is at most the tolerance times the range of the attributes, in exact arithmetic: the tables of both softnesses are
+/// chosen for the tolerance, and culled weights are bounded relative to the background's weight. If no table can meet the tolerance,
+/// [`error_bound`](Self::error_bound) is larger and states the remaining error. In f32, logarithms of weights have a relative error of
+/// 1e-7. An edge softness that is 0 beyond some distance is resolved to 1e-11, so the weight of its background should be at least 1e-6 of
+/// that of the nearest faces. With a softness that is never negligible, such as the network, every face is drawn at every pixel.
 ///
-/// Limits: as the edge softness narrows, faces count only where they cover a pixel; as the depth softness narrows too, the
-/// nearest one alone: the hard image. The faces' share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`, which is not the coverage of a silhouette but one that
-/// grows with each face; it tends to the hard silhouette as the edge narrows and `w / b` vanishes. The order of the faces changes nothing
-/// above rounding.
+/// Limits: as the edge softness narrows, a face counts only where it covers a pixel; as the depth softness narrows too, only the nearest
+/// face counts, which is the hard image. The faces' share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`; unlike the coverage of a silhouette it grows with each
+/// face. It tends to the hard silhouette as the edge narrows and `w / b` vanishes. The order of the faces changes the image only by
+/// rounding.
 ///
 /// ```
 /// use softrast_tensor::{Autodiff, NdArray};
@@ -54,7 +54,7 @@ const BEHIND: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub struct ColourRenderer<S = EdgeSoftness> {
     faces: Arc<[[u32; 3]]>,
-    /// Faces that knots are chosen for: as many as there are, or more.
+    /// Number of faces that knots are chosen for: at least the number of faces.
     room: usize,
     size: ImageSize,
     weighting: Weighting<S>,
@@ -67,15 +67,15 @@ pub struct ColourRenderer<S = EdgeSoftness> {
 }
 
 impl ColourRenderer {
-    /// Scale of the depth softness unless another is chosen, in units of the distance between the planes.
+    /// Default scale of the depth softness, in units of the distance between the planes.
     pub const DEPTH_SCALE: f64 = 0.05;
 }
 
 impl<S: Softness> ColourRenderer<S> {
-    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under an edge
-    /// softness of this [`Width`] (a number is its scale) and, between the depths `planes` of nearness 1 and 0 (ascending, world units), the reversed
-    /// exponential as depth softness: a face counts e times as much as one that lies [`DEPTH_SCALE`](ColourRenderer::DEPTH_SCALE) of the distance
-    /// between the planes behind it, as in `SoftRas` and PyTorch3D. [`Projected::planes`] finds planes around a scene.
+    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`. The edge
+    /// softness has this [`Width`] (a number is its scale). The depth softness is the reversed exponential, as in `SoftRas` and PyTorch3D:
+    /// a face has e times the weight of one that is [`DEPTH_SCALE`](ColourRenderer::DEPTH_SCALE) of the distance between the planes behind
+    /// it. `planes` are the depths of nearness 1 and 0 (ascending, world units); [`Projected::planes`] computes planes around a scene.
     ///
     /// # Panics
     ///
@@ -93,7 +93,7 @@ impl<S: Softness> ColourRenderer<S> {
         Self::with_weighting(faces.into(), size, weighting, phi)
     }
 
-    /// The same from parts: `phi` are the parameters of the softnesses by edge and by depth.
+    /// A renderer from a [`Weighting`]; `phi` are the parameters of the edge and the depth softness.
     ///
     /// # Panics
     ///
@@ -125,8 +125,8 @@ impl<S: Softness> ColourRenderer<S> {
         }
     }
 
-    /// This renderer for other faces. Knots and tables stay as long as there are not many more faces than before, so a mesh that changes
-    /// while it is optimised costs nothing but its list of faces.
+    /// This renderer for other faces. Knots and tables are reused unless there are many more faces than before, so a change of topology
+    /// during an optimisation costs only the new list of faces.
     ///
     /// # Panics
     ///
@@ -144,11 +144,11 @@ impl<S: Softness> ColourRenderer<S> {
         }
     }
 
-    /// With another largest error of a pixel, as a part of the range of what is shown, in (0, 1).
+    /// Sets the largest error of a pixel, relative to the range of the attributes, in (0, 1).
     ///
     /// # Panics
     ///
-    /// If it is not.
+    /// If `tolerance` is not in (0, 1).
     #[must_use]
     pub fn with_tolerance(mut self, tolerance: f64) -> Self {
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
@@ -156,17 +156,17 @@ impl<S: Softness> ColourRenderer<S> {
         self
     }
 
-    /// Without back faces: those whose corners the camera sees clockwise. For closed meshes whose faces go counter-clockwise as seen from outside,
-    /// where back faces are hidden by front faces and cost half of the time.
+    /// Culls back faces: those whose corners appear clockwise to the camera. For closed meshes whose faces are counter-clockwise from
+    /// outside: their back faces are hidden by front faces and take half of the time.
     ///
-    /// The image is that of the front faces alone. It jumps where a face turns, by what the face shows there at its edges.
+    /// The image is that of the front faces only. It jumps where a face turns, by the weight of its colour at the edges.
     #[must_use]
     pub fn without_back_faces(mut self) -> Self {
         self.culls = true;
         self
     }
 
-    /// With another depth softness, of this scale in units of the distance between the planes.
+    /// Sets the depth softness, with this scale in units of the distance between the planes.
     ///
     /// # Panics
     ///
@@ -178,37 +178,37 @@ impl<S: Softness> ColourRenderer<S> {
         self
     }
 
-    /// How faces are weighted.
+    /// The weighting of faces.
     pub fn weighting(&self) -> &Weighting<S> {
         &self.weighting
     }
 
-    /// The parameters φ of the softnesses by edge and by depth: those to draw with where no others are given.
+    /// The parameters φ of the edge and the depth softness, used by [`image`](Self::image).
     pub fn phi(&self) -> &[Vec<f64>; 2] {
         &self.phi
     }
 
-    /// Draws with these parameters from now on.
+    /// Sets the parameters.
     ///
     /// # Panics
     ///
-    /// If there are more or fewer of them than the softnesses have.
+    /// If their number differs from that of the softnesses.
     pub fn set_phi(&mut self, phi: [Vec<f64>; 2]) {
         check(&self.weighting, &phi);
         self.phi = phi;
     }
 
-    /// The largest error of a pixel beside this background under the renderer's own parameters, as a part of the range of what is shown:
-    /// the tolerance, or more where a softness has a jump or a corner that no table can follow to it. In exact arithmetic.
+    /// The largest error of a pixel with this background and the renderer's own parameters, relative to the range of the attributes: the
+    /// tolerance, or more if a softness has a jump or a corner that no table can resolve. In exact arithmetic.
     pub fn error_bound<B: Backend>(&self, background: &Background<B>) -> f64 {
         let prepared = self.prepared(&self.phi, number(background));
-        // As many parts for each table as it is off; half of the tolerance is for what is left out.
+        // Each table has a share in proportion to its error; half of the tolerance is for culling.
         let tables = [prepared.edge.error, prepared.depth.error()].map(|error| error.max(1.0));
         self.tolerance * (0.5 + 0.25 * (tables[0] + tables[1]))
     }
 
-    /// A background of this colour that weighs a thousandth of a face at the far plane: where a face covers a pixel it takes at most that
-    /// share, and it prevails where none does.
+    /// A background of this colour, whose weight is a thousandth of that of a face at the far plane: where a face covers a pixel, its share
+    /// is at most that; where no face does, it dominates.
     pub fn background<B: Backend>(&self, colour: &[f64], device: &B::Device) -> Background<B> {
         let phi = vector::<HostBackend>(&self.phi[1]);
         let far = self.weighting.depth.log_weight(phi, vector::<HostBackend>(&[0.0]));
@@ -222,9 +222,10 @@ impl<S: Softness> ColourRenderer<S> {
 
     /// Blended channels and, last, the share of the faces: `[views, channels + 1, height, width]`, top row first.
     ///
-    /// `vertices` `[views, vertices, 3]` are what [`project`](crate::project) returns. They, the attributes and the background receive gradients, to second order on `Autodiff<Autodiff<B>>`.
+    /// `vertices` `[views, vertices, 3]` are the result of [`project`](crate::project). Gradients reach the vertices, the attributes and
+    /// the background, to second order on `Autodiff<Autodiff<B>>`.
     ///
-    /// On a GPU each image reads one number, the background's weight.
+    /// On a GPU each image reads back one number, the background's weight.
     ///
     /// # Panics
     ///
@@ -239,7 +240,7 @@ impl<S: Softness> ColourRenderer<S> {
         let (device, dtype) = (vertices.device(), vertices.dtype());
         let prepared = self.prepared(&self.phi, number(background));
         let data = self.cache.table(&prepared, || {
-            // In f64, whatever it is drawn with: rounding of an f32 shows in the tables of some families.
+            // In f64 whatever the backend draws in: f32 rounding is visible in the tables of some families.
             let precise = |phi: &Vec<f64>| precise::<HostBackend>(phi, &Default::default());
             prepared.tables(self.phi.each_ref().map(precise)).into_data()
         });
@@ -247,8 +248,8 @@ impl<S: Softness> ColourRenderer<S> {
         self.drawn(&prepared, vertices, attributes, tables, background)
     }
 
-    /// [`image`](Self::image) under parameters φ of the softnesses by edge and by depth, which receive gradients too. On a GPU each
-    /// image waits to read them back, which a browser cannot.
+    /// [`image`](Self::image) with parameters φ of the edge and the depth softness, which receive gradients too. On a GPU each image waits
+    /// to read them back, which is impossible in a browser.
     ///
     /// # Panics
     ///
@@ -268,9 +269,9 @@ impl<S: Softness> ColourRenderer<S> {
         self.drawn(&prepared, vertices.tensor(), attributes, tables, background)
     }
 
-    /// The op behind [`image_with`](Self::image_with), and what makes its tables, for callers that run it on slices: for these values of
-    /// the parameters and of the logarithm of the background's weight, and attributes with these `entries` at the corners of faces, if
-    /// they are places on a texture with its rows and columns.
+    /// The op of [`image_with`](Self::image_with), and the tables it needs, for callers that run it on slices: for these values of the
+    /// parameters and of the logarithm of the background's weight, attributes with these `entries` at the corners of faces, and the rows
+    /// and columns of the texture if the attributes are texture coordinates.
     ///
     /// # Panics
     ///

@@ -6,19 +6,19 @@ use softrast_tensor::{Backend, Tensor, TensorData};
 
 use crate::{ImageSize, NEAR, Projected};
 
-/// Faces that one thread takes at once.
+/// Faces per rayon task.
 const AT_ONCE: usize = 1 << 10;
 
 /// Hard silhouettes: 1 where the centre of a pixel lies in a face (edges included), else 0.
 ///
-/// The result is `[views, height, width]`, top row first, in the float type of `vertices`; it has no gradient. Used for targets and metrics.
-/// Faces that the soft rasterizer does not draw are not drawn here either.
+/// The result is `[views, height, width]`, top row first, in the float type of `vertices`; it has no gradient. Used for targets and
+/// metrics. Faces that the soft rasterizer culls are not drawn here either.
 ///
 /// Source: docs/notes.md, Pixels.
 ///
 /// # Panics
 ///
-/// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
+/// If a vertex number of a face is out of range, or the backend cannot be read synchronously.
 pub fn hard_silhouette<B: Backend>(
     vertices: Projected<B>,
     faces: &[[u32; 3]],
@@ -33,12 +33,12 @@ pub fn hard_silhouette<B: Backend>(
     Tensor::from_data(TensorData::new(image, shape), (&device, dtype))
 }
 
-/// Hard coverage, `[views, height, width]` in [0, 1], top row first: the part of `samples` × `samples` places, evenly spaced in each pixel, that
-/// lie in a face (edges included). It has no gradient. One sample gives [`hard_silhouette`].
+/// Hard coverage, `[views, height, width]` in [0, 1], top row first: the fraction of `samples` × `samples` points, evenly spaced in each
+/// pixel, that lie in a face (edges included). It has no gradient. One sample gives [`hard_silhouette`].
 ///
 /// # Panics
 ///
-/// If `samples` is 0, a face uses a vertex that is not there, or the backend cannot be read synchronously.
+/// If `samples` is 0, a vertex number of a face is out of range, or the backend cannot be read synchronously.
 pub fn hard_coverage<B: Backend>(
     vertices: Projected<B>,
     faces: &[[u32; 3]],
@@ -48,7 +48,7 @@ pub fn hard_coverage<B: Backend>(
     hard_coverage_of(vertices, faces, size.into(), samples, false)
 }
 
-/// [`hard_coverage`], without back faces on request.
+/// [`hard_coverage`], optionally without back faces.
 pub(crate) fn hard_coverage_of<B: Backend>(
     vertices: Projected<B>,
     faces: &[[u32; 3]],
@@ -72,7 +72,7 @@ pub(crate) fn hard_coverage_of<B: Backend>(
             }
             inside_spans(vertices, face, NEAR, fine, |row, start, end| {
                 let places = &covers[row * fine.width + start..row * fine.width + end];
-                // Whoever comes first writes the same.
+                // All threads write the same value.
                 places.iter().for_each(|place| place.store(1, Ordering::Relaxed));
             });
         });
@@ -94,16 +94,16 @@ pub(crate) fn hard_coverage_of<B: Backend>(
     Tensor::from_data(TensorData::new(image, shape), (&device, dtype))
 }
 
-/// The nearest face at the centre of each pixel, edges included, row by row from the top, view after view; none where there is no face.
+/// The nearest face at the centre of each pixel, edges included, row by row from the top, view after view; `None` where there is no face.
 ///
-/// The depth of a face there is that of its plane in perspective, as in [`blended`](crate::reference::blended). Of equally near faces the
-/// first is seen. Faces that the soft rasterizer does not draw are not seen either.
+/// The depth of a face there is that of its plane in perspective, as in [`blended`](crate::reference::blended). The first of equally near
+/// faces is used. Faces that the soft rasterizer culls are excluded.
 ///
 /// Source: docs/notes.md, Colour.
 ///
 /// # Panics
 ///
-/// If a face uses a vertex that is not there, or the backend cannot be read synchronously.
+/// If a vertex number of a face is out of range, or the backend cannot be read synchronously.
 pub fn nearest_faces<B: Backend>(
     vertices: Projected<B>,
     faces: &[[u32; 3]],
@@ -134,7 +134,7 @@ pub fn nearest_faces<B: Backend>(
     nearest.into_iter().map(|(_, face)| face).collect()
 }
 
-/// One over the depth of the plane through three corners, which is linear over the image. For a face that has an area.
+/// One over the depth of the plane through three corners, which is linear over the image. The face must have an area.
 fn closeness(corners: [[f64; 3]; 3]) -> impl Fn([f64; 2]) -> f64 {
     let side = move |k: usize, [x, y]: [f64; 2]| {
         let ([ax, ay, _], [bx, by, _]) = (corners[k], corners[(k + 1) % 3]);
@@ -142,7 +142,7 @@ fn closeness(corners: [[f64; 3]; 3]) -> impl Fn([f64; 2]) -> f64 {
     };
     let area = side(0, [corners[2][0], corners[2][1]]);
     let [first, second, third] = corners.map(|corner| 1.0 / corner[2]);
-    // By differences, so that faces of one depth all over tie exactly.
+    // Computed by differences, so that faces of constant depth tie exactly.
     move |place| {
         first + (side(2, place) * (second - first) + side(0, place) * (third - first)) / area
     }

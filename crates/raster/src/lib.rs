@@ -1,22 +1,21 @@
 //! Differentiable soft rasterizer ops on burn: cameras, silhouettes, exact second order.
 //!
-//! A silhouette is a sum over faces of a one-dimensional function of the signed distance
-//! ([`low_level::profile_sum`]); which function, and how the sum becomes a coverage, is the business of the
-//! softness and the T-conorm ([`low_level::Profile`]). A [`SoftRenderer`] puts the pieces together;
-//! [`mod@reference`] is the same in plain tensor ops over every pixel-face pair. A [`ColourRenderer`]
-//! draws what faces show, soft by edge and by depth; [`blend`] does so for a few faces of any kind.
+//! A silhouette is a sum over faces of a one-dimensional function of the signed distance ([`low_level::profile_sum`]). The softness and the
+//! T-conorm ([`low_level::Profile`]) determine this function, and the coverage as a function of the sum. A [`SoftRenderer`] combines them;
+//! [`mod@reference`] computes the same in plain tensor ops over every pixel-face pair. A [`ColourRenderer`] draws attributes of faces, soft
+//! by edge and by depth; [`blend`] does so for a few faces of any kind.
 //!
 //! ```
 //! use softrast_tensor::{NdArray, Tensor};
 //! use softrast_raster::{Projected, SoftRenderer};
 //! use softrast_softness::Family;
 //!
-//! // x and y in NDC, and the depth, as a camera gives them.
+//! // x and y in NDC and the depth, as after projection.
 //! let corners = [[[-0.5, -0.5, 1.0], [0.5, -0.5, 1.0], [0.0, 0.5, 1.0]]];
 //! let corners = Tensor::<NdArray, 3>::from_floats(corners, &Default::default());
 //! let renderer = SoftRenderer::new(&[[0, 1, 2]], 3, Family::Logistic, 0.01);
 //! let alpha: Vec<f32> = renderer.silhouette(Projected::new(corners)).into_data().iter().collect();
-//! // The pixel in the middle, and that at the top left.
+//! // The pixel in the middle, and the one at the top left.
 //! assert!(alpha[4] > 0.99 && alpha[0] < 0.01);
 //! ```
 
@@ -75,7 +74,7 @@ pub use projected::Projected;
 pub use shading::{Light, lambert, phong, spherical_harmonics, vertex_normals};
 pub use soft_renderer::SoftRenderer;
 pub use softrast_kernel::ImageSize;
-/// For [`on_backend!`].
+/// Used by [`on_backend!`].
 #[doc(hidden)]
 pub use softrast_tensor as tensor;
 pub use t_conorm::{TConorm, UnknownTConorm};
@@ -83,7 +82,7 @@ pub use view::view_rotation;
 pub use weighting::Weighting;
 pub use width::{Width, WidthSchedule};
 
-/// Parts of the renderers, for callers that prepare tables, run ops on slices, or measure them. They take projected vertices as plain tensors.
+/// Components of the renderers, to prepare tables, run ops on slices, or measure them. They take projected vertices as plain tensors.
 pub mod low_level {
     pub use crate::{
         backend::{Call, profile_sum},

@@ -9,42 +9,43 @@ use softrast_tensor::{Backend, DType, Tensor, numbers};
 
 use crate::curve::{CubicCurve, FAR, precise, rounding, settled_until};
 
-/// Stands for an infinite distance; its square fits an f32.
+/// Distance used for infinity; its square fits an f32.
 const LIMIT: f64 = 1e18;
-/// The least optical depth that differs from its limit by more than it is rounded by.
+/// The least optical depth that differs from its limit by more than its rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Minus the logarithm of a softness, as a piecewise cubic function of the squared distance.
 ///
-/// `-ln s(x)` is the optical depth of the mirrored step at `-x`, whose inner side is outside the face. An absolute error of a logarithm is a relative one of the weight, and an error ρ of the logarithms of
-/// all weights moves their mean by at most `ρ / 2` times the range of what is averaged, to first order.
+/// `-ln s(x)` is the optical depth of the mirrored step at `-x`, whose inner side is outside the face. An absolute error of a logarithm is
+/// a relative error of the weight, and errors of at most ρ of the logarithms of all weights move their mean by at most `ρ / 2` times the
+/// range of the averaged values, to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LogCurve<S> {
     softness: Mirrored<S>,
     curve: CubicCurve,
-    /// How far it is off, in multiples of what was asked for.
+    /// Error of the table, as a multiple of the requested one.
     pub(crate) error: f64,
 }
 
-/// What a table is asked for.
+/// Required precision of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Precision {
     /// Relative error of a weight.
     pub(crate) accuracy: f64,
-    /// Logarithm of a weight that may be left out.
+    /// Logarithm of a negligible weight.
     pub(crate) least: f64,
-    /// What is taken off a weight before it counts.
+    /// Floor subtracted from a weight.
     pub(crate) floor: f64,
 }
 
 impl Precision {
-    /// How far a weight is off, in multiples of what is asked for. `rounding` is that of a number of size 1.
+    /// Error of a weight, as a multiple of the required one. `rounding` is that of a number of size 1.
     fn error(&self, exact: f64, interpolated: f64, rounding: f64) -> f64 {
         let relative = self.accuracy + rounding * exact.abs();
         let logarithm = (exact - interpolated).abs() / relative;
         let weights = [exact, interpolated].map(|q| (-q).exp());
         let [exact, interpolated] = weights.map(|weight| (weight - self.floor).max(0.0));
-        // A weight that is held up from 0 is not known to more than a part of that.
+        // A weight with a floor is resolved to a fraction of the floor only.
         let negligible = 0.5 * self.least.exp().max(0.1 * NOTHING * self.floor);
         let bound = relative * exact + rounding * self.floor + negligible;
         let weight = (exact - interpolated).abs() / bound;
@@ -67,7 +68,7 @@ impl<S: Softness> LogCurve<S> {
             numbers(softness.optical_depth(parameters.clone(), precise::<B>(x, device)))
         };
         let outer = support::<B>(&softness, phi, accuracy / 2.0, device).outer;
-        // Until the weight is negligible, or at its limit.
+        // Up to where the weight is negligible, or at its limit.
         let close = if floor > 0.0 { least.exp() / floor } else { accuracy };
         let close = close.min(accuracy).max(ROUNDING) / 2.0;
         let limit = depths(&[LIMIT])[0];
@@ -84,12 +85,12 @@ impl<S: Softness> LogCurve<S> {
         Self { softness, curve, error }
     }
 
-    /// The same softness stretched by `factor` along its argument, to the same precision; None where it has to be chosen anew.
+    /// The curve of the softness stretched by `factor` along its argument, with the same precision; `None` if it has to be chosen anew.
     pub(crate) fn stretched(&self, factor: f64) -> Option<Self> {
         Some(Self { curve: self.curve.stretched(factor)?, ..self.clone() })
     }
 
-    /// The places of the knots.
+    /// The layout of the cells.
     pub(crate) fn grid(&self) -> Grid {
         self.curve.grid
     }
@@ -101,19 +102,19 @@ impl<S: Softness> LogCurve<S> {
     }
 }
 
-/// Logarithms of weights by depth, for a kernel.
+/// Logarithms of depth weights, for a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum DepthCurve {
     /// A family, over the distance from the near plane.
     Family(LogCurve<EdgeSoftness>),
-    /// The reversed exponential: its logarithm is a straight line, until it is 0.
+    /// The reversed exponential: its logarithm is a straight line, up to 0.
     Exponential,
     /// The network: without biases it is a straight line on each side of nearness 0.
     Mlp,
 }
 
 impl DepthCurve {
-    /// As [`LogCurve::new`].
+    /// See [`LogCurve::new`].
     pub(crate) fn new<B: Backend>(
         softness: DepthSoftness,
         phi: &[f64],
@@ -123,7 +124,7 @@ impl DepthCurve {
         match softness {
             DepthSoftness::Family(Family::Exp) => Self::Exponential,
             DepthSoftness::Family(family) => {
-                // The distance from the plane is in units of that between the planes.
+                // The distance from the plane is in units of the distance between the planes.
                 let softness = EdgeSoftness::new(family);
                 Self::Family(LogCurve::new::<B>(softness, phi, precision, device))
             }
@@ -131,7 +132,7 @@ impl DepthCurve {
         }
     }
 
-    /// How far it is off, in multiples of what was asked for.
+    /// Error of the table, as a multiple of the requested one.
     pub(crate) fn error(&self) -> f64 {
         match self {
             Self::Family(curve) => curve.error,
@@ -147,8 +148,8 @@ impl DepthCurve {
         }
     }
 
-    /// As [`LogCurve::table`]; of an exponential one row, with the slope of its logarithm and its value at nearness 1; of a network one row,
-    /// with its values at nearness 1 and -1.
+    /// See [`LogCurve::table`]. For an exponential, one row: the slope of its logarithm and its value at nearness 1. For a network, one
+    /// row: its values at nearness 1 and -1.
     pub(crate) fn table<B: Backend>(&self, phi: Tensor<B, 1>) -> Tensor<B, 2> {
         match self {
             Self::Family(curve) => curve.table(phi),
@@ -186,7 +187,7 @@ mod tests {
                 let device = Default::default();
                 let curve = LogCurve::new::<NdArray<f64>>(softness, &phi, precision, &device);
                 let error = curve.error;
-                // Where the law of this one begins, it rises faster than knots follow.
+                // This law increases faster at its start than knots can resolve.
                 let most = if family == Family::GammaForward { 200.0 } else { 1.0 };
                 assert!(
                     error <= most,

@@ -7,11 +7,10 @@ use crate::{
     ops::ElementaryOp,
 };
 
-/// `1 - |p ∩ t| / |p ∪ t|` of each view, soft: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
+/// Soft IoU loss `1 - |p ∩ t| / |p ∪ t|` of each view: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
 ///
-/// `image` and `target` are `[views, height, width]` in [0, 1]; the result is `[views]`. Two empty
-/// images give 1, as an empty one against any other does: such a target cannot be matched. One of the two may be `[1, height, width]`,
-/// for all views.
+/// `image` and `target` are `[views, height, width]` in [0, 1]; the result is `[views]`. The loss of an empty image or target is 1, also if
+/// both are empty: such a target cannot be matched. Either of them may be `[1, height, width]`, for all views.
 ///
 /// # Panics
 ///
@@ -22,8 +21,8 @@ pub fn iou_loss<B: RasterBackend>(image: Tensor<B, 3>, target: Tensor<B, 3>) -> 
     compared(ElementaryOp::Iou, image, target)
 }
 
-/// Mean squared difference of each view: `[views, height, width]`, or with channels `[views, channels, height, width]`, to `[views]`. One of
-/// the two images may be that of one view, for all.
+/// Mean squared difference of each view: `[views, height, width]`, or with channels `[views, channels, height, width]`, to `[views]`.
+/// Either of the two images may have a single view, used for all.
 ///
 /// # Panics
 ///
@@ -35,7 +34,7 @@ pub fn mse_loss<B: RasterBackend, const D: usize>(
     compared(ElementaryOp::SquaredError, image, target)
 }
 
-/// The loss of each view, where a share of each pixel of the image counts, or all of it.
+/// The loss of each view, with an optional weight for each pixel of the image.
 pub(crate) fn loss_of_images<B: RasterBackend>(
     loss: PixelLoss,
     image: Tensor<B, 3>,
@@ -52,7 +51,7 @@ pub(crate) fn loss_of_images<B: RasterBackend>(
     }
 }
 
-/// The loss of each view, in one op; one image may be compared with those of all views.
+/// The loss of each view, in one op; an image with a single view is compared with all views of the other.
 fn compared<B: RasterBackend, const D: usize>(
     loss: ElementaryOp,
     image: Tensor<B, D>,
@@ -64,44 +63,42 @@ fn compared<B: RasterBackend, const D: usize>(
     elementary(loss, vec![primitive(image), primitive(target)])
 }
 
-/// Added to squared lengths before they divide or a root is taken, in squared world units.
+/// Added to squared lengths before a division or a square root, in squared world units.
 ///
-/// Hides edges and heights below a thousandth of a unit, and so keeps both derivatives finite where
-/// faces collapse. Source: docs/notes.md, Losses and errors.
+/// Hides edges and heights below a thousandth of a unit, and so keeps both derivatives finite where faces collapse. Source: docs/notes.md,
+/// Losses and errors.
 const EPSILON: f64 = 1e-6;
 
-/// How sharply surfaces bend: `Σ (cos α + 1)²` over all edges between two faces, `[1]`.
+/// Flatness loss: `Σ (cos α + 1)²` over all edges between two faces, `[1]`.
 ///
-/// `α` is the angle between the heights of both faces on their common edge: half a turn where the
-/// surface is flat, so that it adds nothing. `hinges` `[shapes, 3, 4 edges]` holds the corners of both
-/// faces of each edge: its two ends, then the two others; all first ones before all second ones, and
-/// so on. Source: docs/notes.md, Losses and errors.
+/// `α` is the angle between the heights of both faces on their common edge: 180° where the surface is flat, so that the term is 0. `hinges`
+/// `[shapes, 3, 4 edges]` holds the corners of both faces of each edge: its two ends, then the two opposite corners; all first corners
+/// before all second ones, and so on. Source: docs/notes.md, Losses and errors.
 ///
 /// # Panics
 ///
-/// If there is no edge, or the last axis is not four parts.
+/// If there is no edge, or the last axis is not a multiple of four.
 pub fn flatness<B: Backend>(hinges: Tensor<B, 3>) -> Tensor<B, 1> {
     let bend = bend(hinges);
     (bend.clone() * bend).sum()
 }
 
-/// How far normals of neighbours differ: the mean of `1 - cos β` over all edges between two faces, `[1]`; β is the angle between their
-/// normals, half a turn less the `α` of [`flatness`]. `hinges` are as there.
+/// Normal consistency: the mean of `1 - cos β` over all edges between two faces, `[1]`; β is the angle between their normals, 180° minus
+/// the `α` of [`flatness`]. `hinges` has the same layout.
 ///
 /// # Panics
 ///
-/// If there is no edge, or the last axis is not four parts.
+/// If there is no edge, or the last axis is not a multiple of four.
 pub fn normal_consistency<B: Backend>(hinges: Tensor<B, 3>) -> Tensor<B, 1> {
     bend(hinges).mean()
 }
 
 /// Mean of `(|e| - length)²` over edges, `[1]`, in squared world units. `ends` `[shapes, 3, 2 edges]` holds both ends of each edge, all
-/// first ones before all second ones. The lengths are those of edges no shorter than a thousandth of a unit, so that derivatives stay
-/// finite.
+/// first ends before all second ones. The length of an edge is `√(|e|² + 1e-6)`, so that derivatives stay finite.
 ///
 /// # Panics
 ///
-/// If there is no edge, or the last axis is not two parts.
+/// If there is no edge, or the last axis is not a multiple of two.
 pub fn edge_length<B: Backend>(ends: Tensor<B, 3>, length: f64) -> Tensor<B, 1> {
     let [from, to] = ends.chunk(2, 2).try_into().expect("two equal parts");
     let edge = to - from;
@@ -123,7 +120,7 @@ fn bend<B: Backend>(hinges: Tensor<B, 3>) -> Tensor<B, 3> {
     dot(h1, h2) * lengths.sqrt().recip() + 1.0
 }
 
-/// Of the vectors along the middle axis: `[shapes, 3, n]` twice to `[shapes, 1, n]`.
+/// Dot products along the middle axis: `[shapes, 3, n]` twice to `[shapes, 1, n]`.
 fn dot<B: Backend>(a: &Tensor<B, 3>, b: &Tensor<B, 3>) -> Tensor<B, 3> {
     (a.clone() * b.clone()).sum_dim(1)
 }

@@ -1,14 +1,14 @@
-//! What is wrong with a picture, beside what [`mse_loss`](crate::mse_loss) and [`iou_loss`](crate::iou_loss) say of it.
+//! Image losses in addition to [`mse_loss`](crate::mse_loss) and [`iou_loss`](crate::iou_loss).
 
 use softrast_tensor::{Backend, Tensor, TensorData};
 
-/// Pixels across the window of [`ssim_loss`], and the width of the Gauss curve in it.
+/// Width in pixels of the window of [`ssim_loss`], and of the Gaussian in it.
 const WINDOW: usize = 11;
 const SIGMA: f64 = 1.5;
-/// What keeps its ratios defined where a window is all of one value, for values from 0 to 1.
+/// Constants that keep the ratios of SSIM finite in constant windows, for values from 0 to 1.
 const STABLE: [f64; 2] = [0.01 * 0.01, 0.03 * 0.03];
 
-/// Mean absolute difference of each view: `[views, ..]` twice to `[views]`. The derivative where both are the same is 0.
+/// Mean absolute difference of each view: `[views, ..]` twice to `[views]`. The derivative at equal pixels is 0.
 pub fn l1_loss<B: Backend, const D: usize>(
     image: Tensor<B, D>,
     target: Tensor<B, D>,
@@ -16,8 +16,8 @@ pub fn l1_loss<B: Backend, const D: usize>(
     of_views((image - target).abs())
 }
 
-/// The mean over the pixels of each view of `d² / 2` where a difference d is at most `delta`, and `delta (|d| - delta / 2)` beyond:
-/// `[views, ..]` twice to `[views]`. So single pixels that do not fit pull no harder than `delta`.
+/// Huber loss: the mean over the pixels of each view of `d² / 2` where a difference d is at most `delta`, and `delta (|d| - delta / 2)`
+/// beyond: `[views, ..]` twice to `[views]`. The gradient of an outlier is therefore at most `delta`.
 ///
 /// Source: Huber, "Robust estimation of a location parameter", 1964.
 ///
@@ -35,8 +35,8 @@ pub fn huber_loss<B: Backend, const D: usize>(
     of_views(near.clone() * (size - near * 0.5))
 }
 
-/// 1 less the mean structural similarity of each view: `[views, channels, height, width]` twice, values from 0 to 1, to `[views]`, from 0
-/// for the same picture to 2. Windows are 11 x 11 pixels under a Gauss curve of 1.5 pixels, and none reaches beyond the picture.
+/// One minus the mean structural similarity of each view: `[views, channels, height, width]` twice, values from 0 to 1, to `[views]`, from
+/// 0 for equal pictures to 2. Windows are 11 x 11 pixels with Gaussian weights of 1.5 pixels, and lie wholly in the picture.
 ///
 /// Source: Wang et al., "Image quality assessment: from error visibility to structural similarity", 2004.
 ///
@@ -59,17 +59,17 @@ pub fn ssim_loss<B: Backend>(image: Tensor<B, 4>, target: Tensor<B, 4>) -> Tenso
     let both = mean(image * target) - ab.clone();
     let [level, contrast] = STABLE;
     let above = (ab * 2.0 + level) * (both * 2.0 + contrast);
-    // Rounding leaves a variance no lower than -1e-7, which the constants make up for.
+    // Rounding leaves a variance of at least -1e-7, which the constants compensate.
     let below = (aa + bb + level) * (spread + other + contrast);
     of_views(above * below.recip()).neg() + 1.0
 }
 
-/// The mean over `levels` of `loss`, of pictures `[views, channels, height, width]` as they are, of half the size, of a quarter and so on.
-/// Wide differences then count at every level, so that a picture is drawn towards a target that it does not overlap.
+/// The mean over `levels` of `loss`, for pictures `[views, channels, height, width]` in full size, half size, a quarter and so on. Wide
+/// differences count at every level, so a picture is attracted to a target that it does not overlap.
 ///
 /// # Panics
 ///
-/// If there are no levels, or the sides cannot be halved so often.
+/// If `levels` is 0, or the sides cannot be halved often enough.
 pub fn multi_scale_loss<B: Backend>(
     image: Tensor<B, 4>,
     target: Tensor<B, 4>,
@@ -106,7 +106,7 @@ fn along<B: Backend>(picture: Tensor<B, 4>, window: &Tensor<B, 2>) -> Tensor<B, 
     flat.matmul(window.clone()).reshape([views, channels, rows, places])
 }
 
-/// Windows at all places of an axis of this `length`, in the float type of a picture: `[length, places]`.
+/// Windows at all positions of an axis of this `length`, in the float type of a picture: `[length, places]`.
 fn window<B: Backend>(length: usize, like: &Tensor<B, 4>) -> Tensor<B, 2> {
     let middle = (WINDOW - 1) as f64 / 2.0;
     let curve = |k: usize| (-0.5 * ((k as f64 - middle) / SIGMA).powi(2)).exp();

@@ -7,16 +7,17 @@ use crate::{
     view::sin_cos,
 };
 
-/// How far from a right angle, a unit length or the middle of an image still counts as none at all.
+/// Deviation from a right angle, a unit length or the middle of an image that counts as zero.
 const EXACT: f64 = 1e-6;
-/// Entries of `R Rᵀ` that are farther than this from the identity make R no rotation: files hold few digits.
+/// Largest deviation of entries of `R Rᵀ` from the identity for a rotation R: files hold few digits.
 const ROUNDED: f64 = 1e-3;
 
-/// A calibrated camera that stands anywhere, as OpenCV has it.
+/// A calibrated camera of any pose, in the convention of OpenCV.
 ///
-/// Its axes are x right, y down and z ahead: it sees a point p of the world at `c = R p + t`, in the pixel `(fx x / z + cx, fy y / z +
-/// cy)`. The corner of the first pixel is (0, 0) and its middle (½, ½), as with instant-ngp, nerfstudio and COLMAP; what OpenCV itself
-/// calibrates counts from the middle of the first pixel, so add ½ to its cx and cy. There is no skew and no distortion.
+/// Its axes are x right, y down and z ahead. It maps a world point p, with `c = R p + t = (x, y, z)`, to the pixel
+/// `(fx x / z + cx, fy y / z + cy)`. The corner of the first pixel is (0, 0) and its centre (½, ½), as in instant-ngp, nerfstudio and
+/// COLMAP; OpenCV's own calibration has (0, 0) at the centre of the first pixel, so add ½ to its cx and cy. There is no skew and no
+/// distortion.
 ///
 /// ```
 /// # use softrast_tensor::NdArray;
@@ -43,7 +44,7 @@ pub struct Pinhole {
     pub size: ImageSize,
 }
 
-/// A camera as PyTorch3D's `PerspectiveCameras` has it: for row vectors (`X R + T`), with axes x left, y up and z ahead; see
+/// A camera in the convention of PyTorch3D's `PerspectiveCameras`: for row vectors (`X R + T`), with axes x left, y up and z ahead; see
 /// [`Pinhole::from_pytorch3d`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PyTorch3dCamera {
@@ -57,13 +58,13 @@ pub struct PyTorch3dCamera {
     pub principal_point: [f64; 2],
 }
 
-/// What is wrong with a [`Pinhole`].
+/// Errors of a [`Pinhole`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PinholeError {
-    /// A number of it is infinite or NaN.
+    /// A number is infinite or NaN.
     #[error("the camera has a number that is not finite")]
     NotFinite,
-    /// R changes lengths or angles.
+    /// R is not orthonormal.
     #[error("R is no rotation: R Rᵀ is off the identity by {0:.2e}")]
     NoRotation(f64),
     /// R is a reflection.
@@ -71,21 +72,21 @@ pub enum PinholeError {
         "R mirrors the world (its determinant is -1): the sign of one or of all its axes is wrong"
     )]
     Mirrors,
-    /// It would see nothing.
+    /// A focal length is not positive.
     #[error("the focal lengths are {0} and {1} pixels: they must be positive")]
     NoFocalLength(f64, f64),
-    /// It has no pixels.
+    /// The image is empty.
     #[error("the image has no pixels")]
     NoPixels,
 }
 
 impl Pinhole {
-    /// A camera at `eye` that has `target` in the middle of its image, with `up` upwards; its whole field of view along the shorter side
-    /// of the image is `fov_deg`.
+    /// A camera at `eye` with `target` in the middle of its image and `up` upwards; `fov_deg` is the whole field of view along the shorter
+    /// side of the image.
     ///
     /// # Panics
     ///
-    /// If the camera stands at its target, or looks along `up`.
+    /// If `eye` is `target`, or the viewing direction is along `up`.
     pub fn look_at(
         eye: [f64; 3],
         target: [f64; 3],
@@ -103,7 +104,7 @@ impl Pinhole {
     pub fn from_orbit(orbit: &Orbit, size: impl Into<ImageSize>) -> Self {
         let [elevation, azimuth] = [orbit.elevation_deg, orbit.azimuth_deg].map(f64::to_radians);
         let ((se, ce), (sa, ca)) = (elevation.sin_cos(), azimuth.sin_cos());
-        // As with `view_rotation`: past a pole the view rolls by half a turn.
+        // As in `view_rotation`: past a pole the view rolls by 180°.
         let roll = if ce < 0.0 { -1.0 } else { 1.0 };
         let rotation = [
             [-ca, 0.0, -sa].map(|x| roll * x),
@@ -114,7 +115,7 @@ impl Pinhole {
         Self::of_view(rotation, eye, orbit.fov_deg, size.into())
     }
 
-    /// The orbit that sees the same, if there is one: it looks at the origin without a roll, its pixels are square and its principal point
+    /// The equivalent orbit, if there is one: the camera looks at the origin without a roll, its pixels are square and its principal point
     /// is in the middle, all to 1e-6.
     pub fn orbit(&self) -> Option<Orbit> {
         let ([right, down, ahead], t) = (self.rotation, self.translation);
@@ -128,13 +129,13 @@ impl Pinhole {
         found.then(|| Orbit {
             distance,
             elevation_deg: (-ahead[1]).clamp(-1.0, 1.0).asin().to_degrees(),
-            // Of the two rows that hold it, the one that does so at a pole too.
+            // The row that determines the azimuth at a pole too.
             azimuth_deg: (-right[2]).atan2(-right[0]).to_degrees(),
             fov_deg: 2.0 * (size.shorter() as f64 / (2.0 * fx)).atan().to_degrees(),
         })
     }
 
-    /// From a camera-to-world matrix with x right, y up and z behind, as OpenGL, Blender, NeRF, instant-ngp and nerfstudio have it.
+    /// From a camera-to-world matrix with x right, y up and z behind, as in OpenGL, Blender, NeRF, instant-ngp and nerfstudio.
     pub fn from_opengl(
         camera_to_world: &[[f64; 4]; 4],
         focal: [f64; 2],
@@ -147,7 +148,7 @@ impl Pinhole {
         Self { rotation, translation: moved(rotation, eye), focal, centre, size: size.into() }
     }
 
-    /// The camera-to-world matrix that [`Pinhole::from_opengl`] takes.
+    /// The camera-to-world matrix, as for [`Pinhole::from_opengl`].
     pub fn to_opengl(&self) -> [[f64; 4]; 4] {
         let ([x, y, z], eye) = (self.rotation, self.eye());
         let row = |k: usize| [x[k], -y[k], -z[k], eye[k]];
@@ -192,13 +193,13 @@ impl Pinhole {
         }
     }
 
-    /// Where it stands, in world units.
+    /// Position of the camera, in world units.
     pub fn eye(&self) -> [f64; 3] {
         let (r, t) = (&self.rotation, &self.translation);
         [0, 1, 2].map(|k| -(0..3).map(|row| r[row][k] * t[row]).sum::<f64>())
     }
 
-    /// A point of the world in camera axes: x right, y down, z ahead, in world units.
+    /// Transforms a world point to camera axes: x right, y down, z ahead, in world units.
     ///
     /// ```
     /// use softrast_raster::Pinhole;
@@ -210,18 +211,18 @@ impl Pinhole {
         [0, 1, 2].map(|k| dot(self.rotation[k], point) + self.translation[k])
     }
 
-    /// Column and row of the pixel where it sees a point, and the depth.
+    /// Column and row of the pixel of a point, and its depth.
     pub fn pixel(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = self.transform(point);
         let ([fx, fy], [cx, cy]) = (self.focal, self.centre);
         [fx * x / z + cx, fy * y / z + cy, z]
     }
 
-    /// Whether it is a camera.
+    /// Checks the camera.
     ///
     /// # Errors
     ///
-    /// If R is no rotation, to a thousandth, or a focal length is not positive, or there are no pixels, or a number is not finite.
+    /// If R is not a rotation to a thousandth, a focal length is not positive, there are no pixels, or a number is not finite.
     pub fn check(&self) -> Result<(), PinholeError> {
         let r = self.rotation;
         let numbers = r.as_flattened().iter().chain(&self.translation).chain(&self.focal);
@@ -247,8 +248,8 @@ impl Pinhole {
         Ok(())
     }
 
-    /// The camera that sees a rectangle of its image, enlarged or reduced to another size: the corner of the rectangle and its extent are
-    /// columns and rows in pixels.
+    /// The camera of a rectangle of the image, scaled to another size: the corner of the rectangle and its extent are columns and rows in
+    /// pixels.
     #[must_use]
     pub fn cropped(&self, corner: [f64; 2], extent: [f64; 2], size: impl Into<ImageSize>) -> Self {
         let size = size.into();
@@ -275,14 +276,14 @@ fn moved(rotation: [[f64; 3]; 3], eye: [f64; 3]) -> [f64; 3] {
     rotation.map(|row| -dot(row, eye))
 }
 
-/// A [`Pinhole`] for each view as tensors, all of them differentiable.
+/// One [`Pinhole`] per view as tensors, all of them differentiable.
 #[derive(Clone, Debug)]
 pub struct Pinholes<B: Backend> {
     /// R of each view, `[views, 3, 3]`.
     pub rotation: Tensor<B, 3>,
     /// t of each view in world units, `[views, 3]`.
     pub translation: Tensor<B, 2>,
-    /// fx, fy, cx and cy in pixels of each view, or one for all of them, `[1 or views, 4]`.
+    /// fx, fy, cx and cy in pixels per view, or one camera for all views, `[1 or views, 4]`.
     pub intrinsics: Tensor<B, 2>,
     /// Height and width of all images.
     pub size: ImageSize,
@@ -336,10 +337,11 @@ impl<B: RasterBackend> Cameras<B> for Pinholes<B> {
     }
 }
 
-/// Rotations `[views, 3, 3]` turned further: `exp([w]×) R`, by the angle |w| in radians around the axis w in camera axes.
+/// Rotates rotations `[views, 3, 3]` further: `exp([w]×) R`, by the angle |w| in radians around the axis w in camera axes.
 ///
-/// `tangent` `[views, 3]` holds w. It has gradients of any order at 0 too, so an optimiser can move it from 0 on, and a rotation has no
-/// pole. Its answers repeat beyond |w| = 2π, where it has no gradient along w's sphere: start anew from where it has come.
+/// `tangent` `[views, 3]` holds w. Gradients of any order exist at 0 too, so an optimiser can start at 0, and the parametrisation has no
+/// pole. Rotations repeat beyond |w| = 2π, where the gradient along the sphere of w vanishes: before that, restart from the current
+/// rotation.
 ///
 /// # Panics
 ///
@@ -351,7 +353,7 @@ pub fn rotate_by_tangent<B: RasterBackend>(
     let [views, ..] = rotation.dims();
     assert_eq!(tangent.dims(), [views, 3], "tangents of {views} rotations");
     let square = (tangent.clone() * tangent.clone()).sum_dim(1); // [views, 1]
-    // Near 0 by their series, whose next terms are below 1e-17; elsewhere by their names, at a number that does not divide by 0.
+    // Near 0 by their series, whose next terms are below 1e-17; elsewhere in closed form, with an argument that avoids division by 0.
     let near = square.clone().lower_elem(SERIES);
     let series = |c: [f64; 4]| {
         ((square.clone() * c[3] + c[2]) * square.clone() + c[1]) * square.clone() + c[0]
@@ -373,5 +375,5 @@ pub fn rotate_by_tangent<B: RasterBackend>(
     rotation + once * sinc.unsqueeze_dim(2) + twice * versine.unsqueeze_dim(2)
 }
 
-/// Squares of angles below which the series of sine and cosine stand for them.
+/// Squared angles below which series are used for sine and cosine.
 const SERIES: f64 = 1e-3;

@@ -9,17 +9,17 @@ use crate::{
     },
 };
 
-/// Where coverage is begun to be asked how fast it rises with the sum.
+/// Least sum at which the slope of the coverage is sampled.
 const LEAST_SUM: f64 = 1e-5;
-/// Relative rounding of an error that is exactly as large as allowed.
+/// Relative rounding of an error that equals its bound.
 const ROUNDING: f64 = 1e-3;
-/// Distances beyond the end of a side, as far as anything is drawn, at which the profile is compared with the constant.
+/// Number of distances beyond the end of a side, up to the farthest drawn, at which the profile is compared with the constant.
 const BEYOND_END: u32 = 24;
 
-/// A softness under a T-conorm as a piecewise cubic function of the squared distance: what
-/// [`profile_sum`](crate::low_level::profile_sum) adds up over the faces of a pixel.
+/// A softness with a T-conorm as a piecewise cubic function of the squared distance, the term of a face in
+/// [`profile_sum`](crate::low_level::profile_sum).
 ///
-/// Its cells suit no family more than another, so that a family needs no knots of its own, and an MLP costs no more per pixel than a
+/// The spacing of its cells suits all families equally, so no family needs custom knots, and an MLP costs no more per pixel than a
 /// logistic. Gradients of any order reach the parameters through the values and slopes at the knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
@@ -31,31 +31,28 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Chooses support and knots for a softness with parameters `phi` in scenes of up to `faces`
-    /// faces, such that no pixel is off by more than `tolerance` (in alpha, in exact arithmetic).
+    /// Chooses support and knots for a softness with parameters `phi` in scenes of up to `faces` faces, such that the error of every pixel
+    /// is at most `tolerance` (in alpha, in exact arithmetic).
     ///
-    /// Half of the tolerance goes to culling. A face that is farther from the pixel than the outer
-    /// radius adds `g(s)` within `e = slack / faces` of its left limit, so all of them together
-    /// change the sum by at most `slack` and the coverage by at most `tolerance / 2`
-    /// ([`TConorm::slack`]). Deeper inside than the inner radius one face alone covers the pixel to
-    /// within `tolerance / 2`, and a T-conorm never falls below its largest argument.
+    /// Half of the tolerance goes to culling. The term `g(s)` of a face farther from the pixel than the outer radius is within
+    /// `e = slack / faces` of its left limit, so all of them together change the sum by at most `slack` and the coverage by at most
+    /// `tolerance / 2` ([`TConorm::slack`]). Deeper inside than the inner radius one face alone covers the pixel to within `tolerance / 2`,
+    /// and a T-conorm never falls below its largest argument.
     ///
-    /// The other half goes to interpolation: the cells are refined until, at four samples of each,
-    /// the error is below `tolerance / 4` times the value plus a share of `e / 2`; the value being
-    /// the term or, where one face all but covers the pixel, the coverage that it alone makes. A
-    /// relative error ρ of every term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= 0.37 ρ`; a
-    /// relative error ρ of every coverage moves it by at most ρ times the probability that exactly
-    /// one face covers the pixel. Under a T-conorm whose coverage steepens with the sum, the coverage
-    /// is taken beside faces that bring the sum to where it is steepest, and terms are held to less where a relative error of the sum
-    /// moves the coverage by more than itself. Knots may run out: at a jump, at a corner far from the edge, under a steep T-conorm at a
-    /// tolerance far below the default. [`Profile::error`] states the error that is left.
+    /// The other half goes to interpolation: the cells are refined until, at four samples of each, the error is below `tolerance / 4` times
+    /// the value plus a share of `e / 2`; the value is the term or, where one face nearly covers the pixel, the coverage of this face
+    /// alone. A relative error ρ of every term moves `1 - exp(-S)` by at most `ρ S exp(-S) <= 0.37 ρ`; a relative error ρ of every coverage
+    /// moves it by at most ρ times the probability that exactly one face covers the pixel. With a T-conorm whose coverage steepens with the
+    /// sum, the coverage is evaluated together with faces that bring the sum to its steepest point, and the error of terms is bounded more
+    /// tightly where a relative error of the sum moves the coverage by more than itself. The number of knots may be insufficient: at a
+    /// jump, at a corner far from the edge, with a steep T-conorm at a tolerance far below the default. [`Profile::error`] states the
+    /// remaining error.
     ///
-    /// **Gradients.** A culled face gives no gradient, and Adam would have moved it however small
-    /// its gradient was. At the default tolerance of 1e-5 the gradient of a face that lies wholly in
-    /// the culled tail is below Adam's usual epsilon of 1e-8 times the image's own; choose a
-    /// smaller tolerance where faces must be drawn in from afar (docs/notes.md, Culling: gradient).
+    /// **Gradients.** A culled face has no gradient, although Adam would move it however small its gradient is. At the default tolerance of
+    /// 1e-5 the gradient of a face that lies wholly in the culled tail is below Adam's usual epsilon of 1e-8 times the image's own; choose
+    /// a smaller tolerance where faces must be attracted from afar (docs/notes.md, Culling: gradient).
     ///
-    /// `B` is the backend that draws; support and knots are chosen on `H`, in f64 if it has that.
+    /// `B` is the backend that draws; support and knots are chosen on `H`, in f64 if it supports that.
     ///
     /// # Panics
     ///
@@ -68,21 +65,21 @@ impl Profile {
         tolerance: f64,
     ) -> Self {
         let sums = <B::FloatElem as Element>::dtype();
-        // The look-up of a GPU knows no cells that are counted from the far end.
+        // The look-up of a GPU does not support cells counted from the far end.
         let far = if B::ON_HOST { &FAR[..] } else { &[] };
         let device = &H::Device::default();
         assert!(tolerance > 0.0 && tolerance < 1.0, "tolerance {tolerance} is not in (0, 1)");
         assert!(faces > 0, "a profile needs at least one face");
         let excess = t_conorm.slack(tolerance / 2.0) / faces as f64;
-        // The T-conorm bends the optical depth: ask for the depth that makes up the excess.
+        // The T-conorm transforms the optical depth: determine the depth whose generator equals the excess.
         let limits = support::<H>(softness, phi, excess, device);
         let depth = depth_of_excess(t_conorm, limits.left, excess);
         let support = support::<H>(softness, phi, depth, device);
-        // Deep inside, what counts is the light left, which knows nothing of the number of faces.
+        // Deep inside, the remaining light matters, which does not depend on the number of faces.
         let shallow = support_inside::<H>(softness, phi, tolerance / 2.0);
         let radii = [support.outer, support.inner.min(shallow)];
         let from = || {
-            // What is left of the budget of interpolation then suffices for the first cells.
+            // The remaining budget of interpolation then suffices for the first cells.
             let (depth, light) = (depth_of_excess(t_conorm, 0.0, excess), tolerance / 2.0);
             let settled = |edge: f64, q: f64| {
                 (q - edge).abs() <= depth / 4.0 || (-q.min(edge)).exp() <= light / 4.0
@@ -113,10 +110,10 @@ impl Profile {
         Self { curve, t_conorm, sums, error }
     }
 
-    /// The profile of the same softness stretched by `factor` along the distance, with the same bounds: all that they were proven and
-    /// measured from is stretched alike.
+    /// The profile of the softness stretched by `factor` along the distance, with the same bounds: the quantities in their derivation are
+    /// stretched alike.
     ///
-    /// None where a radius would leave the range that can be drawn, so that it has to be chosen anew.
+    /// `None` if a radius would leave the drawable range, so that the profile has to be chosen anew.
     pub(crate) fn stretched(self, factor: f64) -> Option<Self> {
         Some(Self { curve: self.curve.stretched(factor)?, ..self })
     }
@@ -130,28 +127,28 @@ impl Profile {
         self.curve.table(terms, like)
     }
 
-    /// The places of the knots.
+    /// The layout of the cells.
     pub(crate) fn grid(&self) -> Grid {
         self.curve.grid
     }
 
-    /// Another number of cells, `2^bits` in each octave, in the same support; their error is not measured.
+    /// Sets the number of cells to `2^bits` per octave, in the same support; their error is not measured.
     pub(crate) fn with_cells(mut self, bits: u32) -> Self {
         self.curve.grid.bits = bits;
         self
     }
 
-    /// Distances, in NDC, beyond which a pixel outside and inside sees a constant.
+    /// Distances, in NDC, outside and inside beyond which the profile is constant.
     pub fn support(&self) -> [f64; 2] {
         [self.curve.grid.outer, self.curve.grid.inner]
     }
 
-    /// Number of knots of the table, both sides together.
+    /// Number of knots of the table, on both sides together.
     pub fn knots(&self) -> usize {
         self.curve.grid.rows()
     }
 
-    /// Largest error of a pixel in exact arithmetic, in coverage: the tolerance, or more where no table of this kind can meet it.
+    /// Largest error of a pixel in exact arithmetic, in coverage: the tolerance, or more if no table of this kind can meet it.
     ///
     /// Measured between the knots and beyond the support.
     pub fn error(&self) -> f64 {
@@ -169,11 +166,11 @@ struct Bound {
     t_conorm: TConorm,
     tolerance: f64,
     faces: f64,
-    /// Largest error of the sum by culling, for each face.
+    /// Largest culling error of the sum, per face.
     excess: f64,
-    /// Where coverage rises fastest with the sum.
+    /// Sum at which the coverage increases fastest.
     steepest: f64,
-    /// Relative rounding of a term, and relative errors of a term and of the coverage that it alone makes that interpolation may cost.
+    /// Relative rounding of a term, and relative interpolation errors allowed for a term and for the coverage of this term alone.
     rounding: f64,
     of_term: f64,
     of_coverage: f64,
@@ -189,19 +186,19 @@ impl Bound {
         Self { t_conorm, tolerance, faces, excess, steepest, rounding, of_term, of_coverage }
     }
 
-    /// The coverage of a sum that is not below 0 but for rounding.
+    /// The coverage of a sum that is below 0 only by rounding.
     fn covered(&self, sum: f64) -> f64 {
         self.t_conorm.coverage_of(sum.max(0.0))
     }
 
-    /// By how much coverage moves between two terms beside faces that bring the sum to where it is steepest.
+    /// Change of the coverage between two terms, with other faces that bring the sum to the steepest point.
     fn moved(&self, from: f64, to: f64) -> f64 {
         let company = (self.steepest - from).max(0.0);
         (self.covered(to + company) - self.covered(from + company)).abs()
     }
 
-    /// How far a term is off, in multiples of what interpolation may cost: either the term itself is right, or the coverage that it alone
-    /// makes.
+    /// Error of a term, as a multiple of the allowed interpolation error: of the term itself or of the coverage of this term alone,
+    /// whichever is smaller.
     fn of_interpolation(&self, exact: f64, interpolated: f64) -> f64 {
         let of_term = self.of_term * exact.abs() + self.excess / 2.0;
         let of_coverage =
@@ -210,8 +207,8 @@ impl Bound {
         term.min(self.moved(exact, interpolated) / of_coverage)
     }
 
-    /// How far terms are from the constants that stand for them before the cells and beyond them, in multiples of what culling may cost
-    /// each face; of half the tolerance where either alone covers a pixel.
+    /// Errors of the constants before the cells and beyond them, as multiples of the culling error allowed per face; of half the tolerance
+    /// where both values alone cover a pixel.
     fn of_constants(&self, grid: &Grid, terms: impl Fn(&[f64]) -> Vec<f64>) -> f64 {
         let mut distances = Vec::new();
         for (side, sign) in SIGNS.into_iter().enumerate() {
@@ -249,15 +246,15 @@ impl Bound {
     }
 }
 
-/// The sum, to a fifth, at which the coverage of a pixel rises fastest: 0 for T-conorms under which it only flattens,
-/// as under the probabilistic sum.
+/// The sum, to a fifth, at which the coverage of a pixel increases fastest: 0 for T-conorms whose coverage only flattens, such as the
+/// probabilistic sum.
 fn steepest(t_conorm: TConorm) -> f64 {
     let slope = |sum: f64| (t_conorm.coverage_of(1.01 * sum) - t_conorm.coverage_of(sum)) / sum;
     let (mut at, mut most) = (0.0, slope(LEAST_SUM));
     for k in 1..80 {
         let sum = LEAST_SUM * (0.25 * f64::from(k)).exp2();
         let found = slope(sum);
-        // By more than rounding makes of a straight line.
+        // By more than rounding of a straight line.
         if found > most * (1.0 + 1e-6) {
             (at, most) = (sum, found);
         }
@@ -265,7 +262,7 @@ fn steepest(t_conorm: TConorm) -> f64 {
     at
 }
 
-/// The optical depth above `left` that makes up `excess` of the generator's sum.
+/// The optical depth above `left` whose generator contributes `excess` to the sum.
 fn depth_of_excess(t_conorm: TConorm, left: f64, excess: f64) -> f64 {
     if t_conorm == TConorm::Probabilistic {
         return excess;
@@ -283,7 +280,7 @@ fn depth_of_excess(t_conorm: TConorm, left: f64, excess: f64) -> f64 {
     low
 }
 
-/// Depth inside a face beyond which it lets less than `light` through; infinite if there is none.
+/// Depth inside a face beyond which it transmits less than `light`; infinite if there is none.
 fn support_inside<H: Backend>(softness: &impl Softness, phi: &[f64], light: f64) -> f64 {
     let support = support::<H>(softness, phi, light, &Default::default());
     if (-support.right).exp() <= light { support.inner } else { f64::INFINITY }
@@ -293,7 +290,7 @@ fn support_inside<H: Backend>(softness: &impl Softness, phi: &[f64], light: f64)
 mod tests {
     use super::*;
 
-    /// How many times the allowed error of each of ten faces these terms are off their constants, at a tolerance of 1e-5.
+    /// Error of these terms' constants as a multiple of the error allowed for each of ten faces, at a tolerance of 1e-5.
     fn off(from: [f64; 2], terms: impl Fn(f64) -> f64) -> f64 {
         let bound = Bound::new(TConorm::Probabilistic, 1e-5, 10, 1e-14);
         let grid = Grid { outer: 0.1, inner: 0.2, from, octaves: 20, far: 0, bits: 3 };
@@ -305,20 +302,20 @@ mod tests {
         let [near, far] = [[0.0, 0.0], [0.05, 0.05]];
         let within = |x: f64| x.abs() < 0.09;
         assert_eq!(off(near, |x| if within(x) { x } else { 0.0 }), 0.0);
-        // A term of 1e-3 is off by 2000 times the 5e-7 that culling may cost a face.
+        // An error of 1e-3 of a term is 2000 times the culling error of 5e-7 allowed per face.
         let beyond =
             [off(near, |x| f64::from(x < -3.0) * 1e-3), off(near, |x| f64::from(x > 3.0) * 1e-3)];
         let before = |side: f64| off(far, |x| f64::from((0.01..0.04).contains(&(side * x))) * 1e-3);
         for found in [beyond, [before(-1.0), before(1.0)]].concat() {
             assert!((found / 2000.0 - 1.0).abs() < 0.01, "{found}");
         }
-        // What lies before the cells is in the cells where these begin at the edge.
+        // With `from` at the edge, terms there are in the cells.
         assert_eq!(off(near, |x| f64::from((0.01..0.04).contains(&x)) * 1e-3), 0.0);
     }
 
     #[test]
     fn a_side_that_covers_the_pixel_may_change_by_the_light_that_it_lets_through() {
-        // exp(-16) = 1.1e-7 of the light is left, of the 5e-6 that may be.
+        // The remaining light is exp(-16) = 1.1e-7, of 5e-6 allowed.
         assert!(off([0.0; 2], |x| if x > 3.0 { 16.0 } else { 17.0 }) < 0.03);
         assert!(off([0.0; 2], |x| if x > 3.0 { 9.0 } else { 17.0 }) > 20.0);
     }

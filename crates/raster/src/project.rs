@@ -6,11 +6,11 @@ use crate::{
     ops::ElementaryOp,
 };
 
-/// Cameras that [`project`] takes, one for each view.
+/// Cameras of [`project`], one per view.
 ///
-/// Orbits `[views, 4]` are some, each with the distance in world units, then elevation, azimuth and the whole field of view in degrees, as
-/// [`Orbit::tensor`](crate::Orbit::tensor) makes them; so are [`Pinholes`](crate::Pinholes), and matrices `[views, 3, 4]` of one's own. Gradients reach the
-/// tensors that they consist of.
+/// Implemented for orbits `[views, 4]` (distance in world units, then elevation, azimuth and the whole field of view in degrees, as in
+/// [`Orbit::tensor`](crate::Orbit::tensor)), for [`Pinholes`](crate::Pinholes), and for custom matrices `[views, 3, 4]`. Gradients reach
+/// all of these tensors.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` are no cameras on the backend `{B}`",
     note = "`project` takes orbits `[views, 4]`, `Pinholes`, or matrices `[views, 3, 4]`, as tensors of the backend of the vertices"
@@ -49,12 +49,11 @@ impl<B: RasterBackend, C: Cameras<B>> Cameras<B> for &C {
 
 /// Perspective projection.
 ///
-/// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates, `cameras` those of each view; see [`Cameras`].
-/// The result is `[views, vertices, 3]`.
+/// `vertices` `[views, vertices, 3]` (or `[1, vertices, 3]` for all views) are world coordinates, `cameras` has one camera per view; see
+/// [`Cameras`]. The result is `[views, vertices, 3]`.
 ///
-/// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A
-/// vertex nearer than [`NEAR`](crate::NEAR) is projected as though it were that near, so that nothing divides
-/// by zero; the rasterizer does not draw its faces, by their depth.
+/// Coordinates beyond 1e15 count as 1e15, so that nothing overflows and gradients stay finite. A vertex nearer than [`NEAR`](crate::NEAR)
+/// is projected as if at that depth, to avoid division by zero; the rasterizer culls its faces by their depth.
 ///
 /// Source: docs/notes.md, Camera.
 ///
@@ -69,7 +68,7 @@ pub fn project<B: RasterBackend>(vertices: Tensor<B, 3>, cameras: impl Cameras<B
         "vertices of {views} views must be [{views}, vertices, 3] or [1, vertices, 3], found {:?}",
         vertices.dims()
     );
-    // The rasterizer wants one row for each axis, and turning them back is free.
+    // The rasterizer needs one row per axis, and the transposition back is free.
     let inputs = vec![primitive(vertices), primitive(matrices)];
     Projected::new(elementary::<B, 3>(ElementaryOp::Perspective, inputs).swap_dims(1, 2))
 }

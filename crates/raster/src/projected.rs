@@ -1,13 +1,13 @@
 use softrast_tensor::{AutodiffBackend, Backend, Tensor, numbers};
 
-/// The part of the distance between depth planes that is left free in front of the nearest vertex and behind the farthest.
+/// Margin in front of the nearest vertex and behind the farthest, as a fraction of the distance between the depth planes.
 const MARGIN: f64 = 0.05;
 
-/// Vertices as cameras see them, `[views, vertices, 3]`: x and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera
+/// Projected vertices, `[views, vertices, 3]`: x and y in NDC (x right, y up; the shorter side of the image is [-1, 1]) and the camera
 /// depth in world units.
 ///
-/// [`project`](crate::project) makes them of vertices in the world. Renderers take them alone, so vertices that nothing has projected are an error of
-/// the compiler:
+/// [`project`](crate::project) computes them from world vertices. Renderers accept only this type, so unprojected vertices are a compile
+/// error:
 ///
 /// ```compile_fail
 /// use softrast_tensor::NdArray;
@@ -21,18 +21,18 @@ const MARGIN: f64 = 0.05;
 pub struct Projected<B: Backend>(Tensor<B, 3>);
 
 impl<B: Backend> Projected<B> {
-    /// Vertices from a camera model of one's own, `[views, vertices, 3]`, as described [above](Projected).
+    /// Vertices projected by a custom camera model, `[views, vertices, 3]`, as described [above](Projected).
     ///
     /// # Panics
     ///
-    /// If a vertex has not three numbers.
+    /// If the last axis does not have length 3.
     pub fn new(vertices: Tensor<B, 3>) -> Self {
         let [_, _, three] = vertices.dims();
         assert_eq!(three, 3, "vertices must be [views, vertices, 3], found {:?}", vertices.dims());
         Self(vertices)
     }
 
-    /// How many views there are.
+    /// Number of views.
     pub fn views(&self) -> usize {
         self.0.dims()[0]
     }
@@ -42,8 +42,8 @@ impl<B: Backend> Projected<B> {
         self.0
     }
 
-    /// Depths between which all vertices lie in all views, ascending, with room to move: planes for a
-    /// [`ColourRenderer`](crate::ColourRenderer). The nearer one is at least [`NEAR`](crate::NEAR). The depths are read from the device.
+    /// Depths that enclose all vertices in all views, ascending, with a margin: planes for a [`ColourRenderer`](crate::ColourRenderer). The
+    /// nearer one is at least [`NEAR`](crate::NEAR). The depths are read from the device.
     ///
     /// ```
     /// use softrast_tensor::{NdArray, Tensor};
@@ -62,7 +62,7 @@ impl<B: Backend> Projected<B> {
         assert!(!depths.is_empty(), "planes need vertices to lie around");
         let near = depths.iter().copied().fold(f64::INFINITY, f64::min).max(crate::NEAR);
         let far = depths.iter().copied().fold(near, f64::max);
-        // A flat scene needs room too.
+        // A flat scene needs a margin too.
         let room = MARGIN * (far - near).max(0.1 * near);
         [(near - room).max(crate::NEAR), far + room]
     }

@@ -1,20 +1,20 @@
-//! Light on surfaces, in tensor ops: at vertices, or at pixels whose points and normals were drawn as attributes.
+//! Lighting of surfaces, in tensor ops: at vertices, or at pixels whose points and normals were drawn as attributes.
 
 use softrast_tensor::{Backend, IndexingUpdateOp, Int, Tensor, TensorData};
 
-/// Where light comes from.
+/// A light source.
 #[derive(Clone, Debug)]
 pub enum Light<B: Backend> {
-    /// From far away.
+    /// A light at infinity.
     Directional {
         /// Direction towards the light, `[3]`, of any length but 0.
         towards: Tensor<B, 1>,
         /// Red, green and blue, `[3]`.
         colour: Tensor<B, 1>,
     },
-    /// From a point, as bright everywhere.
+    /// A point light, without attenuation.
     Point {
-        /// Where it is, `[3]`, in world units.
+        /// Position, `[3]`, in world units.
         place: Tensor<B, 1>,
         /// Red, green and blue, `[3]`.
         colour: Tensor<B, 1>,
@@ -22,7 +22,7 @@ pub enum Light<B: Backend> {
 }
 
 impl<B: Backend> Light<B> {
-    /// Unit vectors from points `[views, n, 3]` towards the light; 0 from where it is. And its colour `[1, 1, 3]`.
+    /// Unit vectors from points `[views, n, 3]` towards the light, 0 at the light itself, and its colour `[1, 1, 3]`.
     fn seen_from(&self, points: &Tensor<B, 3>) -> [Tensor<B, 3>; 2] {
         let (Self::Directional { towards: place, colour } | Self::Point { place, colour }) = self;
         let [place, colour] = [place, colour].map(|x| x.clone().reshape([1, 1, 3]));
@@ -34,14 +34,14 @@ impl<B: Backend> Light<B> {
     }
 }
 
-/// Unit normals of vertices, `[views, vertices, 3]`: the mean of those of the faces around, by area. `vertices` `[views, vertices, 3]` are in
-/// world units; `faces`, counterclockwise from outside, tell outside from inside.
+/// Unit normals of vertices, `[views, vertices, 3]`: the area-weighted means of the normals of adjacent faces. `vertices`
+/// `[views, vertices, 3]` are in world units; `faces` are counterclockwise from outside.
 ///
-/// A vertex without faces, or whose faces have no area or face one another, has the normal 0.
+/// The normal of a vertex without faces, or whose faces have no area or opposite normals, is 0.
 ///
 /// # Panics
 ///
-/// If there is no face, or one has a vertex that is not there.
+/// If there is no face, or a vertex number of a face is out of range.
 pub fn vertex_normals<B: Backend>(vertices: Tensor<B, 3>, faces: &[[u32; 3]]) -> Tensor<B, 3> {
     let device = vertices.device();
     let numbers = [0, 1, 2].map(|k| {
@@ -57,9 +57,9 @@ pub fn vertex_normals<B: Backend>(vertices: Tensor<B, 3>, faces: &[[u32; 3]]) ->
     unit(sums)
 }
 
-/// Light that dull surfaces throw back, `[views, n, 3]`: `Σ colour max(n · l, 0)` over the lights. A surface shows it times its own colour.
+/// Diffuse light, `[views, n, 3]`: `Σ colour max(n · l, 0)` over the lights. Multiply it by the colour of the surface.
 ///
-/// `points` and `normals` are `[views, n, 3]` in world units, the normals of any length but taken as of length 1.
+/// `points` and `normals` are `[views, n, 3]` in world units; normals are normalised to length 1.
 ///
 /// # Panics
 ///
@@ -79,10 +79,10 @@ pub fn lambert<B: Backend>(
     lights.iter().map(of_light).reduce(Tensor::add).expect("a light")
 }
 
-/// Highlights of shiny surfaces, `[views, n, 3]`: `Σ colour max(r · v, 0)^shininess` over the lights that are in front of a surface, where r is
-/// the direction towards the light mirrored at the normal, and v that towards the eye.
+/// Specular highlights, `[views, n, 3]`: `Σ colour max(r · v, 0)^shininess` over the lights in front of a surface, where r is the direction
+/// towards the light mirrored at the normal, and v the direction towards the eye.
 ///
-/// `points` and `normals` are `[views, n, 3]` in world units, `eyes` `[1 or views, 3]`. They come on top of [`lambert`].
+/// `points` and `normals` are `[views, n, 3]` in world units, `eyes` `[1 or views, 3]`. Add them to [`lambert`].
 ///
 /// # Panics
 ///
@@ -115,7 +115,7 @@ pub fn phong<B: Backend>(
     lights.iter().map(of_light).reduce(Tensor::add).expect("a light")
 }
 
-/// Factors of the spherical harmonics of order 0, 1 and 2: those of 1; y, z, x; xy, yz, 3 z² - 1, xz, x² - y².
+/// Factors of the real spherical harmonics of order 0, 1 and 2: of 1; y, z, x; xy, yz, 3 z² - 1, xz, x² - y².
 const HARMONICS: [f64; 9] = [
     0.282_094_791_773_878_14,
     0.488_602_511_902_919_9,
@@ -128,10 +128,10 @@ const HARMONICS: [f64; 9] = [
     0.546_274_215_296_039_6,
 ];
 
-/// Light from all around that changes little from one direction to the next, `[views, n, channels]`: `Σ cₖ Yₖ(n)` of the real spherical
-/// harmonics up to order 2, in the order 1; y, z, x; xy, yz, 3 z² - 1, xz, x² - y². It may be negative.
+/// Environment light of low frequency, `[views, n, channels]`: `Σ cₖ Yₖ(n)` of the real spherical harmonics up to order 2, in the order 1;
+/// y, z, x; xy, yz, 3 z² - 1, xz, x² - y². It may be negative.
 ///
-/// `normals` are `[views, n, 3]`, taken as of length 1; `coefficients` are `[9, channels]`.
+/// `normals` are `[views, n, 3]`, normalised to length 1; `coefficients` are `[9, channels]`.
 ///
 /// # Panics
 ///
@@ -161,9 +161,9 @@ pub fn spherical_harmonics<B: Backend>(
     Tensor::cat(scaled.collect(), 2).matmul(coefficients.unsqueeze())
 }
 
-/// Vectors `[views, n, 3]` at length 1; those of length 0 stay.
+/// Vectors `[views, n, 3]` normalised to length 1; those of length 0 stay.
 fn unit<B: Backend>(vectors: Tensor<B, 3>) -> Tensor<B, 3> {
-    // Squares of what is far from 1 would leave the range of an f32.
+    // Squares of numbers far from 1 would leave the range of f32.
     let largest = vectors.clone().detach().abs().max_dim(2);
     let largest = largest.clone().mask_fill(largest.equal_elem(0.0), 1.0);
     let vectors = vectors / largest;
@@ -178,7 +178,7 @@ fn positive<B: Backend>(x: Tensor<B, 3>) -> Tensor<B, 3> {
     x.mask_fill(below, 0.0)
 }
 
-/// Of the vectors along the last axis: `[views, n, 1]`.
+/// Dot products along the last axis: `[views, n, 1]`.
 fn dot<B: Backend>(a: &Tensor<B, 3>, b: &Tensor<B, 3>) -> Tensor<B, 3> {
     (a.clone() * b.clone()).sum_dim(2)
 }

@@ -13,21 +13,21 @@ use crate::{
     profile_sum,
 };
 
-/// How silhouettes are drawn.
+/// Settings of silhouettes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rasterizer {
     /// Height and width of the image in pixels.
     pub size: ImageSize,
-    /// Largest error of any pixel against evaluating every pixel-face pair; see [`Profile::new`].
+    /// Largest error of any pixel relative to evaluating every pixel-face pair; see [`Profile::new`].
     pub tolerance: f64,
-    /// How the coverages of several faces make one.
+    /// Aggregation of the coverages of several faces.
     pub t_conorm: TConorm,
-    /// Whether back faces are not drawn: those whose corners the camera sees clockwise.
+    /// Whether back faces, whose corners appear clockwise to the camera, are culled.
     pub culls: bool,
 }
 
 impl Rasterizer {
-    /// The largest error of a pixel unless asked for another.
+    /// The default largest error of a pixel.
     pub const TOLERANCE: f64 = 1e-5;
 
     /// A rasterizer for images of `size` pixels, a square or `[height, width]`, with the probabilistic sum and the default tolerance.
@@ -38,8 +38,8 @@ impl Rasterizer {
 
     /// Prepares silhouettes of meshes with these faces, for a softness near the parameters `phi`.
     ///
-    /// The parameters decide the support and the knots only; they are read from the tensor once.
-    /// Prepare anew when they have moved so far that the support no longer fits.
+    /// The parameters only determine the support and the knots; they are read from the tensor once. Prepare again when they have moved so
+    /// far that the support no longer fits.
     ///
     /// # Panics
     ///
@@ -53,12 +53,12 @@ impl Rasterizer {
         let values: Vec<f64> = phi.to_data().iter().collect();
         match B::ON_HOST {
             true => self.prepare_on::<B, B, S>(faces, softness, &values),
-            // Without a word between host and GPU for every attempt.
+            // Without host-GPU transfers for every attempt.
             false => self.prepare_on::<B, HostBackend, S>(faces, softness, &values),
         }
     }
 
-    /// [`Rasterizer::prepare`] from plain numbers. Support and knots are chosen on `H`, in f64 if it has that.
+    /// [`Rasterizer::prepare`] from numbers. Support and knots are chosen on `H`, in f64 if it supports that.
     ///
     /// # Panics
     ///
@@ -72,7 +72,7 @@ impl Rasterizer {
         self.prepare_for::<B, H, S>(faces.len(), faces, softness, phi)
     }
 
-    /// [`Rasterizer::prepare_on`] with knots that serve `room` faces, as many as there are or more.
+    /// [`Rasterizer::prepare_on`] with knots for `room` faces, at least the number of faces.
     pub(crate) fn prepare_for<B: RasterBackend, H: Backend, S: Softness>(
         &self,
         room: usize,
@@ -119,14 +119,14 @@ impl<S: Softness> Silhouette<S> {
         self.coverage_by_table(vertices, self.table(phi))
     }
 
-    /// The table of the softness, `[rows, 4]`: compute it once where `phi` does not change.
+    /// The table of the softness, `[rows, 4]`: compute it once if `phi` does not change.
     pub fn table<B: Backend>(&self, phi: Tensor<B, 1>) -> Tensor<B, 2> {
         self.profile.table(&self.softness, phi)
     }
 
-    /// The numbers of the table of plain parameters, computed on the CPU in f64, whatever it is drawn with: tables made in f32
-    /// put a pixel off by 2e-5 under a Gamma law, and lose their curvature. A GPU gets it in one piece, instead of some sixty small kernels over a few
-    /// hundred numbers.
+    /// The numbers of the table for fixed parameters, computed on the CPU in f64, whatever backend draws: tables computed in f32 change a
+    /// pixel by 2e-5 with a Gamma law, and lose their curvature. A GPU gets it in one upload, instead of some sixty small kernels over a
+    /// few hundred numbers.
     #[doc(hidden)]
     pub fn table_data(&self, phi: &[f64]) -> TensorData {
         self.table(precise::<HostBackend>(phi, &Default::default())).into_data()
@@ -141,9 +141,9 @@ impl<S: Softness> Silhouette<S> {
         covered(self.profile.t_conorm(), self.sums(vertices, table))
     }
 
-    /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of
-    /// [`Silhouette::coverage_by_table`], times the share of each pixel that is `counted` (shaped like a target) unless all is, in one op on
-    /// the CPU under the probabilistic sum. Gradients reach the vertices alone, to second order.
+    /// The [`mse_loss`](crate::mse_loss) of each view of [`Silhouette::coverage_by_table`] relative to a target
+    /// `[1 or views, height, width]`, `[views]`. The coverage is multiplied by `counted` (shaped like a target) if given. On the CPU with
+    /// the probabilistic sum it is one op. Gradients reach only the vertices, to second order.
     ///
     /// # Panics
     ///
@@ -158,7 +158,7 @@ impl<S: Softness> Silhouette<S> {
         self.loss(PixelLoss::SquaredError, vertices, table, target, counted)
     }
 
-    /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
+    /// The [`iou_loss`](crate::iou_loss) of each view; arguments are those of [`Silhouette::mse_loss_by_table`].
     ///
     /// # Panics
     ///
@@ -181,7 +181,7 @@ impl<S: Softness> Silhouette<S> {
         target: Tensor<B, 3>,
         counted: Option<Tensor<B, 3>>,
     ) -> Tensor<B, 1> {
-        // Detaching a leaf leaves its request for a gradient.
+        // Detaching a leaf keeps its flag for a gradient.
         let (table, target) = (constant(table), constant(target));
         let counted = counted.map(constant);
         if !B::ON_HOST || self.profile.t_conorm() != TConorm::Probabilistic {
@@ -191,8 +191,8 @@ impl<S: Softness> Silhouette<S> {
         silhouette_loss(&self.op, loss, vertices, table, target, counted)
     }
 
-    /// Sums over the faces of each pixel, `[views, height, width]`: what the T-conorm of the profile
-    /// turns into coverage. Arguments are those of [`Silhouette::coverage_by_table`].
+    /// Sums over the faces of each pixel, `[views, height, width]`, before the T-conorm of the profile turns them into coverage. Arguments
+    /// are those of [`Silhouette::coverage_by_table`].
     #[doc(hidden)]
     pub fn sums<B: RasterBackend>(
         &self,
@@ -202,13 +202,13 @@ impl<S: Softness> Silhouette<S> {
         profile_sum(&self.op, vertices, table)
     }
 
-    /// The op behind [`Silhouette::sums`], for callers that run it on slices.
+    /// The op of [`Silhouette::sums`], for callers that run it on slices.
     #[doc(hidden)]
     pub fn op(&self) -> FusedOp {
         FusedOp::ProfileSum(self.op.clone())
     }
 
-    /// What draws with the softness stretched by `factor` along the distance, if it can be told from this.
+    /// The silhouette with the softness stretched by `factor` along the distance, if it can be derived from this one.
     pub(crate) fn stretched(&self, factor: f64) -> Option<Self> {
         let profile = self.profile.stretched(factor)?;
         let op = ProfileSum { grid: profile.grid(), ..self.op.clone() };
@@ -226,12 +226,12 @@ impl<S: Softness> Silhouette<S> {
         Self { op, ..self.clone() }
     }
 
-    /// Which softness it is.
+    /// The softness.
     pub(crate) fn softness(&self) -> &S {
         &self.softness
     }
 
-    /// The same on images of another size: neither support nor knots depend on it.
+    /// This silhouette on images of another size: neither support nor knots depend on it.
     ///
     /// # Panics
     ///
@@ -243,16 +243,16 @@ impl<S: Softness> Silhouette<S> {
         self
     }
 
-    /// Number of pixel-face pairs that culling leaves for `vertices` `[views, vertices, 3]`: what
-    /// one pass over all views visits, forward or backward.
+    /// Number of pixel-face pairs after culling for `vertices` `[views, vertices, 3]`: one pass over all views visits them, forward or
+    /// backward.
     #[doc(hidden)]
     pub fn pairs<B: Backend>(&self, vertices: Tensor<B, 3>) -> usize {
         pairs(&self.op, vertices)
     }
 
-    /// The same support with `2^bits` cells in each octave of the squared distance, instead of as
-    /// many as the tolerance asks for. For measuring what knots are worth: the bound of
-    /// [`Profile::new`] does not hold for the result, and [`Profile::error`] is not measured anew.
+    /// This silhouette with `2^bits` cells per octave of the squared distance in the same support, instead of the number required by the
+    /// tolerance. For measuring the effect of knots: the bound of [`Profile::new`] does not hold for the result, and [`Profile::error`] is
+    /// not updated.
     ///
     /// # Panics
     ///
@@ -266,12 +266,12 @@ impl<S: Softness> Silhouette<S> {
         self
     }
 
-    /// Coverage with another function in the backward pass: the image is that of `self`, the
-    /// gradient to the vertices is that of `surrogate` times the image's own `dA/dS`.
+    /// Coverage with a surrogate gradient: the image is that of `self`, the gradient with respect to the vertices is that of `surrogate`
+    /// times the image's own `dA/dS`.
     ///
-    /// This is a straight-through estimator: a sharp image with a wide gradient. What comes back is
-    /// **not** the derivative of the image. Gradients reach the parameters of neither softness at the
-    /// outermost level of autodiff. A step takes as many passes as without.
+    /// This is a straight-through estimator: a sharp image with a wide gradient. The result of the backward pass is **not** the derivative
+    /// of the image. Gradients reach the parameters of neither softness at the outermost level of autodiff. A step takes as many passes as
+    /// without.
     ///
     /// Not in the paper. Source: docs/notes.md, Surrogate gradient.
     pub fn coverage_with_surrogate<B: RasterBackend, T: Softness>(
@@ -286,13 +286,13 @@ impl<S: Softness> Silhouette<S> {
         covered(self.profile.t_conorm(), sums)
     }
 
-    /// Support, knots and error of the table in use.
+    /// Support, knots and error of the current table.
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
 }
 
-/// Coverage of sums, in one op for the T-conorm that most use.
+/// Coverage of sums, in one op for the most common T-conorm.
 fn covered<B: RasterBackend>(t_conorm: TConorm, sums: Tensor<B, 3>) -> Tensor<B, 3> {
     match t_conorm {
         TConorm::Probabilistic => elementary(ElementaryOp::Coverage, vec![primitive(sums)]),

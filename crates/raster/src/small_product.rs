@@ -2,10 +2,10 @@ use softrast_tensor::Tensor;
 
 use crate::RasterBackend;
 
-/// The products of matrices `[views, rows, inner]` and `[views or 1, inner, columns]`, where `inner` is a few.
+/// The products of matrices `[views, rows, inner]` and `[views or 1, inner, columns]` with a small `inner`.
 ///
-/// A GPU adds up products of columns and rows. What burn has for large matrices is no gain here, and wants of an adapter what a browser may
-/// not have.
+/// A GPU sums products of columns and rows. burn's product of large matrices is no faster here, and requires adapter features that a
+/// browser may not have.
 pub fn small_product<B: RasterBackend>(a: Tensor<B, 3>, b: Tensor<B, 3>) -> Tensor<B, 3> {
     if B::ON_HOST {
         return a.matmul(b);

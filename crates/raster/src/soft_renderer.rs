@@ -15,10 +15,10 @@ use crate::{
 
 /// Draws soft silhouettes of one mesh topology.
 ///
-/// It holds what an image depends on beside the vertices: faces, size, softness, T-conorm and tolerance. Support and knots follow the
-/// parameters φ by themselves, so no pixel is off by more than the tolerance in exact arithmetic, wherever the parameters go. Where no
-/// table can meet the tolerance, [`error_bound`](Self::error_bound) is larger and states the error that is left. Where only the scale of the softness has changed they
-/// are stretched, which costs nothing; where its shape has, they are chosen anew, which takes milliseconds.
+/// It holds everything that an image depends on except the vertices: faces, size, softness, T-conorm and tolerance. Support and knots adapt
+/// to the parameters φ, so the error of a pixel is at most the tolerance in exact arithmetic for any parameters. If no table can meet the
+/// tolerance, [`error_bound`](Self::error_bound) is larger and states the remaining error. If only the scale of the softness changes, they
+/// are stretched at no cost; if its shape changes, they are chosen anew, which takes milliseconds.
 ///
 /// ```
 /// use softrast_tensor::{Autodiff, NdArray};
@@ -37,20 +37,20 @@ use crate::{
 pub struct SoftRenderer<S> {
     rasterizer: Rasterizer,
     faces: Arc<[[u32; 3]]>,
-    /// Faces that knots are chosen for: as many as there are, or more.
+    /// Number of faces that knots are chosen for: at least the number of faces.
     room: usize,
     softness: S,
     phi: Vec<f64>,
     surrogate: Option<Box<Self>>,
-    /// Samples along each side of a pixel, where the image is hard.
+    /// Samples along each side of a pixel, if the image is hard.
     samples: Option<usize>,
     cache: Cache<Knots<S>>,
 }
 
 impl<S: Softness> SoftRenderer<S> {
-    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, under a softness
-    /// of this [`Width`] (a number is its scale), the probabilistic sum and [`Rasterizer::TOLERANCE`]. See [`reach`](Self::reach) for a softness with
-    /// heavy tails.
+    /// Draws meshes with these `faces` (corners as vertex numbers) on images of `size` pixels, a square or `[height, width]`, with a
+    /// softness of this [`Width`] (a number is its scale), the probabilistic sum and [`Rasterizer::TOLERANCE`]. See [`reach`](Self::reach)
+    /// for a softness with heavy tails.
     ///
     /// # Panics
     ///
@@ -66,7 +66,7 @@ impl<S: Softness> SoftRenderer<S> {
         Self::with_rasterizer(rasterizer, faces.into(), softness, phi)
     }
 
-    /// The same from parts: `phi` `[parameters]` are the parameters of the softness.
+    /// A renderer from a [`Rasterizer`]; `phi` `[parameters]` are the parameters of the softness.
     ///
     /// # Panics
     ///
@@ -84,8 +84,8 @@ impl<S: Softness> SoftRenderer<S> {
         Self { rasterizer, faces, room, softness, phi, surrogate: None, samples: None, cache }
     }
 
-    /// This renderer for other faces. Knots and tables stay as long as there are not many more faces than before, so a mesh that changes
-    /// while it is optimised costs nothing but its list of faces.
+    /// This renderer for other faces. Knots and tables are reused unless there are many more faces than before, so a change of topology
+    /// during an optimisation costs only the new list of faces.
     ///
     /// ```
     /// use softrast_tensor::NdArray;
@@ -120,32 +120,32 @@ impl<S: Softness> SoftRenderer<S> {
         Self { faces, room, surrogate, cache, ..self.clone() }
     }
 
-    /// Without back faces: those whose corners the camera sees clockwise. For closed meshes whose faces go counter-clockwise as seen from outside,
-    /// where back faces cost half of the time and widen the outline, which both sides cover softly.
+    /// Culls back faces: those whose corners appear clockwise to the camera. For closed meshes whose faces are counter-clockwise from
+    /// outside: their back faces take half of the time and widen the outline, which both sides cover softly.
     ///
-    /// The image is that of the front faces alone. It jumps where a face turns, by what the face covers there.
+    /// The image is that of the front faces only. It jumps where a face turns, by the coverage of the face there.
     #[must_use]
     pub fn without_back_faces(self) -> Self {
         self.changed(|rasterizer| rasterizer.culls = true)
     }
 
-    /// With another largest error of a pixel, in (0, 1); see [`Profile::new`](crate::low_level::Profile::new).
+    /// Sets the largest error of a pixel, in (0, 1); see [`Profile::new`](crate::low_level::Profile::new).
     #[must_use]
     pub fn with_tolerance(self, tolerance: f64) -> Self {
         self.changed(|rasterizer| rasterizer.tolerance = tolerance)
     }
 
-    /// With another way to make one coverage of those of several faces.
+    /// Sets the T-conorm that aggregates the coverages of several faces.
     #[must_use]
     pub fn with_t_conorm(self, t_conorm: TConorm) -> Self {
         self.changed(|rasterizer| rasterizer.t_conorm = t_conorm)
     }
 
-    /// Shows hard coverage of `samples` × `samples` places in a pixel, and differentiates soft coverage: `soft + (hard - soft)`, of which the
-    /// part in brackets is a constant.
+    /// Uses hard coverage of `samples` × `samples` points per pixel as the forward image, and soft coverage for gradients:
+    /// `soft + (hard - soft)`, with the bracket as a constant.
     ///
-    /// Soft coverage of a mesh is a little wide at its outline, and low where faces are narrower than the edge is soft. A mesh that is fitted
-    /// by it ends inside of what it should be; one that is fitted by this does not. Not in the paper. Source: docs/notes.md, Surrogate gradient.
+    /// Soft coverage of a mesh is slightly too wide at its outline, and too low where faces are narrower than the soft edge. A mesh fitted
+    /// to it ends up too small; a mesh fitted with this option does not. Not in the paper. Source: docs/notes.md, Surrogate gradient.
     ///
     /// # Panics
     ///
@@ -157,7 +157,7 @@ impl<S: Softness> SoftRenderer<S> {
         self
     }
 
-    /// With another softness in the backward pass, of this [`Width`]: a sharp image with a wide gradient. What comes back is not the
+    /// Sets a surrogate softness for the backward pass, of this [`Width`]: a sharp image with a wide gradient. The gradient is not the
     /// derivative of the image; see [`Silhouette::coverage_with_surrogate`].
     ///
     /// # Panics
@@ -169,7 +169,7 @@ impl<S: Softness> SoftRenderer<S> {
         self.with_surrogate_phi(softness, phi)
     }
 
-    /// A surrogate with parameters `phi` `[parameters]` in place of a scale; see [`with_surrogate`](Self::with_surrogate).
+    /// Sets a surrogate with parameters `phi` `[parameters]`; see [`with_surrogate`](Self::with_surrogate).
     ///
     /// # Panics
     ///
@@ -186,24 +186,24 @@ impl<S: Softness> SoftRenderer<S> {
         &self.softness
     }
 
-    /// The renderer that the gradient to the vertices is taken of, where that is not the image itself.
+    /// The renderer whose gradient with respect to the vertices is used, if it differs from the image's.
     pub fn surrogate(&self) -> Option<&Self> {
         self.surrogate.as_deref()
     }
 
-    /// The parameters φ, `[parameters]`: those to draw with where no others are given.
+    /// The parameters φ, `[parameters]`, used by [`silhouette`](Self::silhouette).
     pub fn phi(&self) -> &[f64] {
         &self.phi
     }
 
-    /// The same as a tensor to be optimised, for [`silhouette_with`](Self::silhouette_with).
+    /// The parameters as a tensor to optimise, for [`silhouette_with`](Self::silhouette_with).
     pub fn phi_tensor<B: Backend>(&self, device: &B::Device) -> Tensor<B, 1> {
         let data = TensorData::new(self.phi.clone(), [self.phi.len()]);
         Tensor::from_data(data, (device, <B::FloatElem as Element>::dtype()))
     }
 
-    /// The largest error of a pixel under the renderer's own parameters, in coverage: the tolerance, or more where the softness has a
-    /// jump or a corner that no table can follow to it. In exact arithmetic; rounding in `f32` adds some 1e-6.
+    /// The largest error of a pixel with the renderer's own parameters, in coverage: the tolerance, or more if the softness has a jump or a
+    /// corner that no table can resolve. In exact arithmetic; rounding in `f32` adds about 1e-6.
     ///
     /// ```
     /// use softrast_tensor::NdArray;
@@ -217,10 +217,10 @@ impl<S: Softness> SoftRenderer<S> {
         self.prepared::<B>(&self.phi).profile().error()
     }
 
-    /// The distance from a face up to which it is drawn, in NDC: beyond, its softness is below what the tolerance lets be left out.
+    /// The distance from a face up to which it is drawn, in NDC: beyond it, the softness is negligible within the tolerance.
     ///
-    /// The image is 2 wide, so a heavy tail may have every face drawn at every pixel, which takes many times longer. The remedy is a softness that
-    /// ends ([`Truncated`](softrast_softness::Truncated)), or a larger tolerance where that is enough:
+    /// The image is 2 wide, so a heavy tail may have every face drawn at every pixel, which takes many times longer. The remedy is a
+    /// softness with bounded support ([`Truncated`](softrast_softness::Truncated)), or a larger tolerance if that is enough:
     ///
     /// ```
     /// use softrast_tensor::NdArray;
@@ -238,18 +238,18 @@ impl<S: Softness> SoftRenderer<S> {
         self.prepared::<B>(&self.phi).profile().grid().outer
     }
 
-    /// Draws with these parameters from now on.
+    /// Sets the parameters.
     ///
     /// # Panics
     ///
-    /// If there are more or fewer of them than the softness has.
+    /// If their number differs from that of the softness.
     pub fn set_phi(&mut self, phi: Vec<f64>) {
         check(&self.softness, &phi);
         self.phi = phi;
     }
 
-    /// Draws under the default parameters of a softness of this width from now on. Other parameters, of a network for example, are lost: move
-    /// the scale of such a softness by [`set_phi`](Self::set_phi).
+    /// Sets the parameters to the defaults of the softness for this width. Other parameters, of a network for example, are lost: change the
+    /// scale of such a softness by [`set_phi`](Self::set_phi).
     ///
     /// # Panics
     ///
@@ -258,10 +258,10 @@ impl<S: Softness> SoftRenderer<S> {
         self.phi = width.into().phi(&self.softness, self.rasterizer.size);
     }
 
-    /// Coverage `[views, height, width]` in [0, 1], top row first, under the renderer's own parameters.
+    /// Coverage `[views, height, width]` in [0, 1], top row first, with the renderer's own parameters.
     ///
-    /// `vertices` `[views, vertices, 3]` are what [`project`](crate::project) returns. They
-    /// receive gradients, to second order on `Autodiff<Autodiff<B>>`.
+    /// `vertices` `[views, vertices, 3]` are the result of [`project`](crate::project). They receive gradients, to second order on
+    /// `Autodiff<Autodiff<B>>`.
     pub fn silhouette<B: RasterBackend>(&self, vertices: Projected<B>) -> Tensor<B, 3> {
         let seen = vertices.clone().tensor();
         let (silhouette, table) = self.own_table(&seen);
@@ -269,9 +269,9 @@ impl<S: Softness> SoftRenderer<S> {
         self.shown(vertices, soft)
     }
 
-    /// [`silhouette`](Self::silhouette) under parameters `phi` `[parameters]`, which receive gradients too, unless there is a surrogate.
+    /// [`silhouette`](Self::silhouette) with parameters `phi` `[parameters]`, which receive gradients too, unless there is a surrogate.
     ///
-    /// Their values are read from the device, to see whether support and knots still suit them.
+    /// Their values are read from the device, to check whether support and knots still fit.
     ///
     /// # Panics
     ///
@@ -288,7 +288,7 @@ impl<S: Softness> SoftRenderer<S> {
         self.shown(vertices, soft)
     }
 
-    /// The soft image, or hard coverage with its gradient.
+    /// The soft image, or hard coverage with the gradient of the soft image.
     fn shown<B: RasterBackend>(&self, vertices: Projected<B>, soft: Tensor<B, 3>) -> Tensor<B, 3> {
         let Some(samples) = self.samples else { return soft };
         let Rasterizer { size, culls, .. } = self.rasterizer;
@@ -310,12 +310,12 @@ impl<S: Softness> SoftRenderer<S> {
         Self { rasterizer, surrogate, ..self.clone() }
     }
 
-    /// This renderer under other parameters, of the surrogate too if there is one. It begins with knots that follow from those of this one, and
-    /// has a table of its own.
+    /// This renderer with other parameters, also of the surrogate if there is one. Its knots are initially derived from the current ones,
+    /// and its table is separate.
     ///
     /// # Panics
     ///
-    /// If there are more or fewer parameters than the softnesses have, or parameters of a surrogate that there is not.
+    /// If the number of parameters differs from that of the softnesses, or parameters are given for a missing surrogate.
     #[must_use]
     pub fn with_phi<B: RasterBackend>(
         &self,
@@ -331,7 +331,7 @@ impl<S: Softness> SoftRenderer<S> {
         Self { phi, surrogate, cache, ..self.clone() }
     }
 
-    /// What draws under parameters `phi`, with support and knots for them.
+    /// The [`Silhouette`] for parameters `phi`, with support and knots for them.
     ///
     /// # Panics
     ///
@@ -366,7 +366,7 @@ impl<S: Softness> SoftRenderer<S> {
         silhouette.coverage_with_surrogate(vertices, table, &wide, wide_table)
     }
 
-    /// What draws these vertices under the renderer's own parameters, and its table.
+    /// The silhouette of these vertices with the renderer's own parameters, and its table.
     fn own_table<B: RasterBackend>(
         &self,
         vertices: &Tensor<B, 3>,

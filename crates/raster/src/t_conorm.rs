@@ -3,21 +3,20 @@ use std::{fmt, str::FromStr};
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, DType, Tensor};
 
-/// Optical depth beyond which `exp(q)` is held: a face that lets less than e^-40 = 4e-18 of the
-/// light through counts as that.
+/// Optical depth at which `exp(q)` is clamped: a face that transmits less than e^-40 = 4e-18 of the light counts as transmitting that.
 const DEEPEST: f64 = 40.0;
-/// Powers of `exp(q)` are held below `exp` of this, so that sums of them, and their slopes, fit a float. In f32 a face then covers no
-/// more than `1 - exp(-64 / p)` under Dombi and Schweizer-Sklar with this p: all but 1e-7 up to p = 4.
+/// Powers of `exp(q)` are clamped to `exp` of this, so that sums of them, and their slopes, fit a float. In f32 a face then covers at most
+/// `1 - exp(-64 / p)` with Dombi and Schweizer-Sklar of parameter p: all but 1e-7 up to p = 4.
 const LARGEST: [f64; 2] = [64.0, 600.0];
 /// Smallest number that enters a power or a logarithm.
 const SMALLEST: f64 = 1e-30;
 /// Sums below this, in f32 and f64, count as 0: the second derivative of a root fits an f64 there, the first an f32.
 const LEAST_SUM: [f64; 2] = [1e-30, 1e-150];
 
-/// How the coverages of several faces make one: an Archimedean T-conorm `A = g⁻¹(Σ g(s))`.
+/// Aggregation of the coverages of several faces: an Archimedean T-conorm `A = g⁻¹(Σ g(s))`.
 ///
-/// Each has an additive generator g, so that a silhouette is a sum over faces whatever the
-/// T-conorm. `max` is the only common one without a generator, so it is not offered.
+/// Each has an additive generator g, so that a silhouette is a sum over faces for every T-conorm. `max` is the only common one without a
+/// generator, and is not supported.
 ///
 /// Source: Petersen et al. 2022 for the T-conorms; docs/notes.md, T-conorms, for the generators.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -102,8 +101,8 @@ impl TConorm {
         }
     }
 
-    /// Whether `g(s)` is the optical depth of s or close to it: then it grows as slowly as that beside 1, and beside 0 it is no less than a tenth
-    /// of s. Others may be powers of s, whose size floats can tell and a fixed unit cannot.
+    /// Whether `g(s)` is the optical depth of s or close to it: then it increases as slowly as that near 1, and near 0 it is at least a
+    /// tenth of s. Others may be powers of s, whose magnitudes floats can represent and a fixed unit cannot.
     #[cfg(feature = "wgpu")]
     pub(crate) fn is_like_depths(self) -> bool {
         match self {
@@ -115,10 +114,9 @@ impl TConorm {
         }
     }
 
-    /// `g(s(x))` and its derivative by x, both shaped like `x`.
+    /// `g(s(x))` and its derivative with respect to x, both shaped like `x`.
     ///
-    /// Written with the optical depth and the hazard of the softness, which keep their digits where
-    /// 1 - s does not.
+    /// Computed from the optical depth and the hazard of the softness, which keep their digits where 1 - s does not.
     pub fn profile<B: Backend, S: Softness, const D: usize>(
         self,
         softness: &S,
@@ -129,7 +127,7 @@ impl TConorm {
         self.profile_for(sums, softness, phi, x)
     }
 
-    /// [`TConorm::profile`] in the float type of `x`, small enough for `sums` of another one.
+    /// [`TConorm::profile`] in the float type of `x`, small enough for sums in the float type `sums`.
     pub(crate) fn profile_for<B: Backend, S: Softness, const D: usize>(
         self,
         sums: DType,
@@ -204,7 +202,7 @@ impl TConorm {
             Self::Einstein => sum.tanh(),
             Self::Hamacher(p) => {
                 let covered = covered(sum);
-                // 1 - (1 - p) e^-S, written with the coverage.
+                // 1 - (1 - p) e^-S, in terms of the coverage.
                 covered.clone() / (covered * (1.0 - p) + p)
             }
             Self::Frank(p) => {
@@ -244,7 +242,7 @@ impl TConorm {
         }
     }
 
-    /// The largest `S dA/dS`: how far the coverage moves, at most, with a relative error of the sum.
+    /// The largest `S dA/dS`: the largest change of the coverage per relative error of the sum.
     pub(crate) fn sensitivity(self) -> f64 {
         let moved = |k: i32| {
             let sum = f64::exp2(0.25 * f64::from(k));
@@ -253,7 +251,7 @@ impl TConorm {
         (-120..80).map(moved).fold(0.0, f64::max)
     }
 
-    /// [`TConorm::coverage`] in plain numbers.
+    /// [`TConorm::coverage`] for a number.
     pub fn coverage_of(self, sum: f64) -> f64 {
         match self {
             Self::Probabilistic => -(-sum).exp_m1(),
@@ -273,7 +271,7 @@ impl TConorm {
         }
     }
 
-    /// `g` as a function of the optical depth, in plain numbers.
+    /// `g` as a function of the optical depth, for a number.
     pub fn generator(self, q: f64) -> f64 {
         let s = -(-q).exp_m1();
         match self {
@@ -291,8 +289,8 @@ impl TConorm {
         }
     }
 
-    /// The coverage that a pixel loses at most to the range of its sum, in this float type: of a face with the optical depth `q`, which is
-    /// held below the largest power, and of a sum that counts as 0.
+    /// The largest loss of coverage at a pixel due to the range of its sum in this float type: of a face with the optical depth `q`,
+    /// clamped at the largest power, and of a sum that counts as 0.
     pub(crate) fn lost_to_range(self, sums: DType, q: f64) -> f64 {
         let held = |p: f64| (-q.min(deepest(p, sums))).exp() - (-q.min(DEEPEST)).exp();
         let least = |p: f64| for_type(LEAST_SUM, sums).powf(1.0 / p);
@@ -305,18 +303,18 @@ impl TConorm {
     }
 }
 
-/// `1 - exp(-sum)`. Not by way of [`expm1`]: its gradient would lose the digits of `exp(-sum)`,
-/// which steer the pixels that are nearly covered.
+/// `1 - exp(-sum)`. Not computed by [`expm1`]: its gradient would lose the digits of `exp(-sum)`, which drive the pixels that are nearly
+/// covered.
 fn covered<B: Backend, const D: usize>(sum: Tensor<B, D>) -> Tensor<B, D> {
     sum.neg().exp().neg() + 1.0
 }
 
-/// The optical depth from which on `exp(p q)` counts as constant.
+/// The optical depth above which `exp(p q)` counts as constant.
 fn deepest(p: f64, dtype: DType) -> f64 {
     DEEPEST.min(for_type(LARGEST, dtype) / p)
 }
 
-/// The number meant for this float type, of f32 and f64.
+/// The constant for this float type, of f32 and f64.
 fn for_type([single, double]: [f64; 2], dtype: DType) -> f64 {
     if dtype == DType::F64 { double } else { single }
 }

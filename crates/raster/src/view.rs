@@ -1,4 +1,4 @@
-//! The views of orbiting cameras: their rotations.
+//! The rotations of orbiting cameras.
 
 use std::f64::consts::PI;
 
@@ -8,19 +8,18 @@ use crate::RasterBackend;
 
 /// Rotation from world to camera axes for cameras that look at the origin with y up.
 ///
-/// `elevation` and `azimuth` are `[views]` in degrees; the result is `[views, 3, 3]` with rows x
-/// (left), y (up) and z (ahead), as PyTorch3D has them. Both angles 0 give the identity: the camera stands at -z and looks
-/// along +z.
+/// `elevation` and `azimuth` are `[views]` in degrees; the result is `[views, 3, 3]` with rows x (left), y (up) and z (ahead), as in
+/// PyTorch3D. Both angles 0 give the identity: the camera is at -z and looks along +z.
 ///
-/// Past the pole (|elevation| > 90°) the view rolls by half a turn, as `look_at` does. At the pole
-/// itself, where `look_at` divides by zero, this form keeps the axes that it has just before.
+/// Past the pole (|elevation| > 90°) the view rolls by 180°, as in `look_at`. At the pole itself, where `look_at` divides by zero, the axes
+/// are those just before it.
 ///
 /// Source: docs/notes.md, Camera, with the cross products of `look_at` multiplied out.
 pub fn view_rotation<B: RasterBackend>(
     elevation: Tensor<B, 1>,
     azimuth: Tensor<B, 1>,
 ) -> Tensor<B, 3> {
-    // Which way is up: constant on either side of the pole, so it has no gradient. In f32 the cosine at a pole has any sign.
+    // Sign of the up direction: constant on either side of the pole, so it has no gradient. In f32 the cosine at a pole has any sign.
     let past = elevation.clone().detach() + 90.0;
     let past = past.clone() - (past * (1.0 / 360.0)).floor() * 360.0;
     let roll = past.clone().ones_like().mask_fill(past.clone().greater_elem(180.0), -1.0);
@@ -65,11 +64,11 @@ pub(crate) fn sin_cos<B: RasterBackend, const D: usize>(
     }
 }
 
-/// The same from sums and products alone: a GPU's own sine and cosine may be off by 2^-11 (WebGPU Shading Language, Accuracy of Built-in
-/// Functions), which a loss shows.
+/// Sine and cosine by sums and products only: the built-in functions of a GPU may be off by 2^-11 (WebGPU Shading Language, Accuracy of
+/// Built-in Functions), which is visible in a loss.
 fn by_series<B: Backend, const D: usize>(radians: Tensor<B, D>) -> [Tensor<B, D>; 2] {
     let turns = radians * (0.5 / PI);
-    // Half the angle that is left, within a right angle, where the next terms are below 1e-8.
+    // Half the remaining angle, within a right angle, where the next terms are below 1e-8.
     let half = (turns.clone() - turns.round()) * PI;
     let square = half.clone() * half.clone();
     let sum = |last: usize| {

@@ -6,18 +6,18 @@ use crate::HostBackend;
 /// Depths beyond this, in world units, are not drawn in colour: one over the square of a depth fits an f32.
 pub(crate) const FARTHEST_SEEN: f64 = 1e15;
 
-/// How much faces count at a pixel: `w = s(d) b(z)`, of the signed distance d in NDC and the depth z of the point of the face that is
-/// nearest to the pixel.
+/// The weight of a face at a pixel: `w = s(d) b(z)`, for the signed distance d in NDC and the depth z of the point of the face nearest to
+/// the pixel.
 ///
-/// The depth softness sees z by its nearness: 1 at the first plane, 0 at the second ([`nearness`](crate::nearness)). The planes do not
-/// cut: a point in front of the first or behind the second has the weight that the softness gives it there.
+/// The argument of the depth softness is the nearness of z: 1 at the first plane, 0 at the second ([`nearness`](crate::nearness)). The
+/// planes do not clip: a point in front of the first or behind the second has the weight that the softness has there.
 ///
 /// Source: Wu et al. 2024, Eq. 3 and 4.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighting<S = EdgeSoftness> {
-    /// `s`: how much a face covers a pixel.
+    /// `s`: the softness of the edge.
     pub edge: S,
-    /// `b`: how much its depth counts.
+    /// `b`: the softness of the depth.
     pub depth: DepthSoftness,
     /// Depths of nearness 1 and 0, in world units, ascending.
     pub planes: [f64; 2],
@@ -34,13 +34,13 @@ impl<S> Weighting<S> {
     }
 }
 
-/// What is taken off an edge softness s before it counts, as `(s - floor) / (1 - floor)`.
+/// The floor subtracted from an edge softness s: `(s - floor) / (1 - floor)` is used instead of s.
 ///
-/// A softness that is 0 from some distance on is held at [`OPAQUE`] by its logarithm, which would let thousands of faces that are
-/// nowhere near a pixel make up much of it. For such a one it is that, for others 0.
+/// The logarithm of a softness that is 0 beyond some distance is clamped at that of [`OPAQUE`]; without the subtraction thousands of faces
+/// far from a pixel would make up much of it. The floor is [`OPAQUE`] for such a softness, else 0.
 pub(crate) fn floor(edge: &impl Softness) -> f64 {
     let phi = vector::<HostBackend>(&edge.default_phi(1.0));
-    // Squared it still fits an f32.
+    // The square still fits an f32.
     let limit = edge.log_value(phi, vector::<HostBackend>(&[-1e18]));
     let limit = f64::from(limit.into_scalar());
     if (limit - OPAQUE.ln()).abs() < 1e-3 { OPAQUE } else { 0.0 }

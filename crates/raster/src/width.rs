@@ -2,8 +2,8 @@ use softrast_softness::Softness;
 
 use crate::ImageSize;
 
-/// How wide the soft edge of a face is: by default the scale of the softness, in NDC (x right, y up; the shorter side of the image is 2), or
-/// NDC² where that is squared.
+/// Width of the soft edge of a face: by default the scale of the softness, in NDC (x right, y up; the shorter side of the image is 2), or
+/// in NDC² for a squared distance.
 ///
 /// ```
 /// use softrast_raster::{SoftRenderer, Width};
@@ -17,17 +17,17 @@ use crate::ImageSize;
 pub enum Width {
     /// The scale of the softness.
     Scale(f64),
-    /// The scale of a softness of the distance in pixels; of a softness of the squared distance its root.
+    /// The scale of a softness of the distance in pixels; for a softness of the squared distance, the square root of its scale.
     Pixels(f64),
 }
 
 impl Width {
-    /// An edge of this many pixels, whatever the size of the image.
+    /// A width of this many pixels, whatever the size of the image.
     pub fn pixels(width: f64) -> Self {
         Self::Pixels(width)
     }
 
-    /// A width that goes from this one to `end`, in the same unit, by equal factors in equal times.
+    /// A schedule from this width to `end`, in the same unit, geometric in the progress.
     ///
     /// ```
     /// use softrast_raster::Width;
@@ -40,7 +40,7 @@ impl Width {
         WidthSchedule { start: self, end }
     }
 
-    /// Parameters of a softness that is this wide on images of `size`.
+    /// Parameters of a softness with this width on images of `size`.
     pub(crate) fn phi(self, softness: &impl Softness, size: ImageSize) -> Vec<f64> {
         let scale = match self {
             Self::Scale(scale) => scale,
@@ -61,7 +61,7 @@ impl From<f64> for Width {
     }
 }
 
-/// A width over a run; see [`Width::to`].
+/// A schedule of the width over a run; see [`Width::to`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WidthSchedule {
     start: Width,

@@ -5,7 +5,7 @@ use softrast_lab::plot::{Axis, Plot, Series};
 const TITLE_HEIGHT: u32 = 44;
 const PANEL: (u32, u32) = (900, 380);
 
-/// A chart with a line over it that says what it shows.
+/// A chart with a title.
 pub(crate) struct Panel {
     pub(crate) title: String,
     pub(crate) plot: Plot,
@@ -30,7 +30,7 @@ impl Panel {
     }
 }
 
-/// All panels as SVG, under a title.
+/// All panels as SVG, below a title.
 pub(crate) fn svg(title: &str, panels: &[Panel]) -> anyhow::Result<String> {
     let (width, height) = (PANEL.0, TITLE_HEIGHT + PANEL.1);
     let all = TITLE_HEIGHT + height * panels.len() as u32;

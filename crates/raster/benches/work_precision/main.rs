@@ -1,13 +1,13 @@
-//! Measures what accuracy and size cost, and draws it.
+//! Measures time against accuracy and size, and draws charts.
 //!
 //! ```text
 //! cargo bench -p softrast-raster --bench work_precision
 //! ```
 //!
-//! Writes `docs/studies/work_precision.svg` and `docs/studies/scaling.svg`, and both once more for images in colour
-//! (`colour_work_precision.svg`, `colour_scaling.svg`), each with its numbers as CSV. Times are medians, from world vertices to the
-//! gradient of a mean squared difference to a disk; in colour also to the gradient to the colours of the vertices. Words behind `--`
-//! choose: `silhouette`, `colour` or both.
+//! Writes `docs/studies/work_precision.svg` and `docs/studies/scaling.svg`, and both for colour images (`colour_work_precision.svg`,
+//! `colour_scaling.svg`), each with its numbers as CSV. Times are medians, from world vertices to the gradient of a mean squared difference
+//! to a disk; in colour including the gradient with respect to the vertex colours. Arguments after `--` select: `silhouette`, `colour` or
+//! both.
 
 mod chart;
 #[allow(dead_code, reason = "the other benchmark uses the rest")]
@@ -38,10 +38,10 @@ use workload::{SOFTNESS, Workload, disk, tensor};
 type B32 = NdArray<f32>;
 type B64 = NdArray<f64>;
 
-/// Tolerance of the images that count as exact.
+/// Tolerance of the images used as exact ones.
 const EXACT: f64 = 1e-12;
 const REPEATS: usize = 15;
-/// A point of the scaling chart takes at least three runs, and about this long at most.
+/// A point of the scaling chart takes at least three runs, and at most about this many seconds.
 const SECONDS: f64 = 2.0;
 
 fn main() -> anyhow::Result<()> {
@@ -97,7 +97,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// An image and its gradient to the world vertices, flat, and the time they took.
+/// An image and its gradient with respect to the world vertices, flat, and the time of both.
 struct Drawn {
     image: Vec<f64>,
     gradient: Vec<f64>,
@@ -140,7 +140,7 @@ impl<B: RasterBackend> Scene<B> {
     }
 }
 
-/// Largest difference between what counts as exact and the reference, on the first 300 faces.
+/// Largest difference between the exact image and the reference, on the first 300 faces.
 fn error_of_exact(workload: &Workload) -> f64 {
     let faces: Arc<[[u32; 3]]> = workload.faces[..300].into();
     let part = Workload {
@@ -210,7 +210,7 @@ const METHODS: [&str; 4] = [
     "scalar f32, 1 thread, 1e-2 to 1e-8",
 ];
 
-/// An image in colour and its gradients, one behind the other.
+/// A colour image and its gradients, concatenated.
 fn in_colour<B: RasterBackend>(scene: &Coloured<B>) -> Drawn {
     let (image, gradients, ms) = scene.step();
     let gradient = gradients.into_iter().flat_map(|of| of.into_data().iter().collect::<Vec<f64>>());
@@ -249,7 +249,7 @@ fn colour_work_precision(workload: &Workload, csv: &mut String) -> [Panel; 2] {
     })
 }
 
-/// The plain version with a given radius, with projection and loss by tensor ops as for the others.
+/// The plain version with a given radius; projection and loss are tensor ops as for the others.
 fn plain(workload: &Workload, radius: f32) -> Drawn {
     type A = Autodiff<B32>;
     let size = workload.size;
@@ -281,7 +281,7 @@ fn plain(workload: &Workload, radius: f32) -> Drawn {
     Drawn { image: flat(image.inner()), gradient: flat(gradient), ms }
 }
 
-/// The last of several runs after one to warm up, with their median time.
+/// The last of several runs after one warm-up run, with their median time.
 fn median(mut draw: impl FnMut() -> Drawn) -> Drawn {
     let start = Instant::now();
     let mut last = black_box(draw());
@@ -320,7 +320,7 @@ fn slope(points: &[[f64; 2]]) -> f64 {
     sum(|x, y| x * y) / sum(|x, _| x * x)
 }
 
-/// Three panels: milliseconds, as `time` gives them, against faces, pixels and views, the other two fixed.
+/// Three panels: milliseconds, as returned by `time`, against faces, pixels and views, the other two fixed.
 fn scaling(csv: &mut String, time: impl Fn(&Workload) -> f64) -> Vec<Panel> {
     let mut measure = |varied: &str, level: u32, size: usize, views: usize| {
         let azimuths: Vec<f64> = (0..views).map(|k| 360.0 * k as f64 / views as f64).collect();

@@ -8,10 +8,10 @@ use crate::{
     ops::blend::SoftBlend,
 };
 
-/// Blends the attributes of the faces of each pixel by their weights: the one op under every soft image in colour.
+/// Blends the attributes of the faces of each pixel by their weights: the op of every soft colour image.
 ///
-/// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth; `tables` are those of the curves that `op` was made for. The
-/// result is `[views, channels + 1, height, width]`, the last channel being the faces' share.
+/// `vertices` is `[views, vertices, 3]`: x and y in NDC and the camera depth; `tables` are those of the curves that `op` was created for.
+/// The result is `[views, channels + 1, height, width]`; the last channel is the faces' share.
 ///
 /// # Panics
 ///
@@ -51,7 +51,7 @@ pub(super) fn soft_blend<B: RasterBackend>(
     fused(&FusedOp::SoftBlend(op), inputs)
 }
 
-/// A texture as the op takes it: `[texels, 4]`.
+/// A texture as an input of the op: `[texels, 4]`.
 fn texels<B: Backend>(texture: Tensor<B, 3>) -> Tensor<B, 2> {
     let [height, width, channels] = texture.dims();
     let rows = texture.reshape([height * width, channels]);

@@ -8,23 +8,23 @@ use crate::{
     weighting::floor,
 };
 
-/// How far the logarithm of the background's weight may fall below the one that tables were made for.
+/// Amount by which the logarithm of the background's weight may fall below the one that tables were chosen for.
 const MARGIN: f64 = 3.0;
 /// Knots for the parameters `phi`.
 #[derive(Clone, Debug)]
 pub(super) struct Prepared<S> {
     pub(super) phi: [Vec<f64>; 2],
-    /// Logarithm of the background's weight that the tables reach.
+    /// Logarithm of the background's weight that the tables are valid for.
     pub(super) log_weight: f64,
-    /// Faces that they serve.
+    /// Number of faces that the knots are valid for.
     pub(super) room: usize,
     pub(super) edge: LogCurve<S>,
     pub(super) depth: DepthCurve,
 }
 
 impl<S: Softness> Prepared<S> {
-    /// Half of the tolerance goes to culling, the other half to interpolation: an error of the logarithms of both factors of a weight by a
-    /// quarter of it each would do, were they all of one sign; together they move a mean by at most half as much as they are.
+    /// Half of the tolerance goes to culling, the other half to interpolation. Errors of the logarithms of both factors of a weight by a
+    /// quarter of it each would suffice if all had one sign; together they move a mean by at most half of their size.
     pub(super) fn new(
         weighting: &Weighting<S>,
         phi: &[Vec<f64>; 2],
@@ -42,7 +42,7 @@ impl<S: Softness> Prepared<S> {
                 let ends = DepthSoftness::mlp_at_ends(vector::<HostBackend>(&phi[1]));
                 let ends: Vec<f64> = ends.into_data().iter().collect();
                 let [near, far] = weighting.planes;
-                // Only how far the table reaches depends on this.
+                // This only determines the extent of the table.
                 let nearest = (far - NEAR) / (far - near);
                 (ends[0] * nearest).max(ends[1]).max(OPAQUE).ln()
             }
@@ -56,7 +56,7 @@ impl<S: Softness> Prepared<S> {
         Self { phi: phi.clone(), log_weight, room, edge, depth }
     }
 
-    /// Knots for parameters `phi`, if their softnesses are the prepared ones stretched.
+    /// Knots for parameters `phi`, if their softnesses are the prepared ones, stretched.
     pub(super) fn stretched_to(
         &self,
         weighting: &Weighting<S>,
@@ -90,7 +90,7 @@ impl<S: Softness> PartialEq for Prepared<S> {
     }
 }
 
-/// Makes the tables of an op that runs on slices.
+/// Computes the tables of an op that runs on slices.
 #[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct WeightTables<S = EdgeSoftness>(pub(super) Prepared<S>);
@@ -101,13 +101,13 @@ impl<S: Softness> WeightTables<S> {
         self.0.edge.grid().rows() + self.0.depth.grid().rows()
     }
 
-    /// Both tables, `[rows, 4]`, of parameters of the softnesses by edge and by depth.
+    /// Both tables, `[rows, 4]`, for parameters of the edge and the depth softness.
     pub fn of<B: Backend>(&self, phi: [Tensor<B, 1>; 2]) -> Tensor<B, 2> {
         self.0.tables(phi)
     }
 }
 
-/// Both tables as the op takes them, `[rows, 4]`.
+/// Both tables as one input of the op, `[rows, 4]`.
 fn tables<B: Backend>(edge: Tensor<B, 2>, depth: Tensor<B, 2>) -> Tensor<B, 2> {
     Tensor::cat(vec![edge, depth], 0)
 }

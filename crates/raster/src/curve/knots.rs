@@ -1,4 +1,4 @@
-//! How many knots a curve needs, and where.
+//! Number and positions of the knots of a curve.
 
 use softrast_kernel::Grid;
 
@@ -6,22 +6,22 @@ use softrast_kernel::Grid;
 /// two) that it may use, coarsest first.
 const OCTAVES: [u32; 7] = [12, 16, 24, 36, 56, 80, 120];
 const BITS: std::ops::RangeInclusive<u32> = 2..=7;
-/// Finer cells, up to so many on a side, as long as each halving of a cell makes the error this much smaller: a corner gains half, a
-/// jump nothing.
+/// Finer cells are used, up to this many per side, as long as each halving reduces the error at least by the factor [`GAIN`]: a corner
+/// gains half, a jump nothing.
 const MOST_CELLS: usize = 1 << 15;
 const GAIN: f64 = 0.7;
-/// Octaves of the distance to the end of the support that a table may resolve, coarsest first, where
-/// cells that are spaced from the edge of the face are not enough.
+/// Octaves of the distance to the end of the support that a table may resolve, coarsest first, if cells that are spaced from the edge of
+/// the face are not enough.
 pub(crate) const FAR: [u32; 4] = [8, 16, 26, 36];
-/// There, the terms of a second derivative all but cancel; this many bits more keep what is left.
+/// There, the terms of a second derivative nearly cancel; this many more bits preserve the remainder.
 const SHARPER: u32 = 2;
-/// Stands in for a support that does not end, in NDC.
+/// Radius of an unbounded support, in NDC.
 pub(super) const EVERYWHERE: f64 = 4e6;
-/// A side that is constant still needs a cell.
+/// A side that is constant still has a cell, of this size.
 pub(super) const NARROWEST: f64 = 1e-9;
 
-/// A grid with these radii that is fine enough for `error` to be at most 1, or as fine as it may be, and the error. `from` says how far
-/// from the edge the sides begin to change: asked where knots that are close at the edge are not enough.
+/// A grid with these radii that is fine enough for `error` to be at most 1, or as fine as allowed, and the error. `from` returns the
+/// distances from the edge at which the sides start to change; it is called if knots close to the edge are not enough.
 pub(super) fn refined(
     [outer, inner]: [f64; 2],
     from: impl FnOnce() -> [f64; 2],
@@ -54,7 +54,7 @@ pub(super) fn refined(
 }
 
 fn fitted(mut grid: Grid, far: &[u32], error: &impl Fn(Grid) -> Reached) -> (Grid, Reached) {
-    // The innermost cell decides the octaves, all others the cells in an octave.
+    // The innermost cell determines the octaves, all others the cells per octave.
     for octaves in OCTAVES {
         grid.octaves = octaves;
         if error(grid).innermost <= 1.0 {
@@ -73,8 +73,8 @@ fn fitted(mut grid: Grid, far: &[u32], error: &impl Fn(Grid) -> Reached) -> (Gri
         (grid, reached)
     };
     let (mut grid, mut reached) = finer(grid, 1.0);
-    // Knots are left wanting where the profile rises without bound at the end of its support, or
-    // at a corner in the middle, where more of them at the end are of no use.
+    // More knots are needed where the profile increases without bound at the end of its support, or at a corner in the middle, where more
+    // of them at the end do not help.
     if let (true, Some(&most)) = (reached.rest > 1.0, far.last()) {
         let best = error(Grid { far: most, ..grid }).rest;
         if best < 0.5 * reached.rest {
@@ -97,7 +97,7 @@ fn fitted(mut grid: Grid, far: &[u32], error: &impl Fn(Grid) -> Reached) -> (Gri
     (grid, reached)
 }
 
-/// How far interpolation misses its target, as multiples of it.
+/// Interpolation errors, as multiples of their targets.
 pub(super) struct Reached {
     pub(super) innermost: f64,
     pub(super) rest: f64,

@@ -1,4 +1,4 @@
-//! A function of the signed distance as cubics of its square: what the tables of kernels hold.
+//! A function of the signed distance as cubics of its square, in the layout of the tables of kernels.
 
 mod knots;
 mod precise;
@@ -12,39 +12,37 @@ use knots::{EVERYWHERE, NARROWEST, Reached, refined};
 pub(crate) use precise::{precise, rounding};
 pub(crate) use settled::settled_until;
 
-/// Which way the sides lie: outer, inner.
+/// Signs of the distances on each side: outer, inner.
 pub(crate) const SIGNS: [f64; 2] = [-1.0, 1.0];
 /// No drawn face is farther from a pixel, in NDC.
 pub(crate) const FARTHEST_DRAWN: f64 = 1.5e6;
 /// The largest radius that a curve may be stretched to, in NDC: its square fits an f32.
 const WIDEST: f64 = 1e9;
-/// Tails have the value of a place this many times as far as the support. Any place beyond it is as
-/// good for the image; but where the curve ends with a steep slope, its parameters must not move
-/// all that lies in the tail.
+/// Tails have the value at this multiple of the support. Any position beyond the support is equally good for the image; but if the curve
+/// ends with a steep slope, its parameters must not move the whole tail.
 pub(crate) const BEYOND: f64 = 1.1;
-/// How far before its end the slope at the end of the last cell is taken, as a part of the cell.
+/// Distance before its end at which the slope of the last cell is taken, as a fraction of the cell.
 const INSIDE: f64 = 1.0 / 1024.0;
-/// How far before the beginning of the cells the constant there is taken, as a part of the distance: more than an f32 is rounded by.
+/// Distance before the start of the cells at which the constant is taken, as a fraction of the distance: more than the rounding of f32.
 const SHORT: f64 = 2e-6;
-/// Places in a cell at which its error is measured: those of a smooth curve's largest; and how many there are where it may lie elsewhere.
+/// Positions in a cell at which its error is measured: those of the largest error of a smooth curve; and how many if it may be elsewhere.
 const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const DENSE: u32 = 16;
-/// The innermost cell is a straight line over all that is nearer than its end: powers of its place at which that is measured too, each at
-/// a quarter of the distance of the one before.
+/// The innermost cell is a straight line over all smaller distances: exponents of the positions at which it is measured as well, each at a
+/// quarter of the distance of the previous one.
 const INNERMOST: std::ops::RangeInclusive<i32> = 1..=20;
 const NEARER: f64 = 1.0 / 16.0;
-/// The part of its rise that a cubic may miss the next knot by.
+/// The fraction of its rise by which a cubic may miss the next knot.
 const WIDE_OF: f64 = 0.1;
 
-/// The places of the cells of a curve, and how its cubics are made.
+/// The layout of the cells of a curve, and the computation of its cubics.
 ///
-/// The table consists of two one-sided halves that meet at the edge of the face, where curves
-/// kink or rise with infinite slope. Its cells are spaced by the leading bits of the squared
-/// distance: each octave holds the same number of cells, so that no curve needs a spacing of its
-/// own, and a look-up needs no logarithm, no square root and no search.
+/// The table consists of two one-sided halves that meet at the edge of the face, where curves kink or rise with infinite slope. Its cells
+/// are spaced by the leading bits of the squared distance: each octave holds the same number of cells, so no curve needs a special spacing,
+/// and a look-up needs no logarithm, no square root and no search.
 ///
-/// Only the values and slopes at the knots touch the curve. They are tensor ops, so gradients of
-/// any order reach its parameters, and an MLP costs no more per pixel than a logistic.
+/// The curve is evaluated only for values and slopes at the knots. These are tensor ops, so gradients of any order reach its parameters,
+/// and an MLP costs no more per pixel than a logistic.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CubicCurve {
     pub(crate) grid: Grid,
@@ -53,12 +51,13 @@ pub(crate) struct CubicCurve {
 }
 
 impl CubicCurve {
-    /// Cells between the `radii`, outer and inner, that are fine enough for `error` to be at most 1, or as fine as they may be; and the
-    /// largest error.
+    /// Cells between the `radii`, outer and inner, that are fine enough for `error` to be at most 1, or as fine as allowed; and the largest
+    /// error.
     ///
-    /// `curve` gives value and slope at distances in the most exact float type of the device, `error` what an exact value and that of a
-    /// cubic are worth, looked up in the float type `sums`. `from` says how far from the edge the sides begin to change: it is asked where knots that are close at the edge
-    /// are not enough. `far` holds octaves to be tried at the end of the support; none if it is empty, for look-ups that know none.
+    /// `curve` returns value and slope at distances in the most precise float type of the device; `error` rates an exact value and that of
+    /// a cubic, looked up in the float type `sums`. `from` returns the distances from the edge at which the sides start to change; it is
+    /// called if knots close to the edge are not enough. `far` holds octaves to try at the end of the support; empty for look-ups without
+    /// them.
     pub(crate) fn chosen<B: Backend>(
         curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
         radii: [f64; 2],
@@ -89,13 +88,13 @@ impl CubicCurve {
         (rough, missed(rough, &dense).most())
     }
 
-    /// The cells of the same curve stretched by `factor` along the distance, with the same errors.
+    /// The cells of the curve stretched by `factor` along the distance, with the same errors.
     ///
-    /// None where a radius would leave the range that can be drawn, so that it has to be chosen anew.
+    /// `None` if a radius would leave the drawable range, so that the cells have to be chosen anew.
     pub(crate) fn stretched(mut self, factor: f64) -> Option<Self> {
         let stretch = |radius: &mut f64| {
             let least = if *radius >= EVERYWHERE { FARTHEST_DRAWN } else { NARROWEST };
-            // A side of the least radius is constant, or all but that: a narrower one suits it no better.
+            // A side of the least radius is constant, or nearly so: a narrower one would be no better.
             if *radius > NARROWEST || factor > 1.0 {
                 *radius *= factor;
             }
@@ -105,14 +104,13 @@ impl CubicCurve {
         (stretch(&mut self.grid.outer) && stretch(&mut self.grid.inner)).then_some(self)
     }
 
-    /// Coefficients of the cubics, `[rows, 4]`, of a `curve` that gives value and slope at distances `[N]` on this device and in this float
-    /// type.
+    /// Coefficients of the cubics, `[rows, 4]`, of a `curve` that returns value and slope at distances `[N]` on this device and in this
+    /// float type.
     ///
-    /// The cubic of a cell has the curve's value at the near end, and its slopes at both ends and
-    /// in the middle. Its error is that of the cubic with the values and slopes of both ends,
-    /// `t² (1 - t)²` times a 24th of the fourth derivative, to leading order. But differences of slopes
-    /// of neighbours keep their digits where differences of values do not, next to the edge above all:
-    /// in f32 these would leave the second derivative nothing.
+    /// The cubic of a cell has the curve's value at the near end, and its slopes at both ends and in the middle. Its error is that of the
+    /// cubic with the values and slopes of both ends, `t² (1 - t)²` times a 24th of the fourth derivative, to leading order. Differences of
+    /// slopes of neighbours keep their digits where differences of values do not, especially next to the edge: in f32 the latter would lose
+    /// the second derivative.
     pub(crate) fn table<B: Backend>(
         &self,
         curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
@@ -124,17 +122,16 @@ impl CubicCurve {
             let shape = [values.len()];
             Tensor::<B, 1>::from_data(TensorData::new(values, shape), (device, dtype))
         };
-        // Behind the knots stand the middles of all cells but the innermost, whose slopes count, and
-        // the tail.
+        // After the knots come the middles of all cells except the innermost, whose slopes are needed, and the tail.
         let middle = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
         let middles = knots[1..].windows(2).map(middle);
         let mut places: Vec<f64> =
             knots.iter().copied().chain(middles).chain([BEYOND * BEYOND]).collect();
-        // A support often ends at a corner: rounding must not decide which of its slopes the last cell gets.
+        // A support often ends at a corner: rounding must not determine which of its slopes the last cell gets.
         places[cells] -= INSIDE * (knots[cells] - knots[cells - 1]);
         let grid = self.grid;
-        // A distance of 0 has no side; this one has, and is next to nothing also in a wide support. Where a side is constant before its
-        // cells, rounding must not decide on which side of a corner their beginning lies.
+        // A distance of 0 has no side; this one has, and is negligible also in a wide support. If a side is constant before its cells,
+        // rounding must not determine on which side of a corner their start lies.
         let nudged = |side: usize, y: f64| {
             let least = grid.distance(side, 1.0).min(1.0) * 1e-15;
             let distance = match y {
@@ -154,7 +151,7 @@ impl CubicCurve {
             };
             curve(at(&nudged))
         };
-        // An op that is recorded costs more than its few hundred numbers, so both sides are one tensor there. Else each has a thread.
+        // A recorded op costs more than its few hundred numbers, so both sides are one tensor then. Otherwise each has a thread.
         let sides = if B::ad_enabled(device) {
             let both = of_sides(&[0, 1]);
             [0, 1].map(|side| {
@@ -171,8 +168,9 @@ impl CubicCurve {
             let zero = first.clone() * 0.0;
             let rise = at(1) - first.clone();
             rows.push(Tensor::cat(vec![first, rise, zero.clone(), zero.clone()], 1));
-            // From slopes by distance to slopes by place in the cell, in one factor: each of two may leave the range of f32. Where the
-            // distance is 0 the slope by its square may be infinite; the innermost cell is linear and needs none.
+            // From slopes with respect to distance to slopes with respect to the position in the cell, as one factor: each of two may leave
+            // the range of f32. At distance 0 the slope with respect to its square may be infinite; the innermost cell is linear and needs
+            // none.
             let inner = |k: usize| {
                 let rate = |(pair, &y): (&[f64], &f64)| {
                     SIGNS[side] * grid.rate(side, y) * (pair[1] - pair[0])
@@ -197,7 +195,7 @@ impl CubicCurve {
         Tensor::cat(rows, 0)
     }
 
-    /// Values and cubics of a curve at these places in each cell, and nearer ones in the innermost.
+    /// Values and cubics of a curve at these positions in each cell, and at smaller ones in the innermost.
     fn samples<B: Backend>(
         &self,
         curve: impl Fn(Tensor<B, 1>) -> [Tensor<B, 1>; 2] + Sync,
@@ -212,7 +210,7 @@ impl CubicCurve {
         let knots = grid.knots();
         let nearer: Vec<f64> =
             INNERMOST.map(|power| NEARER.powi(power)).chain(places.iter().copied()).collect();
-        // A place is what is left of a number that is at least 2^bits times as large as a cell is wide.
+        // A position is the remainder of a number at least 2^bits times as large as the width of a cell.
         let digits = if sums == DType::F64 { 53 } else { 24 };
         let rounding = f64::exp2(f64::from(grid.bits) - f64::from(digits));
         let mut distances = Vec::with_capacity(2 * places.len() * knots.len());
@@ -242,24 +240,24 @@ impl CubicCurve {
     }
 }
 
-/// The larger of two errors; infinite where the second is no number.
+/// The larger of two errors; infinite if the second is NaN.
 pub(crate) fn worse(most: f64, error: f64) -> f64 {
     if error.is_nan() { f64::INFINITY } else { most.max(error) }
 }
 
-/// A curve and its cubics, at a place between knots.
+/// A curve and its cubics, at a position between knots.
 struct Sample {
     exact: f64,
-    /// At the places next to it to which a look-up may round it.
+    /// Values at the neighbouring positions to which a look-up may round.
     interpolated: [f64; 2],
-    /// Whether it lies in the innermost cell of its side.
+    /// Whether the position is in the innermost cell of its side.
     innermost: bool,
 }
 
-/// `of` 0 and 1.
+/// `of(0)` and `of(1)`, on two threads.
 ///
-/// The second thread is not one of rayon's. A softness may take its slope by autodiff, which waits for every graph of the process, and a
-/// backward pass holds its graph while it waits for a thread of rayon: with all of those in here, both would wait for ever.
+/// The second thread is not one of rayon's. A softness may compute its slope by autodiff, which waits for every graph of the process, and a
+/// backward pass holds its graph while it waits for a rayon thread: if all of these were in here, both would wait forever.
 fn on_two_threads<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; 2] {
     std::thread::scope(|scope| {
         let second = std::thread::Builder::new().spawn_scoped(scope, || of(1));
@@ -273,8 +271,8 @@ fn on_two_threads<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; 2] {
     })
 }
 
-/// Coefficients of cubics from these `values` to the `next`, where they miss those by more than a part of the rise replaced by
-/// straight lines: a cell that holds a jump or a pole gives slopes that lead anywhere.
+/// Coefficients of cubics from these `values` to the `next`, replaced by straight lines where they miss them by more than a fraction of the
+/// rise: the slopes at a cell with a jump or a pole are meaningless.
 fn bounded<B: Backend>(
     values: &Tensor<B, 1>,
     next: Tensor<B, 1>,

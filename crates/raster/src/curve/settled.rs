@@ -3,14 +3,14 @@ use super::{
     knots::{EVERYWHERE, NARROWEST},
 };
 
-/// Distances at which a side is looked at for where it begins to change, in constant ratio, and those by which each refinement divides
-/// what lies between two of them.
+/// Distances, in constant ratio, at which a side is sampled to find where it starts to change, and the number by which each refinement
+/// divides the interval between two of them.
 const COARSE: usize = 1024;
 const FINE: usize = 128;
 const REFINEMENTS: usize = 4;
 
-/// How far from the edge a curve is `settled` on each side, outer and inner, up to its radius: that is asked of its value at the edge and
-/// of that at a place.
+/// Distance from the edge up to which a curve is `settled` on each side, outer and inner, at most its radius. `settled` compares its value
+/// at the edge with that at a distance.
 pub(crate) fn settled_until(
     curve: impl Fn(&[f64]) -> Vec<f64>,
     radii: [f64; 2],
@@ -25,7 +25,7 @@ pub(crate) fn settled_until(
             let signed: Vec<f64> = places.iter().map(|r| SIGNS[side] * r).collect();
             match curve(&signed).iter().position(|&q| !settled(edge, q)) {
                 Some(first @ 1..) => [near, far] = [places[first - 1], places[first]],
-                // Only a place that rounding has moved.
+                // A position that moved only by rounding.
                 _ if count == FINE => return near,
                 _ => return 0.0,
             }

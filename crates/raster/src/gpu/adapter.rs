@@ -6,9 +6,9 @@ use softrast_tensor::wgpu::{
 
 use crate::NoAdapter;
 
-/// Sets up the default adapter of wgpu, once, and names it: `NVIDIA H200`, `llvmpipe (LLVM 15)`.
+/// Sets up the default wgpu adapter, once, and returns its name: `NVIDIA H200`, `llvmpipe (LLVM 15)`.
 ///
-/// Without this, the first tensor sets it up, and panics where there is none.
+/// Without this call, the first tensor sets it up, and panics if there is none.
 ///
 /// # Errors
 ///

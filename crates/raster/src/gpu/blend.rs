@@ -1,5 +1,5 @@
-//! Colours of faces that share pixels, face by face: the largest weight of each pixel, sums relative to it, and their gradient, gathered per
-//! face over its pixels.
+//! Blending of colours face by face: the largest weight of each pixel, sums relative to it, and their gradient, gathered per face over its
+//! pixels.
 
 use cubecl::prelude::*;
 
@@ -19,14 +19,13 @@ pub(super) const UNITS: u32 = 32;
 /// The bits of 1.
 const ONE: u32 = 0x3f80_0000;
 
-/// Numbers of a pixel that are added up: how much the faces count, and that times each channel, with their derivatives in a pass of second
-/// order.
+/// Numbers summed per pixel: the share of the faces, and the share times each channel, with their derivatives in a pass of second order.
 pub(super) fn summed(kind: BlendSpec) -> usize {
     (kind.channels + 1) * if kind.second { 2 } else { 1 }
 }
 
-/// Finds the largest weight of a face at each pixel of the launch: of its [`MARKS`] the first becomes that of its logarithm, which is ordered
-/// as these are.
+/// Computes the largest face weight at each pixel of the launch: the first of the pixel's [`MARKS`] becomes its logarithm, encoded as an
+/// integer of the same order.
 #[cube(launch)]
 pub(super) fn find_largest(
     drawn: &BlendInputs,
@@ -50,7 +49,7 @@ pub(super) fn find_largest(
     }
 }
 
-/// The logarithm of the largest weight at a pixel of the launch, where the background has this one.
+/// The logarithm of the largest weight at a pixel of the launch; `behind` is the logarithm of the background's weight.
 #[cube]
 fn largest(mark: u32, behind: f32) -> f32 {
     let positive = mark >= NEGATIVE;
@@ -59,9 +58,9 @@ fn largest(mark: u32, behind: f32) -> f32 {
     select(mark == 0u32 || log < behind, behind, log)
 }
 
-/// Adds up the shares of faces at each pixel of the launch, relative to the largest weight there, and what they show: [`summed`] whole numbers of
-/// two words. With `measure` it only finds the largest sizes at each pixel of what a face shows and of a derivative: the second and third of
-/// its [`MARKS`]. A share is at most 1.
+/// Sums the shares of faces at each pixel of the launch, relative to the largest weight there, and the weighted channels: [`summed`] whole
+/// numbers of two words. With `measure` it only computes the largest magnitudes at each pixel of a value and of a derivative: the second
+/// and third of its [`MARKS`]. A share is at most 1.
 #[cube(launch)]
 pub(super) fn add_shares(
     drawn: &BlendInputs,
@@ -100,7 +99,7 @@ pub(super) fn add_shares(
                 }
             }
             if measure {
-                // A share that is no number makes all that is shown none.
+                // A share of NaN makes all values NaN.
                 let share = mark(terms[0]);
                 let mut shown = select(share < INFINITE, 0u32, share);
                 let mut moved = 0u32;
@@ -130,13 +129,13 @@ pub(super) fn add_shares(
     }
 }
 
-/// Whether a number of a pixel is a derivative.
+/// Whether a summed number of a pixel is a derivative.
 #[cube]
 fn is_moved(number: usize, #[comptime] kind: BlendSpec) -> bool {
     if kind.second { number % 2 == 1 } else { false.runtime() }
 }
 
-/// Keeps a number among those of a pixel, with its derivative in a pass of second order.
+/// Stores a term among those of a pixel, with its derivative in a pass of second order.
 #[cube]
 fn store(terms: &mut Array<f32>, number: usize, term: Dual, #[comptime] kind: BlendSpec) {
     if kind.second {
@@ -147,7 +146,7 @@ fn store(terms: &mut Array<f32>, number: usize, term: Dual, #[comptime] kind: Bl
     }
 }
 
-/// A number that was added up.
+/// One of the summed numbers of a pixel.
 #[cube]
 fn total(
     sums: &Array<u32>,
@@ -170,12 +169,12 @@ fn total(
     }
 }
 
-/// Input of [`finish_pixels`] beside the numbers that all pixels share.
+/// Inputs of [`finish_pixels`] in addition to the numbers shared by all pixels.
 #[derive(CubeType, CubeLaunch)]
 pub(super) struct Added {
     marks: Array<u32>,
     sums: Array<u32>,
-    /// Where the background begins in the numbers, and their derivatives in the direction.
+    /// Start of the background in the numbers, and of their derivatives in the direction.
     background: u32,
     along: u32,
     face_count: u32,
@@ -230,7 +229,7 @@ pub(super) fn finish_pixels(
     if pull {
         of_share = upstream[first + channels * step];
     }
-    // What the upstream makes of the image, and of the background alone.
+    // The dot products of the upstream with the image, and with the background alone.
     let mut whole = covered.value * of_share;
     let mut whole_tangent = covered.tangent * of_share;
     let mut alone = 0.0f32;
@@ -268,7 +267,7 @@ pub(super) fn finish_pixels(
     }
 }
 
-/// Writes the gradient of each face, and behind those of faces those of parts, a cube each, as `[views · faces + slots, 9 + 3 numbers]`: x, y and
+/// Writes the gradient of each face, and after these those of parts, a cube each, as `[views · faces + slots, 9 + 3 numbers]`: x, y and
 /// depth of each corner, then the attributes of each.
 #[cube(launch)]
 pub(super) fn blend_faces(
@@ -323,13 +322,13 @@ pub(super) fn blend_faces(
                 }
             }
             let between = pair.weights.mul(seen.at_corners).sum();
-            // A share draws the image from what it is towards what the face shows.
+            // A share moves the image from its value towards that of the face.
             let pulled = seen.here.sub(of_pixel.draw);
             let by_edge = share.of_edge.mul(pulled);
             let by_place = share.whole.mul(pulled).mul(pair.depth_slope);
-            // The nearness falls as the depth grows.
+            // The nearness decreases with depth.
             let by_z = by_place.scale(-weights.per_range);
-            // Both the depth and the weights on the face change by a weight on the screen as by its share of 1 / z.
+            // Depth and the weights on the face both depend on a weight on the screen through its share of 1 / z.
             let pulled_back = seen.at_corners.less(between).times(share.whole);
             let by_part = pulled_back.less(pair.depth.mul(by_z)).times(pair.depth);
             let by_barycentric = by_part.mul(shown.per_depth);
@@ -348,7 +347,7 @@ pub(super) fn blend_faces(
         }
         pixel += UNITS;
     }
-    // One number after the other: each unit adds up some of them over all units.
+    // One number after the other: each unit sums some of them over all units.
     let mut shares = SharedMemory::<f32>::new(comptime!((9 + 3 * kind.numbers()) * UNITS as usize));
     for k in 0..count {
         shares[k * units + UNIT_POS as usize] = sums[k];
@@ -365,8 +364,8 @@ pub(super) fn blend_faces(
     }
 }
 
-/// Adds the gradient of both tables, every unit to tables of its own over the pairs that it takes, `[units, rows, 4]`, as
-/// [`sum_cubics`](super::table::sum_cubics) does.
+/// Adds the gradient of both tables, `[units, rows, 4]`: each unit sums over its pairs into a separate table, as in
+/// [`sum_cubics`](super::table::sum_cubics).
 #[cube(launch)]
 pub(super) fn blend_cubics(
     drawn: &BlendInputs,
@@ -401,7 +400,7 @@ pub(super) fn blend_cubics(
     }
 }
 
-/// Adds up the gradient of the background over the pixels that each cube takes, `[cubes, channels + 1]`.
+/// Sums the gradient of the background over the pixels of each cube, `[cubes, channels + 1]`.
 #[cube(launch)]
 pub(super) fn sum_background(
     pixels: &Array<f32>,

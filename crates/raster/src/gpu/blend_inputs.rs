@@ -1,4 +1,4 @@
-//! What the kernels of colours read: faces and how they are weighted, in some of the views.
+//! Inputs of the colour kernels: faces and their weighting, for some of the views.
 
 use cubecl::prelude::*;
 
@@ -9,69 +9,69 @@ use super::{
     parts::Part,
 };
 
-/// How faces are weighted, and where the numbers that all pixels share stand: tables, then attributes, background and texture.
+/// Parameters of the weighting, and the layout of the numbers shared by all pixels: tables, then attributes, background and texture.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
 pub(super) struct BlendParams {
-    /// Cells of the edge softness, mirrored: the inner side is outside a face.
+    /// Layout of the table of the edge softness, mirrored: the inner side is outside a face.
     pub(super) edge: Lookup,
     pub(super) depth: Lookup,
-    /// Row where the table by depth begins.
+    /// First row of the depth table.
     pub(super) depth_row: u32,
-    /// Where attributes, background and texture begin.
+    /// Start of attributes, background and texture.
     pub(super) attributes: u32,
     pub(super) background: u32,
     pub(super) texture: u32,
-    /// Those of the texture.
+    /// Rows and columns of the texture.
     pub(super) rows: u32,
     pub(super) columns: u32,
-    /// Attributes of a view that has its own.
+    /// Numbers of the attributes of a view, 0 if all views share them.
     pub(super) per_view: u32,
-    /// Where the derivatives of all these numbers begin in the direction.
+    /// Start of the derivatives of all these numbers in the direction.
     pub(super) along: u32,
     /// Depth of nearness 1, and one over the distance of the planes.
     pub(super) near: f32,
     pub(super) per_range: f32,
-    /// What is taken off the edge softness, and the logarithm from which on it counts.
+    /// The floor subtracted from the edge softness, and the logarithm above which it counts.
     pub(super) floor: f32,
     pub(super) counts_from: f32,
-    /// Least weight by depth, of a line; of an exponential its logarithm.
+    /// Least depth weight, for a line; its logarithm, for an exponential.
     pub(super) least: f32,
 }
 
-/// What of the weighting is known when a kernel is compiled.
+/// Properties of the weighting known at compile time of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct BlendSpec {
-    /// Whether tables have cells that are counted from their far ends.
+    /// Whether the tables have cells counted from their far ends.
     pub(super) far_edge: bool,
     pub(super) far_depth: bool,
-    /// Whether weights by depth are a line or an exponential in place of a table.
+    /// Whether depth weights come from a line or an exponential instead of a table.
     pub(super) is_line: bool,
     pub(super) is_exponential: bool,
-    /// Whether attributes are places on a texture.
+    /// Whether attributes are texture coordinates.
     pub(super) is_textured: bool,
-    /// Channels of the image, but for the faces' share.
+    /// Channels of the image, except the faces' share.
     pub(super) channels: usize,
     /// Whether the pass is of second order.
     pub(super) second: bool,
 }
 
 impl BlendSpec {
-    /// Numbers of an attribute.
+    /// Numbers per entry of the attributes.
     pub(super) fn numbers(self) -> usize {
         if self.is_textured { 2 } else { self.channels }
     }
 }
 
-/// All of it.
+/// All inputs of a colour kernel.
 #[derive(CubeType, CubeLaunch)]
 pub(super) struct BlendInputs {
     pub(super) corners: Array<f32>,
     pub(super) reaches: Array<u32>,
     pub(super) slots: Array<u32>,
-    /// What all pixels share, and its derivatives behind those of the vertices.
+    /// Numbers shared by all pixels, and their derivatives, which follow those of the vertices.
     numbers: Array<f32>,
     direction: Array<f32>,
-    /// `[faces, 3]`: the attributes at the corners.
+    /// `[faces, 3]`: the entries of the attributes at the corners.
     pub(super) entries: Array<u32>,
     pub(super) weights: BlendParams,
     pub(super) frame: Frame,
@@ -83,7 +83,7 @@ pub(super) struct BlendInputs {
 
 #[cube]
 impl BlendInputs {
-    /// One of the numbers that all pixels share.
+    /// One of the numbers shared by all pixels.
     pub(super) fn number(&self, at: usize, #[comptime] kind: BlendSpec) -> Dual {
         let along = self.weights.along as usize + at;
         load(&self.numbers, at, &self.direction, along, kind.second)
@@ -94,12 +94,12 @@ impl BlendInputs {
         Cubic::new(&self.numbers, row, &self.direction, self.weights.along, kind.second)
     }
 
-    /// The part of a face that a group of units takes.
+    /// The part of a face that belongs to a group of units.
     pub(super) fn part(&self, group: u32) -> Part {
         Part::of(group, &self.reaches, &self.slots, self.views, self.views * self.face_count)
     }
 
-    /// Where the first channel of a pixel of a view of the launch stands in an image of all views.
+    /// Index of the first channel of a pixel of a view of the launch, in an image of all views.
     pub(super) fn in_image(
         &self,
         view: u32,
@@ -112,7 +112,7 @@ impl BlendInputs {
         ((self.first_view + view) * planes * plane + row * self.frame.width + column) as usize
     }
 
-    /// How far a channel of an image is from the next.
+    /// Distance between channels of an image.
     pub(super) fn plane(&self) -> usize {
         (self.frame.height * self.frame.width) as usize
     }

@@ -1,4 +1,4 @@
-//! One call of the op of colours: which kernels run over which buffers.
+//! One call of the colour op: the launches of its kernels and their buffers.
 
 use softrast_kernel::{
     Grid,
@@ -27,7 +27,7 @@ use super::{
 };
 use crate::{ProfileSum, SoftBlend};
 
-/// Stands for no limit.
+/// Logarithm for no limit.
 const LOWEST: f32 = -1e30;
 
 /// Inputs on the device.
@@ -41,31 +41,31 @@ pub(super) struct Blend<'a> {
     entries: OnDevice,
     entry_count: usize,
     channels: usize,
-    /// Whether all views have the same attributes.
+    /// Whether all views share the attributes.
     shared: bool,
-    /// Where attributes, background and texture begin in the numbers.
+    /// Start of attributes, background and texture in the numbers.
     starts: [usize; 3],
 }
 
-/// A gradient of texels in the making.
+/// Accumulator of a gradient of texels.
 struct Texels {
-    /// What is measured, then two words for each of `count` numbers.
+    /// The measured words, then two words for each of `count` numbers.
     sums: Buffer,
     count: usize,
 }
 
-/// What a pass back gives.
+/// Results of a backward pass.
 pub(super) struct Gradient {
     pub(super) vertices: Buffer,
     pub(super) attributes: Buffer,
     pub(super) tables: Option<Buffer>,
     pub(super) background: Buffer,
     pub(super) texture: Option<Buffer>,
-    /// Of a pass of second order.
+    /// The derivative of the image, in a pass of second order.
     pub(super) image: Buffer,
 }
 
-/// A silhouettes' op whose faces reach as far as those of this one: an edge softness reaches as far as its table.
+/// A `ProfileSum` that only provides the support of faces for the colour op: that of the edge table.
 pub(super) fn as_sum(op: &SoftBlend) -> ProfileSum {
     ProfileSum {
         culls: op.culls,
@@ -138,8 +138,8 @@ impl<'a> Blend<'a> {
         image
     }
 
-    /// Gradients of `Σ upstream · image` to vertices, attributes, tables, background and texture, flat; in a pass of second order their
-    /// derivatives, and that of the image. Those of tables and texture are there if they are wanted.
+    /// Gradients of `Σ upstream · image` with respect to vertices, attributes, tables, background and texture, flat; in a pass of second
+    /// order their derivatives, and that of the image. Tables and texture are included if they are wanted.
     pub(super) fn gradient(&self, upstream: Buffer, of_tables: bool, of_texels: bool) -> Gradient {
         let upstream = into_contiguous(upstream);
         let (views, channels) = (self.pass.views, self.channels);
@@ -192,7 +192,7 @@ impl<'a> Blend<'a> {
         Gradient { vertices, attributes, tables, background, texture, image }
     }
 
-    /// The gradient of the background, added up over all pixels.
+    /// The gradient of the background, summed over all pixels.
     fn background(&self, pixels: Buffer) -> Buffer {
         let (count, numbers) = (self.pass.pixels(), self.channels + 1);
         let cubes = count.div_ceil(16 * table::UNITS as usize).clamp(1, 256);
@@ -219,12 +219,12 @@ impl<'a> Blend<'a> {
         out
     }
 
-    /// Numbers of the image of all views.
+    /// Length of the image of all views.
     fn image_length(&self) -> usize {
         self.pass.pixels() * (self.channels + 1)
     }
 
-    /// Draws some views: writes to `image`, and with `pull` what gradients need to `pixels`.
+    /// Draws some views: writes to `image`, and with `pull` the intermediates of gradients to `pixels`.
     fn write_pixels(
         &self,
         faces: &Prepared,
@@ -300,7 +300,7 @@ impl<'a> Blend<'a> {
         of_faces
     }
 
-    /// Adds the gradient of both tables, of so many `rows` together, to `partial`.
+    /// Adds the gradient of both tables, of `rows` rows in total, to `partial`.
     fn add_cubics(
         &self,
         faces: &Prepared,
@@ -322,13 +322,13 @@ impl<'a> Blend<'a> {
         );
     }
 
-    /// A gradient to all numbers of the texture, of no terms.
+    /// A zero gradient of the texture.
     fn no_texels(&self) -> Texels {
         let count = self.numbers.shape().num_elements() - self.starts[2];
         Texels { sums: self.pass.zeros(MEASURED + 2 * count, DType::U32), count }
     }
 
-    /// Finds the largest size of a term with `measure`, else adds up all.
+    /// With `measure` computes the largest magnitude of a term, else sums all terms.
     fn add_texels(
         &self,
         faces: &Prepared,
@@ -350,7 +350,7 @@ impl<'a> Blend<'a> {
         );
     }
 
-    /// The terms added up, as floats.
+    /// The summed terms, as floats.
     fn floats(&self, texels: Texels) -> Buffer {
         let gradient = self.pass.buffer(texels.count, DType::F32);
         texel_floats::launch(
@@ -364,7 +364,7 @@ impl<'a> Blend<'a> {
         gradient
     }
 
-    /// What the kernels read.
+    /// The inputs of the kernels.
     fn drawn(&self, faces: &Prepared) -> BlendInputsLaunch<WgpuRuntime> {
         BlendInputsLaunch::new(
             faces.corners.clone().into_array_arg(),
@@ -381,23 +381,23 @@ impl<'a> Blend<'a> {
         )
     }
 
-    /// A cube for each part of a face.
+    /// One cube per part of a face.
     fn parts(&self, faces: &Prepared) -> CubeCount {
         let groups = faces.views * self.op.faces.len() + SLOTS as usize;
         self.pass.cubes(groups * blend::UNITS as usize, blend::UNITS)
     }
 
-    /// Numbers of a face in a gradient.
+    /// Numbers per face in a gradient.
     fn of_face(&self) -> usize {
         9 + 3 * self.kind().numbers()
     }
 
-    /// The direction; any buffer where there is none, as nothing then reads it.
+    /// The direction; without one any buffer, since it is not read.
     fn direction(&self) -> Buffer {
         self.direction.as_ref().unwrap_or(&self.numbers).clone()
     }
 
-    /// Where the derivatives of the numbers begin in the direction.
+    /// Start of the derivatives of the numbers in the direction.
     fn along(&self) -> usize {
         if self.pass.second() { 3 * self.pass.views * self.pass.vertex_count } else { 0 }
     }

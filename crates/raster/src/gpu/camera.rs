@@ -1,4 +1,4 @@
-//! Cameras: from the numbers of an orbit to a matrix, and from points to what the camera sees, as `ops/elementary/camera.rs` has it.
+//! Cameras: orbits to matrices, and perspective projection of points, as in `ops/elementary/camera.rs`.
 
 use cubecl::prelude::*;
 
@@ -25,11 +25,11 @@ struct Angle {
 
 #[cube]
 impl Angle {
-    /// From sums and products alone: a GPU's own sine and cosine may be off by 2^-11 (WebGPU Shading Language, Accuracy of Built-in Functions),
-    /// which a loss shows.
+    /// Uses sums and products only: the built-in sine and cosine of a GPU may be off by 2^-11 (WebGPU Shading Language, Accuracy of
+    /// Built-in Functions), which is visible in a loss.
     fn of_degrees(angle: Dual) -> Angle {
         let turns = angle.value * (1.0f32 / 360.0f32);
-        // Half the angle that is left, within a right angle, where the next terms are below 1e-8.
+        // Half the remaining angle, within a right angle, where the next terms are below 1e-8.
         let half = (turns - f32::round(turns)) * PI;
         let x = half * half;
         let odd = 1.0f32 - x / 156.0f32;
@@ -61,7 +61,7 @@ struct Orbit {
     elevation: Angle,
     azimuth: Angle,
     focal: Dual,
-    /// Which way is up: 1, or -1 past a pole.
+    /// Sign of the up direction: 1, or -1 past a pole.
     roll: f32,
 }
 
@@ -88,7 +88,7 @@ impl Orbit {
     }
 }
 
-/// Which way is up at an elevation in degrees: 1, or -1 past a pole, but not at it.
+/// Sign of the up direction at an elevation in degrees: 1, or -1 past a pole, but not at it.
 #[cube]
 fn roll(elevation: f32) -> f32 {
     let past = elevation + 90.0f32;
@@ -96,7 +96,7 @@ fn roll(elevation: f32) -> f32 {
     select(past > 180.0f32 && past < 360.0f32, -1.0f32, 1.0f32)
 }
 
-/// Writes the matrices of orbits `[views, 4]`, `[views, 3, 4]`: one unit a view.
+/// Writes the matrices of orbits `[views, 4]`, `[views, 3, 4]`: one unit per view.
 #[cube(launch)]
 pub(super) fn orbit_matrices(
     orbits: &Array<f32>,
@@ -128,7 +128,7 @@ pub(super) fn orbit_matrices(
     matrices[at + 11] = orbit.distance.stored(second);
 }
 
-/// Writes the gradient of `Σ upstream · matrices` to orbits: one unit a view.
+/// Writes the gradient of `Σ upstream · matrices` with respect to the orbits: one unit per view.
 #[cube(launch)]
 pub(super) fn to_orbits(
     orbits: &Array<f32>,
@@ -150,7 +150,7 @@ pub(super) fn to_orbits(
     let (u4, u5, u6) = (upstream[at + 4], upstream[at + 5], upstream[at + 6]);
     let (u8, u9, u10) = (upstream[at + 8], upstream[at + 9], upstream[at + 10]);
     let up = orbit.focal.scale(orbit.roll);
-    // What the upstream makes of the second row over the third: the same of sines and cosines of the azimuth.
+    // The upstream's second and third rows, combined with sine and cosine of the azimuth, and their derivatives (`beside`).
     let ahead = ca.scale(u6).sub(sa.scale(u4));
     let ahead_below = ca.scale(u10).sub(sa.scale(u8));
     let beside = ca.scale(u4).add(sa.scale(u6)).scale(-1.0f32);
@@ -170,7 +170,7 @@ pub(super) fn to_orbits(
     gradient[first + 3] = by_fov.scale(DEGREE).stored(second);
 }
 
-/// Points and the cameras that see them, as kernels read them.
+/// Points and the cameras that project them, as inputs of kernels.
 #[derive(CubeType, CubeLaunch)]
 pub(super) struct Seen {
     /// `[1 or views, points, 3]`.
@@ -181,7 +181,7 @@ pub(super) struct Seen {
     direction: Array<f32>,
     count: u32,
     views: u32,
-    /// Numbers of the points of a view that has its own, else 0, and of all points.
+    /// Length of the points of a view, 0 if all views share them; and of all points.
     per_view: u32,
     all: u32,
 }
@@ -203,14 +203,14 @@ struct Point {
     z: Dual,
 }
 
-/// A point that a camera sees.
+/// A projected point.
 #[derive(CubeType, Clone, Copy)]
 struct Projected {
     at: Point,
     x: Dual,
     y: Dual,
     depth: Dual,
-    /// One over the depth that divides.
+    /// One over the depth used as divisor.
     inverse: Dual,
 }
 
@@ -222,7 +222,7 @@ impl Row {
     }
 }
 
-/// A coordinate held where it is far away: then it depends on nothing. What is no number stays.
+/// A coordinate clamped to the farthest position, where its derivative is 0. NaN stays.
 #[cube]
 fn held(number: Dual) -> Dual {
     let bits = u32::reinterpret(number.value) & SIZE;
@@ -244,7 +244,7 @@ impl Seen {
         }
     }
 
-    /// Where the point of a view stands.
+    /// Index of a point of a view.
     fn place(&self, view: u32, point: u32) -> usize {
         (view * self.per_view + 3u32 * point) as usize
     }
@@ -273,13 +273,13 @@ impl Seen {
         }
     }
 
-    /// The gradient to x and y times the depth and to the depth, of `Σ upstream · seen`.
+    /// The gradient of `Σ upstream · seen` with respect to x and y times the depth, and to the depth.
     fn to_rows(&self, seen: Projected, upstream: &Array<f32>, view: u32, point: u32) -> Point {
         let at = (3u32 * view * self.count + point) as usize;
         let count = self.count as usize;
         let to_x = seen.inverse.scale(upstream[at]);
         let to_y = seen.inverse.scale(upstream[at + count]);
-        // A depth that is held divides without feeling it.
+        // A clamped depth has no derivative as a divisor.
         let through = seen.x.mul(to_x).add(seen.y.mul(to_y));
         let zero = Dual::constant(0.0f32);
         let through = Dual::select(seen.depth.value < DEPTH, zero, through);
@@ -287,7 +287,7 @@ impl Seen {
     }
 }
 
-/// Writes what cameras see, `[views, 3, points]`: one unit for each point of each view.
+/// Writes projected points, `[views, 3, points]`: one unit per point and view.
 #[cube(launch)]
 pub(super) fn perspective(seen: &Seen, out: &mut Array<f32>, #[comptime] second: bool) {
     let own = ABSOLUTE_POS as u32;
@@ -303,7 +303,7 @@ pub(super) fn perspective(seen: &Seen, out: &mut Array<f32>, #[comptime] second:
     out[at + 2 * count] = projected.depth.stored(second);
 }
 
-/// Writes the gradient of `Σ upstream · seen` to the points: one unit each, over all views that see it.
+/// Writes the gradient of `Σ upstream · seen` with respect to the points: one unit each, over all views of the point.
 #[cube(launch)]
 pub(super) fn to_points(
     seen: &Seen,
@@ -340,7 +340,7 @@ pub(super) fn to_points(
     gradient[at + 2] = z;
 }
 
-/// Writes the gradient of `Σ upstream · seen` to the matrices: one cube a view.
+/// Writes the gradient of `Σ upstream · seen` with respect to the matrices: one cube per view.
 #[cube(launch)]
 pub(super) fn to_matrices(
     seen: &Seen,

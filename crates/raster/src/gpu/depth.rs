@@ -1,4 +1,4 @@
-//! How much a point counts by its depth, as `blend/depth.rs` of `kernel` has it.
+//! Depth weights of points, as in `blend/depth.rs` of `kernel`.
 
 use cubecl::prelude::*;
 
@@ -8,7 +8,7 @@ use super::{
     table::add_powers,
 };
 
-/// A logarithm of a weight by depth, and its derivative by the nearness.
+/// The logarithm of a depth weight, and its derivative with respect to the nearness.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct ByDepth {
     pub(super) log: Dual,
@@ -17,7 +17,7 @@ pub(super) struct ByDepth {
 
 #[cube]
 impl ByDepth {
-    /// What a point at `x`, its nearness less 1, counts.
+    /// The depth weight of a point at `x`, its nearness less 1.
     pub(super) fn at(x: Dual, drawn: &BlendInputs, #[comptime] kind: BlendSpec) -> ByDepth {
         let weights = drawn.weights;
         let zero = Dual::constant(0.0f32);
@@ -49,7 +49,7 @@ impl ByDepth {
     }
 }
 
-/// Adds to the gradient of the table by depth, which begins at `first`, of a function with this derivative by the logarithm at `x`.
+/// Adds to the gradient of the depth table, which starts at `first`; `by_log` is the derivative with respect to the logarithm at `x`.
 #[cube]
 pub(super) fn pull_depth(
     x: Dual,

@@ -1,7 +1,7 @@
-//! Dual numbers in kernels: the formulas of a pass and of its derivative are one text.
+//! Dual numbers in kernels: one source for the formulas of a pass and of its derivative.
 //!
-//! Every kernel computes with them. Where a pass stores values alone, nothing reads the tangents and
-//! the driver's compiler drops them, so that the first order pays nothing for the second.
+//! All kernels compute with them. If a pass stores only values, the tangents are unused and the driver's compiler removes them, so the
+//! first order has no overhead.
 
 use cubecl::prelude::*;
 
@@ -64,7 +64,7 @@ impl Dual {
         }
     }
 
-    /// What a pass stores: the derivative in a second-order pass, else the value.
+    /// The number that a pass stores: the derivative in a pass of second order, else the value.
     pub(super) fn stored(self, #[comptime] second: bool) -> f32 {
         if second { self.tangent } else { self.value }
     }

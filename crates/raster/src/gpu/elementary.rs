@@ -1,4 +1,4 @@
-//! Passes of the small ops around the rasterizer: which kernels run over which buffers.
+//! Passes of the small ops around the rasterizer: the launches of their kernels and their buffers.
 
 use softrast_tensor::{
     DType, FloatTensor, FloatTensorOps, Shape, TensorMetadata,
@@ -62,7 +62,7 @@ pub(super) fn run(op: ElementaryOp, pass: &Pass, tensors: Vec<Buffer>) -> FloatT
     }
 }
 
-/// Flat tensors one after the other.
+/// Concatenates flat tensors.
 fn joined(mut parts: Vec<Buffer>) -> Buffer {
     if parts.len() == 1 { parts.remove(0) } else { Wgpu::float_cat(parts, 0) }
 }
@@ -72,7 +72,7 @@ impl Elementary {
         self.direction.is_some()
     }
 
-    /// The direction; any buffer where there is none, as nothing then reads it.
+    /// The direction; without one any buffer, since it is not read.
     fn direction(&self) -> Buffer {
         self.direction.as_ref().unwrap_or(&self.inputs[0]).clone()
     }
@@ -85,7 +85,7 @@ impl Elementary {
         calculate_cube_count_elemwise(self.client(), jobs, CubeDim::new_1d(units))
     }
 
-    /// A flat buffer that nothing has been written to.
+    /// An uninitialised flat buffer.
     fn buffer(&self, length: usize) -> Buffer {
         let handle = self.client().empty(length * DType::F32.size());
         let device = self.inputs[0].device.clone();
@@ -257,7 +257,7 @@ impl Elementary {
         )
     }
 
-    /// Pixels of an image.
+    /// Number of pixels of an image.
     fn pixels(&self) -> usize {
         length(&self.inputs[0]) / self.inputs[0].shape()[0].max(1)
     }
@@ -266,7 +266,7 @@ impl Elementary {
         self.pixels().div_ceil(BLOCK as usize)
     }
 
-    /// Two images of each view.
+    /// Two images per view.
     fn compared(&self) -> ComparedLaunch<WgpuRuntime> {
         let [one, other] = &self.inputs[..] else { panic!("two images") };
         let pixels = self.pixels();

@@ -1,4 +1,4 @@
-//! The arithmetic of one pixel and one face in colour, as `blend/{point,walk}.rs` of `kernel` have it.
+//! The arithmetic of one pixel and one face in colour, as in `blend/{point,walk}.rs` of `kernel`.
 
 use cubecl::prelude::*;
 
@@ -12,7 +12,7 @@ use super::{
 };
 use softrast_kernel::blend::AREA;
 
-/// [`AREA`] in the floats of kernels.
+/// [`AREA`] as an f32.
 #[allow(clippy::cast_possible_truncation)]
 const LEAST_AREA: f32 = AREA as f32;
 
@@ -55,21 +55,21 @@ impl Corners {
     }
 }
 
-/// A face with what its pairs share.
+/// A face with the numbers shared by its pairs.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct FaceAttributes {
     face: Face,
-    /// One over the doubled area, signed; 0 for a face without an inside that counts.
+    /// One over the doubled area, signed; 0 for a face whose area is too small to divide by.
     per_area: Dual,
     /// One over the depth of each corner.
     pub(super) per_depth: Corners,
-    /// Where the attributes of its corners begin.
+    /// Start of the attributes of its corners.
     entry_a: u32,
     entry_b: u32,
     entry_c: u32,
 }
 
-/// What a face is to a pixel.
+/// A face at a pixel.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct ColourPair {
     closest: Closest,
@@ -79,30 +79,30 @@ pub(super) struct ColourPair {
     boundary: Corners,
     pub(super) barycentric: Corners,
     pub(super) depth: Dual,
-    /// Those of the nearest point on the face itself.
+    /// Barycentric weights of the nearest point on the face itself.
     pub(super) weights: Corners,
-    /// Where the table by edges is read, the logarithm of the edge softness and its derivative by the squared distance.
+    /// Position in the edge table, the logarithm of the edge softness and its derivative with respect to the squared distance.
     edge: TablePosition,
     pub(super) log_edge: Dual,
     pub(super) edge_slope: Dual,
-    /// The nearness less 1, the logarithm of the weight by depth and its derivative by the nearness.
+    /// The nearness less 1, the logarithm of the depth weight and its derivative with respect to the nearness.
     x: Dual,
     pub(super) log_depth: Dual,
     pub(super) depth_slope: Dual,
 }
 
-/// What a pair shows of the objective: what it is at the point, and how it changes with the attributes of the three corners, were the point
-/// there.
+/// The objective at a pair: its value at the point, and its derivatives with respect to the attributes of the three corners, as if the
+/// point were there.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Seen {
     pub(super) here: Dual,
     pub(super) at_corners: Corners,
-    /// Derivatives by the place on a texture, if there is one.
+    /// Derivatives with respect to the texture coordinates, if there is a texture.
     pub(super) by_u: Dual,
     pub(super) by_v: Dual,
 }
 
-/// What a pair counts relative to a weight: all of it, and the part that the edge softness makes before its floor is taken off.
+/// Relative weight of a pair: the weight, and its part before the floor of the edge softness is subtracted.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Share {
     pub(super) whole: Dual,
@@ -131,7 +131,7 @@ impl FaceAttributes {
         )
     }
 
-    /// The face whose prepared numbers start at `first` in `corners`; `entries` `[faces, 3]` names the attributes at its corners.
+    /// The face with prepared numbers from `first` on in `corners`; `entries` `[faces, 3]` are the attribute entries at corners.
     fn new(
         corners: &Array<f32>,
         first: usize,
@@ -178,7 +178,7 @@ impl FaceAttributes {
         }
     }
 
-    /// Where a pair sees the texture.
+    /// The texture at the point of a pair.
     pub(super) fn sample(
         self,
         pair: ColourPair,
@@ -190,7 +190,7 @@ impl FaceAttributes {
         Sample::at(u, v, drawn.weights)
     }
 
-    /// What a pair shows under an upstream, the first channel of which stands at `first`.
+    /// The objective at a pair for an upstream, whose first channel is at `first`.
     pub(super) fn seen(
         self,
         pair: ColourPair,
@@ -203,7 +203,7 @@ impl FaceAttributes {
         let zero = Dual::constant(0.0f32);
         if kind.is_textured {
             let sample = self.sample(pair, drawn, kind);
-            // Kept in an array, as a loop changes no struct.
+            // An array, since a loop cannot update a struct.
             let mut sums = Array::<f32>::new(8usize);
             for k in 0..8usize {
                 sums[k] = 0.0f32;
@@ -274,7 +274,7 @@ impl FaceAttributes {
             c: self.face.first.area(px, py),
         };
         let barycentric = Corners::select(within, own.times(self.per_area), boundary);
-        // 1 / z is what interpolates linearly on the screen.
+        // 1 / z interpolates linearly on the screen.
         let parts = barycentric.mul(self.per_depth);
         let depth = parts.sum().recip();
 
@@ -298,8 +298,8 @@ impl FaceAttributes {
         }
     }
 
-    /// Gradient to x and y of a corner, of a function with these derivatives by the squared distance and by the barycentric weights; see
-    /// `blend/point.rs` of `kernel`.
+    /// Gradient with respect to x and y of the corners, given the derivatives of a function with respect to the squared distance and to the
+    /// barycentric weights; see `blend/point.rs` of `kernel`.
     pub(super) fn pulled(self, pair: ColourPair, by_distance2: Dual, by_weights: Corners) -> Moved {
         let zero = Dual::constant(0.0f32);
         let (w0, w1, w2) = (by_weights.a, by_weights.b, by_weights.c);
@@ -307,13 +307,13 @@ impl FaceAttributes {
         let closest = pair.closest;
         let within = pair.within > 0.5f32;
         let (first, second) = (closest.edge == 0, closest.edge == 1);
-        // Of the pixel itself.
+        // For the pixel itself.
         let inner_x = zero
             .sub(w0.mul(e1.along_y).add(w1.mul(e2.along_y)).add(w2.mul(e0.along_y)))
             .mul(self.per_area);
         let inner_y =
             w0.mul(e1.along_x).add(w1.mul(e2.along_x)).add(w2.mul(e0.along_x)).mul(self.per_area);
-        // Of a point of an edge that is not held at one of its ends.
+        // For a point of an edge that is not clamped to one of its ends.
         let slide = Dual::select(first, w1.sub(w0), Dual::select(second, w2.sub(w1), w0.sub(w2)));
         let edge_x = Dual::select(first, e0.along_x, Dual::select(second, e1.along_x, e2.along_x));
         let edge_y = Dual::select(first, e0.along_y, Dual::select(second, e1.along_y, e2.along_y));
@@ -330,7 +330,7 @@ impl FaceAttributes {
     }
 }
 
-/// What moves the corners of a face at a pair.
+/// Contributions of a pair to the gradient of the corners.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Moved {
     field_x: Dual,
@@ -342,18 +342,18 @@ pub(super) struct Moved {
 
 #[cube]
 impl Moved {
-    /// The gradient to x of the corners.
+    /// The gradient with respect to x of the corners.
     pub(super) fn x(self, pair: ColourPair) -> Corners {
         corners(pair, self.pull.x, self.field_x, self.across_x)
     }
 
-    /// The gradient to y of the corners.
+    /// The gradient with respect to y of the corners.
     pub(super) fn y(self, pair: ColourPair) -> Corners {
         corners(pair, self.pull.y, self.field_y, self.across_y)
     }
 }
 
-/// The gradient to the corners along an axis. What is across pushes the first corner of the closest edge back and its second one on.
+/// The gradient of the corners along an axis. `across` acts against the first corner of the closest edge and towards its second.
 #[cube]
 fn corners(pair: ColourPair, pull: Dual, field: Dual, across: Dual) -> Corners {
     let zero = Dual::constant(0.0f32);
@@ -374,7 +374,7 @@ fn corners(pair: ColourPair, pull: Dual, field: Dual, across: Dual) -> Corners {
 
 #[cube]
 impl ColourPair {
-    /// Adds to the gradient of both tables, which begins at `own`, of a function with these derivatives by the logarithms of the weights.
+    /// Adds to the gradient of both tables, which starts at `own`, given the derivatives with respect to the logarithms of the weights.
     pub(super) fn pull_tables(
         self,
         by_edge: Dual,
@@ -391,17 +391,17 @@ impl ColourPair {
         pull_depth(self.x, by_depth, drawn, partial, first, kind);
     }
 
-    /// Whether it counts at all, and is above the floor by more than rounding leaves.
+    /// Whether the edge softness exceeds its floor by more than rounding errors.
     pub(super) fn counts(self, weights: BlendParams) -> bool {
         self.log_edge.value > weights.counts_from
     }
 
-    /// What it counts relative to a weight with this logarithm.
+    /// The share relative to a weight with this logarithm.
     pub(super) fn share(self, relative: Dual, weights: BlendParams) -> Share {
         let by_depth = self.log_depth.sub(relative);
         let whole = self.log_edge.add(by_depth).exp();
         let rest = 1.0f32 / (1.0f32 - weights.floor);
-        // Far from the pixel, a near face without its edge may be beyond the range of floats; it does not count.
+        // Far from the pixel, the depth factor of a near face may exceed the range of floats; such a face does not count.
         let floor = by_depth.exp().scale(weights.floor);
         let has_floor = weights.floor > 0.0f32;
         let less = Dual::select(has_floor, whole.sub(floor).scale(rest), whole);

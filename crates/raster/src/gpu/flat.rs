@@ -1,4 +1,4 @@
-//! Tensors that hold several, one after the other.
+//! Tensors that hold several, concatenated.
 
 use softrast_tensor::{FloatDType, FloatTensor, FloatTensorOps, Slice, TensorMetadata};
 
@@ -8,7 +8,7 @@ pub(super) fn length(tensor: &FloatTensor<Wgpu>) -> usize {
     tensor.shape().num_elements()
 }
 
-/// Parts of a flat tensor that are wanted, flat.
+/// The wanted parts of a flat tensor, concatenated.
 pub(super) fn parts(
     flat: FloatTensor<Wgpu>,
     lengths: &[usize],
@@ -28,7 +28,7 @@ pub(super) fn parts(
     if chosen.len() == 1 { chosen.remove(0) } else { Wgpu::float_cat(chosen, 0) }
 }
 
-/// The inverse: zeros where a part is missing.
+/// The inverse of [`parts`]: zeros in place of missing parts.
 pub(super) fn whole_direction(
     flat: FloatTensor<Wgpu>,
     lengths: &[usize],

@@ -1,8 +1,8 @@
-//! The image: its pixels and where they lie.
+//! Layout of the image: its pixels and their centres.
 
 use cubecl::prelude::*;
 
-/// An [`ImageSize`](crate::ImageSize), as kernels know it.
+/// An [`ImageSize`](crate::ImageSize) in kernels.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
 pub(super) struct Frame {
     pub(super) height: u32,
@@ -25,7 +25,7 @@ impl Frame {
             / f32::cast_from(self.shorter)
     }
 
-    /// Where a pixel of a view stands in an image of all views.
+    /// Index of a pixel of a view in an image of all views.
     pub(super) fn pixel(self, view: u32, row: u32, column: u32) -> u32 {
         (view * self.height + row) * self.width + column
     }

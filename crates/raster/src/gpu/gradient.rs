@@ -1,5 +1,5 @@
-//! The gradient to the vertices, gathered: first per face over its pixels, then per vertex over its
-//! corners. WGSL has no atomic addition of floats, and a gather always sums in one order.
+//! The gradient with respect to the vertices, gathered: first per face over its pixels, then per vertex over its corners. WGSL has no
+//! atomic addition of floats, and a gather has a fixed order of summation.
 
 use cubecl::prelude::*;
 
@@ -13,7 +13,7 @@ use super::{
 /// Units of a cube.
 pub(super) const UNITS: u32 = 64;
 
-/// Writes the gradient of each face to x and y of its three corners, and behind those of faces those of parts: `gradient` becomes
+/// Writes the gradient of each face with respect to x and y of its corners, and after these those of parts: `gradient` becomes
 /// `[views · faces + slots, 6]`. `lanes` units share a part.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
@@ -62,7 +62,7 @@ pub(super) fn sum_faces(
         cy += y.mul(pair.weight(2u32)).stored(second);
         pixel += lanes;
     }
-    // The units of a part add up one corner coordinate after the other.
+    // The units of a part sum one corner coordinate after the other.
     let mut shares = SharedMemory::<f32>::new(comptime!(6 * UNITS as usize));
     let at = UNIT_POS as usize;
     shares[at] = ax;
@@ -90,11 +90,11 @@ pub(super) fn sum_faces(
     }
 }
 
-/// Adds up `count` numbers of the corners of each vertex into `gradient`, one unit for each of its `rows` numbers, of which those behind are 0:
-/// `[views, rows, vertices]`, or with `by_vertex` `[views, vertices, rows]`.
+/// Sums `count` numbers of the corners of each vertex into `gradient`, one unit for each of its `rows` numbers, of which those after
+/// `count` are 0: `[views, rows, vertices]`, or with `by_vertex` `[views, vertices, rows]`.
 ///
-/// `of_faces` is `[views · faces + slots, stride]`, with the numbers of the three corners from `first` on. `corners` starts with the place of
-/// each vertex's first corner, `[vertices + 1]`; the corners follow, each as `3 * face + corner`.
+/// `of_faces` is `[views · faces + slots, stride]`, with the numbers of the three corners from `first` on. `corners` starts with the offset
+/// of each vertex's first corner, `[vertices + 1]`; the corners follow, each as `3 * face + corner`.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn gather_corners(

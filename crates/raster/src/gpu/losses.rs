@@ -1,4 +1,4 @@
-//! Coverage of every pixel of an image, and losses that compare two, as `ops/elementary/image.rs` has it.
+//! Coverage of every pixel of an image, and losses between two images, as in `ops/elementary/image.rs`.
 
 use cubecl::prelude::*;
 use softrast_kernel::EMPTY;
@@ -12,7 +12,7 @@ const _: () = assert!(UNITS == 256, "sums of a cube begin with halves of 128");
 
 const NOTHING: f32 = EMPTY as f32;
 
-/// Writes `1 - exp(-sums)`: one unit a pixel.
+/// Writes `1 - exp(-sums)`: one unit per pixel.
 #[cube(launch)]
 pub(super) fn coverage(
     sums: &Array<f32>,
@@ -30,7 +30,7 @@ pub(super) fn coverage(
     out[pixel] = Dual::constant(1.0f32).sub(through).stored(second);
 }
 
-/// Writes the gradient of `Σ upstream · coverage` to the sums: one unit a pixel.
+/// Writes the gradient of `Σ upstream · coverage` with respect to the sums: one unit per pixel.
 #[cube(launch)]
 pub(super) fn to_sums(
     sums: &Array<f32>,
@@ -49,24 +49,24 @@ pub(super) fn to_sums(
     gradient[pixel] = through.scale(upstream[pixel]).stored(second);
 }
 
-/// Two images of each view, and what compares them: `[views, pixels]`, or `[1, pixels]` for all views.
+/// Two images per view: `[views, pixels]`, or `[1, pixels]` for all views.
 #[derive(CubeType, CubeLaunch)]
 pub(super) struct Compared {
     one: Array<f32>,
     other: Array<f32>,
     /// Derivatives of both.
     direction: Array<f32>,
-    /// Pixels of a view, and of one image before those of the next view: 0 where it is that of all views.
+    /// Pixels of a view, and the stride of each image between views: 0 if all views share the image.
     pixels: u32,
     one_step: u32,
     other_step: u32,
-    /// Where the derivatives of the second begin.
+    /// Start of the derivatives of the second image.
     along: u32,
     views: u32,
     blocks: u32,
 }
 
-/// Terms of two numbers: the squared difference, or the overlap and the union.
+/// Terms of two pixels: the squared difference, or intersection and union.
 #[derive(CubeType, Clone, Copy)]
 struct Terms {
     first: Dual,
@@ -104,7 +104,7 @@ impl Compared {
     }
 }
 
-/// Adds up four numbers of all units of a cube, and writes them from `at` on.
+/// Sums four numbers over all units of a cube, and writes them from `at` on.
 #[cube]
 fn add_up(first: Dual, second: Dual, out: &mut Array<f32>, at: usize) {
     let mut shares = SharedMemory::<f32>::new(comptime!(4 * UNITS as usize));
@@ -130,7 +130,7 @@ fn add_up(first: Dual, second: Dual, out: &mut Array<f32>, at: usize) {
     }
 }
 
-/// Writes what the pixels of each block add to, `[views, blocks, 4]` with derivatives: a cube for each block of each view.
+/// Writes the sums of each block of pixels, `[views, blocks, 4]` with derivatives: one cube per block and view.
 #[cube(launch)]
 pub(super) fn add_blocks(
     images: &Compared,
@@ -162,7 +162,7 @@ pub(super) fn add_blocks(
     add_up(first, second, partial, 4 * job as usize);
 }
 
-/// Adds up the blocks of each view to `totals` `[views, 4]`: a cube for each.
+/// Sums the blocks of each view into `totals` `[views, 4]`: one cube per view.
 #[cube(launch)]
 pub(super) fn add_views(partial: &Array<f32>, totals: &mut Array<f32>, views: u32, blocks: u32) {
     let view = CUBE_POS as u32;
@@ -187,7 +187,7 @@ pub(super) fn add_views(partial: &Array<f32>, totals: &mut Array<f32>, views: u3
     add_up(first, second, totals, 4 * view as usize);
 }
 
-/// The overlap of a view, and one over its union.
+/// The intersection of a view, and one over its union.
 #[derive(CubeType, Clone, Copy)]
 struct Overlap {
     overlap: Dual,
@@ -231,7 +231,7 @@ pub(super) fn judge(
     losses[view as usize] = loss.stored(second);
 }
 
-/// Writes the gradient of `Σ upstream · losses` to one of the images: one unit a pixel, over all views that it is compared with.
+/// Writes the gradient of `Σ upstream · losses` with respect to one of the images: one unit per pixel, over all views of the image.
 #[cube(launch)]
 pub(super) fn to_image(
     images: &Compared,

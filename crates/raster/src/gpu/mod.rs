@@ -1,10 +1,9 @@
-//! The fused op on the GPU: `CubeCL` kernels over the tensors of the wgpu backend, in f32.
+//! The fused ops on the GPU: `CubeCL` kernels over the tensors of the wgpu backend, in f32.
 //!
-//! Sums are those of `softrast-kernel` in another order of loops: everything goes face by face. A few units share a face and add its terms to
-//! the pixels of its bounding box, as whole numbers, by atomic operations, whose order does not matter; so no pixel has to know which faces reach
-//! it, and nothing is culled, sorted or read back. Gradients to vertices are gathered, first per face over its pixels, then per vertex over its
-//! faces. Cameras and losses are kernels too, so that a step launches fewer than twenty. The same numbers come out at every call. The second
-//! order is the same kernels over dual numbers.
+//! They compute the sums of `softrast-kernel` face by face. A few units share a face and add its terms to the pixels of its bounding box as
+//! integers, by atomic operations whose order does not matter. So no kernel needs the faces of a pixel, and nothing is culled, sorted or
+//! read back. Vertex gradients are gathered, first per face over its pixels, then per vertex over its faces. Cameras and losses are kernels
+//! too, so a step launches fewer than twenty. Results are deterministic. The second order uses the same kernels over dual numbers.
 
 #[cfg(not(target_family = "wasm"))]
 mod adapter;
@@ -86,7 +85,7 @@ impl RasterBackend for Wgpu {
     }
 }
 
-/// A pass of the op of colours.
+/// A pass of the colour op.
 fn blended(op: &SoftBlend, pass: &Pass, tensors: Vec<FloatTensor<Wgpu>>) -> FloatTensor<Wgpu> {
     let count = 4 + usize::from(op.texture.is_some());
     let mut inputs = tensors;

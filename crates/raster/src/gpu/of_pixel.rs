@@ -1,4 +1,4 @@
-//! Inputs of the gradient kernels for each pixel.
+//! Per-pixel inputs of the gradient kernels.
 
 use cubecl::prelude::*;
 
@@ -7,7 +7,7 @@ use super::{
     dual::Dual,
 };
 
-/// Numbers of a pixel that a gradient needs: the logarithm of all weights, and what the image is to the upstream, with their derivatives.
+/// Numbers per pixel: the logarithm of the sum of all weights, and the dot product of image and upstream, with their derivatives.
 pub(super) const OF_PIXEL: usize = 4;
 
 /// The numbers of a pixel.
@@ -19,7 +19,7 @@ pub(super) struct OfPixel {
 
 #[cube]
 impl OfPixel {
-    /// Where those of a pixel of a view of the launch begin, and behind them the gradient of the background.
+    /// Start of the numbers of a pixel of a view of the launch; the gradient of the background follows them.
     pub(super) fn at(
         drawn: &BlendInputs,
         view: u32,

@@ -1,4 +1,4 @@
-//! The arithmetic of one pixel and one face, as `{face,pair,table}.rs` of `kernel` have it.
+//! The arithmetic of one pixel and one face, as in `{face,pair,table}.rs` of `kernel`.
 
 use cubecl::prelude::*;
 
@@ -6,27 +6,27 @@ use super::dual::{Dual, load};
 
 /// Edge vectors shorter than this (NDC², squared length) count as a point.
 const POINT: f32 = 1e-30;
-/// Triangles lower than this part of their longest edge count as slivers.
+/// Triangles lower than this fraction of their longest edge count as slivers.
 const SLIVER: f32 = 1e-3;
-/// Largest rate at which a place in a cell moves with the squared distance, in NDC⁻².
+/// Largest rate at which a position in a cell changes with the squared distance, in NDC⁻².
 const STEEPEST: f32 = 1e30;
 /// Bits of the fraction of an f32, and the bias of its exponent.
 const MANTISSA: u32 = 23;
 const BIAS: u32 = 127;
 
-/// Where the cells of a profile table lie: a [`Grid`](softrast_kernel::Grid) prepared for look-ups.
+/// Layout of the cells of a profile table: a [`Grid`](softrast_kernel::Grid) prepared for look-ups.
 #[derive(CubeType, CubeLaunch, Clone, Copy)]
 pub(super) struct Lookup {
-    /// From squared distances to what places are read from, without its start.
+    /// Factor from squared distances to z, relative to its start.
     pub(super) inverse_outer: f32,
     pub(super) inverse_inner: f32,
-    /// Scaled squared distances at which the cells begin; 0 without `far`.
+    /// Scaled squared distances at which the cells start; 0 without `far`.
     pub(super) before_outer: f32,
     pub(super) before_inner: f32,
     pub(super) start: f32,
     pub(super) octaves: u32,
     pub(super) bits: u32,
-    /// Octaves before the end that are resolved, from `1 - z` to what their cells lie in, and the start of that.
+    /// Octaves resolved before the end, the factor from `1 - z` to positions there, and the start of these.
     pub(super) far: u32,
     pub(super) shrunk: f32,
     pub(super) end: f32,
@@ -36,7 +36,7 @@ pub(super) struct Lookup {
 
 #[cube]
 impl Lookup {
-    /// Where a squared distance lies in the table, on its inner side or not. Without `far` no cell is counted from the far end.
+    /// Position of a squared distance in the table, on its inner side or not. Without `far` no cell is counted from the far end.
     pub(super) fn place(
         self,
         distance2: Dual,
@@ -60,7 +60,7 @@ impl Lookup {
             let rest = select(rest < 0.5f32, rest, 0.5f32) * self.shrunk + self.end;
             let cell = Cell::of(rest, self.far + 1u32, self.bits);
             let is_far = z > 0.5f32;
-            // Counted from its end; one that starts at the middle is not reached.
+            // Counted from the end; the cell that starts at the middle is never reached.
             let last = select(z < 1.0f32, self.cells - 1u32 - cell.index, self.cells);
             index = select(is_far, last, index);
             value = select(is_far, 1.0f32 - cell.place, value);
@@ -69,7 +69,7 @@ impl Lookup {
             rate = select(y.value < before, 0.0f32, rate);
         }
         let row = select(inner, index + self.cells + 1u32, index);
-        // In the tail the cubic is constant; a place of 0 keeps overflow out of it.
+        // The cubic of the tail is constant; a position of 0 avoids overflow.
         let place = Dual { value, tangent: y.tangent * rate };
         let place = Dual::select(z < 1.0f32, place, Dual::constant(0.0f32));
         let slope = rate * inverse;
@@ -77,12 +77,12 @@ impl Lookup {
     }
 }
 
-/// A cell of some octaves below 1, counted by exponent and leading mantissa bits of a number in it, and the place of that in it.
+/// A cell of some octaves below 1, indexed by exponent and leading mantissa bits of a number, and the number's position in it.
 #[derive(CubeType, Clone, Copy)]
 struct Cell {
     index: u32,
     place: f32,
-    /// Rate at which the place moves with the number.
+    /// Rate at which the position changes with the number.
     rate: f32,
 }
 
@@ -98,25 +98,25 @@ impl Cell {
     }
 }
 
-/// Where a squared distance lies in a table.
+/// Position of a squared distance in a table.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct TablePosition {
     /// Row of the table.
     pub(super) row: u32,
-    /// Place within the cell, in [0, 1], and its derivative by the squared distance.
+    /// Position within the cell, in [0, 1], and its derivative with respect to the squared distance.
     pub(super) place: Dual,
     pub(super) rate: f32,
 }
 
 #[cube]
 impl TablePosition {
-    /// The value of the table there.
+    /// The value of the table at this position.
     pub(super) fn value(self, cubic: Cubic) -> Dual {
         let t = self.place;
         cubic.a.add(t.mul(cubic.b.add(t.mul(cubic.c.add(t.mul(cubic.d))))))
     }
 
-    /// Its derivative by the squared distance.
+    /// The derivative of the value with respect to the squared distance.
     pub(super) fn slope(self, cubic: Cubic) -> Dual {
         let t = self.place;
         let by_place = cubic.b.add(t.mul(cubic.c.scale(2.0f32).add(t.mul(cubic.d.scale(3.0f32)))));
@@ -153,7 +153,7 @@ pub(super) struct Closest {
     pub(super) distance2: Dual,
     pub(super) dx: Dual,
     pub(super) dy: Dual,
-    /// Place on its edge, from 0 to 1.
+    /// Position on its edge, from 0 to 1.
     pub(super) along: Dual,
     pub(super) edge: u32,
     /// At least 0 where the pixel is on the inner side of all edges so far.
@@ -162,15 +162,15 @@ pub(super) struct Closest {
     line: f32,
 }
 
-/// What the profile makes of one pixel and one face.
+/// A pixel-face pair and its position in the profile table.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Pair {
     /// Row of the table.
     pub(super) row: u32,
-    /// Place within the cell, in [0, 1], and its derivative by the squared distance.
+    /// Position within the cell, in [0, 1], and its derivative with respect to the squared distance.
     pub(super) place: Dual,
     rate: f32,
-    /// From the closest point to the pixel.
+    /// Offset from the closest point to the pixel.
     pub(super) dx: Dual,
     pub(super) dy: Dual,
     along: Dual,
@@ -193,7 +193,7 @@ impl Edge {
         self.along_x.value * self.along_x.value + self.along_y.value * self.along_y.value
     }
 
-    /// The doubled area of the pixel at `px`, `py` and the edge, above 0 to its left.
+    /// The doubled area of the triangle of the pixel at `px`, `py` and the edge, above 0 to its left.
     pub(super) fn area(self, px: f32, py: f32) -> Dual {
         let wx = Dual::constant(px).sub(self.x);
         let wy = Dual::constant(py).sub(self.y);
@@ -221,7 +221,7 @@ impl Edge {
     }
 }
 
-/// A gradient to x and y.
+/// A gradient with respect to x and y.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Pull {
     pub(super) x: Dual,
@@ -230,7 +230,7 @@ pub(super) struct Pull {
 
 #[cube]
 impl Pull {
-    /// That to the closest point, from which a pixel lies at `dx`, `dy`, of a function with this derivative by the squared distance.
+    /// The gradient of a closest point at offset `dx`, `dy` from the pixel, given the derivative with respect to the squared distance.
     pub(super) fn of(by_distance2: Dual, dx: Dual, dy: Dual) -> Pull {
         let pull = by_distance2.scale(-2.0f32);
         Pull { x: pull.mul(dx), y: pull.mul(dy) }
@@ -239,8 +239,8 @@ impl Pull {
 
 #[cube]
 impl Closest {
-    /// The closer of both points. On the boundary of a face that is `stout` the edge whose line has the least signed distance holds it
-    /// (docs/notes.md, Nearest edge), and floats tell lines apart where they do not tell squared distances.
+    /// The closer of two points. On the boundary of a `stout` face it is on the edge whose line has the least signed distance
+    /// (docs/notes.md, Nearest edge), and floats distinguish lines where they do not distinguish squared distances.
     fn nearer(self, other: Closest, stout: bool) -> Closest {
         let by_line = other.line < self.line;
         let by_distance = other.distance2.value < self.distance2.value;
@@ -292,7 +292,7 @@ impl Face {
         first.nearer(second, self.stout > 0.5f32).nearer(third, self.stout > 0.5f32)
     }
 
-    /// Where the pixel at `px`, `py` (NDC) lies in the table.
+    /// The pair of the face and the pixel at `px`, `py` (NDC).
     pub(super) fn pair(self, px: f32, py: f32, lookup: Lookup) -> Pair {
         let orientation = self.orientation;
         let nearest = self.closest(px, py);
@@ -313,17 +313,17 @@ impl Face {
 
 #[cube]
 impl Pair {
-    /// The profile at this pair.
+    /// The value of the profile at this pair.
     pub(super) fn value(self, cubic: Cubic) -> Dual {
         TablePosition { row: self.row, place: self.place, rate: self.rate }.value(cubic)
     }
 
-    /// Derivative of the profile by the squared distance.
+    /// Derivative of the profile with respect to the squared distance.
     pub(super) fn slope(self, cubic: Cubic) -> Dual {
         TablePosition { row: self.row, place: self.place, rate: self.rate }.slope(cubic)
     }
 
-    /// The gradient to the closest point of so many times the profile.
+    /// The gradient of `factor` times the profile with respect to the closest point.
     pub(super) fn pull(self, cubic: Cubic, factor: f32) -> Pull {
         Pull::of(self.slope(cubic).scale(factor), self.dx, self.dy)
     }
@@ -353,7 +353,7 @@ impl Cubic {
         self.a
     }
 
-    /// Row `row` of `table`; the derivatives stand in `direction` from `offset` on.
+    /// Row `row` of `table`; its derivatives are in `direction`, from `offset` on.
     pub(super) fn new(
         table: &Array<f32>,
         row: u32,

@@ -1,9 +1,9 @@
-//! Which units take which pixels of a face. A few units share a face; one that reaches many pixels is cut into parts, each with units of its
-//! own, so that a ground plane takes no longer than the rest.
+//! Assignment of the pixels of a face to units. A few units share a face; a face with many pixels is split into parts with separate units,
+//! so that a ground plane takes no longer than other faces.
 //!
-//! `slots` holds what [`prepare`](super::prepare::prepare) has found in some views: how many slots parts take, the faces that each view draws,
-//! then face and number of the part in each of [`SLOTS`] slots, then the first slot of each face. Where faces ask for more slots than there
-//! are, none is cut: then there are enough large ones to keep all units busy. So what is added up in which order is always the same.
+//! `slots` holds results of [`prepare`](super::prepare::prepare) for some views: the number of slots of all parts, the number of faces
+//! drawn per view, then face and part number for each of [`SLOTS`] slots, then the first slot of each face. If faces need more slots than
+//! there are, none is split: then there are enough large faces to keep all units busy. The order of summation is therefore always the same.
 
 use cubecl::prelude::*;
 
@@ -11,7 +11,7 @@ use super::reach::Reach;
 
 /// Pixels of a part.
 pub(super) const PART: u32 = 4096;
-/// Parts that there is room for.
+/// Most parts per launch.
 pub(super) const SLOTS: u32 = 4096;
 
 /// Words before the slots.
@@ -20,12 +20,12 @@ pub(super) fn header(views: u32) -> u32 {
     views + 1u32
 }
 
-/// Number of words in `slots`, of so many views and faces in all of them.
+/// Number of words in `slots`, for `views` views with `jobs` faces in total.
 pub(super) fn words(views: usize, jobs: usize) -> usize {
     1 + views + 2 * SLOTS as usize + jobs
 }
 
-/// Pixels that a group of units takes, counted row by row in what a face reaches.
+/// Pixels of a group of units, in row-major order of the face's reach.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Part {
     /// The face, among those of all views of the launch.
@@ -39,7 +39,7 @@ pub(super) struct Part {
 
 #[cube]
 impl Part {
-    /// The pixels of group number `group`: of the face with this number, or behind them of a slot.
+    /// The pixels of group `group`: those of the face with this number, or after all faces those of a slot.
     pub(super) fn of(
         group: u32,
         reaches: &Array<u32>,
@@ -72,7 +72,7 @@ impl Part {
         Part { job, start, end, left: reach.left, top: reach.top, width }
     }
 
-    /// All that a face reaches: for sums of floats, whose order must not depend on who took which slot.
+    /// The whole reach of a face: for sums of floats, whose order must not depend on the assignment of slots.
     pub(super) fn whole(job: u32, reaches: &Array<u32>) -> Part {
         let reach = Reach::load(reaches, job as usize);
         let width = select(reach.left < reach.right, reach.right - reach.left, 1u32);
@@ -88,7 +88,7 @@ impl Part {
     }
 }
 
-/// Whether a face that reaches so many pixels is cut.
+/// Whether a face with a reach of `pixels` pixels is split.
 #[cube]
 pub(super) fn is_cut(pixels: u32, slots: &Array<u32>) -> bool {
     let mut cut = false;
@@ -98,13 +98,13 @@ pub(super) fn is_cut(pixels: u32, slots: &Array<u32>) -> bool {
     cut
 }
 
-/// Parts of a face that reaches so many pixels, if it is cut.
+/// Number of parts of a face with a reach of `pixels` pixels, if it is split.
 #[cube]
 pub(super) fn parts(pixels: u32) -> u32 {
     (pixels - 1u32) / PART + 1u32
 }
 
-/// Where the first slot of a face stands.
+/// Index of the first slot of a face.
 #[cube]
 pub(super) fn first_slot(job: u32, views: u32) -> usize {
     (header(views) + 2u32 * SLOTS + job) as usize

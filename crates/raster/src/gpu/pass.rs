@@ -1,4 +1,4 @@
-//! One call of the op: which kernels run over which buffers.
+//! One call of the op: the launches of its kernels and their buffers.
 
 use softrast_kernel::Grid;
 use softrast_tensor::{
@@ -25,17 +25,17 @@ use super::{
 
 use crate::{ImageSize, ProfileSum, SoftBlend, weighting::FARTHEST_SEEN};
 
-/// Largest buffer of a pass's own, in bytes: half of what every adapter can bind (128 MiB).
+/// Largest buffer that a pass allocates, in bytes: half of the size that every adapter can bind (128 MiB).
 const BUFFER: usize = 64 << 20;
-/// Pixels for each face, from which on more units share one.
+/// Pixels per face above which more units share a face.
 const MANY_PIXELS: usize = 32;
-/// Faces that a launch prepares: it counts at most 65535 cubes along an axis.
+/// Most faces of a launch: it has at most 65535 cubes along an axis.
 const MOST_FACES: usize = 65535 * PREPARED as usize;
-/// Bytes of a number that is added up.
+/// Bytes of a summed number.
 const WORDS: usize = 8;
-/// All tables of [`sum_cubics`] together, in bytes.
+/// Size of all tables of [`sum_cubics`] together, in bytes.
 const TABLES: usize = 32 << 20;
-/// Units of a cube where they do not share anything.
+/// Units of a cube in kernels without shared memory.
 pub(super) const CUBE: u32 = 64;
 
 /// Inputs of a pass on the device.
@@ -46,35 +46,35 @@ pub(super) struct Pass<'a> {
     pub(super) vertices: Buffer,
     /// `[rows, 4]`.
     table: Buffer,
-    /// Derivatives of both, flat and in this order, in a pass of second order.
+    /// Derivatives of vertices and table, concatenated, in a pass of second order.
     direction: Option<Buffer>,
     pub(super) topology: OnDevice,
     pub(super) views: usize,
     pub(super) vertex_count: usize,
-    /// Whether what is prepared of faces has their depths.
+    /// Whether prepared faces include depths.
     depths: bool,
-    /// Bytes of sums of a pixel.
+    /// Bytes per pixel of the sums.
     of_pixel: usize,
-    /// Numbers in the gradient of a face.
+    /// Numbers per face in the gradient.
     of_face: usize,
     /// Faces beyond this depth are not drawn.
     far: f32,
 }
 
-/// Sums of pixels in the making.
+/// Accumulators of the sums of pixels.
 struct Splatted {
-    /// Two words of each pixel.
+    /// Two words per pixel.
     words: Buffer,
-    /// One for all pixels, or one for each.
+    /// One scale for all pixels, or one per pixel.
     scale: Buffer,
     terms: Terms,
 }
 
-/// Tables of the units that add up the gradient to one.
+/// Partial tables of the units that sum the gradient of a table.
 pub(super) struct Partial {
     pub(super) cubes: usize,
     units: usize,
-    /// Numbers of a table.
+    /// Numbers per table.
     coefficients: usize,
     /// `[units, rows, 4]`.
     pub(super) tables: Buffer,
@@ -107,8 +107,8 @@ impl<'a> Pass<'a> {
         }
     }
 
-    /// For colours: with the depths of faces, where so many numbers of a pixel are added up and a face has so many in
-    /// its gradient.
+    /// For colours: prepared faces include depths; `of_pixel` numbers are summed per pixel, and a face has `of_face` numbers in its
+    /// gradient.
     pub(super) fn with_depths(self, [of_pixel, of_face]: [usize; 2]) -> Self {
         let far = FARTHEST_SEEN as f32;
         Self { depths: true, far, of_pixel: of_pixel * WORDS, of_face, ..self }
@@ -129,7 +129,7 @@ impl<'a> Pass<'a> {
         sums
     }
 
-    /// Gradient of `Σ upstream · sums` to the vertices alone, flat.
+    /// Gradient of `Σ upstream · sums` with respect to the vertices only, flat.
     pub(super) fn to_vertices(&self, upstream: Buffer) -> Buffer {
         let upstream = into_contiguous(upstream);
         let gradient = self.buffer(3 * self.views * self.vertex_count, DType::F32);
@@ -139,8 +139,8 @@ impl<'a> Pass<'a> {
         gradient
     }
 
-    /// Gradient of `Σ upstream · sums` to vertices and table, flat. In a pass of second order its
-    /// derivative, and behind it that of the sums.
+    /// Gradient of `Σ upstream · sums` with respect to vertices and table, flat. In a pass of second order its derivative, followed by that
+    /// of the sums.
     pub(super) fn gradient(&self, upstream: Buffer) -> Buffer {
         let upstream = into_contiguous(upstream);
         let coordinates = 3 * self.views * self.vertex_count;
@@ -160,7 +160,7 @@ impl<'a> Pass<'a> {
         gradient
     }
 
-    /// Tables of so many rows for units that walk over parts of faces.
+    /// Tables of `rows` rows for units that walk over parts of faces.
     pub(super) fn partial(&self, rows: usize) -> Partial {
         let (cube, coefficients) = (table::UNITS as usize, 4 * rows);
         let cubes = (TABLES / (4 * coefficients * cube)).clamp(1, 4096);
@@ -169,7 +169,7 @@ impl<'a> Pass<'a> {
         Partial { cubes, units, coefficients, tables }
     }
 
-    /// Adds up the tables of all units into `gradient`, from `offset` on.
+    /// Sums the tables of all units into `gradient`, from `offset` on.
     pub(super) fn add_up(&self, partial: Partial, gradient: &Buffer, offset: usize) {
         let Partial { units, coefficients, tables, .. } = partial;
         sum_tables::launch(
@@ -184,7 +184,7 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// The views in parts whose buffers all fit, prepared one after the other.
+    /// The faces of the views, prepared in batches of views whose buffers fit.
     pub(super) fn prepared(&self) -> impl Iterator<Item = Prepared> {
         let faces = self.op.faces.len();
         self.parts().map(move |[first, views]| {
@@ -196,7 +196,7 @@ impl<'a> Pass<'a> {
         })
     }
 
-    /// First view and number of views of each part.
+    /// First view and number of views of each batch.
     fn parts(&self) -> impl Iterator<Item = [usize; 2]> {
         let of_faces = 4 * self.stride().max(self.of_face) * self.op.faces.len();
         let of_view = of_faces.max(self.of_pixel * self.op.size.pixels());
@@ -206,7 +206,7 @@ impl<'a> Pass<'a> {
         (0..views).step_by(step).map(move |first| [first, step.min(views - first)])
     }
 
-    /// Where faces are kept for other passes: not those of some views alone, nor with what only this pass wants of them.
+    /// The cache of prepared faces for later passes, if the batch holds all views and nothing specific to this pass.
     fn kept(&self) -> Option<&Kept> {
         let whole = self.parts().count() == 1 && !self.second() && !self.depths;
         self.op.on_gpu.kept.as_ref().filter(|_| whole)
@@ -244,7 +244,7 @@ impl<'a> Pass<'a> {
         Prepared { first_view, views, corners, reaches, slots }
     }
 
-    /// Zeros to which terms of the pixels of some views are added, and in the first words of `slots`; how they are added, and by what.
+    /// Zeroed sums for the pixels of some views and zeros in the first words of `slots`; how terms are added, and their scale.
     fn cleared(&self, views: usize, slots: Option<&Buffer>) -> Splatted {
         let pixels = views * self.op.size.pixels();
         let words = self.buffer(2 * pixels, DType::U32);
@@ -288,7 +288,7 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// Writes the sums of some views to `out`, all views being at `offset`; in a pass of second order their derivatives.
+    /// Writes the sums of some views to `out`, where all views start at `offset`; in a pass of second order their derivatives.
     fn splat(&self, faces: &Prepared, splatted: Splatted, out: &Buffer, offset: usize) {
         let Prepared { first_view, views, corners, reaches, slots } = faces;
         let Splatted { words, scale, terms } = splatted;
@@ -341,12 +341,12 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// Units that share a face, or a part of one.
+    /// Units that share a face, or a part of it.
     fn lanes(&self) -> u32 {
         if self.op.size.pixels() > MANY_PIXELS * self.op.faces.len() { 32 } else { 8 }
     }
 
-    /// Writes the gradient to the vertices of the views to the start of `out`.
+    /// Writes the gradient with respect to the vertices of the views to the start of `out`.
     fn write_corners(&self, prepared: &Prepared, upstream: &Buffer, out: &Buffer) {
         let Prepared { first_view, views, corners, reaches, slots } = prepared;
         let (faces, lanes) = (self.op.faces.len(), self.lanes());
@@ -377,8 +377,7 @@ impl<'a> Pass<'a> {
         self.gather(prepared, &of_faces, corners, out, [6, 0, 2, 3], false);
     }
 
-    /// Adds up the corners of each vertex or entry: a `count` of numbers, which stand from `first` on in the `stride` of a face, as the first of
-    /// its `rows`.
+    /// Sums the corners of each vertex or entry: `count` numbers from `first` on in the `stride` of a face become the first of its `rows`.
     pub(super) fn gather(
         &self,
         prepared: &Prepared,
@@ -409,7 +408,7 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// Adds the gradient to the table of some views to `partial`.
+    /// Adds the gradient of the table for some views to `partial`.
     fn add_cubics(&self, faces: &Prepared, upstream: &Buffer, partial: &Partial) {
         sum_cubics::launch(
             &self.client,
@@ -429,7 +428,7 @@ impl<'a> Pass<'a> {
         );
     }
 
-    /// What stands for tables.
+    /// The table buffer; for colours, the buffer of all shared numbers.
     pub(super) fn table(&self) -> &Buffer {
         &self.table
     }
@@ -438,17 +437,17 @@ impl<'a> Pass<'a> {
         self.direction.is_some()
     }
 
-    /// The direction; any buffer where there is none, as nothing then reads it.
+    /// The direction; without one any buffer, since it is not read.
     pub(super) fn direction(&self) -> Buffer {
         self.direction.as_ref().unwrap_or(&self.table).clone()
     }
 
-    /// Where the table starts in the direction.
+    /// Start of the table in the direction.
     fn table_offset(&self) -> u32 {
         if self.second() { (3 * self.views * self.vertex_count) as u32 } else { 0 }
     }
 
-    /// Numbers that describe a face.
+    /// Numbers per prepared face.
     fn stride(&self) -> usize {
         let numbers = if self.depths { 9 } else { 6 };
         if self.second() { 2 * numbers } else { numbers }
@@ -475,7 +474,7 @@ impl<'a> Pass<'a> {
         calculate_cube_count_elemwise(&self.client, jobs, CubeDim::new_1d(units))
     }
 
-    /// A flat buffer that nothing has been written to.
+    /// An uninitialised flat buffer.
     pub(super) fn buffer(&self, length: usize, dtype: DType) -> Buffer {
         let handle = self.client.empty(length * dtype.size());
         let device = self.vertices.device.clone();

@@ -1,4 +1,4 @@
-//! The corners of every face side by side, and the pixels it may reach.
+//! The corners of every face, contiguous, and the pixels it may reach.
 
 use cubecl::prelude::*;
 
@@ -9,14 +9,14 @@ use super::{
     whole::SIZE as MAGNITUDE,
 };
 
-/// Projected coordinates beyond 1e6 NDC are not drawn. As bits: floats of one sign are ordered as
-/// their bits are, and a shader may assume that no float is NaN, but not that no integer is.
+/// Bits of 1e6: projected coordinates beyond it (NDC) are not drawn. Compared as bits, since floats of one sign have the order of their
+/// bits, and a shader may assume that no float is NaN.
 const FAR_AWAY_BITS: u32 = 1e6f32.to_bits();
-/// Makes up for rounding, in pixels.
+/// Margin for rounding, in pixels.
 const MARGIN: f32 = 0.01;
 
-/// Whether a corner may be drawn: `x` and `y` not far away, `z` not nearer than the float with the
-/// bits `near` and not beyond that with the bits `far`; false for NaN.
+/// Whether a corner may be drawn: `x` and `y` not far away, `z` not nearer than the float with the bits `near` and not beyond that with the
+/// bits `far`; false for NaN.
 #[cube]
 fn is_drawn(x: f32, y: f32, z: f32, near: u32, far: u32) -> bool {
     let x = u32::reinterpret(x) & MAGNITUDE;
@@ -60,12 +60,12 @@ fn largest(a: f32, b: f32, c: f32) -> f32 {
 /// Units of a cube of [`prepare`], all of one view.
 pub(super) const PREPARED: u32 = 256;
 
-/// Writes corners and reach of every face of every view, one unit each, and to `slots`, the first words of which are 0, how faces are cut (see
-/// [`parts`](super::parts)) and how many each view draws, on the image or beside it.
+/// Writes corners and reach of every face of every view, one unit each, and to `slots`, whose first words are 0, the split of faces (see
+/// [`parts`](super::parts)) and the number of faces drawn per view, on the image or outside of it.
 ///
-/// `vertices` is `[views, 3, vertices]`; `direction` starts with its derivatives. `corners` becomes
-/// `[views, faces, 6]`, in a pass of second order `[views, faces, 12]` with the derivatives last; with `depths` those of the three corners
-/// follow, and their derivatives. With `culls` back faces are not drawn.
+/// `vertices` is `[views, 3, vertices]`; `direction` starts with its derivatives. `corners` becomes `[views, faces, 6]`, in a pass of
+/// second order `[views, faces, 12]` with the derivatives last; with `depths` the depths of the three corners follow, and their
+/// derivatives. With `culls` back faces are not drawn.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn prepare(
@@ -140,7 +140,7 @@ pub(super) fn prepare(
     }
 }
 
-/// Writes the corners of one face, and says what it reaches.
+/// Writes the corners of one face, and returns its reach.
 #[cube]
 #[allow(clippy::too_many_arguments)]
 fn prepare_face(
@@ -199,7 +199,7 @@ fn prepare_face(
     let drawn = is_drawn(ax, ay, az, near, far)
         && is_drawn(bx, by, bz, near, far)
         && is_drawn(cx, cy, cz, near, far);
-    // Corners that are seen clockwise are those of a back face.
+    // Back faces have corners in clockwise order.
     let drawn = drawn && (comptime!(!culls) || (bx - ax) * (cy - ay) >= (by - ay) * (cx - ax));
     let left = first_pixel(least(ax, bx, cx) - radius, frame.width, frame.shorter);
     let right = end_pixel(largest(ax, bx, cx) + radius, frame.width, frame.shorter);

@@ -9,13 +9,13 @@ use super::topology::Topology;
 
 pub(super) type Buffer = CubeTensor<WgpuRuntime>;
 
-/// An op of sums on a GPU, beside its inputs.
+/// GPU state of an op of sums, in addition to its inputs.
 #[derive(Clone, Debug)]
 pub(crate) struct SumOnGpu {
     pub(super) topology: Topology,
-    /// Prepared faces, for an op that is recorded.
+    /// Cached faces, for a recorded op.
     pub(super) kept: Option<Kept>,
-    /// Whether terms are like optical depths: none that counts is lost beside the largest in a sum of whole numbers.
+    /// Whether terms are like optical depths: no significant term is lost next to the largest in a sum of integers.
     pub(super) like_depths: bool,
 }
 
@@ -24,13 +24,13 @@ impl SumOnGpu {
         Self { topology: Topology::default(), kept: None, like_depths }
     }
 
-    /// One for a call whose passes share what they find out.
+    /// The state for a call whose passes share prepared faces.
     pub(crate) fn keeping(&self) -> Self {
         Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
     }
 }
 
-/// Left by a pass forward to the passes back: the faces of all views, if their buffers fit. 44 bytes for each.
+/// Cache between the forward pass and the backward passes: the faces of all views, if their buffers fit. 44 bytes per face.
 #[derive(Clone, Default)]
 pub(super) struct Kept(Arc<OnceLock<Prepared>>);
 
@@ -46,7 +46,7 @@ impl Kept {
     }
 
     pub(super) fn set(&self, faces: Prepared) {
-        // Another call may have been as quick; its faces are the same.
+        // Another call may have set it first, with the same faces.
         let _ = self.0.set(faces);
     }
 }
@@ -58,6 +58,6 @@ pub(super) struct Prepared {
     pub(super) views: usize,
     pub(super) corners: Buffer,
     pub(super) reaches: Buffer,
-    /// How faces are cut, and how many are drawn; see [`parts`](super::parts).
+    /// The split of faces, and the number drawn; see [`parts`](super::parts).
     pub(super) slots: Buffer,
 }

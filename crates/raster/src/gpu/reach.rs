@@ -25,7 +25,7 @@ impl Reach {
         }
     }
 
-    /// How many pixels they are.
+    /// Number of pixels.
     pub(super) fn pixels(self) -> u32 {
         let across = select(self.left < self.right, self.right - self.left, 0u32);
         across * (self.bottom - self.top)

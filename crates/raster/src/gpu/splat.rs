@@ -1,5 +1,5 @@
-//! The image face by face: the units of a face add what it is to its pixels to sums of these, as whole numbers of 64 bits. No pixel has to know
-//! which faces reach it.
+//! The image face by face: the units of a face add its terms to the sums of its pixels, as integers of 64 bits. No kernel needs the faces
+//! of a pixel.
 
 use cubecl::prelude::*;
 
@@ -12,12 +12,12 @@ use super::{
 
 /// Units of a cube of [`clear`].
 pub(super) const CLEARED: u32 = 256;
-/// Whole numbers to 1, unless the terms of all faces together could then leave 64 bits: a term below 1 then fits the lower word, so that it
-/// takes one atomic operation, and each is off by at most 1.2e-10.
+/// Integer units per 1, unless the terms of all faces together could then exceed 64 bits: a term below 1 fits the lower word and takes one
+/// atomic operation, with an error of at most 1.2e-10.
 const UNITS_OF_ONE: f32 = WORD;
 
-/// Writes zeros to `slots` up to its slots and to all `sums`, and to `scale` the bits of what a term is multiplied by to become a whole
-/// number, and of the largest number of the table: no term is more than twice as large.
+/// Writes zeros to the header of `slots` and to all `sums`, and to `scale` the bits of the factor from terms to integers, and of the
+/// largest magnitude of a table row: no term is more than twice as large.
 #[cube(launch)]
 pub(super) fn clear(
     table: &Array<f32>,
@@ -63,7 +63,7 @@ pub(super) fn clear(
             most = select(bits > most, bits, most);
         }
         let size = f32::reinterpret(most);
-        // Such sums are at most that of all faces.
+        // Upper bound of the sums over all faces.
         let sum = 2.0f32 * size * f32::cast_from(face_count);
         let per_term = select(sum * UNITS_OF_ONE < MOST, UNITS_OF_ONE, MOST / sum);
         scale[0] = u32::reinterpret(per_term);
@@ -71,18 +71,18 @@ pub(super) fn clear(
     }
 }
 
-/// How terms become whole numbers.
+/// Conversion of terms to integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Terms {
-    /// By a scale that holds for all pixels, the first of the numbers that [`clear`] has left.
+    /// By one scale for all pixels, the first number written by [`clear`].
     Scaled,
-    /// Not at all: only the largest of each pixel is found, in the place of the scale.
+    /// None: only the largest term of each pixel is computed, and written in place of the scale.
     Measured,
-    /// Relative to that: for terms of all sizes, and for derivatives, whose size nothing bounds.
+    /// Relative to the largest term: for terms of all sizes, and for derivatives, which are unbounded.
     Relative,
 }
 
-/// Adds what each face is to its pixels to `sums`, two words for each pixel of the views of the launch; `lanes` units share a part of a face.
+/// Adds the terms of each face to `sums`, two words per pixel of the views of the launch; `lanes` units share a part of a face.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn splat(
@@ -130,7 +130,7 @@ pub(super) fn splat(
     }
 }
 
-/// Turns the sums of [`splat`] into floats, with what all faces are to pixels that they do not reach: one unit a pixel.
+/// Converts the sums of [`splat`] to floats, and adds the constants of all faces at pixels that they do not reach: one unit per pixel.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn settle(
@@ -158,7 +158,7 @@ pub(super) fn settle(
     let place = 2 * pixel as usize;
     let total = if terms == Terms::Scaled {
         let scaled = sum(words, place) / f32::reinterpret(scale[0]);
-        // A table of something that is no number makes all of them none.
+        // A table with a NaN makes all of them NaN.
         or_nan(scale[1] < INFINITE, scaled)
     } else {
         relative_sum(words, place, scale[pixel as usize], face_count)

@@ -1,4 +1,4 @@
-//! The gradient of a table: summed over the pairs of some pixels, then over all.
+//! The gradient of a table, summed over the pairs of each unit, then over all units.
 
 use cubecl::prelude::*;
 
@@ -12,8 +12,8 @@ use super::{
 /// Units of a cube, which share a face.
 pub(super) const UNITS: u32 = 64;
 
-/// Adds the gradient of the table, every unit to a table of its own over the pairs that it takes:
-/// there is no order of units on which a sum could depend. `partial` is `[units, rows, 4]`.
+/// Adds the gradient of the table: each unit sums over its pairs into a separate table, so that sums do not depend on an order of units.
+/// `partial` is `[units, rows, 4]`.
 #[cube(launch)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn sum_cubics(
@@ -44,7 +44,7 @@ pub(super) fn sum_cubics(
             let (column, row) = (part.column(pixel), part.row(pixel));
             let g = upstream[frame.pixel(view, row, column) as usize];
             let pair = face.pair(frame.column_centre(column), frame.row_centre(row), lookup);
-            // A pair that is not in the tail replaces one that would be.
+            // A pair outside the tail replaces one in the tail.
             if pair.row != lookup.cells {
                 add_powers(partial, own + 4u32 * pair.row, pair.place, Dual::constant(g), second);
                 partial[tail] = partial[tail] - Dual::constant(g).stored(second);
@@ -54,7 +54,7 @@ pub(super) fn sum_cubics(
         job += CUBE_COUNT as u32;
     }
     if !second {
-        // All faces are in the tail of pixels that they do not reach.
+        // All faces contribute their tail to pixels that they do not reach.
         let per_view = frame.height * frame.width;
         let mut pixel = ABSOLUTE_POS as u32;
         while pixel < views * per_view {
@@ -84,7 +84,7 @@ pub(super) fn add_powers(
     partial[at + 3] = partial[at + 3] + square.mul(place).stored(second);
 }
 
-/// Adds up the tables of all units into `gradient`, from `offset` on: one unit a coefficient.
+/// Sums the tables of all units into `gradient`, from `offset` on: one unit per coefficient.
 #[cube(launch)]
 pub(super) fn sum_tables(
     partial: &Array<f32>,

@@ -1,7 +1,7 @@
 //! The gradient of a texture.
 //!
-//! A texel is visible to pairs all over the image, so its gradient is added up by atomic operations: on whole numbers, whose sums do not depend
-//! on their order. They have 64 bits, and a first walk finds how large terms are and how many, so that no sum leaves these.
+//! Pairs all over the image may sample a texel, so its gradient is summed by atomic operations on integers, independent of their order.
+//! They have 64 bits, and a first walk computes the largest term and the number of pairs, so that no sum overflows.
 
 use cubecl::prelude::*;
 
@@ -14,15 +14,15 @@ use super::{
     whole::{INFINITE, MOST, add, mark, or_nan, sum},
 };
 
-/// Terms are taken as if the largest were not less than this, so that floats can hold their scale.
+/// Lower bound of the largest term, so that floats can represent the scale.
 const LEAST: f32 = 1e-19;
-/// Words before the sums: the bits of the largest size of a term, and how many pairs there are.
+/// Words before the sums: the bits of the largest magnitude of a term, and the number of pairs.
 pub(super) const MEASURED: usize = 2;
 
-/// Adds up the gradient of the texels, a cube for each part of a face: with `measure` only finds the first [`MEASURED`] words of `sums`, else adds
-/// all terms to those behind them, two for each number of the texels.
+/// Sums the gradient of the texels, one cube per part of a face: with `measure` only computes the first [`MEASURED`] words of `sums`, else
+/// adds all terms to the words after them, two for each number of the texels.
 ///
-/// `pixels` is what [`finish_pixels`](super::blend::finish_pixels) has written.
+/// `pixels` is written by [`finish_pixels`](super::blend::finish_pixels).
 #[cube(launch)]
 pub(super) fn sum_texels(
     drawn: &BlendInputs,
@@ -81,7 +81,7 @@ pub(super) fn sum_texels(
     }
 }
 
-/// The larger of these bits and those of the size of a number: larger sizes have larger bits, and what is no number has the largest.
+/// The larger of `bits` and the [`mark`] of a number, whose order is that of magnitudes; NaN has the largest.
 #[cube]
 fn larger(bits: u32, number: f32) -> u32 {
     let other = mark(number);
@@ -94,8 +94,7 @@ fn place_of(texel: u32, channel: u32) -> usize {
     MEASURED + (2u32 * (NUMBERS * texel + channel)) as usize
 }
 
-/// What a term is multiplied by to become a whole number, from the bits of the largest and the number of pairs. A pair has at most four terms
-/// in a number.
+/// The factor from terms to integers, given the bits of the largest term and the number of pairs. A pair has at most four terms per number.
 #[cube]
 fn scale_of(largest: u32, pairs: u32) -> f32 {
     let size = f32::reinterpret(largest);
@@ -103,7 +102,7 @@ fn scale_of(largest: u32, pairs: u32) -> f32 {
     MOST / (4.0f32 * f32::cast_from(pairs) + 1.0f32) / size
 }
 
-/// Turns the sums of [`sum_texels`] into floats, one unit a number.
+/// Converts the sums of [`sum_texels`] to floats, one unit per number.
 #[cube(launch)]
 pub(super) fn texel_floats(sums: &Array<u32>, gradient: &mut Array<f32>, count: u32) {
     let number = ABSOLUTE_POS as u32;
@@ -111,6 +110,6 @@ pub(super) fn texel_floats(sums: &Array<u32>, gradient: &mut Array<f32>, count: 
         terminate!();
     }
     let total = sum(sums, MEASURED + (2u32 * number) as usize) / scale_of(sums[0], sums[1]);
-    // One term that is no number makes all of them none.
+    // One NaN term makes all of them NaN.
     gradient[number as usize] = or_nan(sums[0] < INFINITE, total);
 }

@@ -1,4 +1,4 @@
-//! A texture, sampled between its texels at the points of faces, as `blend/texture.rs` of `kernel` has it.
+//! A texture, sampled bilinearly at points of faces, as in `blend/texture.rs` of `kernel`.
 
 use cubecl::prelude::*;
 
@@ -11,19 +11,19 @@ use softrast_kernel::blend::TEXEL_CHANNELS;
 /// Numbers of a texel.
 pub(super) const NUMBERS: u32 = TEXEL_CHANNELS as u32;
 
-/// A place on a texture, between four texels.
+/// A position on a texture, between four texels.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Sample {
     pub(super) above_left: u32,
     pub(super) above_right: u32,
     pub(super) below_left: u32,
     pub(super) below_right: u32,
-    /// From the left texels to the right ones, and from the upper to the lower ones, in [0, 1].
+    /// Fractions from the left to the right texels, and from the upper to the lower ones, in [0, 1].
     right: Dual,
     down: Dual,
 }
 
-/// Two texels side by side, and how far a place is from the first to the second.
+/// Two adjacent texels, and the fraction of a position between them.
 #[derive(CubeType, Clone, Copy)]
 struct Between {
     first: u32,
@@ -31,7 +31,7 @@ struct Between {
     part: Dual,
 }
 
-/// A number of four texels: above left, above right, below left and below right of a place.
+/// A number of four texels: above left, above right, below left and below right of a position.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Four {
     pub(super) a: Dual,
@@ -42,14 +42,14 @@ pub(super) struct Four {
 
 #[cube]
 impl Between {
-    /// `x` counted in texels from the middle of the first of `count`, which repeat.
+    /// `x` in texels from the centre of the first of `count`, which repeat.
     fn new(x: Dual, count: u32) -> Between {
         let floor = f32::floor(x.value);
         let size = f32::cast_from(count);
         let place = floor - size * f32::floor(floor / size);
         let place = select(place > 0.0f32, place, 0.0f32);
         let first = u32::cast_from(select(place < size, place, 0.0f32));
-        // Neither rounding nor a place that is not a number leaves the texture; of floats a shader may assume that there is no such number.
+        // Neither rounding nor NaN leaves the texture; for floats a shader may assume that there is no NaN.
         let first = select(first < count, first, 0u32);
         let second = select(first + 1 == count, 0u32, first + 1);
         Between { first, second, part: x.sub(Dual::constant(floor)) }
@@ -58,7 +58,7 @@ impl Between {
 
 #[cube]
 impl Sample {
-    /// The texture at `u` to the right and `v` up, each from 0 to 1, and again and again beyond.
+    /// Samples the texture at `u` to the right and `v` up, from 0 to 1; it repeats beyond.
     pub(super) fn at(u: Dual, v: Dual, weights: BlendParams) -> Sample {
         let half = Dual::constant(0.5f32);
         let x = u.scale(f32::cast_from(weights.columns)).sub(half);
@@ -92,7 +92,7 @@ impl Sample {
         }
     }
 
-    /// What the four texels count.
+    /// The weights of the four texels.
     pub(super) fn shares(self) -> Four {
         let one = Dual::constant(1.0f32);
         let (left, above) = (one.sub(self.right), one.sub(self.down));
@@ -104,14 +104,14 @@ impl Sample {
         }
     }
 
-    /// A number of the four texels, between them.
+    /// Interpolates a number of the four texels.
     pub(super) fn between(self, four: Four) -> Dual {
         let shares = self.shares();
         let upper = shares.a.mul(four.a).add(shares.b.mul(four.b));
         upper.add(shares.c.mul(four.c)).add(shares.d.mul(four.d))
     }
 
-    /// The derivative of that by u.
+    /// The derivative of the interpolated number with respect to u.
     pub(super) fn by_u(self, four: Four, weights: BlendParams) -> Dual {
         let above = Dual::constant(1.0f32).sub(self.down);
         let upper = four.b.sub(four.a).mul(above);
@@ -119,7 +119,7 @@ impl Sample {
         by_x.scale(f32::cast_from(weights.columns))
     }
 
-    /// The derivative of that by v.
+    /// The derivative of the interpolated number with respect to v.
     pub(super) fn by_v(self, four: Four, weights: BlendParams) -> Dual {
         let left = Dual::constant(1.0f32).sub(self.right);
         let on_the_left = four.a.sub(four.c).mul(left);
@@ -130,7 +130,7 @@ impl Sample {
 
 #[cube]
 impl Four {
-    /// Of eight numbers, values and tangents.
+    /// Four dual numbers from eight floats, values and tangents in turn.
     pub(super) fn load(numbers: &Array<f32>) -> Four {
         Four {
             a: Dual { value: numbers[0], tangent: numbers[1] },

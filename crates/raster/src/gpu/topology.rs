@@ -2,17 +2,17 @@ use std::sync::{Arc, OnceLock};
 
 use softrast_tensor::wgpu::{CubeTensor, WgpuDevice, WgpuRuntime, cubecl::prelude::*};
 
-/// The faces of an op on a device: uploaded by its first pass there, kept for all that follow.
+/// The faces of an op on a device: uploaded by its first pass there, cached for later ones.
 #[derive(Clone, Default)]
 pub(crate) struct Topology(Arc<OnceLock<(WgpuDevice, OnDevice)>>);
 
-/// Who is a corner of whom, both ways round.
+/// Vertices of faces, and faces of vertices.
 #[derive(Clone)]
 pub(super) struct OnDevice {
     /// `[faces, 3]`: the vertices of each face.
     pub(super) faces: CubeTensor<WgpuRuntime>,
-    /// `[vertices + 1 + 3 faces]`: the place of each vertex's first corner, then the corners, each as
-    /// `3 * face + corner`, in ascending order.
+    /// `[vertices + 1 + 3 faces]`: the offset of each vertex's first corner, then the corners, each as `3 * face + corner`, in ascending
+    /// order.
     pub(super) corners: CubeTensor<WgpuRuntime>,
     vertex_count: usize,
 }
@@ -60,7 +60,7 @@ impl OnDevice {
     }
 }
 
-/// Places of the first corners, then the corners, both vertex by vertex.
+/// Offsets of the first corners, then the corners, both in the order of vertices.
 fn corners_of_vertices(vertices: &[u32], vertex_count: usize) -> Vec<u32> {
     let mut places = vec![0u32; vertex_count + 1];
     for &vertex in vertices {

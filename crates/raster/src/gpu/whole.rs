@@ -1,23 +1,24 @@
-//! Sums of numbers as whole ones of 64 bits, by atomic operations: these give the same in every order.
+//! Sums of numbers as integers of 64 bits, by atomic operations, whose order does not matter.
 
 use cubecl::prelude::*;
 
-/// 2³², and what all terms may add up to as whole numbers: a quarter of what has room.
+/// 2³², and the largest sum of all terms as integers: a quarter of the range.
 pub(super) const WORD: f32 = 4_294_967_296.0;
 pub(super) const MOST: f32 = 2_305_843_009_213_693_952.0;
-/// Bits of a float without its sign, and of the least that is not finite. Floats of one sign are ordered as their bits are, and a shader may
-/// assume that no float is NaN, but not that no integer is.
+/// Bits of a float without its sign, and those of infinity. Comparisons use bits, since floats of one sign have the order of their bits,
+/// and a shader may assume that no float is NaN.
 pub(super) const SIZE: u32 = 0x7fff_ffff;
 pub(super) const INFINITE: u32 = 0x7f80_0000;
 
-/// Added to the bits of a number that is not negative, so that those of negative ones lie below.
+/// Added to the bits of a non-negative number, so that those of negative numbers are lower.
 pub(super) const NEGATIVE: u32 = 0x8000_0000;
-/// Words of a pixel in colours beside its sums: see [`find_largest`](super::blend::find_largest) and [`add_shares`](super::blend::add_shares).
+/// Words per pixel of colours in addition to its sums: see [`find_largest`](super::blend::find_largest) and
+/// [`add_shares`](super::blend::add_shares).
 pub(super) const MARKS: u32 = 3;
-/// Sizes below this are nothing.
+/// Magnitudes below this are 0.
 const NOTHING: f32 = 1e-37;
 
-/// The size of a number in bits, which are ordered as sizes are; what is no number has the largest.
+/// The magnitude of a number as bits, in the order of magnitudes; NaN has the largest.
 #[cube]
 pub(super) fn mark(number: f32) -> u32 {
     u32::reinterpret(number) & SIZE
@@ -45,8 +46,8 @@ pub(super) fn zero(
     }
 }
 
-/// Adds a term as a part of the largest one, the [`mark`] of which is `size`, where there are as many as faces at most: so sums keep their
-/// digits however small all terms are.
+/// Adds a term relative to the largest, whose [`mark`] is `size`, for at most as many terms as faces: sums keep their digits however small
+/// all terms are.
 #[cube]
 pub(super) fn add_relative(
     sums: &mut Array<Atomic<u32>>,
@@ -61,21 +62,21 @@ pub(super) fn add_relative(
     }
 }
 
-/// A sum of such terms.
+/// A sum of terms added by [`add_relative`].
 #[cube]
 pub(super) fn relative_sum(sums: &Array<u32>, place: usize, size: u32, face_count: u32) -> f32 {
     let part = sum(sums, place) / (MOST / f32::cast_from(face_count));
-    // One term that is no number makes all of them none.
+    // One NaN term makes all of them NaN.
     or_nan(size < INFINITE, part * f32::reinterpret(size))
 }
 
-/// A number, or none where it does not hold. From bits that are put together at run time: WGSL refuses a constant that is no number.
+/// `number` if `holds`, else NaN, from bits combined at run time: WGSL rejects a constant that is NaN.
 #[cube]
 pub(super) fn or_nan(holds: bool, number: f32) -> f32 {
     f32::reinterpret(select(holds, u32::reinterpret(number), SIZE))
 }
 
-/// Adds a number, rounded to a whole one, to the two words at `place`: to the lower one, and with what that carries to the upper one.
+/// Adds a number, rounded to an integer, to the two words at `place`, with the carry from the lower to the upper word.
 #[cube]
 pub(super) fn add(sums: &mut Array<Atomic<u32>>, place: usize, number: f32) {
     let size = f32::round(f32::abs(number));

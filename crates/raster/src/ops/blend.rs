@@ -11,7 +11,7 @@ use softrast_tensor::{Element, TensorData};
 
 use crate::{ImageSize, NEAR, ops::pass::Pass, weighting::FARTHEST_SEEN};
 
-/// What stays the same over the calls of the op: faces, image size, the places of the knots, and what may be left out.
+/// Constants of the op over its calls: faces, image size, the layout of the tables, and the tolerance of culling.
 #[derive(Clone, Debug)]
 pub struct SoftBlend {
     pub(crate) faces: Arc<[[u32; 3]]>,
@@ -23,26 +23,25 @@ pub struct SoftBlend {
     pub(crate) floor: f64,
     pub(crate) planes: [f64; 2],
     pub(crate) size: ImageSize,
-    /// What all that is left out of a pixel may add up to, in weights of the background.
+    /// Bound of the sum of all weights culled at a pixel, relative to the background's weight.
     pub(crate) tolerance: f64,
-    /// Whether back faces are not drawn.
+    /// Whether back faces are culled.
     pub(crate) culls: bool,
-    /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows, 28 bytes for each face of
-    /// each view, and the sums of each pixel: channels and share in fours, and one number more. Its type is that of the floats.
+    /// Cache between the forward pass and the backward passes of a recorded op: the faces of each row, 28 bytes per face and view, and the
+    /// sums of each pixel: channels and share rounded up to fours, and one number more. Its type is that of the floats.
     pub(crate) kept: Option<Arc<OnceLock<Box<dyn Any + Send + Sync>>>>,
     #[cfg(feature = "wgpu")]
     pub(crate) topology: crate::gpu::Topology,
 }
 
 impl SoftBlend {
-    /// The op of one call whose passes share what they find out.
+    /// The op of a call whose passes share a cache.
     pub(crate) fn keeping(&self) -> Self {
         Self { kept: Some(self.kept.clone().unwrap_or_default()), ..self.clone() }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, numbers]`, `tables` `[rows, 4]`,
-    /// `background` `[channels + 1]` and, if there is one, a texture `[texels, 4]`, to an image `[views, channels + 1, height, width]`, top
-    /// row first.
+    /// A pass over `vertices` `[views, 3, vertices]`, `attributes` `[1 or views, entries, numbers]`, `tables` `[rows, 4]`, `background`
+    /// `[channels + 1]` and, if there is one, a texture `[texels, 4]`, to an image `[views, channels + 1, height, width]`, top row first.
     pub(crate) fn run<F: Kernels + Element>(
         &self,
         pass: &Pass,
@@ -76,7 +75,7 @@ impl SoftBlend {
         let kept = self.kept.as_deref().unwrap_or(&own);
         let kept = kept.get_or_init(|| Box::new(F::kept(&inputs, self.kept.is_some())));
         let kept: &Kept<F> = kept.downcast_ref().expect("passes over the same inputs");
-        // Of each input, the texture being the last of five.
+        // Flags of the five inputs; the texture is the last.
         let five = |flags: &[bool]| {
             let texture = self.texture.is_some() && flags[4];
             [flags[0], flags[1], flags[2], flags[3], texture]

@@ -11,26 +11,26 @@ use crate::{
     },
 };
 
-/// The loss of silhouettes against a target, in one op: its gradient to the vertices is computed along with it.
+/// The loss of silhouettes relative to a target, in one op: the forward pass also computes its gradient with respect to the vertices.
 #[derive(Clone, Debug)]
 pub struct SilhouetteLoss {
     pub(crate) sum: ProfileSum,
     pub(crate) loss: PixelLoss,
-    /// Whether the share of each pixel that counts is an input.
+    /// Whether pixel weights are an input.
     pub(crate) weighted: bool,
-    /// The gradients of the losses, of an op that is recorded; as many numbers as the vertices have.
+    /// The gradients of the losses, for a recorded op; as many numbers as the vertices have.
     pub(crate) kept: Option<Arc<OnceLock<TensorData>>>,
 }
 
 impl SilhouetteLoss {
-    /// The op of one call whose passes share what they find out.
+    /// The op of a call whose passes share a cache.
     pub(crate) fn keeping(&self) -> Self {
         let kept = Some(self.kept.clone().unwrap_or_default());
         Self { sum: self.sum.keeping(), kept, ..self.clone() }
     }
 
-    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[rows, 4]`, a `target` and, if the op is weighted, the share of each pixel
-    /// that counts, both `[1 or views, height, width]`, to losses `[views]`. Only the vertices have a gradient.
+    /// A pass over `vertices` `[views, 3, vertices]`, a `table` `[rows, 4]`, a `target` and, if the op is weighted, pixel weights, both
+    /// `[1 or views, height, width]`, to losses `[views]`. Only the vertices have a gradient.
     pub(crate) fn run<F: Kernels + Element + Number<Float = F>>(
         &self,
         pass: &Pass,
@@ -60,7 +60,7 @@ impl SilhouetteLoss {
             Pass::Forward => {
                 let [losses, gradient] = losses(self.kept.is_some());
                 if let Some(kept) = &self.kept {
-                    // Another call may have been as quick; its gradient is the same.
+                    // Another call may have set it first, with the same gradient.
                     let _ = kept.set(flat(gradient));
                 }
                 flat(losses)
@@ -112,7 +112,7 @@ impl SilhouetteLoss {
             PixelLoss::SquaredError => ElementaryOp::SquaredError,
             PixelLoss::Iou => ElementaryOp::Iou,
         };
-        // The derivatives by the sums do not depend on how the sums move, but how those move depends on them being known.
+        // `by_sums` does not depend on the motion of the sums; its change along the direction does.
         let still = vec![F::ZERO; sums.len()];
         let [by_sums, _] = dual_upstream(loss, [&sums, &still], judged, upstream, &shapes);
         let (along, wanted) = ([true, false], [true, false, true]);

@@ -1,7 +1,7 @@
-//! Ops that run in one piece on the host, with their first and second derivatives.
+//! Fused ops on the host, with their first and second derivatives.
 //!
-//! Each is written once, for a pass forward and one back. Run over dual numbers, the two give the second order. What a step does
-//! around the rasterizer would else be a hundred small tensor ops, which take longer than the rasterizer.
+//! Each has a forward and a backward pass; over dual numbers these give the second order. Without fusion, a step around the rasterizer
+//! would be a hundred small tensor ops, which take longer than the rasterizer.
 
 pub(crate) mod blend;
 pub(crate) mod elementary;
@@ -19,7 +19,7 @@ use loss::SilhouetteLoss;
 pub use pass::Pass;
 use sum::ProfileSum;
 
-/// An op with derivatives of its own.
+/// An op with custom derivatives.
 #[derive(Clone, Debug)]
 pub enum FusedOp {
     /// See [`crate::low_level::profile_sum`].
@@ -30,14 +30,14 @@ pub enum FusedOp {
     /// See [`crate::SoftRenderer::mse_loss`].
     #[doc(hidden)]
     SilhouetteLoss(SilhouetteLoss),
-    /// One that is written for any number.
+    /// An op that is generic over the number type.
     #[doc(hidden)]
     Elementary(ElementaryOp),
 }
 
-/// Floats that an op can run on without tensors, for callers that hold slices: f32 and f64.
+/// Float types of ops on slices, without tensors: f32 and f64.
 pub trait Numbers: Element {
-    /// Runs a pass over `slices` with the shapes `dims`; see [`Pass`] for what stands behind the inputs.
+    /// Runs a pass over `slices` with the shapes `dims`; see [`Pass`] for the inputs that follow those of the op.
     ///
     /// # Panics
     ///
@@ -46,7 +46,7 @@ pub trait Numbers: Element {
 }
 
 impl FusedOp {
-    /// The op of one call whose passes share what they find out: to be run on the same vertices only.
+    /// The op of a call whose passes share a cache: to be run on the same vertices only.
     pub fn keeping(&self) -> Self {
         match self {
             Self::ProfileSum(op) => Self::ProfileSum(op.keeping()),
@@ -59,7 +59,7 @@ impl FusedOp {
 
 macro_rules! host_float {
     ($float:ty) => {
-        // A function that is not generic, so that the ops are compiled here and not again in every crate that draws.
+        // A function without generics, compiled in this crate instead of in each crate that draws.
         impl Numbers for $float {
             fn run_pass(
                 op: &FusedOp,

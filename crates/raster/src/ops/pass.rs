@@ -1,20 +1,20 @@
-/// What is asked of an op with some inputs.
+/// A pass of an op: the result, its gradient, or the gradient of that.
 ///
-/// Gradients come back flat, one after the other, in the order of the inputs, and only those that are wanted.
+/// Gradients are concatenated in the order of the inputs, flat, and only those that are wanted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pass {
     /// The result.
     Forward,
-    /// The gradient of `Σ upstream · result`; the upstream stands behind the inputs.
+    /// The gradient of `Σ upstream · result`; the upstream follows the inputs.
     Vjp {
-        /// To which inputs.
+        /// The inputs with respect to which gradients are wanted.
         wanted: Vec<bool>,
     },
-    /// The gradient of `Σ direction · gradient`; the direction stands behind inputs and upstream.
+    /// The gradient of `Σ direction · gradient`; the direction follows inputs and upstream.
     VjpOfVjp {
-        /// What the gradient consists of.
+        /// The inputs whose gradients the gradient consists of.
         along: Vec<bool>,
-        /// To which of the inputs, and whether to the upstream.
+        /// The inputs, and last the upstream, with respect to which gradients are wanted.
         wanted: Vec<bool>,
     },
 }

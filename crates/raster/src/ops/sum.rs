@@ -5,24 +5,23 @@ use softrast_tensor::{Element, TensorData};
 
 use crate::{ImageSize, ops::pass::Pass};
 
-/// What stays the same over the calls of the op: faces, image size and the places of the knots.
+/// Constants of the op over its calls: faces, image size and the layout of the table.
 #[derive(Clone, Debug)]
 pub struct ProfileSum {
     pub(crate) faces: Arc<[[u32; 3]]>,
     pub(crate) grid: Grid,
     pub(crate) size: ImageSize,
     pub(crate) near: f64,
-    /// Whether back faces are not drawn.
+    /// Whether back faces are culled.
     pub(crate) culls: bool,
-    /// What a pass forward leaves to the passes back, of an op that is recorded: which faces reach which rows. 20 bytes for each face of
-    /// each view.
+    /// Cache between the forward pass and the backward passes of a recorded op: the faces of each row, 20 bytes per face and view.
     pub(crate) kept: Option<Arc<OnceLock<Bands>>>,
     #[cfg(feature = "wgpu")]
     pub(crate) on_gpu: crate::gpu::SumOnGpu,
 }
 
 impl ProfileSum {
-    /// The op of one call whose passes share what they find out.
+    /// The op of a call whose passes share a cache.
     pub(crate) fn keeping(&self) -> Self {
         Self {
             kept: Some(self.kept.clone().unwrap_or_default()),

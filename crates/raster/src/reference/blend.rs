@@ -18,25 +18,25 @@ use crate::{
     weighting::{FARTHEST_SEEN, floor},
 };
 
-/// Stands for the logarithm of a weight of 0.
+/// The logarithm used for a weight of 0.
 const HIDDEN: f64 = -1e30;
 
-/// Soft colours of whole meshes: `[views, channels + 1, height, width]`, top row first, the last channel being the faces' share.
+/// Soft colours of whole meshes: `[views, channels + 1, height, width]`, top row first; the last channel is the faces' share.
 ///
-/// `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` over all faces j none of whose corners is nearer than [`NEAR`], farther than 1e15 world units, or
-/// projected beyond 1e6 NDC, and the background. The weight of a face, `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, is that of a [`Weighting`] with the parameters `phi` of both of its
-/// softnesses. The depth zⱼ and the attributes cⱼ are those at the point of the face nearest to the pixel: the pixel itself where it lies
-/// in the face, else the closest point of the boundary. They are interpolated in perspective: 1/z is linear on the screen, and so is c/z.
-/// A face without area has no inside. The share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`.
+/// `C = (Σⱼ wⱼ cⱼ + w c) / (Σⱼ wⱼ + w)` over the background and all faces j none of whose corners is nearer than [`NEAR`], farther than
+/// 1e15 world units, or projected beyond 1e6 NDC. The weight of a face, `ln wⱼ = ln s(dⱼ) + ln b(zⱼ)`, is that of a [`Weighting`] with the
+/// parameters `phi` of its two softnesses. The depth zⱼ and the attributes cⱼ are those at the point of the face nearest to the pixel: the
+/// pixel itself if it lies in the face, else the closest point of the boundary. They are interpolated in perspective: 1/z is linear on the
+/// screen, and so is c/z. A face without area has no interior. The share is `Σⱼ wⱼ / (Σⱼ wⱼ + w)`.
 ///
-/// Under a softness that is 0 from some distance on, `s` is what its logarithm gives less what keeps that finite, and 0 from 1e-11 on. The computation goes
-/// in chunks of pixels of one view; weights are relative to the largest of a pixel.
+/// For a softness that is 0 beyond some distance, `s` is the exponential of its logarithm minus the floor that keeps the logarithm finite,
+/// and 0 below 1e-11. Pixels are computed in chunks of one view; weights are relative to the largest of a pixel.
 ///
 /// Source: Wu et al. 2024, Eq. 3 and 4; docs/notes.md, Colour.
 ///
 /// # Panics
 ///
-/// If shapes do not fit, or a face uses a vertex that is not there.
+/// If shapes do not fit, or a vertex number of a face is out of range.
 pub fn blended<B: Backend>(
     scene: Scene,
     vertices: Tensor<B, 3>,
@@ -57,7 +57,7 @@ pub fn blended<B: Backend>(
         let values = attributes.values.clone().narrow(0, if own { view } else { 0 }, 1);
         let log_edge = weighting.edge.log_value(phi[0].clone(), points.distance.clone());
         let log_depth = weighting.log_weight_of_depth(phi[1].clone(), points.depth.clone());
-        // What does not count is not even compared, so that it makes nothing else vanish.
+        // Weights that do not count are excluded from the maximum, so that they make no others vanish.
         let nothing = log_edge.clone().lower_equal_elem(counts_from(floor));
         let nothing = nothing.bool_or(points.hidden.clone().expand(log_edge.dims()));
         let log_depth = log_depth.mask_fill(nothing, HIDDEN);
@@ -116,7 +116,7 @@ fn corner_values<B: Backend>(values: &Tensor<B, 3>, entries: &[[u32; 3]]) -> [Te
     })
 }
 
-/// The channels of a texture `[height, width, channels]` at places u, v of any one shape, as [`Attributes::with_texture`] says.
+/// The channels of a texture `[height, width, channels]` at positions u, v of any one shape; see [`Attributes::with_texture`].
 fn sampled<B: Backend>(texture: Tensor<B, 3>, [u, v]: [Tensor<B, 3>; 2]) -> Vec<Tensor<B, 3>> {
     let [height, width, channels] = texture.dims();
     let shape = u.dims();
@@ -150,13 +150,13 @@ fn sampled<B: Backend>(texture: Tensor<B, 3>, [u, v]: [Tensor<B, 3>; 2]) -> Vec<
     (0..channels).map(channel).collect()
 }
 
-/// Points of faces that are nearest to pixels, each `[views, pixels, faces]`.
+/// Points of faces nearest to pixels, each `[views, pixels, faces]`.
 struct Points<B: Backend> {
     /// Signed distance, positive inside.
     distance: Tensor<B, 3>,
     /// Depth of the point.
     depth: Tensor<B, 3>,
-    /// Its barycentric weights on the face itself.
+    /// Barycentric weights of the point on the face itself.
     weights: [Tensor<B, 3>; 3],
     /// Faces that are not drawn, `[views, 1, faces]`.
     hidden: Tensor<B, 3, Bool>,
@@ -172,7 +172,7 @@ impl<B: Backend> Points<B> {
         };
         let drawn = corners.iter().map(seen).reduce(Tensor::bool_and).expect("three corners");
         let hidden = drawn.bool_not();
-        // What is not drawn is a point at depth 1, so that it meets no root and no division.
+        // Faces that are not drawn become a point at depth 1, which avoids invalid roots and divisions.
         let corners = corners.map(|[x, y, z]| {
             let [x, y] = [x, y].map(|x| x.mask_fill(hidden.clone(), 0.0));
             [x, y, z.mask_fill(hidden.clone(), 1.0)]
@@ -184,7 +184,7 @@ impl<B: Backend> Points<B> {
         let area = side_a.clone() + side_b.clone() + side_c.clone();
         let own = inside.clone().bool_and(area.clone().greater_elem(AREA));
         let per_area = area.mask_fill(own.clone().bool_not(), 1.0).recip();
-        // Corner k lies across from edge k + 1.
+        // Corner k is opposite edge k + 1.
         let mut across = [side_b, side_c, side_a].into_iter();
         let parts = on_boundary.map(|weight| {
             let side = across.next().expect("three sides");

@@ -9,16 +9,15 @@ const POINT: f64 = 1e-30;
 const ON_EDGE: f64 = 1e-24;
 /// Signed distances from pixels to faces in NDC, positive inside: `[views, pixels, faces]`.
 ///
-/// `vertices` is `[views, vertices, 3]` (x and y in NDC, depth), `pixels` `[pixels, 2]` in NDC.
-/// Inside or outside is told by edge functions, the distance is that to the nearest point of the
-/// boundary. Edges belong to the inside; a face without area has none.
+/// `vertices` is `[views, vertices, 3]` (x and y in NDC, depth), `pixels` `[pixels, 2]` in NDC. Edge functions determine inside and
+/// outside; the distance is that to the nearest point of the boundary. Edges belong to the inside; a face without area has none.
 ///
 /// Source: Petersen et al. 2022, computed by projection onto the edges instead of barycentric
 /// coordinates (docs/notes.md, Signed distance).
 ///
 /// # Panics
 ///
-/// If a face uses a vertex that is not there.
+/// If a vertex number of a face is out of range.
 pub fn signed_distance<B: Backend>(
     vertices: Tensor<B, 3>,
     faces: &[[u32; 3]],
@@ -28,30 +27,30 @@ pub fn signed_distance<B: Backend>(
     signed(distance2, inside)
 }
 
-/// Signed distances of squared ones.
+/// Signed distances from squared distances.
 pub(super) fn signed<B: Backend>(
     distance2: Tensor<B, 3>,
     inside: Tensor<B, 3, Bool>,
 ) -> Tensor<B, 3> {
-    // Selected by the argument, so that neither the root nor its gradient meets 0.
+    // Masked before the square root, so that neither the root nor its gradient is evaluated at 0.
     let on_edge = distance2.clone().lower_elem(ON_EDGE);
     let distance = distance2.mask_fill(on_edge.clone(), 1.0).sqrt().mask_fill(on_edge, 0.0);
     distance.clone().neg().mask_where(inside, distance)
 }
 
-/// x and y of places, or of the ways between them.
+/// x and y of positions, or of offsets between them.
 type Plane<B> = [Tensor<B, 3>; 2];
 
 /// The closest points of the boundaries of faces to pixels, each `[views, pixels, faces]`.
 pub(super) struct Boundary<B: Backend> {
-    /// Squared distance to it.
+    /// Squared distance to the closest point.
     pub(super) distance2: Tensor<B, 3>,
-    /// Where the pixel lies in the face, edges included.
+    /// Whether the pixel lies in the face, edges included.
     pub(super) inside: Tensor<B, 3, Bool>,
-    /// Where it lies on the second edge rather than on the first, and on the third rather than on these.
+    /// Whether the closest point is on the second edge rather than the first, and on the third rather than these.
     second: Tensor<B, 3, Bool>,
     third: Tensor<B, 3, Bool>,
-    /// Its place on its edge, 0 to 1.
+    /// Position of the closest point on its edge, 0 to 1.
     along: Tensor<B, 3>,
     /// Doubled areas of the triangles that the edges make with the pixel, positive on the inner side.
     pub(super) sides: [Tensor<B, 3>; 3],
@@ -91,7 +90,7 @@ impl<B: Backend> Boundary<B> {
     }
 }
 
-/// The number of the edge that a point lies on.
+/// The number of the edge on which a point lies.
 fn pick<B: Backend>(
     [second, third]: [&Tensor<B, 3, Bool>; 2],
     [a, b, c]: [Tensor<B, 3>; 3],
@@ -99,13 +98,13 @@ fn pick<B: Backend>(
     a.mask_where(second.clone(), b).mask_where(third.clone(), c)
 }
 
-/// An edge as points see it.
+/// An edge relative to points.
 struct Edge<B: Backend> {
-    /// Squared distance to its closest point.
+    /// Squared distance to the closest point of the edge.
     distance2: Tensor<B, 3>,
-    /// Positive on its left: the doubled area of the triangle that it makes with the point.
+    /// Doubled area of the triangle of edge and point, positive to the left of the edge.
     side: Tensor<B, 3>,
-    /// The place of the closest point on it, 0 to 1.
+    /// Position of the closest point on the edge, 0 to 1.
     along: Tensor<B, 3>,
 }
 
@@ -122,7 +121,7 @@ fn edge<B: Backend>(p: &Plane<B>, start: &[Tensor<B, 3>; 3], end: &[Tensor<B, 3>
     Edge { distance2, side: cross([ex, ey], [wx, wy]), along }
 }
 
-/// From one corner to another.
+/// The vector from one corner to another.
 fn between<B: Backend>(start: &[Tensor<B, 3>; 3], end: &[Tensor<B, 3>; 3]) -> Plane<B> {
     [0, 1].map(|k| end[k].clone() - start[k].clone())
 }
@@ -131,7 +130,7 @@ fn cross<B: Backend>([ux, uy]: Plane<B>, [vx, vy]: Plane<B>) -> Tensor<B, 3> {
     ux * vy - uy * vx
 }
 
-/// The lesser of two numbers; where they are the same, the first with all of the gradient.
+/// The lesser of two numbers; if they are equal, the first, which gets the whole gradient.
 fn lesser<B: Backend>(a: Tensor<B, 3>, b: Tensor<B, 3>) -> Tensor<B, 3> {
     let less = b.clone().lower(a.clone());
     a.mask_where(less, b)

@@ -1,4 +1,4 @@
-//! Cameras and losses in tensor ops: what the small ops are tested against.
+//! Cameras and losses in tensor ops, the reference for tests of the small ops.
 
 use softrast_kernel::EMPTY;
 use softrast_tensor::{Backend, Tensor};
@@ -16,7 +16,7 @@ pub fn orbit_matrices<B: RasterBackend>(orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     let [views, _] = orbits.dims();
     let column = |k: usize| orbits.clone().narrow(1, k, 1).reshape([views]);
     let focal = focal(column(3));
-    // The rotation has x left, an image has it right.
+    // The rotation has x left, the image x right.
     let zoom = Tensor::cat(vec![focal.clone().neg(), focal.clone(), focal.ones_like()], 1);
     let rotation = view_rotation(column(1), column(2)) * zoom;
     let distance = column(0).reshape([views, 1, 1]);
@@ -25,7 +25,7 @@ pub fn orbit_matrices<B: RasterBackend>(orbits: Tensor<B, 2>) -> Tensor<B, 3> {
     Tensor::cat(vec![rotation, shift], 2)
 }
 
-/// x and y in NDC and depth `[views, vertices, 3]` of `vertices` `[views or 1, vertices, 3]`, as cameras with these matrices see them.
+/// Projects `vertices` `[views or 1, vertices, 3]` by these matrices: x and y in NDC and depth, `[views, vertices, 3]`.
 pub fn perspective<B: RasterBackend>(
     vertices: Tensor<B, 3>,
     matrices: Tensor<B, 3>,
@@ -53,7 +53,7 @@ pub fn mse_loss<B: Backend, const D: usize>(
     of_views(difference.clone() * difference, Tensor::mean_dim)
 }
 
-/// One number for each view `[views]` of pixels `[views, ..]`.
+/// Reduces pixels `[views, ..]` to one number per view `[views]`.
 fn of_views<B: Backend, const D: usize>(
     pixels: Tensor<B, D>,
     of: impl Fn(Tensor<B, 2>, usize) -> Tensor<B, 2>,

@@ -1,6 +1,6 @@
 //! The definition: burn tensor ops over every pixel-face pair, on any backend, to any order.
 //!
-//! Slow (about 1.3 kB of traffic a pair) and simple; every faster path is tested against it.
+//! Slow (about 1.3 kB of memory traffic per pair) and simple; every faster implementation is tested against it.
 
 mod blend;
 mod distance;
@@ -15,10 +15,10 @@ use distance::corners;
 pub use distance::signed_distance;
 pub use elementary::{iou_loss, mse_loss, orbit_matrices, perspective};
 
-/// Pixel-face pairs that one chunk of [`sums`] and [`vjp`] may hold.
+/// Most pixel-face pairs per chunk of [`sums`] and [`vjp`].
 const PAIRS: usize = 1 << 18;
 
-/// What to draw: faces over the vertices of every view, on an image.
+/// The faces and image of a drawing: faces over the vertices of every view.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
     /// Corners of each face, as vertex numbers.
@@ -29,9 +29,8 @@ pub struct Scene<'a> {
 
 /// Sums of `g(s(d))` over the faces of each pixel: `[views, height, width]`, top row first.
 ///
-/// Computed in chunks of pixels of one view, so that memory stays bounded; under autodiff the tape
-/// still holds all chunks, see [`vjp`] for a gradient that does not. Faces with a vertex nearer than
-/// [`NEAR`] are left out.
+/// Computed in chunks of pixels of one view, so that memory stays bounded; under autodiff the tape still holds all chunks, see [`vjp`] for
+/// a gradient that does not. Faces with a vertex nearer than [`NEAR`] are excluded.
 pub fn sums<B: Backend>(
     scene: Scene,
     vertices: Tensor<B, 3>,
@@ -51,12 +50,12 @@ pub fn sums<B: Backend>(
     Tensor::cat(parts, 0).reshape([views, scene.size.height, scene.size.width])
 }
 
-/// Gradient of `Σ upstream · sums` to the vertices `[views, vertices, 3]`, chunk by chunk: memory
-/// is that of one chunk. `upstream` is `[views, height, width]`.
+/// Gradient of `Σ upstream · sums` with respect to the vertices `[views, vertices, 3]`, chunk by chunk, with the memory of one chunk.
+/// `upstream` is `[views, height, width]`.
 ///
 /// # Panics
 ///
-/// If `upstream` does not fit the image, or a face uses a vertex that is not there.
+/// If `upstream` does not fit the image, or a vertex number of a face is out of range.
 pub fn vjp<B: Backend>(
     scene: Scene,
     vertices: Tensor<B, 3>,
@@ -87,7 +86,7 @@ pub fn vjp<B: Backend>(
     Tensor::cat(parts, 0).reshape([views, count, 3])
 }
 
-/// Sums of one chunk: `vertices` `[1, vertices, 3]`, pixels of that view; `[pixels]`.
+/// Sums of one chunk, `[pixels]`: `vertices` `[1, vertices, 3]`, pixels of that view.
 fn chunk_sums<B: Backend>(
     scene: Scene,
     vertices: Tensor<B, 3>,

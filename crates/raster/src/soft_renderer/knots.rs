@@ -3,22 +3,22 @@ use softrast_tensor::DType;
 
 use crate::Silhouette;
 
-/// Parameters that differ by no more than this, relative to the larger of 1 and themselves, count as the same.
+/// Parameters that differ by at most this, relative to the larger of 1 and themselves, count as equal.
 const SAME: f64 = 1e-12;
 
 /// Support and knots for the parameters `phi`.
 #[derive(Clone, Debug)]
 pub(super) struct Knots<S> {
     pub(super) phi: Vec<f64>,
-    /// Whether it is drawn on the CPU, and in which float type.
+    /// Whether the CPU draws, and the float type.
     pub(super) drawn: (bool, DType),
-    /// Faces that they serve.
+    /// Number of faces that the knots are valid for.
     pub(super) room: usize,
     pub(super) silhouette: Silhouette<S>,
 }
 
 impl<S: Softness> Knots<S> {
-    /// Knots for parameters `phi`, if their softness is that of these stretched.
+    /// Knots for parameters `phi`, if their softness is that of these knots, stretched.
     pub(super) fn stretched_to(&self, phi: &[f64]) -> Option<Self> {
         if self.phi == phi {
             return Some(self.clone());
@@ -35,7 +35,7 @@ impl<S: Softness> PartialEq for Knots<S> {
     }
 }
 
-/// By how much a step with parameters `now` is stretched against one with those `before`, if that is all that they differ by.
+/// The factor by which a step with parameters `now` is stretched relative to one with `before`, if they differ by nothing else.
 pub(crate) fn stretch(softness: &impl Softness, before: &[f64], now: &[f64]) -> Option<f64> {
     let factor = softness.scale(now) / softness.scale(before);
     let stretched = softness.with_scale_values(before, factor);

@@ -6,15 +6,15 @@ use super::SoftRenderer;
 use crate::{Projected, RasterBackend, loss::loss_of_images};
 
 impl<S: Softness> SoftRenderer<S> {
-    /// The [`mse_loss`](crate::mse_loss) of each view against a target `[1 or views, height, width]`, `[views]`: that of the
-    /// [`silhouette`](Self::silhouette). Gradients reach the vertices alone, to second order.
+    /// The [`mse_loss`](crate::mse_loss) of each view of the [`silhouette`](Self::silhouette) relative to a target
+    /// `[1 or views, height, width]`, `[views]`. Gradients reach only the vertices, to second order.
     ///
-    /// On the CPU, under the probabilistic sum and without a surrogate, it is one op that computes the gradient along with the image. It
+    /// On the CPU, with the probabilistic sum and without a surrogate, it is one op that computes the gradient together with the image. It
     /// takes two thirds to nine tenths of the time of two ops.
     ///
     /// # Panics
     ///
-    /// If the target is of another size.
+    /// If the target has another size.
     pub fn mse_loss<B: RasterBackend>(
         &self,
         vertices: Projected<B>,
@@ -23,11 +23,11 @@ impl<S: Softness> SoftRenderer<S> {
         self.loss(PixelLoss::SquaredError, vertices, target, None)
     }
 
-    /// The [`iou_loss`](crate::iou_loss) of each view, likewise.
+    /// The [`iou_loss`](crate::iou_loss) of each view; see [`mse_loss`](Self::mse_loss).
     ///
     /// # Panics
     ///
-    /// If the target is of another size.
+    /// If the target has another size.
     pub fn iou_loss<B: RasterBackend>(
         &self,
         vertices: Projected<B>,
@@ -36,12 +36,12 @@ impl<S: Softness> SoftRenderer<S> {
         self.loss(PixelLoss::Iou, vertices, target, None)
     }
 
-    /// [`mse_loss`](Self::mse_loss) where a share of each pixel counts, `[1 or views, height, width]` in [0, 1]: the coverage is multiplied by
-    /// it. Without one, all of every pixel counts.
+    /// [`mse_loss`](Self::mse_loss) with pixel weights `[1 or views, height, width]` in [0, 1], which multiply the coverage. Without
+    /// weights, every pixel counts in full.
     ///
     /// # Panics
     ///
-    /// If the target or the shares are of another size.
+    /// If the target or the weights have another size.
     pub fn weighted_mse_loss<B: RasterBackend>(
         &self,
         vertices: Projected<B>,
@@ -51,11 +51,11 @@ impl<S: Softness> SoftRenderer<S> {
         self.loss(PixelLoss::SquaredError, vertices, target, counted)
     }
 
-    /// [`iou_loss`](Self::iou_loss), likewise.
+    /// [`iou_loss`](Self::iou_loss) with pixel weights; see [`weighted_mse_loss`](Self::weighted_mse_loss).
     ///
     /// # Panics
     ///
-    /// If the target or the shares are of another size.
+    /// If the target or the weights have another size.
     pub fn weighted_iou_loss<B: RasterBackend>(
         &self,
         vertices: Projected<B>,

@@ -1,4 +1,4 @@
-//! Random scenes for the fused op, on the GPU as in f64.
+//! Random scenes for the fused op, for the GPU and for f64.
 
 use std::sync::Arc;
 

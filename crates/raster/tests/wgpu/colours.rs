@@ -15,35 +15,35 @@ use crate::{
     triangles::triangles,
 };
 
-/// Largest error of a pixel, and of derivatives relative to their length: more where tables are made in f32.
+/// Largest error of a pixel, and of derivatives relative to their length: larger if tables are computed in f32.
 const IMAGE: f64 = 1e-4;
 const PRODUCTS: f64 = 2e-3;
 const PRODUCTS_OF_TABLES: f64 = 5e-3;
 
-/// What is drawn.
+/// A scene to draw.
 struct Scene {
     /// `[views, vertices, 3]`: x and y in NDC, depth.
     vertices: Vec<f64>,
     views: usize,
-    /// At the corners of faces, and how many there are.
+    /// Entries at the corners of faces, and their number.
     entries: (Arc<[[u32; 3]]>, usize),
-    /// Views that have attributes of their own.
+    /// Number of views with separate attributes, or 1.
     own: usize,
-    /// Of the image; attributes are places on a texture where there is one.
+    /// Channels of the image; with a texture, attributes are coordinates on it.
     channels: usize,
-    /// Its rows and columns.
+    /// Rows and columns of the texture.
     texture: Option<[usize; 2]>,
     renderer: ColourRenderer,
 }
 
-/// Which inputs get gradients: vertices, attributes, background and texture, or the parameters of the softnesses too.
+/// Inputs with gradients: vertices, attributes, background and texture, or also the parameters of the softnesses.
 #[derive(Clone, Copy, PartialEq)]
 enum Wanted {
     Scene,
     Softness,
 }
 
-/// The image, then gradients to what is wanted, then derivatives of a sum of these to the same.
+/// The image, then gradients of the wanted inputs, then derivatives of a sum of these with respect to the same inputs.
 fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Vec<Vec<f64>> {
     let Scene { views, channels, own, texture, .. } = *scene;
     let flat =
@@ -58,7 +58,7 @@ fn products<T: RasterBackend>(scene: &Scene, wanted: Wanted, dtype: DType) -> Ve
     let log_weight = numbers(background.log_weight);
     let inner: Vec<_> = [
         scene.vertices.clone(),
-        // Some places lie beyond the texture, which repeats.
+        // Some coordinates lie beyond the texture, which repeats.
         wave(own * scene.entries.1 * numbers_of_entry, 0.71)
             .iter()
             .map(|x| 2.0 * x - 0.4)
@@ -145,12 +145,12 @@ fn renderer(
     ColourRenderer::with_weighting(faces.clone(), size, weighting, phi).with_tolerance(1e-6)
 }
 
-/// A ball from three sides, its colours at its vertices.
+/// A ball in three views, with colours at its vertices.
 fn ball(family: Family, depth: DepthSoftness) -> Scene {
     ball_of(1, [18, 23], family, depth)
 }
 
-/// One of 20 faces without `subdivisions`, of 80 after one, on images of this height and width.
+/// A ball of 20 faces without `subdivisions`, of 80 after one, on images of this height and width.
 fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoftness) -> Scene {
     let (ball, azimuths) = (icosphere(subdivisions), [4.1, 108.3, 211.9]);
     let positions = ball.positions();
@@ -169,7 +169,7 @@ fn ball_of(subdivisions: u32, size: [usize; 2], family: Family, depth: DepthSoft
     }
 }
 
-/// Three triangles that reach more pixels than a part has, one through another.
+/// Three intersecting triangles, each with more pixels than a part.
 fn large() -> Scene {
     let vertices = vec![
         [-0.83, -0.61, 1.9],
@@ -195,12 +195,12 @@ fn large() -> Scene {
     }
 }
 
-/// Random triangles at random depths, some beside the image and some behind the camera, each view with colours of its own for each face.
+/// Random triangles at random depths, some outside of the image and some behind the camera, with separate face colours per view.
 fn random() -> Scene {
     let (one, faces) = triangles(7, 20);
     let mut vertices = [one.clone(), one].concat();
     for (k, corner) in vertices.chunks_mut(3).enumerate() {
-        // Slivers as wide as f32 can tell their edges apart.
+        // Slivers wide enough for f32 to distinguish their edges.
         if k % 15 == 14 {
             corner[0] += 0.03;
             corner[1] -= 0.02;
@@ -235,7 +235,7 @@ fn colours_agree_with_the_kernel_in_f64_to_second_order() {
         ("a ball with edges that end", ball(Family::Uniform, exp)),
         ("a ball by the network of depths", ball(Family::Gauss, DepthSoftness::Mlp)),
         ("random triangles", random()),
-        // Faces that reach more pixels than a part has.
+        // Faces with more pixels than a part.
         ("faces in parts", large()),
         ("faces in parts in a picture", Scene { texture: Some([5, 7]), ..large() }),
         ("a ball in a picture", Scene { texture: Some([5, 7]), ..ball(Family::Logistic, exp) }),
@@ -252,8 +252,8 @@ fn gradients_of_large_faces_that_share_edges_agree_with_the_kernel_in_f64() {
     if !adapter() {
         return;
     }
-    // Some of their pixels are so near an edge that squared distances do not tell which one is the nearest. The second order is not held: f32 on
-    // the CPU is off there too.
+    // Some pixels are so near an edge that squared distances do not determine the nearest one. The second order is not checked: f32 on the
+    // CPU has errors there too.
     let scene = ball_of(0, [150, 140], Family::Logistic, DepthSoftness::Family(Family::Exp));
     let expected = products::<NdArray<f64>>(&scene, Wanted::Scene, DType::F64);
     let found = products::<Wgpu>(&scene, Wanted::Scene, DType::F32);
@@ -267,7 +267,7 @@ fn gradients_to_the_softnesses_agree_with_the_kernel_in_f64() {
     if !adapter() {
         return;
     }
-    // At .03 a pixel lies on the end of an edge, where rounding alone decides the second order, on the CPU too.
+    // At .03 a pixel lies on the end of an edge, where rounding determines the second order, on the CPU too.
     let mut edges_that_end = ball(Family::Uniform, DepthSoftness::Family(Family::Exp));
     let [_, depth] = edges_that_end.renderer.phi().clone();
     edges_that_end.renderer.set_phi([vec![0.025_f64.ln()], depth]);
@@ -302,7 +302,7 @@ fn views_that_no_launch_takes_together_are_drawn_in_parts() {
     if !adapter() {
         return;
     }
-    // The last views differ from those that any earlier part could have drawn in their place.
+    // The last views differ from those of any earlier batch.
     let views = 65_540;
     let triangle = |view: usize| {
         let shift = if view < 65_530 { 0.0 } else { 0.01 * (view - 65_530) as f64 };

@@ -1,4 +1,4 @@
-//! How many kernels a step launches, as the log of `CubeCL` counts them: each takes microseconds of the host, however little it does.
+//! Number of kernels that a step launches, from the log of `CubeCL`: each takes microseconds of the host, however small.
 
 use std::{fs, process::Command, thread, time::Duration};
 
@@ -9,13 +9,13 @@ use softrast_tensor::{Autodiff, Tensor};
 
 use crate::adapter;
 
-/// Names the log in the process that takes the steps.
+/// Environment variable of the log in the process that runs the steps.
 const LOG: &str = "CUBECL_DEBUG_LOG";
-/// Steps that are taken, and the launch with which each begins.
+/// Number of steps, and the launch with which each starts.
 const STEPS: usize = 4;
 const FIRST: &str = "| OrbitMatrices |";
 
-/// Losses of three views of a ball, and what they are differentiated by.
+/// Losses of three views of a ball, and their gradient.
 fn step<T: RasterBackend>(
     renderer: &SoftRenderer<EdgeSoftness>,
     target: Tensor<Autodiff<T>, 3>,
@@ -34,7 +34,7 @@ fn step<T: RasterBackend>(
         true => renderer.iou_loss(seen, target),
         false => renderer.mse_loss(seen, target),
     };
-    // That of a sum of them.
+    // The gradient of the sum of the losses.
     let gradients = loss.backward();
     let _ = match pose {
         true => orbits.grad(&gradients).expect("a gradient").into_data(),
@@ -50,7 +50,7 @@ fn take_steps(pose: bool, size: usize) {
     for _ in 0..STEPS {
         step::<Wgpu>(&renderer, target.clone(), pose);
     }
-    // CubeCL writes its log beside, and not all of it if the process ends.
+    // CubeCL writes its log in the background, and incompletely if the process ends.
     let begun = || fs::read_to_string(&log).map_or(0, |text| text.matches(FIRST).count());
     for _ in 0..600 {
         if begun() == STEPS {
@@ -94,7 +94,7 @@ fn launched(name: &str) -> Vec<String> {
     let lines: Vec<&str> = text.lines().filter(|line| line.starts_with("| ")).collect();
     let begins = |line: &&str| line.contains(FIRST);
     let starts: Vec<usize> = (0..lines.len()).filter(|&k| begins(&lines[k])).collect();
-    // The last step but one is whole, and has nothing to compile.
+    // The second-to-last step is complete, and compiles nothing.
     let [.., start, end] = starts[..] else { panic!("no steps in {text}") };
     lines[start..end].iter().map(|&line| line.to_owned()).collect()
 }

@@ -1,7 +1,6 @@
 //! The fused op on the GPU in f32 against f64 on the CPU: image, gradient, second order.
 //!
-//! Runs on whatever adapter wgpu finds, Mesa's software Vulkan included, and says `skipped` where
-//! there is none.
+//! Runs on any adapter that wgpu finds, including Mesa's software Vulkan, and prints `skipped` if there is none.
 
 mod colours;
 mod launches;
@@ -21,7 +20,7 @@ use softrast_raster::{
 use softrast_softness::{EdgeSoftness, Family, Softness};
 use softrast_tensor::{DType, NdArray, Tensor};
 
-/// Says which adapter the test runs on, or that it does not.
+/// Prints the adapter that the test runs on, or `skipped`.
 fn adapter() -> bool {
     match adapter_name() {
         Ok(name) => println!("on {name}"),
@@ -30,7 +29,7 @@ fn adapter() -> bool {
     adapter_name().is_ok()
 }
 
-/// A mesh seen from 2.732 away at an elevation and some azimuths, all in degrees.
+/// A mesh from a distance of 2.732, for an elevation and some azimuths in degrees.
 fn seen(
     mesh: &Mesh,
     (elevation, azimuths): (f64, &[f64]),
@@ -53,14 +52,14 @@ fn seen(
     }
 }
 
-/// Random triangles, with slivers, and faces beside the image and behind the camera.
+/// Random triangles, with slivers, and faces outside of the image and behind the camera.
 fn random(softness: EdgeSoftness, scale: f64) -> Scene {
     let (mut vertices, faces) = triangles::triangles(7, 20);
-    // Far beside the image.
+    // Far outside of the image.
     for corner in 0..3 {
         vertices[3 * corner] += 40.0;
     }
-    // Slivers wide enough for f32 to tell which of their edges is the nearer one.
+    // Slivers wide enough for f32 to determine the nearer edge.
     for sliver in vertices.chunks_mut(9).skip(4).step_by(5) {
         sliver[6] += 0.03;
         sliver[7] -= 0.02;
@@ -73,7 +72,7 @@ fn a_straight_edge_is_the_softness_itself() {
     if !adapter() {
         return;
     }
-    // The edge x = 0 of a triangle that covers the left half of the image and much beside it.
+    // The edge x = 0 of a triangle that covers the left half of the image and much around it.
     let corners = [0.0, -50.0, 2.0, 0.0, 50.0, 2.0, -50.0, 0.0, 2.0];
     let faces: Arc<[[u32; 3]]> = [[0, 1, 2]].into();
     let softness = EdgeSoftness::new(Family::Logistic);
@@ -111,11 +110,11 @@ fn scenes_agree_with_the_kernel_in_f64_to_second_order() {
     let fox = seen(&fox(), (17.3, &[171.7]), 50, squared, 1e-3);
     // A tail that is not 0 on the far side.
     let tail = random(EdgeSoftness::new(Family::Mlp), 0.05);
-    // No squares.
+    // Images that are not square.
     let azimuths = [4.1, 108.3, 211.9];
     let [low, high] = [[20, 43], [51, 30]]
         .map(|size| seen(&icosphere(2), (17.3, &azimuths), size, squared, 1e-3));
-    // Faces that reach more pixels than a part has.
+    // Faces with more pixels than a part.
     let cut = seen(&icosphere(0), (17.3, &[4.1]), 150, squared, 1e-2);
     let scenes = [
         ("a sphere", sphere),
@@ -137,7 +136,7 @@ fn more_views_than_a_launch_takes_are_drawn_in_parts() {
     if !adapter() {
         return;
     }
-    // The last views differ from those that any earlier part could have drawn in their place.
+    // The last views differ from those of any earlier batch.
     let views = 65_540;
     let triangle = |view: usize| {
         let shift = if view < 65_530 { 0.0 } else { 0.01 * (view - 65_530) as f64 };
@@ -217,7 +216,7 @@ fn more_large_faces_than_can_be_cut_are_drawn_whole() {
     if !adapter() {
         return;
     }
-    // A stack of one triangle: two parts of each would take more slots than there are.
+    // A stack of one triangle: two parts of each would need more slots than there are.
     let (count, softness) = (2100, EdgeSoftness::new(Family::Logistic));
     let corners = [[-1.9, -0.9, 2.0], [1.9, -0.9, 2.0], [0.0, 0.9, 2.0]].concat();
     let faces: Arc<[[u32; 3]]> = vec![[0, 1, 2]; count].into();

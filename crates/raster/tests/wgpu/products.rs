@@ -1,4 +1,4 @@
-//! Everything that can be computed of a scene, on any backend and by either path.
+//! All results for a scene, on any backend and with either implementation.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use softrast_raster::{ImageSize, RasterBackend, TConorm, low_level::Rasterizer, 
 use softrast_softness::{EdgeSoftness, Softness};
 use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData};
 
-/// What is drawn, and how softly.
+/// A scene and its softness.
 pub(crate) struct Scene {
     /// `[views, vertices, 3]`: x and y in NDC, depth.
     pub(crate) vertices: Vec<f64>,
@@ -14,16 +14,16 @@ pub(crate) struct Scene {
     pub(crate) faces: Arc<[[u32; 3]]>,
     pub(crate) size: ImageSize,
     pub(crate) softness: EdgeSoftness,
-    /// Of each view, or of all.
+    /// Scale of the softness.
     pub(crate) scale: f64,
 }
 
-/// Who draws it, and what beside the vertices is an input.
+/// The implementation, and its inputs in addition to the vertices.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Path {
     /// The fused op, with the parameters of the softness.
     Fused,
-    /// The fused op, with a table that was made in f64.
+    /// The fused op, with a table computed in f64.
     Table,
     /// Tensor ops over every pixel and face, with the parameters of the softness.
     Reference,
@@ -33,11 +33,10 @@ pub(crate) enum Path {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Products {
     pub(crate) image: Vec<f64>,
-    /// Gradients to the vertices and to the other input, then the derivatives of a sum of both to
-    /// the other input and, with a table, to the vertices: the curvature of a table that was made in
-    /// f32 is rounding where its cells are narrow, whoever reads it. Of a table, what counts is its
-    /// part along a change of scale: which of two cells gets a pair that lies between them is up to
-    /// rounding.
+    /// Gradients with respect to the vertices and the other input, then the derivatives of a sum of both with respect to the other input
+    /// and, with a table, to the vertices: the curvature of a table computed in f32 is dominated by rounding where its cells are narrow.
+    /// For a table, only the derivative along a change of scale is compared: rounding determines which of two cells gets a pair between
+    /// them.
     pub(crate) products: Vec<Vec<f64>>,
 }
 
@@ -63,7 +62,7 @@ impl Products {
         let Scene { views, size, softness, .. } = *scene;
         let count = scene.vertices.len() / 3 / views;
         let phi = softness.default_phi(scene.scale);
-        // Far below what is asked for, and the same on every backend.
+        // Far below the default, and the same on every backend.
         let rasterizer = Rasterizer { tolerance: 1e-7, ..Rasterizer::new(size) };
         let exact = |phi: &[f64]| tensor::<NdArray<f64>, 1>(phi, [phi.len()], DType::F64);
         let silhouette = rasterizer.prepare(&scene.faces, softness, &exact(&phi));
@@ -119,7 +118,7 @@ impl Products {
         Self { image: plain, products }
     }
 
-    /// Holds `self` against what was computed in f64.
+    /// Compares `self` with the results in f64.
     pub(crate) fn assert_close(&self, expected: &Self, name: &str) {
         let image = self.image.iter().zip(&expected.image).map(|(a, b)| (a - b).abs());
         let image = image.fold(0.0, f64::max);

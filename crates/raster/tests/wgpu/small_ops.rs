@@ -13,16 +13,16 @@ const BOUND: f64 = 2e-5;
 
 const VIEWS: usize = 3;
 const POINTS: usize = 300;
-/// More than one cube compares.
+/// Compared by more than one cube.
 const SIDES: [usize; 2] = [100, 103];
 
 /// A function of a vector.
 #[derive(Clone, Copy, Debug)]
 enum Of {
-    /// Point sets seen by three cameras, and how many.
+    /// Numbers of point sets projected by three cameras.
     Projection(usize),
     Coverage,
-    /// Losses of images and targets, of which there are so many.
+    /// Losses of images and targets, with their numbers.
     Iou(usize, usize),
     Mse(usize, usize),
 }
@@ -38,7 +38,7 @@ impl Of {
         match self {
             Self::Projection(sets) => {
                 let mut x = wave(3 * sets * POINTS, 0.9);
-                // Behind the camera, nearer than what divides, and too far to be true.
+                // Behind the camera, nearer than the least divisor, and too far away.
                 (x[2], x[5], x[10], x[20]) = (-9.0, -2.95, 1e16, -1e300);
                 x.extend([3.0, 20.0, 130.0, 50.0, 2.0, -100.0, 30.0, 80.0, 5.0, 89.0, -10.0, 10.0]);
                 x
@@ -59,7 +59,7 @@ impl Of {
                 let coordinates = 3 * sets * POINTS;
                 let points = x.clone().narrow(0, 0, coordinates).reshape([sets, POINTS, 3]);
                 let orbits = x.clone().narrow(0, coordinates, 4 * VIEWS).reshape([VIEWS, 4]);
-                // What is far away would hide all else.
+                // Far coordinates would dominate all others.
                 project(points, orbits).tensor().flatten(0, 2).clamp(-1e3, 1e3)
             }
             Self::Coverage => TConorm::Probabilistic.coverage(images(0, 2)).flatten(0, 2),

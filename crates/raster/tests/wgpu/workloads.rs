@@ -22,7 +22,7 @@ use crate::{
     seen,
 };
 
-/// Of loss, mean coverage and gradient norm.
+/// Bounds for loss, mean coverage and gradient norm.
 const BOUNDS: [f64; 3] = [1e-5, 1e-5, 1e-4];
 
 fn assert_exact(KnownRow { name, workload, row }: &KnownRow) {

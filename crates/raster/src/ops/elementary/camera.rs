@@ -1,4 +1,4 @@
-//! Cameras: from the numbers of an orbit to a matrix, and from points to what the camera sees.
+//! Cameras: orbits to matrices, and perspective projection of points.
 
 use rayon::prelude::*;
 
@@ -11,11 +11,11 @@ use crate::{NEAR, limits::FARTHEST};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OrbitMatrix;
 
-/// The rotation of an orbit by its elevation and azimuth in degrees, row by row: left, up and ahead of the camera, see
+/// The rotation of an orbit for its elevation and azimuth in degrees; the rows are left, up and ahead of the camera, see
 /// [`crate::view_rotation`].
 fn rotation<N: Number>(elevation: N, azimuth: N) -> [[N; 3]; 3] {
     let degree = N::Float::from_f64(std::f64::consts::PI / 180.0);
-    // Told from degrees: in f32 the cosine at a pole has any sign.
+    // Computed from degrees: in f32 the cosine at a pole has any sign.
     let past = (elevation.value().to_f64() + 90.0).rem_euclid(360.0);
     let roll = if past > 180.0 { -N::Float::ONE } else { N::Float::ONE };
     let (sin_e, cos_e) = elevation.scale(degree).sin_cos();
@@ -72,18 +72,18 @@ impl Elementary for OrbitMatrix {
     }
 }
 
-/// Points in world units `[1 or views, points, 3]`, seen by cameras with matrices `[views, 3, 4]`: `[views, 3, points]` of x and y in NDC,
-/// and depth. Two rows of a matrix give x and y times the depth.
+/// Perspective projection of points in world units `[1 or views, points, 3]` by matrices `[views, 3, 4]`: `[views, 3, points]` of x and y
+/// in NDC, and depth. Two rows of a matrix give x and y times the depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Perspective;
 
-/// Points whose gradients to a matrix are added up before they join the others.
+/// Points per block of the gradient of a matrix: blocks are summed first, then added.
 const BLOCK: usize = 256;
-/// Points that one thread takes at once.
+/// Points per rayon task.
 const POINTS: usize = 64 * BLOCK;
 
 impl Perspective {
-    /// The point of a view and what the camera sees: x, y, depth, and one over the depth that divides.
+    /// The point of a view and its projection: x, y, depth, and one over the depth used as divisor.
     #[inline(always)]
     fn seen<N: Number>(matrix: &[N], point: &[N]) -> ([N; 3], [N; 3], N) {
         let held = |x: N| x.held(-FARTHEST, FARTHEST);
@@ -133,7 +133,7 @@ impl Elementary for Perspective {
     ) -> Vec<N> {
         let (points, count, views) = (Views::new(inputs[0], &dims[0]), dims[0][1], dims[1][0]);
         let zero = N::of(0.0);
-        // The gradients to some points of a view, and to its matrix block by block.
+        // The gradients with respect to some points of a view, and block by block with respect to its matrix.
         let of_points = |view: usize, chunk: usize, points: &[N]| {
             let matrix = &inputs[1][12 * view..12 * view + 12];
             let upstream = &upstream[3 * count * view..3 * count * (view + 1)];
@@ -147,7 +147,7 @@ impl Elementary for Perspective {
                     let (at, [x, y, depth], inverse) = Self::seen(matrix, point);
                     let u = [upstream[k], upstream[count + k], upstream[2 * count + k]];
                     let (to_x, to_y) = (inverse.scale(u[0]), inverse.scale(u[1]));
-                    // A depth that is held divides without feeling it.
+                    // A clamped depth has no derivative as a divisor.
                     let divided = depth.value() >= N::Float::from_f64(NEAR);
                     let through = if divided { x * to_x + y * to_y } else { zero };
                     let to_seen = [to_x, to_y, N::constant(u[2]) - through];

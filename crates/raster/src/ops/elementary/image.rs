@@ -1,13 +1,13 @@
-//! What is done to every pixel of an image, and the losses that compare two.
+//! Per-pixel ops of an image, and losses between two images.
 
 use rayon::prelude::*;
 
 use super::{Elementary, Views, number::Number};
 use softrast_kernel::{EMPTY, Float};
 
-/// Pixels that one task takes; sums of them are added in order, whatever the number of threads.
+/// Pixels per task; the sums of tasks are added in order, whatever the number of threads.
 const PIXELS: usize = 8192;
-/// Sums that run beside each other.
+/// Number of interleaved partial sums.
 const BESIDE: usize = 16;
 
 /// `1 - exp(-sums)`, the coverage of the probabilistic sum; any shape.
@@ -36,7 +36,7 @@ impl Elementary for Coverage {
     }
 }
 
-/// `of` each pair, many at a time, to `out`.
+/// Writes `of` each pair to `out`, in parallel.
 fn map_to<A: Copy + Sync, B: Copy + Sync, C: Copy + Send>(
     out: &mut [C],
     a: &[A],
@@ -44,7 +44,7 @@ fn map_to<A: Copy + Sync, B: Copy + Sync, C: Copy + Send>(
     of: impl Fn(A, B) -> C + Copy + Sync,
 ) {
     let block = |(out, (a, b)): (&mut [C], (&[A], &[B]))| {
-        // What it holds is then known not to change, and the loop becomes vectors.
+        // A local copy cannot change in the loop, which is then vectorized.
         let own = of;
         for (out, (&a, &b)) in out.iter_mut().zip(a.iter().zip(b)) {
             *out = own(a, b);
@@ -59,7 +59,7 @@ fn map_to<A: Copy + Sync, B: Copy + Sync, C: Copy + Send>(
     }
 }
 
-/// The same as a vector.
+/// `of` each pair, as a vector.
 fn mapped<A: Copy + Sync, B: Copy + Sync, N: Number>(
     a: &[A],
     b: &[B],
@@ -70,7 +70,7 @@ fn mapped<A: Copy + Sync, B: Copy + Sync, N: Number>(
     out
 }
 
-/// Sum over pairs of `of` each, in an order of its own that does not depend on the number of threads.
+/// Sums `of` over pairs, in a fixed order that does not depend on the number of threads.
 fn summed<N: Number, const K: usize>(
     a: &[N],
     b: &[N],
@@ -102,7 +102,7 @@ fn summed<N: Number, const K: usize>(
     totals
 }
 
-/// Two images of each view, and what compares them: `[views, height, width]`, or one of all views.
+/// Two images per view, `[views, height, width]`, or one for all views.
 struct Compared<'a, N> {
     images: [Views<'a, N>; 2],
     count: usize,
@@ -119,7 +119,7 @@ impl<'a, N: Number> Compared<'a, N> {
         self.images.map(|images| images.of(view))
     }
 
-    /// What `of` says of both images of each view.
+    /// The loss `of` both images of each view.
     fn losses(&self, of: impl Fn(&[N], &[N]) -> N + Sync) -> Vec<N> {
         let of_view = |view| {
             let [a, b] = self.of(view);
@@ -128,7 +128,7 @@ impl<'a, N: Number> Compared<'a, N> {
         (0..self.count).into_par_iter().map(of_view).collect()
     }
 
-    /// The gradients of views to both images, as they are wanted: `of` gives for a view what maps its pixels to the two.
+    /// The gradients with respect to both images, those that are wanted: for each view, `of` returns functions of the pixels of the two.
     fn gradients<G: Fn(N, N) -> N + Copy + Sync>(
         &self,
         wanted: &[bool],
@@ -157,12 +157,12 @@ impl<'a, N: Number> Compared<'a, N> {
     }
 }
 
-/// How many views two images have that may be one of all.
+/// Number of views of two images, either of which may be one for all.
 fn views(dims: &[Vec<usize>]) -> usize {
     dims[0][0].max(dims[1][0])
 }
 
-/// Numbers of an image.
+/// Length of an image.
 fn pixels(dims: &[Vec<usize>]) -> usize {
     dims[0][1..].iter().product()
 }
@@ -201,12 +201,12 @@ impl Elementary for SquaredError {
     }
 }
 
-/// One less the overlap over the union of each view; see [`crate::iou_loss`].
+/// One minus the intersection over union of each view; see [`crate::iou_loss`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Iou;
 
 impl Iou {
-    /// Overlap, and one over the union.
+    /// The intersection, and one over the union.
     fn of<N: Number>(a: &[N], b: &[N]) -> [N; 2] {
         let [overlap, union] = summed(a, b, |a: N, b: N| {
             let both = a * b;

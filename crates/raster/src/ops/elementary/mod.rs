@@ -1,4 +1,4 @@
-//! What an op is that is written once for any number, and how its passes run.
+//! The trait of elementary ops, which are generic over the number type, and their passes.
 
 mod camera;
 mod image;
@@ -14,13 +14,13 @@ pub(crate) use op::dual_upstream;
 
 use super::pass::Pass;
 
-/// An op that is written for any number. `dims` are the shapes of the inputs.
+/// An op that is generic over the number type. `dims` are the shapes of the inputs.
 pub(super) trait Elementary: Sync {
     fn shape(&self, dims: &[Vec<usize>]) -> Vec<usize>;
 
     fn forward<N: Number>(&self, inputs: &[&[N]], dims: &[Vec<usize>]) -> Vec<N>;
 
-    /// The gradients that are wanted, one after the other.
+    /// The wanted gradients, concatenated.
     fn vjp<N: Number>(
         &self,
         inputs: &[&[N]],
@@ -61,7 +61,7 @@ where
             let duals: Vec<_> = inputs.iter().zip(along).map(dual).collect();
             let duals: Vec<_> = duals.iter().map(Vec::as_slice).collect();
             let (to_upstream, wanted) = wanted.split_last().expect("one for the upstream");
-            // The Hessian is symmetric: to the inputs, it is the derivative of the gradient along the direction.
+            // The Hessian is symmetric: with respect to the inputs, the result is the derivative of the gradient along the direction.
             let mut gradient = Vec::new();
             if wanted.contains(&true) {
                 gradient = op.vjp(&duals, dims, upstream, wanted);
@@ -74,13 +74,13 @@ where
     }
 }
 
-/// Numbers as a flat tensor.
+/// A flat tensor of `values`.
 pub(crate) fn flat<F: Element>(values: Vec<F>) -> TensorData {
     let length = values.len();
     TensorData::new(values, [length])
 }
 
-/// Parts of a tensor `[1 or views, ..]`, one for each view.
+/// A tensor `[1 or views, ..]`, as one slice per view.
 #[derive(Clone, Copy)]
 pub(super) struct Views<'a, N> {
     pub(super) numbers: &'a [N],

@@ -2,14 +2,14 @@ use std::ops::{Add, Mul, Sub};
 
 use softrast_kernel::{Dual, Float};
 
-/// A number that the small ops compute with: a float, or one with its derivative along a direction.
+/// A number type of the small ops: a float, or a float with its derivative along a direction.
 pub(crate) trait Number:
     Copy + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
     type Float: Float;
     /// A number that depends on no input.
     fn constant(value: Self::Float) -> Self;
-    /// The number without its derivative.
+    /// The value without its derivative.
     fn value(self) -> Self::Float;
     /// `factor * self` for a factor that depends on no input.
     fn scale(self, factor: Self::Float) -> Self;
@@ -20,11 +20,11 @@ pub(crate) trait Number:
     /// Sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
 
-    /// A known number.
+    /// A constant.
     fn of(value: f64) -> Self {
         Self::constant(Self::Float::from_f64(value))
     }
-    /// No less than `low` and no more than `high`; beyond them it depends on no input. NaN stays.
+    /// Clamped to the range from `low` to `high`; beyond it depends on no input. NaN stays.
     fn held(self, low: f64, high: f64) -> Self {
         let [least, most] = [low, high].map(Self::Float::from_f64);
         if self.value() < least {

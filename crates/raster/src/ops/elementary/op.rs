@@ -1,4 +1,4 @@
-//! The ops that are written for any number.
+//! The ops that are generic over the number type.
 
 use softrast_kernel::{Dual, Float, Judged};
 use softrast_tensor::{Element, TensorData};
@@ -13,18 +13,18 @@ use super::{
 
 use crate::ops::pass::Pass;
 
-/// An op that is written for any number.
+/// An op that is generic over the number type.
 #[derive(Clone, Copy, Debug)]
 pub enum ElementaryOp {
     /// Orbits to matrices.
     OrbitMatrix,
-    /// Points to what cameras see.
+    /// Perspective projection of points.
     Perspective,
     /// Sums to coverage.
     Coverage,
     /// Mean squared difference.
     SquaredError,
-    /// One less the overlap over the union.
+    /// One minus the intersection over union.
     Iou,
 }
 
@@ -49,8 +49,8 @@ impl ElementaryOp {
     }
 }
 
-/// The derivatives of `Σ upstream · loss` by sums of profiles `[views, height, width]`, whose coverages a loss compares with a target, and how
-/// they change as the sums move by `moved`. `dims` are the shapes of the image and of the target.
+/// The derivatives of `Σ upstream · loss` with respect to sums of profiles `[views, height, width]`, whose coverages a loss compares with a
+/// target, and their derivatives as the sums move by `moved`. `dims` are the shapes of the image and of the target.
 pub(crate) fn dual_upstream<F>(
     loss: ElementaryOp,
     [sums, moved]: [&[F]; 2],
