@@ -8,15 +8,13 @@ use crate::{
     network::{WEIGHTS, weights},
 };
 
-/// How much a face counts by its depth: a family, or a network.
+/// Depth softness, the weight of a face as a function of its depth: a family, or a network.
 ///
-/// It sees the nearness of a face, which is 1 at the near plane and 0 at the far plane. A family
-/// sees it from the near plane on, as `x = nearness - 1`: there it falls off behind the plane as it
-/// falls off outside an edge. The network sees the nearness itself.
+/// Its argument is the nearness of a face, which is 1 at the near plane and 0 at the far plane. A family is evaluated at
+/// `x = nearness - 1`: it decreases behind the near plane as it does outside an edge. The network is evaluated at the nearness itself.
 ///
-/// Source: Wu et al. 2024, Eq. 3 and 4. Not in the paper: where a family has its edge. The released
-/// code leaves it at nearness 0, where the reversed families are 1 for every face and narrow ones
-/// saturate, so that no depth is told from another.
+/// Source: Wu et al. 2024, Eq. 3 and 4. Not in the paper: the position of a family's edge. The released code has it at nearness 0, where
+/// the reversed families are 1 for every face and narrow ones saturate, so that depths are not distinguished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum DepthSoftness {
@@ -25,8 +23,8 @@ pub enum DepthSoftness {
     /// `f(z) = W5 relu(h + W4 relu(W3 relu(W2 h)))` with `h = relu(W1 z)`; φ `[56]` is laid out as
     /// for [`Mlp`](crate::families::Mlp).
     ///
-    /// Without biases it is a straight line on each side of 0, `f(z) = f(1) z` for z >= 0: 56
-    /// weights, one degree of freedom. It is flat where all units of a layer are off.
+    /// Without biases it is a straight line on each side of 0, `f(z) = f(1) z` for z >= 0: 56 weights, one degree of freedom. It is
+    /// constant where all units of a layer are off.
     Mlp,
 }
 
@@ -38,12 +36,12 @@ pub enum DepthSoftness {
     DepthSoftness::Mlp.name()
 )]
 pub struct UnknownDepthSoftness {
-    /// The name that was asked for.
+    /// The requested name.
     pub found: String,
 }
 
 impl DepthSoftness {
-    /// The name in files and on the command line: that of the family, or `depth_mlp`.
+    /// The name in files and on the command line: the name of the family, or `depth_mlp`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Family(family) => family.name(),
@@ -59,9 +57,8 @@ impl DepthSoftness {
         }
     }
 
-    /// Parameters to start from: of a family those at `scale`, in units of the distance between the
-    /// planes; of the network, which has no scale, positive weights that give a face at the near
-    /// plane the weight 1.
+    /// Initial parameters: for a family those at `scale`, in units of the distance between the planes; for the network, which has no scale,
+    /// positive weights for which a face at the near plane has weight 1.
     ///
     /// # Panics
     ///
@@ -75,8 +72,7 @@ impl DepthSoftness {
 
     /// Logarithm of the weight of faces at `nearness`, same shape; φ is `[parameters]`.
     ///
-    /// No network weight is below [`OPAQUE`], where its logarithm is flat: the network may give 0 or
-    /// less.
+    /// Network weights are clamped to at least [`OPAQUE`], where the logarithm is constant: the network may return 0 or less.
     pub fn log_weight<B: Backend, const D: usize>(
         self,
         phi: Tensor<B, 1>,
@@ -91,13 +87,13 @@ impl DepthSoftness {
         }
     }
 
-    /// What the network gives at nearness 1 and -1, `[2]`, before it is held at [`OPAQUE`]: all that there is to know of it.
+    /// Values of the network at nearness 1 and -1, `[2]`, before the clamp to [`OPAQUE`]: they determine the network completely.
     pub fn mlp_at_ends<B: Backend>(phi: Tensor<B, 1>) -> Tensor<B, 1> {
         let ends = Tensor::from_data([1.0, -1.0], (&phi.device(), phi.dtype()));
         network(&phi, ends)
     }
 
-    /// How many of the leading parameters are logarithms; 0 for the network.
+    /// Number of leading parameters that are logarithms; 0 for the network.
     pub fn logarithms(self) -> usize {
         match self {
             Self::Family(family) => family.logarithms(),
@@ -108,7 +104,7 @@ impl DepthSoftness {
 
 /// The network of [`DepthSoftness::Mlp`], same shape as `z`.
 fn network<B: Backend, const D: usize>(phi: &Tensor<B, 1>, z: Tensor<B, D>) -> Tensor<B, D> {
-    // With slope 0 at 0.
+    // With derivative 0 at 0.
     fn relu<B: Backend>(h: Tensor<B, 2>) -> Tensor<B, 2> {
         let off = h.clone().lower_equal_elem(0.0);
         h.mask_fill(off, 0.0)

@@ -5,8 +5,8 @@ use crate::{Family, Softness, softness::curve};
 
 /// A family applied to the signed distance of an edge, or to its signed square.
 ///
-/// `x` of [`Softness`] is here the signed distance d in NDC, positive inside. The family sees d of [`EdgeSoftness::new`], and `d |d|`, with a
-/// scale in NDC², of [`EdgeSoftness::squared`].
+/// The argument `x` of [`Softness`] is the signed distance d in NDC, positive inside. The argument of the family is d for
+/// [`EdgeSoftness::new`], and `d |d|`, with a scale in NDC², for [`EdgeSoftness::squared`].
 ///
 /// Source: Liu et al. 2019, Eq. 1 (squared); Wu et al. 2024, Sec. 4.1.
 ///
@@ -38,12 +38,12 @@ impl EdgeSoftness {
         Self { family, squared: true }
     }
 
-    /// What the family sees of the distance `d`.
+    /// The argument of the family at the distance `d`.
     fn argument<B: Backend, const D: usize>(&self, d: Tensor<B, D>) -> Tensor<B, D> {
         if self.squared { d.clone() * d.abs() } else { d }
     }
 
-    /// Turns a derivative by the argument of the family into one by the distance `d`.
+    /// Converts a derivative with respect to the argument of the family into one with respect to the distance `d`.
     fn by_distance<B: Backend, const D: usize>(
         &self,
         derivative: Tensor<B, D>,
@@ -90,7 +90,7 @@ impl Softness for EdgeSoftness {
         self.family.logarithms()
     }
 
-    /// In NDC, or NDC² of a squared distance.
+    /// In NDC, or NDC² for a squared distance.
     fn scale(&self, phi: &[f64]) -> f64 {
         self.family.scale(phi)
     }

@@ -35,7 +35,7 @@ fn factors<B: Backend, const D: usize>(a: Tensor<B, D>) -> (Tensor<B, D>, Tensor
 
 /// `exp(a²) erfc(a)` for `a >= 0`, which does not underflow.
 ///
-/// Not `1 - erf(a)`: burn has no complement, and the difference has no digits left beyond 6.
+/// Not `1 - erf(a)`: burn has no complement, and the difference loses all digits beyond 6.
 pub(crate) fn erfcx<B: Backend, const D: usize>(a: Tensor<B, D>) -> Tensor<B, D> {
     let (t, rest) = factors(a);
     t * rest

@@ -5,14 +5,13 @@ use softrast_tensor::{Backend, Tensor};
 
 use crate::{Softness, families::*, softness::curve};
 
-/// Makes the enum from the list in `families/mod.rs`.
+/// Defines the enum from the list in `families/mod.rs`.
 macro_rules! family {
     ([] $($file:ident: $($variant:ident $name:literal => $softness:expr),+;)+) => {
         /// A softness chosen by name at run time.
         ///
-        /// Names are snake case: `logistic`, `exp_forward`. Where a family has two directions, the
-        /// plain name is the reversed one (1 inside, decays outside), as in the rows Exp and Gamma of
-        /// the paper (Wu et al. 2024, Sec. 4.2).
+        /// Names are snake case: `logistic`, `exp_forward`. If a family has two directions, the plain name is the reversed one (1 inside,
+        /// decays outside), as in the rows Exp and Gamma of the paper (Wu et al. 2024, Sec. 4.2).
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
         pub enum Family {
             $($(
@@ -35,8 +34,7 @@ macro_rules! family {
 
             /// The family of the mirrored step `1 - s(-x)`, with the same parameters.
             ///
-            /// Symmetric families are their own; a one-sided law turns from reversed to forward and
-            /// back.
+            /// Symmetric families are their own mirror image; a reversed law becomes forward and vice versa.
             #[must_use]
             pub fn mirrored(self) -> Self {
                 let mut lines = [$(&[$(Self::$variant),+][..]),+].into_iter();
@@ -48,7 +46,7 @@ macro_rules! family {
 }
 families!(family);
 
-/// `$family.$method $arguments` of the softness that `$family` names.
+/// Calls `$family.$method $arguments` on the softness of `$family`.
 macro_rules! dispatch {
     ([$family:ident.$method:ident $arguments:tt]
         $($file:ident: $($variant:ident $name:literal => $softness:expr),+;)+) => {
@@ -112,7 +110,7 @@ impl Softness for Family {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown softness {found:?}; known are {}", Family::ALL.map(Family::name).join(", "))]
 pub struct UnknownFamily {
-    /// The name that was asked for.
+    /// The requested name.
     pub found: String,
 }
 

@@ -1,11 +1,10 @@
 //! Soft step functions for differentiable rasterizers, as burn tensor ops.
 //!
-//! A [`Softness`] gives how much a face covers a pixel at a signed distance, and how deep the face
-//! is optically. Its parameters are one explicit vector φ, so that an optimiser sees nothing else.
-//! One of your own has one method; the ones that come with the crate are in [`families`], and a
-//! [`Family`] is one chosen by name. An [`EdgeSoftness`] applies it to the distance or to its signed
-//! square; [`support`] gives how far from the edge it still changes; `SoftStep` (feature `modules`) puts it into a
-//! network; [`Truncated`] ends a heavy tail. A [`DepthSoftness`] gives how much a face counts by its depth.
+//! A [`Softness`] is the coverage of a pixel by a face as a function of the signed distance, with its optical depth. Its parameters are one
+//! explicit vector φ, for optimisers. A custom softness has one required method; the bundled ones are in [`families`], and a [`Family`]
+//! selects one by name. An [`EdgeSoftness`] applies it to the distance or to its signed square; [`support`] computes the distances at which
+//! it still changes; `SoftStep` (feature `modules`) wraps it for networks; [`Truncated`] cuts off a heavy tail. A [`DepthSoftness`] weights
+//! faces by depth.
 //!
 //! ```
 //! use softrast_tensor::{DType, NdArray, Tensor};
@@ -19,10 +18,9 @@
 //! assert_eq!(coverage[1], 0.5);
 //! ```
 //!
-//! Values, optical depths and their derivatives are finite for every finite distance, and so are
-//! their gradients of first and second order; tails keep their digits. Two limits: distances beyond
-//! 1e15 scales count as 1e15 scales, and f32 cannot hold the second derivatives of a step that is
-//! narrower than about 1e-7.
+//! Values, optical depths and their derivatives are finite for every finite distance, and so are their gradients of first and second order;
+//! tails keep their digits. Two limits: distances beyond 1e15 scales count as 1e15 scales, and f32 cannot represent the second derivatives
+//! of a step narrower than about 1e-7.
 
 mod depth_softness;
 mod edge;

@@ -1,16 +1,14 @@
 use softrast_tensor::{Backend, Tensor};
 
-/// What is left of the light behind a face that the formula calls fully opaque.
+/// Light transmitted by a face that the formula makes fully opaque.
 ///
-/// One-sided families reach `s = 1` exactly, where the optical depth `-ln(1 - s)` is infinite. For
-/// them it is taken as `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`: at most `-ln(OPAQUE)` = 16.1, and no
-/// silhouette moves by more than `OPAQUE`.
+/// One-sided families reach `s = 1` exactly, where the optical depth `-ln(1 - s)` is infinite. For them it is
+/// `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`: at most `-ln(OPAQUE)` = 16.1, and no silhouette changes by more than `OPAQUE`.
 pub const OPAQUE: f64 = 1e-7;
 
-/// The largest distance, in scales, that a softness tells apart from infinity.
+/// The largest distance, in scales, that a softness distinguishes from infinity.
 ///
-/// Farther distances count as this one: its square still fits an f32, and the slowest tail
-/// (Levy) has come to within 3e-8 of its limit.
+/// Larger distances are clamped to it: its square still fits an f32, and the slowest tail (Levy) is within 3e-8 of its limit.
 pub(crate) const FAR: f64 = 1e15;
 
 /// Entry `k` of `phi`, shaped `[1; D]` so that it broadcasts over distances.
@@ -34,16 +32,15 @@ pub(crate) fn in_scales<B: Backend, const D: usize>(
     (x * per_scale(phi)).clamp(-FAR, FAR)
 }
 
-/// `|u|`, with slope 1 at 0.
+/// `|u|`, with derivative 1 at 0.
 ///
-/// `Tensor::abs` has slope 0 there, so that a formula in `|u|`, read from the side of positive `u`,
-/// would get a wrong derivative at 0.
+/// `Tensor::abs` has derivative 0 there, so that a formula in `|u|` for positive `u` would have a wrong derivative at 0.
 pub(crate) fn magnitude<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
     let below = u.clone().lower_elem(0.0);
     u.clone().mask_where(below, u.neg())
 }
 
-/// `-ln(open)` where `covered + open = 1`, from whichever of the two is the smaller.
+/// `-ln(open)` where `covered + open = 1`, computed from the smaller of the two.
 ///
 /// `open` must be positive wherever `covered >= 1/2`.
 pub(crate) fn optical_depth_of<B: Backend, const D: usize>(
@@ -58,7 +55,7 @@ pub(crate) fn optical_depth_of<B: Backend, const D: usize>(
 
 /// The optical depth of a softness that reaches 1: `-ln(OPAQUE + (1 - OPAQUE) open)`.
 ///
-/// `covered` and `open` add up to 1, both with their own digits; see [`OPAQUE`].
+/// `covered` and `open` add up to 1, and each is computed without cancellation; see [`OPAQUE`].
 pub(crate) fn bounded_depth<B: Backend, const D: usize>(
     covered: Tensor<B, D>,
     open: Tensor<B, D>,
@@ -74,12 +71,12 @@ pub(crate) fn bounded_hazard<B: Backend, const D: usize>(
     density * (1.0 - OPAQUE) / (open * (1.0 - OPAQUE) + OPAQUE)
 }
 
-/// From here on the plain difference keeps the digits of [`rise`], and those of its derivative.
+/// From here on the direct difference keeps the digits of [`rise`], and those of its derivative.
 const PLAIN_FROM: f64 = 1.0;
 
 /// `1 - exp(-v)` for `v >= 0`, exact also near 0, with a derivative exact in the tail.
 ///
-/// Near 0 by way of `tanh(v / 2)`, as burn has no expm1.
+/// Near 0 computed from `tanh(v / 2)`, as burn has no expm1.
 pub(crate) fn rise<B: Backend, const D: usize>(v: Tensor<B, D>) -> Tensor<B, D> {
     let plain = v.clone().greater_elem(PLAIN_FROM);
     let t = (v.clone().clamp_max(PLAIN_FROM) * 0.5).tanh();
@@ -96,7 +93,7 @@ pub(crate) fn polynomial<B: Backend, const D: usize>(
     rest.iter().rev().fold(highest, |sum, &coefficient| sum * x.clone() + coefficient)
 }
 
-/// Below this argument the series serves; its first term left out is then 7e-22.
+/// Below this argument the series is used; its first omitted term is then 7e-22.
 const SERIES_BELOW: f64 = 3e-3;
 
 /// `atan(w) / w` for `0 <= w <= 1`, with `1` at 0.
@@ -108,10 +105,10 @@ pub(crate) fn atan_ratio<B: Backend, const D: usize>(w: Tensor<B, D>) -> Tensor<
     (w.clone().atan() / w).mask_where(small, series)
 }
 
-/// How far the argument is moved up before the asymptotic series is used.
+/// Shift of the argument before the asymptotic series is used.
 const ASCENT: usize = 10;
 
-/// `B₂ₖ / (2k (2k - 1))` for k = 1, 2, …: at 10 and above, what is left out is below 3e-17.
+/// `B₂ₖ / (2k (2k - 1))` for k = 1, 2, …: at 10 and above, the omitted terms are below 3e-17.
 const STIRLING: [f64; 7] = [
     1.0 / 12.0,
     -1.0 / 360.0,
@@ -124,7 +121,7 @@ const STIRLING: [f64; 7] = [
 
 /// `ln Γ(p)` for `p > 0`, differentiable any number of times.
 ///
-/// Stirling's series at `p + 10`, brought back with `Γ(p + 1) = p Γ(p)`.
+/// Stirling's series at `p + 10`, reduced by `Γ(p + 1) = p Γ(p)`.
 pub(crate) fn ln_gamma<B: Backend, const D: usize>(p: Tensor<B, D>) -> Tensor<B, D> {
     let ascent = (1..ASCENT).fold(p.clone(), |product, k| product * (p.clone() + k as f64));
     let top = p + ASCENT as f64;
@@ -138,7 +135,7 @@ pub(crate) fn ln_gamma<B: Backend, const D: usize>(p: Tensor<B, D>) -> Tensor<B,
 ///
 /// # Panics
 ///
-/// If it is not positive.
+/// If `scale` is not positive.
 pub(crate) fn ln_scale(scale: f64) -> f64 {
     assert!(scale > 0.0 && scale.is_finite(), "scale {scale} is not positive");
     scale.ln()

@@ -4,7 +4,7 @@ use crate::{Softness, softness::curve};
 
 /// The mirrored step `1 - s(-x)` of a softness, with the same parameters.
 ///
-/// Its optical depth is `-ln s(-x)`: the table of a weight is the table of the optical depth of this.
+/// Its optical depth is `-ln s(-x)`: the table of a weight is a table of this optical depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mirrored<S>(pub S);
 

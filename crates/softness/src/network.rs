@@ -1,4 +1,4 @@
-//! What the two networks of the paper share: their weights, and those to start from.
+//! The weights of the two networks of the paper, and their initialisation.
 
 use softrast_tensor::{Backend, Tensor};
 
@@ -24,17 +24,15 @@ pub(crate) fn weights<B: Backend>(phi: &Tensor<B, 1>) -> [Tensor<B, 2>; 5] {
     ]
 }
 
-/// The logit far inside an untrained MLP: with 1280 faces on top of one another, what it leaves of
-/// them outside adds up to less than 1e-3 also where it has not come to its limit yet. At the limit
-/// alone, ln(1280 / 1e-3) = 14.1 is enough.
+/// The logit far inside an untrained MLP: the coverage by 1280 faces on top of one another adds up to less than 1e-3 outside, also where
+/// the logit is not yet at its limit. At the limit, ln(1280 / 1e-3) = 14.1 is enough.
 const REACH: f64 = 15.0;
 
-/// Weights `[56]` of an MLP softness that has not been trained, drawn from `seed`.
+/// Initial weights `[56]` of an MLP softness, drawn from `seed`.
 ///
-/// They are uniform in [0, 1), then W5 is scaled so that the logit tends to 15 far inside, and W1
-/// so that its slope at 0 is `1 / scale`. Source: Wu et al. 2024, Sec. 4.1 (random uniform). Not in
-/// the paper: the two scalings, because without them a logit of at most 4 leaves every face visible
-/// everywhere.
+/// They are uniform in [0, 1), then W5 is scaled so that the logit tends to 15 far inside, and W1 so that its slope at 0 is `1 / scale`.
+/// Source: Wu et al. 2024, Sec. 4.1 (random uniform). Not in the paper: the two scalings; without them the logit is at most 4, and every
+/// face is visible everywhere.
 ///
 /// # Panics
 ///

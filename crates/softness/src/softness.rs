@@ -4,16 +4,14 @@ use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::math::{bounded_depth, ln_scale, with_first};
 
-/// A soft step: how much a face covers a pixel at signed distance `x`.
+/// A soft step: the coverage of a pixel by a face at signed distance `x`.
 ///
-/// `x` is positive inside the face; its unit is NDC, or NDC² for a softness of the squared
-/// distance. All parameters sit in one vector `phi` `[parameters]`; those that must be positive are
-/// kept as logarithms. `phi` and `x` must have the same float type.
+/// `x` is positive inside the face; its unit is NDC, or NDC² for a softness of the squared distance. All parameters are in one vector `phi`
+/// `[parameters]`; those that must be positive are stored as logarithms. `phi` and `x` must have the same float type.
 ///
-/// Only [`value`](Softness::value) is required, made of tracked tensor ops; then gradients of any
-/// order reach `phi` and `x` through every method. All else follows from it, for a softness whose
-/// first parameter is the logarithm of its scale. Whatever a formula of its own makes more exact or
-/// faster can be overridden.
+/// Only [`value`](Softness::value) is required, composed of tracked tensor ops; then gradients of any order reach `phi` and `x` through
+/// every method. The other methods are provided for a softness whose first parameter is the logarithm of its scale. Override them for
+/// formulas that are more exact or faster.
 ///
 /// ```
 /// use std::f64::consts::FRAC_1_PI;
@@ -33,9 +31,9 @@ use crate::math::{bounded_depth, ln_scale, with_first};
 /// assert_eq!(Arctan.default_phi(0.02), [0.02_f64.ln()]);
 /// ```
 ///
-/// This one has heavy tails: its coverage falls with one over the distance, so that every face reaches every pixel. An image then takes many times
-/// longer, and is opaque all over unless its scale is tiny. A renderer's `reach` is the distance in NDC up to which faces are drawn;
-/// [`Truncated`](crate::Truncated) ends the tails.
+/// This example has heavy tails: its coverage decreases with one over the distance, so that every face reaches every pixel. An image then
+/// takes many times longer, and is opaque everywhere unless its scale is tiny. A renderer's `reach` is the distance in NDC up to which
+/// faces are drawn; [`Truncated`](crate::Truncated) cuts off the tails.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no softness",
     note = "`Family`, `EdgeSoftness` and `DepthSoftness` are some; for one of your own implement `Softness::value`, and `Clone` and `Debug`"
@@ -52,8 +50,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
 
     /// Derivative `ds/dx`, in 1 / (unit of x), same shape as `x`.
     ///
-    /// Provided: by automatic differentiation of [`value`](Softness::value), which must not call
-    /// this method.
+    /// Provided: by automatic differentiation of [`value`](Softness::value), which must not call this method.
     fn density<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
@@ -64,9 +61,9 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
 
     /// Optical depth `q = -ln(1 - s)`, at least 0, same shape as `x`.
     ///
-    /// Silhouettes are sums of it: `1 - Π (1 - sⱼ) = 1 - exp(-Σ qⱼ)` (Wu et al. 2024, Sec. 4.4).
-    /// Provided: `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`, see [`OPAQUE`](crate::OPAQUE). Override it where `1 - s` loses
-    /// digits that matter and s does not reach 1.
+    /// Silhouettes are sums of optical depths: `1 - Π (1 - sⱼ) = 1 - exp(-Σ qⱼ)` (Wu et al. 2024, Sec. 4.4). Provided:
+    /// `-ln(OPAQUE + (1 - OPAQUE)(1 - s))`, see [`OPAQUE`](crate::OPAQUE). Override it if `1 - s` loses significant digits and s does not
+    /// reach 1.
     fn optical_depth<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
@@ -89,9 +86,9 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         slope(x, |x| self.optical_depth::<Autodiff<B>, D>(Tensor::from_inner(phi), x))
     }
 
-    /// Optical depth and hazard, each of the shape of `x`: what the table of a silhouette needs of every knot.
+    /// Optical depth and hazard, each of the shape of `x`, as required at every knot of a silhouette's table.
     ///
-    /// Provided: one after the other. Override it where both share most of their work.
+    /// Provided: by separate evaluation. Override it if both share most of their work.
     fn depth_and_hazard<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
@@ -100,9 +97,9 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         [self.optical_depth(phi.clone(), x.clone()), self.hazard(phi, x)]
     }
 
-    /// `ln s(x)`, same shape as `x`; at most 0, and finite where `s` underflows: the weight by which faces are blended in colour.
+    /// `ln s(x)`, same shape as `x`; at most 0, and finite where `s` underflows. It is the edge weight of faces in colour images.
     ///
-    /// Provided: `ln(OPAQUE + (1 - OPAQUE) s)`. Override it where s loses digits that matter and does not reach 0.
+    /// Provided: `ln(OPAQUE + (1 - OPAQUE) s)`. Override it if s loses significant digits and does not reach 0.
     fn log_value<B: Backend, const D: usize>(
         &self,
         phi: Tensor<B, 1>,
@@ -112,7 +109,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         bounded_depth(covered.clone().neg() + 1.0, covered).neg()
     }
 
-    /// `ln s(x)` and its derivative by `x`, each of the shape of `x`: what the table of weights needs of every knot.
+    /// `ln s(x)` and its derivative with respect to `x`, each of the shape of `x`, as required at every knot of a table of weights.
     ///
     /// Provided: by automatic differentiation of [`log_value`](Softness::log_value), which must not call this method.
     fn log_value_and_slope<B: Backend, const D: usize>(
@@ -126,7 +123,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         [self.log_value(phi, x), slope]
     }
 
-    /// Parameters to start from; `scale` is in the unit of x. Provided: its logarithm, then 0.
+    /// Initial parameters; `scale` is in the unit of x. Provided: its logarithm, then 0.
     ///
     /// # Panics
     ///
@@ -137,8 +134,8 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         phi
     }
 
-    /// How many of the leading parameters are logarithms, first that of the scale or of a multiple of
-    /// it; 0 for a softness without a scale of its own. Provided: 1.
+    /// Number of leading parameters that are logarithms, first that of the scale or of a multiple of it; 0 for a softness without a scale.
+    /// Provided: 1.
     fn logarithms(&self) -> usize {
         1
     }
@@ -153,21 +150,20 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
         false
     }
 
-    /// Width of the step, in the unit of `x`. Provided: the scale, or its root where that
-    /// [is squared](Softness::scale_is_squared). Where [`with_scale`](Softness::with_scale) is all that
-    /// changes the parameters, the step is stretched along `x` by as much as the width grows.
+    /// Width of the step, in the unit of `x`. Provided: the scale, or its square root if it [is squared](Softness::scale_is_squared). If
+    /// only [`with_scale`](Softness::with_scale) changes the parameters, the step is stretched along `x` in proportion to the width.
     fn width(&self, phi: &[f64]) -> f64 {
         if self.scale_is_squared() { self.scale(phi).sqrt() } else { self.scale(phi) }
     }
 
-    /// Parameters of a step whose scale is `factor` `[1]` times that of `phi`, and which is the same
-    /// but for that. Provided: the logarithm of the factor is added to the first.
+    /// Parameters of an otherwise equal step whose scale is `factor` `[1]` times that of `phi`. Provided: the logarithm of the factor is
+    /// added to the first.
     fn with_scale<B: Backend>(&self, phi: Tensor<B, 1>, factor: Tensor<B, 1>) -> Tensor<B, 1> {
         let first = phi.clone().narrow(0, 0, 1) + factor.log();
         with_first(first, phi)
     }
 
-    /// [`with_scale`](Softness::with_scale) on plain numbers.
+    /// [`with_scale`](Softness::with_scale) for numbers.
     fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
         let mut phi = phi.to_vec();
         phi[0] += factor.ln();
@@ -175,7 +171,7 @@ pub trait Softness: Clone + Debug + Send + Sync + 'static {
     }
 }
 
-/// A method of [`Softness`] on distances: the trait's signature, with this body; in brackets, one that gives as many tensors.
+/// A method of [`Softness`] on distances: the trait's signature, with this body; in brackets, a method that returns several tensors.
 macro_rules! curve {
     ($self:ident.$method:ident($phi:ident, $x:ident) => $body:expr) => {
         fn $method<B: Backend, const D: usize>(
@@ -198,8 +194,8 @@ macro_rules! curve {
 }
 pub(crate) use curve;
 
-/// The derivative of every entry of `of(x)` by its own `x`, one level of autodiff further in; ops on
-/// `B` are still tracked by the levels of `B`.
+/// The derivative of every entry of `of(x)` with respect to its own `x`, at an inner level of autodiff; ops on `B` are still tracked by the
+/// levels of `B`.
 fn slope<B: Backend, const D: usize>(
     x: Tensor<B, D>,
     of: impl FnOnce(Tensor<Autodiff<B>, D>) -> Tensor<Autodiff<B>, D>,

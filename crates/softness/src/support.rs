@@ -2,28 +2,28 @@ use softrast_tensor::{Backend, DType, Tensor, TensorData};
 
 use crate::Softness;
 
-/// The nearest and the farthest distance looked at, in the unit of x.
+/// The smallest and the largest distance sampled, in the unit of x.
 const NEAREST: f64 = 1e-12;
 const FARTHEST: f64 = 1e6;
 
-/// Stands for an infinite distance: its square fits an f32, and every family is at its limit.
+/// Distance used for infinity: its square fits an f32, and every family is at its limit.
 const LIMIT: f64 = 1e18;
 
-/// Distances looked at on either side, 4 % apart.
+/// Distances sampled on each side, 4 % apart.
 const COARSE: usize = 1024;
 
 /// Distances by which each refinement divides an interval; four of them reach 2e-10 relative.
 const FINE: usize = 128;
 const REFINEMENTS: usize = 4;
 
-/// Where an optical depth is not yet at its limits: between `-outer` and `inner`.
+/// The interval between `-outer` and `inner`, outside of which an optical depth is at its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Support {
-    /// Beyond this distance outside, the optical depth differs from `left` by at most the excess.
-    /// Infinite where that is not reached within 1e6.
+    /// Beyond this distance outside, the optical depth differs from `left` by at most the excess. Infinite if that is not reached within
+    /// 1e6.
     pub outer: f64,
-    /// Beyond this distance inside, the light left, `exp(-q)`, is at most the excess, or `q` is at
-    /// its limit to within the excess. Infinite where neither is reached within 1e6.
+    /// Beyond this distance inside, the transmitted light, `exp(-q)`, is at most the excess, or `q` is at its limit to within the excess.
+    /// Infinite if neither is reached within 1e6.
     pub inner: f64,
     /// The limit of the optical depth far outside; not 0 for some MLPs.
     pub left: f64,
@@ -33,10 +33,9 @@ pub struct Support {
 
 /// The distances between which the optical depth of `softness` changes by more than `excess`.
 ///
-/// It is evaluated in f64 where the backend has it, whatever the backend's float type, on 1024
-/// distances a side in [1e-12, 1e6] (unit of x), and the last distance that is not settled is then
-/// refined to 2e-10 relative; the side that is settled is returned. It need not be monotone, but a
-/// bump narrower than 4 % of its distance can be missed. A settled side gives 0.
+/// It is evaluated in f64 if the backend supports that, whatever the backend's float type, at 1024 distances per side in [1e-12, 1e6] (unit
+/// of x), and the last distance that is not settled is then refined to 2e-10 relative; the settled end of the interval is returned. The
+/// depth need not be monotone, but a bump narrower than 4 % of its distance can be missed. A settled side gives 0.
 ///
 /// With at most F faces culled at a pixel, an excess of `E / F` changes its coverage by at most E.
 ///
@@ -62,10 +61,10 @@ pub fn support<B: Backend>(
     Support { outer, inner, left, right }
 }
 
-/// The distance beyond which every value of `curve` is `settled`: 0 if all are, infinite where that is not reached within 1e6.
+/// The distance beyond which every value of `curve` is `settled`: 0 if all are, infinite if that is not reached within 1e6.
 ///
-/// `curve` gives the values at distances in [1e-12, 1e6]; it is looked at on 1024 of them, and the last one that is not settled is then refined to 2e-10
-/// relative; the side that is settled is returned. A bump narrower than 4 % of its distance can be missed.
+/// `curve` returns the values at distances in [1e-12, 1e6]; it is sampled at 1024 of them, and the last one that is not settled is then
+/// refined to 2e-10 relative; the settled end of the interval is returned. A bump narrower than 4 % of its distance can be missed.
 pub fn settled_beyond(curve: impl Fn(&[f64]) -> Vec<f64>, settled: impl Fn(f64) -> bool) -> f64 {
     let mut found = Interval { start: NEAREST, end: FARTHEST };
     for count in std::iter::once(COARSE).chain([FINE; REFINEMENTS]) {
@@ -79,7 +78,7 @@ pub fn settled_beyond(curve: impl Fn(&[f64]) -> Vec<f64>, settled: impl Fn(f64) 
     found.end
 }
 
-/// Evaluates an optical depth at plain numbers.
+/// Evaluates an optical depth for numbers.
 struct Depth<'a, B: Backend> {
     phi: Tensor<B, 1>,
     dtype: DType,
@@ -108,7 +107,7 @@ struct Interval {
 }
 
 impl Interval {
-    /// `count` distances in constant ratio, both ends among them.
+    /// `count` distances in constant ratio, including both ends.
     fn grid(self, count: usize) -> Vec<f64> {
         let ratio = (self.end / self.start).ln() / (count - 1) as f64;
         let mut grid: Vec<_> = (0..count).map(|k| self.start * (ratio * k as f64).exp()).collect();

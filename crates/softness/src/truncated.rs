@@ -2,11 +2,11 @@ use softrast_tensor::{Backend, Tensor};
 
 use crate::{Softness, softness::curve};
 
-/// A softness that ends: nothing is covered from `reach` scales outside the edge on, everything from as many inside.
+/// A softness with bounded support: the coverage is 0 from `reach` scales outside the edge on, and 1 from as many inside.
 ///
-/// The step in between is stretched to go from 0 to 1: `(s(x) - s(-r)) / (s(r) - s(-r))` with `r` the reach times the scale. This is the remedy
-/// for a heavy tail such as that of an arctangent, whose coverage falls with one over the distance. Without an end every face is drawn at
-/// every pixel, and hundreds of tails add up to an image that is opaque all over.
+/// The step in between is stretched to go from 0 to 1: `(s(x) - s(-r)) / (s(r) - s(-r))` with `r` the reach times the scale. This is the
+/// remedy for a heavy tail such as that of an arctangent, whose coverage decreases with one over the distance. Without truncation every
+/// face is drawn at every pixel, and hundreds of tails add up to an image that is opaque everywhere.
 ///
 /// ```
 /// use softrast_softness::{Family, Softness, Truncated};
@@ -24,7 +24,7 @@ pub struct Truncated<S> {
 }
 
 impl<S: Softness> Truncated<S> {
-    /// Ends `softness` at `reach` times its scale on both sides of the edge.
+    /// Truncates `softness` at `reach` times its scale on both sides of the edge.
     ///
     /// # Panics
     ///
@@ -45,7 +45,7 @@ impl<S: Softness> Softness for Truncated<S> {
         let scale = scale.reshape([1; D]);
         let x = (x / scale.clone()).clamp(-self.reach, self.reach) * scale;
         let step = (self.softness.value(phi, x) - low.clone()) / (high - low);
-        // Only rounding at the ends lies outside.
+        // Only rounding errors at the ends are outside.
         step.clamp(0.0, 1.0)
     });
 

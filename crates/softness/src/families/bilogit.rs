@@ -9,11 +9,9 @@ use crate::{
 
 /// A logistic whose argument has two slopes: `s = sigmoid(a tanh(y) + y / r)` with `y = x / (2 scale)`.
 ///
-/// φ `[3]` holds the logarithms of twice the scale, in the unit of x, of the height a and of the ratio
-/// r. Near the edge the argument rises by a + 1/r for two scales, far from it by 1/r: a steep edge with
-/// wide tails, or the other way round. With a = r = 1 it is as steep at the edge as a logistic of the
-/// same scale. With three parameters it follows the learned networks that were released with the paper
-/// to 5e-5.
+/// φ `[3]` holds the logarithms of twice the scale, in the unit of x, of the height a and of the ratio r. The slope of the argument in y is
+/// a + 1/r near the edge, up to about two scales, and 1/r far from it: a steep edge with wide tails, or the reverse. With a = r = 1 it is
+/// as steep at the edge as a logistic of the same scale. It fits the learned networks released with the paper to 5e-5.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Bilogit;
 
@@ -24,13 +22,13 @@ impl Bilogit {
         y.clone().tanh() * height + y * slope
     }
 
-    /// Its derivative by x.
+    /// The derivative of the logit with respect to x.
     fn logit_slope<B: Backend, const D: usize>(
         phi: &Tensor<B, 1>,
         y: Tensor<B, D>,
     ) -> Tensor<B, D> {
         let [height, slope] = height_and_slope(phi);
-        // sech² from exp(-2 |y|): 1 - tanh² has no digits left where tanh saturates.
+        // sech² from exp(-2 |y|): 1 - tanh² loses all digits where tanh saturates.
         let decay = (magnitude(y) * -2.0).exp();
         let upper = (decay.clone() + 1.0).recip();
         (decay * upper.clone() * upper * 4.0 * height + slope) * per_scale(phi)

@@ -5,16 +5,16 @@ use softrast_tensor::{Backend, Tensor};
 use super::unit_step::UnitStep;
 use crate::math::{atan_ratio, magnitude};
 
-/// Half the tail one scale from the edge. Smaller tails, which are replaced by what has more digits, count as it meanwhile.
+/// Half the tail at one scale from the edge. Smaller tails are clamped to it, since a more precise formula replaces them.
 const LEAST_TAIL: f64 = 0.125;
 
 /// `s(x) = 1/2 + atan(x / scale) / π`; φ `[1]` is the logarithm of the scale, in the unit of x.
 ///
-/// Its tails fall like 1 / |x|, too slowly to cull. Source: Petersen et al. 2022, Table 1.
+/// The tails decrease like 1 / |x|, too slowly for culling. Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cauchy;
 
-/// `1 - S` at `size >= 0`, and the same times `size` where that is above 1 (elsewhere any number).
+/// `1 - S` at `size >= 0`, and its product with `size` where that is above 1 (unspecified elsewhere).
 fn tail<B: Backend, const D: usize>(size: Tensor<B, D>) -> (Tensor<B, D>, Tensor<B, D>) {
     let far = size.clone().greater_elem(1.0);
     let inverse = size.clone().clamp_min(1.0).recip();
@@ -39,7 +39,7 @@ impl UnitStep for Cauchy {
         let size = magnitude(u);
         let far = size.clone().greater_elem(1.0);
         let (tail, scaled) = tail(size.clone());
-        // Both logarithms are of numbers that cannot come near 0 where they are chosen.
+        // Both logarithms are of numbers bounded away from 0 where they are selected.
         let near = tail.clone().clamp_min(LEAST_TAIL).log().neg();
         let thick = near.mask_where(far, size.clamp_min(1.0).log() - scaled.log());
         thick.mask_where(below, tail.neg().log1p().neg())

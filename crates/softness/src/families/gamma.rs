@@ -5,19 +5,19 @@ use softrast_tensor::{Backend, Tensor};
 use super::half_line::{HalfLine, Law};
 use crate::math::{ln_gamma, parameter};
 
-/// The shapes that the fixed numbers of terms below are good for; others count as the nearest end.
+/// Range of shapes for which the fixed numbers of terms below suffice; others are clamped to it.
 const SHAPES: RangeInclusive<f64> = 0.02..=20.0;
 
 /// Terms of the power series and of the continued fraction: below 2e-15 at the switch.
 const TERMS: usize = 48;
 
-/// The power series serves up to `p + SWITCH`, the continued fraction from there.
+/// The power series is used up to `p + SWITCH`, the continued fraction from there.
 const SWITCH: f64 = 2.0;
 
-/// Below this distance, in scales, the distribution function is a parabola from 0 that joins the law with its slope.
+/// Below this distance, in scales, the distribution function is a parabola through 0 with value and slope of the law at its end.
 ///
-/// For `p < 1` the density grows without bound towards 0; here it ends at `(2 - p) F(FLOOR) / FLOOR`: 1.7e4 per scale for p = 0.5. For
-/// `p >= 1` the parabola is a straight line.
+/// For `p < 1` the density increases without bound towards 0; here it is at most `(2 - p) F(FLOOR) / FLOOR`: 1.7e4 per scale for p = 0.5.
+/// For `p >= 1` the parabola is a straight line.
 const FLOOR: f64 = 1e-8;
 
 /// The Gamma law, `F(y) = P(p, y)`, the regularised incomplete gamma function; φ `[3]` is the
@@ -33,13 +33,13 @@ pub struct Gamma;
 
 /// The incomplete gamma function at one set of distances.
 struct Pieces<B: Backend, const D: usize> {
-    /// Where the continued fraction serves.
+    /// Where the continued fraction is used.
     far: Tensor<B, D, softrast_tensor::Bool>,
-    /// `P(p, y)` where the series serves, 0 elsewhere.
+    /// `P(p, y)` where the series is used, 0 elsewhere.
     below: Tensor<B, D>,
     /// `dP/dy`.
     slope: Tensor<B, D>,
-    /// `-ln Q(p, y)` where the fraction serves.
+    /// `-ln Q(p, y)` where the fraction is used.
     far_depth: Tensor<B, D>,
     /// The derivative of `far_depth`.
     far_depth_slope: Tensor<B, D>,
@@ -52,7 +52,7 @@ impl<B: Backend, const D: usize> Pieces<B, D> {
         let switch = p.clone() + SWITCH;
         let far = (y.clone() - switch.clone()).greater_equal_elem(0.0);
 
-        // Both are selected by their argument, so that neither meets one that it cannot bear.
+        // Each is evaluated at clamped arguments only, so that neither sees one for which it fails.
         let y_near = y.clone().clamp_max(SHAPES.end() + SWITCH);
         let ln_front = y_near.clone().log() * p.clone() - y_near.clone();
         let below = (ln_front - ln_gamma(p.clone() + 1.0)).exp() * series(p.clone(), y_near);
@@ -71,7 +71,7 @@ impl<B: Backend, const D: usize> Pieces<B, D> {
     }
 }
 
-/// The part of `F(FLOOR)` that the law has come to at `y`, 1 from [`FLOOR`] on, and below it the rate at which it grows, per scale.
+/// The fraction of `F(FLOOR)` reached at `y`, 1 from [`FLOOR`] on, and below it its derivative, per scale.
 fn begun<B: Backend, const D: usize>(
     p: &Tensor<B, D>,
     y: Tensor<B, D>,
@@ -101,7 +101,7 @@ fn fraction<B: Backend, const D: usize>(p: Tensor<B, D>, y: Tensor<B, D>) -> Ten
 }
 
 impl HalfLine for Gamma {
-    // The shape that the paper uses.
+    // The shape of the paper.
     const SHAPES: &'static [f64] = &[0.5];
 
     fn law<B: Backend, const D: usize>(phi: &Tensor<B, 1>, y: Tensor<B, D>) -> Law<B, D> {

@@ -8,8 +8,7 @@ use crate::math::{atan_ratio, magnitude};
 /// `s(x) = 1/2 + (2/π) atan(tanh(x / (2 scale)))`, the hyperbolic secant distribution; φ `[1]` is
 /// the logarithm of the scale, in the unit of x.
 ///
-/// Computed as `(2/π) atan(exp(x / scale))`, which is the same and keeps the digits of the tail.
-/// Source: Petersen et al. 2022, Table 1.
+/// Computed as `(2/π) atan(exp(x / scale))`, which is equal and keeps the digits of the tail. Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gudermannian;
 

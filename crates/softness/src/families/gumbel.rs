@@ -3,10 +3,10 @@ use softrast_tensor::{Backend, Tensor};
 use super::unit_step::UnitStep;
 use crate::math::rise;
 
-/// Where the double exponential has long settled: `exp(-exp(20))` is 0.
+/// Argument at which the double exponential is settled: `exp(-exp(20))` is 0.
 const SETTLED: f64 = 20.0;
 
-/// Below this argument the series of [`expm1_ratio`] serves; its first term left out is 3e-22.
+/// Below this argument the series of [`expm1_ratio`] is used; its first omitted term is 3e-22.
 const SMALL: f64 = 1e-2;
 
 /// `s(x) = exp(-exp(-x / scale))`; φ `[1]` is the logarithm of the scale, in the unit of x.
@@ -17,8 +17,7 @@ pub struct GumbelMax;
 
 /// `s(x) = 1 - exp(-exp(x / scale))`; φ `[1]` is the logarithm of the scale, in the unit of x.
 ///
-/// Its optical depth, `exp(x / scale)`, stops growing 20 scales inside, at 4.9e8. Source: Petersen
-/// et al. 2022, Table 1.
+/// Its optical depth, `exp(x / scale)`, is constant from 20 scales inside on, at 4.9e8. Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GumbelMin;
 
@@ -34,7 +33,7 @@ fn expm1_ratio<B: Backend, const D: usize>(v: Tensor<B, D>) -> Tensor<B, D> {
     (rise(v.clone()) / v).mask_where(small, series)
 }
 
-/// `exp(u)`, kept at `exp(20)` from 20 on.
+/// `exp(u)`, clamped to `exp(20)`.
 fn growth<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
     u.clamp_max(SETTLED).exp()
 }

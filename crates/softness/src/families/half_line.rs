@@ -10,10 +10,10 @@ use crate::{
 
 /// A distribution on the half line `y >= 0`, in units of the scale.
 ///
-/// φ begins with the logarithm of the scale and ends with the shift in scales; between them are the
-/// logarithms of the shapes. Every method sees `0 <= y <= FAR` and must stay finite there.
+/// φ starts with the logarithm of the scale and ends with the shift in scales; between them are the logarithms of the shapes. Arguments of
+/// every method are in `0 <= y <= FAR`, where results must be finite.
 pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
-    /// Positive parameters of the law, to start from; φ holds their logarithms.
+    /// Initial positive parameters of the law; φ holds their logarithms.
     const SHAPES: &'static [f64] = &[];
 
     /// The law at each distance.
@@ -25,7 +25,7 @@ pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
         [optical_depth_of(below, above.clone()), slope / above]
     }
 
-    /// Parameters to start from: no shift.
+    /// Initial parameters, without a shift.
     fn default_phi(scale: f64) -> Vec<f64> {
         let shapes = Self::SHAPES.iter().map(|shape| shape.ln());
         [ln_scale(scale)].into_iter().chain(shapes).chain([0.0]).collect()
@@ -36,16 +36,16 @@ pub(crate) trait HalfLine: Clone + Debug + Send + Sync + 'static {
 pub(crate) struct Law<B: Backend, const D: usize> {
     /// `F(y)`.
     pub(crate) below: Tensor<B, D>,
-    /// `1 - F(y)`, with its own digits.
+    /// `1 - F(y)`, computed without cancellation.
     pub(crate) above: Tensor<B, D>,
     /// `dF/dy`.
     pub(crate) slope: Tensor<B, D>,
 }
 
-/// A one-sided law as it stands: `s = F(x / scale + shift)`, which is 0 outside and rises inside.
+/// A one-sided law in its own direction: `s = F(x / scale + shift)`, which is 0 outside and increases inside.
 ///
-/// It never reaches 1 at a finite distance, so its optical depth is exact and grows without bound.
-/// At the kink (`x = -shift scale`) density and hazard are those of the side of larger x.
+/// It never reaches 1 at a finite distance, so its optical depth is exact and unbounded. At the kink (`x = -shift scale`) density and
+/// hazard are those of the side of larger x.
 ///
 /// Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,19 +54,19 @@ pub struct Forward<L>(
     pub L,
 );
 
-/// A one-sided law mirrored: `s = 1 - F(shift - x / scale)`, which is 1 inside and decays outside.
+/// A mirrored one-sided law: `s = 1 - F(shift - x / scale)`, which is 1 inside and decays outside.
 ///
 /// It reaches 1, so its optical depth is bounded: see [`OPAQUE`](crate::OPAQUE). At the kink
 /// (`x = shift scale`) density and hazard are those of the side of smaller x.
 ///
-/// Source: Wu et al. 2024, Sec. 4.2: the rows Exp and Gamma of shape and pose are these.
+/// Source: Wu et al. 2024, Sec. 4.2: the rows Exp and Gamma of shape and pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reversed<L>(
     /// The law, for example [`Exp`](super::Exp).
     pub L,
 );
 
-/// `sign x / scale + shift`, where the law begins at 0.
+/// `sign x / scale + shift`, where the law starts at 0.
 fn law_distance<L: HalfLine, B: Backend, const D: usize>(
     phi: &Tensor<B, 1>,
     x: Tensor<B, D>,
@@ -75,7 +75,7 @@ fn law_distance<L: HalfLine, B: Backend, const D: usize>(
     x * (per_scale(phi) * sign) + parameter(phi, L::SHAPES.len() + 1)
 }
 
-/// `f(max(y, 0))` where the law has begun, 0 before.
+/// `f(y)` for `y >= 0`, 0 before.
 fn where_begun<B: Backend, const D: usize, const N: usize>(
     y: Tensor<B, D>,
     f: impl FnOnce(Tensor<B, D>) -> [Tensor<B, D>; N],

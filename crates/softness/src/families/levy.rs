@@ -3,15 +3,14 @@ use softrast_tensor::{Backend, Tensor};
 use super::half_line::{HalfLine, Law};
 use crate::error_function::{erf, erfc};
 
-/// Distances below this count as it: `erfc(sqrt(1 / 2y))` is 0 there in f64 already.
+/// Smaller distances are clamped to this one: `erfc(sqrt(1 / 2y))` is already 0 there in f64.
 const FLOOR: f64 = 5e-4;
 
 /// The Levy law, `F(y) = erfc(sqrt(1 / 2y))`; φ `[2]` is the logarithm of the scale, in the unit of
 /// x, and the shift in scales. Use it as [`Reversed`](super::Reversed) or
 /// [`Forward`](super::Forward).
 ///
-/// `1 - F` falls like `1 / sqrt(y)`, the slowest of all tails. Source: Petersen et al. 2022,
-/// Table 1.
+/// `1 - F` decreases like `1 / sqrt(y)`, the slowest of all tails. Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Levy;
 

@@ -11,8 +11,7 @@ pub struct Logistic;
 
 impl UnitStep for Logistic {
     fn step<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        // Each half from exp(-|u|), which cannot overflow: the lower tail keeps its digits, which
-        // the form with tanh loses.
+        // Each half from exp(-|u|), which cannot overflow: the lower tail keeps its digits, which the form with tanh loses.
         let below = u.clone().lower_elem(0.0);
         let decay = magnitude(u).neg().exp();
         let upper = (decay.clone() + 1.0).recip();
@@ -26,8 +25,8 @@ impl UnitStep for Logistic {
     }
 
     fn depth<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        // Softplus, as max(u, 0) + ln(1 + exp(-|u|)); chosen half by half, because a sum of the two
-        // halves would leave the tail's derivative as a difference of numbers near 1/2.
+        // Softplus, as max(u, 0) + ln(1 + exp(-|u|)); selected half by half, because in a sum of the two halves the tail's derivative would
+        // be a difference of numbers near 1/2.
         let below = u.clone().lower_elem(0.0);
         let size = magnitude(u);
         let thin = size.clone().neg().exp().log1p();

@@ -8,21 +8,20 @@ use crate::{
     softness::curve,
 };
 
-/// The least slope of the logit that counts: a flat network has no scale, any finite one will do.
+/// Lower bound of the slope of the logit: a flat network has no scale, any finite one will do.
 const FLATTEST: f64 = 4e-12;
 
 /// A small network: `s(x) = sigmoid(W5 tanh(h + W4 tanh(W3 tanh(W2 h))))` with `h = tanh(W1 x)`.
 ///
-/// φ `[56]` holds W1 to W5 one after the other, each row by row (output, input); x is taken as it
-/// is. Without biases the argument of the sigmoid is odd: `s(-x) = 1 - s(x)`. It is bounded too,
-/// by the sum of |W5|, so that s need not reach 0 far outside. Nothing makes it monotone.
+/// φ `[56]` holds W1 to W5, each in row-major order (output, input); x is not scaled. Without biases the argument of the sigmoid is odd:
+/// `s(-x) = 1 - s(x)`. It is also bounded by the sum of |W5|, so s need not reach 0 far outside. s need not be monotone.
 ///
 /// Source: Wu et al. 2024, Eq. 2. Not the kernel released with the paper, which leaves most
 /// weights of W2, W3 and W4 unused.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mlp;
 
-/// A layer's output `[points, units]` and its derivative by the input of the network.
+/// A layer's output `[points, units]` and its derivative with respect to the input of the network.
 type Dual<B> = (Tensor<B, 2>, Tensor<B, 2>);
 
 /// A layer without its activation.
@@ -31,7 +30,7 @@ fn linear<B: Backend>((h, dh): Dual<B>, weight: Tensor<B, 2>) -> Dual<B> {
 }
 
 fn tanh<B: Backend>((h, dh): Dual<B>) -> Dual<B> {
-    // Both from exp(-2 |h|): 1 - tanh² has no digits left where the unit saturates.
+    // Both from exp(-2 |h|): 1 - tanh² loses all digits where the unit saturates.
     let below = h.clone().lower_elem(0.0);
     let decay = (magnitude(h) * -2.0).exp();
     let upper = (decay.clone() + 1.0).recip();
@@ -52,7 +51,7 @@ impl Mlp {
         h4.matmul(w5).reshape(shape)
     }
 
-    /// [`Mlp::logit`] and its derivative by x, carried forward layer by layer.
+    /// [`Mlp::logit`] and its derivative with respect to x, by forward differentiation.
     fn logit_and_slope<B: Backend, const D: usize>(
         phi: &Tensor<B, 1>,
         x: Tensor<B, D>,

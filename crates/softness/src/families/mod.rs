@@ -1,4 +1,4 @@
-//! The families of soft steps, a file each. [`Family`](crate::Family) has them by name.
+//! The families of soft steps, one per file. [`Family`](crate::Family) selects one by name.
 
 mod bilogit;
 mod cauchy;
@@ -20,11 +20,11 @@ mod wigner;
 
 pub use half_line::{Forward, Reversed};
 
-/// Hands the list of all families to the macro `$make`, behind its arguments.
+/// Passes the list of all families to the macro `$make`, after its arguments.
 ///
-/// A line is a file of this folder: name of the variant of [`Family`](crate::Family), name in files
-/// and on the command line, softness. A law and its mirror image `1 - s(-x)` share a file and a line;
-/// a family alone on its line is its own mirror image. The order is that of the documentation.
+/// A line is a file of this folder: name of the variant of [`Family`](crate::Family), name in files and on the command line, softness. A
+/// law and its mirror image `1 - s(-x)` share a file and a line; a single family on its line is its own mirror image. The order is that of
+/// the documentation.
 macro_rules! families {
     ($make:ident $($arguments:tt)*) => {
         $make! { [$($arguments)*]

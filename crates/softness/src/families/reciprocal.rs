@@ -8,7 +8,7 @@ use crate::math::magnitude;
 /// `s(x) = 1/2 + u / (2 + 2 |u|)` with `u = x / scale`; φ `[1]` is the logarithm of the scale, in
 /// the unit of x.
 ///
-/// Its tails fall like 1 / |x|, too slowly to cull. Source: Petersen et al. 2022, Table 1.
+/// The tails decrease like 1 / |x|, too slowly for culling. Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reciprocal;
 

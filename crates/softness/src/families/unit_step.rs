@@ -8,8 +8,7 @@ use crate::{
     softness::curve,
 };
 
-/// A softness `s(x) = S(x / scale)`, given by the step `S` alone; φ `[1]` is the logarithm of the
-/// scale, in the unit of x.
+/// A softness `s(x) = S(x / scale)`, defined by the step `S`; φ `[1]` is the logarithm of the scale, in the unit of x.
 pub(crate) trait UnitStep: Clone + Debug + Send + Sync + 'static {
     /// `S(u)`.
     fn step<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D>;
@@ -17,12 +16,12 @@ pub(crate) trait UnitStep: Clone + Debug + Send + Sync + 'static {
     /// `dS/du`.
     fn slope<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D>;
 
-    /// `-ln(1 - S(u))`. Provided: of a symmetric step that reaches 1, see [`OPAQUE`](crate::OPAQUE).
+    /// `-ln(1 - S(u))`. Provided: for a symmetric step that reaches 1, see [`OPAQUE`](crate::OPAQUE).
     fn depth<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
         bounded_depth(Self::step(u.clone()), Self::step(u.neg()))
     }
 
-    /// The derivative of [`UnitStep::depth`]. Provided: of a symmetric step that reaches 1.
+    /// The derivative of [`UnitStep::depth`]. Provided: for a symmetric step that reaches 1.
     fn depth_slope<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
         bounded_hazard(Self::slope(u.clone()), Self::step(u.neg()))
     }

@@ -21,17 +21,16 @@ const END: [f64; 18] = [
     -1.5250192434151066e-11, -4.500413206537482e-12,
 ];
 
-/// `s(x) = 1/2 + (u sqrt(1 - u²) + asin(u)) / π` with `u = x / scale` kept within ±1, the semicircle
-/// distribution; φ `[1]` is the logarithm of the scale, in the unit of x.
+/// `s(x) = 1/2 + (u sqrt(1 - u²) + asin(u)) / π` with `u = x / scale` clamped to ±1, the semicircle distribution; φ `[1]` is the logarithm
+/// of the scale, in the unit of x.
 ///
-/// Within 1e-12 scales of the two ends, s runs with a bounded second derivative instead of an
-/// infinite one. Source: Petersen et al. 2022, Table 1.
+/// Within 1e-12 scales of the two ends, the second derivative of s is bounded, not infinite. Source: Petersen et al. 2022, Table 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wigner;
 
 impl UnitStep for Wigner {
     fn step<B: Backend, const D: usize>(u: Tensor<B, D>) -> Tensor<B, D> {
-        // From the end of the tail: the textbook formula has no digits left there.
+        // From the end of the tail: the textbook formula loses all digits there.
         let below = u.clone().lower_elem(0.0);
         let y = ((magnitude(u).neg() + 1.0) * 0.5).clamp_min(0.0);
         let tail = y.clone() * y.clone().clamp_min(FLOOR).sqrt() * polynomial(&END, y * 4.0 - 1.0);
