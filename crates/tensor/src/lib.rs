@@ -1,8 +1,8 @@
 //! Tensors, backends and automatic differentiation of softrast: those of burn 0.21.
 //!
-//! This is the only crate of the project that names burn, so that another release, or tensors of our own, are a change of one file.
-//! The types are burn's own: a tensor of burn 0.21 is a tensor here. Networks use burn's modules and optimisers through
-//! `burn`, the whole of it, which the Cargo feature of that name compiles.
+//! This is the only crate of the workspace that depends on burn directly, so replacing burn, or its release, changes a single file. The
+//! types are burn's own: a tensor of burn 0.21 is a tensor here. Networks use burn's modules and optimisers through `burn`, the whole
+//! crate, which the Cargo feature `burn` compiles.
 //!
 //! The Cargo features `ndarray`, `flex` and `wgpu` compile the backends of these names.
 //!
@@ -37,7 +37,7 @@ pub use burn_tensor::{
 };
 pub use plain::{numbers, tensor, tensor_on, vector};
 
-/// Types that register an op with a backward pass of its own.
+/// Types to register an op with a custom backward pass.
 pub mod autodiff {
     #[doc(no_inline)]
     pub use burn_autodiff::{
@@ -47,7 +47,7 @@ pub mod autodiff {
     };
 }
 
-/// The backend for GPUs, and what its kernels are written with.
+/// The backend for GPUs, and the types of its kernels.
 #[cfg(feature = "wgpu")]
 pub mod wgpu {
     #[doc(no_inline)]

@@ -1,21 +1,21 @@
-//! Tensors of plain numbers, in the float type of their backend whatever type the device defaults to.
+//! Tensors of numbers, in the float type of their backend, not that of the device.
 
 use crate::{Backend, Element, Tensor, TensorData};
 
-/// A tensor of these values, row by row.
+/// A tensor of `values`, in row-major order.
 ///
 /// # Panics
 ///
-/// If the number of values is not that of the shape.
+/// If the number of values does not match the shape.
 pub fn tensor<B: Backend, const D: usize>(values: Vec<f64>, shape: [usize; D]) -> Tensor<B, D> {
     tensor_on(values, shape, &Default::default())
 }
 
-/// The same on a device.
+/// A [`tensor`] on a device.
 ///
 /// # Panics
 ///
-/// If the number of values is not that of the shape.
+/// If the number of values does not match the shape.
 pub fn tensor_on<B: Backend, const D: usize>(
     values: Vec<f64>,
     shape: [usize; D],
@@ -30,7 +30,7 @@ pub fn vector<B: Backend>(values: &[f64]) -> Tensor<B, 1> {
     tensor(values.to_vec(), [values.len()])
 }
 
-/// Numbers of a tensor, row by row.
+/// Numbers of a tensor, in row-major order.
 pub fn numbers<B: Backend, const D: usize>(tensor: Tensor<B, D>) -> Vec<f64> {
     tensor.into_data().iter().collect()
 }
