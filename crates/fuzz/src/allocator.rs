@@ -1,4 +1,4 @@
-//! An allocator that counts the bytes in use, and ends the process where there are far too many.
+//! An allocator that counts the bytes in use, and ends the process if there are far too many.
 #![allow(unsafe_code, reason = "an allocator cannot be written without")]
 
 use std::{
@@ -6,16 +6,16 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering::Relaxed},
 };
 
-/// More bytes in use than this end the process with the message of the standard library, before the machine runs out of memory.
+/// Bytes in use above which the process ends with the message of the standard library, before the machine runs out of memory.
 const MOST: usize = 6 << 30;
 
 static IN_USE: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 
-/// The allocator of the system, with the bytes in use counted. For `#[global_allocator]`.
+/// The system allocator, with a count of the bytes in use. For `#[global_allocator]`.
 pub struct Allocator;
 
-/// Bytes in use now. The peak begins anew from here.
+/// Resets the peak, and returns the bytes in use.
 pub(crate) fn begin() -> usize {
     let now = IN_USE.load(Relaxed);
     PEAK.store(now, Relaxed);
@@ -27,7 +27,7 @@ pub(crate) fn peak() -> usize {
     PEAK.load(Relaxed)
 }
 
-/// Counts `more` bytes; false if they are too many.
+/// Counts `more` bytes; returns false if there are too many.
 fn grow(more: usize) -> bool {
     let now = IN_USE.fetch_add(more, Relaxed).saturating_add(more);
     if now > MOST {
@@ -38,10 +38,10 @@ fn grow(more: usize) -> bool {
     true
 }
 
-// SAFETY: All calls go to the allocator of the system unchanged, or return null, which says that there is no memory.
+// SAFETY: All calls go to the system allocator unchanged, or return null, which means that there is no memory.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        // SAFETY: The caller keeps the contract of the trait, which is also that of `System`.
+        // SAFETY: The caller upholds the contract of the trait, which is also that of `System`.
         if grow(layout.size()) { unsafe { System.alloc(layout) } } else { std::ptr::null_mut() }
     }
 
@@ -61,7 +61,7 @@ unsafe impl GlobalAlloc for Allocator {
     }
 
     unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // Both may be there while the content is copied.
+        // Both blocks may exist while the content is copied.
         if !grow(size) {
             return std::ptr::null_mut();
         }

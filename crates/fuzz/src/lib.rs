@@ -1,6 +1,6 @@
-//! Mutates files, gives them to readers in this process, and finds panics, hangs and large allocations.
+//! Mutates files, passes them to readers in this process, and reports panics, hangs and large allocations.
 //!
-//! A fuzz target is a plain program, with the allocator of this crate, that lists its readers:
+//! A fuzz target is a program with the allocator of this crate and a list of readers:
 //!
 //! ```no_run
 //! use std::process::ExitCode;
@@ -19,8 +19,8 @@
 //! }
 //! ```
 //!
-//! Each input follows from the seed of the run, the name of the reader and its own number alone. So a run finds the same again, whatever
-//! else it reads and however fast.
+//! Each input is determined by the seed of the run, the name of the reader and its number, so a run is reproducible whatever else it reads
+//! and however fast.
 
 mod allocator;
 mod mutator;

@@ -1,8 +1,8 @@
-//! Changes files a little: as editors, networks, disks and people with bad intentions do.
+//! Small mutations of files, like damage by editors, networks, disks and attackers.
 
 use crate::random::Random;
 
-/// Inputs are not longer than this, in bytes.
+/// Longest input, in bytes.
 const LONGEST: usize = 1 << 18;
 
 const NUMBERS: [&[u8]; 24] = [
@@ -35,24 +35,24 @@ const NUMBERS: [&[u8]; 24] = [
 const WORDS: [u32; 12] =
     [0, 1, 2, 3, 255, 65535, 1 << 20, 1 << 30, i32::MAX as u32, 1 << 31, u32::MAX, u32::MAX - 1];
 
-/// Floats that are seldom tried.
+/// Floats that are rarely tested.
 const FLOATS: [f32; 6] = [f32::NAN, f32::INFINITY, f32::MAX, f32::MIN_POSITIVE, -1.0, 255.0];
 
 const BYTES: &[u8] = b"\0\x01\x7f\x80\xff \t\r\n\\/#\"-.0123456789aenvf[]{},:";
 
-/// Makes inputs of sound files.
+/// Creates inputs from valid files.
 pub struct Mutator<'a> {
     seeds: &'a [Vec<u8>],
     random: Random,
 }
 
 impl<'a> Mutator<'a> {
-    /// That of input `number` of the reader `name` in a run with this seed; `seeds` are sound files, at least one.
+    /// The mutator of input `number` of the reader `name` in a run with this seed; `seeds` are valid files, at least one.
     pub fn new(seeds: &'a [Vec<u8>], seed: u64, name: &str, number: u64) -> Self {
         Self { seeds, random: Random::new(seed, name, number) }
     }
 
-    /// One sound file with one to a dozen changes; of 2¹⁸ bytes at most.
+    /// A valid file with 1 to 13 mutations; at most 2¹⁸ bytes.
     pub fn input(&mut self) -> Vec<u8> {
         let mut bytes = self.random.pick(self.seeds).clone();
         let changes = 1 + self.random.below(4) * self.random.below(5);
@@ -129,19 +129,19 @@ impl<'a> Mutator<'a> {
         bytes.truncate(LONGEST);
     }
 
-    /// A place in `bytes`, which are not empty: half of the time near their beginning, where most is decided.
+    /// A position in `bytes`, which must not be empty: half of the time near their start, where most is determined.
     fn place(&mut self, bytes: &[u8]) -> usize {
         let length = if self.random.below(2) == 0 { bytes.len() } else { bytes.len().min(200) };
         self.random.below(length)
     }
 
-    /// The end of a piece of `bytes`: short more often than long.
+    /// The end of a piece of `bytes`: more often short than long.
     fn end(&mut self, bytes: &[u8], place: usize) -> usize {
         let longest = *self.random.pick(&[4, 16, 256, bytes.len()]);
         (place + 1 + self.random.below(longest)).min(bytes.len())
     }
 
-    /// A length, or nearly the `length` of all.
+    /// A length, or approximately the total `length`.
     fn number(&mut self, length: usize) -> u32 {
         match self.random.below(3) {
             0 => (length as u32).wrapping_add_signed(self.random.below(65) as i32 - 32),
@@ -163,7 +163,7 @@ impl<'a> Mutator<'a> {
     }
 }
 
-/// The number in a text at `place` or after it; nothing at the end if there is none.
+/// The number in a text at `place` or after it; empty at the end if there is none.
 fn number_at(bytes: &[u8], place: usize) -> std::ops::Range<usize> {
     let is_number = |byte: &u8| byte.is_ascii_digit() || b"+-.".contains(byte);
     let start = bytes[place..].iter().position(is_number).map_or(bytes.len(), |k| place + k);

@@ -1,6 +1,6 @@
-//! Random numbers that follow from a seed, on every machine and for ever.
+//! Random numbers determined by a seed, the same on every machine and in every version.
 
-/// Source: Vigna's splitmix64.
+/// The generator. Source: Vigna's splitmix64.
 pub(crate) struct Random(u64);
 
 impl Random {
@@ -30,7 +30,7 @@ impl Random {
         self.draw() as u8
     }
 
-    /// One entry of a list that is not empty.
+    /// One entry of a list, which must not be empty.
     pub(crate) fn pick<'a, T>(&mut self, list: &'a [T]) -> &'a T {
         &list[self.below(list.len())]
     }

@@ -1,4 +1,4 @@
-//! Gives inputs to readers, and keeps those that break them.
+//! Passes inputs to readers, and stores those that break them.
 
 use std::{
     any::Any,
@@ -18,14 +18,14 @@ use cpu_time::ProcessTime;
 
 use crate::{Mutator, Settings, allocator};
 
-/// A reader whose process computes longer for one input, in each of three tries, hangs. Waiting counts only towards `FOR_EVER`: a loaded
-/// machine would give false finds.
+/// CPU time of the process per input above which a reader hangs, in each of three tries. Waiting counts only towards `FOR_EVER`: a loaded
+/// machine would give false positives.
 const LONGEST: Duration = Duration::from_secs(1);
-/// One that takes this long will never end: the process ends.
+/// Seconds after which a reader counts as endless, and the process ends.
 const FOR_EVER: u64 = 120;
-/// A reader that takes more memory for one input, in bytes, takes too much.
+/// Memory per input above which a reader takes too much, in bytes.
 const MOST: usize = 1 << 30;
-/// No more inputs of one reader are kept than this.
+/// Most inputs stored per reader.
 const MOST_KEPT: usize = 20;
 
 type Read<'a> = Box<dyn Fn(&[u8]) + 'a>;
@@ -39,8 +39,8 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// A reader called `name`, for files that end in `ending` (without the dot), with sound files to begin with. `read` may panic only
-    /// where the reader, or what it returns, is not as promised.
+    /// A reader called `name`, for files with the extension `ending` (without the dot); `seeds` are valid files to start from. `read` may
+    /// panic only if the reader, or its result, violates its contract.
     ///
     /// # Panics
     ///
@@ -59,20 +59,20 @@ impl<'a> Reader<'a> {
 /// The findings of a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// Inputs that were read.
+    /// Number of inputs read.
     pub inputs: u64,
     /// Inputs on which a reader panicked.
     pub panics: u64,
-    /// Inputs that took more than a second of CPU time, three times.
+    /// Inputs that took more than a second of CPU time, in three tries.
     pub hangs: u64,
-    /// Inputs that took more than 1 GiB.
+    /// Inputs that took more than 1 GiB of memory.
     pub large: u64,
-    /// Most memory that an input took, in bytes.
+    /// Largest memory of an input, in bytes.
     pub peak: usize,
 }
 
 impl Report {
-    /// Whether nothing was found.
+    /// Whether there are no findings.
     pub fn is_clean(&self) -> bool {
         self.panics + self.hangs + self.large == 0
     }
@@ -98,8 +98,8 @@ impl std::fmt::Display for Report {
     }
 }
 
-/// The program of a fuzz target: reads the command line (see [`Settings`]), runs all readers, prints the seed, a line for each reader and one
-/// for all. It fails if anything was found.
+/// Entry point of a fuzz target: parses the command line (see [`Settings`]), runs all readers, and prints the seed, a line per reader and
+/// one for all. It fails if there are findings.
 pub fn main(readers: Vec<Reader<'_>>) -> ExitCode {
     let settings = match Settings::parse(std::env::args().skip(1)) {
         Ok(settings) => settings,
@@ -120,10 +120,10 @@ pub fn main(readers: Vec<Reader<'_>>) -> ExitCode {
     }
 }
 
-/// Runs the readers that the settings ask for, and prints the seed, and a line for each reader and each finding.
+/// Runs the readers selected by the settings, and prints the seed, and a line for each reader and each finding.
 ///
-/// An input that breaks a reader is written to the folder of the settings, under the name of the reader, the seed and its number. An input
-/// that ends the process (no memory, no stack, no end) is left there as `NAME-running.ENDING`.
+/// An input that breaks a reader is written to the folder of the settings, named after the reader, the seed and its number. An input that
+/// ends the process (no memory, no stack, no end) remains there as `NAME-running.ENDING`.
 ///
 /// # Errors
 ///
@@ -159,7 +159,7 @@ impl Reader<'_> {
         let Self { name, ending, .. } = self;
         let running = settings.keep.join(format!("{name}-running.{ending}"));
         let (start, mut report, mut kept) = (Instant::now(), Report::default(), 0);
-        // The sound files come first, as they are.
+        // The valid files come first, unchanged.
         let sound = self.seeds.len() as u64;
         for number in 0..settings.inputs + sound {
             if start.elapsed() > share {
@@ -202,7 +202,7 @@ impl Reader<'_> {
         Ok(report)
     }
 
-    /// Reads an input; again if it takes long, since caches may have been cold.
+    /// Reads an input; repeatedly if it takes long, since caches may have been cold.
     fn read(&self, input: &[u8]) -> Reading {
         let mut reading = self.read_once(input);
         for _ in 0..2 {
@@ -224,7 +224,7 @@ impl Reader<'_> {
     }
 }
 
-/// How a reader fared with an input.
+/// Result of a reader for an input.
 struct Reading {
     panic: Option<String>,
     /// CPU time of the process.
@@ -239,10 +239,10 @@ fn message(payload: &(dyn Any + Send)) -> String {
     text.lines().next().unwrap_or_default().chars().take(200).collect()
 }
 
-/// Ends the process if a reader does not come back.
+/// Ends the process if a reader does not return.
 #[derive(Default)]
 struct Watch {
-    /// Seconds that the present input has taken, plus one; 0 between inputs, and `ENDED` in the end.
+    /// Seconds of the current input, plus one; 0 between inputs, and `ENDED` at the end.
     seconds: AtomicU64,
     running: Mutex<PathBuf>,
 }
@@ -268,7 +268,7 @@ impl Watch {
     }
 
     fn run(&self) {
-        // Short naps, so that a short run ends soon.
+        // Short sleeps, so that a short run ends soon.
         let mut naps = 0;
         loop {
             thread::sleep(Duration::from_millis(50));
@@ -283,7 +283,7 @@ impl Watch {
                 }
                 seconds => {
                     if let Some(next) = next(seconds) {
-                        // Another input may have begun: then it is counted from its own beginning.
+                        // Another input may have started: its time is then counted from its own start.
                         let _changed =
                             self.seconds.compare_exchange(seconds, next, Relaxed, Relaxed);
                     }

@@ -2,31 +2,31 @@
 
 use std::{path::PathBuf, time::Duration};
 
-/// How long to search, from which seed, and where to keep what is found.
+/// Limits of a run, its seed, and the folder for findings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// All inputs follow from it.
+    /// Seed of all inputs.
     pub seed: u64,
-    /// Inputs for each reader.
+    /// Inputs per reader.
     pub inputs: u64,
-    /// Time for all readers together, in equal parts; the search ends with the inputs or the time, whichever is first.
+    /// Total time of all readers, in equal shares; a reader ends at its last input or its time limit, whichever is first.
     pub time: Duration,
-    /// The folder for inputs that were found.
+    /// The folder for inputs with findings.
     pub keep: PathBuf,
-    /// Only readers whose name begins like this.
+    /// Prefix of the names of the readers to run.
     pub only: String,
 }
 
 impl Settings {
     const USAGE: &'static str = "[--seed N] [--inputs N] [--seconds N] [--keep DIR] [--only NAME]: a number after each of the first three";
 
-    /// The settings in `words`, the arguments of the program without its name.
+    /// Parses `words`, the arguments of the program without its name.
     ///
     /// Defaults: seed 1, 100,000 inputs, an hour, `out/fuzz`, all readers.
     ///
     /// # Errors
     ///
-    /// If a word is not an option, or its value is missing or no number; as one line.
+    /// If a word is not an option, or its value is missing or not a number; a message of one line.
     pub fn parse(words: impl IntoIterator<Item = String>) -> Result<Self, String> {
         let mut settings = Self {
             seed: 1,
