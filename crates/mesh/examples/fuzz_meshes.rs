@@ -1,6 +1,6 @@
-//! Gives mutated files to every reader of meshes: `cargo run --release -p softrast-mesh --example fuzz_meshes -- --inputs 200000`.
+//! Passes mutated files to every reader of meshes: `cargo run --release -p softrast-mesh --example fuzz_meshes -- --inputs 200000`.
 //!
-//! The checks of what is read are those of `tests/found.rs`, which replays what was found here.
+//! The checks of the results are those of `tests/found.rs`, which replays the files found here.
 
 use std::process::ExitCode;
 

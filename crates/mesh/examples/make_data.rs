@@ -13,10 +13,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(painted(fox())?.save(folder.join("fox.glb"))?)
 }
 
-/// Sides of the fox's picture, in texels.
+/// Side length of the fox's picture, in texels.
 const SIDE: u32 = 256;
 
-/// The fox with a picture that is seen from the side: u goes from its nose to its tail, v from its paws to its ears.
+/// The fox with a picture projected from the side: u goes from its nose to its tail, v from its paws to its ears.
 fn painted(fox: Mesh) -> Result<Mesh, Box<dyn Error>> {
     let [low, high] = fox.bounds();
     let share = |p: &[f64; 3], k: usize| (p[k] - low[k]) / (high[k] - low[k]);
@@ -32,7 +32,7 @@ fn painted(fox: Mesh) -> Result<Mesh, Box<dyn Error>> {
     Ok(fox.with_texture(texture)?)
 }
 
-/// The colour of the fox by z, which is ahead where it is low, and height.
+/// The colour of the fox by z, which is lowest at the front, and height.
 fn fur(z: f64, y: f64) -> Rgb<u8> {
     const RED: Rgb<u8> = Rgb([214, 106, 38]);
     const WHITE: Rgb<u8> = Rgb([245, 238, 228]);

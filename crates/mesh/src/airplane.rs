@@ -9,7 +9,7 @@ use crate::{
 /// An airliner that flies along -z, with y up.
 ///
 /// One closed surface of about 3,400 triangles, counterclockwise from outside: 0.9 wide, 0.3 high and
-/// 1 long, around the origin, so that it fits a camera 2.732 away with a field of view of 30 degrees.
+/// 1 long, around the origin, so that it fits a camera at distance 2.732 with a field of view of 30 degrees.
 /// Coordinates have five decimals, so that a file of it can be exact.
 pub fn airplane() -> Mesh {
     let grid = Grid { low: [-0.5, -0.175, -0.55], step: 0.025, cubes: [40, 16, 44] };
@@ -24,12 +24,12 @@ const BODY: [Stroke; 3] = [
     ([0.0, 0.0, 0.18], 0.065, [0.0, 0.025, 0.46], 0.028),
 ];
 
-/// Engine below the wing at +x; it comes twice.
+/// Engine below the wing at +x; it is mirrored.
 const ENGINE: Stroke = ([0.17, -0.062, -0.09], 0.038, [0.17, -0.058, 0.02], 0.032);
 
-/// How much thinner than deep wings and fin are.
+/// Ratio of depth to thickness of wings and fin.
 const FLAT: f64 = 3.0;
-/// Wing and stabiliser at +x as they are before they are flattened along y; they come twice.
+/// Wing and stabiliser at +x before they are flattened along y; they are mirrored.
 const WINGS: [Stroke; 2] = [
     ([0.03, -0.05, -0.06], 0.12, [0.40, 0.07, 0.15], 0.055),
     ([0.02, 0.09, 0.39], 0.07, [0.17, 0.15, 0.455], 0.042),
@@ -37,7 +37,7 @@ const WINGS: [Stroke; 2] = [
 /// Fin before it is flattened along x.
 const FIN: Stroke = ([0.0, 0.03, 0.36], 0.08, [0.0, 0.135, 0.45], 0.045);
 
-/// Signed distance to the airplane, roughly: negative inside, with smooth joints.
+/// Approximate signed distance to the airplane: negative inside, with smooth joints.
 fn solid(p: [f64; 3]) -> f64 {
     const REACH: f64 = 0.03;
     let [x, y, z] = [p[0].abs(), p[1], p[2]];

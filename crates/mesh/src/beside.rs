@@ -1,4 +1,4 @@
-//! Files that lie beside a mesh: materials and pictures.
+//! Files next to a mesh: materials and pictures.
 
 use std::{
     io,
@@ -7,10 +7,10 @@ use std::{
 
 use crate::{MeshError, bounded::read_bounded, material::media_type};
 
-/// Where the file lies that another one in `folder` calls `name`.
+/// Path of the file that another file in `folder` calls `name`.
 ///
-/// Nothing outside of the folder is opened: where a path leads out of it, its last part is looked for in the folder itself. So a path from
-/// the machine on which a mesh was made does no harm.
+/// No file outside of the folder is opened: if a path leads out of it, only its last component is used, in the folder itself. A path from
+/// the machine on which a mesh was made is therefore harmless.
 pub(crate) fn beside(folder: &Path, name: &str) -> PathBuf {
     let parts: Vec<&str> = name.split(['/', '\\']).filter(|part| *part != ".").collect();
     let inside = |part: &&str| !(part.is_empty() || part.contains(':') || **part == *"..");
@@ -18,7 +18,7 @@ pub(crate) fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(kept.iter().filter(|part| inside(part)).collect::<PathBuf>())
 }
 
-/// Largest file that is read, in bytes: the longest that a GLB file can say.
+/// Largest file that is read, in bytes: the longest that the header of a GLB file can state.
 pub(crate) const MOST_BYTES: u64 = u32::MAX as u64;
 
 /// The content of a regular file.
@@ -26,13 +26,13 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     read_bounded(path, MOST_BYTES).map_err(|reason| MeshError::Read { path: path.into(), reason })
 }
 
-/// Where the file lies that a URI in a file in `folder` names: `%20` stands for a blank, but not all programs know.
+/// Path of the file that a URI in a file in `folder` refers to: `%20` stands for a space, but not all programs encode it.
 pub(crate) fn beside_uri(folder: &Path, uri: &str) -> PathBuf {
     let plain = beside(folder, uri);
     if plain.exists() { plain } else { beside(folder, &decoded(uri)) }
 }
 
-/// A text without its escapes: `%` and two hexadecimal digits stand for a byte.
+/// A text with its escapes decoded: `%` and two hexadecimal digits stand for a byte.
 fn decoded(uri: &str) -> String {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
@@ -50,7 +50,7 @@ fn decoded(uri: &str) -> String {
     String::from_utf8(bytes).unwrap_or_else(|_| uri.to_owned())
 }
 
-/// The content of the picture that a file in `folder` calls `name`.
+/// The content of the picture called `name` in a file in `folder`.
 pub(crate) fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, MeshError> {
     picture_at(beside(folder, name))
 }

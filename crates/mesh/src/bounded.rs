@@ -1,4 +1,4 @@
-//! Reading files that strangers may have made: regular files only, and never more of them than a bound.
+//! Reading of untrusted files: only regular files, and only up to a bound.
 
 use std::{
     fs::{self, File},
@@ -8,8 +8,8 @@ use std::{
 
 /// Opens the file at `path` for reading if it is a regular file.
 ///
-/// Folders, devices and pipes are refused before they are opened: opening a pipe may wait for ever, and a device may have no end.
-/// Links are followed.
+/// Folders, devices and pipes are refused before they are opened: opening a pipe may block forever, and a device may be endless. Links are
+/// followed.
 ///
 /// # Errors
 ///
@@ -20,7 +20,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
         return Err(refused());
     }
     let file = File::open(path)?;
-    // Another file may have taken its place in between.
+    // Another file may have replaced it in between.
     if file.metadata()?.is_file() { Ok(file) } else { Err(refused()) }
 }
 
@@ -35,7 +35,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 ///
-/// Those of [`open_regular`], and if the file has more bytes or cannot be read. The error does not name the path.
+/// As for [`open_regular`], or if the file has more bytes or cannot be read. The error does not name the path.
 pub fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open_regular(path)?;
     let too_long = || io::Error::other(format!("it has more than {most} bytes"));
@@ -45,7 +45,7 @@ pub fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
     let mut content = Vec::new();
     content.try_reserve_exact(usize::try_from(length).map_err(io::Error::other)?)?;
-    // Files of the kernel claim to be empty, and some have no end.
+    // Files of the kernel may report size 0, and some are endless.
     file.take(most.saturating_add(1)).read_to_end(&mut content)?;
     if content.len() as u64 > most { Err(too_long()) } else { Ok(content) }
 }

@@ -1,4 +1,4 @@
-//! A chair: plates, thin legs and air between them.
+//! A chair: plates and thin legs with space between them.
 
 use crate::{
     Mesh,
@@ -7,10 +7,10 @@ use crate::{
     surface_net::{Grid, surface_net},
 };
 
-/// A chair whose front looks along -z, with y up.
+/// A chair that faces -z, with y up.
 ///
 /// One closed surface of about 3,800 triangles, counterclockwise from outside: 0.55 wide and deep and 0.95 high,
-/// around the origin, so that it fits a camera 2.732 away with a field of view of 30 degrees.
+/// around the origin, so that it fits a camera at distance 2.732 with a field of view of 30 degrees.
 /// Coordinates have five decimals, so that a file of it can be exact.
 pub fn chair() -> Mesh {
     let grid = Grid { low: [-0.36, -0.54, -0.36], step: 0.03, cubes: [24, 36, 24] };
@@ -30,7 +30,7 @@ const PLATES: [Plate; 2] = [
     ([0.0, 0.2, 0.22], [0.2, 0.22, 0.005]),
 ];
 
-/// Signed distance to the chair, roughly: negative inside, with smooth joints.
+/// Approximate signed distance to the chair: negative inside, with smooth joints.
 fn solid(p: [f64; 3]) -> f64 {
     const REACH: f64 = 0.04;
     let leg = distance([p[0].abs(), p[1], p[2].abs()], &LEG);

@@ -3,11 +3,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::Mesh;
 
 impl Mesh {
-    /// The same shape with fewer faces: all vertices in one cube of a grid become one, at their mean.
+    /// The shape with fewer faces: all vertices in a cube of a grid are merged into one, at their mean.
     ///
-    /// `cell` is the side of a cube in world units; no vertex moves further than its diagonal. Faces that shrink to an edge or a point are
-    /// left out, and of faces between the same three vertices only the first stays, so walls thinner than a cube become one sheet.
-    /// Colours are means too, a texture is left out. `None` if no face is left.
+    /// `cell` is the side of a cube in world units; no vertex moves by more than its diagonal. Faces that shrink to an edge or a point are
+    /// removed, and only the first of several faces between the same three vertices is kept, so walls thinner than a cube become one sheet.
+    /// Colours are averaged too, a texture is removed. `None` if no face remains.
     ///
     /// Source: vertex clustering, Rossignac and Borrel 1993.
     #[must_use]
@@ -50,7 +50,7 @@ impl Mesh {
         };
         let mesh = Self::from_valid(means(0), faces);
         Some(match self.colours() {
-            // Rounding may lead a hair beyond what all of them are.
+            // Rounding may exceed the largest of them slightly.
             Some(_) => mesh.painted(means(1).into_iter().map(|c| c.map(|x| x.min(1.0))).collect()),
             None => mesh,
         })

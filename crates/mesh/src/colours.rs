@@ -1,34 +1,34 @@
-//! Colours of vertices as files have them: from 0 to 1, and often not.
+//! Vertex colours in files: from 0 to 1, but often not.
 //!
-//! A mesh is worth having without its colours, so nothing here is an error: colours are used, clamped, scaled or left out, and one warning
-//! says what was done.
+//! A mesh is useful without its colours, so nothing here is an error: colours are used, clamped, scaled or omitted, and one warning
+//! describes the change.
 
 use crate::{
     Fault,
     error::{Place, Trouble},
 };
 
-/// Channels this far beyond 0 and 1 are roundings: less than one level of an 8-bit picture, with 1/255 included.
+/// Channels this far beyond 0 and 1 count as rounding errors: less than one level of an 8-bit picture, with 1/255 included.
 const ROUNDING: f64 = 0.004;
-/// Full in files whose floats count levels of 8-bit pictures.
+/// Value of 1 in files whose floats are levels of 8-bit pictures.
 const LEVELS: f64 = 255.0;
-/// A channel above this is a level, also where not all channels are whole numbers.
+/// A channel above this is a level, even if not all channels are integers.
 const SURELY_A_LEVEL: f64 = 16.0;
 
-/// Colours that are neither shares nor roundings nor levels.
+/// Treatment of colours that are neither in [0, 1] nor rounding errors nor levels.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Beyond {
     LeftOut,
-    /// As glTF asks.
+    /// As required by glTF.
     Clamped,
 }
 
-/// The colours read so far, as shares of the value that stands for full.
+/// The colours read so far, relative to the value that stands for 1.
 pub(crate) struct Colours {
     full: [f64; 3],
     beyond: Beyond,
     shares: Vec<[f64; 3]>,
-    /// Place and value of the first channel that is not from 0 to full.
+    /// Place and value of the first channel out of range.
     first: Option<(Place, f64, f64)>,
     lowest: f64,
     highest: f64,
@@ -37,7 +37,7 @@ pub(crate) struct Colours {
 }
 
 impl Colours {
-    /// None yet; `full` stands for 1 in each channel.
+    /// No colours yet; `full` stands for 1 in each channel.
     pub(crate) fn new(full: [f64; 3], beyond: Beyond) -> Self {
         Self {
             full,
@@ -51,7 +51,7 @@ impl Colours {
         }
     }
 
-    /// Adds the colour of the next vertex, which the file has at `place`; NaN stands for what is no number.
+    /// Adds the colour of the next vertex, at `place` in the file; NaN stands for a word that is not a number.
     pub(crate) fn push(&mut self, channels: [f64; 3], place: impl FnOnce() -> Place) {
         let share = [0, 1, 2].map(|k| channels[k] / self.full[k]);
         if self.first.is_none()
@@ -72,7 +72,7 @@ impl Colours {
         self.shares.len()
     }
 
-    /// The colours, all from 0 to 1, unless they are left out; and a warning unless they are as the file has them.
+    /// The colours, all from 0 to 1, unless they are omitted; and a warning if they differ from those of the file.
     pub(crate) fn settled(mut self) -> (Option<Vec<[f64; 3]>>, Option<Trouble>) {
         let Some((place, value, full)) = self.first else { return (Some(self.shares), None) };
         let are_roundings = self.lowest >= -ROUNDING && self.highest <= 1.0 + ROUNDING;

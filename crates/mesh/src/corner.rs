@@ -2,12 +2,12 @@
 
 use crate::{Fault, error::shown};
 
-/// The field of a corner that says the vertex.
+/// The field of a corner for its vertex.
 pub(crate) fn first_field(corner: &str) -> &str {
     corner.split('/').next().unwrap_or(corner)
 }
 
-/// The vertex, counted from 1, that a corner such as `7`, `7/1/2`, `7//2` or `-1` means.
+/// The vertex number, from 1, of a corner such as `7`, `7/1/2`, `7//2` or `-1`.
 pub(crate) fn absolute(
     corner: &str,
     vertices_read: usize,

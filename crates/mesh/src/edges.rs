@@ -1,4 +1,4 @@
-//! Which vertices and faces are neighbours.
+//! Adjacency of vertices and faces.
 
 use std::collections::BTreeMap;
 
@@ -7,13 +7,13 @@ use std::collections::BTreeMap;
 pub struct Edges {
     /// Both ends of every edge, the lower number first, in order.
     pub ends: Vec<[u32; 2]>,
-    /// Two faces and the edge between them: both ends, then the corner of either face beyond it.
-    /// Edges of one face, or of more than two, are left out.
+    /// Two faces and the edge between them: both ends, then the opposite corner of either face. Edges of one face, or of more than two, are
+    /// excluded.
     pub hinges: Vec<[u32; 4]>,
 }
 
 impl Edges {
-    /// The edges of `faces`; those from a vertex to itself do not count.
+    /// The edges of `faces`; those from a vertex to itself are excluded.
     pub fn new(faces: &[[u32; 3]]) -> Self {
         let mut beyond: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
         for &[a, b, c] in faces {

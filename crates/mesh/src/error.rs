@@ -1,14 +1,14 @@
-//! What can be wrong with a mesh or its file, each as one line of text.
+//! Errors of meshes and their files, each as one line of text.
 
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
-/// Largest coordinate of a texture, in either direction. Much farther out floats of 32 bits would not tell the texels of a picture apart.
+/// Largest absolute texture coordinate. Much farther out, 32-bit floats could not distinguish the texels of a picture.
 pub(crate) const FARTHEST: f64 = 1e4;
 
-/// Why a mesh could not be made, read or written.
+/// Errors when a mesh is created, read or written.
 ///
 /// Each message is complete in itself: the cause is part of the text, not a separate source.
 #[derive(Debug, thiserror::Error)]
@@ -16,20 +16,20 @@ pub enum MeshError {
     /// The file is missing, is not a regular file, or could not be read.
     #[error("{}: cannot be read: {reason}", file(path))]
     Read {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         reason: io::Error,
     },
-    /// The file could not be written; what was there before is untouched.
+    /// The file could not be written; its previous content is unchanged.
     #[error("{}: cannot be written: {reason}", file(path))]
     Write {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         reason: io::Error,
     },
-    /// The file's name has no ending of a format that is read.
+    /// The file's name does not have the extension of a readable format.
     #[error(
         "{}: meshes are read from files that end in .obj, .ply, .stl, .off, .glb or .gltf",
         file(name)
@@ -38,10 +38,10 @@ pub enum MeshError {
         /// Name of the file.
         name: String,
     },
-    /// The path has no ending of a format that is written; what was there before is untouched.
+    /// The path does not have the extension of a writable format; its previous content is unchanged.
     #[error("{}: meshes are written to files that end in .obj, .ply or .glb", file(path))]
     NotWritten {
-        /// The file asked for.
+        /// The requested file.
         path: PathBuf,
     },
     /// A line of a text file, or of the header of a PLY file, cannot be used.
@@ -51,17 +51,17 @@ pub enum MeshError {
         name: String,
         /// Physical line on which the statement starts, counted from 1.
         line: usize,
-        /// What is wrong there.
+        /// The reason.
         reason: Fault,
     },
-    /// A part of a file that has no lines cannot be used.
+    /// A part of a file without lines cannot be used.
     #[error("{}: {part}: {reason}", file(name))]
     Part {
         /// Name of the file.
         name: String,
-        /// Which part, such as `vertex 3`, `triangle 0` or `accessor 2`; all count from 0.
+        /// The part, such as `vertex 3`, `triangle 0` or `accessor 2`; all count from 0.
         part: String,
-        /// What is wrong there.
+        /// The reason.
         reason: Fault,
     },
     /// A file without faces: empty, a point cloud, or not of its format at all.
@@ -69,7 +69,7 @@ pub enum MeshError {
     NoFaces {
         /// Name of the file.
         name: String,
-        /// Where a file of this format has its faces.
+        /// Description of the faces in a file of this format.
         expected: &'static str,
     },
     /// A list of faces is empty.
@@ -81,7 +81,7 @@ pub enum MeshError {
         /// Index of the vertex, from 0.
         vertex: usize,
     },
-    /// An edge has not two faces that go through it in opposite directions.
+    /// An edge does not have two faces in opposite directions.
     #[error(
         "the mesh is not closed: the edge of vertices {} and {} has not two faces that go through it in opposite directions",
         vertices[0],
@@ -91,18 +91,18 @@ pub enum MeshError {
         /// Indices of both ends, from 0.
         vertices: [usize; 2],
     },
-    /// Faces at a vertex do not make one fan.
+    /// Faces at a vertex do not form a single fan.
     #[error("the mesh branches: the faces at vertex {vertex} do not make one fan")]
     Branches {
         /// Index of the vertex, from 0.
         vertex: usize,
     },
-    /// There are more or fewer colours than vertices.
+    /// The number of colours differs from that of the vertices.
     #[error("{found} colours for the {vertices} vertices of the mesh")]
     Colours {
-        /// How many colours there are.
+        /// Number of colours.
         found: usize,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// A channel of a colour is not from 0 to 1.
@@ -111,7 +111,7 @@ pub enum MeshError {
         /// Index of the vertex, from 0.
         vertex: usize,
     },
-    /// A coordinate of a texture is NaN, or too far out for 32-bit floats to tell texels apart.
+    /// A texture coordinate is NaN, or too large for 32-bit floats to distinguish texels.
     #[error("texture coordinate {coordinate} is not from -{FARTHEST} to {FARTHEST}")]
     Coordinate {
         /// Index of the coordinate, from 0.
@@ -124,25 +124,25 @@ pub enum MeshError {
     Corner {
         /// Index of the face, from 0.
         face: usize,
-        /// The coordinate it asks for, from 0.
+        /// Its coordinate, from 0.
         coordinate: u32,
-        /// How many coordinates there are.
+        /// Number of coordinates.
         coordinates: usize,
     },
-    /// A texture lies on more or fewer faces than the mesh has.
+    /// The number of faces of a texture differs from that of the mesh.
     #[error("a texture on {found} faces for the {faces} faces of the mesh")]
     TextureFaces {
-        /// How many faces the texture lies on.
+        /// Number of faces of the texture.
         found: usize,
-        /// How many faces there are.
+        /// Number of faces of the mesh.
         faces: usize,
     },
-    /// There are more or fewer numbers of materials than faces.
+    /// The number of materials of faces differs from that of the faces.
     #[error("materials of {found} faces for the {faces} faces of a texture")]
     MaterialFaces {
-        /// How many faces have a number.
+        /// Number of faces with a material.
         found: usize,
-        /// How many faces there are.
+        /// Number of faces.
         faces: usize,
     },
     /// A face refers to a material that the texture does not have.
@@ -150,15 +150,15 @@ pub enum MeshError {
     Material {
         /// Index of the face, from 0.
         face: usize,
-        /// The material it asks for, from 0.
+        /// Its material, from 0.
         material: u32,
-        /// How many materials there are.
+        /// Number of materials.
         materials: usize,
     },
     /// A factor of a material is not from 0 to 1.
     #[error("a factor of a material is not from 0 to 1")]
     Factor,
-    /// The first bytes of a picture are not those of a format that is read.
+    /// The first bytes of a picture are not those of a readable format.
     #[error("the picture of a texture is neither PNG nor JPEG")]
     Picture,
     /// A face refers to a vertex that the mesh does not have.
@@ -166,20 +166,20 @@ pub enum MeshError {
     Vertex {
         /// Index of the face, from 0.
         face: usize,
-        /// The vertex it asks for, from 0.
+        /// Its vertex, from 0.
         vertex: u32,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
 }
 
-/// What is wrong at one place of a file.
+/// Errors at a place of a file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Fault {
     /// A vertex with fewer than three coordinates.
     #[error("fewer than three coordinates: found {0}")]
     Coordinates(usize),
-    /// A coordinate that does not read as a number.
+    /// A coordinate that does not parse as a number.
     #[error("{0:?} is not a number")]
     Number(String),
     /// A coordinate that is NaN, infinite, or infinite once rounded to 32 bits.
@@ -191,38 +191,38 @@ pub enum Fault {
     /// A corner whose first field is not a whole number.
     #[error("bad index: {0:?} does not start with a vertex number")]
     Index(String),
-    /// An index of a vertex that the file, or this part of it, does not have.
+    /// A vertex index that the file, or this part of it, does not have.
     #[error("index {index} is out of range: the file has {vertices} vertices")]
     OutOfRange {
-        /// The index as written: counted from 1 in OBJ files, from 0 in all others.
+        /// The index in the file: counted from 1 in OBJ files, from 0 in all others.
         index: String,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// A negative index that reaches back past the first vertex.
     #[error("index {index} is out of range: {before} vertices come before it")]
     TooFarBack {
-        /// The index as written: -1 is the latest vertex.
+        /// The index in the file: -1 is the latest vertex.
         index: String,
-        /// How many vertices have been read up to here.
+        /// Number of vertices read before it.
         before: usize,
     },
     /// The file ends before this part of it is complete.
     #[error("the file ends before it is complete")]
     Truncated,
-    /// What the format does not allow, or what is not read, in plain words.
+    /// A violation of the format, or an unsupported feature, in plain words.
     #[error("{0}")]
     Format(String),
 }
 
 impl Fault {
-    /// Words from a file or a library may break the line or be long; the message stays on one line that can be read.
+    /// Words from a file or a library may contain line breaks or be long; the message stays on one readable line.
     pub(crate) fn format(reason: impl AsRef<str>) -> Self {
         Self::Format(on_one_line(reason.as_ref(), " "))
     }
 }
 
-/// A place in a file whose name the reader does not know.
+/// A place in a file whose name the reader does not have.
 pub(crate) enum Place {
     /// Counted from 1.
     Line(usize),
@@ -238,17 +238,17 @@ impl Place {
     }
 }
 
-/// What is wrong with the content of a file whose name the reader does not know.
+/// An error in the content of a file whose name the reader does not have.
 pub(crate) enum Trouble {
     Line(usize, Fault),
     Part(String, Fault),
     NoFaces(&'static str),
-    /// With a file that this one names.
+    /// An error of another file, which this one refers to.
     OtherFile(MeshError),
 }
 
 impl Trouble {
-    /// A part and what is wrong there, in plain words.
+    /// A part and its error, in plain words.
     pub(crate) fn part(part: impl Into<String>, reason: impl AsRef<str>) -> Self {
         Self::Part(part.into(), Fault::format(reason))
     }
@@ -264,7 +264,7 @@ impl Trouble {
     }
 }
 
-/// The name of a file as an error message shows it: signs in it must not break the line, colour it, or move the cursor.
+/// The name of a file in an error message: control characters in it must not break the line, colour it, or move the cursor.
 fn file(name: impl AsRef<Path>) -> String {
     on_one_line(&name.as_ref().display().to_string(), "\u{fffd}")
 }
@@ -278,7 +278,7 @@ fn on_one_line(text: &str, for_signs: &str) -> String {
     line.replace(char::is_control, for_signs)
 }
 
-/// A word of a file as an error message shows it: not longer than a line can bear, and without signs that would break or colour it.
+/// A word of a file in an error message: shortened, and without characters that would break or colour the line.
 pub(crate) fn shown(word: &str) -> String {
     const LONGEST: usize = 40;
     let sign = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };

@@ -1,4 +1,4 @@
-//! The formats of mesh files, known by the ending of a file's name.
+//! The formats of mesh files, determined by the extension.
 
 use std::path::Path;
 
@@ -26,7 +26,7 @@ impl Format {
     }
 }
 
-/// What follows the last dot of the file's name, in lower case.
+/// The extension of a file's name, in lower case.
 pub(crate) fn ending(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }

@@ -7,19 +7,18 @@ use crate::{
     surface_net::{Grid, surface_net},
 };
 
-/// A standing fox that looks along -z, with y up.
+/// A standing fox that faces -z, with y up.
 ///
 /// One closed surface of about 2,900 triangles, counterclockwise from outside: 0.9 wide, 1.6 high and 2
-/// long, around the origin. Seen by a camera at azimuth 0 it faces the viewer. Its tail
-/// swings to +x and its head is turned there, so its left and right differ. Coordinates have five
-/// decimals, so that a file of it can be exact.
+/// long, around the origin. It faces a camera at azimuth 0. Its tail and its head are turned to +x, so its left and right differ.
+/// Coordinates have five decimals, so that a file of it can be exact.
 pub fn fox() -> Mesh {
     let grid = Grid { low: [-0.47, -0.82, -1.08], step: 0.07, cubes: [16, 27, 31] };
     let (positions, faces) = surface_net(&grid, solid);
     Mesh::from_valid(positions.into_iter().map(|p| p.map(rounded)).collect(), faces)
 }
 
-/// The same fox in colours that tell its sides apart: orange, with a white chest, belly and tail tip, and dark legs, ears, eyes and nose.
+/// The fox in colours that distinguish its sides: orange, with a white chest, belly and tail tip, and dark legs, ears, eyes and nose.
 pub fn painted_fox() -> Mesh {
     let fox = fox();
     let colours = fox.positions().iter().map(|&p| coat(p)).collect();
@@ -71,7 +70,7 @@ const SINGLE: [Stroke; 10] = [
     ([0.40, 0.44, 0.84], 0.15, [0.52, 0.86, 0.84], 0.03),
 ];
 
-/// Parts that come twice: here the one at +x.
+/// Parts that are mirrored: here the one at +x.
 const PAIRED: [Stroke; 6] = [
     // Front leg with its paw.
     ([0.15, 0.02, -0.32], 0.13, [0.16, -0.30, -0.32], 0.09),
@@ -83,7 +82,7 @@ const PAIRED: [Stroke; 6] = [
     ([0.17, -0.63, 0.42], 0.075, [0.17, -0.64, 0.33], 0.07),
 ];
 
-/// Signed distance to the fox, roughly: negative inside, with smooth joints.
+/// Approximate signed distance to the fox: negative inside, with smooth joints.
 fn solid(p: [f64; 3]) -> f64 {
     const REACH: f64 = 0.06;
     let mirrored = [p[0].abs(), p[1], p[2]];

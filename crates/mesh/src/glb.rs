@@ -1,4 +1,4 @@
-//! A GLB or glTF file: glTF 2.0, of which the geometry, colours and a texture are read.
+//! GLB and glTF files: the geometry, colours and a texture of glTF 2.0 are read.
 
 use std::{
     collections::{HashMap, hash_map::Entry},
@@ -24,11 +24,11 @@ pub(crate) const MAGIC: &[u8] = b"glTF";
 pub(crate) const JSON: &[u8] = b"JSON";
 pub(crate) const BIN: &[u8] = b"BIN\0";
 
-/// These extensions are read as far as this reader goes.
+/// Extensions that are supported within the limits of this reader.
 const READ: [&str; 3] =
     ["KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit"];
 
-/// Extensions that start like this do not change where the triangles are.
+/// Prefixes of extensions that do not change the position of triangles.
 const HARMLESS: [&str; 8] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -40,22 +40,22 @@ const HARMLESS: [&str; 8] = [
     "MSFT_texture_",
 ];
 
-/// The colour of what has none beside what has one.
+/// The colour of parts without colours in a mesh that has some.
 const WHITE: [f64; 3] = [1.0; 3];
 
 const NO_FACES: Trouble = Trouble::NoFaces(
     "a GLB or glTF file has them in meshes of triangles at the nodes of its scene",
 );
 
-/// The mesh in `bytes` of a GLB file; see [`crate::Mesh::parse`]. With the `folder` of the file also buffers beside it, and its texture
-/// if that is wanted.
+/// The mesh in `bytes` of a GLB file; see [`crate::Mesh::parse`]. With the `folder` of the file also buffers in other files, and its
+/// texture if it is wanted.
 pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>, textured: bool) -> Result<Parts, Trouble> {
     let (json, bin) = chunks(bytes)?;
     let gltf = Gltf::read(json, bin, folder)?;
     scene(&gltf, bytes.len(), folder.filter(|_| textured))
 }
 
-/// The mesh in `bytes` of a glTF file, which is JSON alone; otherwise as [`parse`].
+/// The mesh in `bytes` of a glTF file, which is plain JSON; otherwise like [`parse`].
 pub(crate) fn parse_text(
     bytes: &[u8],
     folder: Option<&Path>,
@@ -109,7 +109,7 @@ fn scene(gltf: &Gltf, length: usize, folder: Option<&Path>) -> Result<Parts, Tro
     Ok(Parts { warnings, ..parts })
 }
 
-/// An error if an extension is required that may change where the triangles are; a warning if another one that is not read is.
+/// An error if a required extension may change the position of triangles; a warning if another unsupported one is required.
 fn required(extensions: &[String]) -> Result<Option<Trouble>, Trouble> {
     let wrong = |reason| Trouble::part("JSON", reason);
     let is_read = |name: &&String| READ.contains(&name.as_str());
@@ -149,7 +149,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Trouble> {
 
     let (mut json, mut bin) = (None, None);
     for chunk in 0.. {
-        // Zeros that pad a file are shorter than the head of a chunk.
+        // Zero padding of a file is shorter than the header of a chunk.
         let Some(length) = word(&mut rest) else { break };
         let kind = word(&mut rest).map(u32::to_le_bytes);
         let content = rest.split_at_checked(length as usize);
@@ -167,14 +167,14 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), Trouble> {
     Ok((json.ok_or_else(missing)?, bin))
 }
 
-/// Takes a number of 32 bits off `rest`.
+/// Removes a 32-bit number from `rest`.
 fn word(rest: &mut &[u8]) -> Option<u32> {
     let (word, after) = rest.split_first_chunk()?;
     *rest = after;
     Some(u32::from_le_bytes(*word))
 }
 
-/// The nodes of the scene, or those that are no node's children.
+/// The nodes of the scene; without a scene, those that are no node's children.
 fn roots(gltf: &Gltf) -> Result<Vec<usize>, Trouble> {
     match (gltf.scene, gltf.scenes.first()) {
         (None, Some(scene)) => Ok(scene.nodes.clone()),
@@ -194,7 +194,7 @@ fn roots(gltf: &Gltf) -> Result<Vec<usize>, Trouble> {
     }
 }
 
-/// Puts `nodes` on the stack, the first on top.
+/// Pushes `nodes` on the stack, the first on top.
 fn enter(
     nodes: &[usize],
     parent: &Placement,
@@ -213,7 +213,7 @@ fn enter(
     Ok(())
 }
 
-/// Calls `place` with each mesh in the tree of nodes, and with where it is.
+/// Calls `place` with each mesh in the tree of nodes and its placement.
 fn walk(
     gltf: &Gltf,
     mut place: impl FnMut(usize, &Placement) -> Result<(), Trouble>,
@@ -239,13 +239,13 @@ fn walk(
 /// The parts placed so far.
 struct Surface<'a> {
     gltf: &'a Gltf<'a>,
-    /// Colours may be fewer than positions: those at the end are white.
+    /// There may be fewer colours than positions: the rest are white.
     parts: Parts,
-    /// Numbers of vertices and faces in the end.
+    /// Final numbers of vertices and faces.
     most: [usize; 2],
-    /// Why the colours of all are left out, if they are.
+    /// The reason to omit all colours, if there is one.
     colours: Result<(), Trouble>,
-    /// If it is to be read: the texture so far, or what is wrong with it.
+    /// If a texture is wanted: the texture so far, or its error.
     unwrapped: Option<Result<Unwrapped, Trouble>>,
 }
 
@@ -290,7 +290,7 @@ impl Surface<'_> {
         Ok(())
     }
 
-    /// Adds the triangles of a part after the `first` vertices, and returns them as its indices say, wound as they are placed.
+    /// Adds the triangles of a part after the `first` vertices; returns those of its indices, with the winding of the placement.
     fn add_triangles(
         &mut self,
         primitive: &Primitive,
@@ -300,7 +300,7 @@ impl Surface<'_> {
     ) -> Result<Vec<[u32; 3]>, Trouble> {
         let indices = match primitive.indices {
             Some(indices) => self.gltf.indices(indices)?,
-            // No more than 2³² vertices have been let in.
+            // At most 2³² vertices have passed the check.
             None => (0..vertices as u32).collect(),
         };
         if let Some(index) = indices.iter().find(|&&index| index as usize >= vertices) {
@@ -322,7 +322,7 @@ impl Surface<'_> {
         Ok(triangles)
     }
 
-    /// Adds the colours of all vertices after the `first`, or gives up those of the whole file.
+    /// Adds the colours of all vertices after the `first`, or drops those of the whole file.
     fn add_colours(
         &mut self,
         accessor: &Value,
@@ -356,7 +356,7 @@ impl Surface<'_> {
         }
     }
 
-    /// The linear colours of as many vertices, from 0 to 1, and a warning; or why colours are left out.
+    /// The linear colours of `vertices` vertices, from 0 to 1, and a warning; or the reason to omit colours.
     fn settled_colours(
         &self,
         accessor: &Value,
@@ -401,7 +401,7 @@ fn triangles(mode: u64, indices: &[u32]) -> Vec<[u32; 3]> {
     let windows = indices.windows(3).enumerate();
     match mode {
         4 => indices.as_chunks().0.to_vec(),
-        // Every other triangle of a strip runs against the order of its corners.
+        // Every other triangle of a strip has the reverse order of corners.
         5 => windows
             .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
             .collect(),

@@ -1,4 +1,4 @@
-//! The parts of the meshes of a glTF file: which are surfaces, what they share, and how much room they take.
+//! The parts of the meshes of a glTF file: surfaces, shared vertices, and size limits.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,10 +9,10 @@ use crate::{
     gltf::{Attributes, Gltf, Primitive, entry},
 };
 
-/// A small file can place a mesh many times over. It may have this many vertices and as many faces in the end, or twice its bytes, which is more
-/// than any file needs that places each of its meshes once. Vertices with colours count twice, and so do faces with a texture.
+/// Limit of placed vertices, and of faces, since a small file can place a mesh many times; or twice the bytes of the file, which is enough
+/// for every file that places each of its meshes once. Vertices with colours count twice, and so do faces with a texture.
 const MOST_PLACED: u64 = 20_000_000;
-/// Placed parts of meshes, also empty ones.
+/// Limit of placed parts of meshes, including empty ones.
 const MOST_PARTS: u64 = 1_000_000;
 
 /// The parts of a mesh.
@@ -21,7 +21,7 @@ pub(crate) fn primitives<'a>(gltf: &'a Gltf, mesh: usize) -> Result<&'a [Primiti
     Ok(&gltf.meshes.get(mesh).ok_or_else(missing)?.primitives)
 }
 
-/// Puts a part of a mesh before the place of a trouble.
+/// Prepends a part of a mesh to the place of an error.
 pub(crate) fn at(mesh: usize, primitive: usize) -> impl Fn(Trouble) -> Trouble {
     move |trouble| {
         let here = format!("mesh {mesh}, primitive {primitive}");
@@ -33,7 +33,7 @@ pub(crate) fn at(mesh: usize, primitive: usize) -> impl Fn(Trouble) -> Trouble {
     }
 }
 
-/// The accessor of the positions of a part, if it is a surface.
+/// The accessor of the positions of a part; `None` if it is not a surface.
 pub(crate) fn surface_of(primitive: &Primitive) -> Result<Option<usize>, Trouble> {
     match (primitive.mode, primitive.attributes.position) {
         (0..4, _) | (4..7, None) => Ok(None),
@@ -42,15 +42,15 @@ pub(crate) fn surface_of(primitive: &Primitive) -> Result<Option<usize>, Trouble
     }
 }
 
-/// Parts of other materials often use the same vertices: those with one accessor of positions and one of colours do.
+/// Key of parts that share vertices, often with different materials: those with one accessor of positions and one of colours.
 pub(crate) type Shared = (usize, Option<u64>);
 
 pub(crate) fn shared(accessor: usize, primitive: &Primitive) -> Shared {
     (accessor, primitive.attributes.colour.as_u64())
 }
 
-/// Factors that multiply the linear colours of each part of a mesh. It is 1 where parts of other factors use the same vertices, which have one colour
-/// each.
+/// Factors that multiply the linear colours of each part of a mesh: 1 if parts with other factors use the same vertices, since vertices
+/// have one colour each.
 pub(crate) fn factors(gltf: &Gltf, primitives: &[Primitive]) -> Vec<[f64; 3]> {
     let mut of_vertices = HashMap::new();
     let key = |primitive: &Primitive| Some(shared(primitive.attributes.position?, primitive));
@@ -66,7 +66,7 @@ pub(crate) fn factors(gltf: &Gltf, primitives: &[Primitive]) -> Vec<[f64; 3]> {
     primitives.iter().map(|primitive| known(primitive).unwrap_or([1.0; 3])).collect()
 }
 
-/// The factor of the material of a part for the colours of its vertices: 1 if it shows a picture, which the factor multiplies.
+/// The factor of a part's material for the colours of its vertices: 1 if it has a picture, which the factor multiplies instead.
 fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
     let material = entry(&gltf.materials, &primitive.material);
     match picture_of(material).is_null() {
@@ -75,9 +75,9 @@ fn factor(gltf: &Gltf, primitive: &Primitive) -> [f64; 3] {
     }
 }
 
-/// The factor of a material: 1 if it has none that can be read.
+/// The factor of a material: 1 if it has no readable one.
 ///
-/// Source: glTF 2.0 specification, Sec. 3.9.2; `KHR_materials_pbrSpecularGlossiness`, which comes first where it is.
+/// Source: glTF 2.0 specification, Sec. 3.9.2; `KHR_materials_pbrSpecularGlossiness`, which takes precedence.
 pub(crate) fn factor_of(material: &Value) -> [f64; 3] {
     let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"];
     let factor = match glossy.is_null() {
@@ -93,13 +93,13 @@ pub(crate) fn factor_of(material: &Value) -> [f64; 3] {
 
 /// The texture of the colours of a material.
 pub(crate) fn picture_of(material: &Value) -> &Value {
-    // Programs that know the extension show its picture, whatever stands beside it for others.
+    // Programs that support the extension show its picture, regardless of the fallback for others.
     let glossy = &material["extensions"]["KHR_materials_pbrSpecularGlossiness"]["diffuseTexture"];
     let rough = &material["pbrMetallicRoughness"]["baseColorTexture"];
     if glossy.is_null() { rough } else { glossy }
 }
 
-/// The numbers of parts, vertices and faces that are placed.
+/// Numbers of placed parts, vertices and faces.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Room {
     parts: u64,
@@ -110,7 +110,7 @@ pub(crate) struct Room {
 }
 
 impl Room {
-    /// Adds a mesh once more.
+    /// Adds another placement of a mesh.
     pub(crate) fn take(
         &mut self,
         gltf: &Gltf,
@@ -130,7 +130,7 @@ impl Room {
         Ok(())
     }
 
-    /// A mesh whose bytes are all there.
+    /// A mesh, after checking that all of its bytes exist.
     fn of(gltf: &Gltf, mesh: usize) -> Result<Self, Trouble> {
         let primitives = primitives(gltf, mesh)?;
         let mut room = Self { parts: primitives.len() as u64, ..Self::default() };
@@ -155,7 +155,7 @@ impl Room {
         Ok(room)
     }
 
-    /// The numbers of vertices and faces, unless they are too many for a file of this length.
+    /// The numbers of vertices and faces, unless they are too large for a file of this length.
     pub(crate) fn checked(self, length: usize, textured: bool) -> Result<(usize, usize), Trouble> {
         let Self { parts, vertices, faces, .. } = self;
         let wrong = |reason| Err(Trouble::part("scene", reason));
@@ -173,7 +173,7 @@ impl Room {
                  twice: export fewer copies"
             ));
         }
-        // No more than 2³² of either have been let in.
+        // At most 2³² of either have passed the check.
         Ok((vertices as usize, faces as usize))
     }
 }

@@ -19,17 +19,17 @@ use crate::{
     texture::is_near,
 };
 
-/// Coordinates of a file that is not longer, in bytes. Many small accessors may lie over the same bytes.
+/// Limit of the coordinates of a file of at most this many bytes. Many small accessors may share the same bytes.
 const MOST_COORDINATES: usize = 10_000_000;
 
-/// A part of a mesh, as it is placed.
+/// A placed part of a mesh.
 pub(crate) struct Part<'a> {
     pub(crate) primitive: &'a Primitive,
-    /// Between its own vertices.
+    /// Triangles between the part's own vertices.
     pub(crate) triangles: &'a [[u32; 3]],
     /// Number of its vertices.
     pub(crate) vertices: usize,
-    /// The factor that the colours of its vertices already have.
+    /// The factor already included in the colours of its vertices.
     pub(crate) lit: [f64; 3],
 }
 
@@ -38,20 +38,20 @@ pub(crate) struct Unwrapped {
     most: usize,
     coordinates: Vec<[f64; 2]>,
     corners: Vec<[u32; 3]>,
-    /// Where the coordinates of an accessor begin.
+    /// First coordinate of each accessor.
     firsts: HashMap<usize, usize>,
-    /// Image and factor of each material, and which faces have it.
+    /// Image and factor of each material, and its faces.
     materials: Vec<(Option<usize>, [f64; 3])>,
-    /// Where each is among the materials, by the bits of its factor.
+    /// Number of each material, by image and bits of the factor.
     numbers: HashMap<(Option<usize>, [u64; 3]), u32>,
     of_faces: Vec<u32>,
-    /// The coordinate of corners that have none of their own.
+    /// The coordinate of corners without one.
     nowhere: Option<u32>,
     multiplies_colours: bool,
 }
 
 impl Unwrapped {
-    /// None yet, for a file of `length` bytes.
+    /// An empty texture, for a file of `length` bytes.
     pub(crate) fn new(length: usize) -> Self {
         Self {
             most: MOST_COORDINATES.max(length).min(u32::MAX as usize),
@@ -66,7 +66,7 @@ impl Unwrapped {
         }
     }
 
-    /// Adds the coordinates and the material of a part, one of `faces` faces in all.
+    /// Adds the coordinates and the material of a part; `faces` is the total number of faces.
     pub(crate) fn add(&mut self, gltf: &Gltf, part: &Part, faces: usize) -> Result<(), Trouble> {
         let Part { primitive, triangles, .. } = part;
         if triangles.is_empty() {
@@ -100,7 +100,7 @@ impl Unwrapped {
         self.corners.extend(triangles.iter().map(|triangle| triangle.map(place)));
 
         let factor = factor_of(material);
-        // Vertices that parts of several factors share have no factor in their colours.
+        // Vertices shared by parts with several factors have no factor in their colours.
         let factor = if part.lit == factor { [1.0; 3] } else { factor };
         let next = self.materials.len() as u32;
         let number = *self.numbers.entry((image, factor.map(f64::to_bits))).or_insert(next);
@@ -113,7 +113,7 @@ impl Unwrapped {
         Ok(())
     }
 
-    /// Where the coordinates of an accessor for as many vertices begin.
+    /// First coordinate of an accessor, for `vertices` vertices.
     fn first(&mut self, gltf: &Gltf, accessor: usize, vertices: usize) -> Result<u32, Trouble> {
         let wrong = |reason: String| Err(Trouble::part("", reason));
         let entry = match self.firsts.entry(accessor) {
@@ -141,7 +141,7 @@ impl Unwrapped {
         Ok(*entry.insert(first) as u32)
     }
 
-    /// The texture, if there are coordinates or several materials; `warnings` gets why pictures were left out.
+    /// The texture, if there are coordinates or several materials; reasons to omit pictures are added to `warnings`.
     pub(crate) fn texture(
         self,
         gltf: &Gltf,
@@ -173,9 +173,9 @@ impl Unwrapped {
     }
 }
 
-/// The image that a material shows, and the set of coordinates that places it.
+/// The image of a material, and the number of its set of coordinates.
 ///
-/// Read leniently: what is wrong with materials does not keep a mesh from being read.
+/// Read leniently: errors in materials do not prevent reading the mesh.
 fn base_colour(gltf: &Gltf, material: &Value) -> Result<(Option<usize>, u64), String> {
     let shown = picture_of(material);
     if shown.is_null() {
@@ -189,7 +189,7 @@ fn base_colour(gltf: &Gltf, material: &Value) -> Result<(Option<usize>, u64), St
     Ok((Some(image), shown["texCoord"].as_u64().unwrap_or(0)))
 }
 
-/// The content of the file that an image is.
+/// The content of the file of an image.
 fn content(gltf: &Gltf, folder: &Path, image: usize) -> Result<Vec<u8>, Trouble> {
     let wrong = |reason: &str| Err(Trouble::part(format!("image {image}"), reason));
     let found = &gltf.images[image];

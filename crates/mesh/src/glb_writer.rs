@@ -14,12 +14,13 @@ const FLOATS: u32 = 5126;
 const WHOLE: u32 = 5125;
 const OF_VERTICES: u32 = 34962;
 const OF_INDICES: u32 = 34963;
-/// The colour of a material without a picture, on a mesh without colours; proportional to light.
+/// The linear colour of a material without a picture, on a mesh without colours.
 const GREY: f64 = 0.75;
-/// Coordinates are written from the origin on where 32 bits round them by at most this part of the longest side of the mesh.
+/// Largest rounding error of 32-bit coordinates relative to the longest side of the mesh, up to which they are written relative to the
+/// origin.
 const COARSEST: f64 = 1e-5;
 
-/// The binary chunk, and what the JSON says of it.
+/// The binary chunk, and its description in the JSON.
 #[derive(Default)]
 struct Buffer {
     bytes: Vec<u8>,
@@ -28,7 +29,7 @@ struct Buffer {
 }
 
 impl Buffer {
-    /// Adds bytes and returns the number of their view; numbers begin at whole multiples of four bytes.
+    /// Adds bytes and returns the number of their view; the start is aligned to four bytes.
     fn view(&mut self, bytes: impl IntoIterator<Item = u8>) -> usize {
         let start = self.bytes.len();
         self.bytes.extend(bytes);
@@ -71,7 +72,7 @@ pub(crate) fn origin(mesh: &Mesh) -> [f64; 3] {
     if farthest * f64::from(f32::EPSILON) <= COARSEST * longest {
         return [0.0; 3];
     }
-    // Of 32 bits, so that programs that keep the node in as many have the same.
+    // Rounded to 32 bits, so that programs that store the node in 32 bits have the same value.
     [0, 1, 2].map(|k| f64::from(f64::midpoint(low[k], high[k]) as f32))
 }
 
@@ -162,8 +163,8 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
     file(json.to_string().into_bytes(), &buffer.bytes)
 }
 
-/// The vertices as the format has them, each with one coordinate on a texture: the numbers of vertex and coordinate, and the faces between
-/// them. Without a texture the vertices are as they are; with one, those that no face uses are left out.
+/// The vertices of the format, each with a single texture coordinate, as numbers of vertex and coordinate; and the faces between them.
+/// Without a texture the vertices are unchanged; with one, unused vertices are removed.
 fn split(mesh: &Mesh) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
     let Some(texture) = mesh.texture() else {
         let all = (0..mesh.positions().len() as u32).map(|vertex| [vertex, 0]).collect();
@@ -180,7 +181,7 @@ fn split(mesh: &Mesh) -> (Vec<[u32; 2]>, Vec<[u32; 3]>) {
     (vertices, faces)
 }
 
-/// Both chunks and their heads.
+/// Both chunks and their headers.
 fn file(mut json: Vec<u8>, bin: &[u8]) -> Vec<u8> {
     json.resize(json.len().next_multiple_of(4), b' ');
     let all = 12 + 8 + json.len() + 8 + bin.len();

@@ -1,7 +1,7 @@
 //! The geometry of a glTF or GLB file: the JSON of glTF 2.0, and the numbers it refers to.
 //!
-//! Read by code of our own: the crate for it panics on some lengths and strides that the format
-//! forbids, and refuses whole files for materials that it does not know.
+//! Not read by the `gltf` crate, which panics on some lengths and strides that the format forbids, and refuses whole files for unknown
+//! materials.
 
 use std::path::Path;
 
@@ -13,17 +13,17 @@ use crate::{
     gltf_buffers::{Content, Files, data},
 };
 
-/// Everything else in the JSON is skipped.
+/// The supported part of the JSON; everything else is skipped.
 #[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct Gltf<'a> {
-    /// The content of each buffer, or the reason why there is none.
+    /// The content of each buffer, or the reason for its absence.
     #[serde(skip)]
     contents: Vec<Result<Content<'a>, String>>,
-    /// Bytes in all buffers, of those that are the same once.
+    /// Bytes in all buffers, where shared content counts once.
     #[serde(skip)]
     length: usize,
-    /// Bytes in buffers that lie in other files.
+    /// Bytes in buffers in other files.
     #[serde(skip)]
     pub(crate) length_beside: usize,
     pub(crate) scene: Option<usize>,
@@ -34,7 +34,7 @@ pub(crate) struct Gltf<'a> {
     buffer_views: Vec<View>,
     buffers: Vec<Buffer>,
     pub(crate) extensions_required: Vec<String>,
-    /// What a mesh can do without is looked at only where it is asked for.
+    /// Optional data, interpreted only on use.
     pub(crate) materials: Value,
     pub(crate) textures: Value,
     pub(crate) images: Value,
@@ -52,7 +52,7 @@ pub(crate) struct Node {
     #[serde(default)]
     pub(crate) children: Vec<usize>,
     // Boxed, since the shortest text of a node is `{}`.
-    /// Column by column.
+    /// In column-major order.
     pub(crate) matrix: Option<Box<[f64; 16]>>,
     pub(crate) translation: Option<Box<[f64; 3]>>,
     /// x, y, z, w.
@@ -138,17 +138,17 @@ struct Buffer {
     uri: Option<String>,
 }
 
-/// The number of an entry in a list.
+/// The index of an entry in a list.
 pub(crate) fn number(value: &Value) -> Option<usize> {
     value.as_u64().and_then(|number| usize::try_from(number).ok())
 }
 
-/// The entry of a list that a number names; nothing where there is none.
+/// The entry of a list with this index; `Null` if there is none.
 pub(crate) fn entry<'a>(list: &'a Value, of: &Value) -> &'a Value {
     number(of).and_then(|number| list.get(number)).unwrap_or(&Value::Null)
 }
 
-/// The types that glTF numbers from 5120.
+/// The component types, numbered from 5120 in glTF.
 #[derive(Clone, Copy)]
 enum Component {
     I8,
@@ -184,7 +184,7 @@ impl Component {
         matches!(self, Self::U8 | Self::U16 | Self::U32)
     }
 
-    /// The value of as many bytes as the type takes; every value of every type fits.
+    /// The value of `bytes`, whose number is that of the type; exact for every value of every type.
     fn value(self, bytes: &[u8], normalized: bool) -> f64 {
         let mut low = [0; 4];
         low[..bytes.len()].copy_from_slice(bytes);
@@ -202,7 +202,7 @@ impl Component {
 }
 
 impl<'a> Gltf<'a> {
-    /// The content of the JSON; `bin` is the binary chunk. With the `folder` of the file also buffers beside it.
+    /// The content of the JSON; `bin` is the binary chunk. With the `folder` of the file also buffers in other files.
     pub(crate) fn read(
         json: &[u8],
         bin: Option<&'a [u8]>,
@@ -227,7 +227,7 @@ impl<'a> Gltf<'a> {
         Ok(gltf)
     }
 
-    /// The result of `read` for the accessor with this number; the number is part of an error.
+    /// The result of `read` for the accessor with this number; errors include the number.
     fn of_accessor<T>(
         &self,
         number: usize,
@@ -237,7 +237,7 @@ impl<'a> Gltf<'a> {
         accessor.and_then(read).map_err(|why| Trouble::part(format!("accessor {number}"), why))
     }
 
-    /// How many entries the accessor claims.
+    /// The number of entries according to the accessor.
     pub(crate) fn count(&self, accessor: usize) -> Result<usize, Trouble> {
         self.of_accessor(accessor, |it| Ok(it.count))
     }
@@ -257,7 +257,7 @@ impl<'a> Gltf<'a> {
         }
     }
 
-    /// The entries of an accessor of linear colours, without transparency; the value that stands for full; and whether the accessor says so.
+    /// The entries of an accessor of linear colours, without alpha; the value that stands for 1; and whether the accessor declares it.
     pub(crate) fn colours(&self, accessor: usize) -> Result<(Vec<[f64; 3]>, f64, bool), Trouble> {
         self.of_accessor(accessor, |it| {
             let (full, said) = match Component::of(it.component_type) {
@@ -298,12 +298,12 @@ impl<'a> Gltf<'a> {
         Ok((view, end.and_then(|end| content.get(view.byte_offset..end))))
     }
 
-    /// The number of positions of an accessor, once it is sure that their bytes are there.
+    /// The number of positions of an accessor, after checking that their bytes exist.
     pub(crate) fn sure_positions(&self, accessor: usize) -> Result<usize, Trouble> {
         self.sure::<3>(accessor, Self::are_positions)
     }
 
-    /// The number of vertex indices of an accessor, once it is sure that their bytes are there.
+    /// The number of vertex indices of an accessor, after checking that their bytes exist.
     pub(crate) fn sure_indices(&self, accessor: usize) -> Result<usize, Trouble> {
         self.sure::<1>(accessor, Self::are_indices)
     }
@@ -322,12 +322,12 @@ impl<'a> Gltf<'a> {
         })
     }
 
-    /// Where the entries of an accessor lie; none if they are zero, but for sparse ones.
+    /// Location of the entries of an accessor; `None` if they are zero, except sparse ones.
     fn source(&self, accessor: &Accessor) -> Result<Option<Source>, String> {
         let (component, count) = (component(accessor.component_type)?, accessor.count);
         match accessor.buffer_view {
             Some(view) => Ok(Some(Source { view, offset: accessor.byte_offset, component })),
-            // Such entries take no bytes, so their number could be anything.
+            // Such entries take no bytes, so their number must be bounded.
             None if accessor.sparse.is_some() && count <= self.length => Ok(None),
             None => {
                 let reason = "no bytes for them: export it without compression";
@@ -398,7 +398,7 @@ fn component(code: u64) -> Result<Component, String> {
     Component::of(code).ok_or_else(|| format!("{code} is not a component type of glTF"))
 }
 
-/// Where entries of equal size lie one after the other.
+/// Location of contiguous or strided entries of equal size.
 struct Source {
     view: usize,
     offset: usize,
@@ -406,7 +406,7 @@ struct Source {
 }
 
 impl Source {
-    /// The bytes of `count` entries of `N` components each, once it is sure that they are there.
+    /// The bytes of `count` entries of `N` components each, after checking that they exist.
     fn entries<'a, const N: usize>(
         &self,
         gltf: &'a Gltf,

@@ -1,4 +1,4 @@
-//! The bytes that a glTF file refers to: in its binary chunk, in data URIs, or in files beside it.
+//! The bytes that a glTF file refers to: in its binary chunk, in data URIs, or in other files.
 
 use std::{
     collections::HashMap,
@@ -32,7 +32,7 @@ impl Content<'_> {
     }
 }
 
-/// The files that buffers lie in, each read once.
+/// The files of buffers, each read once.
 #[derive(Default)]
 pub(crate) struct Files {
     read: HashMap<PathBuf, Result<Rc<Vec<u8>>, String>>,
@@ -41,7 +41,7 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// The content of the file that a URI names, or why there is none.
+    /// The content of the file of a URI, or the reason why there is none.
     pub(crate) fn read(&mut self, folder: Option<&Path>, uri: &str) -> Result<Rc<Vec<u8>>, String> {
         let Some(folder) = folder else {
             return Err("lies in another file: export it as one .glb file".to_owned());
@@ -61,7 +61,7 @@ impl Files {
     }
 }
 
-/// The bytes in a data URI, `None` if it is not coded in base 64; `None` for other URIs.
+/// The bytes in a data URI, `Some(None)` if it is not base64; `None` for other URIs.
 pub(crate) fn data(uri: &str) -> Option<Option<Vec<u8>>> {
     const LENIENT: GeneralPurpose = GeneralPurpose::new(
         &alphabet::STANDARD,

@@ -7,7 +7,7 @@ use crate::{
     mesh::{cross, dot, norm},
 };
 
-/// The unit sphere: an icosahedron whose triangles are cut in four `subdivisions` times.
+/// The unit sphere: an icosahedron whose triangles are split in four `subdivisions` times.
 ///
 /// It has `10 · 4ⁿ + 2` vertices and `20 · 4ⁿ` faces (642 and 1280 for `n = 3`), counterclockwise
 /// from outside.
@@ -19,7 +19,7 @@ pub fn icosphere(subdivisions: u32) -> Mesh {
     assert!(subdivisions <= 10, "an icosphere of {subdivisions} subdivisions is too large");
     let (mut positions, mut faces) = icosahedron();
     for _ in 0..subdivisions {
-        // Two faces share an edge, so the vertex in its middle is made once.
+        // Two faces share an edge, so the vertex in its middle is created once.
         let mut middles = HashMap::new();
         let mut middle = |a: u32, b: u32| {
             *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {

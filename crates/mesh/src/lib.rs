@@ -1,9 +1,7 @@
-//! Triangle meshes for softrast: a careful reader of OBJ, PLY, STL, OFF, GLB and glTF, a
-//! writer of OBJ, PLY and GLB, and small generators.
+//! Triangle meshes for softrast: a robust reader of OBJ, PLY, STL, OFF, GLB and glTF, a writer of OBJ, PLY and GLB, and small generators.
 //!
-//! A [`Mesh`] is always fit to render: its positions are finite, its indices are in range, and it
-//! has at least one face; it may have colours and a [`Texture`]. Whatever breaks these rules is a [`MeshError`] of one line that names
-//! the file, the place and the reason. Nothing here depends on burn.
+//! A [`Mesh`] is always valid: its positions are finite, its indices are in range, and it has at least one face; it may have colours and a
+//! [`Texture`]. Violations are a [`MeshError`] of one line with the file, the place and the reason. This crate does not depend on burn.
 //!
 //! ```
 //! use softrast_mesh::{Mesh, icosphere};

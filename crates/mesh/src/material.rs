@@ -1,12 +1,12 @@
-//! The look of faces that have it in common.
+//! The appearance of a group of faces.
 
 use std::sync::Arc;
 
 use crate::MeshError;
 
-/// The colours of faces: a picture if they have one, else the colours of the vertices, times a factor.
+/// The colours of faces: a picture if there is one, else the colours of the vertices, times a factor.
 ///
-/// The picture is kept as the content of its file, PNG or JPEG. Nothing here decodes it, so it may still be broken.
+/// The picture is stored as the content of its file, PNG or JPEG. It is not decoded here, so it may be corrupt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     picture: Option<Arc<[u8]>>,
@@ -21,11 +21,11 @@ impl Default for Material {
 }
 
 impl Material {
-    /// With this picture: the content of a PNG or JPEG file.
+    /// Sets the picture: the content of a PNG or JPEG file.
     ///
     /// # Errors
     ///
-    /// If its first bytes are those of neither.
+    /// If its first bytes are those of neither format.
     pub fn with_picture(self, picture: impl Into<Arc<[u8]>>) -> Result<Self, MeshError> {
         let picture = picture.into();
         if media_type(&picture).is_none() {
@@ -34,11 +34,11 @@ impl Material {
         Ok(Self { picture: Some(picture), ..self })
     }
 
-    /// With a factor for red, green and blue, proportional to light, as `baseColorFactor` of glTF is.
+    /// Sets a factor for red, green and blue, linear in light, like `baseColorFactor` in glTF.
     ///
     /// # Errors
     ///
-    /// If one is not from 0 to 1.
+    /// If a factor is not from 0 to 1.
     pub fn with_factor(self, factor: [f64; 3]) -> Result<Self, MeshError> {
         match factor.iter().all(|x| (0.0..=1.0).contains(x)) {
             true => Ok(Self { factor, ..self }),
@@ -46,7 +46,7 @@ impl Material {
         }
     }
 
-    /// A texture of parts that are known to be right.
+    /// A material of valid parts.
     pub(crate) fn of(picture: Option<Arc<[u8]>>, factor: [f64; 3]) -> Self {
         Self { picture, factor }
     }
@@ -56,13 +56,13 @@ impl Material {
         self.picture.as_deref()
     }
 
-    /// The factor for red, green and blue, proportional to light, from 0 to 1.
+    /// The factor for red, green and blue, linear in light, from 0 to 1.
     pub fn factor(&self) -> [f64; 3] {
         self.factor
     }
 }
 
-/// The media type of a PNG or JPEG file, by its first bytes.
+/// The media type of a PNG or JPEG file, determined by its first bytes.
 pub(crate) fn media_type(picture: &[u8]) -> Option<&'static str> {
     if picture.starts_with(b"\x89PNG\r\n\x1a\n") {
         return Some("image/png");
@@ -70,14 +70,14 @@ pub(crate) fn media_type(picture: &[u8]) -> Option<&'static str> {
     picture.starts_with(b"\xff\xd8\xff").then_some("image/jpeg")
 }
 
-/// A channel of a picture, from 0 to 1, proportional to light.
+/// Converts a channel of a picture, from 0 to 1, to linear light.
 ///
 /// Source: IEC 61966-2-1 (sRGB).
 pub fn to_linear(x: f64) -> f64 {
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
-/// A channel as screens have it, of one that is proportional to light; both from 0 to 1. The inverse of [`to_linear`].
+/// Converts a channel of linear light to sRGB; both from 0 to 1. The inverse of [`to_linear`].
 ///
 /// Source: IEC 61966-2-1 (sRGB).
 pub fn from_linear(x: f64) -> f64 {

@@ -8,9 +8,8 @@ use crate::{
 
 /// Vertices and the triangles between them.
 ///
-/// Every position is finite, also once rounded to 32 bits; every index is in range; there is at
-/// least one face. Faces may be degenerate (a corner repeated, or no area), vertices may be
-/// doubled or unused, and the surface may be open: none of this keeps a mesh from being rendered.
+/// Every position is finite, also once rounded to 32 bits; every index is in range; there is at least one face. Faces may be degenerate (a
+/// repeated corner, or no area), vertices may be duplicated or unused, and the surface may be open: such meshes can be rendered.
 ///
 /// A mesh may have a colour at each vertex; then every channel is in [0, 1]. It may have a [`Texture`] on its faces.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,11 +40,11 @@ impl Mesh {
         Ok(Self::from_valid(positions, faces))
     }
 
-    /// The same mesh with a colour at each vertex: red, green and blue from 0 to 1, as pictures and screens have them (sRGB).
+    /// The mesh with a colour at each vertex: red, green and blue from 0 to 1 in sRGB.
     ///
     /// # Errors
     ///
-    /// If there are not as many colours as vertices, or a channel is not from 0 to 1.
+    /// If the number of colours differs from that of the vertices, or a channel is not from 0 to 1.
     pub fn with_colours(self, colours: Vec<[f64; 3]>) -> Result<Self, MeshError> {
         let (found, vertices) = (colours.len(), self.positions.len());
         if found != vertices {
@@ -57,11 +56,11 @@ impl Mesh {
         Ok(Self { colours: Some(colours), ..self })
     }
 
-    /// The same mesh with a texture on its faces.
+    /// The mesh with a texture on its faces.
     ///
     /// # Errors
     ///
-    /// If the texture has not as many faces as the mesh.
+    /// If the number of faces of the texture differs from that of the mesh.
     pub fn with_texture(self, texture: Texture) -> Result<Self, MeshError> {
         let (found, faces) = (texture.corners().len(), self.faces.len());
         if found != faces {
@@ -70,7 +69,7 @@ impl Mesh {
         Ok(Self { texture: Some(texture), ..self })
     }
 
-    /// The same faces, colours and texture between vertices at other places.
+    /// The mesh with its vertices at other positions: faces, colours and texture are unchanged.
     ///
     /// # Errors
     ///
@@ -78,14 +77,14 @@ impl Mesh {
     ///
     /// # Panics
     ///
-    /// If there are not as many positions as vertices.
+    /// If the number of positions differs from that of the vertices.
     pub fn with_positions(&self, positions: Vec<[f64; 3]>) -> Result<Self, MeshError> {
         all_finite(&positions)?;
         Ok(self.moved(positions))
     }
 
-    /// The same surface with each triangle cut into four, at the middles of its edges. There the colour is the mean of both ends, and so are
-    /// the coordinates on a texture.
+    /// The surface with each triangle split into four, at the midpoints of its edges. Colours and texture coordinates of a midpoint are the
+    /// means of both ends.
     #[must_use]
     pub fn subdivided(&self) -> Self {
         let mut positions = self.positions.clone();
@@ -106,13 +105,13 @@ impl Mesh {
         &self.positions
     }
 
-    /// Red, green and blue at each vertex, from 0 to 1 as pictures and screens have them (sRGB); if the mesh has colours.
+    /// Red, green and blue at each vertex, from 0 to 1 in sRGB; if the mesh has colours.
     #[doc(alias = "colors")]
     pub fn colours(&self) -> Option<&[[f64; 3]]> {
         self.colours.as_deref()
     }
 
-    /// The texture, if the mesh has one; [`Mesh::load_textured`] reads it.
+    /// The texture, if there is one; [`Mesh::load_textured`] reads it.
     pub fn texture(&self) -> Option<&Texture> {
         self.texture.as_ref()
     }
@@ -130,7 +129,7 @@ impl Mesh {
 
     /// Lowest and highest corner of the axis-aligned box around all vertices that a face uses.
     ///
-    /// A vertex that no face uses cannot be seen, so it does not count.
+    /// An unused vertex is not visible, and is ignored.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         let start = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         self.triangles().flatten().fold(start, |[low, high], p| {
@@ -139,24 +138,24 @@ impl Mesh {
         })
     }
 
-    /// Surface area in square world units: the sum over triangles, either side up.
+    /// Surface area in square world units: the sum over the triangles, regardless of orientation.
     pub fn area(&self) -> f64 {
         self.triangles()
             .map(|[a, b, c]| 0.5 * norm(cross(difference(b, a), difference(c, a))))
             .sum()
     }
 
-    /// A mesh of parts that are valid by construction.
+    /// A mesh of valid parts.
     pub(crate) fn from_valid(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
         Self { positions, faces, colours: None, texture: None }
     }
 
-    /// With colours that are valid by construction.
+    /// The mesh with colours, which must be valid.
     pub(crate) fn painted(self, colours: Vec<[f64; 3]>) -> Self {
         Self { colours: Some(colours), ..self }
     }
 
-    /// With its vertices at other places, which are valid by construction.
+    /// The mesh with its vertices at other positions, which must be valid.
     pub(crate) fn moved(&self, positions: Vec<[f64; 3]>) -> Self {
         assert_eq!(positions.len(), self.positions.len(), "positions of vertices");
         let (faces, colours) = (self.faces.clone(), self.colours.clone());
@@ -164,7 +163,7 @@ impl Mesh {
     }
 }
 
-/// Whether a channel of a colour is one.
+/// Whether a channel of a colour is from 0 to 1.
 fn is_share(x: &f64) -> bool {
     (0.0..=1.0).contains(x)
 }
@@ -176,12 +175,12 @@ fn all_finite(positions: &[[f64; 3]]) -> Result<(), MeshError> {
     }
 }
 
-/// Whether `x` stays finite when a 32-bit backend takes it.
+/// Whether `x` is finite as an f32.
 pub(crate) fn fits_f32(x: f64) -> bool {
     (x as f32).is_finite()
 }
 
-/// An error unless all of `position` is finite in 32 bits.
+/// An error unless all coordinates of `position` are finite in 32 bits.
 pub(crate) fn finite(position: [f64; 3]) -> Result<(), Fault> {
     match position.iter().find(|&&x| !fits_f32(x)) {
         Some(x) => Err(Fault::NotFinite(shown(&format!("{x:?}")))),

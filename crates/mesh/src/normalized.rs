@@ -5,9 +5,8 @@ use crate::Mesh;
 impl Mesh {
     /// The mesh centred at the origin and scaled so that the longest side of its box is 2.
     ///
-    /// The box is that of [`Mesh::bounds`]: a vertex that no face uses does not count, and is
-    /// clamped to the box from -1 to 1 so that it stays finite at any scale. A mesh without extent
-    /// only moves to the origin.
+    /// The box is that of [`Mesh::bounds`]: an unused vertex is ignored, and is clamped to the box from -1 to 1 so that it stays finite at
+    /// any scale. A mesh without extent is only moved to the origin.
     ///
     /// Source: the normalisation of `GenDR`'s loader, with its box centre and one scale for all axes.
     #[must_use]
@@ -15,8 +14,8 @@ impl Mesh {
         let [low, high] = self.bounds();
         let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         let divisor = if longest > 0.0 { longest } else { 1.0 };
-        // Twice (x - centre) as a difference of distances to both sides: no centre is rounded, so
-        // the ends of the longest side land on -1 and 1 exactly, however far from the origin.
+        // Twice (x - centre) as a difference of distances to both sides: the centre is not rounded, so the ends of the longest side are
+        // exactly -1 and 1, however far from the origin.
         let scaled = |x: f64, k: usize| ((x - low[k]) - (high[k] - x)) / divisor;
         let place = |p: &[f64; 3]| [0, 1, 2].map(|k| scaled(p[k], k).clamp(-1.0, 1.0));
         let positions = self.positions().iter().map(place).collect();

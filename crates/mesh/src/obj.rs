@@ -1,11 +1,11 @@
-//! An OBJ file, which `tobj` parses; and the text of one.
+//! Reads OBJ files with `tobj`, and writes them.
 //!
-//! `tobj` pulls the file through [`Lines`], one statement at a time, so each number is parsed once and the text is never copied as a whole. A
-//! line for `tobj` has the coordinates or the vertices of a statement and nothing else: it refuses or misreads much that programs write after
-//! them. The same walk takes colours and the texture, whose faults are warnings that name a line.
+//! `tobj` pulls the file through [`Lines`], one statement at a time, so each number is parsed once and the text is never copied as a whole.
+//! A line for `tobj` contains only the coordinates or the vertices of a statement: it refuses or misreads much that programs write after
+//! them. The same pass collects colours and the texture, whose errors are warnings with a line number.
 //!
-//! An error of `tobj` names neither line nor word, and a face may come before its vertices. So a file that is refused is walked once
-//! more, by [`fault`], to find the first statement that is wrong.
+//! An error of `tobj` names neither line nor word, and a face may come before its vertices. A refused file is therefore scanned again, by
+//! [`fault`], for the first wrong statement.
 
 use std::{
     collections::VecDeque,
@@ -28,13 +28,13 @@ use crate::{
 
 /// The mesh in `bytes`; see [`Mesh::parse`]. With the `folder` of the file also its texture.
 ///
-/// Only `v` and `f` matter to the mesh, in lower case; of a vertex the first three numbers and, where there are six, the other three as a
-/// colour; of a corner the field before the first slash.
+/// The mesh is read from `v` and `f` only, in lower case: the first three numbers of a vertex and, if there are six, the other three as a
+/// colour; the field of a corner before the first slash.
 pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Trouble> {
     let (mut vertices, mut colours) = (0, Colours::new([1.0; 3], Beyond::LeftOut));
     let mut texture = folder.map(|_| Found::new());
     let lines = statements(bytes).map(Some).chain([None]).map(|statement| {
-        // tobj numbers vertices as faces first use them. A last polygon of all says which is which, and keeps those that no face uses.
+        // tobj numbers vertices by first use in faces. A final polygon of all vertices reveals the mapping, and keeps unused ones.
         let Some(statement) = statement else {
             return line("f", (1..=vertices).map(|vertex| vertex.to_string()));
         };
@@ -76,8 +76,8 @@ pub(crate) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parts, Troubl
     Ok(Parts { positions, faces, colours, texture, warnings })
 }
 
-/// A line for `tobj`, which splits words at any white space and not only at spaces and tabs: a word that is not plain ASCII is no number, and
-/// stays none.
+/// A line for `tobj`, which splits words at any white space and not only at spaces and tabs: a word that is not plain ASCII is not a
+/// number, and is replaced by another word that is not.
 fn line(keyword: &str, words: impl Iterator<Item = impl AsRef<str>>) -> String {
     let mut line = keyword.to_owned();
     for word in words {
@@ -89,7 +89,7 @@ fn line(keyword: &str, words: impl Iterator<Item = impl AsRef<str>>) -> String {
     line
 }
 
-/// Lines as the content of a file, each made when it is read.
+/// Lines as the content of a file, each created when it is read.
 struct Lines<I> {
     lines: I,
     unread: VecDeque<u8>,
@@ -106,7 +106,7 @@ impl<I: Iterator<Item = String>> Read for Lines<I> {
     }
 }
 
-/// Vertices and polygons of lines, the last of which is a polygon of all vertices; none if a line is wrong or there are too many.
+/// Vertices and polygons of lines, the last of which is a polygon of all vertices; `None` if a line is wrong or there are too many.
 fn parsed(lines: impl Iterator<Item = String>) -> Option<(Vec<[f64; 3]>, Polygons)> {
     let mut file = BufReader::new(Lines { lines, unread: VecDeque::new() });
     let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
@@ -131,7 +131,7 @@ fn parsed(lines: impl Iterator<Item = String>) -> Option<(Vec<[f64; 3]>, Polygon
     is_sound.then(|| (order.iter().map(position).collect(), Polygons { corners, arities }))
 }
 
-/// The first statement that keeps `bytes` from being a mesh.
+/// The first statement that prevents `bytes` from being a mesh.
 fn fault(bytes: &[u8]) -> Option<Trouble> {
     let (vertices, mut before) = (count(bytes, "v"), 0);
     statements(bytes).find_map(|statement| {
@@ -148,7 +148,7 @@ fn fault(bytes: &[u8]) -> Option<Trouble> {
     })
 }
 
-/// The first error, or that there are `fewer` than three.
+/// Checks that there are three entries or more; else the first error, or `fewer`.
 fn three<T>(
     found: impl Iterator<Item = Result<T, Fault>>,
     fewer: fn(usize) -> Fault,
@@ -162,7 +162,7 @@ fn coordinate(word: &str) -> Result<f64, Fault> {
     if fits_f32(x) { Ok(x) } else { Err(Fault::NotFinite(shown(word))) }
 }
 
-/// The colour after the coordinates of a vertex. One further number is a weight, and other lists are not of the format.
+/// The colour after the coordinates of a vertex. A single further number is a weight, and lists of other lengths are not in the format.
 fn colour<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<[f64; 3]> {
     let mut channel = || words.next().map(|word| word.parse().unwrap_or(f64::NAN));
     let channels = [channel()?, channel()?, channel()?];

@@ -16,42 +16,42 @@ use crate::{
     texture::is_near,
 };
 
-/// Libraries of materials that a file may name, and words of their names.
+/// Limit of material libraries of a file, and of words in their names.
 const MOST_LIBRARIES: usize = 100;
 
-/// The texture of a file, as the statements read so far have it.
+/// The texture of a file, from the statements read so far.
 #[derive(Default)]
 pub(crate) struct Found {
     coordinates: Vec<[f64; 2]>,
-    /// A place for each corner of each face, in the order of the file; [`NOWHERE`] for those that have none.
+    /// A coordinate for each corner of each face, in the order of the file; [`NOWHERE`] for those without one.
     corners: Vec<u32>,
-    /// The texts after `mtllib`, each once.
+    /// The texts after `mtllib`, without duplicates.
     libraries: Vec<String>,
-    /// The materials of faces, in the order of first use; that of faces before the first `usemtl` is "".
+    /// The materials of faces, in the order of first use; faces before the first `usemtl` have "".
     materials: Vec<Used>,
-    /// Where each is among the materials.
+    /// Number of each material.
     numbers: HashMap<String, u32>,
-    /// The corner at which each run of faces of one material begins, and its material.
+    /// First corner of each run of faces with one material, and its material.
     runs: Vec<(u32, u32)>,
-    /// The material of the next faces, until one has it.
+    /// The material of the next faces, until a face uses it.
     material: Option<String>,
-    /// The line of the first corner that has a coordinate.
+    /// The line of the first corner with a coordinate.
     with: Option<usize>,
 }
 
-/// A material that faces have.
+/// A material used by faces.
 struct Used {
     name: String,
-    /// The line of its first corner that has no coordinate.
+    /// The line of its first corner without a coordinate.
     without: Option<usize>,
 }
 
-/// In place of a coordinate that a corner has not.
+/// Coordinate number of a corner without one.
 const NOWHERE: u32 = u32::MAX;
 
-/// The texture in `bytes`, a file in `folder` whose vertices and faces are sound; `warnings` gets why it, its picture or a library was left
-/// out. `found` is what its statements have unless one is wrong, `cut` the corners of the triangles, all corners of the file being numbered
-/// in order. Colours of vertices count in place of those of materials.
+/// The texture in `bytes`, a file in `folder` whose vertices and faces are valid; reasons to omit it, its picture or a library are added to
+/// `warnings`. `found` are its statements unless one is wrong, `cut` the corners of the triangles, where all corners of the file are
+/// numbered in order. Vertex colours take precedence over those of materials.
 pub(crate) fn parse(
     found: Option<Found>,
     bytes: &[u8],
@@ -92,14 +92,14 @@ impl Found {
         Self { material: Some(String::new()), ..Self::default() }
     }
 
-    /// Everything that `bytes` holds, or the first statement that is wrong.
+    /// The texture statements in `bytes`, or the first that is wrong.
     fn of(bytes: &[u8]) -> Result<Self, Trouble> {
         let (mut found, all) = (Self::new(), count(bytes, "vt"));
         statements(bytes).try_for_each(|statement| found.add(&statement, all))?;
         Ok(found)
     }
 
-    /// Adds what `statement` has, in a file of at most `all` coordinates.
+    /// Adds `statement`, in a file of at most `all` coordinates.
     pub(crate) fn add(&mut self, statement: &Statement, all: usize) -> Result<(), Trouble> {
         let line = statement.line;
         let at = |reason| Trouble::Line(line, reason);
@@ -136,7 +136,7 @@ impl Found {
         Ok(())
     }
 
-    /// The number of a material that a face has.
+    /// The number of a material of a face.
     fn number(&mut self, name: String) -> u32 {
         let next = self.materials.len() as u32;
         let number = *self.numbers.entry(name.clone()).or_insert(next);
@@ -146,14 +146,15 @@ impl Found {
         number
     }
 
-    /// Whether there is each coordinate that a corner has: it may come after the face.
+    /// Whether all coordinates of corners exist: they may come after the face.
     fn is_in_range(&self) -> bool {
         let is_there =
             |&number: &u32| number == NOWHERE || (number as usize) < self.coordinates.len();
         self.corners.iter().all(is_there)
     }
 
-    /// Whether there is a texture: corners with coordinates, or materials with colours. An error if corners need a coordinate and have none.
+    /// Whether there is a texture: corners with coordinates, or materials with colours. An error if corners need a coordinate and have
+    /// none.
     fn is_on_faces(&self, looks: &[Look], of_materials: &[u32]) -> Result<bool, Trouble> {
         let are_plain = looks.iter().all(|look| look.picture.is_none() && look.colour.is_none());
         for (Used { without, name }, &look) in self.materials.iter().zip(of_materials) {
@@ -163,7 +164,7 @@ impl Found {
                     "a corner has no texture coordinate, but its material {:?} shows a picture",
                     shown(name)
                 ),
-                // Nothing but a picture that comes later is shown by coordinates.
+                // Only a picture that comes later uses the coordinates.
                 (Some(with), None) if are_plain => format!(
                     "a corner has no texture coordinate, but one of line {with} has: all need one"
                 ),
@@ -174,7 +175,7 @@ impl Found {
         Ok(self.with.is_some() || !are_plain)
     }
 
-    /// The texture on triangles, whose corners are numbers of those of the file.
+    /// The texture on triangles, whose corners are numbered as in the file.
     fn texture(
         mut self,
         cut: &[[u32; 3]],
@@ -199,12 +200,12 @@ impl Found {
     }
 }
 
-/// The text after the keyword: names of files and materials may hold spaces.
+/// The text after the keyword: names of files and materials may contain spaces.
 fn rest(statement: &Statement) -> String {
     statement.words().skip(1).collect::<Vec<_>>().join(" ")
 }
 
-/// (u, v); a second number that is left out is 0, a third is of no use to a picture.
+/// (u, v); v is 0 if omitted, a third number is ignored.
 fn coordinate<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 2], Fault> {
     let read = |word: &str| {
         let x: f64 = word.parse().map_err(|_| Fault::Number(shown(word)))?;
@@ -220,7 +221,7 @@ fn coordinate<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 2], 
     Ok([read(u)?, words.next().map_or(Ok(0.0), read)?])
 }
 
-/// The coordinate, from 0, that the second field of a corner means.
+/// The coordinate, from 0, of the second field of a corner.
 fn index(field: &str, before: usize, all: usize) -> Result<u32, Fault> {
     let number = absolute(field, before, all).ok();
     let number = number.and_then(|number| u32::try_from(number - 1).ok());
@@ -232,14 +233,14 @@ fn index(field: &str, before: usize, all: usize) -> Result<u32, Fault> {
     })
 }
 
-/// Adds what is not there yet.
+/// Adds an entry unless the list contains it.
 fn add<T: PartialEq>(list: &mut Vec<T>, entry: T) {
     if !list.contains(&entry) {
         list.push(entry);
     }
 }
 
-/// The names of the libraries in the text after `mtllib`: one name, or several that end in `.mtl`, all of which may hold spaces.
+/// The names of the libraries in the text after `mtllib`: one name, or several that end in `.mtl`, all of which may contain spaces.
 fn names(folder: &Path, text: &str) -> Vec<String> {
     let exists = |name: &str| beside(folder, name).is_file();
     let words: Vec<&str> = text.split(' ').take(MOST_LIBRARIES + 1).collect();
@@ -259,17 +260,17 @@ fn names(folder: &Path, text: &str) -> Vec<String> {
     names
 }
 
-/// The look of a material.
+/// The appearance of a material.
 #[derive(Clone, Default)]
 struct Look {
     /// Folder and name of its picture.
     picture: Option<(PathBuf, String)>,
-    /// Its colour, which counts where there is no picture; proportional to light.
+    /// Its colour, used without a picture; linear in light.
     colour: Option<[f64; 3]>,
 }
 
 impl Look {
-    /// This library without a picture that has options, of a material of this name.
+    /// This look without a picture with options, for a material of this name.
     fn without_options(mut self, name: &str, warnings: &mut Vec<Trouble>) -> Self {
         if let Some((_, options)) = self.picture.take_if(|(_, name)| name.starts_with('-')) {
             let (options, name) = (shown(&options), shown(name));
@@ -280,8 +281,7 @@ impl Look {
     }
 }
 
-/// The looks of the materials that faces have, each once, as far as they are known, and that of each material; `warnings` gets what cannot be
-/// read.
+/// The distinct looks of the materials of faces, as far as they are known, and the look of each material; errors are added to `warnings`.
 fn looks(found: &Found, folder: &Path, warnings: &mut Vec<Trouble>) -> (Vec<Look>, Vec<u32>) {
     let mut paths = Vec::new();
     for name in found.libraries.iter().flat_map(|text| names(folder, text)) {
@@ -293,7 +293,7 @@ fn looks(found: &Found, folder: &Path, warnings: &mut Vec<Trouble>) -> (Vec<Look
         let reason = format!("more than {MOST_LIBRARIES} libraries: the others are not read");
         warnings.push(Trouble::part("materials", reason));
     }
-    // The first library that has a material counts.
+    // The first library with a material takes precedence.
     let mut known = HashMap::new();
     for path in paths.iter().take(MOST_LIBRARIES) {
         match read(path) {
@@ -308,7 +308,7 @@ fn looks(found: &Found, folder: &Path, warnings: &mut Vec<Trouble>) -> (Vec<Look
     let (mut looks, mut numbers) = (Vec::new(), HashMap::new());
     let mut number = |used: &Used| {
         let look = known.get(&used.name).cloned().unwrap_or_default();
-        // Beside a picture it does not count.
+        // Ignored if there is a picture.
         let colour = look.colour.filter(|_| look.picture.is_none());
         let bits = colour.map(|colour| colour.map(f64::to_bits));
         *numbers.entry((look.picture.clone(), bits)).or_insert_with(|| {

@@ -1,6 +1,6 @@
-//! An OFF file, of text.
+//! Reads text OFF files.
 //!
-//! Read by code of our own: no kept crate reads the variants that programs write.
+//! No existing crate reads the variants that programs write.
 
 use crate::{
     Fault,
@@ -69,7 +69,7 @@ fn settled(channels: &[(usize, [f64; 3])]) -> (Option<Vec<[f64; 3]>>, Option<Tro
 
 /// The first lines: the kind of file and its counts.
 struct Header {
-    /// Whether vertices have colours, and how many numbers stand before these.
+    /// Whether vertices have colours, and how many numbers precede them.
     coloured: bool,
     skipped: usize,
     vertices: usize,
@@ -88,7 +88,7 @@ impl Header {
             return Err(wrong(first.line, "binary OFF files are not read: export it as text"));
         }
         let kind = kind.strip_prefix("ST").or(kind.strip_suffix("ST")).unwrap_or(kind);
-        // Some programs write NC for colours that stand before the normal.
+        // Some programs write NC for colours before the normal.
         let (skipped, coloured) = match kind {
             "" | "N" => (3, false),
             "C" | "NC" => (3, true),
@@ -99,7 +99,7 @@ impl Header {
                 return Err(wrong(first.line, &reason));
             }
         };
-        // Some programs write the numbers into the first line, some even without a blank.
+        // Some programs write the numbers in the first line, some even without a space.
         match after {
             "" => drop(words.remove(0)),
             _ => words[0] = after,
@@ -126,7 +126,7 @@ fn number(word: &str) -> Result<f64, Fault> {
     word.parse().map_err(|_| Fault::Number(shown(word)))
 }
 
-/// Adds the polygon of a line: how many corners it has, then their vertices. A colour may follow.
+/// Adds the polygon of a line: the number of its corners, then their vertices. A colour may follow.
 fn corners(line: &Statement, vertices: usize, polygons: &mut Polygons) -> Result<(), Fault> {
     let mut words = line.words();
     let not_whole = |word: &str| Fault::format(format!("{:?} is not a whole number", shown(word)));

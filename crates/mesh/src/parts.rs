@@ -1,4 +1,4 @@
-//! The content of a mesh file, before it is known to be a mesh.
+//! The content of a mesh file, before validation.
 
 use crate::{Texture, error::Trouble};
 
@@ -8,6 +8,6 @@ pub(crate) struct Parts {
     pub(crate) faces: Vec<[u32; 3]>,
     pub(crate) colours: Option<Vec<[f64; 3]>>,
     pub(crate) texture: Option<Texture>,
-    /// Everything that was left out or changed although the file has it: colours, textures, pictures, extensions.
+    /// Everything in the file that was omitted or changed: colours, textures, pictures, extensions.
     pub(crate) warnings: Vec<Trouble>,
 }

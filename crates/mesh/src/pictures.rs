@@ -1,15 +1,15 @@
-//! The pictures that materials of a file name, each read once.
+//! The pictures of the materials of a file, each read once.
 
 use std::{collections::HashMap, hash::Hash, sync::Arc};
 
 use crate::error::Trouble;
 
-/// Pictures of a mesh.
+/// Limit of pictures of a mesh.
 const MOST: usize = 1000;
-/// Bytes of all pictures of a mesh: images of a small file may lie over the same bytes.
+/// Limit of the bytes of all pictures of a mesh: images of a small file may share the same bytes.
 const MOST_BYTES: usize = 1 << 30;
 
-/// The pictures so far, by the names that the file has for them.
+/// The pictures so far, by their names in the file.
 pub(crate) struct Pictures<K> {
     known: HashMap<K, Option<Arc<[u8]>>>,
     bytes: usize,
@@ -22,7 +22,7 @@ impl<K> Default for Pictures<K> {
 }
 
 impl<K: Eq + Hash> Pictures<K> {
-    /// The picture of this name: what `read` gives the first time, or none, and then `warnings` gets the reason.
+    /// The picture of this name, read by `read` the first time; `None` on errors, which add a warning the first time.
     pub(crate) fn get(
         &mut self,
         name: K,

@@ -1,4 +1,4 @@
-//! Where a node of a glTF tree puts its mesh.
+//! Placement of the mesh of a node in a glTF tree.
 
 use crate::{
     gltf::Node,
@@ -8,7 +8,7 @@ use crate::{
 /// `p ↦ linear p + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Placement {
-    /// Row by row.
+    /// In row-major order.
     linear: [[f64; 3]; 3],
     offset: [f64; 3],
 }
@@ -19,7 +19,7 @@ impl Placement {
 
     /// The placement of a node relative to its parent.
     ///
-    /// Source: glTF 2.0 specification, Sec. 3.5.3: scaled, then turned, then moved; or a matrix.
+    /// Source: glTF 2.0 specification, Sec. 3.5.3: scaled, then rotated, then translated; or a matrix.
     pub(crate) fn of(node: &Node) -> Self {
         let each = [0, 1, 2];
         if let Some(m) = &node.matrix {
@@ -52,7 +52,7 @@ impl Placement {
         [0, 1, 2].map(|i| dot(self.linear[i], p) + self.offset[i])
     }
 
-    /// Whether it makes left hands of right hands.
+    /// Whether it is a reflection.
     pub(crate) fn mirrors(&self) -> bool {
         let [a, b, c] = self.linear;
         dot(cross(a, b), c) < 0.0

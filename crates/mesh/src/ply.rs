@@ -1,8 +1,7 @@
-//! A PLY file: text or binary, read and written.
+//! Text and binary PLY files, read and written.
 //!
-//! Read by code of our own: the crates for it read the numbers of text as 32 bits if the header
-//! says float, keep every property of every vertex, and loop as often as the header of an element
-//! without properties claims.
+//! Not read by the existing crates: they read the numbers of text as 32 bits if the header says float, keep every property of every vertex,
+//! and loop as often as the header claims for an element without properties.
 
 use std::slice::ChunksExact;
 
@@ -18,7 +17,7 @@ use crate::{
 };
 
 const AXES: [[&str; 2]; 3] = [["x", "x"], ["y", "y"], ["z", "z"]];
-/// Most programs write the first name of each, some older ones the second.
+/// Most programs use the first name of each, some older ones the second.
 const CHANNELS: [[&str; 2]; 3] =
     [["red", "diffuse_red"], ["green", "diffuse_green"], ["blue", "diffuse_blue"]];
 
@@ -50,7 +49,7 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
                 };
                 let is_one = |p: &Property| p.list.is_none();
                 let [x, y, z] = columns(element, AXES, is_one, "number")?;
-                // Without all three there is no colour.
+                // A colour requires all three.
                 match columns(element, CHANNELS, is_one, "number") {
                     Ok(channels) => {
                         let full = channels.map(|column| full(&element.properties[column]));
@@ -89,7 +88,7 @@ pub(crate) fn parse(mut bytes: &[u8]) -> Result<Parts, Trouble> {
     Ok(Parts { positions, faces, colours, warnings: Vec::from_iter(warning), ..Parts::default() })
 }
 
-/// The value of a channel of a colour that stands for full.
+/// The value of a channel of a colour that stands for 1.
 fn full(channel: &Property) -> f64 {
     match channel.number {
         Number::F32 | Number::F64 => 1.0,
@@ -111,7 +110,7 @@ fn element<'a>(elements: &'a [Element], name: &str) -> Result<Option<&'a Element
     }
 }
 
-/// Where `element` has the properties `wanted`, each under either of two names.
+/// Columns of the properties `wanted` in `element`, each under either of two names.
 fn columns<const N: usize>(
     element: &Element,
     wanted: [[&str; 2]; N],
@@ -129,7 +128,7 @@ fn columns<const N: usize>(
     Ok(columns)
 }
 
-/// A corner's vertex; `index` is a whole number of at most 32 bits, or was text.
+/// The vertex of a corner; `index` is an integer of at most 32 bits, or was text.
 fn vertex(index: f64, vertices: u64) -> Result<u32, Fault> {
     if index >= 0.0 && index < vertices as f64 && index <= f64::from(u32::MAX) {
         return Ok(index as u32);
@@ -137,7 +136,7 @@ fn vertex(index: f64, vertices: u64) -> Result<u32, Fault> {
     Err(Fault::OutOfRange { index: index.to_string(), vertices: vertices as usize })
 }
 
-/// What follows the header, up to where it has been read.
+/// The rest of the file after the header, from the current position.
 struct Body<'a> {
     rest: &'a [u8],
     encoding: Encoding,
@@ -146,8 +145,8 @@ struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// Gives the values of the properties `columns` of each row of `element` to `take`, and the place of the row. Text that is no number is
-    /// an error in the first `strict` columns, and NaN in the others.
+    /// Passes the values of the properties `columns` of each row of `element` to `take`, with the place of the row. Text that is not a
+    /// number is an error in the first `strict` columns, and NaN in the others.
     fn rows<const N: usize>(
         &mut self,
         element: &Element,
@@ -158,11 +157,11 @@ impl<'a> Body<'a> {
         let ascii = self.encoding == Encoding::Ascii;
         let least: usize =
             element.properties.iter().map(|p| p.list.unwrap_or(p.number).size()).sum();
-        // Whatever the count of what has no properties, there is nothing to read.
+        // Elements without properties take no bytes, whatever their count.
         if least == 0 {
             return Ok(());
         }
-        // A text has at least a digit and a blank for each value, but for the last blank.
+        // A text has at least a digit and a separator for each value, except the last separator.
         let least = if ascii { 2 * element.properties.len() } else { least } as u64;
         let room = self.rest.len() as u64 + u64::from(ascii);
         if element.count.checked_mul(least).is_none_or(|bytes| bytes > room) {
@@ -189,7 +188,7 @@ impl<'a> Body<'a> {
         Ok(())
     }
 
-    /// The next line that is not blank. Values after those of the header are skipped: some programs write colours there.
+    /// The next line that is not blank. Values beyond those of the header are skipped: some programs write colours there.
     fn text_row(
         &mut self,
         element: &Element,
@@ -247,7 +246,7 @@ impl<'a> Body<'a> {
         Ok(())
     }
 
-    /// Takes `count` numbers off the body, each as its bytes.
+    /// Removes `count` numbers from the body, each as its bytes.
     fn bytes(&mut self, count: usize, number: Number) -> Result<ChunksExact<'a, u8>, Fault> {
         let size = number.size();
         let taken = count.checked_mul(size).and_then(|length| self.rest.split_at_checked(length));
@@ -256,7 +255,7 @@ impl<'a> Body<'a> {
         Ok(bytes.chunks_exact(size))
     }
 
-    /// The value of as many bytes as `number` takes.
+    /// The value of `bytes`, whose number is that of the type.
     fn number(&self, bytes: &[u8], number: Number) -> f64 {
         let mut low = [0; 8];
         low[..bytes.len()].copy_from_slice(bytes);
@@ -277,7 +276,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The value of a word; `whole` of an index or a length.
+/// The value of a word; `whole` for an index or a length.
 fn parsed(word: &str, whole: bool) -> Result<f64, Fault> {
     if whole {
         let not_whole = |_| Fault::format(format!("{:?} is not a whole number", shown(word)));
@@ -286,7 +285,7 @@ fn parsed(word: &str, whole: bool) -> Result<f64, Fault> {
     word.parse().map_err(|_| Fault::Number(shown(word)))
 }
 
-/// Of a list; the caller finds out whether the file has as many entries.
+/// The length of a list; the caller checks whether the file has this many entries.
 fn length(entries: f64) -> Result<usize, Fault> {
     if entries < 0.0 {
         return Err(Fault::format(format!("a list cannot have {entries} entries")));

@@ -1,4 +1,4 @@
-//! The header of a PLY file: which elements it has, of which properties, in which encoding.
+//! The header of a PLY file: its elements, their properties, and the encoding.
 
 use crate::{
     Fault,
@@ -6,7 +6,7 @@ use crate::{
     statements::next_line,
 };
 
-/// Of two bytes or more, those of numbers are in an order that binary files name.
+/// The encoding; binary files state the byte order of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Encoding {
     Ascii,
@@ -18,14 +18,14 @@ pub(crate) enum Encoding {
 pub(crate) struct Header {
     pub(crate) encoding: Encoding,
     pub(crate) elements: Vec<Element>,
-    /// How many lines the header has: the body starts on the next.
+    /// Number of lines of the header: the body starts on the next.
     pub(crate) lines: usize,
 }
 
 #[derive(Debug)]
 pub(crate) struct Element {
     pub(crate) name: String,
-    /// As the header claims; nothing has checked it yet.
+    /// According to the header, unchecked.
     pub(crate) count: u64,
     pub(crate) properties: Vec<Property>,
     /// Line of the header, from 1.
@@ -35,7 +35,7 @@ pub(crate) struct Element {
 #[derive(Debug)]
 pub(crate) struct Property {
     pub(crate) name: String,
-    /// Type of the number of entries, if it is a list.
+    /// Type of the number of entries, for a list.
     pub(crate) list: Option<Number>,
     pub(crate) number: Number,
 }
@@ -71,7 +71,7 @@ impl Number {
         !matches!(self, Self::F32 | Self::F64)
     }
 
-    /// How many bytes it takes in a binary file.
+    /// Size in a binary file, in bytes.
     pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -83,7 +83,7 @@ impl Number {
 }
 
 impl Header {
-    /// Takes the header off `bytes`.
+    /// Removes the header from `bytes`.
     pub(crate) fn read(bytes: &mut &[u8]) -> Result<Self, Trouble> {
         let (mut lines, mut encoding, mut elements) = (0, None, Vec::new());
         loop {

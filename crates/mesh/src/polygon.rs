@@ -1,4 +1,4 @@
-//! Cuts polygons into triangles by clipping ears.
+//! Triangulates polygons by ear clipping.
 
 use std::collections::VecDeque;
 
@@ -7,37 +7,37 @@ use crate::{
     mesh::{cross, difference},
 };
 
-/// Looks at boxes that all polygons of a file may take together, for each corner and beside that. Outlines that do not cross themselves take
-/// up to about 60 for each corner; a file made to take the square of its length would keep programs busy for hours.
+/// Limits of box tests for all polygons of a file together, per corner and in addition to that. Simple outlines take up to about 60 per
+/// corner; a malicious file of quadratic cost would keep programs busy for hours.
 const LOOKS_PER_CORNER: u64 = 100;
 const LOOKS: u64 = 20_000_000;
 
-/// How often a polygon that has run out of ears is searched for new ones in whole. One that does not cross itself never runs out.
+/// Number of full searches for new ears when a polygon has run out of them. A simple polygon never runs out.
 const SEARCHES: usize = 16;
 
 /// Corners in one leaf of the tree of boxes.
 const LEAF: usize = 8;
 
-/// The polygons of a file, one after the other.
+/// The polygons of a file, concatenated.
 #[derive(Default)]
 pub(crate) struct Polygons {
     /// The vertices of all corners.
     pub(crate) corners: Vec<u32>,
-    /// How many corners each polygon has, at least three.
+    /// Number of corners of each polygon, at least three.
     pub(crate) arities: Vec<u32>,
 }
 
 impl Polygons {
-    /// The triangles between vertices, of triangles between [`Polygons::cut`] corners.
+    /// The triangles between vertices, from triangles between [`Polygons::cut`] corners.
     pub(crate) fn faces(&self, cut: &[[u32; 3]]) -> Vec<[u32; 3]> {
         cut.iter().map(|triangle| triangle.map(|k| self.corners[k as usize])).collect()
     }
 
-    /// The `n - 2` triangles of each polygon of `n` corners, in its winding, all corners of the file being numbered in order.
+    /// The `n - 2` triangles of each polygon of `n` corners, in its winding; all corners of the file are numbered in order.
     ///
-    /// A polygon is seen along the axis that shows most of its area. Again and again a convex corner with no other corner in its triangle is
-    /// cut off, so a concave outline keeps its area; a convex one becomes the fan from its first corner. What has no such corner (crossing
-    /// itself, no area) is cut anyhow. `n` corners take about `n log n` steps.
+    /// A polygon is projected along the axis that shows most of its area. Convex corners with no other corner in their triangle are clipped
+    /// repeatedly, so a concave outline keeps its area; a convex one becomes the fan from its first corner. Outlines without such a corner
+    /// (self-intersecting, no area) are cut anyway. `n` corners take about `n log n` steps.
     pub(crate) fn cut(&self, positions: &[[f64; 3]]) -> Result<Vec<[u32; 3]>, Trouble> {
         u32::try_from(self.corners.len())
             .map_err(|_| Trouble::part("faces", "more corners than 32 bits can number"))?;
@@ -63,12 +63,12 @@ impl Polygons {
     }
 }
 
-/// A polygon that is being cut.
+/// A polygon during triangulation.
 struct Outline {
     /// The corners in a plane, counterclockwise.
     flat: Vec<[f64; 2]>,
     before: Vec<u32>,
-    /// The corner itself once it is cut off.
+    /// The next corner; the corner itself once it is clipped.
     next: Vec<u32>,
     blockers: Blockers,
 }
@@ -87,7 +87,7 @@ impl Outline {
         outline
     }
 
-    /// Gives all triangles to `add`; false if that takes more than `looks`.
+    /// Passes all triangles to `add`; returns false if that takes more than `looks`.
     fn clip(&mut self, looks: &mut u64, mut add: impl FnMut([u32; 3])) -> bool {
         let n = self.next.len() as u32;
         if self.blockers.are_none() {
@@ -114,7 +114,7 @@ impl Outline {
                     self.blockers.remove(k);
                 }
             }
-            // No other corner becomes an ear or ceases to be one, as long as the outline does not cross itself.
+            // The state of other corners as ears is unchanged, as long as the outline is simple.
             waiting.push_front(c);
             waiting.push_back(a);
             here = c;
@@ -144,17 +144,17 @@ impl Outline {
         turn(a, b, c) > 0.0
     }
 
-    /// Whether the triangle at a corner turns left and holds no corner that blocks and lies elsewhere.
+    /// Whether the triangle at a corner turns left and contains no blocking corner at another position.
     fn is_ear(&self, k: u32, looks: &mut u64) -> bool {
         self.turns_left(k) && !self.blockers.meet(&self.triangle(k), looks)
     }
 }
 
-/// The corners that are left and turn right or not at all: in an outline that does not cross itself, a triangle that holds any corner holds one
-/// of these. No corner becomes one later.
+/// The remaining corners that turn right or not at all: in a simple outline, a triangle that contains any corner contains one of these. No
+/// corner becomes one later.
 #[derive(Default)]
 struct Blockers {
-    /// Their places, near ones next to each other; NaN once they are gone.
+    /// Their positions, near ones next to each other; NaN once they are clipped.
     points: Vec<[f64; 2]>,
     /// The number in `points` of each corner of the polygon, or `NOWHERE`.
     slots: Vec<u32>,
@@ -222,10 +222,10 @@ impl Blockers {
         }
     }
 
-    /// Whether one of them lies in `triangle`, and at none of its corners.
+    /// Whether a blocker lies in `triangle`, and at none of its corners.
     fn meet(&self, triangle: &[[f64; 2]; 3], looks: &mut u64) -> bool {
         let leaves = self.boxes.len() / 2;
-        // One node of each level, and its sibling.
+        // One node per level, and its sibling.
         let (mut waiting, mut count) = ([1; 64], 1);
         while count > 0 && *looks > 0 {
             *looks -= 1;
@@ -263,7 +263,7 @@ fn around_all(boxes: impl IntoIterator<Item = [[f64; 2]; 2]>) -> [[f64; 2]; 2] {
     })
 }
 
-/// Whether a box may have a point in a triangle: never false if it has, with the same rounding.
+/// Whether a box may have a point in a triangle, with the same rounding: no false negatives.
 fn meets(&[low, high]: &[[f64; 2]; 2], triangle: &[[f64; 2]; 3]) -> bool {
     let [[a, b, c], [d, e, f]] = [0, 1].map(|k| triangle.map(|p| p[k]));
     if low[0] > a.max(b).max(c)
@@ -286,7 +286,7 @@ fn is_in(p: [f64; 2], &[a, b, c]: &[[f64; 2]; 3]) -> bool {
     turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0
 }
 
-/// The corners in a plane, counterclockwise: seen along the axis that shows most of their area.
+/// The corners in a plane, counterclockwise: projected along the axis that shows most of their area.
 fn flattened(positions: &[[f64; 3]], polygon: &[u32]) -> Vec<[f64; 2]> {
     let first = positions[polygon[0] as usize];
     let offset = |v: u32| difference(positions[v as usize], first);
@@ -321,7 +321,7 @@ mod tests {
         Mesh::new(positions, faces).unwrap()
     }
 
-    /// The case of an outline that does not cross itself.
+    /// The area of a simple outline.
     fn area(outline: &[[f64; 2]]) -> f64 {
         let next = outline.iter().cycle().skip(1);
         outline.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>().abs() / 2.0
@@ -358,7 +358,7 @@ mod tests {
         }
     }
 
-    /// Outlines of about `n` corners that do not cross themselves.
+    /// Simple outlines of about `n` corners.
     fn outlines(n: u32) -> Vec<(&'static str, Vec<[f64; 2]>)> {
         let circle = |radius: &dyn Fn(u32) -> f64| -> Vec<[f64; 2]> {
             let at = |k: u32| f64::from(k) * std::f64::consts::TAU / f64::from(n);

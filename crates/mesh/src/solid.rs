@@ -1,4 +1,4 @@
-//! The surface of a solid by marching tetrahedra, which branches nowhere.
+//! The surface of a solid by marching tetrahedra, which is manifold.
 
 use std::collections::HashMap;
 
@@ -6,22 +6,22 @@ use rayon::prelude::*;
 
 use crate::{Mesh, MeshError, surface_net::Grid};
 
-/// A vertex keeps away from both corners of its edge by this part of it, so that no two fall together.
+/// Least distance of a vertex from both corners of its edge, as a fraction of the edge, so that no two coincide.
 const APART: f64 = 0.05;
-/// Corners of the six tetrahedra of a cube, by the bits of x, y and z. All have its diagonal in common, so those of neighbouring cubes meet in whole faces.
+/// Corners of the six tetrahedra of a cube, by the bits of x, y and z. All share its diagonal, so neighbouring cubes meet in whole faces.
 const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
 impl Mesh {
-    /// The surface of a solid within a box (lowest and highest corner, world units), with so many cells along the longest side of that:
-    /// closed, counterclockwise from outside, and nowhere branching, so that it makes a [`ClosedSurface`](crate::ClosedSurface).
+    /// The surface of a solid within a box (lowest and highest corner, world units), with this many cells along its longest side: closed,
+    /// counterclockwise from outside, and manifold, so that it is a valid [`ClosedSurface`](crate::ClosedSurface).
     ///
-    /// `field` is negative inside the solid, and grows about like a distance. What of the solid reaches the sides of the box is cut off half
-    /// a cell before them.
+    /// `field` is negative inside the solid, and increases approximately like a distance. Parts of the solid that reach the sides of the
+    /// box are cut off half a cell before them.
     ///
     /// # Errors
     ///
-    /// If nothing in the box is inside, or the box has no extent.
+    /// If the box contains no part of the solid, or has no extent.
     ///
     /// Source: Doi and Koide 1991.
     pub fn of_solid(
@@ -74,7 +74,7 @@ fn surface(grid: &Grid, field: impl Fn([f64; 3]) -> f64 + Sync) -> (Vec<[f64; 3]
     (positions, faces)
 }
 
-/// Adds the triangles between what is inside and what is outside of a tetrahedron whose corners go right round: those of the first three are seen
+/// Adds the triangles between the inside and the outside of a tetrahedron with positive orientation: its first three corners are
 /// counterclockwise from outside.
 fn triangles(
     corners: [usize; 4],
@@ -82,7 +82,7 @@ fn triangles(
     crossing: &mut impl FnMut(usize, usize) -> u32,
     faces: &mut Vec<[u32; 3]>,
 ) {
-    // An even permutation that has the corners inside first keeps the tetrahedron as it is.
+    // An even permutation that puts the inside corners first keeps the orientation.
     let [a, b, c, d] = corners;
     let order = [
         [a, b, c, d],
@@ -124,7 +124,7 @@ mod tests {
         let ball = Mesh::of_solid(bounds, 20, |p| norm(p) - 1.0).unwrap();
         assert!((ball.area() / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.02);
         assert!(matches!(Mesh::of_solid(bounds, 20, |_| 1.0), Err(MeshError::Empty)));
-        // A ball that the box cuts off on all sides is closed there.
+        // A ball clipped by the box on all sides is closed there.
         let cut = Mesh::of_solid([[-1.0; 3], [1.0; 3]], 20, |p| norm(p) - 1.2).unwrap();
         ClosedSurface::new(&cut, 0.1, 0).unwrap();
         let [low, high] = cut.bounds();
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_surface_looks_outwards_and_branches_nowhere() {
-        // Values at corners that know nothing of each other, on a grid so coarse that all cases come up.
+        // Independent values at corners, on a grid so coarse that all cases occur.
         for seed in 0..20 {
             let noise = |p: [f64; 3]| {
                 let at = p.map(|x| (x * 8.0).round() + f64::from(seed));

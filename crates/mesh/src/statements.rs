@@ -9,7 +9,7 @@ pub(crate) struct Statement<'a> {
 }
 
 impl Statement<'_> {
-    /// The fields, which spaces and tabs separate; the first is the keyword.
+    /// The fields, separated by spaces and tabs; the first is the keyword.
     pub(crate) fn words(&self) -> impl Iterator<Item = &str> {
         self.text.split([' ', '\t']).filter(|word| !word.is_empty())
     }
@@ -17,9 +17,9 @@ impl Statement<'_> {
 
 /// The statements of `bytes`, in order, empty ones included.
 ///
-/// A UTF-8 byte order mark is skipped. LF, CRLF and CR end a line. `#` starts a comment anywhere.
-/// A backslash at the very end of a line joins the next one to it, but not at the end of a
-/// comment, where it may well be part of a path. Bytes of a line that are not UTF-8 become U+FFFD.
+/// A UTF-8 byte order mark is skipped. LF, CRLF and CR end a line. `#` starts a comment anywhere. A backslash at the very end of a line
+/// joins the next one to it, but not at the end of a comment, where it may be part of a path. Bytes of a line that are not UTF-8 become
+/// U+FFFD.
 pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
     let mut rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut lines_read = 0;
@@ -40,12 +40,12 @@ pub(crate) fn statements(bytes: &[u8]) -> impl Iterator<Item = Statement<'_>> {
     })
 }
 
-/// How many statements of `bytes` start with `keyword`.
+/// Number of statements of `bytes` that start with `keyword`.
 pub(crate) fn count(bytes: &[u8], keyword: &str) -> usize {
     statements(bytes).filter(|statement| statement.words().next() == Some(keyword)).count()
 }
 
-/// Takes the next physical line off `rest`, without its end.
+/// Removes the next physical line from `rest`, without its end.
 pub(crate) fn next_line<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     if rest.is_empty() {
         return None;

@@ -1,7 +1,6 @@
-//! An STL file, text or binary.
+//! Text and binary STL files.
 //!
-//! Read by code of our own: the crate for it rounds the numbers of text to 32 bits, and takes every
-//! file that starts with "solid" for text.
+//! Not read by the existing crate, which rounds the numbers of text to 32 bits, and takes every file that starts with "solid" for text.
 
 use std::collections::HashMap;
 
@@ -13,9 +12,9 @@ use crate::{
     statements::next_line,
 };
 
-/// A binary file starts with as many bytes of any content, then the number of triangles.
+/// Length of the arbitrary header of a binary file, before the number of triangles.
 const HEADER: usize = 80;
-/// Each has a normal, three corners of three 32-bit floats, and two bytes of any content.
+/// Bytes of a triangle: a normal, three corners of three 32-bit floats, and two arbitrary bytes.
 const TRIANGLE: usize = 50;
 const NORMAL: usize = 12;
 
@@ -26,7 +25,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut surface = Surface::default();
     let starts_like_text = bytes.trim_ascii_start().get(..5).is_some_and(|word| {
-        // A binary file may start with this word as well, but text has no zeros.
+        // A binary file may also start with this word, but text has no zeros.
         word.eq_ignore_ascii_case(b"solid") && !bytes[..bytes.len().min(1024)].contains(&0)
     });
     if starts_like_text && claimed(bytes) != Some(bytes.len() as u64) {
@@ -42,13 +41,13 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Parts, Trouble> {
     }
 }
 
-/// The number of triangles that a binary file names.
+/// The number of triangles according to a binary file.
 fn count(bytes: &[u8]) -> Option<u32> {
     let count = bytes.get(HEADER..)?.first_chunk()?;
     Some(u32::from_le_bytes(*count))
 }
 
-/// The length that a binary file should have, in bytes.
+/// The expected length of a binary file, in bytes.
 fn claimed(bytes: &[u8]) -> Option<u64> {
     Some((HEADER + 4) as u64 + TRIANGLE as u64 * u64::from(count(bytes)?))
 }
@@ -90,11 +89,11 @@ fn text(mut bytes: &[u8], surface: &mut Surface) -> Result<(), Trouble> {
     Err(Trouble::Line(line, Fault::format(reason)))
 }
 
-/// How far a text has been read.
+/// Parser state of a text.
 enum State {
     /// Before and between solids.
     Closed,
-    /// In a solid, before its first facet: its name may take several lines, and some programs write all of it twice.
+    /// In a solid, before its first facet: its name may take several lines, and some programs write the line twice.
     Named,
     /// In a solid, after a facet.
     Open,
@@ -102,7 +101,7 @@ enum State {
     Facet(Vec<[f64; 3]>),
 }
 
-/// One line.
+/// Parses one line.
 fn statement(line: &str, state: &mut State, surface: &mut Surface) -> Result<(), Fault> {
     let mut words = line.split_ascii_whitespace();
     let Some(first) = words.next() else { return Ok(()) };
@@ -141,7 +140,7 @@ fn position<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], Fa
     Ok(position)
 }
 
-/// Triangles that share the corners which lie at one place.
+/// Triangles that share corners at equal positions.
 #[derive(Default)]
 struct Surface {
     positions: Vec<[f64; 3]>,
@@ -154,7 +153,7 @@ impl Surface {
         let mut face = [0; 3];
         for (corner, position) in face.iter_mut().zip(triangle) {
             finite(position)?;
-            // Adding 0 makes 0 of -0.
+            // Adding 0 turns -0 into 0.
             let place = position.map(|x| (x + 0.0).to_bits());
             let next = u32::try_from(self.positions.len());
             let next = next.map_err(|_| Fault::format("more vertices than 32 bits can number"))?;

@@ -1,11 +1,11 @@
-//! Strokes: what the solids of the generators are made of.
+//! Strokes, the components of the solids of the generators.
 
 use crate::mesh::{difference, dot, norm};
 
 /// A tapered stroke with round ends: from a point and radius to a point and radius.
 pub(crate) type Stroke = ([f64; 3], f64, [f64; 3], f64);
 
-/// Distance to a stroke whose radius changes evenly along it; negative inside.
+/// Distance to a stroke whose radius changes linearly along it; negative inside.
 pub(crate) fn distance(p: [f64; 3], &(from, from_radius, to, to_radius): &Stroke) -> f64 {
     let (along, offset) = (difference(to, from), difference(p, from));
     let t = (dot(offset, along) / dot(along, along)).clamp(0.0, 1.0);
@@ -13,13 +13,13 @@ pub(crate) fn distance(p: [f64; 3], &(from, from_radius, to, to_radius): &Stroke
     norm(away) - (from_radius + t * (to_radius - from_radius))
 }
 
-/// The smaller of two distances, with the crease between them filled over about `reach`.
+/// The smaller of two distances, with the crease between them smoothed over about `reach`.
 pub(crate) fn joined(a: f64, b: f64, reach: f64) -> f64 {
     let near = (reach - (a - b).abs()).max(0.0);
     a.min(b) - near * near / (4.0 * reach)
 }
 
-/// Five decimals, so that a file of the coordinate can be exact.
+/// Rounds to five decimals, so that a file of the coordinate can be exact.
 pub(crate) fn rounded(x: f64) -> f64 {
     (x * 1e5).round() / 1e5 + 0.0
 }

@@ -1,8 +1,8 @@
-//! Triangles cut into four.
+//! Subdivision of triangles into four.
 
 use std::collections::BTreeMap;
 
-/// Each triangle cut into four, at the middles of its edges; `add` is called once for the ends of each edge, and gives the number of its middle.
+/// Splits each triangle into four, at the midpoints of its edges; `add` returns the number of the midpoint, and is called once per edge.
 pub(crate) fn quartered(faces: &[[u32; 3]], mut add: impl FnMut([u32; 2]) -> u32) -> Vec<[u32; 3]> {
     let mut middles = BTreeMap::new();
     let mut middle =

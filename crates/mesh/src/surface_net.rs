@@ -1,9 +1,8 @@
-//! Turns a solid, given as a function that is negative inside, into one seamless surface.
+//! Converts a solid, given as a function that is negative inside, to a seamless surface.
 
 use crate::mesh::norm;
 
-/// Least slope of a field that a Newton step counts on: flatter fields, as where strokes meet, are
-/// followed in shorter steps.
+/// Least slope of a field assumed in a Newton step: in flatter fields, as where strokes meet, steps are shorter.
 const FLATTEST: f64 = 0.5;
 
 /// A box of cubes in which a solid is sampled.
@@ -18,9 +17,8 @@ pub(crate) struct Grid {
 
 /// Vertices and triangles of the surface where `field` is zero, counterclockwise from outside.
 ///
-/// `field` should grow like a distance, and be positive on the sides of the grid. Each cube that
-/// the surface crosses has one vertex, each grid edge that it crosses one quadrilateral between the
-/// four cubes around it; the vertices are then evened out on the surface.
+/// `field` should increase like a distance, and be positive on the sides of the grid. Each cube that the surface crosses has one vertex,
+/// each grid edge that it crosses one quadrilateral between the four cubes around it; the vertices are then smoothed on the surface.
 ///
 /// Source: Gibson 1998, Constrained Elastic Surface Nets.
 pub(crate) fn surface_net(
@@ -70,17 +68,17 @@ impl Grid {
         (0..=nz).flat_map(move |z| (0..=ny).flat_map(move |y| (0..=nx).map(move |x| [x, y, z])))
     }
 
-    /// The place of a corner among all.
+    /// The index of a corner among all.
     pub(crate) fn number(&self, [x, y, z]: [usize; 3]) -> usize {
         x + (self.cubes[0] + 1) * (y + (self.cubes[1] + 1) * z)
     }
 
-    /// Where a corner is.
+    /// Position of a corner.
     pub(crate) fn point(&self, corner: [usize; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.low[k] + self.step * corner[k] as f64)
     }
 
-    /// Where the surface crosses the twelve edges of a cube, by linear interpolation.
+    /// Crossings of the surface with the twelve edges of a cube, by linear interpolation.
     fn crossings(&self, cube: [usize; 3], sample: impl Fn([usize; 3]) -> f64) -> Vec<[f64; 3]> {
         let corners = (0..8).map(|bits| [0, 1, 2].map(|k| cube[k] + (bits >> k & 1)));
         let edges = corners.flat_map(|from| [0, 1, 2].map(|axis| (from, axis)));
@@ -121,7 +119,7 @@ fn even_out(
     }
 }
 
-/// The end of a few Newton steps from `point` along the gradient of `field`.
+/// The result of a few Newton steps from `point` along the gradient of `field`.
 fn onto_surface(mut point: [f64; 3], step: f64, field: impl Fn([f64; 3]) -> f64) -> [f64; 3] {
     let h = 1e-4 * step;
     for _ in 0..3 {

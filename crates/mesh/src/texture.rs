@@ -6,11 +6,11 @@ use crate::{
     subdivision::{between, quartered},
 };
 
-/// Where the corners of faces lie on pictures, and the [`Material`] of each face.
+/// Texture coordinates of the corners of faces, and the [`Material`] of each face.
 ///
-/// A coordinate is (u, v): u goes from 0 at the left end of the picture to 1 at the right one, v from 0 at the bottom to 1 at the top. Beyond
-/// them the picture repeats. Each corner of each face has one of its own, so vertices on a seam have several. All coordinates are from
-/// -10000 to 10000, and every index is in range.
+/// A coordinate is (u, v): u goes from 0 at the left end of the picture to 1 at the right one, v from 0 at the bottom to 1 at the top.
+/// Beyond them the picture repeats. Each corner of each face has a separate coordinate, so vertices on a seam have several. All coordinates
+/// are from -10000 to 10000, and every index is in range.
 ///
 /// ```
 /// use softrast_mesh::{Mesh, Texture};
@@ -31,7 +31,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// `coordinates` (u, v), and for each face of a mesh the three of its corners, as indices from 0; all faces of one white material.
+    /// `coordinates` (u, v), and for each face of a mesh those of its three corners, as indices from 0; all faces have one white material.
     ///
     /// # Errors
     ///
@@ -50,21 +50,21 @@ impl Texture {
         Ok(Self { coordinates, corners, materials, of_faces, multiplies_colours: false })
     }
 
-    /// With this picture on all faces: the content of a PNG or JPEG file.
+    /// Sets the picture of all faces: the content of a PNG or JPEG file.
     ///
     /// # Errors
     ///
-    /// If its first bytes are those of neither.
+    /// If its first bytes are those of neither format.
     pub fn with_picture(self, picture: Vec<u8>) -> Result<Self, MeshError> {
         let of_faces = vec![0; self.corners.len()];
         self.with_materials(vec![Material::default().with_picture(picture)?], of_faces)
     }
 
-    /// With these materials, and for each face the number of its own, from 0.
+    /// Sets the materials, and for each face the number of its material, from 0.
     ///
     /// # Errors
     ///
-    /// If there are not as many numbers as faces, or one is out of range.
+    /// If the number of `of_faces` differs from that of the faces, or one is out of range.
     pub fn with_materials(
         self,
         materials: Vec<Material>,
@@ -81,7 +81,7 @@ impl Texture {
         Ok(Self { materials, of_faces, ..self })
     }
 
-    /// This texture, whose pictures the colours of the vertices multiply, as in glTF files.
+    /// Sets that vertex colours multiply the pictures, as in glTF files.
     #[must_use]
     pub fn multiplying_colours(self) -> Self {
         Self { multiplies_colours: true, ..self }
@@ -107,12 +107,12 @@ impl Texture {
         &self.of_faces
     }
 
-    /// Whether the colours of the vertices multiply pictures. Faces without a picture show the colours of the vertices in any case.
+    /// Whether vertex colours multiply pictures. Faces without a picture show the vertex colours in any case.
     pub fn multiplies_colours(&self) -> bool {
         self.multiplies_colours
     }
 
-    /// The picture of the one material, where there is one only: the content of a PNG or JPEG file.
+    /// The picture of the material, if there is only one: the content of a PNG or JPEG file.
     pub fn picture(&self) -> Option<&[u8]> {
         match self.materials.as_slice() {
             [material] => material.picture(),
@@ -120,7 +120,7 @@ impl Texture {
         }
     }
 
-    /// For faces cut as by [`crate::Mesh::subdivided`].
+    /// The texture of faces split as by [`crate::Mesh::subdivided`].
     pub(crate) fn subdivided(&self) -> Self {
         let mut coordinates = self.coordinates.clone();
         let corners = quartered(&self.corners, |ends| {
@@ -132,7 +132,7 @@ impl Texture {
     }
 }
 
-/// Whether a coordinate is one.
+/// Whether a texture coordinate is in range.
 pub(crate) fn is_near(x: &f64) -> bool {
     x.abs() <= FARTHEST
 }

@@ -1,4 +1,4 @@
-//! Writing a mesh, in the format that the path ends in.
+//! Writing of meshes, in the format of the path's extension.
 
 use std::{
     fs,
@@ -9,50 +9,49 @@ use std::{
 use crate::{Mesh, MeshError, format::Format, glb_writer, obj::Obj, ply};
 
 impl Mesh {
-    /// The text of an OBJ file, with as many digits as the numbers need; colours as `v x y z r g b`. Of a texture the coordinates are written,
-    /// but not the picture: GLB holds both.
+    /// The text of an OBJ file, with as many digits as the numbers need; colours as `v x y z r g b`. The coordinates of a texture are
+    /// written, but not its picture: GLB holds both.
     pub fn to_obj(&self) -> String {
         Obj(self).to_string()
     }
 
-    /// The bytes of a PLY file: binary, little endian, coordinates in 64 bits, so nothing of them is lost.
+    /// The bytes of a PLY file: binary, little endian, with coordinates in 64 bits, so they are exact.
     ///
-    /// Colours are rounded to 8 bits, `uchar red`, `green` and `blue`: all programs read these. A texture is left out.
+    /// Colours are rounded to 8 bits, `uchar red`, `green` and `blue`, which all programs read. A texture is omitted.
     pub fn to_ply(&self) -> Vec<u8> {
         ply::bytes(self)
     }
 
     /// The bytes of a GLB file (binary glTF 2.0) with one mesh and a two-sided material, grey unless the mesh has colours.
     ///
-    /// Coordinates are rounded to 32 bits: the format has no others. So a mesh that is far from the origin for its size is written around
-    /// [`Mesh::glb_origin`], to which its node moves it. Colours are written as the linear ones that the
-    /// format asks for, in 32 bits. A texture is written with its pictures, as they are; beside pictures colours are left out, since programs
-    /// would show the product of both, unless it is one ([`Texture::multiplies_colours`](crate::Texture::multiplies_colours)). Faces lie
-    /// material by material then. The format has one texture coordinate for each vertex, so vertices on seams are doubled, and those that no
-    /// face uses are left out.
+    /// Coordinates are rounded to 32 bits, the only type of the format. A mesh that is far from the origin for its size is therefore
+    /// written relative to [`Mesh::glb_origin`], to which its node moves it. Colours are written as linear ones, as the format requires, in
+    /// 32 bits. A texture is written with its pictures, unchanged; colours are then omitted, since programs would show the product of both,
+    /// unless that is intended ([`Texture::multiplies_colours`](crate::Texture::multiplies_colours)), and faces are sorted by material. The
+    /// format has one texture coordinate per vertex, so vertices on seams are duplicated, and unused ones are removed.
     ///
     /// # Panics
     ///
-    /// If the file would have 4 GiB or more, which the format cannot say.
+    /// If the file would have 4 GiB or more, which the format cannot represent.
     pub fn to_glb(&self) -> Vec<u8> {
         glb_writer::bytes(self)
     }
 
-    /// The translation of the node in [`Mesh::to_glb`], in world units: about the middle of the mesh where 32 bits would round coordinates by
-    /// more than 1e-5 of its longest side, as on a map, and else zeros.
+    /// The translation of the node in [`Mesh::to_glb`], in world units: approximately the middle of the mesh if 32 bits would round
+    /// coordinates by more than 1e-5 of its longest side, as on a map, else zeros.
     pub fn glb_origin(&self) -> [f64; 3] {
         glb_writer::origin(self)
     }
 
-    /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its ending, in any case.
+    /// Writes the mesh to a file at `path`: OBJ, PLY or GLB by its extension, in any case.
     ///
-    /// [`Mesh::load`] reads OBJ back without change, PLY with colours rounded to 8 bits, GLB with
-    /// all numbers rounded to 32 bits; [`Mesh::load_textured`] with the texture, as far as it was written. The file appears whole or not at all: it is written under another name in the same
+    /// [`Mesh::load`] reads OBJ back unchanged, PLY with colours rounded to 8 bits, GLB with all numbers rounded to 32 bits;
+    /// [`Mesh::load_textured`] also the texture, as far as it was written. The file is written atomically: under another name in the same
     /// folder, then renamed.
     ///
     /// # Errors
     ///
-    /// If the path has another ending, the folder is missing, or the file cannot be written.
+    /// If the path has another extension, the folder is missing, or the file cannot be written.
     ///
     /// # Panics
     ///

@@ -1,4 +1,4 @@
-//! The generated meshes: committed as they are made, and sound surfaces.
+//! The generated meshes: equal to the committed files, and valid surfaces.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -6,7 +6,7 @@ use std::{collections::HashSet, path::Path};
 
 use softrast_mesh::{Mesh, airplane, chair, fox, painted_fox};
 
-/// Each with the least and the largest volume it may have.
+/// Each with the least and the largest allowed volume.
 fn generated() -> [(&'static str, Mesh, [f64; 2]); 3] {
     [
         ("fox", fox(), [0.3, 0.5]),

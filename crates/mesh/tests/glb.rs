@@ -1,4 +1,4 @@
-//! GLB files as programs write them, and as they should not.
+//! GLB files as programs write them, and invalid ones.
 
 use serde_json::{Value, json};
 use softrast_mesh::Mesh;
@@ -144,7 +144,7 @@ fn colours((json, bin): &(Value, Vec<u8>)) -> Option<Vec<[f64; 3]>> {
 
 #[test]
 fn colours_are_floats_bytes_or_shorts_and_linear() {
-    // A fifth of the light is almost a half on the screen.
+    // A fifth of the light is almost a half in sRGB.
     let fifth = 0.484_529_204_481_713;
     let expected = [[0.0, 1.0, fifth]; 4];
     let close = |found: &(Value, Vec<u8>), expected: &[[f64; 3]]| {
@@ -156,9 +156,9 @@ fn colours_are_floats_bytes_or_shorts_and_linear() {
     close(&coloured(5121, "VEC4", &[0, 255, 51, 7].repeat(4)), &expected);
     let shorts: Vec<u8> = [0u16, 65535, 13107].iter().flat_map(|x| x.to_le_bytes()).collect();
     close(&coloured(5123, "VEC3", &shorts.repeat(4)), &expected);
-    // What is beyond 0 and 1 is held there, as the format says.
+    // Values beyond 0 and 1 are clamped, as the format requires.
     close(&coloured(5126, "VEC3", &floats(&[-1.0, 9.0, 0.2]).repeat(4)), &expected);
-    // Near 0 the curve is a line.
+    // Near 0 the curve is a straight line.
     close(&coloured(5126, "VEC4", &floats(&[0.002; 16])), &[[0.02584; 3]; 4]);
 }
 
@@ -265,13 +265,13 @@ fn buffers_may_be_data_uris_with_or_without_a_binary_chunk() {
             let mut json = json.clone();
             json["buffers"][0]["uri"] = json!(format!("{head};base64,{coded}"));
             assert_eq!(faces((json.clone(), vec![])), expected);
-            // Without the head of an empty binary chunk.
+            // Without the header of an empty binary chunk.
             let whole = glb(&json, &[]);
             let mut file = whole[..whole.len() - 8].to_vec();
             let length = (file.len() as u32).to_le_bytes();
             file[8..12].copy_from_slice(&length);
             assert_eq!(Mesh::parse(&file, "a.glb").expect("a sound file").faces(), expected);
-            // A second buffer beside the binary chunk.
+            // A second buffer next to the binary chunk.
             json["buffers"] = json!([{"byteLength": 6}, json["buffers"][0]]);
             json["bufferViews"][0]["buffer"] = json!(1);
             json["bufferViews"][1] = json!({"buffer": 0, "byteLength": 6});
@@ -303,15 +303,15 @@ fn factors_of_materials_multiply_the_linear_colours_of_their_parts() {
         }
         part
     };
-    // Half of the light is this bright on a screen.
+    // Half of the light in sRGB.
     let half = 0.735_356_983_052_449_2;
     for (parts, expected) in [
         (vec![with(0, true)], vec![[0.0, 1.0, 0.0]]),
         (vec![with(0, false)], vec![[half, 1.0, 0.0]]),
-        // What is no factor counts as 1.
+        // A value that is not a factor counts as 1.
         (vec![with(1, true)], vec![[0.0, 1.0, 1.0]]),
         (vec![with(2, false)], vec![[0.0, half, 1.0]]),
-        // The same vertices with two factors have none; with colours of their own they are others.
+        // Vertices shared by two factors have none; those with separate colours are different vertices.
         (vec![with(2, false), with(0, false), with(0, true)], vec![[1.0; 3], [0.0, 1.0, 0.0]]),
     ] {
         json["meshes"][0]["primitives"] = json!(parts);
@@ -336,7 +336,7 @@ fn a_gltf_file_has_its_buffers_inside_or_beside_it() {
     let whole = Mesh::parse(&glb(&json, &bin), "a.glb").unwrap();
     for uri in ["my%20buffer.bin", "my buffer.bin", "./my buffer.bin", "../far/my%20buffer.bin"] {
         json["buffers"][0]["uri"] = json!(uri);
-        // Some programs begin with a mark of the order of bytes.
+        // Some programs write a byte order mark.
         std::fs::write(at("a.gltf"), format!("\u{feff}{json}")).unwrap();
         let mesh = Mesh::load(at("a.gltf")).unwrap();
         assert_eq!((mesh.faces(), mesh.positions()), (&expected[..], whole.positions()), "{uri}");
@@ -359,7 +359,7 @@ fn a_gltf_file_has_its_buffers_inside_or_beside_it() {
     }
 }
 
-/// Many buffers may name one file, and then claim as many zeros as the file has bytes, and no more.
+/// Many buffers may refer to one file, and then claim as many zeros as the file has bytes, and no more.
 #[test]
 fn buffers_that_share_a_file_take_its_bytes_once() {
     let folder = tempfile::tempdir().unwrap();

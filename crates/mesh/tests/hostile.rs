@@ -1,11 +1,11 @@
-//! Whatever the bytes, reading gives a valid mesh or an error of one line, and nothing else.
+//! For any bytes, reading returns a valid mesh or an error of one line.
 
 use std::fs;
 
 use proptest::{collection::vec, prelude::*, sample};
 use softrast_mesh::{Mesh, Texture, icosphere};
 
-/// Reads `bytes` and checks what every mesh promises.
+/// Reads `bytes` and checks the guarantees of every mesh.
 fn read(bytes: &[u8], name: &str) {
     match Mesh::parse(bytes, name) {
         Ok(mesh) => {
@@ -26,7 +26,7 @@ fn read(bytes: &[u8], name: &str) {
     }
 }
 
-/// The same with textures, for a file of its own.
+/// Reads `bytes` from a file, with textures, and checks the guarantees of every mesh.
 fn read_textured(bytes: &[u8], name: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
@@ -50,7 +50,7 @@ fn nasty_files() -> Vec<Vec<u8>> {
     paths.iter().map(|path| fs::read(path).expect("a nasty file")).collect()
 }
 
-/// Pieces of OBJ files in any order: far more often nearly valid than random bytes are.
+/// Pieces of OBJ files in any order: far more often nearly valid than random bytes.
 fn pieces() -> impl Strategy<Value = Vec<u8>> {
     let piece = sample::select(vec![
         "v",
@@ -94,7 +94,7 @@ fn pieces() -> impl Strategy<Value = Vec<u8>> {
     vec(piece, 0..60).prop_map(|pieces| pieces.concat().into_bytes())
 }
 
-/// Every vertex at its x and y on a picture.
+/// The mesh with the x and y of every vertex as its texture coordinate.
 fn textured(mesh: Mesh) -> Mesh {
     let coordinates = mesh.positions().iter().map(|&[x, y, _]| [x, y]).collect();
     let texture = Texture::new(coordinates, mesh.faces().to_vec()).expect("valid");
@@ -187,7 +187,7 @@ proptest! {
         read(&bytes, name);
         for (place, byte, kind) in changes {
             if !bytes.is_empty() {
-                // Half of the changes are in the header, where most is decided.
+                // Half of the changes are in the header, where most is determined.
                 let length = if byte % 2 == 0 { bytes.len() } else { bytes.len().min(300) };
                 let place = place.index(length);
                 match kind {

@@ -1,4 +1,4 @@
-//! Well-known meshes of the field load with the sizes that others report.
+//! Well-known meshes of the field load with their published sizes.
 //!
 //! They are not part of this repository: `SOFTRAST_MESHES` names the folder that holds them.
 

@@ -1,4 +1,4 @@
-//! Small files that ask for much: what is quadratic in their length, or copied many times.
+//! Small files of high cost: quadratic in their length, or copied many times.
 //!
 //! Reading each of them in quadratic time would take minutes.
 
@@ -142,7 +142,7 @@ fn polygons_that_wind_many_times_are_cut_in_good_time() {
 
 #[test]
 fn a_polygon_of_a_hundred_thousand_corners_keeps_its_area() {
-    // A comb of unit teeth, each as wide as the gap beside it.
+    // A comb of unit teeth, each as wide as the gap next to it.
     let teeth = 25_000;
     let tooth = |k: i32| [[2 * k, 0], [2 * k, 1], [2 * k + 1, 1], [2 * k + 1, 0]];
     let top: Vec<[i32; 2]> = (0..teeth).flat_map(tooth).collect();

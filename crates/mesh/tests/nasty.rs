@@ -1,4 +1,4 @@
-//! Every file in `tests/nasty` gives what `expected.json` says of it.
+//! Every file in `tests/nasty` gives the result in `expected.json`.
 
 use std::{fs, path::Path};
 
@@ -57,13 +57,13 @@ fn check_error(file: &str, facts: &Value, error: &MeshError) {
         Some(line) => assert!(place.starts_with(&format!(":{line}: ")), "{message}"),
         None => assert!(place.starts_with(": no faces"), "{message}"),
     }
-    // "index out of range" is to be found in "index 7 is out of range".
+    // "index out of range" must match "index 7 is out of range".
     let reason = facts["reason"].as_str().unwrap_or_default();
     let words = reason.split(' ').collect::<Vec<_>>();
     assert!(words.iter().all(|word| message.contains(word)), "{message}: expected {reason}");
 }
 
-/// Volume between a triangle and the origin, positive if the triangle looks away from it.
+/// Volume between a triangle and the origin, positive if its front faces away from it.
 fn signed_volume([[ax, ay, az], [bx, by, bz], [cx, cy, cz]]: [[f64; 3]; 3]) -> f64 {
     (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6.0
 }

@@ -1,4 +1,4 @@
-//! OFF files as programs write them, and as they should not.
+//! OFF files as programs write them, and invalid ones.
 
 use softrast_mesh::Mesh;
 
@@ -34,7 +34,7 @@ fn colours_stand_behind_positions_and_normals() {
         "CNOFF\n3 1 0\n0 0 0 0 0 1 255 0 0 255\n1 0 0 0 0 1 0 51 0 255\n0 1 0 0 0 1 0 0 255 255\n{faces}"
     );
     assert_eq!(mesh(&levels).colours().unwrap()[1], [0.0, 0.2, 0.0]);
-    // Levels are as usual as shares, so neither is worth a warning.
+    // Levels are as common as values from 0 to 1, so neither has a warning.
     let folder = tempfile::tempdir().unwrap();
     for (file, warnings) in [(&levels, 0), (&shares, 0), (&shares.replace(".5", "700"), 1)] {
         let path = folder.path().join("a.off");

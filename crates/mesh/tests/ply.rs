@@ -1,4 +1,4 @@
-//! PLY files as programs write them, and as they should not.
+//! PLY files as programs write them, and invalid ones.
 
 use softrast_mesh::Mesh;
 
@@ -7,7 +7,7 @@ const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nprop
 const POSITIONS: [[f32; 3]; 4] =
     [[0.0, 0.0, 0.5], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 
-/// A quad and a triangle, numbers in the byte order that `format` names.
+/// A quad and a triangle, with numbers in the byte order of `format`.
 fn binary(format: &str, float: fn(f32) -> [u8; 4], int: fn(i32) -> [u8; 4]) -> Vec<u8> {
     let mut file = format!("ply\nformat {format} 1.0\n{HEADER}").into_bytes();
     for position in POSITIONS {
@@ -78,7 +78,7 @@ fn colours_are_bytes_shorts_or_floats() {
     let mesh = coloured(&floats, ["9 .25 1 9 0"; 3]).unwrap();
     assert_eq!(mesh.colours().unwrap(), [[1.0, 0.0, 0.25]; 3]);
     assert_eq!(mesh.positions()[1], [1.0, 0.0, 0.0]);
-    // One channel is no colour.
+    // A single channel is not a colour.
     assert_eq!(coloured(&["uchar red"], ["7"; 3]).unwrap().colours(), None);
 }
 

@@ -1,4 +1,4 @@
-//! STL files as programs write them, and as they should not.
+//! STL files as programs write them, and invalid ones.
 
 use softrast_mesh::Mesh;
 
@@ -33,7 +33,7 @@ fn corners_at_one_place_are_one_vertex_in_text_and_binary() {
         text(" a solid thing").into_bytes(),
         text("").to_uppercase().replace('\n', "\r\n").into_bytes(),
         binary(b"made by hand"),
-        // Many programs start binary files like texts.
+        // Many programs start binary files like text ones.
         binary(b"solid facet normal"),
         padded,
     ];

@@ -1,4 +1,4 @@
-//! Textures in OBJ and GLB files: as programs write them, as they should not, and as they come back.
+//! Textures in OBJ and GLB files: as programs write them, invalid ones, and after a round trip.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use softrast_mesh::{Material, Mesh, Texture, icosphere};
 use tempfile::TempDir;
 
-/// What starts as a PNG file does; nothing decodes it here.
+/// Content with the signature of a PNG file; it is not decoded here.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n and so on";
 const JPEG: &[u8] = b"\xff\xd8\xff\xe0 and so on";
 
@@ -120,7 +120,7 @@ fn what_is_wrong_with_the_texture_of_an_obj_file_leaves_it_out_by_name() {
         assert_eq!(left_out.as_deref(), Some(message));
         assert_eq!(mesh.texture(), None);
     }
-    // No corner has a coordinate: nothing is missing.
+    // No corner has a coordinate, so none is missing.
     let (mesh, left_out) = wrong(&format!("{SQUARE}f 1 2 3\nf 1/ 3//1 4/\n"));
     assert_eq!((mesh.texture(), left_out), (None, None));
 }
@@ -153,7 +153,7 @@ fn a_picture_that_cannot_be_had_leaves_coordinates_and_says_why() {
         options,
         "a.obj: materials: map_Kd of \"a\" has options, which are not read: -s 2 2 a.png",
     );
-    // Of two pictures the one that is there is shown.
+    // The available one of two pictures is shown.
     let several = mtl(&[("a.png", PNG)], "newmtl a\nmap_Kd a.png\nnewmtl b\nmap_Kd b.png");
     starts(several, "b.png: cannot be read: ");
     // Materials without pictures have colours.
@@ -180,7 +180,7 @@ fn faces_of_an_obj_file_show_the_pictures_and_colours_of_their_materials() {
     assert!(red == 1.0 && green == 0.0 && (blue - 0.2140).abs() < 1e-4, "{blue}: half of sRGB");
     assert_eq!(corners(&mesh)[3], [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]);
 
-    // A picture has no place on a corner without a coordinate.
+    // A picture cannot be placed on a corner without a coordinate.
     let spoiled = obj.replace("f 1/4 2/3 3/2", "f 1/4 2/3 3");
     let files = [("a.obj", spoiled.as_bytes()), files[1], files[2], files[3]];
     let (mesh, warning) = load(folder(&files).path(), "a.obj");
@@ -189,7 +189,7 @@ fn faces_of_an_obj_file_show_the_pictures_and_colours_of_their_materials() {
         "a.obj:14: a corner has no texture coordinate, but its material \"a\" shows a picture";
     assert_eq!(warning.as_deref(), Some(expected));
 
-    // Colours without any picture or coordinate; those of vertices count in their place.
+    // Colours without any picture or coordinate; vertex colours take precedence.
     let plain = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n";
     let painted = plain.replace(" 0 0\n", " 0 0 1 1 1\n").replace(" 1 0\n", " 1 0 1 1 1\n");
     for (text, factor) in [(plain, Some([1.0, 0.0, blue])), (painted.as_str(), None)] {
@@ -224,7 +224,7 @@ fn a_line_may_name_several_libraries_and_names_may_hold_spaces() {
         assert_eq!(warning, None, "{line}");
         assert_eq!(mesh.texture().unwrap().picture(), Some(PNG), "{line}");
     }
-    // Words that are files count where the whole is none.
+    // Words that are files are used if the whole text is not a file.
     let obj = format!("mtllib gone b\n{SQUARE}{FACES}");
     let folder = folder(&[("a.obj", obj.as_bytes()), ("b", shown), picture]);
     let (mesh, warning) = load(folder.path(), "a.obj");
@@ -309,7 +309,7 @@ fn signs_in_the_names_of_files_stay_out_of_warnings() {
 
 type Change<'a> = &'a dyn Fn(&mut Value, &mut Vec<u8>);
 
-/// A square in two parts that share vertices, coordinates and a picture; `change` spoils it.
+/// A square in two parts that share vertices, coordinates and a picture; `change` modifies it.
 fn glb(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
     let floats = |values: &[f32]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let mut bin = floats(&[0., 0., 0., 1., 0., 0., 1., 1., 0., 0., 1., 0.]);
@@ -515,7 +515,7 @@ fn the_diffuse_picture_of_specular_and_glossy_materials_is_the_texture() {
     }
 }
 
-/// The part in two materials, the second with a picture beside the file.
+/// The part in two materials, the second with a picture in another file.
 fn of_two_materials(change: impl Fn(&mut Value)) -> (Mesh, Option<String>) {
     let file = glb(|json, _| {
         json["meshes"][0]["primitives"][1]["material"] = json!(1);
@@ -548,12 +548,12 @@ fn parts_of_a_glb_file_have_pictures_and_factors_of_their_own() {
     assert!(!mesh.texture().unwrap().multiplies_colours());
     assert_eq!(mesh.texture().unwrap().coordinates().len(), 4, "both parts share them");
 
-    // What cannot be read is left out alone.
+    // Only unreadable pictures are omitted.
     let (mesh, warning) = of_two_materials(|json| json["images"][1]["uri"] = json!("b.jpg"));
     assert_eq!(looks(&mesh), [(png.clone(), white), (None, blue)]);
     assert!(warning.unwrap().starts_with("b.jpg: cannot be read: "));
 
-    // Without a picture the factor is in the colours of vertices, unless others share these.
+    // Without a picture the factor is in the vertex colours, unless others share these.
     let (mesh, warning) = of_two_materials(|json| {
         json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = json!(null);
     });
@@ -568,7 +568,7 @@ fn parts_of_a_glb_file_have_pictures_and_factors_of_their_own() {
     assert_eq!(mesh.colours(), Some(&[[0.0, 1.0, 0.0]; 4][..]));
     assert_eq!(looks(&mesh), [(None, white), (None, white)]);
 
-    // Colours of vertices multiply the picture.
+    // Vertex colours multiply the picture.
     let (mesh, warning) = of_two_materials(|json| {
         for part in json["meshes"][0]["primitives"].as_array_mut().unwrap() {
             part["attributes"]["COLOR_0"] = json!(0);
@@ -599,7 +599,7 @@ fn several_materials_that_are_written_to_glb_come_back() {
         let (found, warning) = load(folder.path(), "a.glb");
         assert_eq!(warning, None);
         let texture = found.texture().unwrap();
-        // Faces lie by material, and the material that no face has is gone.
+        // Faces are sorted by material, and the unused material is removed.
         assert_eq!(texture.materials(), &materials[..3]);
         let expected: Vec<u32> = (0..80).map(|face| face / 27).collect();
         assert_eq!(texture.of_faces(), expected);
@@ -638,7 +638,7 @@ fn a_required_extension_that_is_not_read_is_a_warning_or_an_error() {
     }
 }
 
-/// A ball with a seam: faces of its right half have coordinates of their own.
+/// A ball with a seam: faces of its right half have separate coordinates.
 fn ball() -> Mesh {
     let ball = icosphere(1);
     let flat = |[x, y, _]: [f64; 3], side: f64| [side + x / 4.0, 0.5 + y / 2.0];

@@ -1,4 +1,4 @@
-//! A mesh file is an ordinary file, although it is written under another name first.
+//! A mesh file is an ordinary file, although it is first written under another name.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]

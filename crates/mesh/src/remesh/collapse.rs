@@ -4,13 +4,13 @@ use super::{
     lengths, normal, place, shape,
 };
 
-/// Edges that a vertex may have after two have become one.
+/// Most edges of a vertex after a collapse.
 const MOST_EDGES: u32 = 10;
 /// Least cosine of the angle by which a face may turn.
 const TURN: f32 = 0.5;
 
 impl HalfEdges {
-    /// Makes a vertex of each edge that is too short, where the surface allows it: the number of them.
+    /// Collapses each edge that is too short into a vertex, if the surface allows it; returns their number.
     pub(super) fn collapse_short(&mut self, numbers: &mut [f32], width: usize) -> usize {
         let mut marks = vec![0u32; self.of_vertex.len()];
         let (mut mark, mut count) = (0, 0);
@@ -39,8 +39,8 @@ impl HalfEdges {
         count
     }
 
-    /// Whether the surface stays one without the edge of this half-edge: its ends have no common neighbours but the two across, and no vertex loses too many
-    /// edges or gets too many.
+    /// Whether the surface stays manifold without the edge of this half-edge: its ends have no common neighbours except the two opposite
+    /// vertices, and no vertex ends up with too few or too many edges.
     fn may_become_one(&self, h: u32, marks: &mut [u32], mark: u32) -> bool {
         let t = self.twin[h as usize];
         let [a, b, c, d] = [h, t, previous(h), previous(t)].map(|h| self.from[h as usize]);
@@ -53,7 +53,7 @@ impl HalfEdges {
         self.around(b).filter(common).count() == 2
     }
 
-    /// Whether a vertex may move to a place without turning a face over, except those between `ends`, and without an edge above this length.
+    /// Whether a vertex may move to a position without turning a face over, except those between `ends`, or an edge above this length.
     fn may_move(
         &self,
         numbers: &[f32],
@@ -78,7 +78,7 @@ impl HalfEdges {
         })
     }
 
-    /// Merges the vertex at which the half-edge begins into the one at which it ends, in the middle.
+    /// Merges the start vertex of the half-edge into its end vertex, at the midpoint.
     fn merge(&mut self, h: u32, numbers: &mut [f32], width: usize) {
         let t = self.twin[h as usize];
         let [a, b, c, d] = [h, t, previous(h), previous(t)].map(|h| self.from[h as usize]);

@@ -4,13 +4,13 @@ use super::{
     lengths, normal, place, shape,
 };
 
-/// Least cosine of the angle between each of two new faces and the two old ones together.
+/// Least cosine of the angle between each of two new faces and the sum of the two old ones.
 const FLAT: f32 = 0.8;
-/// How many edges a vertex of an even mesh has.
+/// Number of edges per vertex in a regular mesh.
 const EDGES: i32 = 6;
 
 impl HalfEdges {
-    /// Flips each edge where that brings the numbers of edges at its four vertices nearer to six and the surface is about flat: the number of them.
+    /// Flips each edge if that brings the valences of its four vertices closer to six and the surface is nearly flat; returns their number.
     pub(super) fn flip(&mut self, numbers: &[f32], width: usize) -> usize {
         let mut count = 0;
         for h in 0..self.from.len() as u32 {
@@ -51,7 +51,7 @@ impl HalfEdges {
             && !self.around(c).any(|g| self.from[next(g) as usize] == d)
     }
 
-    /// Joins the two vertices across by the edge of a half-edge.
+    /// Flips the edge of a half-edge to join the two opposite vertices.
     fn flip_one(&mut self, h: u32) {
         let t = self.twin[h as usize];
         let (hn, hp, tn, tp) = (next(h), previous(h), next(t), previous(t));

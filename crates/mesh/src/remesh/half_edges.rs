@@ -6,13 +6,13 @@ const NONE: u32 = u32::MAX;
 /// Faces as half-edges: half-edge h lies in face h / 3 and begins at the corner h % 3 of it.
 #[derive(Clone, Debug)]
 pub(super) struct HalfEdges {
-    /// The vertex at which each half-edge begins.
+    /// Start vertex of each half-edge.
     pub(super) from: Vec<u32>,
-    /// The half-edge the other way, in the neighbouring face.
+    /// The opposite half-edge, in the neighbouring face.
     pub(super) twin: Vec<u32>,
-    /// A half-edge that begins at each vertex.
+    /// A half-edge that starts at each vertex.
     pub(super) of_vertex: Vec<u32>,
-    /// How many edges each vertex has.
+    /// Number of edges of each vertex.
     pub(super) valence: Vec<u32>,
     /// Whether a face has collapsed.
     pub(super) is_dead: Vec<bool>,
@@ -33,11 +33,11 @@ pub(super) fn previous(h: u32) -> u32 {
 }
 
 impl HalfEdges {
-    /// Half-edges of faces over so many vertices.
+    /// Half-edges of faces over `vertices` vertices.
     ///
     /// # Errors
     ///
-    /// If an edge has not two faces that go through it in opposite directions, or faces at a vertex do not make one fan.
+    /// If an edge does not have two faces in opposite directions, or the faces at a vertex do not form a single fan.
     pub(super) fn new(faces: &[[u32; 3]], vertices: usize) -> Result<Self, MeshError> {
         let from = faces.as_flattened().to_vec();
         let twin = twins(&from, vertices)?;
@@ -59,12 +59,12 @@ impl HalfEdges {
         }
     }
 
-    /// How many faces there have been, dead ones among them.
+    /// Number of faces, including dead ones.
     pub(super) fn faces(&self) -> usize {
         self.is_dead.len()
     }
 
-    /// Half-edges that begin at a vertex, once around.
+    /// Half-edges that start at a vertex, once around.
     #[inline(always)]
     pub(super) fn around(&self, vertex: u32) -> impl Iterator<Item = u32> + '_ {
         let first = self.of_vertex[vertex as usize];
@@ -75,7 +75,7 @@ impl HalfEdges {
         std::iter::successors(Some(first), turn)
     }
 
-    /// Makes each other's twins of two half-edges.
+    /// Makes two half-edges each other's twins.
     #[inline(always)]
     pub(super) fn join(&mut self, g: u32, h: u32) {
         (self.twin[g as usize], self.twin[h as usize]) = (h, g);
@@ -149,7 +149,7 @@ fn twins(from: &[u32], vertices: usize) -> Result<Vec<u32>, MeshError> {
             }
         }
     }
-    // Two twins each way between the same vertices could be paired otherwise.
+    // With two twins each way between the same vertices, the pairing would be ambiguous.
     let open = (0..count).find(|&h| {
         let ([a, b], lower) = (ends(h), lower(h));
         let slots = starts[lower] as usize..filled[lower] as usize;

@@ -1,5 +1,5 @@
-//! Remeshing of closed surfaces towards edges of given lengths: short edges collapse, long ones are split, and edges are flipped towards six at each
-//! vertex.
+//! Remeshing of closed surfaces towards given edge lengths: short edges collapse, long ones are split, and edges are flipped towards
+//! valence six.
 //!
 //! Source: Botsch and Kobbelt 2004; in an optimisation, Palfinger 2022.
 
@@ -14,17 +14,17 @@ use half_edges::HalfEdges;
 
 use crate::{Mesh, MeshError};
 
-/// Edges shorter than this part of their target length collapse.
+/// Edges shorter than this fraction of their target length collapse.
 const SHORTEST: f32 = 0.8;
-/// No change makes a triangle nearer to a line than this, by [`shape`], unless it was nearer before.
+/// Least [`shape`] of a triangle after a change, unless it was lower before.
 const THINNEST: f32 = 0.06;
-/// Edges longer than this part of their target length are split.
+/// Edges longer than this multiple of their target length are split.
 const LONGEST: f32 = 4.0 / 3.0;
 
-/// A closed surface whose vertices and faces change, with numbers that belong to its vertices and move with them.
+/// A closed surface with mutable topology, and numbers attached to its vertices.
 ///
-/// A row of numbers belongs to each vertex: its position, the length that edges around it should have, and whatever else a caller keeps. A vertex that is
-/// made in the middle of an edge has the mean of both ends in all of them, and so has one that two vertices are merged to.
+/// Each vertex has a row of numbers: its position, the target length of edges around it, and custom numbers of the caller. The row of a new
+/// vertex in the middle of an edge is the mean of those of both ends, and so is that of a merged vertex.
 ///
 /// ```
 /// use softrast_mesh::{ClosedSurface, icosphere};
@@ -45,21 +45,21 @@ pub struct ClosedSurface {
     width: usize,
 }
 
-/// How often a pass over a surface changed it.
+/// Numbers of changes of a pass over a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
-    /// Edges that became a vertex.
+    /// Collapsed edges.
     pub collapsed: usize,
-    /// Edges that got a vertex in their middle.
+    /// Edges split at their midpoint.
     pub split: usize,
-    /// Edges that now join the two vertices across.
+    /// Edges flipped to join the two opposite vertices.
     pub flipped: usize,
 }
 
 impl ClosedSurface {
-    /// Column of the length that edges around a vertex should have, after those of its position.
+    /// Column of the target length of edges around a vertex, after those of its position.
     pub const LENGTH: usize = 3;
-    /// Columns before those of the caller.
+    /// Number of columns before those of the caller.
     pub const OWN: usize = 4;
 
     /// The surface of a mesh, with edges that should have this `length` in its units, and `more` numbers of 0 for each vertex.
@@ -67,7 +67,7 @@ impl ClosedSurface {
     ///
     /// # Errors
     ///
-    /// If an edge has not two faces that go through it in opposite directions, or faces at a vertex do not make one fan.
+    /// If an edge does not have two faces in opposite directions, or the faces at a vertex do not form a single fan.
     ///
     /// # Panics
     ///
@@ -91,12 +91,12 @@ impl ClosedSurface {
         self.edges.corners()
     }
 
-    /// Numbers of all vertices, `[vertices, 4 + more]`: x, y, z, the length of edges, and those of the caller.
+    /// Numbers of all vertices, `[vertices, 4 + more]`: x, y, z, the target length of edges, and those of the caller.
     pub fn numbers(&self) -> &[f32] {
         &self.numbers
     }
 
-    /// Numbers of all vertices, to be changed. Lengths must stay positive.
+    /// Mutable numbers of all vertices. Lengths must stay positive.
     pub fn numbers_mut(&mut self) -> &mut [f32] {
         &mut self.numbers
     }
@@ -120,16 +120,16 @@ impl ClosedSurface {
         self.width
     }
 
-    /// How many vertices there are.
+    /// Number of vertices.
     pub fn vertices(&self) -> usize {
         self.numbers.len() / self.width
     }
 
-    /// Asks for edges of this length everywhere.
+    /// Sets the target length of all edges.
     ///
     /// # Panics
     ///
-    /// If it is not positive and finite in 32 bits.
+    /// If `length` is not positive and finite in 32 bits.
     pub fn set_length(&mut self, length: f64) {
         let length = length as f32;
         assert!(length > 0.0 && length.is_finite(), "edges of length {length}");
@@ -147,8 +147,8 @@ impl ClosedSurface {
         Mesh::new(positions.collect(), self.faces().to_vec())
     }
 
-    /// One pass over all edges: collapses those below four fifths of their target length, the mean of both ends; splits those above four thirds, while there are
-    /// no more than `most` faces; flips those where the numbers of edges at the four vertices around come nearer to six.
+    /// One pass over all edges: collapses those below four fifths of their target length, the mean of both ends; splits those above four
+    /// thirds, while there are at most `most` faces; flips those for which the valences of the four adjacent vertices come closer to six.
     ///
     /// The surface stays closed and of its genus. No change turns a face by more than 60 degrees, makes a needle of it, or makes two edges between the same
     /// vertices.
@@ -164,7 +164,7 @@ impl ClosedSurface {
     }
 }
 
-/// Place of a vertex.
+/// Position of a vertex.
 #[inline(always)]
 fn place(numbers: &[f32], width: usize, vertex: u32) -> [f32; 3] {
     let start = vertex as usize * width;
@@ -196,7 +196,7 @@ fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
     [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
 }
 
-/// How far a triangle is from a line: twice its area in the sum of its squared sides, at most 0.29 for one with equal sides.
+/// Quality of a triangle: twice its area over the sum of its squared sides, 0 for a line, 0.29 if equilateral.
 #[inline(always)]
 fn shape(corners: [[f32; 3]; 3]) -> f32 {
     let [a, b, c] = corners;
@@ -205,10 +205,10 @@ fn shape(corners: [[f32; 3]; 3]) -> f32 {
     dot(n, n).sqrt() / sides.into_iter().map(|side| dot(side, side)).sum::<f32>()
 }
 
-/// Whether the angle between two vectors has a cosine above this; a vector of no length has none.
+/// Whether the cosine of the angle between two vectors is above `cosine`; false for a vector of length 0.
 #[inline(always)]
 fn are_within(a: [f32; 3], b: [f32; 3], cosine: f32) -> bool {
-    // Products of squares of small triangles would leave the range of an f32.
+    // Products of squares of small triangles would leave the range of f32.
     let across = dot(a, b);
     across > cosine * dot(a, a).sqrt() * dot(b, b).sqrt()
 }

@@ -5,7 +5,7 @@ use super::{
 };
 
 impl HalfEdges {
-    /// Puts a vertex into the middle of each edge that is too long, while there are no more than `most` faces: the number of them.
+    /// Splits each edge that is too long at its midpoint, while there are at most `most` faces; returns their number.
     pub(super) fn split_long(
         &mut self,
         numbers: &mut Vec<f32>,
@@ -14,7 +14,7 @@ impl HalfEdges {
     ) -> usize {
         let mut room = most.saturating_sub(self.is_dead.iter().filter(|dead| !**dead).count());
         let mut count = 0;
-        // Half-edges that are made on the way are for the next pass.
+        // New half-edges are left for the next pass.
         for h in 0..self.from.len() as u32 {
             let ends @ [a, b] = [self.from[h as usize], self.from[next(h) as usize]];
             if self.is_dead[h as usize / 3] || a > b {
@@ -33,7 +33,7 @@ impl HalfEdges {
         count
     }
 
-    /// Puts a vertex into the middle of the edge of a half-edge, and an edge from there to both vertices across.
+    /// Inserts a vertex at the midpoint of the edge of a half-edge, and edges from there to both opposite vertices.
     fn split(&mut self, h: u32, numbers: &mut Vec<f32>, width: usize) {
         let t = self.twin[h as usize];
         let [a, b, c, d] = [h, t, previous(h), previous(t)].map(|h| self.from[h as usize]);

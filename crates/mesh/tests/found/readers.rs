@@ -1,11 +1,11 @@
-//! The readers of mesh files, each with sound files to begin with, and the checks of what they return.
+//! The readers of mesh files, each with valid seed files, and the checks of their results.
 
 use std::{fs, path::Path};
 
 use serde_json::{Value, json};
 use softrast_mesh::{Mesh, MeshError, Texture, icosphere};
 
-/// A reader under test. The names of files that were found begin with the `name`.
+/// A reader under test. The names of its files in `found` start with `name`.
 pub(crate) struct Kind {
     pub(crate) name: &'static str,
     pub(crate) ending: &'static str,
@@ -51,7 +51,7 @@ fn loaded(bytes: &[u8], folder: &Path, name: &str) {
     check(Mesh::load_textured(&path));
 }
 
-/// Checks what every mesh and every error promises.
+/// Checks the guarantees of every mesh and every error.
 fn check(result: Result<(Mesh, Vec<MeshError>), MeshError>) {
     let one_line = |error: &MeshError| {
         let message = error.to_string();
@@ -100,7 +100,7 @@ fn textured_mtl(bytes: &[u8], folder: &Path) {
     loaded(SQUARE.as_bytes(), folder, "a.obj");
 }
 
-/// Files that materials name.
+/// Creates files that materials refer to.
 fn beside(folder: &Path) {
     if !folder.join("a.png").exists() {
         fs::write(folder.join("a.png"), b"\x89PNG\r\n\x1a\n").expect("a file in the folder");
@@ -168,7 +168,7 @@ fn plys() -> Vec<Vec<u8>> {
     vec![text.into(), big, painted.to_ply(), icosphere(1).to_ply()]
 }
 
-/// Every vertex of a ball at its x and y on a picture.
+/// A ball with the x and y of every vertex as its texture coordinate.
 fn textured() -> Mesh {
     let mesh = icosphere(0);
     let coordinates = mesh.positions().iter().map(|&[x, y, _]| [x, y]).collect();
@@ -213,7 +213,7 @@ fn offs() -> Vec<Vec<u8>> {
     vec![plain.into(), joined.into(), coloured.into()]
 }
 
-/// Files whose buffer lies beside them.
+/// Files whose buffer is in another file.
 fn gltf_files() -> Vec<Vec<u8>> {
     let beside = |json: Vec<u8>| {
         let mut json: Value = serde_json::from_slice(&json).expect("JSON");
