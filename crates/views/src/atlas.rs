@@ -8,19 +8,19 @@ use softrast_mesh::{Mesh, Texture, from_linear, to_linear};
 
 use crate::PictureFile;
 
-/// Red, green and blue of faces that have neither a picture nor colours; as screens have them.
+/// sRGB colour of faces without picture and colours.
 const GREY: [f64; 3] = [0.7; 3];
-/// Texels along a side of the square of a face whose colours change from corner to corner.
+/// Texels along a side of the square of a face whose colours differ between corners.
 const SMALLEST: usize = 4;
 /// Texels around a part of a picture.
 const MARGIN: i64 = 1;
-/// Times that pictures are reduced until everything has room.
+/// Most reductions of pictures until everything fits.
 const MOST_ROUNDS: usize = 8;
 
-/// One picture for all faces of a mesh, whatever materials they have: pictures, factors and colours of vertices are multiplied as glTF asks.
+/// A single picture for all faces of a mesh, for any materials: pictures, factors and vertex colours are multiplied as in glTF.
 ///
-/// A single picture without a factor stays as it is. Of others the parts that faces show are packed beside each other. Between texels the colours are
-/// then those of the pictures themselves, over seams and repeats too.
+/// A single picture without a factor is used unchanged. Otherwise the visible parts of the pictures are packed. Colours interpolated
+/// between texels equal those of the original pictures, also across seams and repeats.
 #[derive(Clone, Debug)]
 pub struct Atlas {
     coordinates: Vec<[f64; 2]>,
@@ -29,9 +29,9 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// The atlas of the texture of a mesh, of at most so many texels, and why pictures are not in it. Pictures that are too large for that are
-    /// reduced. None where the mesh has no texture, or one whose materials have neither pictures nor factors that can be shown: colours of
-    /// vertices say everything then.
+    /// The atlas of the texture of a mesh, of at most `most` texels, and the errors of omitted pictures. Pictures that are too large are
+    /// reduced. `None` if the mesh has no texture, or one whose materials have neither readable pictures nor factors: vertex colours
+    /// suffice then.
     pub fn of(mesh: &Mesh, most: usize) -> (Option<Self>, Vec<Error>) {
         let Some(texture) = mesh.texture() else { return (None, vec![]) };
         let mut pictures = Pictures::of(texture);
@@ -67,7 +67,7 @@ impl Atlas {
         (None, errors)
     }
 
-    /// (u, v) from 0 to 1, v up; beyond them the picture repeats.
+    /// (u, v) from 0 to 1, v up; beyond that range the picture repeats.
     pub fn coordinates(&self) -> &[[f64; 2]] {
         &self.coordinates
     }
@@ -82,16 +82,16 @@ impl Atlas {
         &self.picture
     }
 
-    /// The colour between the texels at a coordinate, from 0 to 1 as screens have it.
+    /// The colour interpolated between texels at a coordinate, from 0 to 1 in sRGB.
     pub fn colour_at(&self, coordinate: [f64; 2]) -> [f64; 3] {
         between(texels(coordinate, &self.picture), &self.picture)
     }
 }
 
-/// A mesh with the colours of its texture at its vertices, so that these are means over their surroundings; or none where the texture
-/// has none, and why pictures are not in them.
+/// A mesh with the colours of its texture at its vertices, as means over their neighbourhoods; `None` if the texture has none; and the
+/// errors of omitted pictures.
 ///
-/// A mesh of few faces is cut as by [`Mesh::subdivided`] before, while it has at most so many in the end.
+/// A mesh of few faces is first subdivided as by [`Mesh::subdivided`], as long as it then has at most `most_faces`.
 pub fn painted_by_texture(mesh: &Mesh, most_faces: usize) -> (Option<Mesh>, Vec<Error>) {
     let mut mesh = mesh.clone();
     let (atlas, errors) = Atlas::of(&mesh, MOST_TEXELS);
@@ -116,22 +116,22 @@ pub fn painted_by_texture(mesh: &Mesh, most_faces: usize) -> (Option<Mesh>, Vec<
             }
         }
     }
-    // A vertex that no face uses is not seen.
+    // A vertex that no face uses is not visible.
     let mean = |(sum, count): ([f64; 3], f64)| sum.map(|x| (x / count.max(1.0)).clamp(0.0, 1.0));
     let colours = sums.into_iter().map(mean).collect();
     (mesh.with_colours(colours).ok(), errors)
 }
 
-/// Texels of the atlas of a mesh that gets colours at its vertices.
+/// Texels of the atlas of a mesh whose vertices are coloured.
 const MOST_TEXELS: usize = 1 << 22;
-/// Weights of corners where a vertex looks for its colour: the corner itself, and three places around it.
+/// Barycentric weights of the sample points of a vertex: the corner itself, and three points around it.
 const AROUND: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.7, 0.3, 0.0], [0.7, 0.0, 0.3], [0.6, 0.2, 0.2]];
 
 const WHITE: [f64; 3] = [1.0; 3];
 
 /// The texels of the pictures of a texture.
 struct Pictures {
-    /// By where their files lie in memory, so that each is decoded once.
+    /// By the address of their files in memory, so that each is decoded once.
     of_files: HashMap<*const u8, Option<RgbImage>>,
     of_materials: Vec<Option<*const u8>>,
 }
@@ -148,7 +148,7 @@ impl Pictures {
         Self { of_files: HashMap::new(), of_materials }
     }
 
-    /// Decodes pictures anew: together at most so many texels, and each at most what `limit` makes of the number of those it has now.
+    /// Decodes pictures again: at most `most` texels in total, and at most `limit` of its current number of texels for each.
     fn reduce(&mut self, texture: &Texture, most: usize, limit: impl Fn(f64) -> f64) -> Vec<Error> {
         let mut errors = vec![];
         let mut done = HashMap::new();
@@ -192,22 +192,22 @@ struct Patch {
 enum Fill {
     /// The picture of a material from this texel on.
     Cut { material: usize, low: [i64; 2] },
-    /// A face, its first corner above left, the second right, the third below: colours of its corners, proportional to light, times the picture
-    /// of a material, on which the corners lie at these texels.
+    /// A face, with its first corner at the upper left, the second at the right, the third below: linear colours of its corners, times the
+    /// picture of a material, on which the corners are at these texels.
     Face { light: [[f64; 3]; 3], shown: Option<(usize, [[f64; 2]; 3])> },
 }
 
 /// A box around texels: the first and the last.
 type Bounds = [[i64; 2]; 2];
 
-/// Which patches there are, and where on them faces lie.
+/// The patches, and the positions of faces on them.
 struct Layout {
     patches: Vec<Patch>,
-    /// The patch of each face, and its corners in texels from the patch's corner above left.
+    /// The patch of each face, and its corners in texels from the patch's upper left corner.
     faces: Vec<(usize, [[f64; 2]; 3])>,
 }
 
-/// Where patches begin.
+/// Positions of patches.
 struct Placed {
     width: usize,
     height: usize,
@@ -263,8 +263,8 @@ impl Layout {
         layout
     }
 
-    /// Adds a patch for each material whose faces overlap so much that one for all of them is smaller than one for each. Returns, for such a
-    /// material, the patch and the texel at which it begins.
+    /// Adds a patch for each material whose faces overlap so much that one patch for all of them is smaller than one for each. Returns the
+    /// patch and its first texel for each of these materials.
     fn add_shared(
         &mut self,
         mesh: &Mesh,
@@ -292,7 +292,7 @@ impl Layout {
         all.into_iter().enumerate().map(&mut add).collect()
     }
 
-    /// Patches on shelves, the highest first.
+    /// Packs patches on shelves, the highest first.
     fn placed(&self) -> Placed {
         let mut order = Vec::from_iter(0..self.patches.len());
         order.sort_by_key(|&k| std::cmp::Reverse(self.patches[k].size[1]));
@@ -378,12 +378,12 @@ fn uv_of_faces(texture: &Texture) -> impl Iterator<Item = [[f64; 2]; 3]> {
     texture.corners().iter().map(move |corners| corners.map(at))
 }
 
-/// A coordinate in texels of a picture, from its corner above left.
+/// A coordinate in texels of a picture, from its upper left corner.
 fn texels([u, v]: [f64; 2], picture: &RgbImage) -> [f64; 2] {
     [u * f64::from(picture.width()), (1.0 - v) * f64::from(picture.height())]
 }
 
-/// Corners moved by whole pictures, so that the lowest lie in the first.
+/// Corners moved by whole pictures, so that the lowest are in the first.
 fn shifted(corners: [[f64; 2]; 3], picture: &RgbImage) -> [[f64; 2]; 3] {
     let sides = [picture.width(), picture.height()].map(f64::from);
     let lowest =
@@ -392,7 +392,7 @@ fn shifted(corners: [[f64; 2]; 3], picture: &RgbImage) -> [[f64; 2]; 3] {
     corners.map(|corner| [0, 1].map(|k| corner[k] - back[k]))
 }
 
-/// The texels that a triangle needs, margins included.
+/// The texels needed by a triangle, including margins.
 fn bounds(corners: [[f64; 2]; 3]) -> Bounds {
     let of = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
         let all = corners.iter().map(|corner| corner[k]);
@@ -417,19 +417,19 @@ fn texels_in(bounds: [[i64; 2]; 2]) -> f64 {
     width as f64 * height as f64
 }
 
-/// Corners in texels from this one on.
+/// Corners in texels relative to `low`.
 fn from(corners: [[f64; 2]; 3], low: [i64; 2]) -> [[f64; 2]; 3] {
     corners.map(|corner| [0, 1].map(|k| corner[k] - low[k] as f64))
 }
 
-/// The levels of a texel of a picture that repeats.
+/// The levels of a texel of a repeating picture.
 fn repeated(picture: &RgbImage, x: i64, y: i64) -> [u8; 3] {
     let [x, y] = [(x, picture.width()), (y, picture.height())]
         .map(|(k, side)| k.rem_euclid(i64::from(side)) as u32);
     picture.get_pixel(x, y).0
 }
 
-/// The colour between the middles of the four texels around a place, from 0 to 1.
+/// The colour interpolated between the centres of the four texels around a position, from 0 to 1.
 fn between([x, y]: [f64; 2], picture: &RgbImage) -> [f64; 3] {
     let [x, y] = [x - 0.5, y - 0.5];
     let [left, above] = [x.floor(), y.floor()];
@@ -444,7 +444,7 @@ mod tests {
     use super::*;
     use softrast_mesh::{Material, icosphere};
 
-    /// A picture whose colours change from texel to texel, as a PNG file.
+    /// A picture with different colours in adjacent texels, as a PNG file.
     fn png(width: u32, height: u32, seed: u32) -> Vec<u8> {
         let level = |x: u32, y: u32, k: u32| (37 * x + 91 * y + 53 * k + 17 * seed) % 256;
         let picture =
@@ -454,8 +454,8 @@ mod tests {
         file.into_inner()
     }
 
-    /// A ball whose faces lie on pictures by their places, `repeats` times; every third face has another of three materials: a picture with a
-    /// factor, none with a factor, another picture.
+    /// A ball textured by its positions, with `repeats` repeats; the faces alternate between three materials: a picture with a factor, only
+    /// a factor, another picture.
     fn ball(repeats: f64) -> (Mesh, Vec<Material>) {
         let ball = icosphere(1);
         let places = ball.positions().iter().map(|p| [p[0] * repeats, p[1] * repeats - 3.0]);
@@ -481,7 +481,7 @@ mod tests {
         [0, 1].map(|k| (0..3).map(|corner| weights[corner] * corners[corner][k]).sum())
     }
 
-    /// The largest difference of an atlas from `expected`, which gets a face and the weights of its corners.
+    /// The largest difference of an atlas from `expected`, a function of a face and barycentric weights.
     fn error(mesh: &Mesh, atlas: &Atlas, expected: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> f64 {
         let mut worst = 0.0f64;
         for face in 0..mesh.faces().len() {
@@ -530,7 +530,7 @@ mod tests {
                     _ => &pictures[1],
                 };
                 let uv = texture.corners()[face].map(|k| texture.coordinates()[k as usize]);
-                // Factors are for light, means between texels are of levels: so texels are multiplied first.
+                // Factors apply to linear light, interpolation to levels: so texels are multiplied first.
                 let mut multiplied = picture.clone();
                 for pixel in multiplied.pixels_mut() {
                     let light = pixel.0.map(|level| to_linear(f64::from(level) / 255.0));
@@ -538,7 +538,7 @@ mod tests {
                 }
                 between(texels(at(uv, weights), picture), &multiplied)
             };
-            // Half of a level.
+            // Half a level.
             assert!(error(&ball, &atlas, expected) < 0.51 / 255.0, "{repeats}");
         }
     }
@@ -563,7 +563,7 @@ mod tests {
             let sum = |c: usize| (0..3).map(|k| weights[k] * light[k][c]).sum::<f64>();
             [0, 1, 2].map(|c| from_linear(sum(c)))
         };
-        // Four texels along an edge are few: levels between them are means, light is not.
+        // Four texels along an edge are few: levels are interpolated between them, linear light is not.
         let worst = error(&lit, &atlas, corner);
         assert!(worst < 0.06, "{worst}");
     }

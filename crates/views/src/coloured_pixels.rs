@@ -6,19 +6,19 @@ use softrast_raster::{NEAR, Pinhole};
 
 use crate::Frame;
 
-/// Samples along each side of a pixel, where there are not too many of them.
+/// Samples along each side of a pixel, unless there are too many.
 const SAMPLES: usize = 4;
 /// Rows of pixels that are drawn together.
 const BAND: usize = 16;
 /// Samples of an image at most. Larger pictures have fewer in a pixel, but one.
 const MOST_SAMPLES: usize = 1 << 24;
 
-/// What a camera sees of a mesh with colours, without softness: red, green and blue over black, then the part of each pixel that the mesh
-/// covers; each row by row from the top, from 0 to 1.
+/// Renders a coloured mesh without softness: red, green and blue over black, then the fraction of each pixel that the mesh covers; each row
+/// by row from the top, from 0 to 1.
 ///
-/// A pixel is the mean of 4 × 4 samples, of fewer where a picture has more than a million pixels. A sample shows the nearest face, its
-/// colour interpolated in perspective. A mesh without colours is white. Faces with a corner behind the camera
-/// are not drawn. Mesh and camera may be anywhere, in any unit.
+/// A pixel is the mean of 4 × 4 samples, of fewer if a picture has more than a million pixels. A sample has the colour of the nearest face,
+/// interpolated in perspective. A mesh without colours is white. Faces with a corner behind the camera are not drawn. Mesh and camera may
+/// be anywhere, in any unit.
 pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     let pixels = camera.size.pixels();
     let each = (1..=SAMPLES).rev().find(|n| n * n * pixels <= MOST_SAMPLES).unwrap_or(1);
@@ -33,7 +33,7 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
         for face in mesh.faces() {
             let corners = face.map(|v| {
                 let [x, y, z] = seen[v as usize];
-                // The middle of the first sample is (0, 0).
+                // The centre of the first sample is (0, 0).
                 [x * each as f64 - 0.5, y * each as f64 - 0.5, z]
             });
             let colours = face.map(|v| mesh.colours().map_or([1.0; 3], |all| all[v as usize]));
@@ -63,9 +63,9 @@ pub fn coloured_pixels(mesh: &Mesh, camera: &Pinhole) -> [Vec<f64>; 4] {
     [0, 1, 2, 3].map(|k| bands.iter().flatten().map(|pixel| pixel[k]).collect())
 }
 
-/// Shows each sample of some rows inside of a triangle to `show`: its column and row, its depth, and the weights of the corners in space.
+/// Calls `show` for each sample of some rows inside a triangle: its column and row, its depth, and the barycentric weights in space.
 ///
-/// Corners are columns and rows in samples, and depths; a face with one below `near` is not shown.
+/// Corners are columns and rows in samples, and depths; a face with a corner below `near` is skipped.
 fn samples(
     corners: [[f64; 3]; 3],
     near: f64,
@@ -87,7 +87,7 @@ fn samples(
             corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| {
                 [low.min(p[axis]), high.max(p[axis])]
             });
-        // A cast holds what is too large, and makes 0 of what is below 0.
+        // A cast saturates: too large numbers at the maximum, negative ones at 0.
         let (first, end) = (low.ceil().max(0.0) as usize, (high.floor() + 1.0).max(0.0) as usize);
         first.max(within.start)..end.min(within.end)
     };
@@ -100,7 +100,7 @@ fn samples(
             if on_screen.iter().any(|&part| part < 0.0) {
                 continue;
             }
-            // On the screen, 1 / z is linear.
+            // 1 / z is linear on the screen.
             let [p, q, r] = [0, 1, 2].map(|k| on_screen[k] / corners[k][2]);
             let depth = 1.0 / (p + q + r);
             show(column, row, depth, [p, q, r].map(|part| part * depth));
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn the_nearest_face_is_seen_and_pixels_are_means() {
-        // A red half of the picture before a blue whole.
+        // A red half of the picture in front of a blue whole.
         let square = |low: f64, high: f64, z: f64| {
             [[low * z, -z, z], [high * z, -z, z], [high * z, z, z], [low * z, z, z]]
         };
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn colours_change_in_space_and_not_on_the_screen() {
-        // A floor from depth 1 to depth 3: its middle, at depth 2, is seen above the middle of the screen.
+        // A floor from depth 1 to depth 3: its middle, at depth 2, appears above the middle of the screen.
         let positions = vec![[-9.0, 0.5, 1.0], [9.0, 0.5, 1.0], [9.0, 0.5, 3.0], [-9.0, 0.5, 3.0]];
         let mesh = Mesh::new(positions, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
         let mesh = mesh.with_colours(vec![[0.0; 3], [0.0; 3], [1.0; 3], [1.0; 3]]).unwrap();

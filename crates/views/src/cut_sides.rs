@@ -2,8 +2,8 @@ use softrast_raster::ImageSize;
 
 use crate::Picture;
 
-/// The sides of its picture that a mask reaches, of `left`, `top`, `right` and `bottom`: the object may go on beyond them, where nothing is
-/// known of it. Specks do not count.
+/// The sides of a picture that its mask touches, of `left`, `top`, `right` and `bottom`: the object may extend beyond them. Specks are
+/// ignored.
 ///
 /// ```
 /// use softrast_views::{Picture, cut_sides};

@@ -1,14 +1,14 @@
 use softrast_mesh::Mesh;
 use softrast_raster::Pinhole;
 
-/// Least unit of a frame that is taken from depths, in the largest depth: the near plane lies a hundredth of that away.
+/// Least unit of a frame derived from depths, relative to the largest depth: the near plane is at a hundredth of that unit.
 const LEAST_DEPTH: f64 = 1e-2;
 
-/// Coordinates with an origin and a unit of their own.
+/// A coordinate system with its own origin and unit.
 ///
-/// Images are computed in 32 bits, with a near plane at a fixed depth. Cameras in metres of a map or in thousandths of a unit leave neither
-/// digits nor depth there. So a problem is moved into a frame in 64 bits, solved, and moved back. Cameras see the same: a frame changes
-/// neither their rotation nor what is where in an image.
+/// Images are computed in 32 bits, with a near plane at a fixed depth. Cameras in metres of a map or in thousandths of a unit would lose
+/// digits and depth there. A problem is therefore moved into a frame in 64 bits, solved, and moved back. Images are the same: a frame
+/// changes neither the rotation of cameras nor positions in an image.
 ///
 /// ```
 /// use softrast_views::Frame;
@@ -33,15 +33,15 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame in which the middle of the box around a mesh is the origin, and its farthest vertex from there has distance 1. Vertices
-    /// without a face do not count. A mesh without extent has unit 1.
+    /// The frame in which the middle of the bounding box of a mesh is the origin, and its farthest vertex from there has distance 1. Unused
+    /// vertices are ignored. A mesh without extent has unit 1.
     pub fn of_mesh(mesh: &Mesh) -> Self {
         let (middle, radius) = bounding_ball(mesh);
         Self { middle, unit: if radius > 0.0 { radius } else { 1.0 } }
     }
 
-    /// The frame around the middle of a mesh in which no vertex before a camera has a depth below 1, or below a hundredth of the largest
-    /// depth. So cameras may stand far off or between the parts of the mesh.
+    /// The frame around the middle of a mesh in which no vertex in front of a camera has a depth below 1, or below a hundredth of the
+    /// largest depth. Cameras may therefore be far away or between the parts of the mesh.
     pub fn of_cameras<'a>(mesh: &Mesh, cameras: impl IntoIterator<Item = &'a Pinhole>) -> Self {
         let corners: Vec<[f64; 3]> = mesh.triangles().flatten().collect();
         let unit =
@@ -50,18 +50,18 @@ impl Frame {
         Self { unit: if least.is_finite() { least } else { 1.0 }, ..Self::of_mesh(mesh) }
     }
 
-    /// A point of the world in the frame.
+    /// Transforms a world point to the frame.
     pub fn point(&self, p: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| (p[k] - self.middle[k]) / self.unit)
     }
 
-    /// A mesh of the world in the frame.
+    /// Transforms a world mesh to the frame.
     ///
-    /// A vertex that 32 bits cannot hold there, which no face uses if the frame is that of the mesh, is moved to where they can.
+    /// A vertex that would overflow 32 bits there, which is unused if the frame is that of the mesh, is clamped.
     ///
     /// # Panics
     ///
-    /// If the frame is not of finite numbers.
+    /// If the frame has a number that is not finite.
     #[must_use]
     pub fn mesh(&self, mesh: &Mesh) -> Mesh {
         let held = |x: f64| x.clamp(f64::from(f32::MIN), f64::from(f32::MAX));
@@ -70,23 +70,23 @@ impl Frame {
         mesh.with_positions(positions).expect("all numbers fit into 32 bits")
     }
 
-    /// A mesh of the frame in the world.
+    /// Transforms a mesh of the frame to the world.
     ///
     /// # Errors
     ///
-    /// If 32 bits cannot hold a vertex there.
+    /// If a vertex overflows 32 bits there.
     pub fn mesh_to_world(&self, mesh: &Mesh) -> Result<Mesh, softrast_mesh::MeshError> {
         let place = |p: &[f64; 3]| [0, 1, 2].map(|k| self.middle[k] + self.unit * p[k]);
         mesh.with_positions(mesh.positions().iter().map(place).collect())
     }
 
-    /// A camera of the world in the frame.
+    /// Transforms a world camera to the frame.
     #[must_use]
     pub fn camera(&self, camera: &Pinhole) -> Pinhole {
         Pinhole { translation: camera.transform(self.middle).map(|x| x / self.unit), ..*camera }
     }
 
-    /// A camera of the frame in the world.
+    /// Transforms a camera of the frame to the world.
     #[must_use]
     pub fn camera_to_world(&self, camera: &Pinhole) -> Pinhole {
         let turned =
@@ -96,8 +96,8 @@ impl Frame {
     }
 }
 
-/// The middle of the box around a mesh, and the distance of its farthest vertex from there, in the unit of the mesh. Vertices without a face
-/// do not count.
+/// The middle of the bounding box of a mesh, and the distance of its farthest vertex from there, in the unit of the mesh. Unused vertices
+/// are ignored.
 pub fn bounding_ball(mesh: &Mesh) -> ([f64; 3], f64) {
     let [low, high] = mesh.bounds();
     let middle = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
@@ -105,7 +105,7 @@ pub fn bounding_ball(mesh: &Mesh) -> ([f64; 3], f64) {
     (middle, mesh.triangles().flatten().map(distance).fold(0.0, f64::max))
 }
 
-/// The least depth before a camera, or a hundredth of the largest if that is more; 1 if nothing is before it.
+/// The least depth in front of a camera, or a hundredth of the largest if that is more; 1 if there is none.
 fn unit_of_depths(depths: impl Iterator<Item = f64>) -> f64 {
     let before = depths.filter(|&depth| depth > 0.0);
     let [least, largest] = before.fold([f64::INFINITY, 0.0], |[least, largest], depth| {
@@ -178,7 +178,7 @@ mod tests {
         let at = |z: f64| Pinhole::look_at([0.0, 0.0, z], [0.0; 3], [0.0, 1.0, 0.0], 40.0, 8);
         let unit = Frame::of_cameras(&ball, &[at(4.0), at(3.0)]).unit;
         assert!((unit - 2.0).abs() < 0.1, "{unit}");
-        // Within the mesh, and before nothing.
+        // Inside the mesh, and with nothing in front.
         assert!(Frame::of_cameras(&ball, &[at(0.5)]).unit >= 0.01);
         assert_eq!(unit_of_depths([-1.0, 0.0].into_iter()), 1.0);
     }

@@ -1,8 +1,9 @@
-//! Pictures, masks and cameras as files have them, and what follows from them without a gradient.
+//! Pictures, masks and cameras in files, and computations on them without gradients.
 //!
-//! A [`Picture`] is a mask or a channel of a picture file, read by [`MaskRules`]. A [`CameraFile`] holds the cameras of many pictures, as
-//! nerfstudio, COLMAP or OpenCV write them; a [`Lens`] and a [`PoseFile`] are the two halves of one. [`load_views`] reads pictures with their
-//! cameras, each a [`View`]; [`Views`] are tensors of them. [`visual_hull`] is the solid that their masks leave, [`coloured_pixels`] what a camera sees of a mesh.
+//! A [`Picture`] is a mask or a channel of a picture file, read with [`MaskRules`]. A [`CameraFile`] holds the cameras of many pictures, in
+//! the formats of nerfstudio, COLMAP or OpenCV; a [`Lens`] and a [`PoseFile`] are the two halves of one camera. [`load_views`] reads
+//! pictures with their cameras, each a [`View`]; [`Views`] are tensors of them. [`visual_hull`] computes a solid from their masks,
+//! [`coloured_pixels`] renders a mesh.
 //!
 //! ```
 //! use softrast_mesh::icosphere;

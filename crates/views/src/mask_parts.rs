@@ -2,10 +2,10 @@ use softrast_raster::ImageSize;
 
 use crate::Picture;
 
-/// Parts that are smaller than the largest by this factor are specks or details.
+/// Components that are smaller than the largest by this factor are specks or details.
 const SMALL: usize = 5;
 
-/// How many parts of a mask, of pixels that share sides, are at least a fifth as large as the largest. 0 if nothing is white.
+/// Number of components of a mask (pixels that share sides) at least a fifth as large as the largest. 0 if no pixel is white.
 ///
 /// ```
 /// use softrast_views::{Picture, mask_parts};

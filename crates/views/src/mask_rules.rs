@@ -2,25 +2,26 @@ use anyhow::{anyhow, ensure};
 
 use crate::picture_file::Pixel;
 
-/// How the levels of a picture become a mask.
+/// Conversion of the levels of a picture to a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MaskRules {
-    /// Black pixels are the mask.
+    /// Whether black pixels are the mask.
     pub invert: bool,
-    /// What is at least so bright, from 0 to 1, is the mask; after it is inverted. None keeps soft edges.
+    /// Least level of the mask, from 0 to 1, after inversion. `None` keeps soft edges.
     pub threshold: Option<f64>,
-    /// Pixels of the class with this number are the mask: an entry of the palette of a picture, or its level as a whole number.
+    /// Pixels of the class with this number are the mask: an index into the palette of a picture, or its level as an integer.
     pub label: Option<u32>,
 }
 
-/// Share of the pixels that have a colour, and of those that are not black which are neither white, from which on a picture is no mask.
+/// Fraction of coloured pixels, and of pixels that are neither black nor white among those not black, above which a picture is not a mask.
 const COLOURED: f64 = 0.05;
 const GREY: f64 = 0.5;
-/// Least difference between red, green and blue of a colour, and the level up to which a pixel is black; from 1 less that level on it is white.
+/// Least difference between red, green and blue of a coloured pixel, and largest level of a black one; white ones have at least 1 minus
+/// that.
 const COLOUR: f32 = 0.25;
 const BLACK: f32 = 0.1;
 
-/// How many pixels of a picture look like those of a photograph.
+/// Numbers of pixels of a picture that look like those of a photograph.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Looks {
     pixels: usize,
@@ -30,7 +31,7 @@ pub(crate) struct Looks {
 }
 
 impl Looks {
-    /// Takes note of a pixel.
+    /// Counts a pixel.
     pub(crate) fn see(&mut self, [red, green, blue, _]: Pixel) {
         let (least, most) = (red.min(green).min(blue), red.max(green).max(blue));
         self.pixels += 1;
@@ -39,7 +40,7 @@ impl Looks {
         self.grey += usize::from(most > BLACK && least < 1.0 - BLACK);
     }
 
-    /// An error if most of them do.
+    /// An error if most pixels look like those of a photograph.
     pub(crate) fn check(&self) -> anyhow::Result<()> {
         let share = |part: usize, of: usize| part as f64 / of.max(1) as f64;
         let coloured = share(self.coloured, self.pixels);
@@ -57,12 +58,12 @@ impl Looks {
     }
 }
 
-/// The levels that a picture has, as far as a mask is told by them.
+/// Statistics of the levels of a picture, as needed for a mask.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Levels {
     darkest: f32,
     brightest: f32,
-    /// The largest below the brightest, and the least above the darkest, if there are any.
+    /// The largest level below the brightest, and the least above the darkest, if there are any.
     next: [Option<f32>; 2],
 }
 
@@ -73,7 +74,7 @@ impl Default for Levels {
 }
 
 impl Levels {
-    /// Takes note of the level of a pixel.
+    /// Records the level of a pixel.
     pub(crate) fn see(&mut self, level: f32) {
         if level == self.darkest || level == self.brightest {
             return;
@@ -100,24 +101,24 @@ impl Levels {
         self.brightest
     }
 
-    /// The levels as they are where black and white are exchanged.
+    /// The statistics after inversion.
     fn inverted(self) -> Self {
         let [below, above] = self.next.map(|next| next.map(|level| 1.0 - level));
         Self { darkest: 1.0 - self.brightest, brightest: 1.0 - self.darkest, next: [above, below] }
     }
 
-    /// The one level that is not 0, where there are no others and it is not 1.
+    /// The only level that is not 0, if there is just one and it is not 1.
     fn only(&self) -> Option<f32> {
         let two = self.darkest == 0.0 && self.next[0] == Some(0.0);
         (two && self.brightest < 1.0).then_some(self.brightest)
     }
 }
 
-/// From a level of the file to one of the mask.
+/// Maps a level of the file to one of the mask.
 type Change = Box<dyn Fn(f32) -> f32>;
 
 impl MaskRules {
-    /// How levels of the file are changed, and the level that is taken for white where there is just one.
+    /// The mapping of levels of the file, and the level that becomes white if it is the only one.
     ///
     /// # Errors
     ///
@@ -135,7 +136,7 @@ impl MaskRules {
             );
             return Ok((Box::new(move |level| f32::from(u8::from(taken(level)))), None));
         }
-        // A mask of 0 and 1 is one before black and white are exchanged.
+        // A mask of 0 and 1 is detected before inversion.
         if let Some(only) = levels.only() {
             let white = move |level: f32| f32::from(u8::from((level > 0.0) != invert));
             return Ok((Box::new(white), Some(only)));
@@ -154,7 +155,7 @@ impl MaskRules {
     }
 }
 
-/// The brightest level, and the threshold that takes it.
+/// The brightest level, and a threshold that includes it.
 fn advice(levels: &Levels) -> String {
     let Levels { brightest, next: [below, _], .. } = *levels;
     match below {
@@ -171,7 +172,7 @@ fn advice(levels: &Levels) -> String {
 fn between(low: f32, high: f32) -> f64 {
     let [low, high] = [low, high].map(f64::from);
     let rounded = |digits: i32| (high * 10f64.powi(digits)).floor() / 10f64.powi(digits);
-    // Digits that a person would write, where the levels are that far apart.
+    // Few digits, if the levels are far enough apart.
     (3..=9).map(rounded).find(|&x| x > low && x > 0.0).unwrap_or(high)
 }
 
@@ -199,7 +200,7 @@ mod tests {
             let expected = Ok((vec![0.0, 1.0, 0.0], Some(only)));
             assert_eq!(mask(PLAIN, &[0.0, only, 0.0]), expected);
             assert_eq!(mask(PLAIN, &[only, 0.0]).unwrap().0, [1.0, 0.0]);
-            // What is black in it, and a picture whose object is a little darker than white.
+            // An inverted mask, and a picture whose object is slightly darker than white.
             assert_eq!(mask(INVERTED, &[0.0, only]).unwrap().0, [1.0, 0.0]);
             assert_eq!(mask(INVERTED, &[1.0, only]).unwrap().0, [0.0, 1.0]);
         }

@@ -3,7 +3,7 @@ use softrast_mesh::Mesh;
 
 use crate::{Picture, View, coloured_pixels};
 
-/// Squared errors below this count as this: 100 dB.
+/// Lower bound of squared errors: 100 dB.
 const LEAST_ERROR: f64 = 1e-10;
 
 /// A view with the colours of its object.
@@ -11,26 +11,25 @@ const LEAST_ERROR: f64 = 1e-10;
 pub struct PaintedView {
     /// The view.
     pub view: View,
-    /// Red, green and blue, as the numbers of the picture are, times the part of each pixel that counts.
+    /// Red, green and blue, in the levels of the picture, times the weight of each pixel.
     pub over_black: [Picture; 3],
-    /// The part of each pixel that counts, from 0 to 1.
+    /// The weight of each pixel, from 0 to 1.
     pub part: Picture,
-    /// Whether a pixel counts in full or not at all.
+    /// Whether weights are 0 or 1.
     opaque: bool,
 }
 
 impl PaintedView {
     /// The view with the colours of its picture file.
     ///
-    /// In a picture with transparency a pixel counts as much as its mask says, and its colour is known without what is behind: so
-    /// the object is seen over black. In one that is opaque all over, pixels at the outline are mixed with what is behind, and a mask of
-    /// luminance says how bright a pixel is and not how much of it the object covers. So there a pixel counts in full if its mask and those
-    /// of all eight around it are at least one half, and else not at all: the outline and what is outside of it are compared with nothing.
-    /// Where that would leave nothing, the outline counts.
+    /// In a picture with transparency the weight of a pixel is its mask, and its colour is known without the background: the object is
+    /// compared over black. In an opaque picture, pixels at the outline are mixed with the background, and a mask of luminance is the
+    /// brightness of a pixel and not its coverage. There a pixel has weight 1 if its mask and those of all eight neighbours are at least
+    /// one half, else 0: the outline and everything outside are excluded. If that excludes all pixels, the outline is included.
     ///
     /// # Errors
     ///
-    /// If the file is missing, no picture, or not of the size of the mask; if no pixel counts.
+    /// If the file is missing, not a picture, or not of the size of the mask; if no pixel has a weight.
     pub fn load(view: &View) -> anyhow::Result<Self> {
         let of = || {
             let [red, green, blue, opacity] = Picture::load_with_opacity(&view.picture)?;
@@ -58,7 +57,7 @@ impl PaintedView {
         Ok(painted)
     }
 
-    /// The view with these colours, and how opaque the picture is, all of the size of its mask; see [`PaintedView::load`].
+    /// The view with these colours and the opacity of the picture, all of the size of its mask; see [`PaintedView::load`].
     ///
     /// # Panics
     ///
@@ -67,7 +66,7 @@ impl PaintedView {
         let opaque = opacity.pixels().iter().all(|&x| x >= 1.0);
         let width = view.mask.size().width;
         let levels = view.mask.pixels().iter().zip(opacity.pixels());
-        // The colour of what is transparent all through is not known.
+        // The colour of fully transparent pixels is unknown.
         let known = levels.map(|(&mask, &opacity)| mask * f32::from(u8::from(opacity > 0.0)));
         let part = match opaque {
             true => within(&view.mask),
@@ -83,31 +82,31 @@ impl PaintedView {
         Self { view, over_black, part, opaque }
     }
 
-    /// Whether its picture is opaque all over, so that pixels count in full or not at all.
+    /// Whether the picture is opaque everywhere, so that weights are 0 or 1.
     pub fn is_opaque(&self) -> bool {
         self.opaque
     }
 
-    /// How near a mesh with colours comes to the view, in decibels, at most 100: `-10 log₁₀` of the mean squared difference of red, green and
-    /// blue, each over black, in all pixels that the mesh or what counts of the mask covers at least in part. None if there is no such.
+    /// The PSNR of a coloured mesh relative to the view, in decibels, at most 100: `-10 log₁₀` of the mean squared difference of red, green
+    /// and blue, each over black, in all pixels with coverage or weight. `None` if there are none.
     ///
-    /// The mesh is drawn by [`coloured_pixels`]. Where pixels of the view count in full or not at all, those of the mesh do too: in full from
-    /// one half covered on. There the outline of the mask, whose colours are not known, is left out.
+    /// The mesh is drawn by [`coloured_pixels`]. If weights are 0 or 1, coverages of the mesh are rounded likewise, and pixels of the
+    /// mask's outline, whose colours are unknown, are excluded.
     pub fn psnr(&self, mesh: &Mesh) -> Option<f64> {
         let drawn = coloured_pixels(mesh, &self.view.camera);
         self.psnr_of(&drawn)
     }
 
-    /// The same of what [`coloured_pixels`] drew.
+    /// [`psnr`](Self::psnr) for the result of [`coloured_pixels`].
     ///
     /// # Panics
     ///
-    /// If it is of another size.
+    /// If it has another size.
     pub fn psnr_of(&self, drawn: &[Vec<f64>; 4]) -> Option<f64> {
         let [colours @ .., covered] = drawn;
         let part = self.part.pixels();
         assert_eq!(covered.len(), part.len(), "pixels of what is drawn and of the view");
-        // Times which a pixel of the drawing counts as it is.
+        // Factor of a pixel of the drawing.
         let gain = |pixel: usize| match (self.opaque, covered[pixel]) {
             (false, _) => 1.0,
             (true, share) if share >= 0.5 => 1.0 / share,
@@ -128,7 +127,7 @@ impl PaintedView {
     }
 }
 
-/// Colours and opacity of a picture as a straight lens would have shown them: a colour counts as much as it is opaque.
+/// Colours and opacity of a picture without lens distortion: colours are weighted by opacity.
 fn undistorted(view: &View, [colours @ .., opacity]: [Picture; 4]) -> [Picture; 4] {
     let width = opacity.size().width;
     let with = |colour: &Picture, opacity: &Picture, change: fn(f32, f32) -> f32| {
@@ -143,7 +142,7 @@ fn undistorted(view: &View, [colours @ .., opacity]: [Picture; 4]) -> [Picture; 
     [red, green, blue, straight]
 }
 
-/// White where a mask and all around are at least half white, or where the mask itself is if that is nowhere.
+/// White where a mask and all eight neighbours are at least half white, or where the mask itself is if there is no such pixel.
 fn within(mask: &Picture) -> Picture {
     let (levels, width) = (mask.pixels(), mask.size().width);
     let height = mask.size().height;
@@ -185,7 +184,7 @@ mod tests {
         let opaque = Picture::new(vec![1.0; 6], 6);
         let seen = PaintedView::new(view(mask, 6), gray(), &opaque);
         assert_eq!(seen.part.pixels(), [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
-        // A thin mask has nothing but an outline.
+        // A thin mask is all outline.
         let seen = PaintedView::new(view(vec![0.0, 1.0, 0.7, 0.0, 0.0, 0.0], 6), gray(), &opaque);
         assert_eq!(seen.part.pixels(), [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     }
@@ -200,13 +199,13 @@ mod tests {
         let mask = vec![0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
         let clear = Picture::new(mask.clone(), 6);
         let seen = PaintedView::new(view(mask.clone(), 6), gray(), &clear);
-        // One of four pixels is off by 0.2, another is where nothing should be.
+        // One of four pixels has an error of 0.2, another is drawn where nothing should be.
         let image = drawn([0.0, 0.5, 0.5, 0.7, 0.1, 0.0], [0.0, 1.0, 1.0, 1.0, 0.25, 0.0]);
         let expected = -10.0 * ((0.04f64 + 0.01) / 4.0).log10();
         assert!((seen.psnr_of(&image).unwrap() - expected).abs() < 1e-5);
         let opaque = Picture::new(vec![1.0; 6], 6);
         let seen = PaintedView::new(view(mask, 6), gray(), &opaque);
-        // Of the mask only the middle counts; what covers less than half of a pixel does not.
+        // Only the middle of the mask has a weight; coverage below half of a pixel is ignored.
         assert_eq!(seen.psnr_of(&image), Some(100.0));
         let image = drawn([0.0, 0.5, 0.5, 0.7, 0.3, 0.0], [0.0, 1.0, 1.0, 1.0, 0.75, 0.0]);
         let expected = -10.0 * (0.16f64 / 2.0).log10();

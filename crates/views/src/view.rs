@@ -11,8 +11,8 @@ use crate::{
     colmap_pose, cut_sides, mask_parts,
 };
 
-/// A camera as JSON: R and t as OpenCV has them, the same from camera to world as nerfstudio has it (`transform_matrix`) and as COLMAP has it
-/// (`colmap`: QW, QX, QY, QZ, TX, TY, TZ), K, width and height, and the orbit if there is one that sees the same.
+/// A camera as JSON: R and t of OpenCV, the camera-to-world matrix of nerfstudio (`transform_matrix`), the pose of COLMAP (`colmap`: QW,
+/// QX, QY, QZ, TX, TY, TZ), K, width and height, and the equivalent orbit if there is one.
 pub fn camera_json(camera: &Pinhole) -> Value {
     let ([fx, fy], [cx, cy]) = (camera.focal, camera.centre);
     let mut found = json!({
@@ -35,11 +35,11 @@ pub fn camera_json(camera: &Pinhole) -> Value {
     found
 }
 
-/// Overlap over union of a silhouette and a mask with as many pixels; a pixel is in from one half on. 1 if both are empty.
+/// Intersection over union of a silhouette and a mask, thresholded at one half. 1 if both are empty.
 ///
 /// # Panics
 ///
-/// If they have not as many pixels.
+/// If their numbers of pixels differ.
 pub fn mask_iou(silhouette: &[f64], mask: &Picture) -> f64 {
     assert_eq!(silhouette.len(), mask.pixels().len(), "pixels of the silhouette and the mask");
     let pairs = || silhouette.iter().zip(mask.pixels()).map(|(&a, &b)| (a >= 0.5, b >= 0.5));
@@ -51,22 +51,22 @@ pub fn mask_iou(silhouette: &[f64], mask: &Picture) -> f64 {
 /// A picture and the camera that took it.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// What the file calls it.
+    /// The name in the file.
     pub name: String,
     /// The file of the picture.
     pub picture: PathBuf,
-    /// Its mask, undistorted.
+    /// The mask, undistorted.
     pub mask: Picture,
-    /// The camera that took it, for the pixels of the mask.
+    /// The camera of the picture, for the pixels of the mask.
     pub camera: Pinhole,
-    /// How the lens distorted the picture in its file, if it did.
+    /// Lens distortion of the picture in its file, if there is one.
     pub distortion: Option<Distortion>,
-    /// How far R Rᵀ was from the identity in the file, before it became the nearest rotation.
+    /// Deviation of R Rᵀ from the identity in the file, before R was replaced by the nearest rotation.
     pub off: f64,
 }
 
 impl View {
-    /// A picture that the camera took, of the size of the mask, without what its lens does to it.
+    /// Removes lens distortion from a picture of this camera, of the size of the mask.
     #[must_use]
     pub fn undistorted(&self, picture: Picture) -> Picture {
         match &self.distortion {
@@ -75,18 +75,18 @@ impl View {
         }
     }
 
-    /// The square of the mask that is looked at: its left, its top and its extent in pixels. See [`Picture::view_square`].
+    /// The view square of the mask: left, top and extent in pixels. See [`Picture::view_square`].
     ///
     /// # Errors
     ///
-    /// If nothing or all of the mask is white, with the name of the view.
+    /// If no pixel or every pixel of the mask is white, with the name of the view.
     pub fn square(&self) -> anyhow::Result<[f64; 3]> {
         self.mask.view_square().with_context(|| self.name.clone())
     }
 }
 
-/// Notes for the user on views that were read, a line for each kind: pictures that were undistorted, masks whose only level was taken for
-/// white, masks that may be inverted or show several objects, and rotations that were rounded.
+/// Notes for the user on views that were read, one line per kind: undistorted pictures, masks whose only level became white, masks that may
+/// be inverted or show several objects, and rounded rotations.
 pub fn reading_notes(views: &[View]) -> Vec<String> {
     let masks = views.iter().filter_map(|view| Some((view.mask.only_level()?, &view.name)));
     let masks: Vec<(f64, &String)> = masks.collect();
@@ -123,15 +123,15 @@ pub fn reading_notes(views: &[View]) -> Vec<String> {
     notes
 }
 
-/// The first of some names, and how many more there are.
+/// The first of some names, and the number of others.
 fn first_and_more<'a>(mut names: impl ExactSizeIterator<Item = &'a String>) -> String {
     let more = names.len().saturating_sub(1);
     let first = names.next().map_or("", String::as_str);
     if more == 0 { first.to_owned() } else { format!("{first} and {more} more") }
 }
 
-/// How many faces of a mesh cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those across
-/// [`NEAR`](softrast_raster::NEAR) are not drawn.
+/// Number of faces of a mesh that cross the plane at a depth in front of a camera, in world units: they have corners on both sides. Those
+/// across [`NEAR`](softrast_raster::NEAR) are not drawn.
 pub fn faces_across(mesh: &Mesh, camera: &Pinhole, depth: f64) -> usize {
     let ahead: Vec<bool> =
         mesh.positions().iter().map(|&p| camera.transform(p)[2] >= depth).collect();
@@ -142,7 +142,7 @@ pub fn faces_across(mesh: &Mesh, camera: &Pinhole, depth: f64) -> usize {
     mesh.faces().iter().filter(crosses).count()
 }
 
-/// What should be said where [`faces_across`] finds some at cameras, each with its name.
+/// A note for the user if [`faces_across`] is above 0 for some cameras, each with its name.
 pub fn faces_across_note<N: Display>(
     mesh: &Mesh,
     cameras: impl IntoIterator<Item = (N, Pinhole)>,

@@ -6,7 +6,7 @@ use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use crate::{Picture, View, load_views};
 
-/// Views of one object whose masks have one size, as tensors for a loop of one's own.
+/// Views of one object whose masks have one size, as tensors for a custom loop.
 ///
 /// ```no_run
 /// use softrast_tensor::NdArray;
@@ -24,7 +24,7 @@ use crate::{Picture, View, load_views};
 pub struct Views(Vec<View>);
 
 impl Views {
-    /// The views of a folder, as [`load_views`] finds them, with masks by the default [`MaskRules`](crate::MaskRules).
+    /// The views of a folder, found as by [`load_views`], with masks by the default [`MaskRules`](crate::MaskRules).
     ///
     /// # Errors
     ///
@@ -33,11 +33,11 @@ impl Views {
         Self::new(load_views(folder, |path| Picture::load_mask(path))?)
     }
 
-    /// These views.
+    /// Creates views, after checks.
     ///
     /// # Errors
     ///
-    /// If there is none, masks differ in size, or a mask is not of the size of its camera's image: one line that names them.
+    /// If there is none, masks differ in size, or a mask does not have the size of its camera's image: one line with their names.
     pub fn new(views: Vec<View>) -> anyhow::Result<Self> {
         ensure!(!views.is_empty(), "there are no views");
         let first = &views[0];
@@ -94,7 +94,7 @@ impl Views {
     ///
     /// # Errors
     ///
-    /// If a picture cannot be read, or is not of the size of its mask: one line that names it.
+    /// If a picture cannot be read, or does not have the size of its mask: one line with its name.
     pub fn pictures<B: Backend>(&self, device: &B::Device) -> anyhow::Result<Tensor<B, 4>> {
         let size = self.size();
         let mut levels = Vec::with_capacity(3 * self.len() * size.pixels());

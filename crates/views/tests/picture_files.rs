@@ -1,4 +1,4 @@
-//! Picture files as people have them: turned by cameras, with palettes and few levels, broken, or larger than is read.
+//! Picture files in practice: rotated by cameras, with palettes and few levels, invalid, or too large.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -23,7 +23,7 @@ fn mask(bytes: &[u8]) -> Result<Picture, String> {
     mask.map_err(|error| format!("{error:#}"))
 }
 
-/// Exif data that ask for an orientation.
+/// Exif data with an orientation.
 fn exif(orientation: u8) -> Vec<u8> {
     [&b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"[..], &[orientation, 0, 0, 0], &[0; 4]]
         .concat()
@@ -40,7 +40,7 @@ fn chunk(kind: &[u8; 4], content: &[u8]) -> Vec<u8> {
     [&(content.len() as u32).to_be_bytes()[..], &body, &(!sum).to_be_bytes()].concat()
 }
 
-/// A PNG file of these bits and colour type, with chunks before its pixels: bytes of rows, each after a 0.
+/// A PNG file with this bit depth and colour type, with chunks before its pixels: bytes of rows, each after a 0.
 fn png(size: [u32; 2], [bits, kind]: [u8; 2], chunks: &[u8], rows: &[u8]) -> Vec<u8> {
     let [width, height] = size.map(u32::to_be_bytes);
     let head = [&width[..], &height, &[bits, kind, 0, 0, 0]].concat();
@@ -87,7 +87,7 @@ fn pictures_are_turned_as_their_exif_data_ask_for_all_eight_values() {
             let expected: Vec<f32> =
                 expected.to_luma8().pixels().map(|p| f32::from(p.0[0]) / 255.0).collect();
             assert_eq!(picture.pixels(), expected, "orientation {orientation}");
-            // A texture lies as it is in its file.
+            // A texture is not rotated.
             let texels = PictureFile::decode(&bytes).unwrap().texels(1 << 20);
             assert_eq!(texels.dimensions(), (48, 32));
         }
@@ -133,7 +133,7 @@ fn numbers_of_classes_are_one_line_with_the_threshold_that_takes_the_brightest()
     let file = PictureFile::decode(&bytes).unwrap();
     let found = Picture::mask_of(&file, &rules).unwrap();
     assert_eq!(found.pixels()[..5], [0.0, 0.0, 0.0, 1.0, 0.0]);
-    // Colours under an alpha channel that hides them.
+    // Colours hidden by an alpha channel.
     let hidden = GrayAlphaImage::from_pixel(4, 4, LumaA([255, 0]));
     let error = mask(&encoded(hidden, ImageFormat::Png)).unwrap_err();
     assert!(error.contains("all of it is transparent"), "{error}");
@@ -147,7 +147,7 @@ fn a_palette_that_is_none_and_a_picture_without_pixels_are_one_line() {
             let error = mask(&png([1, 1], [bits, 3], &palette, &[0, 0])).unwrap_err();
             assert!(error.contains(&format!("its palette has {bytes} bytes")), "{error}");
         }
-        // Where pixels do not refer to it, it is a hint that nothing depends on.
+        // If pixels do not refer to it, it is an optional hint.
         assert!(PictureFile::decode(&png([1, 1], [8, 2], &palette, &[0, 9, 9, 9])).is_ok());
     }
     for size in [[0, 0], [0, 3], [3, 0]] {

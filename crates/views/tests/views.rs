@@ -27,7 +27,7 @@ fn masks_cameras_and_pictures_of_a_folder_belong_together() {
     assert_eq!(levels[(views.len() - 1) * height * width..], *views[views.len() - 1].mask.pixels());
 }
 
-/// A view of so many pixels each way.
+/// A view of `side` × `side` pixels.
 fn square(name: &str, side: usize) -> View {
     View {
         name: name.to_owned(),
@@ -49,7 +49,7 @@ fn views_of_two_sizes_and_none_are_errors_of_one_line() {
     );
     assert!(!line.contains('\n'));
     assert_eq!(Views::new(Vec::new()).unwrap_err().to_string(), "there are no views");
-    // A picture that is not there is named.
+    // The error names a missing picture.
     let missing = Views::new(vec![square("gone.png", 4)]).unwrap();
     let line = missing.pictures::<NdArray>(&Default::default()).unwrap_err().to_string();
     assert!(line.contains("gone.png"), "{line}");

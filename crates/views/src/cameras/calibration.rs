@@ -1,6 +1,6 @@
-//! Calibrations as OpenCV and ROS write them, in JSON or in YAML, in the fields of a [`Lens`](super::Lens).
+//! Calibrations as written by OpenCV and ROS, in JSON or YAML, converted to the fields of a [`Lens`](super::Lens).
 //!
-//! YAML is read by code of our own: what OpenCV writes begins with a line that YAML does not allow.
+//! YAML is parsed by a custom parser: OpenCV's files start with a line that YAML does not allow.
 
 use anyhow::{bail, ensure};
 use serde_json::{Map, Value, json};
@@ -13,15 +13,15 @@ const HEIGHTS: [&str; 3] = ["image_height", "height", "h"];
 const SIZES: [&str; 3] = ["image_size", "img_size", "imageSize"];
 const MODELS: [&str; 2] = ["distortion_model", "camera_model"];
 const FISHEYES: [&str; 2] = ["is_fisheye", "fisheye_model"];
-/// Other names of what a [`Lens`](super::Lens) knows as `OPENCV` and as `OPENCV_FISHEYE`.
+/// Other names of the models `OPENCV` and `OPENCV_FISHEYE` of a [`Lens`](super::Lens).
 const OPENCV: [&str; 3] = ["plumb_bob", "rational_polynomial", "radtan"];
 const FISHEYE: [&str; 3] = ["equidistant", "kannala_brandt", "kannala_brandt4"];
-/// Coefficients by name.
+/// Names of coefficients.
 const OWN: [&str; 9] = ["distortion", "k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
-/// The camera in a file with a `camera_matrix` in the fields of a lens; other files as they are.
+/// The camera of a file with a `camera_matrix`, in the fields of a lens; other files are unchanged.
 ///
-/// OpenCV counts pixels from the middle of the first one, which lies half a pixel from the border.
+/// OpenCV counts pixels from the centre of the first one, which is half a pixel from the border.
 pub(super) fn as_lens(file: Value) -> anyhow::Result<Value> {
     let first = |names: &[&str]| {
         names.iter().map(|name| &file[*name]).find(|value| !value.is_null()).cloned()
@@ -87,7 +87,7 @@ fn numbers(matrix: &Value) -> Vec<Value> {
     }
 }
 
-/// The fields of a calibration in YAML, None for what is none: numbers, words, and the numbers of matrices.
+/// The fields of a calibration in YAML: numbers, words, and the numbers of matrices; `None` for other texts.
 pub(super) fn yaml(text: &str) -> Option<Value> {
     // Without comments.
     let text: Vec<&str> =
@@ -109,7 +109,7 @@ pub(super) fn yaml(text: &str) -> Option<Value> {
     is_calibration.then_some(fields.into())
 }
 
-/// What follows a name up to the next one, which begins a line.
+/// The text after a name up to the next name, which starts a line.
 fn own<'a>(text: &'a str, name: &str) -> Option<&'a str> {
     let mut start = 0;
     let mut found = None;
@@ -128,7 +128,7 @@ fn own<'a>(text: &'a str, name: &str) -> Option<&'a str> {
     found.map(|from| &text[from..])
 }
 
-/// The numbers of a list: those of all rows between brackets, behind `data` if it has rows and columns; or those of lines that begin with `-`.
+/// The numbers of a list: all rows in brackets, after `data` if there are rows and columns; or those of lines that start with `-`.
 fn list(text: &str) -> Option<Value> {
     let text = text.split_once("data:").map_or(text, |(_, data)| data);
     if !text.contains('[') {
@@ -147,7 +147,7 @@ fn list(text: &str) -> Option<Value> {
     Some(words.filter(|word| !word.is_empty()).map(scalar).collect())
 }
 
-/// A number, or a word. OpenCV writes `640.` and `.5`, which JSON does not know.
+/// A number, or a word. OpenCV writes `640.` and `.5`, which are invalid JSON.
 fn scalar(word: &str) -> Value {
     let word = word.trim_matches(['"', '\'']);
     match word.parse::<f64>() {

@@ -12,36 +12,36 @@ use super::{
 };
 use crate::{Picture, View};
 
-/// Files of cameras in a folder, in the order in which they are looked for, and folders with a model of COLMAP behind the first.
+/// Camera files of a folder in order of precedence, and folders with a COLMAP model, which come after the first file.
 const FILES: [&str; 2] = ["transforms.json", "transforms_train.json"];
 const MODELS: [&str; 6] = ["", "sparse/0", "sparse", "colmap", "colmap/sparse/0", "colmap/sparse"];
 
 /// Cameras in a file or a folder, before pictures are opened.
 ///
-/// - `transforms.json`, as instant-ngp and nerfstudio write it: `fl_x, fl_y, cx, cy, w, h` or `camera_angle_x` for all frames or for each, and
-///   `frames` with `file_path` and `transform_matrix` (camera to world; x right, y up, z behind). A frame with a `mask_path` has its mask there.
-/// - A model of COLMAP: `cameras.bin` and `images.bin`, or `.txt`.
-/// - A [`Lens`] alone.
+/// - `transforms.json` of instant-ngp and nerfstudio: `fl_x, fl_y, cx, cy, w, h` or `camera_angle_x` for all frames or per frame, and
+///   `frames` with `file_path` and `transform_matrix` (camera to world; x right, y up, z behind). `mask_path` is the mask of a frame.
+/// - A COLMAP model: `cameras.bin` and `images.bin`, or `.txt`.
+/// - A single [`Lens`].
 #[derive(Clone, Debug)]
 pub struct CameraFile {
     /// The file, for errors.
     name: String,
     files: Vec<PathBuf>,
-    /// Lenses that belong to no frame.
+    /// Lenses without a frame.
     lenses: Vec<Lens>,
     frames: Vec<Frame>,
-    /// Where names of pictures may begin.
+    /// Folders that picture names may be relative to.
     roots: Vec<PathBuf>,
     note: Option<String>,
 }
 
 impl CameraFile {
-    /// The cameras in a file; of a folder those of its `transforms.json`, else of the model of COLMAP in it, in `sparse/0`, `sparse` or `colmap`,
-    /// else of its `transforms_train.json`.
+    /// The cameras in a file; for a folder those of its `transforms.json`, else of the COLMAP model in it, in `sparse/0`, `sparse` or
+    /// `colmap`, else of its `transforms_train.json`.
     ///
     /// # Errors
     ///
-    /// If there is none, or one cannot be read or is broken: one line that names the file and the frame.
+    /// If there is none, or one cannot be read or is invalid: one line with the file and the frame.
     pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let path = path.as_ref();
         if path.is_dir() {
@@ -82,7 +82,7 @@ impl CameraFile {
         let colmap::Model { lenses, frames, files } = colmap::load(folder)?;
         let name = files.last().unwrap_or(&folder.to_owned()).display().to_string();
         let lenses = lenses.into_iter().map(|(_, lens)| lens).collect();
-        // A model stands beside its pictures, or in a folder or two beside them.
+        // A model is next to its pictures, or one or two folders deeper.
         let above = folder.ancestors().take(4).map(Path::to_owned);
         let roots = above.flat_map(|above| [above.join("images"), above]).collect();
         Ok(Self { name, files, lenses, frames, roots, note: None })
@@ -92,7 +92,7 @@ impl CameraFile {
     ///
     /// # Errors
     ///
-    /// If it is neither, tells no focal length and has no frames, or has a frame without a file or with a pose that is none.
+    /// If it is neither, has neither a focal length nor frames, or has a frame without a file or with an invalid pose.
     pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
         let file = fields::json(bytes, name)?;
         let (lens, frames, note) = match file["frames"].is_null() {
@@ -108,12 +108,12 @@ impl CameraFile {
         &self.files
     }
 
-    /// What is to be known of the world of the frames, in one line: a `transforms.json` may say that it was turned or scaled (`applied_transform`).
+    /// A note on the world of the frames, in one line: a `transforms.json` may declare that it was rotated or scaled (`applied_transform`).
     pub fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }
 
-    /// The mask that a frame names for its picture, or that lies in a folder `masks` beside it; None if there is no such frame or mask.
+    /// The mask of a picture, from its frame or from a folder `masks` next to it; `None` if there is no such frame or mask.
     pub fn mask_of(&self, picture: &Path) -> Option<PathBuf> {
         let file = picture.canonicalize().ok()?;
         let is =
@@ -121,11 +121,11 @@ impl CameraFile {
         self.frames.iter().find(is).and_then(|frame| self.mask_beside(frame))
     }
 
-    /// The lens that took a picture: that of the frame which names the picture or its mask; or the one lens, where there is but one.
+    /// The lens of a picture: that of the frame with this picture or mask; or the only lens, if there is just one.
     ///
     /// # Errors
     ///
-    /// If there are several, and no frame or more than one is for this picture.
+    /// If there is none, or there are several and not exactly one frame has this picture.
     pub fn lens_of(&self, picture: &Path) -> anyhow::Result<Lens> {
         let files = |frame: &&Frame| {
             [Some(frame.picture.clone()), frame.mask.clone()].into_iter().flatten()
@@ -156,12 +156,12 @@ impl CameraFile {
         Ok(first.clone())
     }
 
-    /// The views of all frames. `masks` is a folder of masks that have the names of their pictures; without one a frame's own mask is taken,
-    /// else that in a folder `masks` beside the pictures if there is one, else the picture itself. `load` reads a mask.
+    /// The views of all frames. `masks` is a folder of masks with the names of their pictures; without it, the mask of a frame is used,
+    /// else that in a folder `masks` next to the pictures, else the picture itself. `load` reads a mask.
     ///
     /// # Errors
     ///
-    /// If there are no frames, a mask cannot be read, or a camera is none for its picture: one line that names the file and the frame.
+    /// If there are no frames, a mask cannot be read, or a camera does not fit its picture: one line with the file and the frame.
     pub fn views(
         &self,
         masks: Option<&Path>,
@@ -205,14 +205,14 @@ impl CameraFile {
         Ok(View { name: frame.picture.clone(), picture, mask, camera, distortion, off })
     }
 
-    /// The mask that a frame names, or that lies in a folder `masks`.
+    /// The mask of a frame, or the one in a folder `masks`.
     fn mask_beside(&self, frame: &Frame) -> Option<PathBuf> {
         let named = frame.mask.as_ref().map(|name| self.file(name));
         let folders = || self.roots.iter().map(|root| root.join("masks"));
         named.or_else(|| folders().find_map(|folder| find_mask(&folder, &frame.picture)))
     }
 
-    /// The file that a name means: the first that is there.
+    /// The file of a name: the first that exists.
     fn file(&self, name: &str) -> PathBuf {
         let mut candidates = self.roots.iter().map(|root| picture_path(root, name));
         let first = candidates.next().unwrap_or_else(|| picture_path(Path::new(""), name));
@@ -221,14 +221,14 @@ impl CameraFile {
     }
 }
 
-/// The views of a folder with cameras as [`CameraFile::load`] finds them, and the masks that they name; `load` reads a mask.
+/// The views of a folder, with cameras found as by [`CameraFile::load`], and their masks; `load` reads a mask.
 ///
-/// A path may be written as on Windows, and may lead out of the folder: pictures are all that is read. Where no file has a name without an
-/// ending, or with one of no picture, as `frame.0001`, the endings png, jpg, jpeg and gif are tried.
+/// A path may have the format of Windows, and may lead out of the folder, since only pictures are read. If no file exists for a name
+/// without the extension of a picture, such as `frame.0001`, the extensions png, jpg, jpeg and gif are tried.
 ///
 /// # Errors
 ///
-/// If a file is missing or cannot be read, there is no frame, or a camera is none: one line that names the file and the frame.
+/// If a file is missing or cannot be read, there is no frame, or a camera is invalid: one line with the file and the frame.
 pub fn load_views(
     folder: impl AsRef<Path>,
     load: impl Fn(&Path) -> anyhow::Result<Picture>,

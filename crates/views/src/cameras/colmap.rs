@@ -1,4 +1,4 @@
-//! A model of COLMAP, as text or binary: `cameras` and `images`.
+//! COLMAP models, as text or binary: `cameras` and `images`.
 
 use std::{
     collections::HashMap,
@@ -18,10 +18,10 @@ use super::{
     rotation::{of_quaternion, to_quaternion},
 };
 
-/// Bytes of a line with a camera or an image at most.
+/// Longest line of a camera or an image, in bytes.
 const LONGEST_LINE: u64 = 1 << 16;
 
-/// Names of camera models by their number, and their parameters in order.
+/// Names of camera models by number, and their parameters in order.
 const MODELS: [(&str, &[&str]); 11] = [
     ("SIMPLE_PINHOLE", &["fx", "cx", "cy"]),
     ("PINHOLE", &["fx", "fy", "cx", "cy"]),
@@ -39,16 +39,16 @@ const MODELS: [(&str, &[&str]); 11] = [
     ),
 ];
 
-/// Cameras of a model by their numbers, in the order of the file.
+/// Cameras of a model by number, in the order of the file.
 pub(super) type Lenses = Vec<(u32, Lens)>;
 
-/// The pose of a camera as COLMAP writes it: the quaternion w, x, y, z of R, and t.
+/// The pose of a camera in the format of COLMAP: the quaternion w, x, y, z of R, and t.
 pub fn colmap_pose(camera: &Pinhole) -> [f64; 7] {
     let ([w, x, y, z], [tx, ty, tz]) = (to_quaternion(&camera.rotation), camera.translation);
     [w, x, y, z, tx, ty, tz]
 }
 
-/// Whether a folder has cameras of a model.
+/// Whether a folder contains the cameras of a model.
 pub(super) fn is_in(folder: &Path) -> bool {
     ["cameras.bin", "cameras.txt"].iter().any(|name| folder.join(name).is_file())
 }
@@ -56,13 +56,13 @@ pub(super) fn is_in(folder: &Path) -> bool {
 /// Cameras and images of a folder.
 pub(super) struct Model {
     pub(super) lenses: Lenses,
-    /// None if there is no file of images.
+    /// Empty if there is no file of images.
     pub(super) frames: Vec<Frame>,
     /// The file of the cameras, then that of the images if there is one.
     pub(super) files: Vec<PathBuf>,
 }
 
-/// The model in a folder. Of a text and a binary file the binary one is read, as COLMAP does.
+/// The model in a folder. A binary file takes precedence over a text, as in COLMAP.
 pub(super) fn load(folder: &Path) -> anyhow::Result<Model> {
     let file = |stem: &str| {
         let paths = ["bin", "txt"].map(|ending| folder.join(format!("{stem}.{ending}")));
@@ -113,7 +113,7 @@ pub(super) fn text_lenses(mut file: impl BufRead) -> anyhow::Result<Lenses> {
     Ok(lenses)
 }
 
-/// The images of a text called `name`. Every image takes two lines, the second of which holds points.
+/// The images of a text called `name`. Every image has two lines, the second of which holds points.
 pub(super) fn text_frames(
     mut file: impl BufRead,
     lenses: &HashMap<u32, &Lens>,
@@ -122,7 +122,7 @@ pub(super) fn text_frames(
     let (mut frames, mut number) = (Vec::new(), 0);
     while let Some(line) = next_line(&mut file, &mut number).with_context(|| name.to_owned())? {
         let of = || {
-            // The name comes last and may hold spaces.
+            // The name comes last and may contain spaces.
             let mut words = line.splitn(10, ' ');
             let mut word = || words.next().unwrap_or_default();
             let _id: u32 = word().parse().context("no image number")?;
@@ -140,7 +140,7 @@ pub(super) fn text_frames(
     Ok(frames)
 }
 
-/// The next line that says something, and its number; None behind the last.
+/// The next line with content, and its number; `None` after the last.
 fn next_line(file: &mut impl BufRead, number: &mut usize) -> anyhow::Result<Option<String>> {
     loop {
         let mut line = Vec::new();
@@ -196,7 +196,7 @@ pub(super) fn binary_frames(
             }
             let camera = u32::from_le_bytes(file.take()?);
             let picture = file.text()?;
-            // x and y as floats of 64 bits, and the number of a point.
+            // x and y as f64, and the number of a point.
             let points = file.count()?;
             file.skip(points.saturating_mul(24))?;
             frame(&picture, pose, camera, lenses)
@@ -248,7 +248,7 @@ fn frame(
     of().with_context(|| short(picture))
 }
 
-/// A binary file, whose numbers have their lowest byte first.
+/// A binary file with little-endian numbers.
 struct Binary<R>(R);
 
 impl<R: BufRead> Binary<R> {
@@ -266,7 +266,7 @@ impl<R: BufRead> Binary<R> {
         Ok(f64::from_le_bytes(self.take()?))
     }
 
-    /// A text that ends with a zero.
+    /// A zero-terminated text.
     fn text(&mut self) -> anyhow::Result<String> {
         let mut text = Vec::new();
         self.0.by_ref().take(LONGEST_LINE).read_until(0, &mut text)?;
@@ -336,12 +336,12 @@ mod tests {
         assert_eq!(frames, same);
         assert_eq!(frames[0].picture, "a b/00.png");
         assert_eq!(frames[0].translation, [1.0, 2.0, 3.0]);
-        // A turn about x whose half has cosine .6 and sine .8.
+        // A rotation about x by an angle whose half has cosine .6 and sine .8.
         let expected = [[1.0, 0.0, 0.0], [0.0, -0.28, -0.96], [0.0, 0.96, -0.28]];
         for (row, expected) in frames[0].rotation.iter().zip(expected) {
             assert!((0..3).all(|k| (row[k] - expected[k]).abs() < 1e-12), "{row:?}");
         }
-        // A quaternion of any length is that of its direction.
+        // Quaternions of any length are normalised.
         assert_eq!(frames[1].rotation, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let size = ImageSize { height: 150, width: 200 };
         let (camera, bent) = frames[1].lens.camera(size).unwrap();

@@ -2,16 +2,16 @@ use anyhow::ensure;
 use serde_json::{Value, json};
 use softrast_raster::Pinhole;
 
-/// Radii that are looked at to find out where a lens folds the picture.
+/// Radii sampled to determine where a lens folds the picture.
 const RADII: usize = 2000;
-/// A lens that folds its picture nearer to the middle than this share of the shorter side is none.
+/// Least unfolded radius of a valid lens, as a fraction of the shorter side.
 const LEAST_UNFOLDED: f64 = 0.25;
-/// A lens that shows a corner so many times as far from the middle as a pinhole does is none.
+/// Largest ratio of the radius of a corner to that of a pinhole, for a valid lens.
 const MOST_STRETCHED: f64 = 10.0;
 
-/// How a lens bends what a pinhole sees straight, as OpenCV has it.
+/// Lens distortion relative to a pinhole, in the models of OpenCV.
 ///
-/// A point `(X, Y, Z)` before the camera has `x = X / Z`, `y = Y / Z` and `r² = x² + y²`. The lens shows it at `(fx x' + cx, fy y' + cy)`.
+/// A point `(X, Y, Z)` before the camera has `x = X / Z`, `y = Y / Z` and `r² = x² + y²`. Its pixel is `(fx x' + cx, fy y' + cy)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Distortion {
     /// `x' = x q + 2 p1 x y + p2 (r² + 2 x²)` and `y' = y q + p1 (r² + 2 y²) + 2 p2 x y` with
@@ -30,7 +30,7 @@ pub enum Distortion {
 }
 
 impl Distortion {
-    /// The coefficients as JSON, and the name of their model: what a [`Lens`](crate::Lens) is read from.
+    /// The coefficients as JSON, and the name of their model, as fields of a [`Lens`](crate::Lens).
     pub fn json(&self) -> Value {
         match self {
             Self::Rational { k: [k1, k2, k3, k4, k5, k6], p: [p1, p2] } => json!({
@@ -43,7 +43,7 @@ impl Distortion {
         }
     }
 
-    /// `(x', y')` of `(x, y)`.
+    /// `(x', y')` for `(x, y)`.
     pub fn bend(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let square = x * x + y * y;
         match self {
@@ -58,7 +58,7 @@ impl Distortion {
         }
     }
 
-    /// The radial part: `r' / r` of `r²`.
+    /// The radial factor `r' / r` for `r²`.
     fn ratio(&self, square: f64) -> f64 {
         let polynomial = |k: &[f64], x: f64| k.iter().rev().fold(0.0, |sum, k| (sum + k) * x);
         match self {
@@ -74,7 +74,7 @@ impl Distortion {
         }
     }
 
-    /// The radius up to `most` beyond which the lens would show what is farther out no farther out.
+    /// The radius, at most `most`, up to which the distorted radius increases.
     fn unfolded(&self, most: f64) -> f64 {
         let radius = |step: usize| most * step as f64 / RADII as f64;
         let shown = |step: usize| radius(step) * self.ratio(radius(step).powi(2));
@@ -85,7 +85,7 @@ impl Distortion {
         folds.map_or(most, |step| radius(step - 1))
     }
 
-    /// An error if no lens takes pictures like this: it would fold them near their middle, or stretch them.
+    /// An error if the distortion is implausible: it folds pictures near their middle, or stretches them.
     pub(super) fn check(&self, camera: &Pinhole) -> anyhow::Result<()> {
         let most = farthest(camera);
         let unfolded = self.unfolded(most);
@@ -103,10 +103,10 @@ impl Distortion {
         Ok(())
     }
 
-    /// Where each pixel of an undistorted picture lies in the picture that the lens took, in pixels from the corner of the first, row by row.
-    /// The camera is that of both, but for the lens.
+    /// Positions of the pixels of an undistorted picture in the distorted one, in pixels from the corner of the first, row by row. `camera`
+    /// is that of both, except for the lens.
     ///
-    /// Beyond where the lens would fold the picture, the place is that of the fold in the same direction.
+    /// Beyond the radius where the lens folds the picture, the position is that of the fold in the same direction.
     pub(crate) fn sources(&self, camera: &Pinhole) -> impl Iterator<Item = [f64; 2]> {
         let Pinhole { focal, centre, size, .. } = *camera;
         let (lens, unfolded) = (*self, self.unfolded(farthest(camera)));

@@ -1,4 +1,4 @@
-//! Fields of camera files. An error names the file and the field.
+//! Fields of camera files. Errors include the file and the field.
 
 use std::{borrow::Cow, path::Path};
 
@@ -9,7 +9,7 @@ use softrast_mesh::read_bounded;
 
 use super::calibration;
 
-/// Fields that hold one number.
+/// Fields with a single number.
 const NUMBERS: [&str; 20] = [
     "fl_x",
     "fl_y",
@@ -33,21 +33,21 @@ const NUMBERS: [&str; 20] = [
     "p2",
 ];
 
-/// Letters of a name that an error shows.
+/// Characters of a name in an error.
 const LONGEST_NAME: usize = 200;
-/// Bytes of a camera file at most: 100,000 frames have fewer.
+/// Largest camera file in bytes: 100,000 frames need less.
 const LARGEST_FILE: u64 = 1 << 25;
-/// Positions in world units beyond this do not fit the floats that draw.
+/// Positions in world units beyond this do not fit the floats used for drawing.
 const FARTHEST: f64 = 1e15;
 
-/// A name of a file for an error: on one line, and not longer than a person reads.
+/// A file name for an error: on one line, and shortened.
 pub(super) fn short(name: &str) -> String {
     let mut letters = name.chars().map(|letter| if letter.is_control() { ' ' } else { letter });
     let start: String = letters.by_ref().take(LONGEST_NAME).collect();
     if letters.next().is_some() { format!("{start}…") } else { start }
 }
 
-/// The content of a camera file, with its path as its name.
+/// The content of a camera file, and its path as its name.
 pub(super) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
     let name = path.display().to_string();
     let bytes = read_bounded(path, LARGEST_FILE)
@@ -55,7 +55,7 @@ pub(super) fn read(path: &Path) -> anyhow::Result<(Vec<u8>, String)> {
     Ok((bytes, name))
 }
 
-/// The content of the camera file `name` as JSON, also of a calibration in YAML.
+/// The content of the camera file `name` as JSON, also for a calibration in YAML.
 pub(super) fn json(bytes: &[u8], name: &str) -> anyhow::Result<Value> {
     let text = text(bytes).with_context(|| name.to_owned())?;
     let parsed = serde_json::from_str(&text).or_else(|error| calibration::yaml(&text).ok_or(error));
@@ -69,7 +69,7 @@ pub(super) fn json(bytes: &[u8], name: &str) -> anyhow::Result<Value> {
     calibration::as_lens(file).with_context(|| name.to_owned())
 }
 
-/// A text in UTF-8, with or without a byte order mark, or in UTF-16 with one, as shells of Windows write it.
+/// A text in UTF-8, with or without a byte order mark, or in UTF-16 with one, as written by shells of Windows.
 fn text(bytes: &[u8]) -> anyhow::Result<Cow<'_, str>> {
     let of_16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
         let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
@@ -85,7 +85,7 @@ fn text(bytes: &[u8]) -> anyhow::Result<Cow<'_, str>> {
     text.context("the file is no text in UTF-8: save it as that")
 }
 
-/// An error if t is no place that can be drawn from.
+/// An error if t is not a position that can be drawn from.
 pub(super) fn check_place(translation: [f64; 3]) -> anyhow::Result<()> {
     let near = translation.iter().all(|x| x.abs() <= FARTHEST);
     ensure!(
@@ -95,7 +95,7 @@ pub(super) fn check_place(translation: [f64; 3]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The fields of an object as a type, or the first that has another one.
+/// The fields of an object as a type, or an error for the first field of another type.
 pub(super) fn typed<T: DeserializeOwned>(object: &Value) -> anyhow::Result<T> {
     for name in NUMBERS {
         let value = &object[name];
@@ -113,10 +113,10 @@ pub(super) fn typed<T: DeserializeOwned>(object: &Value) -> anyhow::Result<T> {
     })
 }
 
-/// Stands for a number that is none.
+/// String in place of a number that is not finite.
 const MARK: &str = "\u{1}not finite";
 
-/// Where a text would be JSON but for a word that some programs write into it, which has none for such numbers: the place of the first.
+/// The place of the first non-finite number in a text that is JSON except for such words, which some programs write.
 fn not_finite(text: &str) -> Option<String> {
     let marked = marked(text);
     let whole: Value = serde_json::from_str(&marked).ok()?;
@@ -135,7 +135,7 @@ fn marked(text: &str) -> String {
                 rest = &rest[word.len()..];
                 continue;
             }
-            // What is escaped does not end a string.
+            // An escaped character does not end a string.
             (true, _) if next == '\\' => {
                 rest.char_indices().nth(2).map_or(rest.len(), |(at, _)| at)
             }
@@ -148,7 +148,7 @@ fn marked(text: &str) -> String {
     marked
 }
 
-/// The way to the first mark, as `frames[3].transform_matrix[0][2]`.
+/// The path to the first mark, such as `frames[3].transform_matrix[0][2]`.
 fn place_of_mark(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => (text == MARK).then(String::new),
@@ -168,7 +168,7 @@ fn place_of_mark(value: &Value) -> Option<String> {
     }
 }
 
-/// What stands behind a name or an index.
+/// The rest of a path, after a name or an index.
 fn dotted(rest: String) -> String {
     if rest.is_empty() || rest.starts_with('[') { rest } else { format!(".{rest}") }
 }
@@ -188,7 +188,7 @@ mod tests {
         for bytes in [plain.as_bytes(), &marked, &little, &big] {
             assert_eq!(json(bytes, "a.json").unwrap()["file_path"], "füchse/01.png");
         }
-        // Cut within a sign, half of a pair, or another encoding.
+        // Truncated within a character, half of a surrogate pair, or another encoding.
         for bytes in [&little[..5], &[0xff, 0xfe, 0x00, 0xd8], b"{\"a\": \"f\xfcchse\"}"] {
             let error = format!("{:#}", json(bytes, "a.json").unwrap_err());
             assert_eq!(error, "a.json: the file is no text in UTF-8: save it as that");
@@ -201,7 +201,7 @@ mod tests {
         assert_eq!(place(r#"{"fx": NaN}"#).as_deref(), Some("fx"));
         let frames = r#"{"frames": [{"file_path": "NaN \" NaN", "depth": null}, {"m": {"t": [[1, -Infinity]]}}]}"#;
         assert_eq!(place(frames).as_deref(), Some("frames[1].m.t[0][1]"));
-        // Broken for another reason, or not at all.
+        // Invalid for another reason, or valid.
         assert_eq!(place(r#"{"file_path": "Infinity.png", "fx": }"#), None);
         assert_eq!(place(r#"{"file_path": "Infinity.png"}"#), None);
     }

@@ -1,6 +1,6 @@
 use super::{Lens, fields::short};
 
-/// A frame: names of its files, its lens, its pose from world to camera, and how far off its rotation was.
+/// A frame: names of its files, its lens, its pose from world to camera, and the deviation of its rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Frame {
     pub(super) picture: String,
@@ -11,7 +11,7 @@ pub(super) struct Frame {
     pub(super) off: f64,
 }
 
-/// Where an error is: the frame of a file.
+/// The place of an error: the frame of a file.
 pub(super) fn frame_place(file: &str, k: usize, picture: &str) -> String {
     format!("{file}: frame {k} ({})", short(picture))
 }

@@ -10,17 +10,17 @@ use super::{
     fields::{json, read, short, typed},
 };
 
-/// Intrinsics of a camera as files have them.
+/// Intrinsics of a camera in a file.
 ///
-/// Focal lengths as `fl_x` and `fl_y`, as `fx` and `fy`, as the matrix `K`, or as the field of view `camera_angle_x` in radians; `cx` and
-/// `cy`, else those of `K`, else the middle; the size of its pictures as `w` and `h` or `width` and `height`. See [`Pinhole`] for what they
-/// mean.
+/// Focal lengths are `fl_x` and `fl_y`, `fx` and `fy`, the matrix `K`, or the field of view `camera_angle_x` in radians; the principal
+/// point is `cx` and `cy`, else that of `K`, else the middle; the size of pictures is `w` and `h` or `width` and `height`. See [`Pinhole`]
+/// for their definitions.
 ///
-/// A calibration of OpenCV or ROS is one too, in JSON or YAML: `camera_matrix` is its K, from the middle of the first pixel, beside
-/// `distortion_coefficients`, `image_width`, `image_height` and `distortion_model`.
+/// A calibration of OpenCV or ROS is also supported, in JSON or YAML: `camera_matrix` is its K, relative to the centre of the first pixel,
+/// with `distortion_coefficients`, `image_width`, `image_height` and `distortion_model`.
 ///
-/// A lens may distort: `k1` to `k6`, `p1` and `p2` as OpenCV has them, or as its list `distortion_coefficients`; a fisheye has k1 to k4 and
-/// `is_fisheye`, or a `camera_model` that says so. Names of models are those of COLMAP.
+/// A lens may have distortion: `k1` to `k6`, `p1` and `p2` of OpenCV, or its list `distortion_coefficients`; a fisheye has k1 to k4 and
+/// `is_fisheye`, or a `camera_model` of this kind. Names of models are those of COLMAP.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Lens {
     #[serde(alias = "fx")]
@@ -42,7 +42,7 @@ pub struct Lens {
     coefficients: Coefficients,
 }
 
-/// By name, or as a list.
+/// Coefficients by name, or as a list.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 struct Coefficients {
     /// In the order of OpenCV: k1, k2, p1, p2, k3 to k6; those of a fisheye are k1 to k4.
@@ -64,7 +64,7 @@ struct Coefficients {
 /// Names of coefficients in the order of OpenCV's list, and in that of nerfstudio's.
 const OPENCV: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 const NERFSTUDIO: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
-/// Models of cameras that show straight what is straight but for their coefficients, and those of a fisheye.
+/// Camera models without distortion except by their coefficients, and fisheye models.
 const STRAIGHT: [&str; 8] = [
     "PINHOLE",
     "SIMPLE_PINHOLE",
@@ -77,19 +77,19 @@ const STRAIGHT: [&str; 8] = [
 ];
 const FISHEYES: [&str; 4] =
     ["OPENCV_FISHEYE", "FISHEYE", "RADIAL_FISHEYE", "SIMPLE_RADIAL_FISHEYE"];
-/// Focal lengths against the shorter and the longer side of a picture: from a field of view of 179 degrees down to a thousandth of one.
+/// Focal lengths relative to the shorter and the longer side of a picture: fields of view from 179 degrees down to a thousandth of one.
 const FOCAL_LENGTHS: [f64; 2] = [0.01, 1e5];
-/// How far off the principal point may be, in longer sides: a picture may be a small part of a large one.
+/// Largest offset of the principal point, in longer sides: a picture may be a small crop of a large one.
 const FARTHEST_CENTRE: f64 = 1e5;
-/// How much `fx` and that of `K` may differ, as a fraction: files hold few digits.
+/// Largest relative difference of `fx` and that of `K`: files hold few digits.
 const ROUNDED: f64 = 1e-6;
 
 impl Lens {
-    /// The lens that a camera file describes: a `transforms.json`, a calibration of OpenCV or ROS in YAML or JSON, or a result of ours.
+    /// The lens of a camera file: a `transforms.json`, a calibration of OpenCV or ROS in YAML or JSON, or a result file of this project.
     ///
     /// # Errors
     ///
-    /// If the file is missing, is neither JSON nor such YAML, has a field of another type, or tells no focal length.
+    /// If the file is missing, is neither JSON nor such YAML, has a field of another type, or has no focal length.
     pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let (bytes, name) = read(path.as_ref())?;
         Self::parse(&bytes, &name)
@@ -102,13 +102,13 @@ impl Lens {
     /// The errors of [`Lens::load`], except those of reading.
     pub fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Self> {
         let file = json(bytes, name)?;
-        // A result of ours holds its camera one level down.
+        // Result files hold the camera one level down.
         let camera = if file["camera"].is_object() { &file["camera"] } else { &file };
         let lens = Self::of(camera).and_then(|lens| lens.angle_or_length().map(|()| lens));
         lens.with_context(|| name.to_owned())
     }
 
-    /// What the fields of an object say.
+    /// The lens with the fields of an object.
     pub(super) fn of(object: &Value) -> anyhow::Result<Self> {
         typed(object)
     }
@@ -121,13 +121,13 @@ impl Lens {
         Self { fl_x: Some(focal), ..Self::default() }
     }
 
-    /// The camera with this lens for pictures of this size, at the origin, looking along z; and how the lens distorts them, if it does. It sees
-    /// what [`Picture::undistorted`](crate::Picture::undistorted) makes of them.
+    /// The camera with this lens for pictures of this size, at the origin, looking along z; and the distortion of the lens, if there is
+    /// one. The camera is that of pictures after [`Picture::undistorted`](crate::Picture::undistorted).
     ///
     /// # Errors
     ///
-    /// If it is for pictures of another size, contradicts itself, has a skew or no focal length, one that no picture of this size is taken
-    /// with, or a model that is not known.
+    /// If it is for pictures of another size, is inconsistent, has a skew or no focal length, an implausible one for this size, or an
+    /// unknown model.
     pub fn camera(&self, size: ImageSize) -> anyhow::Result<(Pinhole, Option<Distortion>)> {
         self.check_size(size)?;
         let distortion = self.coefficients.distortion(self.camera_model.as_deref())?;
@@ -146,7 +146,7 @@ impl Lens {
         Ok((pinhole, distortion))
     }
 
-    /// The camera with this lens for pictures that are not distorted; see [`Lens::camera`].
+    /// The camera with this lens for undistorted pictures; see [`Lens::camera`].
     ///
     /// # Errors
     ///
@@ -160,7 +160,7 @@ impl Lens {
         Ok(pinhole)
     }
 
-    /// Focal lengths in pixels, for pictures of so many along x and y.
+    /// Focal lengths in pixels, for pictures of this many along x and y.
     fn focal(&self, pixels: [f64; 2]) -> anyhow::Result<[f64; 2]> {
         self.angle_or_length()?;
         let of_matrix = self.matrix.as_ref().map(focal_of).transpose()?;
@@ -186,12 +186,12 @@ impl Lens {
         };
         let along_x = length("camera_angle_x", self.camera_angle_x, pixels[0])?;
         let along_y = length("camera_angle_y", self.camera_angle_y, pixels[1])?;
-        // One of them is there. Pixels are square if the other is not.
+        // At least one exists. Pixels are square if the other does not.
         let either = along_x.or(along_y).unwrap_or_default();
         Ok([along_x.unwrap_or(either), along_y.unwrap_or(either)])
     }
 
-    /// The principal point, as far as it is told.
+    /// The principal point, as far as it is given.
     fn centre(&self) -> [Option<f64>; 2] {
         let of_matrix = |row: usize| self.matrix.map(|matrix| matrix[row][2]);
         [self.cx.or(of_matrix(0)), self.cy.or(of_matrix(1))]
@@ -221,9 +221,9 @@ impl Lens {
         Ok(())
     }
 
-    /// The lens of a frame that says so much of its own.
+    /// The lens of a frame that overrides some fields.
     pub(super) fn with(&self, frame: &Self) -> Self {
-        // Focal lengths belong together, however they are told.
+        // Focal lengths belong together, in whatever form they are given.
         let focal = if frame.angle_or_length().is_ok() { frame } else { self };
         let ([cx, cy], [own_cx, own_cy]) = (self.centre(), frame.centre());
         Self {
@@ -238,7 +238,7 @@ impl Lens {
     }
 }
 
-/// An error if a camera's numbers, though positive, are those of no camera: floats of 32 bits would not tell pixels apart.
+/// An error if a camera's numbers are positive but implausible: f32 could not distinguish pixels.
 fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
     let ImageSize { width, height } = camera.size;
     let (shorter, longer) = (camera.size.shorter() as f64, width.max(height) as f64);
@@ -259,7 +259,7 @@ fn check_sense(camera: &Pinhole) -> anyhow::Result<()> {
 }
 
 impl Coefficients {
-    /// The distortion by these coefficients under a model of this name; None if there is none.
+    /// The distortion with these coefficients and a model of this name; `None` if there is none.
     fn distortion(&self, model: Option<&str>) -> anyhow::Result<Option<Distortion>> {
         let model = model.unwrap_or("OPENCV").to_ascii_uppercase();
         let fisheye = self.is_fisheye.unwrap_or(false) || FISHEYES.contains(&&*model);
@@ -303,7 +303,7 @@ impl Coefficients {
             );
             return Ok(Some(Distortion::Fisheye { k: [k1, k2, k3, k4] }));
         }
-        // nerfstudio has a k4 that multiplies r⁸.
+        // The k4 of nerfstudio multiplies r⁸.
         ensure!(
             k4 == 0.0 || self.distortion_params.is_none() || self.k4.is_some(),
             "distortion_params has a fourth coefficient {k4}, which is not supported"
@@ -329,7 +329,7 @@ impl Coefficients {
     }
 }
 
-/// The numbers of a list, of lists in a list, or of the `data` of a matrix as OpenCV writes it, in order.
+/// The numbers of a list, of nested lists, or of the `data` of an OpenCV matrix, in order.
 fn numbers(value: &Value) -> anyhow::Result<Vec<f64>> {
     match value {
         Value::Array(values) => {
@@ -448,7 +448,7 @@ mod tests {
         ] {
             assert_eq!(found(lens.clone()), fisheye, "{lens}");
         }
-        // No coefficient at all is a pinhole, unless the lens is a fisheye.
+        // A lens whose coefficients are all 0 is a pinhole, unless it is a fisheye.
         for lens in [
             json!({ "fx": 900, "k1": 0, "p2": 0.0, "camera_model": "SIMPLE_RADIAL" }),
             json!({ "fx": 900, "distortion": [0, 0, 0, 0, 0], "camera_model": "perspective" }),

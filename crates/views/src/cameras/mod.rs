@@ -1,4 +1,4 @@
-//! Files of cameras: a lens, a pose, and the frames of many pictures.
+//! Camera files: lenses, poses, and frames of many pictures.
 
 mod calibration;
 mod camera_file;

@@ -1,11 +1,11 @@
-//! Names of pictures as camera files write them, and the files that are meant.
+//! Picture names in camera files, and the corresponding files.
 
 use std::path::{Path, PathBuf};
 
-/// Endings of picture files, as they are written.
+/// Extensions of picture files.
 const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "gif"];
 
-/// The file that a name in a camera file means: the first that is there, or else the likeliest, for an error.
+/// The file of a name in a camera file: the first that exists, or else the likeliest, for an error.
 pub(super) fn picture_path(folder: &Path, name: &str) -> PathBuf {
     let ending = |name: &str| name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
     let complete = ending(name).is_some_and(|ending| ENDINGS.contains(&&*ending));
@@ -22,7 +22,7 @@ pub(super) fn picture_path(folder: &Path, name: &str) -> PathBuf {
     candidates.swap_remove(found.unwrap_or(usize::from(!complete)))
 }
 
-/// A name as it stands, with the separators of Windows replaced, and if it begins with a drive of Windows its ends, the longest first.
+/// The name itself, with the separators of Windows replaced, and if it starts with a drive of Windows its suffixes, the longest first.
 fn spellings(name: &str) -> Vec<String> {
     let mut names = vec![name.to_owned()];
     if name.contains('\\') {
@@ -38,8 +38,8 @@ fn spellings(name: &str) -> Vec<String> {
     names
 }
 
-/// The mask of a picture in a folder of masks: a file with the name of the picture, with or without the folders before it, and any ending of a
-/// picture; or as COLMAP has it, the whole name and `.png`. The first that is there.
+/// The mask of a picture in a folder of masks: a file with the name of the picture, with or without its parent folders, and any picture
+/// extension; or in the convention of COLMAP, the whole name and `.png`. The first that exists.
 pub fn find_mask(folder: &Path, picture: &str) -> Option<PathBuf> {
     let picture = picture.replace('\\', "/");
     let parts: Vec<&str> = picture.split('/').filter(|part| !part.is_empty()).collect();
@@ -53,14 +53,14 @@ pub fn find_mask(folder: &Path, picture: &str) -> Option<PathBuf> {
     candidates.map(|name| folder.join(name)).find(|path| path.is_file())
 }
 
-/// Whether a name in a camera file may mean this file: both have the same name but for folders and the ending of a picture.
+/// Whether a name in a camera file may refer to this file: both have the same name except folders and picture extension.
 pub(super) fn is_called(path: &Path, name: &str) -> bool {
     let of_path = path.file_name().unwrap_or_default().to_string_lossy();
     let of_name = name.rsplit(['/', '\\']).next().unwrap_or(name);
     !of_name.is_empty() && stem(&of_path) == stem(of_name)
 }
 
-/// A name without the ending of a picture.
+/// A name without its picture extension.
 fn stem(name: &str) -> &str {
     match name.rsplit_once('.') {
         Some((stem, ending)) if ENDINGS.contains(&&*ending.to_ascii_lowercase()) => stem,
@@ -108,7 +108,7 @@ mod tests {
             let expected = inside.join(expected);
             assert_eq!(found.canonicalize().unwrap(), expected.canonicalize().unwrap(), "{name}");
         }
-        // What is not there is named as it most likely would be.
+        // A missing file gets its most likely name.
         assert!(picture_path(&inside, "images/no").ends_with("images/no.png"));
         assert!(picture_path(&inside, "images/no.png").ends_with("images/no.png"));
         assert!(picture_path(&inside, "").ends_with(".png"));

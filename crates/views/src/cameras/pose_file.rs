@@ -9,24 +9,24 @@ use super::{
     rotation::{SAID, nearest},
 };
 
-/// Where a camera stands and how it is turned, as a file has it.
+/// The pose of a camera in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseFile {
-    /// R, row by row, from world to camera axes, as OpenCV has it.
+    /// R, row by row, from world to camera axes, in the convention of OpenCV.
     pub rotation: [[f64; 3]; 3],
     /// t, in world units.
     pub translation: [f64; 3],
-    /// A note for the user where R was rounded and became the nearest rotation.
+    /// A note for the user if R was rounded and was replaced by the nearest rotation.
     pub note: Option<String>,
 }
 
 impl PoseFile {
-    /// R and t of a camera in a file: `{"R": .., "t": ..}` as OpenCV has them, `{"transform_matrix": ..}` as OpenGL has it, or either of them
-    /// under `camera`, as a result of ours.
+    /// R and t of a camera in a file: `{"R": .., "t": ..}` of OpenCV, `{"transform_matrix": ..}` of OpenGL, or either of them under
+    /// `camera`, as in result files of this project.
     ///
     /// # Errors
     ///
-    /// If the file is missing, is no JSON, has neither, or what it has is no rotation to a hundredth.
+    /// If the file is missing, is not JSON, has neither, or its matrix is not a rotation to a hundredth.
     pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let (bytes, name) = read(path.as_ref())?;
         Self::parse(&bytes, &name)
@@ -46,7 +46,7 @@ impl PoseFile {
             transform_matrix: Option<Vec<Vec<f64>>>,
         }
         let file = json(bytes, name)?;
-        // Results of version 0.1 have the camera for the mesh in its file apart.
+        // Results of version 0.1 have the camera for the mesh in its file separately.
         let inside = ["camera_in_file", "camera"].into_iter().find(|name| file[name].is_object());
         let object = inside.map_or(&file, |name| &file[name]);
         let camera = || {
@@ -70,7 +70,7 @@ impl PoseFile {
     }
 }
 
-/// That a rotation was rounded, and as many in all.
+/// Note that a rotation was rounded, and the number of such rotations.
 pub(crate) fn rounded_note(name: &str, off: f64, count: usize) -> String {
     let of = match count {
         1 => "its rotation is".to_owned(),
@@ -87,7 +87,7 @@ fn checked(camera: Pinhole, off: f64) -> anyhow::Result<(Pinhole, f64)> {
     Ok((camera, off))
 }
 
-/// A `transform_matrix` of 3 or 4 rows, with the rotation that is nearest to its own, and how far off that was.
+/// A `transform_matrix` of 3 or 4 rows, with its rotation replaced by the nearest one, and the deviation of the original.
 pub(crate) fn camera_to_world(rows: &[Vec<f64>]) -> anyhow::Result<([[f64; 4]; 4], f64)> {
     let complete: Option<Vec<[f64; 4]>> =
         rows.iter().map(|row| row.as_slice().try_into().ok()).collect();

@@ -1,21 +1,21 @@
 use anyhow::{bail, ensure};
 
-/// Entries of `R Rᵀ` may be so far from those of the identity: numbers with three decimals are off by a fifth of it.
+/// Largest deviation of entries of `R Rᵀ` from the identity: numbers with three decimals deviate by a fifth of it.
 const MOST_OFF: f64 = 1e-2;
-/// From here on it is said that a rotation was rounded: below it are numbers of 32 bits, and those with five decimals or more.
+/// Deviation above which a note on rounding is printed: that of numbers in f32, or with five decimals or more, is lower.
 pub(crate) const SAID: f64 = 5e-5;
-/// A matrix that is nearer to a rotation stays as it is.
+/// A matrix that is closer to a rotation is unchanged.
 const EXACT: f64 = 1e-9;
-/// Each step squares what is missing.
+/// Each step squares the remaining deviation.
 const STEPS: usize = 6;
 
-/// The rotation that is nearest to R, and how far entries of `R Rᵀ` are from those of the identity: files hold few digits.
+/// The rotation nearest to R, and the largest deviation of `R Rᵀ` from the identity: files hold few digits.
 ///
-/// A reflection becomes the nearest one.
+/// A reflection becomes the nearest reflection.
 ///
 /// # Errors
 ///
-/// If they are as far as 0.01.
+/// If the deviation is at least 0.01.
 pub(crate) fn nearest(r: [[f64; 3]; 3]) -> anyhow::Result<([[f64; 3]; 3], f64)> {
     ensure!(r.as_flattened().iter().all(|x| x.is_finite()), "R has a number that is not finite");
     let product = product(&r);
@@ -38,7 +38,7 @@ pub(crate) fn nearest(r: [[f64; 3]; 3]) -> anyhow::Result<([[f64; 3]; 3], f64)> 
     if off < EXACT {
         return Ok((r, off));
     }
-    // The polar decomposition by Newton's method: half of X and of its inverse transposed.
+    // The polar decomposition by Newton's method: the mean of X and its inverse transpose.
     let polar = (0..STEPS).fold(r, |x, _| {
         let (inverse, determinant) = cofactors(&x);
         [0, 1, 2].map(|i| [0, 1, 2].map(|j| 0.5 * (x[i][j] + inverse[i][j] / determinant)))
@@ -67,7 +67,7 @@ pub(crate) fn of_quaternion(quaternion: [f64; 4]) -> anyhow::Result<[[f64; 3]; 3
 
 /// The quaternion `w + x i + y j + z k` of a rotation, of length 1 and with w at least 0.
 pub(super) fn to_quaternion(r: &[[f64; 3]; 3]) -> [f64; 4] {
-    // Four times the squares of the parts: the largest is far from 0, and the others follow from sums and differences beside the diagonal.
+    // Four times the squares of the components: the largest is far from 0; the others follow from off-diagonal sums and differences.
     let trace = r[0][0] + r[1][1] + r[2][2];
     let squares = [
         1.0 + trace,
@@ -99,7 +99,7 @@ fn product(r: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| r[i][k] * r[j][k]).sum()))
 }
 
-/// The inverse transposed times the determinant, and the determinant.
+/// The inverse transpose times the determinant, and the determinant.
 fn cofactors(x: &[[f64; 3]; 3]) -> ([[f64; 3]; 3], f64) {
     let next = [1, 2, 0];
     let of = |i: usize, j: usize| {
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn a_rotation_comes_back_from_its_quaternion() {
         for k in 0..400 {
-            // Half turns about the axes among them.
+            // Including half turns about the axes.
             let (a, b) = (
                 (k % 20) as f64 * 0.1 * std::f64::consts::PI,
                 (k / 20) as f64 * 0.1 * std::f64::consts::PI,
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn the_nearest_rotation_treats_all_axes_alike() {
-        // A small symmetric stretch of a rotation is undone, in whichever order its axes stand.
+        // A small symmetric stretch of a rotation is undone, for any order of its axes.
         let exact = rotation(0.8, -0.3);
         let stretch = [[1.002, 1e-3, 0.0], [1e-3, 0.998, -5e-4], [0.0, -5e-4, 1.001]];
         let stretched = [0, 1, 2]
@@ -183,7 +183,7 @@ mod tests {
             let error = nearest(wrong).unwrap_err().to_string();
             assert_eq!(error.lines().count(), 1, "{error}");
         }
-        // A mirror image stays one, for the camera to refuse.
+        // A reflection stays one, and the camera refuses it.
         let (mirror, _) = nearest(changed(exact, |x| -x)).unwrap();
         assert_eq!(mirror, changed(exact, |x| -x));
     }

@@ -1,4 +1,4 @@
-//! `transforms.json`, as instant-ngp, nerfstudio and Blender's NeRF data write it.
+//! `transforms.json` of instant-ngp, nerfstudio and Blender's NeRF data.
 
 use anyhow::{Context, ensure};
 use serde::Deserialize;
@@ -12,7 +12,7 @@ use super::{
     pose_file::camera_to_world,
 };
 
-/// What the file holds: the lens that stands outside of the frames, the frames, and what is to be known of their world.
+/// The content of the file: the lens outside of the frames, the frames, and a note on their world.
 pub(super) type Transforms = (Lens, Vec<Frame>, Option<String>);
 
 /// The content of a file called `name`.
@@ -48,7 +48,7 @@ pub(super) fn parse(bytes: &[u8], name: &str) -> anyhow::Result<Transforms> {
 const APPLIED: &str = "its world is not that of the reconstruction that it was made from, but turned or scaled (applied_transform, \
     applied_scale): what is found is in the world of this file";
 
-/// Whether the world of the cameras was changed when the file was written.
+/// Whether the world of the cameras was transformed when the file was written.
 fn applied(file: &Value) -> bool {
     let entry = |row: usize, column: usize| file["applied_transform"][row][column].as_f64();
     let identity = |row: usize, column: usize| if row == column { 1.0 } else { 0.0 };

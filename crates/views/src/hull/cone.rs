@@ -1,23 +1,23 @@
-//! A mask as its camera looks through it.
+//! The viewing cone of a mask.
 
 use softrast_mesh::Mesh;
 
 use crate::{View, coloured_pixels, cut_sides};
 
-/// Pixels a side of what is looked at of each mask.
+/// Side length in cells of the sampled square of each mask.
 const SIDE: usize = 128;
-/// Cells between a silhouette and what counts as lacking: outlines of photographs are off by as much.
+/// Largest distance in cells of uncovered white cells from a silhouette: outlines of photographs have such errors.
 const TOLERATED: f64 = 1.5;
 
-/// A mask as its camera looks through it.
+/// The viewing cone of a mask.
 pub(super) struct Cone<'a> {
     pub(super) view: &'a View,
     square: [f64; 3],
-    /// Extent of what is white, in pixels.
+    /// Extent of the white area, in pixels.
     pub(super) white: f64,
     /// Signed distance to the outline in pixels of the picture, negative inside, at the cells of the square.
     distance: Vec<f64>,
-    /// Whether the picture cuts the object off: what is beyond its border is unknown then, else it is empty.
+    /// Whether the object is cut off by the picture border: the area beyond it is then unknown, else empty.
     pub(super) cut: bool,
 }
 
@@ -31,7 +31,7 @@ impl<'a> Cone<'a> {
         Ok(Self { view, square, white, distance, cut: !cut_sides(&view.mask).is_empty() })
     }
 
-    /// Which cells of the square are white although the silhouette of a mesh does not reach them by far.
+    /// The white cells of the square that are far from the silhouette of a mesh.
     pub(super) fn lacking(&self, mesh: &Mesh) -> Vec<bool> {
         let [left, top, extent] = self.square;
         let camera = self.view.camera.cropped([left, top], [extent; 2], SIDE);
@@ -42,7 +42,7 @@ impl<'a> Cone<'a> {
         self.distance.iter().zip(away).map(|(&d, away)| d < -cell && away > TOLERATED).collect()
     }
 
-    /// The cell of the square that shows a point.
+    /// The cell of the square for a point.
     pub(super) fn cell(&self, p: [f64; 3]) -> Option<usize> {
         let [column, row, depth] = self.view.camera.pixel(p);
         let [left, top, extent] = self.square;
@@ -61,7 +61,7 @@ impl<'a> Cone<'a> {
         [0, 1, 2].map(|k| (x * r[0][k] + y * r[1][k] + r[2][k]) / length)
     }
 
-    /// A point's distance to the cone of the mask in world units, about; negative inside, and beyond a picture that cuts the object off.
+    /// Approximate distance of a point to the cone in world units; negative inside, and beyond a picture that cuts the object off.
     pub(super) fn distance(&self, p: [f64; 3]) -> f64 {
         let camera = &self.view.camera;
         let [column, row, depth] = camera.pixel(p);
@@ -88,14 +88,14 @@ impl<'a> Cone<'a> {
     }
 }
 
-/// Signed distance to where an image `[SIDE * SIDE]` is one half, negative where it is more, for cells of this width.
+/// Signed distance to the contour at one half of an image `[SIDE * SIDE]`, negative where levels are higher, for cells of width `cell`.
 fn signed_distance(levels: &[f64], cell: f64) -> Vec<f64> {
     let white: Vec<bool> = levels.iter().map(|&level| level >= 0.5).collect();
     let black: Vec<bool> = white.iter().map(|white| !white).collect();
     let (to_white, to_black) = (distances(&white), distances(&black));
     let signed = |k: usize| {
         let level = levels[k];
-        // Within the cell that the outline passes, its share tells more.
+        // In the cell of the outline, its level is more precise.
         if to_white[k].max(to_black[k]) < 1.5 && level > 0.0 && level < 1.0 {
             return cell * (0.5 - level);
         }
@@ -104,10 +104,10 @@ fn signed_distance(levels: &[f64], cell: f64) -> Vec<f64> {
     (0..levels.len()).map(signed).collect()
 }
 
-/// Distance of each cell to the nearest that is on, in cells.
+/// Distance of each cell to the nearest cell that is on, in cells.
 fn distances(on: &[bool]) -> Vec<f64> {
     const FAR: f64 = 1e9;
-    // Along each column first, then the best of each row.
+    // Along each column first, then the minimum over each row.
     let mut along = vec![FAR; on.len()];
     for x in 0..SIDE {
         for forward in [true, false] {
@@ -146,7 +146,7 @@ mod tests {
     fn the_distance_to_a_disc_is_that_of_a_circle() {
         let centre = 63.3;
         let far = |k: usize| ((k % SIDE) as f64 - centre).hypot((k / SIDE) as f64 - centre);
-        // Cells that the circle passes are covered in part.
+        // Cells on the circle are covered partially.
         let levels: Vec<f64> = (0..SIDE * SIDE).map(|k| (30.5 - far(k)).clamp(0.0, 1.0)).collect();
         for (k, found) in signed_distance(&levels, 2.0).into_iter().enumerate() {
             assert!((found - 2.0 * (far(k) - 30.0)).abs() < 1.2, "{k}: {found}");

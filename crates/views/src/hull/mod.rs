@@ -1,4 +1,4 @@
-//! The visual hull: all that no mask rules out.
+//! The visual hull: the space that no mask excludes.
 //!
 //! Source: Laurentini 1994.
 
@@ -15,14 +15,15 @@ mod cone;
 /// Cells along each side of the first grid.
 const COARSE: usize = 40;
 
-/// Masks that must show what a single one rules out.
+/// Number of other masks that must show something a single mask excludes.
 const WITNESSES: usize = 2;
 
-/// The visual hull of the masks, but for the faults of single ones, as a mesh in world units of the cameras: closed, counterclockwise from outside, without parts of fewer faces
-/// than a fiftieth of the largest. A box around the hull has `cells` cells, at least one, along its longest side.
+/// The visual hull of the masks, except faults of single ones, as a mesh in world units of the cameras: closed, counterclockwise from
+/// outside, without components of fewer faces than a fiftieth of the largest. The bounding box of the hull has `cells` cells, at least one,
+/// along its longest side.
 ///
-/// A place that one mask alone rules out belongs to the hull if two others show something there that the hull lacks. So a hole in one mask does not cut
-/// through the object.
+/// A point that only one mask excludes belongs to the hull if two others show something there that the hull lacks. A hole in one mask
+/// therefore does not cut through the object.
 ///
 /// # Errors
 ///
@@ -85,14 +86,14 @@ impl<'a> VisualHull<'a> {
     }
 }
 
-/// The solid in a cube where a field is negative, without specks; a box around it has so many cells along its longest side.
+/// The solid in a cube where a field is negative, without specks; its bounding box has `cells` cells along its longest side.
 fn solid(
     centre: [f64; 3],
     reach: f64,
     cells: usize,
     field: impl Fn([f64; 3]) -> f64 + Sync,
 ) -> anyhow::Result<Mesh> {
-    // Where there is something at all.
+    // Extent of the solid on a coarse grid.
     let step = 2.0 * reach / COARSE as f64;
     let at = |k: usize| {
         let cell = [k % COARSE, k / COARSE % COARSE, k / COARSE / COARSE];
@@ -113,9 +114,9 @@ fn solid(
     without_specks(hull.context("the visual hull is no mesh")?)
 }
 
-/// Without the parts of fewer faces than a fiftieth of the largest: what few views happen to leave between their cones.
+/// Removes components of fewer faces than a fiftieth of the largest: artefacts between the cones of few views.
 fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
-    // Each vertex leads to another of its part, the last one to itself.
+    // Each vertex points to another of its component, the last one to itself.
     let mut next: Vec<usize> = (0..mesh.positions().len()).collect();
     fn last(next: &mut [usize], mut vertex: usize) -> usize {
         while next[vertex] != vertex {
@@ -137,7 +138,7 @@ fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
     let largest = faces_of.iter().copied().max().unwrap_or(0);
     let kept = mesh.faces().iter().zip(&part).filter(|(_, part)| 50 * faces_of[**part] >= largest);
     let kept: Vec<[u32; 3]> = kept.map(|(face, _)| *face).collect();
-    // Vertices of no face would be moved and written for nothing.
+    // Removes unused vertices, which would be moved and written for nothing.
     let mut number = vec![u32::MAX; next.len()];
     let mut positions = Vec::new();
     let faces = kept.iter().map(|face| {
@@ -154,13 +155,13 @@ fn without_specks(mesh: Mesh) -> anyhow::Result<Mesh> {
     Ok(Mesh::new(positions, faces)?)
 }
 
-/// The frame in which the ball of radius 1 around the origin holds what the masks show: its middle is nearest to the lines of sight through
-/// the middle of the masks, those that a picture cuts off left out unless most are. So place and size come from the pictures, whatever the
-/// units and the origin of the cameras.
+/// The frame whose unit ball around the origin contains the objects in the masks: its middle is the point nearest to the lines of sight
+/// through the middles of the masks, except masks cut off by their picture unless most are. Position and size thus come from the pictures,
+/// whatever the units and the origin of the cameras.
 ///
 /// # Errors
 ///
-/// If there is no view, a mask is empty or full, the cameras do not look at one thing from two directions at least, or a camera is inside
+/// If there is no view, a mask is empty or full, the cameras do not look at one thing from at least two directions, or a camera is inside
 /// the object or has it behind it: with the name of the view.
 pub fn frame_of_masks(views: &[View]) -> anyhow::Result<Frame> {
     let cones = views.par_iter().map(Cone::new).collect::<anyhow::Result<Vec<_>>>()?;
@@ -169,11 +170,11 @@ pub fn frame_of_masks(views: &[View]) -> anyhow::Result<Frame> {
 }
 
 fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
-    // From one of the cameras on, so that no digits are lost far from the origin.
+    // Relative to one of the cameras, so that no digits are lost far from the origin.
     let origin = eye(&cones.first().context("there is no view")?.view.camera)?;
     let mut matrix = [[0.0; 3]; 3];
     let mut right = [0.0; 3];
-    // What is left of a mask that its picture cuts off has its middle elsewhere. Where most are cut off, they are all that there is.
+    // The middle of a mask that its picture cuts off is biased. If most are cut off, they are used anyway.
     let whole = cones.iter().filter(|cone| !cone.cut).count();
     for cone in cones.iter().filter(|cone| !cone.cut || 2 * whole < cones.len()) {
         let eye = eye(&cone.view.camera)?;
@@ -214,12 +215,12 @@ fn region(cones: &[Cone<'_>]) -> anyhow::Result<([f64; 3], f64)> {
     Ok((middle, reach))
 }
 
-/// Where a camera stands. Far from the origin, the digits that a file leaves out of a rotation would move the product with its transpose.
+/// Position of a camera. Far from the origin, rounding of a rotation in a file would move the product with its transpose.
 fn eye(camera: &Pinhole) -> anyhow::Result<[f64; 3]> {
     solved(camera.rotation, camera.translation.map(|x| -x)).context("a rotation has an inverse")
 }
 
-/// The solution of three linear equations, unless they are as good as two.
+/// The solution of three linear equations, unless they are nearly dependent.
 fn solved(matrix: [[f64; 3]; 3], right: [f64; 3]) -> Option<[f64; 3]> {
     let determinant = |m: [[f64; 3]; 3]| {
         (0..3)
@@ -268,7 +269,7 @@ mod tests {
         let away = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, -0.8], [0.0, 0.8, 0.6]];
         let mut views = of_ball(away);
         let whole = visual_hull(&views, 40).unwrap();
-        // The first mask lacks all that is below its middle.
+        // The first mask lacks everything below its middle.
         let mut levels = views[0].mask.pixels().to_vec();
         levels[52 * 96..].fill(0.0);
         views[0].mask = crate::Picture::new(levels, 96);
@@ -276,7 +277,7 @@ mod tests {
         let [[expected, _], [low, high]] = [whole.bounds(), found.bounds()];
         assert!((low[1] - expected[1]).abs() < 0.5, "{low:?}, not {expected:?}");
         assert!(high[1] - low[1] > 5.5, "{low:?} to {high:?}");
-        // Where two lack it, nobody tells who is right.
+        // If two masks lack it, the conflict is undecided.
         let mut levels = views[1].mask.pixels().to_vec();
         levels[52 * 96..].fill(0.0);
         views[1].mask = crate::Picture::new(levels, 96);
@@ -293,7 +294,7 @@ mod tests {
         assert!((3.0..5.0).contains(&frame.unit), "{frame:?}");
         let [low, high] = visual_hull(&views, 40).unwrap().bounds();
         for k in 0..3 {
-            // The hull holds the ball, but for part of a cell, and four views leave a little more.
+            // The hull contains the ball, up to part of a cell, and four views leave slightly more.
             assert!((2.8..4.0).contains(&(high[k] - centre[k])), "{high:?}");
             assert!((2.8..4.0).contains(&(centre[k] - low[k])), "{low:?}");
         }

@@ -9,8 +9,8 @@ use crate::Distortion;
 
 /// A gray picture of any size: a target for silhouettes. Copies share their pixels.
 ///
-/// A picture of more than 4,194,304 pixels in a file, as 2048 × 2048, is reduced to that many or a few less when it is read. [`Picture::size`] is the
-/// size of its pixels then, [`Picture::whole_size`] that of the file.
+/// A picture file of more than 4,194,304 pixels, such as 2048 × 2048, is reduced to that many or slightly fewer when it is read.
+/// [`Picture::size`] is then the reduced size, [`Picture::whole_size`] that of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// From 0 to 1, row by row from the top.
@@ -18,7 +18,7 @@ pub struct Picture {
     width: usize,
     /// Size of the picture in the file, before it was reduced.
     whole: ImageSize,
-    /// The level of the file that was taken for white, where it had just one above 0.
+    /// The level of the file that became white, if it was the only one above 0.
     only_level: Option<f32>,
 }
 
@@ -27,7 +27,7 @@ impl Picture {
     ///
     /// # Panics
     ///
-    /// If there are no levels, or no whole rows of this width.
+    /// If there are no levels, or their number is not a multiple of the width.
     pub fn new(levels: Vec<f32>, width: usize) -> Self {
         let count = levels.len();
         assert!(
@@ -43,22 +43,22 @@ impl Picture {
         [self.levels.len() / self.width, self.width].into()
     }
 
-    /// Height and width of the picture in its file, turned as the file asks for: those that a camera of the picture has.
+    /// Height and width of the picture in its file, after the rotation that the file declares: the size for a camera of the picture.
     pub fn whole_size(&self) -> ImageSize {
         self.whole
     }
 
-    /// The level from 0 to 1 that stood for white in the file of a mask, where it was the only one above 0 and less than 1.
+    /// The level from 0 to 1 that stood for white in the file of a mask, if it was the only one above 0 and less than 1.
     pub fn only_level(&self) -> Option<f64> {
         self.only_level.map(f64::from)
     }
 
-    /// A camera of the picture in the file as one of these pixels.
+    /// Converts a camera of the picture in the file to one of these pixels.
     pub fn camera(&self, of_whole: &Pinhole) -> Pinhole {
         resized(of_whole, self.whole, self.size())
     }
 
-    /// A camera of these pixels as one of the picture in the file.
+    /// Converts a camera of these pixels to one of the picture in the file.
     pub fn whole_camera(&self, camera: &Pinhole) -> Pinhole {
         resized(camera, self.size(), self.whole)
     }
@@ -68,7 +68,7 @@ impl Picture {
         &self.levels
     }
 
-    /// As a straight lens would have shown it: `camera` is that of these pixels but for its lens. What lies beyond the picture is as its border.
+    /// The picture without lens distortion: `camera` is that of these pixels, except its lens. Outside the border is repeated.
     ///
     /// # Panics
     ///
@@ -80,7 +80,7 @@ impl Picture {
         Self { levels: levels.collect(), ..self.clone() }
     }
 
-    /// The level at a place in pixels from the corner of the first: between the middles of four pixels bilinear, beyond the outermost theirs.
+    /// The level at a position in pixels from the corner of the first: bilinear between pixel centres, constant beyond the outermost.
     fn between(&self, place: [f64; 2]) -> f32 {
         let (width, height) = (self.width, self.levels.len() / self.width);
         let along = |x: f64, count: usize| {
@@ -98,7 +98,7 @@ impl Picture {
         above + down * (below - above)
     }
 
-    /// With black for white.
+    /// Exchanges black and white.
     #[must_use]
     pub fn inverted(self) -> Self {
         Self { levels: self.levels.iter().map(|level| 1.0 - level).collect(), ..self }
@@ -112,7 +112,7 @@ impl Picture {
         Self { levels, ..self }
     }
 
-    /// Without specks: a pixel that is white or black among mostly others becomes as they are.
+    /// Removes specks: a pixel that is white or black among a majority of others becomes like them.
     #[must_use]
     pub fn despeckled(&self) -> Self {
         let (width, height) = (self.width, self.levels.len() / self.width);
@@ -138,7 +138,7 @@ impl Picture {
     }
 }
 
-/// The camera of a picture that is enlarged or reduced.
+/// The camera of a picture that is scaled.
 fn resized(camera: &Pinhole, from: ImageSize, to: ImageSize) -> Pinhole {
     camera.cropped([0.0; 2], [from.width as f64, from.height as f64], to)
 }

@@ -1,18 +1,18 @@
-//! Parts of a picture on other pixels, each the mean over its area.
+//! Resampling of parts of a picture, by means over areas.
 
 use anyhow::{Context, ensure};
 use softrast_tensor::{Backend, Tensor, tensor_on};
 
 use super::Picture;
 
-/// The square that is looked at is this much larger than the white part of a mask.
+/// Size of the view square relative to the white part of a mask.
 const MARGIN: f64 = 1.5;
 
 impl Picture {
-    /// The least square around all that is at least half white, in the middle of it: its left, its top and its extent in pixels. None if
-    /// there is nothing.
+    /// The least square around the pixels that are at least half white, with its centre at theirs: left, top and extent in pixels. `None`
+    /// if there are none.
     ///
-    /// A pixel counts if most of the nine around it are white too, unless none is like that: specks do not.
+    /// A pixel counts if most of the nine around it are white too, unless there is no such pixel: specks are ignored.
     pub fn square(&self) -> Option<[f64; 3]> {
         let height = self.levels.len() / self.width;
         let white = |x: usize, y: usize| {
@@ -33,12 +33,11 @@ impl Picture {
         Some([corner[0], corner[1], longest])
     }
 
-    /// The square of a mask that is looked at, one and a half times as large as [`Picture::square`]: its left, its top and its extent in
-    /// pixels.
+    /// The view square of a mask, one and a half times as large as [`Picture::square`]: left, top and extent in pixels.
     ///
     /// # Errors
     ///
-    /// If nothing or all of the mask is white.
+    /// If no pixel or every pixel of the mask is white.
     pub fn view_square(&self) -> anyhow::Result<[f64; 3]> {
         let [left, top, extent] =
             self.square().context("the mask is empty: no pixel is half white or more")?;
@@ -50,8 +49,8 @@ impl Picture {
         Ok([left - margin, top - margin, MARGIN * extent])
     }
 
-    /// A square of it, given by its left, its top and its extent in pixels, on `side` × `side` pixels: the mean of the picture over the
-    /// area of each, black outside, and how much of each the picture covers.
+    /// A square of the picture, given by left, top and extent in pixels, resampled to `side` × `side` pixels: the mean of the picture over
+    /// each pixel, black outside, and the fraction of each that the picture covers.
     pub fn part(&self, [left, top, extent]: [f64; 3], side: usize) -> [Vec<f64>; 2] {
         let (height, cell) = (self.levels.len() / self.width, extent / side as f64);
         let columns = shares(self.width, left, cell, side);
@@ -61,7 +60,7 @@ impl Picture {
 
     /// The image `[size * size]`, top row first, 0 black to 1 white.
     ///
-    /// The longer side of a picture takes up the whole image; the rest is black. Each pixel is the mean of the picture over its area.
+    /// The longer side of a picture fills the image; the rest is black. Each pixel is the mean of the picture over its area.
     pub fn levels(&self, size: usize) -> Vec<f64> {
         let (width, height) = (self.width as f64, (self.levels.len() / self.width) as f64);
         let longest = width.max(height);
@@ -122,10 +121,10 @@ fn covered(columns: &[Shares], rows: &[Shares]) -> Vec<f64> {
     rows.iter().flat_map(|row| columns.iter().map(move |column| row * column)).collect()
 }
 
-/// Which picture elements a cell holds, and what share of it they fill.
+/// The picture elements of a cell, and the fraction of the cell that each fills.
 type Shares = Vec<(usize, f64)>;
 
-/// The shares of cells of this length, of which the first begins at `from`, in `count` picture elements of length 1 from 0 on.
+/// The shares in cells of length `cell`, the first of which starts at `from`, of `count` picture elements of length 1 from 0 on.
 fn shares(count: usize, from: f64, cell: f64, cells: usize) -> Vec<Shares> {
     let of_cell = |k: usize| {
         let (from, to) = (from + k as f64 * cell, from + (k + 1) as f64 * cell);

@@ -11,39 +11,39 @@ use crate::{
     picture_file::{Pixel, luminance},
 };
 
-/// Labels that an error names at most.
+/// Most labels in an error.
 const MOST_CLASSES: usize = 12;
-/// Pixels of a picture at most, 2048 × 2048: of larger ones in files the means over equal rectangles are kept.
+/// Most pixels of a picture, 2048 × 2048: larger files are reduced to means over equal rectangles.
 const MOST_PIXELS: usize = 1 << 22;
 
 impl Picture {
-    /// The mask in a picture file: its transparency, or where all of it is opaque its luminance; see [`Picture::mask_of`].
+    /// The mask in a picture file: its alpha, or if it is opaque its luminance; see [`Picture::mask_of`].
     ///
     /// # Errors
     ///
-    /// If the path is no regular file or no picture, or those of [`Picture::mask_of`].
+    /// If the path is not a regular file or not a picture, or the errors of [`Picture::mask_of`].
     pub fn load_mask(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         Self::load_mask_by(&MaskRules::default(), path)
     }
 
-    /// The mask in a picture file by rules.
+    /// The mask in a picture file, with rules.
     ///
     /// # Errors
     ///
-    /// If the path is no regular file or no picture, or those of [`Picture::mask_of`].
+    /// If the path is not a regular file or not a picture, or the errors of [`Picture::mask_of`].
     pub fn load_mask_by(rules: &MaskRules, path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let (path, file) = (path.as_ref(), PictureFile::load(path.as_ref())?);
         Self::mask_of(&file, rules).with_context(|| path.display().to_string())
     }
 
-    /// The mask that a picture is: its transparency, or where all of it is opaque its luminance.
+    /// The mask of a picture: its alpha, or if it is opaque its luminance.
     ///
-    /// Where one level is above 0 and nothing else, as in masks of 0 and 1, that is the mask: it becomes white, and
-    /// [`Picture::only_level`] has it. A threshold takes levels as they are, and a label the pixels of one class.
+    /// If there is a single level above 0, as in masks of 0 and 1, it becomes white, and [`Picture::only_level`] returns it. A threshold
+    /// applies to unchanged levels, and a label selects the pixels of one class.
     ///
     /// # Errors
     ///
-    /// If no pixel would be half white: with the brightest level, and the threshold that takes it. If there is neither transparency nor a
+    /// If no pixel would be half white: with the brightest level, and a threshold that includes it. If there is neither alpha nor a
     /// threshold nor a label, and the picture looks like a photograph.
     pub fn mask_of(file: &PictureFile, rules: &MaskRules) -> anyhow::Result<Self> {
         if let Some(label) = rules.label {
@@ -88,30 +88,30 @@ impl Picture {
         Ok(Self::of(file, level))
     }
 
-    /// The luminance of a picture file; what is transparent is black.
+    /// The luminance of a picture file; transparent pixels are black.
     ///
     /// # Errors
     ///
-    /// If the path is no regular file or no picture.
+    /// If the path is not a regular file or not a picture.
     pub fn load_luminance(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         Ok(Self::of(&PictureFile::load(path)?, |pixel| luminance(pixel) * pixel[3]))
     }
 
-    /// Red, green and blue of a picture file, as its numbers are; what is transparent is black.
+    /// Red, green and blue of a picture file, as stored; transparent pixels are black.
     ///
     /// # Errors
     ///
-    /// If the path is no regular file or no picture.
+    /// If the path is not a regular file or not a picture.
     pub fn load_colours(path: impl AsRef<Path>) -> anyhow::Result<[Self; 3]> {
         Ok(Self::channels(&PictureFile::load(path)?, |[r, g, b, a]| [r * a, g * a, b * a]))
     }
 
-    /// Red, green and blue of a picture file, as its numbers are whatever the transparency, and how opaque it is. In a picture that is reduced
-    /// colours count as much as they are opaque.
+    /// Red, green and blue of a picture file, as stored regardless of alpha, and its opacity. In a reduced picture colours are weighted by
+    /// opacity.
     ///
     /// # Errors
     ///
-    /// If the path is no regular file or no picture.
+    /// If the path is not a regular file or not a picture.
     pub fn load_with_opacity(path: impl AsRef<Path>) -> anyhow::Result<[Self; 4]> {
         let file = PictureFile::load(path)?;
         if file.size().pixels() <= MOST_PIXELS {
@@ -178,7 +178,7 @@ mod tests {
         for name in ["a.png", "a.gif"] {
             DynamicImage::from(picture.clone()).to_rgba8().save(path(name)).unwrap();
             let whole = std::fs::read(path(name)).unwrap();
-            // Heads stand at both ends; the palette of a GIF lies between them.
+            // Headers are at both ends; the palette of a GIF is between them.
             let ends = |&bit: &usize| bit / 8 < 40 || whole.len() - bit / 8 <= 40;
             for bit in (0..8 * whole.len()).filter(ends) {
                 let mut bytes = whole.clone();
@@ -191,7 +191,7 @@ mod tests {
                 seen(name);
             }
         }
-        // No width at all, and a folder.
+        // A width of 0, and a folder.
         std::fs::write(path("b.gif"), b"GIF89a\0\0\0\0\0\0\0;").unwrap();
         seen("b.gif");
         std::fs::create_dir(path("c.png")).unwrap();

@@ -4,23 +4,23 @@ use anyhow::ensure;
 
 /// Bytes of the signature.
 const SIGNATURE: usize = 8;
-/// Place of the colour type in the first chunk, and the type whose pixels are entries of a palette.
+/// Offset of the colour type in the first chunk, and the type with a palette.
 const COLOUR_TYPE: usize = 9;
 const PALETTED: u8 = 3;
-/// Bytes of an entry of a palette, and its most entries.
+/// Bytes per palette entry, and the most entries.
 const ENTRY: usize = 3;
 const MOST_ENTRIES: usize = 256;
 
-/// The content of the first chunk of a kind, if it is whole.
+/// The content of the first complete chunk of a kind.
 pub(super) fn find(png: &[u8], kind: [u8; 4]) -> Option<&[u8]> {
     all(png).find(|(found, _)| *found == kind).map(|(_, content)| content)
 }
 
-/// The palette, where pixels are numbers of its entries.
+/// The palette, if pixels are indices into it.
 ///
 /// # Errors
 ///
-/// If it is none: the decoder counts on one.
+/// If it is invalid: the decoder requires a valid one.
 pub(super) fn palette(png: &[u8]) -> anyhow::Result<Option<Vec<[u8; ENTRY]>>> {
     let head = find(png, *b"IHDR");
     let paletted = head.and_then(|head| head.get(COLOUR_TYPE)) == Some(&PALETTED);
@@ -37,14 +37,14 @@ pub(super) fn palette(png: &[u8]) -> anyhow::Result<Option<Vec<[u8; ENTRY]>>> {
     Ok(first)
 }
 
-/// Kinds and contents of all chunks up to the first that is cut off.
+/// Kinds and contents of all chunks up to the first truncated one.
 fn all(png: &[u8]) -> impl Iterator<Item = ([u8; 4], &[u8])> {
     let mut rest = png.get(SIGNATURE..).unwrap_or_default();
     std::iter::from_fn(move || {
         let (length, after) = rest.split_first_chunk::<4>()?;
         let (kind, after) = after.split_first_chunk::<4>()?;
         let (content, after) = after.split_at_checked(u32::from_be_bytes(*length) as usize)?;
-        // A sum of four bytes follows.
+        // A checksum of four bytes follows.
         rest = after.get(4..).unwrap_or_default();
         Some((*kind, content))
     })

@@ -1,4 +1,4 @@
-//! Work of others that may panic.
+//! Guard for third-party code that may panic.
 
 use std::{
     cell::Cell,
@@ -7,14 +7,14 @@ use std::{
 };
 
 thread_local! {
-    /// Whether this thread does such work, so that its panics are not printed.
+    /// Whether this thread runs guarded code, whose panics are not printed.
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The result of `work`, or nothing where it panics.
+/// The result of `work`, or `None` if it panics.
 ///
-/// A decoder that meets a file which its authors have not thought of may panic. That is an error in the file for whoever names it, and no reason
-/// to end the program. The panic is not printed; panics elsewhere are, as before.
+/// A decoder may panic on an unexpected file. That is an error of the file, and no reason to end the program. The panic is not printed;
+/// other panics still are.
 pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -1,4 +1,4 @@
-//! Picture files within bounds: nothing is decoded before its size is known, and no file ends the program.
+//! Picture files within bounds: the size is checked before anything is decoded, and no file ends the program.
 
 mod chunks;
 mod guard;
@@ -14,24 +14,24 @@ use softrast_raster::ImageSize;
 
 use self::{guard::guarded, orientation::Orientation};
 
-/// Bytes of a picture file at most.
+/// Largest picture file, in bytes.
 const LARGEST_FILE: u64 = 1 << 28;
-/// Bytes of decoded pixels at most: 23,170 × 23,170 pixels of grey, 11,585 × 11,585 with colours and transparency.
+/// Most bytes of decoded pixels: 23,170 × 23,170 pixels of grey, 11,585 × 11,585 with colours and alpha.
 const MOST_DECODED: u64 = 1 << 29;
-/// The same of a JPEG file, whose decoder may keep two bytes more for each of them: 10,922 × 10,922 pixels in colours.
+/// Most bytes of decoded pixels of a JPEG file, whose decoder may use two more bytes for each of them: 10,922 × 10,922 pixels in colours.
 const MOST_DECODED_JPEG: u64 = (1 << 30) / 3;
-/// Pixels along a side at most, as in JPEG and GIF files.
+/// Most pixels along a side, as in JPEG and GIF files.
 const LONGEST_SIDE: u32 = 65_535;
 
 /// The content of a PNG, JPEG or GIF file, decoded.
 ///
-/// A picture has at most 65,535 pixels along a side, and 512 MiB of decoded pixels (341 MiB of a JPEG file): that is known from its head,
-/// before anything is decoded. Its file has at most 256 MiB.
+/// A picture has at most 65,535 pixels along a side, and 512 MiB of decoded pixels (341 MiB for a JPEG file), which is checked in its
+/// header before anything is decoded. Its file has at most 256 MiB.
 #[derive(Clone, Debug)]
 pub struct PictureFile {
     image: DynamicImage,
     orientation: Orientation,
-    /// Colours of the classes, where pixels of the file are numbers of them.
+    /// Colours of the classes, if pixels of the file are indices of them.
     palette: Option<Vec<[u8; 3]>>,
 }
 
@@ -43,7 +43,7 @@ impl PictureFile {
     ///
     /// # Errors
     ///
-    /// If the path is no regular file or cannot be read, or for the reasons of [`PictureFile::decode`]: one line that names the file.
+    /// If the path is not a regular file or cannot be read, or for the reasons of [`PictureFile::decode`]: one line with the file.
     pub fn load(path: impl AsRef<Path>) -> anyhow::Result<Self> {
         let path = path.as_ref();
         let bytes = read_bounded(path, LARGEST_FILE)
@@ -51,26 +51,26 @@ impl PictureFile {
         Self::decode(&bytes).with_context(|| path.display().to_string())
     }
 
-    /// The picture whose file has this content.
+    /// Decodes the content of a picture file.
     ///
     /// # Errors
     ///
-    /// If it is no PNG, JPEG or GIF file, is broken, has no pixels or more than are read.
+    /// If it is not a PNG, JPEG or GIF file, is invalid, has no pixels or too many.
     pub fn decode(bytes: &[u8]) -> anyhow::Result<Self> {
         let decoded = guarded(|| decoded(bytes)).unwrap_or_else(|| {
             Err(anyhow!("the picture cannot be decoded: save it anew with another program"))
         });
-        // Words of a decoder stay on one line.
+        // Messages of a decoder stay on one line.
         decoded.map_err(|error| anyhow!(format!("{error:#}").replace(char::is_control, " ")))
     }
 
-    /// Height and width in pixels, turned as the file asks for: as everyone sees it.
+    /// Height and width in pixels, after the rotation that the file declares.
     pub fn size(&self) -> ImageSize {
         self.orientation.size(self.in_file())
     }
 
-    /// Red, green and blue as a texture has them: not turned, and without transparency. Of more than so many texels the means over equal
-    /// rectangles remain.
+    /// Red, green and blue for a texture: not rotated, and without alpha. More than `most` texels are reduced to means over equal
+    /// rectangles.
     pub fn texels(&self, most: usize) -> RgbImage {
         let (whole, size) = (self.in_file(), reduce::within(self.in_file(), most));
         if size == whole {
@@ -85,7 +85,7 @@ impl PictureFile {
         })
     }
 
-    /// The class of a pixel: its number in the palette, or where there is none its level as a whole number.
+    /// The class of a pixel: its index in the palette, or without a palette its level as an integer.
     pub(crate) fn class_of(&self, [red, green, blue, _]: Pixel) -> Option<u32> {
         let most = match &self.image {
             DynamicImage::ImageLuma16(_)
@@ -113,7 +113,7 @@ impl PictureFile {
         opaque
     }
 
-    /// Shows all pixels, in the order of the file.
+    /// Calls `show` for all pixels, in the order of the file.
     pub(crate) fn each(&self, mut show: impl FnMut(Pixel)) {
         let mut row = Vec::new();
         for y in 0..self.image.height() as usize {
@@ -122,8 +122,8 @@ impl PictureFile {
         }
     }
 
-    /// Numbers of pixels as pictures of at most so many pixels: the means over equal rectangles where there are more. Turned, row by row
-    /// from the top; and the size.
+    /// Channels of the pixels as pictures of at most `most` pixels: means over equal rectangles if there are more. Rotated, row by row from
+    /// the top; and the size.
     pub(crate) fn planes<const N: usize>(
         &self,
         most: usize,
@@ -134,12 +134,12 @@ impl PictureFile {
         (planes.map(|plane| self.orientation.turned(plane, size)), self.orientation.size(size))
     }
 
-    /// The size before it is turned.
+    /// The size before rotation.
     fn in_file(&self) -> ImageSize {
         [self.image.height() as usize, self.image.width() as usize].into()
     }
 
-    /// Fills `row` with the pixels of a row, as they lie in the file.
+    /// Fills `row` with the pixels of a row of the file.
     fn row(&self, y: usize, row: &mut Vec<Pixel>) {
         let width = self.image.width() as usize;
         row.clear();
@@ -161,7 +161,7 @@ impl PictureFile {
                 row.extend(samples.chunks_exact(channels).map(|pixel| rgba(pixel, level)));
             }
             image => {
-                // Decoders of PNG, JPEG and GIF make nothing but whole numbers of 8 or 16 bits.
+                // Decoders of PNG, JPEG and GIF produce only integers of 8 or 16 bits.
                 let channels = usize::from(image.color().channel_count());
                 let samples = image.as_bytes();
                 let samples = &samples[y * width * channels..(y + 1) * width * channels];
@@ -172,12 +172,12 @@ impl PictureFile {
     }
 }
 
-/// The luminance of a pixel, from 0 to 1; of grey exactly its level.
+/// The luminance of a pixel, from 0 to 1; for grey exactly its level.
 pub(crate) fn luminance([red, green, blue, _]: Pixel) -> f32 {
     green + 0.2126 * (red - green) + 0.0722 * (blue - green)
 }
 
-/// Grey, or colours, with or without opacity.
+/// Grey, or colours, with or without alpha.
 fn rgba<T: Copy>(pixel: &[T], level: impl Fn(T) -> f32) -> Pixel {
     match *pixel {
         [grey] => [level(grey), level(grey), level(grey), 1.0],
@@ -212,7 +212,7 @@ fn decoded(bytes: &[u8]) -> anyhow::Result<PictureFile> {
     );
     let orientation = match format {
         ImageFormat::Png => chunks::find(bytes, *b"eXIf").map(<[u8]>::to_vec),
-        // What cannot be read of it says nothing.
+        // Unreadable data are ignored.
         _ => decoder.exif_metadata().unwrap_or_default(),
     };
     let orientation = orientation.map_or_else(Orientation::default, |exif| Orientation::of(&exif));

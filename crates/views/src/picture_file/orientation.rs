@@ -1,8 +1,8 @@
-//! How a picture is to be turned before it is looked at.
+//! Rotation of a picture for display.
 
 use softrast_raster::ImageSize;
 
-/// What Exif calls the orientation, from 1 to 8: whether rows and columns change places, and which way both go then.
+/// The orientation in Exif, from 1 to 8: whether rows and columns are exchanged, and the direction of both afterwards.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Orientation {
     /// Rows of the file are columns of the picture.
@@ -13,14 +13,14 @@ pub(super) struct Orientation {
     from_bottom: bool,
 }
 
-/// The tag of the orientation, and the types that its number may have: 8, 16 or 32 bits.
+/// The tag of the orientation, and the allowed types of its number: 8, 16 or 32 bits.
 const TAG: u16 = 0x112;
 const TYPES: [u16; 3] = [1, 3, 4];
 /// Bytes of an entry of a directory.
 const ENTRY: usize = 12;
 
 impl Orientation {
-    /// The one that Exif data ask for; none if they say nothing that can be read.
+    /// The orientation in Exif data; the default if there is no readable one.
     pub(super) fn of(exif: &[u8]) -> Self {
         number(exif).and_then(Self::from_exif).unwrap_or_default()
     }
@@ -40,12 +40,12 @@ impl Orientation {
         Some(Self { swapped, from_right, from_bottom })
     }
 
-    /// The size of a picture that has this one in the file.
+    /// The displayed size of a picture with this size in the file.
     pub(super) fn size(self, ImageSize { width, height }: ImageSize) -> ImageSize {
         if self.swapped { [width, height].into() } else { [height, width].into() }
     }
 
-    /// A channel, row by row, of a picture that has this size in the file.
+    /// Rotates a channel, row by row, of a picture with this size in the file.
     pub(super) fn turned(self, channel: Vec<f32>, in_file: ImageSize) -> Vec<f32> {
         if self == Self::default() {
             return channel;
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// Exif data in either order of bytes, whose orientation has a type of so many bits.
+    /// Exif data in either byte order, whose orientation has type `kind`.
     fn exif(number: u8, big: bool, kind: u16) -> Vec<u8> {
         let short = |x: u16| if big { x.to_be_bytes() } else { x.to_le_bytes() };
         let long = |x: u32| if big { x.to_be_bytes() } else { x.to_le_bytes() };

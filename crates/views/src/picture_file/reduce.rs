@@ -1,8 +1,8 @@
-//! Fewer pixels than a file has.
+//! Reduction of pictures.
 
 use softrast_raster::ImageSize;
 
-/// A size of about the same shape with at most so many pixels.
+/// A size of nearly the same aspect ratio with at most `most` pixels.
 pub(super) fn within(size: ImageSize, most: usize) -> ImageSize {
     if size.pixels() <= most {
         return size;
@@ -14,9 +14,9 @@ pub(super) fn within(size: ImageSize, most: usize) -> ImageSize {
     [height.min(most / width), width].into()
 }
 
-/// Numbers of the pixels of a picture, row by row: the means over equal rectangles, of which there are so many. `fill` gives a row of pixels.
+/// Channels of the pixels of a picture, row by row: means over equal rectangles, `size` in number. `fill` returns a row of pixels.
 ///
-/// Only a row of the picture and two of the result are held beside the result.
+/// Only one row of the picture and two of the result are in memory in addition to the result.
 pub(super) fn means<P: Copy, const N: usize>(
     whole: ImageSize,
     size: ImageSize,
@@ -36,7 +36,7 @@ pub(super) fn means<P: Copy, const N: usize>(
     }
     let columns: Vec<Share> = (0..whole.width).map(|x| share(x, whole.width, size.width)).collect();
     let area = (whole.width * whole.height) as f64;
-    // Sums of the row of the result that is being filled, and of the next.
+    // Sums of the current row of the result, and of the next.
     let empty = vec![[0.0; N]; size.width];
     let [mut sums, mut next] = [empty.clone(), empty.clone()];
     let mut line = empty.clone();
@@ -66,15 +66,15 @@ pub(super) fn means<P: Copy, const N: usize>(
     planes
 }
 
-/// The cell in which a pixel begins, and how much of it lies in that and in the next.
+/// The first cell of a pixel, and the parts of the pixel in that cell and in the next.
 #[derive(Clone, Copy)]
 struct Share {
     cell: usize,
     parts: [f64; 2],
 }
 
-/// Of pixel number `k` of `count` in a row of fewer `cells` of the same length. A whole pixel counts as many as there are cells, a whole cell as
-/// many as there are pixels: whole numbers, so that parts of a cell add up to all of it.
+/// The share of pixel number `k` of `count` in a row of fewer `cells` of the same length. A whole pixel counts `cells`, a whole cell
+/// `count`: integers, so that parts of a cell add up exactly.
 fn share(k: usize, count: usize, cells: usize) -> Share {
     let (from, to) = (k * cells, (k + 1) * cells);
     let cell = from / count;
@@ -90,7 +90,7 @@ fn add<const N: usize>(sums: &mut [f64; N], numbers: [f64; N], part: f64) {
 mod tests {
     use super::*;
 
-    /// The means of a picture of one channel.
+    /// The means of a single-channel picture.
     fn means_of(picture: &[f32], width: usize, size: [usize; 2]) -> Vec<f32> {
         let fill = |y: usize, row: &mut Vec<f32>| {
             row.clear();
