@@ -2,9 +2,8 @@
 //!
 //! `cargo bench -p softrast-tests --bench exact_row -- NAME reference|TOLERANCE`
 //!
-//! NAME is sphere, fox, airplane, chair, or with the paper's meshes w1, w2 or spot64, which is w2 at
-//! 64 × 64 pixels, for its memory. A tolerance, such as 1e-5, runs the fused op; `reference`
-//! evaluates every pair, which takes minutes.
+//! NAME is sphere, fox, airplane, chair, or with the paper's meshes w1, w2 or spot64, which is w2 at 64 × 64 pixels, to save memory. A
+//! tolerance, such as 1e-5, runs the fused op; `reference` evaluates every pair, which takes minutes.
 
 use std::{env, time::Instant};
 
@@ -14,7 +13,7 @@ use softrast_tests::{KnownRow, Row, Workload};
 
 type B = NdArray<f64>;
 
-/// The workload of this name, and its exact row if that is known.
+/// The workload of this name, and its exact row if it is known.
 fn named(name: &str) -> (Workload, Option<Row>) {
     let known = match name {
         "w1" => KnownRow::w1(),
@@ -28,7 +27,7 @@ fn named(name: &str) -> (Workload, Option<Row>) {
 }
 
 fn main() {
-    // Cargo adds a flag of its own.
+    // Cargo adds the flag `--bench`.
     let mut arguments = env::args().skip(1).filter(|argument| argument != "--bench");
     let mut argument = || arguments.next().expect("usage: NAME reference|TOLERANCE");
     let (workload, exact) = named(&argument());

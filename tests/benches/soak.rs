@@ -1,7 +1,7 @@
-//! Draws random scenes, softnesses, T-conorms and tolerances, and looks for a pixel that is off by more than the renderer states.
+//! Draws random scenes, softnesses, T-conorms and tolerances, and searches for pixels with errors above the renderer's bound.
 //!
-//! `cargo bench -p softrast-tests --bench soak -- SEED CASES SECONDS`, in f64 and f32 in turn. A case that is found is printed as a line of
-//! JSON: once its fault is mended, it goes to `tests/f64/raster/found.json` or `tests/f32/raster/found.json`, which the tests replay.
+//! `cargo bench -p softrast-tests --bench soak -- SEED CASES SECONDS`, in f64 and f32 alternately. Failing cases are printed as a line of
+//! JSON: once fixed, a case is added to `tests/f64/raster/found.json` or `tests/f32/raster/found.json`, which the tests replay.
 
 use std::{
     env,
@@ -16,13 +16,13 @@ use std::{
 
 use softrast_tests::{Deviation, ToleranceCase};
 
-/// Float types that each case is drawn in.
+/// Float types of each case.
 const FLOATS: [&str; 2] = ["f64", "f32"];
 
 /// Time between two lines of progress.
 const PROGRESS: Duration = Duration::from_secs(60);
 
-/// Images that were compared, and what came of it.
+/// Statistics of the compared images.
 #[derive(Default)]
 struct Tally {
     images: usize,
@@ -43,7 +43,7 @@ impl Tally {
 }
 
 fn main() -> ExitCode {
-    // Cargo adds a flag of its own.
+    // Cargo adds the flag `--bench`.
     let words = env::args().skip(1).filter(|word| word != "--bench");
     let numbers: Vec<u64> = words.map(|word| word.parse().expect("a whole number")).collect();
     let &[seed, cases, seconds] = numbers.as_slice() else { panic!("usage: SEED CASES SECONDS") };

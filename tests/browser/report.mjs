@@ -85,7 +85,7 @@ async function turns(file) {
   assert.ok(await pixels(page) !== zoomed, "keys turn");
   await page.getByRole("button", { name: "Reset" }).click();
   assert.ok(await pixels(page) === start, "Reset brings the start back");
-  // A viewer leaves the wheel to a page that is being scrolled, as a click on what is not in view does.
+  // A viewer ignores the wheel while the page scrolls, as after a click on an element outside the view.
   await page.waitForTimeout(300);
   await page.mouse.move(...middle);
   await page.mouse.wheel(0, 2000);
@@ -130,7 +130,7 @@ async function shots(page, folder) {
   const stage = page.locator(".viewer-stage").first();
   await page.getByRole("checkbox", { name: "Cameras" }).uncheck();
   await page.selectOption(".viewer select", "3");
-  // What is on the screen may be some frames late.
+  // The screen may be some frames late.
   await page.waitForTimeout(500);
   await stage.screenshot({ path: `${folder}/view.png` });
   await page.getByRole("button", { name: "Reset" }).click();

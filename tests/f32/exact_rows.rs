@@ -1,4 +1,4 @@
-//! The fused op as binaries use it, in f32 with the default tolerance, against exact results.
+//! The fused op in f32 with the default tolerance, as in binaries, compared with exact results.
 
 use softrast_raster::low_level::Rasterizer;
 use softrast_tensor::NdArray;
@@ -6,7 +6,7 @@ use softrast_tests::KnownRow;
 
 type B = NdArray<f32>;
 
-/// Of loss, mean coverage and gradient norm.
+/// Bounds for loss, mean coverage and gradient norm.
 const BOUNDS: [f64; 3] = [5e-6, 1e-5, 5e-5];
 
 fn assert_agrees(KnownRow { name, workload, row }: KnownRow) {

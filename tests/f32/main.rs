@@ -1,4 +1,4 @@
-//! What is tested in f32, a file or folder for each crate; see the tests in f64.
+//! Tests in f32, one file or folder per crate; see also the tests in f64.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

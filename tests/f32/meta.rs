@@ -1,4 +1,4 @@
-//! Meta-gradients in f32, against the same in f64.
+//! Meta-gradients in f32, compared with those in f64.
 
 use softrast_meta::{Adam, BilevelProblem, InnerLoop, MetaGradient, OuterSteps};
 use softrast_tensor::{Backend, NdArray};
@@ -9,8 +9,8 @@ fn meta_gradient<B: Backend>(scene: usize, steps: usize) -> Vec<f64> {
         (0..4).map(|k| 1.5 * (1.7 * scene as f64 + 2.3 * k as f64).sin()).collect();
     let problem = BilevelProblem {
         objective: WAVES,
-        // The first step of Adam has almost no derivative by the softness: what f32 makes of it is
-        // rounding. The share of the outer loss itself covers that.
+        // The first step of Adam has almost no derivative with respect to the softness: in f32 it is rounding. The direct term of the outer
+        // loss dominates it.
         outer_loss: WAVES,
         inner: InnerLoop { optimizer: Adam::new(0.05), steps },
         start: vector::<B>(&start),
@@ -22,8 +22,8 @@ fn meta_gradient<B: Backend>(scene: usize, steps: usize) -> Vec<f64> {
 
 #[test]
 fn single_precision_keeps_two_digits_of_a_gradient_through_ten_steps() {
-    // Medians over twelve scenes; source: docs/notes.md, Meta-gradients: checks.
-    // Through 30 steps one digit is left, which no bound is worth: it is printed alone.
+    // Medians over twelve scenes; source: docs/notes.md, Meta-gradients: checks. After 30 steps a single digit is left: it is printed,
+    // without a bound.
     for (steps, bound) in [(1, 1e-5), (10, 2e-2), (30, f64::INFINITY)] {
         let mut errors: Vec<f64> = (0..12)
             .map(|scene| {

@@ -1,4 +1,4 @@
-//! Poses under a softness of one's own. `minimize` judges hard images in f32, as programs do, so this is not tested in f64.
+//! Poses with a custom softness. `minimize` evaluates hard images in f32, as in programs, so this is not tested in f64.
 
 use softrast_inverse::{
     InverseProblem, Method, PoseProblem, ScheduledSoftness, SolveConfig, minimize, pose::PoseSearch,

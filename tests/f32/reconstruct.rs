@@ -34,7 +34,7 @@ fn pictures_show_the_voxels_where_the_rasterizer_sees_them() {
             let seen = projected(&centres(&voxels), view);
             let on = |p: &&[f64; 3]| alpha[pixel(-p[1]) * SIZE + pixel(p[0])] > 0;
             let share = seen.iter().filter(on).count() as f64 / seen.len() as f64;
-            // Centres of cells next to the surface may round to the pixel beyond its edge.
+            // Centres of cells next to the surface may be rounded to the pixel beyond its edge.
             assert!(share > 0.93, "class {class}, view {view}: {share}");
         }
     }
@@ -75,7 +75,7 @@ fn the_silhouette_of_the_template_is_a_disc() {
     let orbit = Tensor::<Backend, 2>::from_data([orbit(3).map(|x| x as f32)], &device);
     let drawn = hard_silhouette(project(sphere.swap_dims(1, 2), orbit), template.faces(), SIZE);
     let area = drawn.sum().into_scalar() / (SIZE * SIZE) as f32 * 4.0;
-    // Seen from 2.732 with half an angle of 15 degrees: the tangent cone of the sphere.
+    // From distance 2.732 with a half angle of 15 degrees: the tangent cone of the sphere.
     let radius = (0.25_f32 / 2.732).asin().tan() / 15_f32.to_radians().tan();
     assert!((area / (std::f32::consts::PI * radius * radius) - 1.0).abs() < 0.03, "{area}");
 }
@@ -86,7 +86,7 @@ fn smoothness_adds_up_what_was_worked_by_hand() {
     // Two triangles on the edge from 0 to 1, the second upright: a right angle, so (cos α + 1)² = 1.
     let points = [[0.0_f32, 1.0, 0.5, 0.5], [0.0, 0.0, -1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
     let smoothness = Smoothness::<Backend>::new(&[[0, 1, 2], [1, 0, 3]], 4, &device);
-    // Neighbours: all but 2 and 3, which only know 0 and 1.
+    // Neighbours: all except 2 and 3, which only have 0 and 1.
     let middle = |others: &[usize], k: usize| {
         others.iter().map(|&v| points[k][v]).sum::<f32>() / others.len() as f32
     };

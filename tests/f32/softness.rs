@@ -7,9 +7,8 @@ use softrast_tensor::{Autodiff, Backend, DType, NdArray, Tensor, TensorData, num
 type First = Autodiff<NdArray<f32>>;
 type Second = Autodiff<First>;
 
-/// The smallest scale at which second derivatives (and the gradients of density and hazard) are
-/// asked to be finite: at the edge, the optical depth of Gamma has one of 1e22 / scale², which f32
-/// cannot hold for smaller scales.
+/// The smallest scale at which second derivatives (and the gradients of density and hazard) are required to be finite: at the edge, the
+/// optical depth of Gamma has one of 1e22 / scale², which overflows f32 for smaller scales.
 const SECOND_ORDER_FROM: f64 = 1e-7;
 
 const SCALES: [f64; 7] = [1e-12, 1e-7, 1e-4, 1e-2, 1.0, 30.0, 1e3];
@@ -20,7 +19,7 @@ fn distances() -> Vec<f64> {
     sizes.into_iter().flat_map(|x| [-x, x]).chain([0.0]).collect()
 }
 
-/// Distances around 0, where the terms of every formula change places.
+/// Distances around 0, where the terms of every formula are exchanged.
 fn near(scale: f64) -> impl Iterator<Item = f64> {
     (-120..=120).map(move |k| f64::from(k) / 10.0 * scale)
 }
@@ -39,7 +38,7 @@ fn assert_finite<B: Backend>(found: Option<Tensor<B, 1>>, what: &str) {
     }
 }
 
-/// Value, optical depth and their derivatives by x, with the gradients of each.
+/// Value, optical depth and their derivatives with respect to x, with the gradients of each.
 fn check(softness: EdgeSoftness, scale: f64, x: &[f64]) {
     let phi = vector::<First>(&softness.default_phi(scale)).require_grad();
     let x = vector::<First>(x).require_grad();

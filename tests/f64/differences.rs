@@ -1,4 +1,4 @@
-//! Derivatives against central differences, wherever a loss comes from.
+//! Comparison of derivatives with central differences, for any loss.
 
 use softrast_meta::{Adam, InnerLoop, Objective};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
@@ -20,7 +20,7 @@ fn loss(objective: &impl Objective<B>, theta: &[f64], phi: &[f64]) -> f64 {
     objective.loss(vector(theta), vector(phi), 0).into_scalar()
 }
 
-/// Asserts that every entry of the gradient to `theta` is right to 1e-6 of the largest.
+/// Asserts that every entry of the gradient with respect to `theta` is correct to 1e-6 of the largest.
 pub(crate) fn check_gradient(
     objective: &(impl Objective<A> + Objective<B>),
     theta: &[f64],
@@ -29,7 +29,7 @@ pub(crate) fn check_gradient(
     check_gradient_to(1e-6, objective, theta, phi);
 }
 
-/// The same to another part of the largest.
+/// [`check_gradient`] with another relative tolerance.
 pub(crate) fn check_gradient_to(
     tolerance: f64,
     objective: &(impl Objective<A> + Objective<B>),
@@ -52,8 +52,7 @@ pub(crate) fn check_gradient_to(
     }
 }
 
-/// Asserts that the meta-gradient through two steps of Adam from `theta` is right to 1e-5, for a
-/// softness of one parameter.
+/// Asserts that the meta-gradient through two steps of Adam from `theta` is correct to 1e-5, for a softness of one parameter.
 pub(crate) fn check_meta_gradient(
     objective: &(impl Objective<B> + Objective<A> + Objective<Autodiff<A>>),
     learning_rate: f64,

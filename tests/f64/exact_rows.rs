@@ -1,19 +1,19 @@
-//! The reference and the fused op against results with every pixel-face pair evaluated, in f64.
+//! The reference and the fused op, compared with exact results of every pixel-face pair in f64.
 //!
-//! The reference visits up to 190 million pairs for a row. Its full runs are left to
-//! `cargo bench -p softrast-tests --bench exact_row -- fox reference`; the tests hold it against the
-//! fused op on a small image of the same; views beside one another are in the exact rows.
+//! The reference visits up to 190 million pairs per row. Its full runs are those of
+//! `cargo bench -p softrast-tests --bench exact_row -- fox reference`; the tests compare it with the fused op on a small image; several
+//! views are in the exact rows.
 
 use softrast_tensor::NdArray;
 use softrast_tests::{KnownRow, Workload};
 
 type B = NdArray<f64>;
 
-/// Small enough that what is left against the reference is interpolation of the slope.
+/// So small that the remaining difference to the reference is interpolation of the slope.
 const TOLERANCE: f64 = 1e-9;
-/// Of loss, mean coverage and gradient norm.
+/// Bounds for loss, mean coverage and gradient norm.
 const BOUNDS: [f64; 3] = [1e-9, 1e-9, 1e-8];
-/// Those of the paper's meshes are known to seven decimals.
+/// Rows of the paper's meshes are known to seven decimals.
 const SEVEN_DECIMALS: [f64; 3] = [5e-7, 5e-7, 2e-6];
 
 #[test]

@@ -1,4 +1,4 @@
-//! What is tested in f64, a folder for each crate; beside them what crosses crates.
+//! Tests in f64, one folder per crate, and tests that span crates.
 //!
 //! One binary, because burn is slow to build and fixes the float type of a device per process.
 

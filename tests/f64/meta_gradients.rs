@@ -1,7 +1,7 @@
-//! Meta-gradients through a whole inner loop, on `Autodiff<Autodiff<B>>`, in f64: against central
-//! differences, and the two ways to draw against one another.
+//! Meta-gradients through a whole inner loop, on `Autodiff<Autodiff<B>>`, in f64, compared with central differences, and the fused op
+//! compared with the reference.
 //!
-//! The fused op keeps the support and knots that were chosen at φ while φ is varied.
+//! The fused op keeps the support and knots chosen at φ while φ varies.
 
 use softrast_inverse::{Method, ScheduledSoftness};
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
@@ -20,17 +20,16 @@ type A = Autodiff<B>;
 
 /// Width of the softness in NDC: a little over half a pixel.
 const SCALE: f64 = 0.1;
-/// Tolerance of the fused op: far below what is compared.
+/// Tolerance of the fused op: far below the compared differences.
 const FINE: f64 = 1e-9;
-/// The same where the op is compared with differences of itself, whose table need not be that long.
+/// Tolerance where the op is compared with differences of itself, whose table can be shorter.
 const COARSE: f64 = 1e-6;
-/// Half the distance of a central difference, as a share of the parameter's size. One of them has
-/// to meet the bound: larger ones cross kinks of the image and of the table, smaller ones drown in
-/// rounding (docs/notes.md, Meta-gradients: checks).
+/// Half the distance of a central difference, relative to the size of the parameter. One of them has to meet the bound: larger ones cross
+/// kinks of the image and of the table, smaller ones are dominated by rounding (docs/notes.md, Meta-gradients: checks).
 const SHARES: [f64; 4] = [1e-5, 1e-6, 1e-7, 1e-4];
 
 const SGD: InnerLoop<Sgd> = InnerLoop { optimizer: Sgd { learning_rate: 0.3 }, steps: 5 };
-/// Relative to central differences.
+/// Bound relative to central differences.
 const SGD_BOUND: f64 = 1e-5;
 
 /// Ten steps.
@@ -51,7 +50,7 @@ fn by_fused_op<S: Softness>(softness: S, phi: &[f64], tolerance: f64) -> Shape2d
     Shape2d::by_fused_op(softness, &vector::<B>(phi), tolerance)
 }
 
-/// Loss of `problem` after `inner` has solved it, `[1]`.
+/// Loss of `problem` after `inner`, `[1]`.
 fn outer_loss<B: Backend>(
     problem: &(impl Objective<B> + Objective<Autodiff<B>>),
     inner: &InnerLoop<impl Optimizer>,
@@ -161,7 +160,7 @@ fn fused_errors<S: Softness>(softness: S, phi: &[f64], tolerance: f64) -> [f64; 
     errors
 }
 
-// Of the errors of a table of cubics that of the second derivative is the largest.
+// The largest error of a table of cubics is that of its second derivative.
 #[test]
 fn both_ways_to_draw_have_the_same_meta_gradient() {
     let edge = EdgeSoftness::new(Family::Logistic);

@@ -1,4 +1,4 @@
-//! Convolutions as products of matrices against those of burn.
+//! Convolutions as products of matrices compared with those of burn.
 
 use reconstruct::{convolution, convolved};
 use softrast_tensor::{Autodiff, NdArray, Tensor};
@@ -7,7 +7,7 @@ use softrast_tests::{numbers, tensor};
 type B = NdArray<f64>;
 type A = Autodiff<B>;
 
-/// A convolution, and its gradients to pictures and weights.
+/// A convolution, and its gradients with respect to pictures and weights.
 fn results(
     convolve: impl Fn(Tensor<A, 4>) -> Tensor<A, 4>,
     of: [Tensor<A, 4>; 2],

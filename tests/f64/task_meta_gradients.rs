@@ -20,18 +20,18 @@ use tempfile::TempDir;
 use crate::differences::relative_error;
 
 type B = NdArray<f64>;
-/// What `learn` computes on.
+/// The float type of `learn`.
 type Single = NdArray<f32>;
 
-/// Relative to central differences.
+/// Bound relative to central differences.
 const BOUND: f64 = 1e-5;
-/// Half the distance of a difference, as a share of the parameter's size. The differences choose among them without the gradient that they
-/// check: the first that agrees with the one before is taken, whose error by curvature is then a hundredth of what they differ by.
+/// Half the distance of a difference, relative to the size of the parameter. The step is chosen without the gradient under test: the first
+/// whose difference agrees with the one before is used, whose curvature error is then a hundredth of their difference.
 const SHARES: [f64; 4] = [1e-4, 1e-5, 1e-6, 1e-7];
 const AGREE: f64 = 1e-4;
 const SEED: u64 = 5;
 
-/// A problem at the size of its images, with a softness and how the result is judged.
+/// A problem at the size of its images, with a softness and an outer loss.
 struct Case<'a, P, S> {
     name: &'a str,
     problem: &'a dyn Fn() -> P,
@@ -65,8 +65,8 @@ impl<P: InverseProblem, S: Softness> Case<'_, P, S> {
         let what = format!("{}, {:?}, {:?}", self.name, self.softness.softness, self.outer_loss);
         let (phi, exact, loss) = self.gradient::<B>();
         assert!(exact.iter().any(|&g| g != 0.0), "{what}: no gradient");
-        // Printed, since no bound holds at every seed: Adam's first steps turn on the sign of coordinates whose gradient is nearly rounding,
-        // and the order of additions decides these. Over 12 seeds of 3D SHAPE the median is 7e-4 and the largest 13.
+        // Printed, since no bound holds at every seed: Adam's first steps depend on the sign of coordinates whose gradient is nearly
+        // rounding, and the order of additions determines these. Over 12 seeds of 3D SHAPE the median is 7e-4 and the largest 13.
         let (_, single, _) = self.gradient::<Single>();
         println!("{what}, in single precision: {:.1e}", relative_error(&single, &exact));
         let differences = |share: f64| -> Vec<f64> {
@@ -94,7 +94,7 @@ impl<P: InverseProblem, S: Softness> Case<'_, P, S> {
     }
 }
 
-/// Compares the meta-gradient of one instance with central differences, under both outer losses.
+/// Compares the meta-gradient of one instance with central differences, for both outer losses.
 fn check<P: InverseProblem>(
     name: &str,
     size: usize,
@@ -114,8 +114,7 @@ fn check<P: InverseProblem>(
     }
 }
 
-/// The same with a surrogate. Its own loss has another derivative than the one that is gone down, so that only the
-/// fixed one judges it.
+/// [`check`] with a surrogate. The descent does not follow the derivative of its own loss, so only the fixed outer loss is used.
 fn check_surrogate<P: InverseProblem>(
     name: &str,
     size: usize,
@@ -132,7 +131,7 @@ fn task<T: Task>(args: &T::Args) -> T {
     T::new(args, Variant::Original, &EdgeChoice::default()).expect("the task is sound")
 }
 
-/// A scale of its own for a softness that stays, and those of the decay from there; or those of the task.
+/// A custom fixed scale and its decay, or the scales of the task.
 fn scales<T: Task>(scale: Option<f64>) -> [f64; 3] {
     let [first, last] = T::SCALES.decay;
     match scale {
@@ -141,7 +140,7 @@ fn scales<T: Task>(scale: Option<f64>) -> [f64; 3] {
     }
 }
 
-/// A file with five vertices without symmetry, all octants' signs among them.
+/// A file with five vertices without symmetry, with the signs of all octants.
 fn body() -> (TempDir, PathBuf) {
     const BODY: &str = "v 0.4 0.3 0.2\nv -0.5 0.2 0.3\nv 0.1 -0.5 0.3\nv 0.2 0.3 -0.5\nv -0.3 -0.2 -0.4\n\
                         f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 5 3\nf 2 4 5\nf 3 5 4\n";

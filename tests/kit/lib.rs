@@ -1,5 +1,4 @@
-//! Helpers of all tests that need no tensors: property tests that draw from a fixed seed, and programs that are started as their user starts
-//! them.
+//! Test helpers without tensors: property tests with a fixed seed, and programs started as by a user.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

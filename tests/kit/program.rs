@@ -10,17 +10,17 @@ use std::{
 
 use serde_json::Value;
 
-/// Far longer than any run of a test takes on a loud machine: only a program that hangs comes to it.
+/// Far longer than any run of a test on a loaded machine: only a hanging program reaches it.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// A program of the workspace, started as its user starts it.
+/// A program of the workspace, started as by a user.
 #[derive(Clone, Copy, Debug)]
 pub struct Program {
     path: &'static str,
     one_thread: bool,
 }
 
-/// How a program ended that could not do its work.
+/// The exit of a program that failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// Exit code.
@@ -41,12 +41,12 @@ impl Program {
         Self { path, one_thread: false }
     }
 
-    /// The program on a machine of one core: its pool has one thread.
+    /// The program with a pool of one thread, as on a machine of one core.
     pub const fn on_one_thread(self) -> Self {
         Self { one_thread: true, ..self }
     }
 
-    /// A command that starts it.
+    /// A command that starts the program.
     pub fn command(self) -> Command {
         let mut command = Command::new(self.path);
         if self.one_thread {
@@ -55,11 +55,11 @@ impl Program {
         command
     }
 
-    /// Runs a command line whose words have no spaces, with results in `out`: its JSON line.
+    /// Runs a command line whose words have no spaces, with results in `out`; returns its JSON line.
     ///
     /// # Errors
     ///
-    /// Exit code and stderr, where the exit code is not 0.
+    /// Exit code and stderr, if the exit code is not 0.
     ///
     /// # Panics
     ///
@@ -72,11 +72,11 @@ impl Program {
     ///
     /// # Errors
     ///
-    /// Exit code and stderr, where the exit code is not 0.
+    /// Exit code and stderr, if the exit code is not 0.
     ///
     /// # Panics
     ///
-    /// As [`Program::run_in`].
+    /// As for [`Program::run_in`].
     pub fn run_words(self, out: &Path, words: &[&str]) -> Result<Value, Failure> {
         let mut command = self.command();
         command.args(words).args(["--quiet", "--json", "--out"]).arg(out);
@@ -89,7 +89,7 @@ impl Program {
     }
 }
 
-/// The output of a command that ends; it is killed where it does not.
+/// The output of a command; it is killed if it does not end.
 ///
 /// # Panics
 ///
@@ -124,7 +124,7 @@ fn text(file: &File) -> String {
     String::from_utf8_lossy(&read(file.try_clone().unwrap())).into_owned()
 }
 
-/// A command that starts `count` processes of a program, as MPI does.
+/// A command that starts `count` processes of a program with MPI.
 pub fn mpirun(program: &str, count: usize) -> Command {
     let mut command = Command::new("mpirun");
     let count = count.to_string();

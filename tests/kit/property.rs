@@ -4,17 +4,17 @@ use proptest::test_runner::{
     Config, FailurePersistence, FileFailurePersistence, PersistedSeed, RngSeed,
 };
 
-/// Seed of the ordinary test command.
+/// Default seed.
 const SEED: u64 = 0x50f7;
 
-/// The configuration of every property test: `count` cases from a fixed seed, so that the test command gives one answer.
+/// The configuration of every property test: `count` cases from a fixed seed, so that results are reproducible.
 ///
-/// A random search sets `SOFTRAST_SOAK_SEED` to another seed and `SOFTRAST_SOAK_CASES` to a factor on `count`. A case that fails is written
-/// to `NAME.proptest-regressions` beside the test `NAME.rs`; from then on every run replays it first.
+/// A random search sets `SOFTRAST_SOAK_SEED` to another seed and `SOFTRAST_SOAK_CASES` to a factor on `count`. A failing case is written to
+/// `NAME.proptest-regressions` next to the test `NAME.rs`; later runs replay it first.
 ///
 /// # Panics
 ///
-/// If one of these variables is not a whole number.
+/// If one of these variables is not an integer.
 pub fn cases(count: u32) -> Config {
     Config {
         cases: count.saturating_mul(whole("SOFTRAST_SOAK_CASES", 1)),
@@ -34,8 +34,8 @@ fn whole<T: FromStr>(name: &str, default: T) -> T {
 
 const BESIDE: FileFailurePersistence = FileFailurePersistence::WithSource("proptest-regressions");
 
-/// Keeps cases that fail beside the source of their test. `FileFailurePersistence` alone takes the source for a path from the folder in which
-/// the test runs where it writes, and from the workspace where it reads.
+/// Stores failing cases next to the source of their test. `FileFailurePersistence` alone resolves the source relative to the working
+/// directory of the test when it writes, and relative to the workspace when it reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct BesideTheTest;
 
@@ -67,7 +67,7 @@ impl FailurePersistence for BesideTheTest {
     }
 }
 
-/// A path from the folder of the workspace, as `file!()` gives it. What is allocated stays: once for each property.
+/// A path relative to the workspace folder, as returned by `file!()`. The allocation is leaked, once per property.
 fn absolute(source: &'static str) -> &'static str {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
     workspace.join(source).to_string_lossy().into_owned().leak()

@@ -4,7 +4,7 @@ use softrast_inverse::NamedSoftness;
 use softrast_softness::Softness;
 use softrast_tensor::{Backend, Tensor};
 
-/// A softness of one's own, of one method: `s(x) = 1/2 + atan(x / scale) / π`; φ `[1]` is the logarithm of the scale.
+/// A custom softness with one method: `s(x) = 1/2 + atan(x / scale) / π`; φ `[1]` is the logarithm of the scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arctan;
 

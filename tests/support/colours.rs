@@ -1,4 +1,4 @@
-//! Everything that the op in colour computes of one scene.
+//! All results of the colour op for one scene.
 
 use softrast_mesh::fox;
 use softrast_raster::{
@@ -9,16 +9,16 @@ use softrast_tensor::{Autodiff, Tensor, numbers};
 
 use crate::{outputs::Outputs, tensors::tensor};
 
-/// Height and width of the image in pixels: more rows than are computed at once, twice over.
+/// Height and width of the image in pixels: more than twice the rows of a band.
 const SIZE: [usize; 2] = [101, 110];
 const AZIMUTHS_DEG: [f64; 2] = [0.0, 100.0];
 const CHANNELS: usize = 3;
 
-/// Image, gradients and gradients of these, on two views of the fox with colours at its vertices, in the float type of `B`.
+/// Image, gradients and gradients of these, on two views of the fox with vertex colours, in the float type of `B`.
 ///
 /// # Panics
 ///
-/// If one of them does not depend on what it is the gradient to.
+/// If one of them does not depend on the input that it is differentiated with respect to.
 pub fn colours<B: RasterBackend>() -> Outputs {
     let fox = fox();
     let edge = EdgeSoftness::new(Family::Logistic);

@@ -1,4 +1,4 @@
-//! Runs of a program in a folder with its inputs: none of these is ever removed, replaced or shortened. Test files include this one.
+//! Runs of a program in a folder with its inputs: none of the inputs is ever removed, replaced or truncated. Test files include this one.
 
 use std::{
     collections::BTreeMap,
@@ -15,17 +15,17 @@ pub(crate) const OCTAHEDRON: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0
 pub(crate) const SOFTNESS: &str =
     r#"{ "softness": { "family": "gauss", "squared": false }, "phi": [-3.0] }"#;
 
-/// A program and the inputs that its flags name.
+/// A program and the inputs of its flags.
 pub(crate) struct Program {
     pub(crate) path: &'static str,
-    /// Makes the inputs in a folder.
+    /// Creates the inputs in a folder.
     pub(crate) inputs: fn(&Path),
-    /// Words behind every line, so that runs are short.
+    /// Words appended to every line, so that runs are short.
     pub(crate) short: &'static str,
 }
 
 impl Program {
-    /// Runs a line in a folder. A word in which an underscore stands for a space is `'a_b'`.
+    /// Runs a line in a folder. A word with spaces is written `'a_b'`, with underscores in their place.
     pub(crate) fn run(&self, folder: &Path, line: &str) -> Output {
         let word = |word: &str| match word.strip_prefix('\'').and_then(|w| w.strip_suffix('\'')) {
             Some(quoted) => quoted.replace('_', " ").into(),
@@ -40,8 +40,8 @@ impl Program {
         Command::new(self.path).args(words).current_dir(folder).output().unwrap()
     }
 
-    /// Runs each line twice, in a folder of its own with the inputs. What was there before stays as it is; what ends with an error
-    /// changes nothing at all. Behind a line stands a part of its error, or nothing where it succeeds.
+    /// Runs each line twice, in a separate folder with the inputs. Existing files stay unchanged; a failing line changes nothing. Each line
+    /// is followed by a part of its error, empty on success.
     pub(crate) fn keeps_inputs(&self, lines: &[(&str, &str)]) {
         for (line, error) in lines {
             let folder = tempfile::tempdir().unwrap();
@@ -70,7 +70,7 @@ impl Program {
         }
     }
 
-    /// Every flag whose value is a file or folder, by the help of the commands, is in a line.
+    /// Asserts that a line contains every flag whose value is a file or folder, according to the help of the commands.
     pub(crate) fn every_flag_is_in(&self, commands: &[&str], lines: &[(&str, &str)]) {
         for command in commands {
             let words: Vec<OsString> =
@@ -89,8 +89,8 @@ impl Program {
         }
     }
 
-    /// Names that are not UTF-8 or hold control codes are read, and reach no terminal. `IN/` in a line is a folder of such a name with
-    /// the inputs; a line fails if it names `none`, which is not there.
+    /// Names that are not UTF-8 or contain control codes are read, and never printed raw. `IN/` in a line is a folder of such a name with
+    /// the inputs; a line fails if it contains `none`, which does not exist.
     #[cfg(unix)]
     pub(crate) fn prints_no_control_codes(&self, lines: &[&str]) {
         use std::os::unix::ffi::OsStrExt;

@@ -1,4 +1,4 @@
-//! Workloads whose exact results are known, every pixel-face pair evaluated in f64.
+//! Workloads with known exact results, every pixel-face pair evaluated in f64.
 
 use softrast_mesh::{airplane, chair, fox, icosphere};
 
@@ -7,20 +7,19 @@ use super::{
     workload::{Row, Workload},
 };
 
-/// A workload and what it comes to.
+/// A workload and its result.
 #[derive(Clone, Debug)]
 pub struct KnownRow {
-    /// What it is called on the command line.
+    /// The name on the command line.
     pub name: &'static str,
-    /// What is drawn.
+    /// The workload.
     pub workload: Workload,
     /// Its exact result.
     pub row: Row,
 }
 
 impl KnownRow {
-    /// Meshes of this repository. The numbers are those of
-    /// `cargo bench -p softrast-tests --bench exact_row -- NAME reference`.
+    /// Meshes of this repository. The numbers are results of `cargo bench -p softrast-tests --bench exact_row -- NAME reference`.
     pub fn ours() -> [Self; 4] {
         [
             Self {
@@ -62,10 +61,10 @@ impl KnownRow {
         ]
     }
 
-    /// W1: the paper's sphere of 1280 faces from 24 sides, 64 × 64.
+    /// W1: the paper's sphere of 1280 faces in 24 views, 64 × 64.
     ///
-    /// It is not the [`icosphere`] of as many faces: every face of its icosahedron is cut into 64 at
-    /// once, not into 4 three times, which moves the gradient by 2.6 %.
+    /// It differs from the [`icosphere`] of as many faces: every face of its icosahedron is split into 64 at once, not into 4 three times,
+    /// which changes the gradient by 2.6 %.
     ///
     /// # Panics
     ///

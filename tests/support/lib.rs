@@ -1,4 +1,4 @@
-//! What the tests that cross crates share: workloads with known results, small problems, tensors; and the examples of the pages.
+//! Shared code of tests that span crates: workloads with known results, small problems, tensors; and doctests of the pages.
 
 mod arctan;
 mod colours;
@@ -37,7 +37,7 @@ pub struct Readme;
 #[doc = include_str!("../../docs/guide/adding-a-softness.md")]
 pub struct AddingASoftness;
 
-/// Compiles and runs the examples of the page for those who come from other rasterizers.
+/// Compiles and runs the examples of the page for users of other rasterizers.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/guide/coming-from-pytorch3d.md")]
 pub struct ComingFromPyTorch3d;

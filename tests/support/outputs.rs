@@ -1,4 +1,4 @@
-//! Everything that the fused op computes of one scene.
+//! All results of the fused op for one scene.
 
 use softrast_mesh::fox;
 use softrast_raster::{RasterBackend, low_level::Rasterizer, project};
@@ -7,21 +7,21 @@ use softrast_tensor::{Autodiff, Backend, Tensor, numbers};
 
 use crate::tensors::tensor;
 
-/// Width and height of the image in pixels: more rows than are computed at once, twice over.
+/// Width and height of the image in pixels: more than twice the rows of a band.
 const SIZE: usize = 150;
 const AZIMUTHS_DEG: [f64; 2] = [0.0, 70.0];
 
-/// What an op gives, by name.
+/// Results of an op, by name.
 pub type Outputs = Vec<(&'static str, Vec<f64>)>;
 
 /// All outputs of the fused op on two views of the fox, 150 × 150, in the float type of `B`.
 ///
-/// They are the sums; the gradients of a weighted sum of these to vertices and table; and the
-/// gradients of a weighted sum of both to vertices, table and first weights.
+/// The sums; the gradients of a weighted sum of these with respect to vertices and table; and the gradients of a weighted sum of both with
+/// respect to vertices, table and first weights.
 ///
 /// # Panics
 ///
-/// If one of them does not depend on what it is the gradient to.
+/// If one of them does not depend on the input that it is differentiated with respect to.
 pub fn outputs<B: RasterBackend>() -> Outputs {
     type Second<B> = Autodiff<Autodiff<B>>;
 
@@ -57,7 +57,7 @@ pub fn outputs<B: RasterBackend>() -> Outputs {
     ]
 }
 
-/// The vertices of all views on the screen, `[views, vertices, 3]`.
+/// The projected vertices of all views, `[views, vertices, 3]`.
 fn projected<B: RasterBackend>(positions: &[[f64; 3]]) -> Tensor<B, 3> {
     let orbits: Vec<f64> =
         AZIMUTHS_DEG.iter().flat_map(|&azimuth| [2.732, 17.0, azimuth, 60.0]).collect();
@@ -65,7 +65,7 @@ fn projected<B: RasterBackend>(positions: &[[f64; 3]]) -> Tensor<B, 3> {
     project(world, tensor(&orbits, [AZIMUTHS_DEG.len(), 4])).tensor()
 }
 
-/// Numbers between -1 and 1 that differ from place to place.
+/// Numbers between -1 and 1 that differ between positions.
 fn wave<B: Backend, const D: usize>(shape: [usize; D], step: f64) -> Tensor<B, D> {
     let values: Vec<f64> =
         (0..shape.iter().product()).map(|k: usize| (step * k as f64).sin()).collect();

@@ -4,11 +4,11 @@ use std::{env, path::Path};
 
 use softrast_mesh::Mesh;
 
-/// The mesh `paper/NAME` in the folder that the environment variable `SOFTRAST_MESHES` names.
+/// The mesh `paper/NAME` in the folder of the environment variable `SOFTRAST_MESHES`.
 ///
 /// # Panics
 ///
-/// If it is not there.
+/// If it is missing.
 pub fn paper_mesh(name: &str) -> Mesh {
     let folder = env::var_os("SOFTRAST_MESHES").unwrap_or_else(|| {
         panic!("needs paper/{name} in the folder that SOFTRAST_MESHES names, which is not set")

@@ -1,4 +1,4 @@
-//! A small 2-D problem: triangles that move until they show a target.
+//! A small 2-D problem: triangles that are fitted to a target.
 
 use softrast_meta::Objective;
 use softrast_raster::{
@@ -14,31 +14,30 @@ const SIZE: usize = 12;
 /// Triangles in a row along the diagonal.
 const FACES: usize = 6;
 
-/// Two ways to draw.
+/// Two implementations of drawing.
 #[derive(Clone, Debug)]
 enum Drawing<S> {
     /// Plain tensor ops over every pair.
     Reference(S),
-    /// The fused op, with support and knots that were chosen beforehand.
+    /// The fused op, with support and knots chosen beforehand.
     Fused(Box<Silhouette<S>>),
 }
 
-/// Six triangles, each free to move its corners, against the image of a disk.
+/// Six triangles with free corners, fitted to the image of a disk.
 ///
-/// θ `[36]` holds x and y of all corners in NDC, φ belongs to the softness; the loss is the mean
-/// squared difference.
+/// θ `[36]` holds x and y of all corners in NDC, φ belongs to the softness; the loss is the mean squared difference.
 #[derive(Clone, Debug)]
 pub struct Shape2d<S> {
     drawing: Drawing<S>,
 }
 
 impl<S: Softness> Shape2d<S> {
-    /// Drawn by the reference.
+    /// Creates a problem drawn by the reference.
     pub fn by_reference(softness: S) -> Self {
         Self { drawing: Drawing::Reference(softness) }
     }
 
-    /// Drawn by the fused op, prepared for parameters near `phi`.
+    /// Creates a problem drawn by the fused op, prepared for parameters near `phi`.
     pub fn by_fused_op<B: RasterBackend>(softness: S, phi: &Tensor<B, 1>, tolerance: f64) -> Self {
         let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(SIZE) };
         let silhouette = rasterizer.prepare(&faces().into(), softness, phi);
@@ -46,7 +45,7 @@ impl<S: Softness> Shape2d<S> {
     }
 }
 
-/// Where the corners of [`Shape2d`] start: triangles of unequal shape that overlap their neighbours.
+/// Initial corners of [`Shape2d`]: triangles of unequal shape that overlap their neighbours.
 pub fn shape2d_start() -> Vec<f64> {
     let corner = |face: usize, corner: usize| {
         let along = 0.26 * face as f64 - 0.65;

@@ -1,4 +1,4 @@
-//! The promise that no pixel is off by more than its bound, for one random scene and softness.
+//! The error bound of pixels, for one random scene and softness.
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ type Exact = NdArray<f64>;
 
 const SIZE: usize = 12;
 
-/// A scene, a softness and what is asked of them.
+/// A scene, a softness and a tolerance.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ToleranceCase {
@@ -24,30 +24,30 @@ pub struct ToleranceCase {
     pub t_conorm: String,
     /// Largest error of a pixel.
     pub tolerance: f64,
-    /// Scales of the softness, one after the other, as logarithms to base 10, in NDC.
+    /// Scales of the softness, in sequence, as logarithms to base 10, in NDC.
     pub widths: Vec<f64>,
     /// Index of another parameter and the amount added to it, before each image except the first.
     pub moves: Vec<(usize, f64)>,
 }
 
-/// How an image compares with that of every pixel-face pair.
+/// Error of an image relative to that of every pixel-face pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Deviation {
-    /// The largest error of a pixel beyond what rounding of distances explains.
+    /// The largest error of a pixel beyond rounding of distances.
     pub found: f64,
-    /// The error that the renderer states.
+    /// The renderer's stated error.
     pub stated: f64,
 }
 
 impl Deviation {
-    /// Whether no pixel is off by more than is stated.
+    /// Whether no error exceeds the stated one.
     pub fn is_kept(&self) -> bool {
         self.found <= self.stated
     }
 }
 
 impl ToleranceCase {
-    /// The case that belongs to a seed: over all families, T-conorms, scales from 1e-6 to 10 NDC and tolerances from 1e-2 to 1e-8.
+    /// The case of a seed: over all families, T-conorms, scales from 1e-6 to 10 NDC and tolerances from 1e-2 to 1e-8.
     pub fn random(seed: u64) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
         let family = Family::ALL[random.random_range(0..Family::ALL.len())];
@@ -76,9 +76,9 @@ impl ToleranceCase {
         self.deviations_on::<Exact>(2e-14, 0.0)
     }
 
-    /// Deviations in f32: vertices are rounded to that before they are compared. Rounding of cubics and sums does not count: a relative error of
-    /// the sum, some 32 roundings for each term and one for each face that is added, moves the coverage by `S dA/dS` times as much, which
-    /// the T-conorm bounds.
+    /// Deviations in f32: vertices are rounded to f32 before the comparison. Rounding of cubics and sums is excluded: a relative error of
+    /// the sum, about 32 roundings per term and one per added face, changes the coverage by `S dA/dS` times as much, which the T-conorm
+    /// bounds.
     ///
     /// # Panics
     ///
@@ -132,7 +132,7 @@ impl ToleranceCase {
         deviations
     }
 
-    /// Corners of the triangles. Half of the triangles pass a pixel's centre at a distance of the order of the `width`.
+    /// Corners of the triangles. Half of the triangles pass a pixel's centre at a distance of about `width`.
     fn vertices(&self, width: f64) -> Vec<f64> {
         let mut random = StdRng::seed_from_u64(self.scene);
         let mut vertices = Vec::new();
@@ -155,7 +155,7 @@ impl ToleranceCase {
             let row = -centre(number(0.0, SIZE as f64) as usize);
             let depth = if number(0.0, 1.0) < 0.05 { -1.0 } else { 2.0 };
             if near {
-                // An upright edge beside a column of pixels, or a corner beside one of them.
+                // An upright edge next to a column of pixels, or a corner next to one of them.
                 let side = number(-1.0, 1.0).signum();
                 let far = column + side * number(0.05, 2.0);
                 corners = if number(0.0, 1.0) < 0.7 {
@@ -172,7 +172,7 @@ impl ToleranceCase {
     }
 }
 
-/// The largest `S dA/dS` of a coverage A by its sum S.
+/// The largest `S dA/dS` of a coverage A with sum S.
 fn steepness(t_conorm: TConorm) -> f64 {
     let moved = |k: i32| {
         let sum = f64::exp2(0.25 * f64::from(k));
@@ -181,7 +181,7 @@ fn steepness(t_conorm: TConorm) -> f64 {
     (-120..80).map(moved).fold(0.0, f64::max)
 }
 
-/// Ranges of coverage that rounding of distances allows.
+/// Ranges of coverage within rounding of distances.
 struct Ranges<'a> {
     vertices: &'a [f64],
     faces: &'a [[u32; 3]],

@@ -1,17 +1,16 @@
 use softrast_meta::Objective;
 use softrast_tensor::{Backend, Tensor};
 
-/// A loss in closed form: `Σ exp(φ0) log cosh(θ - 0.2) + φ1 sin(θ) θ_next`, at step t times
-/// `1 + 0.1 t`.
+/// A loss in closed form: `Σ exp(φ0) log cosh(θ - 0.2) + φ1 sin(θ) θ_next`, at step t times `1 + 0.1 t`.
 ///
-/// It is smooth, coupled, not convex, and different from step to step.
+/// It is smooth, coupled, not convex, and varies with the step.
 #[derive(Clone, Copy, Debug)]
 pub struct Waves {
-    /// Whether the last parameter feels nothing.
+    /// Whether the last parameter has no effect.
     pub dead: bool,
 }
 
-/// Every parameter feels something.
+/// Every parameter has an effect.
 pub const WAVES: Waves = Waves { dead: false };
 
 impl<B: Backend> Objective<B> for Waves {

@@ -1,4 +1,4 @@
-//! A mesh seen from several sides, and what its comparison with a disk comes to.
+//! A mesh in several views, and the result of its comparison with a disk.
 
 use std::sync::Arc;
 
@@ -18,10 +18,10 @@ const CAMERA: [f64; 3] = [2.732, 0.0, 60.0];
 /// Centre and radius of the disk that images are compared with, in NDC.
 const DISK: ([f64; 2], f64) = ([0.1, 0.05], 0.5);
 
-/// A mesh seen from several sides, compared with the image of a disk.
+/// A mesh in several views, compared with the image of a disk.
 #[derive(Clone, Debug)]
 pub struct Workload {
-    /// What is drawn, in world units.
+    /// The mesh, in world units.
     pub mesh: Mesh,
     /// Azimuths of the cameras in degrees.
     pub azimuths_deg: Vec<f64>,
@@ -29,14 +29,14 @@ pub struct Workload {
     pub size: usize,
 }
 
-/// What a workload comes to.
+/// The result of a workload.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// Mean squared difference to the disk over views and pixels.
     pub loss: f64,
     /// Mean coverage over views and pixels.
     pub mean_alpha: f64,
-    /// Norm of the gradient of the loss to the vertices in world units, all views together.
+    /// Norm of the gradient of the loss with respect to the vertices in world units, all views together.
     pub gradient_norm: f64,
 }
 
@@ -71,7 +71,7 @@ impl Workload {
     ///
     /// # Panics
     ///
-    /// If nothing of the mesh can be seen.
+    /// If no part of the mesh is visible.
     pub fn by_fused_op<B: RasterBackend>(&self, tolerance: f64) -> Row {
         let faces: Arc<[[u32; 3]]> = self.mesh.faces().into();
         let rasterizer = Rasterizer { tolerance, ..Rasterizer::new(self.size) };
@@ -88,7 +88,7 @@ impl Workload {
     ///
     /// # Panics
     ///
-    /// If nothing of the mesh can be seen.
+    /// If no part of the mesh is visible.
     pub fn by_reference<B: RasterBackend>(&self) -> Row {
         let scene = reference::Scene { faces: self.mesh.faces(), size: self.size.into() };
         let conorm = TConorm::default();
@@ -117,7 +117,7 @@ impl Workload {
         tensor(positions.concat(), [1, positions.len(), 3])
     }
 
-    /// Vertices of all views on the screen, `[views, vertices, 3]`.
+    /// The projected vertices of all views, `[views, vertices, 3]`.
     fn project<B: RasterBackend>(&self, world: Tensor<B, 3>) -> Tensor<B, 3> {
         let [distance, elevation, fov] = CAMERA;
         let orbit = |&azimuth| [distance, elevation, azimuth, fov];
@@ -129,7 +129,7 @@ impl Workload {
     fn loss<B: RasterBackend>(&self, alpha: Tensor<B, 3>) -> Tensor<B, 1> {
         let (centre, radius) = DISK;
         let size = self.size as f64;
-        // Membership is decided in f64: in f32 the rim would take other pixels.
+        // Membership is computed in f64: in f32 the rim would have other pixels.
         let inside = |pixel: usize| {
             let at = |index: usize| (2.0 * index as f64 + 1.0 - size) / size;
             let (row, column) = (pixel / self.size, pixel % self.size);

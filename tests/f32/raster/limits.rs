@@ -1,4 +1,4 @@
-//! The fused op in f32: close to f64, and finite where f32 itself is at its limits.
+//! The fused op in f32: close to f64, and finite at the limits of f32.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ fn tensor<T: Backend>(values: &[f64], dtype: DType) -> Tensor<T, 1> {
     Tensor::from_data(data, (&Default::default(), dtype))
 }
 
-/// Coverage and the gradient of `Σ coverage²` to the vertices and to phi.
+/// Coverage and the gradient of `Σ coverage²` with respect to the vertices and to phi.
 fn render<T: RasterBackend>(
     corners: &[[f64; 3]],
     softness: EdgeSoftness,

@@ -1,4 +1,4 @@
-//! Second-order products in f32: as good as f32 itself, not as good as differences in it.
+//! Second-order products in f32: as accurate as f32 allows, and more than differences in f32.
 
 use std::sync::Arc;
 
@@ -17,8 +17,7 @@ fn tensor<T: Backend>(values: &[f64], dtype: DType) -> Tensor<T, 1> {
     Tensor::from_data(data, (&Default::default(), dtype))
 }
 
-/// Gradient of `Σ w coverage²` to the projected vertices and phi, and gradient of a weighted sum of
-/// that to both.
+/// Gradient of `Σ w coverage²` with respect to the projected vertices and phi, and gradient of a weighted sum of that with respect to both.
 fn products(softness: EdgeSoftness, scale: f64, dtype: DType) -> [Vec<f64>; 4] {
     let mesh = icosphere(2);
     let faces: Arc<[[u32; 3]]> = mesh.faces().into();
@@ -50,7 +49,7 @@ fn products(softness: EdgeSoftness, scale: f64, dtype: DType) -> [Vec<f64>; 4] {
 #[test]
 fn second_order_products_in_f32_agree_with_f64() {
     let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
-    // The kink of a plain distance at the edge bends by 1 / d, which rounding of d feels.
+    // The kink of a plain distance at the edge has curvature 1 / d, which is sensitive to rounding of d.
     let bounds = [5e-5, 5e-5, 1e-2, 1e-4];
     for family in [Family::Logistic, Family::Gauss, Family::Exp, Family::Mlp] {
         for squared in [false, true] {

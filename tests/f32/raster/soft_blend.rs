@@ -1,4 +1,4 @@
-//! Soft colours of whole meshes in f32: close to f64, and right where the answer is known.
+//! Soft colours of whole meshes in f32: close to f64, and correct where the result is known.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ type A = Autodiff<B>;
 const SIZE: usize = 16;
 const EXP: DepthSoftness = DepthSoftness::Family(Family::Exp);
 
-/// How a scene is drawn.
+/// Rendering parameters of a scene.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     edge: EdgeSoftness,
@@ -35,21 +35,21 @@ const SOFT: Look = Look {
     log_weight: -10.0,
 };
 
-/// The image `[2, size, size]` of faces of these colours before a black background; its colours lie between theirs, and its gradients are
-/// finite.
+/// The image `[2, size, size]` of faces of these colours in front of a black background; asserts that its colours are between theirs, and
+/// its gradients are finite.
 fn image(corners: &[[f64; 3]], colours: &[f64], look: Look) -> Vec<f64> {
     drawn::<B>(corners, colours, look)
 }
 
-/// [`image`], no channel of which is farther than `bound` from the same image in f64.
+/// [`image`], after asserting that its channels differ from the image in f64 by at most `bound`.
 fn image_as_in_f64(corners: &[[f64; 3]], colours: &[f64], look: Look, bound: f64) {
-    // Both begin with the same numbers.
+    // Both start with the same numbers.
     let corners = in_f32(corners);
     let expected = drawn::<NdArray<f64>>(&corners, colours, look);
     assert_as_in_f64(&image(&corners, colours, look), &expected, look, bound);
 }
 
-/// Corners that f32 holds.
+/// Corners rounded to f32.
 fn in_f32(corners: &[[f64; 3]]) -> Vec<[f64; 3]> {
     corners.iter().map(|corner| corner.map(|x| f64::from(x as f32))).collect()
 }
@@ -60,7 +60,7 @@ fn assert_as_in_f64(found: &[f64], expected: &[f64], look: Look, bound: f64) {
     }
 }
 
-/// The largest error of an image that the rounding of nearness leaves under a depth softness of this scale.
+/// The largest error of an image due to rounding of the nearness, for a depth softness of this scale.
 fn of_nearness(depth_scale: f64) -> f64 {
     1e-4 + 2e-7 / depth_scale
 }
@@ -72,7 +72,7 @@ where
     drawn_by::<B>(&renderer(colours.len(), look), corners, colours, look.log_weight)
 }
 
-/// A renderer of so many faces.
+/// A renderer of `faces` faces.
 fn renderer(faces: usize, look: Look) -> ColourRenderer {
     let faces: Arc<[[u32; 3]]> = (0..faces as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
     let weighting = Weighting { edge: look.edge, depth: look.depth, planes: look.planes };
@@ -135,7 +135,7 @@ fn coincident_faces_share_alike() {
     let both = image(&[FACE, FACE].concat(), &[0.2, 0.6], SOFT);
     let share = &both[SIZE * SIZE..];
     assert_near(&both, share.iter().map(|share| 0.4 * share), 1e-6);
-    // Twice the odds.
+    // Doubled odds.
     let odds = alone.iter().map(|share| 2.0 * share / (1.0 + share));
     assert_near(share, odds.take(SIZE * SIZE), 1e-5);
 }
@@ -157,7 +157,7 @@ fn many_layers_add_up() {
     let colours: Vec<f64> = (0..LAYERS).map(|k| (k % 2) as f64).collect();
     let found = image(&stack, &colours, SOFT);
     let (colour, share) = found.split_at(SIZE * SIZE);
-    // Sums of thousands of numbers, one after the other.
+    // Sequential sums of thousands of numbers.
     assert_near(colour, share.iter().map(|share| 0.5 * share), 1e-4);
     let layers = LAYERS as f64;
     let odds = alone.iter().map(|share| layers * share / (1.0 + (layers - 1.0) * share));
@@ -187,12 +187,12 @@ fn touching_the_near_plane_is_finite() {
 
 #[test]
 fn a_background_that_weighs_nothing_is_seen_through() {
-    // It is there where nothing else is: far outside the face it takes all.
+    // The background is visible where nothing else is: far outside the face it dominates.
     for log_weight in [-60.0, -600.0, -6e4] {
         let look = Look { log_weight, ..SOFT };
         let found = image(&FACE, &[1.0], look);
         assert!((found[SIZE * SIZE / 2 + SIZE / 2] - 1.0).abs() < 1e-5);
-        // Logarithms of weights: that of the face in the corner is some -d / scale.
+        // Logarithms of weights: that of the face in the corner is about -d / scale.
         let corner = if log_weight < -100.0 { 1.0 } else { found[SIZE - 1] };
         assert!((found[SIZE - 1] - corner).abs() < 1e-5);
     }
@@ -206,7 +206,7 @@ fn depths_of_all_sizes_are_told_apart_as_in_f64() {
             for depth_scale in [1e-5, 1e-2, 1.0] {
                 let look = Look { planes, depth, depth_scale, ..SOFT };
                 let at = |z: f64| FACE.map(|[x, y, _]| [x, y, z * scale]);
-                // At the planes, between them, before and behind.
+                // At the planes, between them, in front and behind.
                 let faces = [at(1.0), at(1.5), at(4.0), at(40.0), at(1.0 + 1e-6)];
                 let colours = [0.1, 0.3, 0.5, 0.7, 0.9];
                 image_as_in_f64(&faces.concat(), &colours, look, of_nearness(depth_scale));
@@ -240,7 +240,7 @@ fn faces_of_all_kinds_are_drawn_under_every_softness() {
             for log_weight in [0.0, -10.0, -1000.0] {
                 let colours = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
                 drawn_by::<B>(&of_all, &faces.concat(), &colours, log_weight);
-                // Without those whose distances f32 cannot hold.
+                // Without faces whose distances overflow f32.
                 let sound = [faces[0], faces[1], faces[2], faces[5], faces[6]].concat();
                 let (sound, colours) = (in_f32(&sound), [0.1, 0.2, 0.3, 0.6, 0.7]);
                 let found = drawn_by::<B>(&of_sound, &sound, &colours, log_weight);

@@ -1,4 +1,4 @@
-//! The same bits on any number of threads, in f32.
+//! Results are bitwise equal for any number of threads, in f32.
 
 use softrast_tensor::NdArray;
 use softrast_tests::assert_same_on_threads;

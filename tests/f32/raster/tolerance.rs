@@ -1,4 +1,4 @@
-//! No pixel is off by more than is stated, but for the rounding of f32.
+//! No error of a pixel exceeds the stated bound, except for rounding in f32.
 
 use rayon::prelude::*;
 use softrast_raster::{SoftRenderer, TConorm};
@@ -47,7 +47,7 @@ fn every_number_of_a_table_fits_the_float_type() {
             let softness =
                 if squared { EdgeSoftness::squared(family) } else { EdgeSoftness::new(family) };
             for (beside, t_conorm) in t_conorms.into_iter().enumerate() {
-                // The steepest always, and one of the others in turn: each softness meets all, and so does each T-conorm.
+                // The steepest one always, and one of the others in turn: each softness is combined with all, and so is each T-conorm.
                 for (scale, tolerance) in [steepest, others[(at + beside) % others.len()]] {
                     let renderer = SoftRenderer::new(&[[0, 1, 2]], 8, softness, scale)
                         .with_tolerance(tolerance)

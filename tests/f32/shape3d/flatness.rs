@@ -1,11 +1,11 @@
-//! Hinges worked by hand.
+//! Hinges computed by hand.
 
 use softrast_inverse::Surface;
 use softrast_mesh::Edges;
 use softrast_tensor::NdArray;
 use softrast_tests::tensor;
 
-/// Flatness and normal consistency of two faces on an edge along x, the second turned up to the point (y, z).
+/// Flatness and normal consistency of two faces on an edge along x, the second bent up to the point (y, z).
 fn losses([y, z]: [f64; 2]) -> [f32; 2] {
     let vertices = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.3, -1.0, 0.0, 0.6, y, z];
     let surface =

@@ -1,4 +1,4 @@
-//! A triangle worked by hand.
+//! A triangle computed by hand.
 
 use softrast_inverse::Surface;
 use softrast_mesh::Edges;
@@ -13,7 +13,7 @@ fn loss(faces: &[[u32; 3]], vertices: &[[f64; 3]]) -> f32 {
 
 #[test]
 fn each_corner_of_a_triangle_is_compared_with_the_middle_of_the_others() {
-    // A corner is off by one and a half times its distance from the centroid.
+    // The Laplacian of a corner is one and a half times its distance from the centroid.
     let corners = [[2.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0]];
     assert!((loss(&[[0, 1, 2]], &corners) - 2.25 * 8.0).abs() < 1e-5);
 }

@@ -1,4 +1,4 @@
-//! What keeps the surface of 3D SHAPE smooth.
+//! Smoothness losses of 3D SHAPE.
 
 mod flatness;
 mod laplacian;

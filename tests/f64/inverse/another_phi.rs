@@ -1,4 +1,4 @@
-//! The loss of a problem under another softness than it was made for.
+//! The loss of a problem with another softness than its own.
 
 use softrast_inverse::{
     Instances, LearnConfig, Method, PoseProblem, ScheduledSoftness, SolveConfig,
@@ -25,7 +25,7 @@ fn a_problem_follows_another_softness_than_it_was_made_for() {
     let other = made_for_wide.loss(&narrow);
     assert!((other - own).abs() < 1e-3 * own, "{other}, not {own}");
     assert!((made_for_wide.loss(&wide) - own).abs() > 1e-2 * own);
-    // So differences of whole runs are no longer 0 on it.
+    // Differences of whole runs are therefore no longer 0 for it.
     let es = MetaGradient::EvolutionStrategy { sigma: 0.5, pairs: 2 };
     assert!(numbers(es.estimate(&made_for_wide, &wide, 1).gradient)[0] != 0.0);
 }

@@ -1,4 +1,4 @@
-//! What learning starts from, as one vector.
+//! Initial parameters of learning, as one vector.
 
 use std::path::Path;
 
@@ -41,7 +41,7 @@ fn instances(line: &str, config: &LearnConfig) -> anyhow::Result<Instances<Squar
     Instances::new(Square { floor: 0.0, seen: true }, &method(line), &solve, config)
 }
 
-/// Parameters at a step by tensor ops on the vector, as learning has them.
+/// Parameters at a step computed by tensor ops on the vector, as in learning.
 fn phi_at(line: &str, input: Input, learned: &[f64], step: usize) -> Vec<f64> {
     let instances = instances(line, &config(input)).unwrap();
     let problem = instances.problem(5, &vector(learned));
@@ -49,7 +49,7 @@ fn phi_at(line: &str, input: Input, learned: &[f64], step: usize) -> Vec<f64> {
     numbers(problem.objective.prepared(phi, step))
 }
 
-/// Saves what a vector stands for, and gives the line that names the file.
+/// Saves the softness of a vector, and returns the line with its file.
 fn saved(line: &str, input: Input, learned: &[f64], path: &Path) -> String {
     let (softness, own) = layout(line, input).softness(learned);
     assert!(own.is_empty());
@@ -73,7 +73,7 @@ fn a_learned_width_begins_with_the_softness_as_it_is() {
         assert_near(&phi_at(line, Input::Relative, &relative.start(), 0), &ndc.start());
         assert_eq!(relative.stage(7), 0);
     }
-    // The scale of a family takes the place of its first parameter.
+    // The scale of a family replaces its first parameter.
     assert_eq!(layout("exp --scale 0.05", Input::Relative).start().len(), 2);
 }
 
@@ -113,7 +113,7 @@ fn a_learned_vector_comes_back_from_its_file() {
             assert_near(surrogate, &learned[learned.len() - surrogate.len()..]);
             assert_eq!(read.learning_rate, Some(0.3));
             assert_eq!(read.note.as_deref(), Some("a test"));
-            // The rate is for the task that it was learned on.
+            // The rate is only used for the task that it was learned on.
             ScheduledSoftness { task: Some("another".into()), ..read }.save(&path).unwrap();
             assert_eq!(method(&file).softness.learning_rate, None);
         }
@@ -190,7 +190,7 @@ fn feedback_is_part_of_the_vector_and_judged_by_what_a_run_returns() {
     let softness = method(line).softness;
     let layout = PhiLayout::learned(&softness, vec![7.0], STEPS, SIZE, &config);
     let start = layout.start();
-    // Three knots and the surrogate before it, a parameter of the problem's own behind it.
+    // Three knots preceded by the surrogate and followed by a custom parameter of the problem.
     assert_eq!((start.len(), &start[4..10]), (11, &Feedback::START.parameters()[..]));
     let (learned, own) = layout.softness(&start);
     assert_eq!(
@@ -198,7 +198,7 @@ fn feedback_is_part_of_the_vector_and_judged_by_what_a_run_returns() {
         (Some(Feedback { steps: STEPS, ..Feedback::START }), vec![7.0])
     );
 
-    // From 5, ten steps of 0.1 come to 4, whose image of whole numbers has an error of 16.
+    // From 5, ten steps of 0.1 arrive at 4, whose image of integers has an error of 16.
     let instances = instances(line, &config).unwrap();
     assert!((instances.loss(5, &vector(&start[..10])) - 4.0).abs() < 1e-12);
 }

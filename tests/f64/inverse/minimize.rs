@@ -1,4 +1,4 @@
-//! Descents whose every place is known.
+//! Descents whose positions are all known.
 
 use softrast_inverse::{Feedback, InverseProblem, Iterate, Method, ScheduledSoftness, minimize};
 use softrast_meta::{Adam, Optimizer};
@@ -24,7 +24,7 @@ fn iterates(
     Ok(())
 }
 
-/// Where Adam goes, down `θ²`.
+/// Positions of Adam on `θ²`.
 fn expected(floor: f64) -> Vec<Vec<f64>> {
     let adam = Adam::new(0.25);
     let mut theta = vector::<B>(&START);
@@ -78,7 +78,7 @@ fn a_rate_falls_geometrically_to_its_end() {
     let method = Method::new("none", ScheduledSoftness { rate_end: Some(0.01), ..constant });
     let problem = Square { floor: -1e9, seen: true };
     let mut places = Vec::new();
-    // So far away that all gradients are alike and Adam takes steps as long as its rate.
+    // So far away that all gradients are alike and steps of Adam have the length of its rate.
     minimize::<_, B>(&problem, &[1e6], &method, &problem.defaults(), |now, _| {
         places.push(numbers(now.theta.clone())[0]);
         Ok(())
@@ -110,7 +110,7 @@ fn nothing_to_solve_is_an_error() {
     assert_eq!(end.unwrap_err().to_string(), "there is no instance to solve");
 }
 
-/// A scale that moves with feedback, on a path of one step.
+/// A moving scale with feedback, on a schedule of one step.
 fn with_feedback() -> Method {
     let softness = EdgeSoftness::new(Family::Logistic);
     let feedback = Feedback {
@@ -139,7 +139,7 @@ fn a_run_that_is_stuck_begins_again_from_another_start_if_there_is_one() {
         };
         minimize::<_, B>(&problem, &[start], &method, &config, |now, _| visit(now)).unwrap();
         assert!((places[1] - second).abs() < 1e-6 && places[0] == start, "{places:?}");
-        // The first step of an Adam that begins again has the length of the learning rate.
+        // The first step of a restarted Adam has the length of the learning rate.
         assert!((places[1] - places[2] - 0.25).abs() < 1e-6, "{places:?}");
         for (scale, expected) in scales.iter().zip([0.1, 0.1, 0.01]) {
             assert!((scale / expected - 1.0).abs() < 1e-9, "{scales:?}");

@@ -1,4 +1,4 @@
-//! Inverse rendering, on problems small enough to know every number.
+//! Inverse rendering, on problems small enough to compute by hand.
 
 mod another_phi;
 mod layout;

@@ -1,4 +1,4 @@
-//! A softness of one's own, of one method, over runs: solved with, learned and kept in a file.
+//! A custom softness with one method, over runs: solved with, learned, and saved to a file.
 
 use occlusion::Occlusion;
 use shape2d::colour::Coloured;
@@ -15,7 +15,7 @@ use softrast_tests::{Arctan, lopsided_mesh, vector};
 
 type B = NdArray<f64>;
 
-/// Mean hard loss at the start of a run and at its end.
+/// Mean hard loss at the start and the end of a run.
 fn solved<P: InverseProblem>(
     problem: &P,
     softness: ScheduledSoftness<Arctan>,

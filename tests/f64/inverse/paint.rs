@@ -17,7 +17,7 @@ fn camera(elevation_deg: f64, azimuth_deg: f64) -> Pinhole {
     Pinhole::from_orbit(&orbit, 48)
 }
 
-/// A ball whose colours follow its shape.
+/// A ball whose colours depend on position.
 fn ball() -> Mesh {
     let ball = icosphere(3);
     let colours = ball.positions().iter().map(|p| p.map(|x| 0.5 + 0.4 * (3.0 * x).sin()));
@@ -25,7 +25,7 @@ fn ball() -> Mesh {
     ball.with_colours(colours).unwrap()
 }
 
-/// What a camera sees of a mesh, with its transparency or over white.
+/// Renders a mesh, with transparency or over white.
 fn seen(mesh: &Mesh, camera: Pinhole, opaque: bool) -> PaintedView {
     let [red, green, blue, covered] = coloured_pixels(mesh, &camera);
     let width = camera.size.width;
@@ -70,7 +70,7 @@ fn a_ball_gets_its_colours_back_from_pictures_with_and_without_transparency() {
         let found = found.unwrap();
         assert_eq!((losses.len(), found.positions()), (60, plain.positions()));
         assert!(losses[59] < 0.01 * losses[0], "{losses:?}");
-        // From where no camera stood.
+        // From a camera that was not used.
         let aside = seen(&ball(), camera(30.0, 45.0), false);
         let psnr = aside.psnr(&found).unwrap();
         assert!(psnr > 28.0, "{psnr} dB, opaque: {opaque}");
@@ -103,7 +103,7 @@ fn views_that_show_nothing_and_meshes_behind_cameras_are_errors() {
     assert!(message(&behind, &views[..1]).contains("no camera has the mesh before it"));
 }
 
-/// The loss of a coloured ball as its colours, then its places, change; drawn so softly that differences can tell.
+/// The loss of a coloured ball as a function of its colours, then its vertices; so soft that differences are accurate.
 struct Painted {
     views: Vec<PaintedView>,
     mesh: Mesh,

@@ -1,4 +1,4 @@
-//! Scales that move over the steps.
+//! Schedules of the scale.
 
 use softrast_inverse::{ScaleSchedule, ScheduledSoftness};
 use softrast_softness::{EdgeSoftness, Family, Softness};
@@ -82,7 +82,7 @@ fn a_schedule_multiplies_the_scale_of_the_parameters_above_a_floor_in_pixels() {
                 if softness.scale_is_squared() { (2.0 * scale).sqrt() } else { 2.0 * scale };
             assert_near(moving.width_at(part, 64), width);
         }
-        // The knots take the place of a family's scale; a network has none.
+        // The knots replace a family's scale; a network has none.
         let expected = if softness == network { 56 + 3 } else { 3 };
         assert_eq!(moving.parameters(), expected);
     }

@@ -8,7 +8,7 @@ use softrast_softness::Softness;
 use softrast_tensor::Tensor;
 use softrast_tests::vector;
 
-/// `θ²` of numbers that may not fall below `floor`.
+/// `θ²` of numbers clamped to at least `floor`.
 pub(super) struct Square {
     pub(super) floor: f64,
     /// Whether the image depends on θ.
@@ -16,13 +16,13 @@ pub(super) struct Square {
 }
 
 impl Square {
-    /// The start that has another, and the other.
+    /// The start that has an alternative, and the alternative.
     pub(super) const MANY: f64 = 4.0;
     pub(super) const OTHER: f64 = 6.0;
 }
 
 impl InverseProblem for Square {
-    /// The number to start from.
+    /// The initial number.
     type Instance = f64;
     type Scene<B: RasterBackend> = Vec<f64>;
 

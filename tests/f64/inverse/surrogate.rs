@@ -17,7 +17,7 @@ type B = NdArray<f64>;
 type A = Autodiff<B>;
 
 const SIZE: usize = 16;
-/// Two triangles that overlap.
+/// Two overlapping triangles.
 const CORNERS: [f64; 18] = [
     -0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.6, 1.0, -0.2, -0.7, 1.0, 0.8, 0.2, 1.0, -0.3, 0.5, 1.0,
 ];
@@ -33,7 +33,7 @@ fn weights() -> Tensor<A, 3> {
     tensor(&weights, [1, SIZE, SIZE])
 }
 
-/// The gradient of a sum of pixels to the corners.
+/// The gradient of a sum of pixels with respect to the corners.
 fn gradient(sum: impl Fn(Tensor<A, 3>) -> Tensor<A, 1>) -> Vec<f64> {
     let corners = vector::<A>(&CORNERS).require_grad();
     let grads = sum(corners.clone().reshape([1, 6, 3])).backward();
@@ -48,7 +48,7 @@ fn both() -> ScheduledSoftness {
     narrow().with_surrogate_scale(0.1)
 }
 
-/// Draws a run of three steps.
+/// The renderer of a run of three steps.
 fn renderer(softness: ScheduledSoftness) -> ScheduledRenderer {
     let layout = PhiLayout::new(softness, Vec::new(), 3, SIZE);
     let phi = layout.start();
@@ -87,14 +87,14 @@ fn the_gradient_is_the_wide_one_through_the_slope_of_the_narrow_image() {
     let narrow = gradient_at(&renderer(narrow()), 0);
     let off = |a: &[f64]| a.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
-    // The table of the method is chosen in f32, so its knots may be others.
+    // The knots of the method's table are chosen in f32, so they may differ.
     assert!(off(&found) < 3e-3 * size, "{found:?}, not {expected:?}");
     assert!(off(&narrow) > 0.1 * size, "{narrow:?} is the gradient of the image itself");
 }
 
 #[test]
 fn both_move_together() {
-    // Halfway down the scale is 0.01, and that of the surrogate ten times as large.
+    // Halfway the scale is 0.01, and that of the surrogate ten times as large.
     let decay = ScheduledSoftness::decay(LOGISTIC, 0.02, 0.005).with_surrogate_scale(0.2);
     let moving = renderer(decay);
     let (found, expected) = (gradient_at(&moving, 1), gradient_at(&renderer(both()), 0));

@@ -1,4 +1,4 @@
-//! Steps of Adam worked by hand.
+//! Steps of Adam computed by hand.
 
 use softrast_meta::{Adam, Optimizer};
 use softrast_tensor::NdArray;

@@ -1,4 +1,4 @@
-//! Scene and softness that move together.
+//! Joint descent of scene and softness.
 
 use softrast_meta::{BilevelProblem, InnerLoop, MetaGradient, Objective, OuterSteps, Sgd};
 use softrast_tensor::{Backend, NdArray, Tensor};
@@ -16,7 +16,7 @@ impl<B: Backend> Objective<B> for Chase {
     }
 }
 
-/// The loss in the end from θ = 3 and φ = 1, and how far φ went.
+/// The final loss from θ = 3 and φ = 1, and the distance moved by φ.
 fn moved(steps: usize, learning_rate: f64) -> (f64, f64) {
     let problem = BilevelProblem {
         objective: Chase,
@@ -32,7 +32,7 @@ fn moved(steps: usize, learning_rate: f64) -> (f64, f64) {
 
 #[test]
 fn both_take_a_step_from_the_same_place_at_their_own_rates() {
-    // Slopes: 2 (3 - 1) = 4 by θ, -4 + 2 by φ, which Adam turns into a step of its rate.
+    // Slopes: 2 (3 - 1) = 4 with respect to θ, -4 + 2 with respect to φ, which Adam turns into a step of its rate.
     let (loss, way) = moved(1, 0.01);
     assert!((way - 0.01).abs() < 1e-10, "{way}");
     let (theta, phi) = (3.0 - 0.1 * 4.0, 1.0 + way);
@@ -42,7 +42,7 @@ fn both_take_a_step_from_the_same_place_at_their_own_rates() {
 #[test]
 fn softness_at_rest_leaves_the_plain_inner_loop() {
     let (loss, way) = moved(5, 0.0);
-    // Each step leaves 0.8 of what is left to φ.
+    // Each step multiplies the distance to φ by 0.8.
     assert_eq!(way, 0.0);
     assert!((loss - ((2.0 * 0.8_f64.powi(5)).powi(2) + 1.0)).abs() < 1e-12, "{loss}");
 }

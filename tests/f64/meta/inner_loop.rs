@@ -1,4 +1,4 @@
-//! Two steps of an inner loop whose meta-gradients are known, and what every loop keeps to.
+//! Two steps of an inner loop whose meta-gradients are known, and invariants of every loop.
 
 use softrast_meta::{Adam, InnerLoop, Objective, Optimizer, Sgd};
 use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
@@ -11,7 +11,7 @@ const START: f64 = 1.5;
 const CENTRE: f64 = 0.2;
 const PHI: f64 = -0.3;
 
-/// `0.5 exp(φ) (θ0 - 0.2)²`: pulls on the first parameter only, times 0 on the others.
+/// `0.5 exp(φ) (θ0 - 0.2)²`: depends on the first parameter only.
 struct Parabola;
 
 impl<B: Backend> Objective<B> for Parabola {
@@ -23,7 +23,7 @@ impl<B: Backend> Objective<B> for Parabola {
     }
 }
 
-/// Meta-gradient of the loss at the end, through the steps and without them.
+/// Meta-gradient of the final loss, through the steps and without them.
 fn meta_gradients(optimizer: impl Optimizer, steps: usize, start: &[f64]) -> [f64; 2] {
     let end = |phi: &Tensor<A, 1>| {
         InnerLoop { optimizer, steps }.solve(&Parabola, vector::<A>(start), phi)
@@ -36,7 +36,7 @@ fn meta_gradients(optimizer: impl Optimizer, steps: usize, start: &[f64]) -> [f6
     })
 }
 
-/// Total and direct derivative of the loss by φ at a solution that moves by `rate` with φ.
+/// Total and direct derivative of the loss with respect to φ at a solution that moves by `rate` with φ.
 fn expected(end: f64, rate: f64) -> [f64; 2] {
     let (k, off) = (PHI.exp(), end - CENTRE);
     let direct = 0.5 * k * off * off;
@@ -64,7 +64,7 @@ fn two_steps_of_adam_have_the_known_meta_gradient() {
     let adam = Adam { epsilon_root: 1e-3, epsilon: 1e-2, ..Adam::new(0.4) };
     let Adam { learning_rate, beta1, beta2, epsilon, epsilon_root } = adam;
     let k = PHI.exp();
-    // h / (sqrt(w + e) + E), and what it changes by with h and w.
+    // h / (sqrt(w + e) + E), and its derivative with respect to h and w.
     let ratio = |(h, dh): (f64, f64), (w, dw): (f64, f64)| {
         let root = (w + epsilon_root).sqrt();
         let below = root + epsilon;
@@ -75,7 +75,7 @@ fn two_steps_of_adam_have_the_known_meta_gradient() {
     let (theta1, dtheta1) = (START - learning_rate * move1, -learning_rate * rate1);
     let g2 = k * (theta1 - CENTRE);
     let dg2 = g2 + k * dtheta1;
-    // Both means corrected: (b (1-b) x1 + (1-b) x2) / (1 - b²) = (b x1 + x2) / (1 + b).
+    // Both means with bias correction: (b (1-b) x1 + (1-b) x2) / (1 - b²) = (b x1 + x2) / (1 + b).
     let mean = |b: f64, x1: f64, x2: f64| (b * x1 + x2) / (1.0 + b);
     let m = (mean(beta1, g1, g2), mean(beta1, g1, dg2));
     let v = (mean(beta2, g1 * g1, g2 * g2), mean(beta2, 2.0 * g1 * g1, 2.0 * g2 * dg2));
@@ -87,7 +87,7 @@ fn two_steps_of_adam_have_the_known_meta_gradient() {
 
 #[test]
 fn parameter_without_gradient_leaves_the_meta_gradient_finite() {
-    // Nothing pulls on the second parameter (docs/notes.md, Meta-gradients: checks).
+    // The second parameter has gradient 0 (docs/notes.md, Meta-gradients: checks).
     let root = |epsilon_root: f64| Adam { epsilon_root, ..Adam::new(0.05) };
     let start = [START, 3.0];
     let without = meta_gradients(root(0.0), 30, &start);

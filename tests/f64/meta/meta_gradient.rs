@@ -14,7 +14,7 @@ const PHI: [f64; 2] = [-0.3, 0.4];
 const START: [f64; 3] = [1.5, -0.7, 0.4];
 const EXACT: MetaGradient = MetaGradient::Unrolled { clip: None };
 
-/// `Σ (θ - 0.1)²`, whatever the softness.
+/// `Σ (θ - 0.1)²`, for any softness.
 #[derive(Clone, Copy)]
 struct Distance;
 
@@ -45,7 +45,7 @@ fn gradient<R: Objective<B> + Objective<A>>(
     numbers(estimate(problem, estimator).gradient)
 }
 
-/// The loss and its gradient through one tape of the whole inner loop.
+/// The loss and its gradient through a single tape of the whole inner loop.
 fn whole_tape<R: Objective<A>>(
     problem: &BilevelProblem<B, Waves, R, impl Optimizer + Copy>,
     at: &[usize],
@@ -152,7 +152,7 @@ fn direct_is_the_slope_of_the_loss_at_the_solution() {
 
 #[test]
 fn modes_differ() {
-    // A first-order gradient could pass for the exact one (docs/notes.md, Meta-gradients: orders).
+    // A first-order gradient could be confused with the exact one (docs/notes.md, Meta-gradients: orders).
     let adam = problem(WAVES, adam(), 8);
     let modes = [
         EXACT,
@@ -195,17 +195,17 @@ fn clipping_only_rescales_the_adjoint() {
     assert_eq!((loose.clips, numbers(loose.gradient)), (0, numbers(free.gradient.clone())));
     assert_eq!(loose.adjoint_norms, free.adjoint_norms);
 
-    // A limit that every step meets: all norms are at most that of the last step.
+    // A limit that every step reaches: all norms are at most that of the last step.
     let clip = 0.01;
     let tight = estimate(&adam, MetaGradient::Unrolled { clip: Some(clip) });
     assert!(tight.clips > 0 && tight.is_finite());
-    // What the steps do to an adjoint does not depend on its length.
+    // The effect of steps on an adjoint does not depend on its length.
     assert!((tight.adjoint_growth - free.adjoint_growth).abs() < 1e-9);
     assert_eq!(free.adjoint_norms.len(), 21);
     let growth = (free.adjoint_norms[20] / free.adjoint_norms[0]).log10();
     assert!((growth - free.adjoint_growth).abs() < 1e-9);
 
-    // Clipped at the first step back only, the rest of the gradient shrinks by one factor.
+    // Clipped only at the first backward step, the rest of the gradient shrinks by one factor.
     let two = problem(Distance, adam.inner.optimizer, 2);
     let [last, exact] =
         [1, 2].map(|steps| gradient(&two, MetaGradient::Truncated { steps, clip: None }));
@@ -230,7 +230,7 @@ fn memory_is_the_states_of_the_steps_walked_back() {
 
 #[test]
 fn evolution_agrees_with_the_exact_gradient_within_its_standard_error() {
-    // Adam moves by the sign of small gradients, so that its loss is rough on the scale of sigma.
+    // Adam moves by the sign of small gradients, so its loss is rough on the scale of sigma.
     let smooth = problem(Distance, Sgd { learning_rate: 0.1 }, 10);
     let exact = gradient(&smooth, EXACT);
     let mode = MetaGradient::EvolutionStrategy { sigma: 0.01, pairs: 1 };

@@ -1,4 +1,4 @@
-//! Learning a step size: one softness parameter whose best value is known.
+//! Learning a step size: one softness parameter whose optimum is known.
 
 use softrast_inverse::Checkpoint;
 use softrast_meta::{
@@ -9,8 +9,7 @@ use softrast_tensor::{Backend, NdArray, Tensor};
 
 type B = NdArray<f64>;
 
-/// A pull of strength exp(φ): gradient descent at rate 0.25 in two steps arrives where
-/// `0.25 exp(φ) = 1`. A broken one is not a number.
+/// An attraction of strength exp(φ): gradient descent at rate 0.25 converges in two steps if `0.25 exp(φ) = 1`. A broken instance has NaN.
 #[derive(Clone, Copy)]
 struct Pull {
     broken: bool,
@@ -32,7 +31,7 @@ impl<B: Backend> Objective<B> for Distance {
     }
 }
 
-/// Starts that differ from seed to seed; one in `broken`, if any, is not a number.
+/// Starts that depend on the seed; the one in `broken`, if any, is NaN.
 struct Pulls {
     broken: Option<u64>,
 }
@@ -78,7 +77,7 @@ fn text(job: &str, progress: &Progress) -> Vec<u8> {
     checkpoint.text().unwrap().into_bytes()
 }
 
-/// A record or progress without what no two runs share.
+/// Records without fields that differ between runs.
 fn timeless(records: Vec<Record>) -> Vec<Record> {
     records.into_iter().map(|record| Record { seconds: 0.0, ..record }).collect()
 }
@@ -153,7 +152,7 @@ fn patience_ends_a_run_that_does_not_get_better() {
 
 #[test]
 fn a_long_gradient_is_shortened_to_the_limit() {
-    // Adam does not see the length of a first gradient, so its moment has to tell.
+    // Adam is invariant to the length of a first gradient, so its moment is compared.
     let mut progress = Progress::new(vec![0.3]);
     let learner = OuterLoop { clip: 1e-3, ..learner() };
     let record = learner.step(&SOUND, &mut progress).unwrap().unwrap();
@@ -163,7 +162,7 @@ fn a_long_gradient_is_shortened_to_the_limit() {
     assert!((mean.abs() - 0.1 * 1e-3).abs() < 1e-12, "{mean}");
 }
 
-/// Why a learner of one number does not go on from these bytes.
+/// The reason why a learner of one number rejects these bytes as a checkpoint.
 fn refusal(bytes: &[u8], job: &str) -> String {
     Checkpoint::parse(bytes, job, &learner(), 1).unwrap_err().to_string()
 }
@@ -173,7 +172,7 @@ fn a_damaged_checkpoint_is_refused() {
     let mut progress = Progress::new(vec![0.3]);
     learner().step(&SOUND, &mut progress).unwrap();
     let whole = text("pulls", &progress);
-    // Whatever digit or letter changes and wherever the text ends, it is noticed.
+    // Any changed digit or letter and any truncation is detected.
     for at in 0..whole.trim_ascii_end().len() {
         assert!(refusal(&whole[..at], "pulls").contains("is no checkpoint, or a damaged one"));
         let mut bytes = whole.clone();

@@ -1,4 +1,4 @@
-//! Scenes that break renderers: every number stays finite, and where the answer is known it is met.
+//! Degenerate scenes: every number stays finite, and known results are met.
 
 use std::panic::catch_unwind;
 
@@ -23,8 +23,7 @@ fn instance(quads: Vec<Quad>, target: &[f64], start: &[f64]) -> (Problem, Instan
     (problem, Instance { quads, target: target.into(), start: start.into() })
 }
 
-/// Image and gradient of its loss to the depths for every depth softness from sharp to dull; all
-/// must be finite.
+/// Image and gradient of its loss with respect to the depths for every depth softness from sharp to dull; asserts that all are finite.
 fn assert_finite(name: &str, (problem, instance): &(Problem, Instance), size: usize) {
     let scene = Scene::<A>::new(problem, std::slice::from_ref(instance), size);
     let edge = EdgeSoftness::new(Family::Logistic);

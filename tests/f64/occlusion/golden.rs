@@ -1,4 +1,4 @@
-//! What an instance looks like, small enough to read.
+//! The appearance of an instance, small enough to read.
 
 use occlusion::{Instance, Problem, Scene};
 use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
@@ -9,8 +9,8 @@ type B = NdArray<f64>;
 
 const SIZE: usize = 16;
 
-/// The colours of a picture as letters, one row a line: upper case for the bright shade of a quad,
-/// lower case for the dark one, a dot for black, a question mark for a mixture.
+/// The colours of a picture as letters, one row per line: upper case for the bright shade of a quad, lower case for the dark one, a dot for
+/// black, a question mark for a mixture.
 fn letters(image: &[f64], instance: &Instance) -> String {
     let pixels = SIZE * SIZE;
     let letter = |pixel: usize| {
@@ -44,7 +44,7 @@ fn the_target_of_seed_0_shows_three_quads_and_so_does_a_narrow_softness() {
         letters(&numbers(image), &instance)
     };
     assert_eq!(drawn(3e-3), expected);
-    // Wide, it mixes the colours of overlaps and of nothing else.
+    // A wide softness mixes the colours of overlaps and of nothing else.
     let soft = drawn(0.3);
     assert!(soft.contains('?') && soft.contains('.'), "{soft}");
     assert!(soft.chars().zip(expected.chars()).all(|(s, e)| s == e || s == '?'), "{soft}");

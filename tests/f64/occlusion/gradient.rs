@@ -1,5 +1,5 @@
-//! The gradient of the loss to depths and parameters, and its Hessian-vector products, against
-//! central differences in f64.
+//! The gradient of the loss with respect to depths and parameters, and its Hessian-vector products, compared with central differences in
+//! f64.
 
 use occlusion::{Instance, Problem, Scene};
 use softrast_raster::RasterBackend;
@@ -16,8 +16,7 @@ const SIZE: usize = 12;
 /// Step of the differences.
 const H: f64 = 1e-5;
 
-/// A softness of edges and depths, and how many entries of the vector x are φ of each; the rest of
-/// x is θ.
+/// A softness of edges and depths, and the number of entries of the vector x that are φ of each; the rest of x is θ.
 #[derive(Clone, Copy)]
 struct Case {
     problem: Problem,
@@ -32,7 +31,7 @@ impl Case {
         Scene::new(&self.problem, &instances, SIZE)
     }
 
-    /// θ of the start, φ of the edges and φ of the depths, one after the other.
+    /// θ of the start, φ of the edges and φ of the depths, concatenated.
     fn x(&self) -> Vec<f64> {
         let start = numbers(self.scene::<B>().start());
         [start, self.edge.default_phi(0.03), self.depth.default_phi(0.3)].concat()

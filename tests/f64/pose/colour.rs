@@ -1,4 +1,4 @@
-//! POSE by colour: the gradient of the loss against central differences.
+//! POSE with colour: the gradient of the loss compared with central differences.
 
 use pose::colour::Scene;
 use softrast_inverse::pose::PoseInstance;
@@ -14,7 +14,7 @@ use crate::differences::check_gradient_to;
 const SIZE: usize = 24;
 const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 
-/// Three cameras around the fox in colours, whose fields of view are optimised too.
+/// Three cameras around the coloured fox, whose fields of view are optimised too.
 struct Three;
 
 fn scene<B: RasterBackend>() -> Scene<B> {

@@ -1,4 +1,4 @@
-//! The gradient of the loss to the pose against central differences, in f64.
+//! The gradient of the loss with respect to the pose compared with central differences, in f64.
 
 use softrast_inverse::pose::{PoseInstance, PoseScene};
 use softrast_mesh::fox;
@@ -28,8 +28,7 @@ fn losses(
     iou_loss(image, scene.target())
 }
 
-/// Compares all entries of θ `[views, columns]`, whose last column is the field of view if there
-/// are four.
+/// Compares all entries of θ `[views, columns]`, whose last column is the field of view if there are four.
 fn check(optimise_fov: bool) {
     let instances = [0, 1, 2].map(|seed| PoseInstance::seeded(seed, [15.0, 35.0]));
     let scene = PoseScene::<A>::new(&fox(), &instances, SIZE, optimise_fov);
@@ -55,7 +54,7 @@ fn check(optimise_fov: bool) {
         let slopes: Vec<f64> =
             after.iter().zip(&before).map(|(a, b)| (a - b) / (2.0 * H)).collect();
         for (view, slope) in slopes.into_iter().enumerate() {
-            // Views do not see one another.
+            // Views are independent.
             let expected = if view == k / columns { grad } else { 0.0 };
             let off = (slope - expected).abs() / largest;
             assert!(off < 1e-6, "entry {k}, view {view}: {slope} and {expected}, off by {off:.1e}");

@@ -1,5 +1,4 @@
-//! Scenes that break rasterizers: no case gives a number that is not finite, and where the exact
-//! answer is known it is met.
+//! Degenerate scenes: every number stays finite, and known exact results are met.
 
 use std::sync::{Arc, LazyLock};
 
@@ -17,7 +16,7 @@ type A = Autodiff<B>;
 
 const SIZE: usize = 16;
 
-/// Of one face, every family at each of [`SCALES`]: to choose the knots costs far more than an image.
+/// Silhouettes of one face, for every family at each of [`SCALES`]: choosing knots costs far more than an image.
 static OF_ONE_FACE: LazyLock<Vec<Silhouette<EdgeSoftness>>> =
     LazyLock::new(|| prepared(1).collect());
 
@@ -41,7 +40,7 @@ fn prepare(faces: u32, softness: EdgeSoftness, scale: f64) -> Silhouette<EdgeSof
     Rasterizer::new(SIZE).prepare(&loose(faces), softness, &phi)
 }
 
-/// Coverage and gradient of `Σ coverage²` to the vertices, through the fused op.
+/// Coverage and gradient of `Σ coverage²` with respect to the vertices, by the fused op.
 fn render(
     corners: &[[f64; 3]],
     silhouette: &Silhouette<EdgeSoftness>,

@@ -1,4 +1,4 @@
-//! Cameras against one that looks at the origin.
+//! Cameras compared with one built by `look_at` on the origin.
 
 use proptest::prelude::*;
 use softrast_raster::{NEAR, project, view_rotation};
@@ -57,7 +57,7 @@ proptest! {
         azimuth in -400.0..400.0,
         fov in 2.0..160.0,
     ) {
-        // At the poles `look_at` has no answer, and next to them no digits.
+        // At the poles `look_at` is undefined, and next to them it has no digits.
         prop_assume!(f64::cos(f64::to_radians(elevation)).abs() > 1e-2);
         let orbit = [distance, elevation, azimuth, fov];
         let expected = view_square(vertex, orbit);

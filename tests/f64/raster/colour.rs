@@ -1,5 +1,5 @@
-//! Colours of faces that share pixels: by hand, against direct sums, by differences, to second
-//! order, in any order of the faces, and where weights leave the range of floats.
+//! Blended colours: by hand, compared with direct sums and with differences, to second order, in any order of the faces, and with weights
+//! beyond the range of floats.
 
 use proptest::prelude::*;
 use softrast_raster::{Background, blend, hard_colour, nearness};
@@ -74,7 +74,7 @@ fn the_blend_is_the_direct_sum_over_faces() {
     }
 }
 
-/// `Σ (C - 0.3)² r` with fixed factors r, of log weights and the background's.
+/// `Σ (C - 0.3)² r` with fixed factors r, as a function of log weights and the background's.
 fn objective<T: Backend>(
     weights: Tensor<T, 1>,
     colours: &[f64],

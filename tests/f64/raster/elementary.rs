@@ -1,4 +1,4 @@
-//! What a step does around the sums in one op each, against the same in tensor ops: values, gradients, second order.
+//! The small ops of a step, one op each, compared with tensor ops: values, gradients, second order.
 
 use softrast_raster::{iou_loss, mse_loss, project, reference};
 use softrast_tensor::{Autodiff, NdArray, Tensor, numbers, vector};
@@ -7,7 +7,7 @@ type B = NdArray<f64>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
-/// What is computed of a vector.
+/// A function of a vector.
 type Of = fn(Tensor<AA, 1>) -> Tensor<AA, 1>;
 
 fn wave(count: usize, step: f64) -> Vec<f64> {
@@ -42,8 +42,7 @@ fn assert_same(fused: Of, dense: Of, x: &[f64]) {
 const VIEWS: usize = 3;
 const VERTICES: usize = 300;
 
-/// Vertices of one mesh or one for each view, some of them behind the camera or too far to be true, and orbits that
-/// pass a pole.
+/// Vertices of one mesh or one per view, some of them behind the camera or too far away, and orbits that pass a pole.
 fn scene(meshes: usize) -> Vec<f64> {
     let mut x = wave(3 * meshes * VERTICES, 0.9);
     (x[2], x[5], x[10], x[20]) = (-9.0, -2.95, 1e16, -1e300);
@@ -51,7 +50,7 @@ fn scene(meshes: usize) -> Vec<f64> {
     x
 }
 
-/// Vertices and orbits of such a vector.
+/// Vertices and orbits of a vector of [`scene`].
 fn parts(x: Tensor<AA, 1>) -> (Tensor<AA, 3>, Tensor<AA, 2>) {
     let coordinates = x.dims()[0] - 4 * VIEWS;
     let vertices = x.clone().narrow(0, 0, coordinates).reshape([-1, VERTICES as i32, 3]);
@@ -65,7 +64,7 @@ fn projected(x: Tensor<AA, 1>) -> Tensor<AA, 1> {
 
 #[test]
 fn projection_is_that_of_tensor_ops() {
-    // What is far away would hide all else.
+    // Far coordinates would dominate all others.
     let near: Of = |x| projected(x).clamp(-1e3, 1e3);
     let near_dense: Of = |x| {
         let (vertices, orbits) = parts(x);
@@ -79,7 +78,7 @@ fn projection_is_that_of_tensor_ops() {
     }
 }
 
-/// Two images of each view.
+/// Two images per view.
 fn images(x: Tensor<AA, 1>) -> [Tensor<AA, 3>; 2] {
     let length = x.dims()[0] / 2;
     let image = |k: usize| x.clone().narrow(0, k * length, length).reshape([2, 100, -1]);
@@ -91,7 +90,7 @@ fn pixels() -> Vec<f64> {
     wave(2 * 2 * 100 * 103, 0.37).into_iter().map(|x| x * x).collect()
 }
 
-/// Images of two views, and one target of both.
+/// Images of two views, and one target for both.
 fn with_one_target(x: Tensor<AA, 1>) -> [Tensor<AA, 3>; 2] {
     let length = x.dims()[0] / 3;
     let images = x.clone().narrow(0, 0, 2 * length).reshape([2, 100, -1]);
@@ -112,7 +111,7 @@ fn one_target_is_compared_with_all_views() {
         },
         pixels,
     );
-    // And the other way round.
+    // And in the other order.
     assert_same(
         |x| {
             let [image, target] = with_one_target(x);

@@ -1,4 +1,4 @@
-//! The fused op against the reference, in f64: image, gradient, second order.
+//! The fused op compared with the reference, in f64: image, gradient, second order.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ fn relative(a: &Tensor<B, 1>, b: &Tensor<B, 1>) -> f64 {
     norm(a.clone() - b.clone()) / norm(b.clone()).max(1e-12)
 }
 
-/// Image, gradients to vertices and phi, and the second-order products of both paths.
+/// Largest errors of the image, the gradients with respect to vertices and phi, and the second-order products.
 fn compare(softness: EdgeSoftness, t_conorm: TConorm, scale: f64) -> [f64; 5] {
     let (values, faces) = triangles(7, 20);
     let count = values.len() / 3;

@@ -1,4 +1,4 @@
-//! Which face a pixel shows.
+//! The nearest face at a pixel.
 
 use softrast_raster::{Projected, hard_coverage, hard_silhouette, nearest_faces};
 use softrast_tensor::{NdArray, Tensor};
@@ -8,7 +8,7 @@ use super::triangles::triangles;
 
 #[test]
 fn of_faces_that_cut_one_another_each_is_seen_where_it_is_nearer() {
-    // A flat one at depth 2, and one whose depth goes from 1 at x = -1 to 4 at x = 1: one over it is 1/2 at x = 1/3.
+    // A flat one at depth 2, and one whose depth goes from 1 at x = -1 to 4 at x = 1: 1 / depth is 1/2 at x = 1/3.
     let vertices = [
         [-9.0, -9.0, 2.0],
         [9.0, -9.0, 2.0],

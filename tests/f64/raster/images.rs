@@ -1,4 +1,4 @@
-//! Images that are no squares.
+//! Images that are not square.
 
 use softrast_raster::{
     ImageSize, Projected, TConorm, hard_silhouette, low_level::Rasterizer, reference,
@@ -57,7 +57,7 @@ fn passes(
 #[test]
 fn any_image_agrees_with_the_reference_to_second_order() {
     let (one, faces) = triangles(7, 12);
-    // Three views that differ.
+    // Three different views.
     let vertices: Vec<f64> = (0..3)
         .flat_map(|view| one.iter().map(move |x| x * (1.0 - 0.1 * f64::from(view))))
         .collect();
@@ -87,7 +87,7 @@ fn a_lower_image_shows_the_middle_of_a_square_one() {
     const SIDE: usize = 16;
     let (values, faces) = triangles(7, 12);
     let softness = EdgeSoftness::new(Family::Gauss);
-    // The lower image has half as many rows, so that a pixel of it is twice as large.
+    // The lower image has half as many rows, so its pixels are twice as large.
     let drawn = |size: ImageSize, factor: f64| {
         let along = |(k, x): (usize, &f64)| if k % 3 < 2 { factor * x } else { *x };
         let values: Vec<f64> = values.iter().enumerate().map(along).collect();

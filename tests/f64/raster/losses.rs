@@ -1,4 +1,4 @@
-//! Losses of pictures and surfaces: values worked out another way, derivatives against central differences.
+//! Losses of pictures and surfaces: values computed in another way, derivatives compared with central differences.
 
 use softrast_raster::{
     edge_length, huber_loss, l1_loss, multi_scale_loss, normal_consistency, ssim_loss,
@@ -18,7 +18,7 @@ pub(super) fn wave(count: usize, step: f64) -> Vec<f64> {
     (0..count).map(|k| (step * k as f64 + 0.3).sin()).collect()
 }
 
-/// Two pictures of each of two views, in [0, 1].
+/// Two pictures for each of two views, in [0, 1].
 fn pixels() -> Vec<f64> {
     wave(2 * PIXELS, 0.37).into_iter().map(|x| x * x).collect()
 }
@@ -36,7 +36,7 @@ fn of(loss: fn(Tensor<AA, 4>, Tensor<AA, 4>) -> Tensor<AA, 1>, x: &[f64]) -> Vec
     numbers(loss(image, target).inner().inner())
 }
 
-/// The gradient of the sum of a loss, and how a weighted sum of that changes.
+/// The gradient of the sum of a loss, and the gradient of a weighted sum of that.
 pub(super) fn derivatives(of: Of, x: &[f64], weights: &[f64]) -> [Vec<f64>; 2] {
     let inner = vector::<A>(x).require_grad();
     let outer = Tensor::<AA, 1>::from_inner(inner.clone()).require_grad();
@@ -45,7 +45,7 @@ pub(super) fn derivatives(of: Of, x: &[f64], weights: &[f64]) -> [Vec<f64>; 2] {
     [numbers(gradient.inner()), inner.grad(&pulled).map_or(vec![0.0; x.len()], numbers)]
 }
 
-/// Both orders along a few directions, against differences.
+/// Asserts both orders along a few directions, compared with differences.
 pub(super) fn assert_derivatives(of: Of, x: &[f64]) {
     let h = 1e-5;
     let weights = wave(x.len(), 2.1);
@@ -87,7 +87,7 @@ fn picture_losses_are_what_they_say() {
     let huber = |d: f64| if d <= 0.2 { d * d / 2.0 } else { 0.2 * (d - 0.1) };
     let of_huber = of(|a, b| huber_loss(a, b, 0.2), &x);
     close(of_huber, [0, 1].map(|view| mean(pairs(view).into_iter().map(huber).collect())));
-    // Of constant pictures a quarter apart, every level sees the same.
+    // Constant pictures with a difference of a quarter are the same on every level.
     let mut flat = vec![0.5; PIXELS];
     flat.extend(vec![0.25; PIXELS]);
     close(of(|a, b| multi_scale_loss(a, b, 3, l1_loss), &flat), [0.25; 2]);
@@ -162,7 +162,7 @@ fn picture_losses_have_both_derivatives() {
     }
 }
 
-/// Pictures of half the size are smaller than a window: there, squares.
+/// Pictures of half the size are smaller than a window: squares are used there.
 fn ssim_small(image: Tensor<AA, 4>, target: Tensor<AA, 4>) -> Tensor<AA, 1> {
     match image.dims()[2] {
         12 => ssim_loss(image, target),

@@ -1,4 +1,4 @@
-//! The rasterizer: cameras, the reference, and the fused op against it.
+//! The rasterizer: cameras, the reference, and comparisons of the fused op with it.
 
 mod bad_cases;
 mod camera;

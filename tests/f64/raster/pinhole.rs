@@ -1,4 +1,4 @@
-//! Pinhole cameras: worked numbers, conventions there and back, derivatives against differences.
+//! Pinhole cameras: values computed by hand, round trips of conventions, derivatives compared with differences.
 
 use proptest::prelude::*;
 use softrast_raster::{
@@ -11,7 +11,7 @@ type B = NdArray<f64>;
 type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
-/// Quarter turns and a wide image, so that every number can be found by hand.
+/// Quarter turns and a wide image, so that every number can be computed by hand.
 fn worked() -> Pinhole {
     Pinhole {
         rotation: [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]],
@@ -68,7 +68,7 @@ fn conventions_of_others_are_the_matrices_that_were_worked_out_by_hand() {
     assert_close(&principal_point, &[-0.06, 3.25 / 75.0], 1e-12);
     assert_eq!(camera.orbit(), None);
 
-    // At azimuth 90 and elevation 0 an orbit stands at +x and looks along -x: right is -z there.
+    // At azimuth 90 and elevation 0 an orbit is at +x and looks along -x: right is -z there.
     let orbit = Orbit { distance: 3.0, elevation_deg: 0.0, azimuth_deg: 90.0, fov_deg: 90.0 };
     let side = Pinhole::from_orbit(&orbit, 64);
     let expected = [[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]];
@@ -97,8 +97,7 @@ fn what_is_no_camera_says_what_is_wrong() {
     assert_eq!(error(Pinhole { size: [0, 5].into(), ..camera }), PinholeError::NoPixels);
 }
 
-/// Two views with a pose of their own and intrinsics in common, seen of a vector of 3 vertices, 2 tangents, 2 translations and
-/// intrinsics.
+/// Two views with separate poses and shared intrinsics, projected from a vector of 3 vertices, 2 tangents, 2 translations and intrinsics.
 fn seen(x: Tensor<AA, 1>) -> Tensor<AA, 1> {
     let part = |from: usize, count: usize| x.clone().narrow(0, from, count);
     let start = [worked(), Pinhole { translation: [0.1, 0.3, 3.0], ..worked() }];
@@ -119,7 +118,7 @@ fn point(tangent: f64) -> Vec<f64> {
     x
 }
 
-/// Gradient of a weighted sum of squares of what is seen, and gradient of a weighted sum of that.
+/// Gradient of a weighted sum of squares of the projection, and gradient of a weighted sum of that.
 fn orders(x: &[f64]) -> [Vec<f64>; 2] {
     let vector = |values: Vec<f64>| Tensor::<A, 1>::from_data(&values[..], &Default::default());
     let wave = |count: usize, step: f64| (0..count).map(|k| (step * k as f64).cos()).collect();
@@ -132,7 +131,7 @@ fn orders(x: &[f64]) -> [Vec<f64>; 2] {
     [numbers(gradient.inner()), numbers(inner.grad(&again).unwrap())]
 }
 
-/// With tangents of no length, where their series count, where these end, and well beyond.
+/// With tangents of length 0, where the series are used, at their limit, and well beyond.
 #[test]
 fn gradients_to_pose_intrinsics_and_vertices_are_differences_to_second_order() {
     let value = |x: &[f64]| {
@@ -189,7 +188,7 @@ proptest! {
         let pytorch3d = Pinhole::from_pytorch3d(&camera.to_pytorch3d(), size);
         assert_close(&flat(&pytorch3d), &flat(&camera), 1e-12);
 
-        // A part of the image, enlarged: the same point at its place there.
+        // A part of the image, enlarged: the same point at its position there.
         let crop = camera.cropped([10.0, -20.0], [40.0, 80.0], [160, 80]);
         let point = [0, 1, 2].map(|k| camera.eye()[k] + 2.0 * rotation[2][k] + 0.1 * rotation[0][k]);
         let ([u, v, _], [x, y, _]) = (camera.pixel(point), crop.pixel(point));

@@ -1,5 +1,5 @@
-//! A soft silhouette as `PyTorch3D` draws it, from its published formulas in plain numbers, against ours with what
-//! docs/guide/coming-from-pytorch3d.md translates.
+//! A soft silhouette of `PyTorch3D`, computed from its published formulas, compared with ours after the translation in
+//! docs/guide/coming-from-pytorch3d.md.
 //!
 //! Source: Liu et al. 2019, Eq. 1 and its aggregate function for silhouettes, as in `sigmoid_alpha_blend` of `PyTorch3D`.
 
@@ -54,7 +54,7 @@ fn signed_squared_distance(p: Point, corners: [Point; 3]) -> f64 {
     if inside { -nearest } else { nearest }
 }
 
-/// A ball that is pressed and sheared, so that no two of its sides look the same.
+/// A ball that is compressed and sheared, so that no two of its sides look the same.
 fn mesh() -> Mesh {
     let ball = icosphere(1);
     let sheared =
@@ -66,15 +66,15 @@ fn focal() -> f64 {
     (FOV_DEG / 2.0).to_radians().tan().recip()
 }
 
-/// The vertices along the axes of their camera: left, up, ahead.
+/// The vertices in the axes of their camera: left, up, ahead.
 fn seen(mesh: &Mesh) -> Vec<[f64; 3]> {
     let (r, t) = view();
     let along = |p: &[f64; 3], j: usize| (0..3).map(|i| p[i] * r[i][j]).sum::<f64>() + t[j];
     mesh.positions().iter().map(|p| [0, 1, 2].map(|j| along(p, j))).collect()
 }
 
-/// `1 - Π (1 - sigmoid(-dists / sigma))` of each pixel, over the faces within `blur_radius`. Their NDC has x left: the first column is at
-/// x = 1, the first row at y = 1.
+/// `1 - Π (1 - sigmoid(-dists / sigma))` of each pixel, over the faces within `blur_radius`. PyTorch3D's NDC has x left: the first column
+/// is at x = 1, the first row at y = 1.
 fn theirs(mesh: &Mesh, blur_radius: f64) -> Vec<f64> {
     let seen: Vec<Point> =
         seen(mesh).iter().map(|p| [0, 1].map(|k| focal() * p[k] / p[2])).collect();
@@ -89,7 +89,7 @@ fn theirs(mesh: &Mesh, blur_radius: f64) -> Vec<f64> {
     (0..SIZE * SIZE).map(alpha).collect()
 }
 
-/// Our silhouette of vertices on the screen, with `sigma` as the scale.
+/// Our silhouette of projected vertices, with `sigma` as the scale.
 fn ours(mesh: &Mesh, seen: Tensor<B, 3>) -> Vec<f64> {
     let softness = EdgeSoftness::squared(Family::Logistic);
     let image =
@@ -133,14 +133,14 @@ fn an_orbit_shows_the_same() {
 #[test]
 fn clip_space_of_opengl_over_its_w_is_what_we_draw() {
     let mesh = mesh();
-    // Their left is the other way round in OpenGL; w is the depth ahead.
+    // PyTorch3D's left is reversed in OpenGL; w is the depth ahead.
     let clip = seen(&mesh).into_iter().map(|[x, y, z]| [-focal() * x, focal() * y, z]);
     let over_w: Vec<[f64; 3]> = clip.map(|[x, y, w]| [x / w, y / w, w]).collect();
     let image = ours(&mesh, vertices::<B>(&over_w, &Default::default()));
     assert_same(&image, &theirs(&mesh, f64::INFINITY));
 }
 
-/// What the page says of their usual cut: where a face still covers 1e-4.
+/// The claim of the page about PyTorch3D's usual cut: a face covers 1e-4 there.
 #[test]
 fn the_usual_blur_radius_leaves_out_more_than_our_tolerance() {
     let mesh = mesh();

@@ -1,4 +1,4 @@
-//! Signed distances of the reference, by hand and against many points of the boundary.
+//! Signed distances of the reference, by hand and compared with many points of the boundary.
 
 use proptest::prelude::*;
 use softrast_raster::reference::signed_distance;

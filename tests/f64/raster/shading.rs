@@ -1,4 +1,4 @@
-//! Light on surfaces: by hand, by sums over a sphere, and derivatives against central differences.
+//! Lighting of surfaces: by hand, by sums over a sphere, and derivatives compared with central differences.
 
 use softrast_mesh::icosphere;
 use softrast_raster::{Light, lambert, phong, spherical_harmonics, vertex_normals};
@@ -44,7 +44,7 @@ fn normals_of_a_sphere_point_away_from_its_middle() {
 
 #[test]
 fn light_worked_by_hand() {
-    // A point at (0, 0, 1) that looks up z; a lamp 3 to its right and 4 up; an eye where the mirrored ray goes.
+    // A point at (0, 0, 1) with normal +z; a light 3 to its right and 4 up; an eye on the mirrored ray.
     let points = tensor::<B, 3>(&[0.0, 0.0, 1.0], [1, 1, 3]);
     let normals = tensor::<B, 3>(&[0.0, 0.0, 7.0], [1, 1, 3]);
     let lights = lights([0.0, 0.0, 2.0], [3.0, 0.0, 5.0]);
@@ -53,11 +53,11 @@ fn light_worked_by_hand() {
     let eye = tensor::<B, 2>(&[-6.0, 0.0, 9.0], [1, 3]);
     let shine = numbers(phong(points.clone(), normals.clone(), eye, &lights[1..], 5.0));
     assert_close(&shine, &[0.2, 0.4, 0.8]);
-    // The directional light comes back along z, at the cosine 0.8 of the eye.
+    // The directional light is reflected along z, at the cosine 0.8 of the eye.
     let eye = tensor::<B, 2>(&[-6.0, 0.0, 9.0], [1, 3]);
     let shine = numbers(phong(points.clone(), normals.clone(), eye, &lights[..1], 2.0));
     assert_close(&shine, &[0.64, 0.32, 0.16]);
-    // From behind there is no light at all.
+    // No light arrives from behind.
     let eye = tensor::<B, 2>(&[-6.0, 0.0, 9.0], [1, 3]);
     assert_close(&numbers(lambert(points.clone(), -normals.clone(), &lights)), &[0.0; 3]);
     assert_close(&numbers(phong(points, -normals, eye, &lights, 2.0)), &[0.0; 3]);
@@ -70,7 +70,7 @@ fn spherical_harmonics_are_orthonormal() {
     let normals = tensor::<B, 3>(sphere.positions().as_flattened(), [1, count, 3]);
     let unit: Vec<f64> = (0..81).map(|k| f64::from(u8::from(k % 10 == 0))).collect();
     let harmonics = numbers(spherical_harmonics(normals, tensor(&unit, [9, 9])));
-    // Vertices do not lie evenly, so each stands for the area around it.
+    // Vertices are not evenly distributed, so each is weighted by the area around it.
     let mut areas = vec![0.0; count];
     for (face, [a, b, c]) in sphere.faces().iter().zip(sphere.triangles()) {
         let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
@@ -110,7 +110,7 @@ fn shading_has_both_derivatives_also_where_there_is_no_normal() {
     let of: Of = shaded;
     assert_derivatives(of, &wave(15, 1.3));
     for at in [0.0, 0.3] {
-        // All vertices in one place: no face has an area.
+        // All vertices at one position: no face has an area.
         let [gradient, second] = derivatives(of, &[at; 15], &wave(15, 2.1));
         assert!(gradient.iter().chain(&second).all(|g| g.is_finite()), "{gradient:?} {second:?}");
     }

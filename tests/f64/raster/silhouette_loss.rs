@@ -1,4 +1,4 @@
-//! A loss that is computed along with the silhouette is that of the silhouette, and so are its derivatives.
+//! The fused loss of silhouettes is that of the silhouette, and so are its derivatives.
 
 use proptest::prelude::*;
 use softrast_raster::{Projected, SoftRenderer, iou_loss, low_level::Silhouette, mse_loss};
@@ -13,10 +13,10 @@ type A = Autodiff<B>;
 type AA = Autodiff<A>;
 
 type Renderer = SoftRenderer<EdgeSoftness>;
-/// A loss of vertices, a target, and the share of each pixel that counts.
+/// A loss of vertices, a target, and pixel weights.
 type Loss = fn(&Renderer, Tensor<AA, 3>, Tensor<AA, 3>, Option<Tensor<AA, 3>>) -> Tensor<AA, 1>;
 
-/// In one op, and in two.
+/// As one op, and as two.
 const LOSSES: [[Loss; 2]; 2] = [
     [
         |renderer, vertices, target, counted| match counted {
@@ -46,7 +46,7 @@ fn by_table(renderer: &Renderer) -> (Silhouette<EdgeSoftness>, Tensor<AA, 2>) {
     (silhouette, table)
 }
 
-/// A silhouette times the share of each pixel that counts.
+/// A silhouette times pixel weights.
 fn part(
     renderer: &Renderer,
     vertices: Tensor<AA, 3>,
@@ -59,8 +59,8 @@ fn part(
     }
 }
 
-/// Losses of views, the gradient of a sum of them to the vertices, and the gradients of a product with that to vertices and to the
-/// factors of the sum.
+/// Losses of views, the gradient of a sum of them with respect to the vertices, and the gradients of a product with that with respect to
+/// vertices and to the factors of the sum.
 fn derivatives(
     loss: Loss,
     renderer: &Renderer,
@@ -86,8 +86,7 @@ fn derivatives(
     [numbers(losses), numbers(gradient), numbers(to_vertices), numbers(to_factors)]
 }
 
-/// Asserts that both ways agree, for a renderer, so many views and a target of each or one of all, where all of each pixel counts or a share
-/// of it.
+/// Asserts that both implementations agree, for a renderer, `views` views with one target each or one for all, and optional pixel weights.
 fn assert_same(
     renderer: &Renderer,
     seed: u64,
@@ -107,7 +106,7 @@ fn assert_same(
     let pixel = |k: usize| 0.5 + 0.5 * (0.37 * k as f64).sin();
     let pixels: Vec<f64> = (0..targets * height * width).map(pixel).collect();
     let target = vector::<B>(&pixels).reshape([targets, height, width]);
-    // Some pixels do not count at all.
+    // Some pixels have weight 0.
     let share = |k: usize| (1.2 * (0.23 * k as f64).cos()).clamp(0.0, 1.0);
     let shares: Vec<f64> = (0..pixels.len()).map(share).collect();
     let counted = weighted.then(|| vector::<B>(&shares).reshape([targets, height, width]));
@@ -149,7 +148,7 @@ proptest! {
 
 #[test]
 fn more_pairs_than_are_kept_are_walked_again() {
-    // 400 faces that reach most pixels: up to 400 * 32 * 64 / 8 chunks in a band.
+    // 400 faces that reach most pixels: up to 400 * 32 * 64 / 8 chunks per band.
     let size = [64, 64];
     let softness = EdgeSoftness::new(Family::Logistic);
     let (_, faces) = triangles(3, 20);

@@ -1,4 +1,4 @@
-//! Soft colours of whole meshes: by hand, kernel against reference, by differences, and their properties.
+//! Soft colours of whole meshes: by hand, kernel compared with reference, by differences, and their properties.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ const SIZE: [usize; 2] = [11, 14];
 const PIXELS: usize = SIZE[0] * SIZE[1];
 const PLANES: [f64; 2] = [1.0, 4.0];
 
-/// What is drawn: vertices `[vertices, 3]`, faces, and how.
+/// A scene: vertices `[vertices, 3]`, faces, and rendering parameters.
 struct Case<S = EdgeSoftness> {
     vertices: Vec<f64>,
     faces: Arc<[[u32; 3]]>,
@@ -28,22 +28,22 @@ struct Case<S = EdgeSoftness> {
     attributes: Vec<f64>,
     entries: Arc<[[u32; 3]]>,
     channels: usize,
-    /// Rows and columns of a texture, and its texels: then attributes are places on it.
+    /// Rows and columns of a texture, and its texels: attributes are then coordinates on it.
     texture: Option<([usize; 2], Vec<f64>)>,
     weighting: Weighting<S>,
     phi: [Vec<f64>; 2],
     /// The colour, then the logarithm of the weight.
     background: Vec<f64>,
     tolerance: f64,
-    /// Whether the kernel leaves back faces out.
+    /// Whether the kernel culls back faces.
     culls: bool,
 }
 
-/// Inputs of a case, one after the other: vertices, attributes, both parameters, background, and texels if there are any.
+/// Inputs of a case, concatenated: vertices, attributes, both parameters, background, and texels if there are any.
 type Inputs<T> = Vec<Tensor<T, 1>>;
 
 impl<S: Softness> Case<S> {
-    /// Random triangles at random depths under these softnesses.
+    /// Random triangles at random depths with these softnesses.
     fn random(seed: u64, faces: usize, weighting: Weighting<S>, phi: [Vec<f64>; 2]) -> Self {
         let (mut vertices, faces) = triangles(seed, faces);
         for (k, z) in vertices.iter_mut().skip(2).step_by(3).enumerate() {
@@ -76,7 +76,7 @@ impl<S: Softness> Case<S> {
         self
     }
 
-    /// The faces whose corners go counter-clockwise as they are seen.
+    /// The faces whose corners appear counter-clockwise.
     fn front_faces(&self) -> Arc<[[u32; 3]]> {
         let is_front = |face: &&[u32; 3]| {
             let [a, b, c] = face.map(|v| &self.vertices[3 * v as usize..3 * v as usize + 2]);
@@ -85,7 +85,7 @@ impl<S: Softness> Case<S> {
         self.faces.iter().filter(is_front).copied().collect()
     }
 
-    /// The same with a texture, of which faces show pieces of any size.
+    /// The case with a texture; faces show pieces of any size.
     fn textured(mut self) -> Self {
         let size = [5, 7];
         self.attributes = wave(self.vertices.len() / 3 * 2, 1.7).iter().map(|x| 0.9 * x).collect();
@@ -112,7 +112,7 @@ impl<S: Softness> Case<S> {
         self.image_by(inputs, by_kernel.then(|| self.renderer()).as_ref())
     }
 
-    /// The image by a renderer that is there already, or by the reference.
+    /// The image by an existing renderer, or by the reference.
     fn image_by<T: RasterBackend>(
         &self,
         inputs: Inputs<T>,
@@ -141,7 +141,7 @@ impl<S: Softness> Case<S> {
         }
     }
 
-    /// The image, the gradients of a sum of squares of it to all inputs, and the gradients of a sum of these.
+    /// The image, the gradients of a sum of squares of it with respect to all inputs, and the gradients of a sum of these.
     fn derivatives(&self, by_kernel: bool) -> Vec<Vec<f64>> {
         let inner: Inputs<A> = self.inputs().into_iter().map(Tensor::require_grad).collect();
         let outer = |x: &Tensor<A, 1>| Tensor::<AA, 1>::from_inner(x.clone()).require_grad();
@@ -184,7 +184,7 @@ fn compare(name: &str, case: &Case<impl Softness>, bounds: [f64; 3]) {
     assert_same(name, [case.derivatives(true), case.derivatives(false)], bounds);
 }
 
-/// Compares what [`Case::derivatives`] found with what is expected, by order.
+/// Compares results of [`Case::derivatives`] with expected ones, by order.
 fn assert_same(name: &str, [found, expected]: [Vec<Vec<f64>>; 2], bounds: [f64; 3]) {
     let inputs = found.len() / 2;
     for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
@@ -221,7 +221,7 @@ fn any_number_of_channels_agrees_with_the_reference() {
     }
 }
 
-/// A softness of one's own: nothing but its value.
+/// A custom softness with nothing but its value.
 #[derive(Clone, Debug)]
 struct Tanh;
 
@@ -264,7 +264,7 @@ fn without_back_faces_there_are_only_front_faces() {
 fn textures_agree_with_the_reference_to_second_order() {
     let weighting = weighting(LOGISTIC, EXP);
     let phi = [LOGISTIC.default_phi(0.05), EXP.default_phi(0.1)];
-    // Two, since a texture is looked up before anything that the test above draws on five.
+    // Two seeds are enough, since a texture is looked up before everything that the test above checks with five.
     for seed in 0..2 {
         let case = Case::random(seed, 20, weighting, phi.clone()).textured();
         compare("textured", &case, [1e-8, 1e-6, 1e-4]);
@@ -298,7 +298,7 @@ fn a_texture_is_seen_upright_and_repeats() {
     let image = seen(0.0);
     let at = |row: usize, column: usize| image[8 * row + column];
     let between = |t: f64, a: f64, b: f64| a + t * (b - a);
-    // Centres of pixels lie at (2 k + 1) / 8 texels, those of texels at 1/2 and 3/2.
+    // Centres of pixels are at (2 k + 1) / 8 texels, those of texels at 1/2 and 3/2.
     for row in 2..6 {
         for column in 2..6 {
             let [down, right] = [row, column].map(|k| (2 * k + 1) as f64 / 8.0 - 0.5);
@@ -310,7 +310,7 @@ fn a_texture_is_seen_upright_and_repeats() {
             );
         }
     }
-    // Beyond its last texel comes the first again.
+    // The first texel follows the last.
     let edge = between(0.375, 1.0, 2.0);
     let wanted = between(0.375, edge, between(0.375, 3.0, 4.0));
     assert!((at(0, 0) - wanted).abs() < 1e-6, "{} {wanted}", at(0, 0));
@@ -322,14 +322,14 @@ fn a_texture_is_seen_upright_and_repeats() {
 #[test]
 fn every_edge_softness_agrees_with_the_reference() {
     let squared = Family::ALL.map(EdgeSoftness::squared);
-    // The kernel is told a table and no family. What squares the distance is the same for all, and has a test over all in fused.rs.
+    // The kernel receives a table and no family. Squaring of the distance is the same for all, and is tested for all in fused.rs.
     let squared = squared.into_iter().step_by(3);
     let plain = Family::ALL.into_iter().map(EdgeSoftness::new);
     for edge in plain.chain(squared) {
         let (family, squared) = (edge.family, edge.scale_is_squared());
         let phi = [edge.default_phi(if squared { 0.01 } else { 0.05 }), EXP.default_phi(0.1)];
         let case = Case::random(3, 20, weighting(edge, EXP), phi);
-        // The curvature of the law of Levy all but vanishes next to the edge, and then rises faster than any other.
+        // The curvature of the law of Levy nearly vanishes next to the edge, and then increases faster than any other.
         let second = if family == Family::LevyForward { 2e-4 } else { 1e-4 };
         compare(&format!("{family}, squared {squared}"), &case, [1e-8, 1e-6, second]);
     }
@@ -341,7 +341,7 @@ fn every_depth_softness_agrees_with_the_reference() {
     for depth in families.into_iter().chain([DepthSoftness::Mlp]) {
         let phi = [LOGISTIC.default_phi(0.05), depth.default_phi(0.2)];
         let mut case = Case::random(4, 20, weighting(LOGISTIC, depth), phi);
-        // Forward families are 0 behind the near plane, all faces at their least weight: beside a background that lets them be seen.
+        // Forward families are 0 behind the near plane: all faces have their least weight, and need a lower background.
         case.background[3] = -20.0;
         compare(&format!("depth {depth}"), &case, [1e-8, 1e-6, 1e-4]);
     }
@@ -368,7 +368,7 @@ fn own_faces(count: usize) -> Arc<[[u32; 3]]> {
 #[test]
 fn a_pixel_worked_by_hand() {
     // The only pixel has its centre at 0. The left edge of the first face is 0.1 to its right, at depths 2 and 4: the closest point is its
-    // middle, where 1/z = (1/2 + 1/4) / 2, so z = 8/3. The second face is around the pixel, at a depth of 3.
+    // middle, where 1/z = (1/2 + 1/4) / 2, so z = 8/3. The second face contains the pixel, at a depth of 3.
     let corners = [
         [0.1, -0.5, 2.0],
         [0.9, 0.0, 3.0],
@@ -387,7 +387,7 @@ fn a_pixel_worked_by_hand() {
     let (first, second) = (first * by_depth(8.0 / 3.0), second * by_depth(3.0));
     let behind = 0.01;
     let share = (first + second) / (first + second + behind);
-    // At that point the attribute of the corners 0 and 2, in perspective, is that of the nearer one by two thirds.
+    // At that point the attribute of corners 0 and 2, in perspective, has weight two thirds of the nearer one.
     let attributes =
         Attributes::of_corners(tensor::<B, 3>(&[3.0, 7.0, 6.0, 1.0, 1.0, 1.0], [1, 6, 1]));
     let background =
@@ -422,7 +422,7 @@ fn gradients_match_central_differences() {
             let grad = numbers(leaf.grad(&grads).unwrap());
             let most = grad.iter().fold(0.0, |most: f64, g| most.max(g.abs()));
             for k in (0..grad.len()).step_by(grad.len().div_ceil(30)) {
-                // A sliver turns over on the way.
+                // A sliver turns over within the step.
                 if which == 0 && (k / 9) % 5 == 4 {
                     continue;
                 }
@@ -443,8 +443,8 @@ fn gradients_match_central_differences() {
     }
 }
 
-/// `softmax_rgb_blend` of PyTorch3D in plain numbers, with its background where no face counts, for one channel: `faces` are signed squared
-/// distance (negative inside), nearness and colour.
+/// `softmax_rgb_blend` of PyTorch3D, with its background where no face counts, for one channel: `faces` are signed squared distance
+/// (negative inside), nearness and colour.
 fn softmax_blend(faces: &[[f64; 3]], sigma: f64, gamma: f64, behind: f64) -> (f64, f64) {
     const EPS: f64 = 1e-10;
     let nearest = faces.iter().fold(EPS, |most, face| most.max(face[1]));
@@ -459,14 +459,14 @@ fn softmax_blend(faces: &[[f64; 3]], sigma: f64, gamma: f64, behind: f64) -> (f6
 
 #[test]
 fn the_blend_is_that_of_soft_ras_and_pytorch3d_where_theirs_has_no_floor() {
-    // Faces that face the camera, so that no two ways to find their depth differ.
+    // Faces parallel to the image plane, so that all definitions of their depth agree.
     let count = 12;
     let (mut vertices, faces) = triangles(2, count);
-    // Their usual sigma and gamma: there the background is held at 1e-10 of the nearest face, and ours at next to nothing. Then softer
+    // PyTorch3D's usual sigma and gamma: there its background is clamped to 1e-10 of the nearest face, and ours is negligible. Then softer
     // ones, where it is not.
     let planes = [1.0, 2.0];
     for (sigma, gamma) in [(1e-4, 1e-4), (1e-3, 1e-1)] {
-        // Depths that differ by a few gamma: else the nearest face would win wherever it is, and only their blur radius prevents that.
+        // Depths that differ by a few gamma: else the nearest face would dominate, up to PyTorch3D's blur radius.
         let depth = |face: usize| 1.3 + 2.0 * gamma * (2.1 * face as f64).sin();
         for (k, z) in vertices.iter_mut().skip(2).step_by(3).enumerate() {
             *z = depth(k / 3);
@@ -478,7 +478,7 @@ fn the_blend_is_that_of_soft_ras_and_pytorch3d_where_theirs_has_no_floor() {
             .with_tolerance(1e-6);
         let colours: Vec<f64> = (0..count).map(|k| 0.5 + 0.5 * (1.9 * k as f64).cos()).collect();
         let corners: Vec<[f64; 3]> = vertices.as_chunks().0.to_vec();
-        // A face at the near plane weighs 1 here, exp(1 / gamma) there.
+        // A face at the near plane has weight 1 here, exp(1 / gamma) there.
         let found = flat_faces::<B>(&renderer, &corners, &colours, (1e-10 - 1.0) / gamma);
         let scene = Scene { faces: &faces, size: 16.into() };
         let attributes = Attributes::of_faces(tensor::<B, 3>(&colours, [1, count, 1]));
@@ -501,7 +501,7 @@ fn the_blend_is_that_of_soft_ras_and_pytorch3d_where_theirs_has_no_floor() {
             };
             let of_faces: Vec<_> = distances.iter().enumerate().map(of_face).collect();
             let (colour, share) = softmax_blend(&of_faces, sigma, gamma, 0.0);
-            // Where their floor decides, no face counts for more than 1e-4.
+            // Where PyTorch3D's floor dominates, no face has a weight above 1e-4.
             if share < 1.0 - 1e-6 && gamma < 1e-3 {
                 continue;
             }
@@ -546,7 +546,7 @@ fn narrow_softnesses_give_the_hard_image() {
     for (pixel, found) in found[..size * size].iter().enumerate() {
         let place = |index: usize| (2.0 * index as f64 + 1.0) / size as f64 - 1.0;
         let (px, py) = (place(pixel % size), -place(pixel / size));
-        // Nearest of the faces that cover the pixel, by 1/z, which is linear on the screen.
+        // The nearest of the faces that cover the pixel, by 1/z, which is linear on the screen.
         let depth = |face: usize| {
             let k = [3 * face, 3 * face + 1, 3 * face + 2];
             let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
@@ -585,7 +585,7 @@ fn permuting_the_faces_changes_nothing_above_rounding() {
     }
 }
 
-/// The largest errors of the op at tolerances, against the reference, which knows none.
+/// The largest errors of the op at some tolerances, relative to the reference, which has none.
 fn errors_at<const N: usize>(case: &mut Case, tolerances: [f64; N]) -> [f64; N] {
     let exact = numbers(case.image(case.inputs::<B>(), false));
     tolerances.map(|tolerance| {

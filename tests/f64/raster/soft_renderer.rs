@@ -1,4 +1,4 @@
-//! Support and knots follow the parameters: the promised error holds whatever happens to them.
+//! Support and knots adapt to the parameters: the stated error bound holds after any change.
 
 use softrast_raster::{
     Projected, SoftRenderer, TConorm, hard_coverage, low_level::Rasterizer, reference,
@@ -18,7 +18,7 @@ fn shaped(vertices: &[f64]) -> Tensor<B, 3> {
     vector::<B>(vertices).reshape([1, vertices.len() as i64 / 3, 3])
 }
 
-/// By how much the renderer's image differs from that of every pixel-face pair, and the error that it states.
+/// The largest difference of the renderer's image to that of every pixel-face pair, and the stated error.
 fn off(
     renderer: &SoftRenderer<EdgeSoftness>,
     (vertices, faces): (&[f64], &[[u32; 3]]),
@@ -41,7 +41,7 @@ fn renderer(softness: EdgeSoftness, faces: &[[u32; 3]], scale: f64) -> SoftRende
 
 #[test]
 fn no_pixel_is_off_by_more_than_the_tolerance_where_a_face_covers_before_its_edge() {
-    // The law begins outside, so that the optical depth has a pole there, away from the edge and from the end of the support.
+    // The law starts outside, so the optical depth has a pole there, away from the edge and from the end of the support.
     let softness = EdgeSoftness::squared(Family::Exp);
     let (vertices, faces) = triangles(553, 20);
     let scale = |width: f64| 10f64.powf(2.0 * width);
@@ -198,7 +198,7 @@ fn other_faces_are_drawn_as_a_renderer_of_their_own_does_and_keep_the_knots() {
         renderer.prepared::<B>(renderer.phi()).profile().support()
     };
     assert_eq!(support(&few), support(&all), "knots for forty faces serve thirteen");
-    // Twenty times as many need a wider support, and the tolerance holds.
+    // Twenty times as many faces need a wider support, and the tolerance holds.
     let many: Vec<[u32; 3]> = faces.iter().cycle().take(20 * faces.len()).copied().collect();
     let more = all.with_faces(many.clone());
     let known = drawn(&renderer(softness, &many, 0.02));

@@ -1,4 +1,4 @@
-//! Culling keeps its bound, and nothing depends on the order of faces.
+//! Culling satisfies its bound, and results do not depend on the order of faces.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ type B = NdArray<f64>;
 
 const SIZE: usize = 16;
 
-/// The silhouette through the fused op and over every pair, and the error that the profile states.
+/// The silhouette by the fused op and over every pair, and the stated error of the profile.
 fn images(
     (vertices, faces): &(Vec<f64>, Arc<[[u32; 3]]>),
     softness: EdgeSoftness,
@@ -31,7 +31,7 @@ fn images(
     (numbers(culled), numbers(t_conorm.coverage(sums)), silhouette.profile().error())
 }
 
-/// Asserts that no image of a case is off by more than the renderer states.
+/// Asserts that no image of a case has an error above the renderer's stated one.
 fn assert_kept(case: &ToleranceCase) {
     for deviation in case.deviations() {
         assert!(deviation.is_kept(), "{deviation:?} of {case:?}");
@@ -66,7 +66,7 @@ fn the_tolerance_itself_is_kept_by_every_family_at_the_default() {
                 let Some(shift) = phi.last_mut().filter(|_| softness.parameters() == 2) else {
                     continue;
                 };
-                // The law of one half line begins away from the edge.
+                // The law of one half line starts away from the edge.
                 *shift -= 7.0;
                 renderer.set_phi(phi);
                 let stated = renderer.error_bound::<B>();

@@ -1,4 +1,4 @@
-//! 2D SHAPE in colour: derivatives of the loss against central differences, and a short solve.
+//! 2D SHAPE in colour: derivatives of the loss compared with central differences, and a short solve.
 
 use shape2d::{
     Args,
@@ -21,7 +21,7 @@ const TRIANGLES: usize = 7;
 const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const SCALE: f64 = 0.08;
 
-/// The loss of a few triangles against the landscape.
+/// The loss of a few triangles relative to the landscape.
 struct Small;
 
 fn picture() -> Colours {
@@ -39,7 +39,7 @@ impl<B: RasterBackend> Objective<B> for Small {
     }
 }
 
-/// Corners, colours and depths, all away from where the start has them: there neighbours share edges.
+/// Corners, colours and depths away from the start, where neighbours share edges.
 fn theta() -> Vec<f64> {
     let start = numbers(Scene::<B>::new(&picture(), &start()).start());
     start.iter().enumerate().map(|(k, x)| x + 0.05 * (1.7 * k as f64).sin()).collect()

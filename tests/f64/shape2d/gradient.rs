@@ -1,4 +1,4 @@
-//! Derivatives of the loss against central differences, in f64.
+//! Derivatives of the loss compared with central differences, in f64.
 
 use shape2d::{Instance, Logo, Scene};
 use softrast_cli::Variant;
@@ -19,7 +19,7 @@ const SIZE: usize = 16;
 const TRIANGLES: usize = 12;
 const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const SCALE: f64 = 0.08;
-/// The whole loss of a few triangles against the letters.
+/// The whole loss of a few triangles relative to the letters.
 struct Small {
     silhouette: Silhouette<EdgeSoftness>,
 }

@@ -1,4 +1,4 @@
-//! Derivatives of the loss against central differences, in f64.
+//! Derivatives of the loss compared with central differences, in f64.
 
 use shape3d::{Instance, Scene};
 use softrast_mesh::{airplane, icosphere};
@@ -18,7 +18,7 @@ type B = NdArray<f64>;
 const SIZE: usize = 12;
 const SOFTNESS: EdgeSoftness = EdgeSoftness::new(Family::Logistic);
 const SCALE: f64 = 0.05;
-/// The whole loss of a small sphere against the airplane.
+/// The whole loss of a small sphere relative to the airplane.
 struct Small {
     silhouette: Silhouette<EdgeSoftness>,
 }
@@ -41,7 +41,7 @@ impl<B: RasterBackend> Objective<B> for Small {
     }
 }
 
-/// Somewhere that is no symmetric place: `[3 * 12 + 3]`.
+/// Parameters without symmetry: `[3 * 12 + 3]`.
 fn theta() -> Vec<f64> {
     (0..39).map(|k| 0.3 * (1.7 * f64::from(k)).sin()).collect()
 }

@@ -1,4 +1,4 @@
-//! The network that sees depths.
+//! The network of the depth softness.
 
 use softrast_softness::{DepthSoftness, OPAQUE, initial_mlp};
 use softrast_tensor::{Autodiff, NdArray};
@@ -21,7 +21,7 @@ fn positive_weights_make_a_straight_line_through_zero() {
     }
 }
 
-/// Eq. 3, one number at a time.
+/// Eq. 3, in scalars.
 fn network(weights: &[f64], z: f64) -> f64 {
     let relu = |x: f64| x.max(0.0);
     let product = |from: usize, h: [f64; 4]| -> [f64; 4] {

@@ -1,4 +1,4 @@
-//! How much a face counts by its depth.
+//! Depth softness.
 
 use softrast_softness::{DepthSoftness, Family, OPAQUE, initial_mlp};
 use softrast_tensor::NdArray;

@@ -1,4 +1,4 @@
-//! Every family against differences of itself, in f64.
+//! Every family compared with differences of itself, in f64.
 
 use softrast_softness::{EdgeSoftness, Family, OPAQUE, Softness};
 use softrast_tensor::{Autodiff, Backend, NdArray, Tensor};
@@ -21,7 +21,7 @@ const DISTANCES: [f64; 18] = [
     3.1, 5.9, 12.1, 24.3,
 ];
 
-/// Families, as they are and of the squared distance, with φ moved away from its defaults.
+/// Families, for the distance and the squared distance, with φ away from its defaults.
 fn cases() -> Vec<(EdgeSoftness, Vec<f64>)> {
     let families = Family::ALL
         .into_iter()
@@ -159,14 +159,14 @@ fn automatic_derivatives_are_right_at_the_edge_itself() {
     }
 }
 
-/// The gradient of `Σ curve` to φ.
+/// The gradient of `Σ curve` with respect to φ.
 fn gradient(curve: Curve, softness: EdgeSoftness, phi: &[f64], x: &[f64]) -> Vec<f64> {
     let at = vector::<First>(phi).require_grad();
     let grads = curve.of(softness, at.clone(), vector(x)).sum().backward();
     numbers(at.grad(&grads).expect("φ has a gradient"))
 }
 
-/// `f` differenced along entry `k` of `phi`.
+/// Central difference of `f` along entry `k` of `phi`.
 fn along(phi: &[f64], k: usize, f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
     let [high, low] = [STEP, -STEP].map(|step| {
         let mut phi = phi.to_vec();
@@ -191,7 +191,7 @@ fn gradients_to_phi_match_central_differences() {
     }
 }
 
-/// `∂/∂x` of every point, and of its sum the gradients to φ and to x.
+/// `∂/∂x` of every point, and the gradients of its sum with respect to φ and to x.
 fn second_order(
     curve: Curve,
     softness: EdgeSoftness,

@@ -1,4 +1,4 @@
-//! Gamma against the incomplete gamma function with 250 digits, and at its edge.
+//! Gamma compared with the incomplete gamma function with 250 digits, and at its edge.
 
 use softrast_softness::{Family, Softness};
 
@@ -40,7 +40,7 @@ fn gamma_density_stops_growing_at_the_edge() {
     assert_eq!(density[4], 0.0);
 }
 
-/// Shape p, distance y, P(p, y), Q(p, y); made with mpmath.
+/// Shape p, distance y, P(p, y), Q(p, y); computed with mpmath.
 #[rustfmt::skip]
 const INCOMPLETE_GAMMA: [(f64, f64, f64, f64); 36] = [
     (0.1, 0.001, 0.5267685683924451, 0.4732314316075549),

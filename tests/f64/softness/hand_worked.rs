@@ -1,10 +1,10 @@
-//! Every family against values worked out by hand.
+//! Every family compared with values computed by hand.
 
 use softrast_softness::{EdgeSoftness, Family, Softness};
 
 use super::{assert_relative, numbers, vector};
 
-/// Family, distance in scales, value worked out by hand.
+/// Family, distance in scales, value computed by hand.
 fn hand_worked() -> Vec<(Family, f64, f64)> {
     use std::f64::consts::{E, LN_2};
     vec![

@@ -59,7 +59,7 @@ fn a_mirrored_family_is_the_family_of_the_mirrored_law() {
 
 #[test]
 fn what_is_provided_is_the_logarithm_and_its_slope() {
-    // Where the value is far above what the provided logarithm is held at.
+    // Where the value is far above the floor of the provided logarithm.
     let x = [-0.2, -0.05, 0.0, 0.03, 0.2];
     for family in [Family::Logistic, Family::Gauss, Family::Cauchy] {
         let phi = vector::<B>(&family.default_phi(0.1));

@@ -1,10 +1,10 @@
-//! The network of the paper against its formula, and what its weights make of it.
+//! The network of the paper compared with its formula, for several weights.
 
 use softrast_softness::{Softness, families::Mlp, initial_mlp};
 
 use super::{assert_relative, numbers, vector};
 
-/// Eq. 2, one number at a time.
+/// Eq. 2, in scalars.
 fn mlp_logit(weights: &[f64], x: f64) -> f64 {
     let product = |from: usize, h: [f64; 4]| -> [f64; 4] {
         std::array::from_fn(|row| (0..4).map(|k| weights[from + 4 * row + k] * h[k]).sum())

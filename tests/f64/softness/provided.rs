@@ -1,4 +1,4 @@
-//! What a softness with one method gets: density, optical depth and hazard from its value alone.
+//! Provided methods of a softness: density, optical depth and hazard from its value.
 
 use softrast_raster::low_level::Rasterizer;
 use softrast_softness::{Family, OPAQUE, Softness};
@@ -15,7 +15,7 @@ const SCALE: f64 = 0.3;
 /// Distances in scales, clear of kinks, where 1 - s has digits.
 const DISTANCES: [f64; 8] = [-0.93, -0.7, -0.41, -0.09, 0.087, 0.43, 0.71, 0.95];
 
-/// A family of which nothing is known but its value and the number of its parameters.
+/// A family with nothing but its value and the number of its parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct ValueOf(pub(crate) Family);
 
@@ -50,7 +50,7 @@ impl Curve {
     }
 }
 
-/// A curve; the gradients of its weighted sum to φ and to x; and those of a weighted sum of these.
+/// A curve; the gradients of its weighted sum with respect to φ and to x; and those of a weighted sum of these.
 fn derivatives(curve: Curve, softness: &impl Softness, phi: &[f64]) -> [Vec<f64>; 5] {
     let weights = |count: usize| -> Vec<f64> { (1..=count).map(|k| (k as f64).sin()).collect() };
     let inner = [vector::<First>(phi), vector(&DISTANCES.map(|u| u * SCALE))];
@@ -72,7 +72,7 @@ fn assert_same(curve: Curve, family: Family) {
     let phi = family.default_phi(SCALE);
     let provided = derivatives(curve, &ValueOf(family), &phi);
     let own = derivatives(curve, &family, &phi);
-    // The second derivative of the series that was fitted to the error function has fewer digits.
+    // The second derivative of the fitted series of the error function has fewer digits.
     let tolerance = if family == Family::Gauss { 1e-6 } else { 1e-11 };
     let parts = ["value", "to φ", "to x", "to φ, second order", "to x, second order"];
     for ((found, expected), part) in provided.iter().zip(&own).zip(parts) {
@@ -88,7 +88,7 @@ fn assert_same(curve: Curve, family: Family) {
 #[test]
 fn the_density_of_a_value_alone_is_the_one_by_formula_to_second_order() {
     for family in Family::ALL {
-        // A law that has not begun leaves zeros, and a straight line has no curvature to track.
+        // Before its start a law is all zeros, and a straight line has no curvature to track.
         if family != Family::Uniform {
             assert_same(Curve::Density, family);
         }
@@ -97,7 +97,7 @@ fn the_density_of_a_value_alone_is_the_one_by_formula_to_second_order() {
 
 #[test]
 fn the_hazard_of_a_value_alone_is_the_one_by_formula_to_second_order() {
-    // Those whose optical depth is bounded in their own formula too.
+    // Families whose own optical depth is bounded too.
     for family in [Family::CubicHermite, Family::Wigner, Family::Gamma, Family::Levy, Family::Exp] {
         assert_same(Curve::Depth, family);
         assert_same(Curve::Hazard, family);
@@ -129,7 +129,7 @@ fn the_first_parameter_of_a_value_alone_is_the_logarithm_of_its_scale() {
     assert_eq!(numbers(found), wide);
 }
 
-/// An image, and the gradients of a weighted sum of its pixels to φ and to the corners.
+/// An image, and the gradients of a weighted sum of its pixels with respect to φ and to the corners.
 fn drawn(softness: impl Softness) -> [Vec<f64>; 3] {
     const SIZE: usize = 16;
     let corners = [-0.6, -0.5, 1.0, 0.7, -0.4, 1.0, 0.1, 0.6, 1.0];
@@ -149,13 +149,13 @@ fn a_value_alone_is_rasterized_as_the_family_is() {
     for (found, expected) in found.iter().zip(&expected) {
         let size = expected.iter().fold(0.0_f64, |size, e| size.max(e.abs()));
         for (f, e) in found.iter().zip(expected) {
-            // Twice the error that the rasterizer allows itself.
+            // Twice the default tolerance of the rasterizer.
             assert!((f - e).abs() <= 2.0 * Rasterizer::TOLERANCE * size, "{f}, not {e}");
         }
     }
 }
 
-/// Half of everything, wherever the edge is.
+/// One half everywhere.
 #[derive(Clone, Debug)]
 struct Flat;
 

@@ -1,4 +1,4 @@
-//! Every family against references with 250 digits, far into its tails.
+//! Every family compared with references with 250 digits, far into its tails.
 
 use softrast_softness::{Family, Softness};
 
@@ -20,7 +20,7 @@ fn values_and_optical_depths_keep_their_digits_in_the_tails() {
     }
 }
 
-/// Family, distance in scales, value, optical depth; made with mpmath.
+/// Family, distance in scales, value, optical depth; computed with mpmath.
 #[rustfmt::skip]
 const REFERENCES: &[(Family, f64, f64, f64)] = &[
     (Family::Logistic, -30.0, 9.357622968839299e-14, 9.357622968839737e-14),

@@ -1,8 +1,7 @@
-//! No file imports another in a circle, and burn is imported in one place.
+//! No cyclic imports between files, and burn is imported in one place.
 //!
-//! A file imports another where it names something that the other defines, by `use` or by a path. A re-export is followed to the file that
-//! defines the item, so a module that only gathers names ties nothing together. Modules of tests do not count, nor do types that are never
-//! named.
+//! A file imports another if it refers to an item of the other, by `use` or by a path. A re-export is resolved to the file that defines the
+//! item, so a module that only re-exports creates no dependency. Test modules are excluded, and so are types that are never named.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -31,7 +30,7 @@ fn no_file_imports_another_in_a_circle() {
     assert!(circles.is_empty(), "{} circles of imports:\n{}", circles.len(), circles.join("\n"));
 }
 
-/// Another release of burn, or tensors of our own, are then a change of `crates/tensor`.
+/// Another release of burn, or other tensors, then only require a change of `crates/tensor`.
 #[test]
 fn only_the_tensor_crate_depends_on_burn() {
     let manifests = files(root(), "toml").into_iter().filter(|path| path.ends_with("Cargo.toml"));
@@ -46,7 +45,7 @@ fn only_the_tensor_crate_depends_on_burn() {
     assert_eq!(depend, ["bindings/burn/Cargo.toml", "crates/tensor/Cargo.toml"]);
 }
 
-/// The folders in which a crate begins: those with a `lib.rs`, or with a `main.rs` alone.
+/// The root folders of crates: those with a `lib.rs`, or with only a `main.rs`.
 fn sources() -> Vec<PathBuf> {
     let roots = files(root(), "rs").into_iter().filter(|path| {
         let name = path.file_name().unwrap();
@@ -55,7 +54,7 @@ fn sources() -> Vec<PathBuf> {
     roots.collect()
 }
 
-/// One line for each set of files that import each other, with what ties them.
+/// One line per set of files that import each other, with the names that link them.
 fn circles_of(links: &Links) -> Vec<String> {
     let mut next: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
     for (from, to) in links.keys() {
@@ -83,7 +82,7 @@ fn circles_of(links: &Links) -> Vec<String> {
     circles
 }
 
-/// All files that a file imports, those that these import, and so on.
+/// All files that a file imports, directly or indirectly.
 fn reached<'a>(
     file: &'a Path,
     next: &BTreeMap<&'a Path, BTreeSet<&'a Path>>,
@@ -99,7 +98,7 @@ fn reached<'a>(
     found
 }
 
-/// A crate of these files in a folder of its own; the circles in it.
+/// Creates a crate of these files in a new folder; returns its cycles.
 fn circles_in(written: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in written {

@@ -1,4 +1,4 @@
-//! Links of the documents lead somewhere, and sections that code cites exist.
+//! Links of the documents are valid, and sections cited in code exist.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -12,7 +12,7 @@ use std::{
 
 use repository::{files, root, shown};
 
-/// Where files of the repository are read on the web.
+/// Base addresses of repository files on the web.
 const ON_THE_WEB: [&str; 2] = [
     "https://github.com/softrast/softrast/blob/main/",
     "https://github.com/softrast/softrast/tree/main/",
@@ -57,7 +57,7 @@ fn every_section_of_the_notes_that_is_cited_exists() {
     assert!(wrong.is_empty(), "no such section of docs/notes.md:\n{}", wrong.join("\n"));
 }
 
-/// Why a link on a page leads nowhere, if it does not.
+/// The reason why a link on a page is invalid, if it is.
 fn fault(page: &Path, link: &str) -> Option<String> {
     let on_the_web = ON_THE_WEB.iter().find_map(|start| link.strip_prefix(start));
     let is_elsewhere = ["http:", "https:", "mailto:", "data:"].iter().any(|x| link.starts_with(x));
@@ -79,7 +79,7 @@ fn fault(page: &Path, link: &str) -> Option<String> {
     (!anchors(&text).contains(anchor)).then(|| "there is no such heading".to_owned())
 }
 
-/// The lines of a page outside of blocks of code, and in them only what is outside of pieces of code.
+/// The lines of a page outside of code blocks, without inline code.
 fn prose(text: &str) -> String {
     let mut fenced = false;
     let mut prose = String::new();
@@ -106,11 +106,11 @@ fn links(text: &str) -> Vec<String> {
     found.extend(prose.lines().filter_map(|line| {
         line.strip_prefix('[').filter(|line| !line.starts_with('^'))?.split_once("]: ").map(|x| x.1)
     }));
-    // A title may stand behind the target.
+    // A title may follow the target.
     found.iter().map(|link| link.split_whitespace().next().unwrap_or_default().to_owned()).collect()
 }
 
-/// The titles of the headings of a page, as they read.
+/// The titles of the headings of a page, as rendered.
 fn headings(text: &str) -> Vec<String> {
     let mut fenced = false;
     let mut found = Vec::new();
@@ -127,7 +127,7 @@ fn headings(text: &str) -> Vec<String> {
     found
 }
 
-/// A title without the marks of links, code and emphasis.
+/// A title without the markup of links, code and emphasis.
 fn as_read(title: &str) -> String {
     let mut read = String::new();
     let mut rest = title;
@@ -141,7 +141,7 @@ fn as_read(title: &str) -> String {
     read.replace(['`', '*'], "")
 }
 
-/// Anchors that GitHub gives to the headings of a page, and those that the page sets.
+/// Anchors that GitHub assigns to the headings of a page, and explicit ones.
 fn anchors(text: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
@@ -160,7 +160,7 @@ fn anchors(text: &str) -> BTreeSet<String> {
     found
 }
 
-/// The section named after each `docs/notes.md, `, in one line.
+/// The section cited after each `docs/notes.md, `, in one line.
 fn citations(text: &str) -> Vec<String> {
     let lines = text.lines().map(|line| line.trim().trim_start_matches(['/', '!', '#']).trim());
     let text = lines.collect::<Vec<_>>().join(" ");
@@ -169,7 +169,7 @@ fn citations(text: &str) -> Vec<String> {
     found.map(|rest| rest.chars().take(60).collect()).collect()
 }
 
-/// Whether a text begins with a name, and with all of its last word.
+/// Whether a text starts with a name that ends at a word boundary.
 fn begins_with_name(text: &str, name: &str) -> bool {
     text.strip_prefix(name).is_some_and(|rest| !rest.starts_with(char::is_alphanumeric))
 }

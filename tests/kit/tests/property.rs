@@ -1,4 +1,4 @@
-//! Property tests draw the same cases in every run, and replay those that have failed.
+//! Property tests draw the same cases in every run, and replay failed ones.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -10,7 +10,7 @@ pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().parent().unwrap()
 }
 
-/// All files below a folder with this extension, in order; without what is built, downloaded, hidden or lent.
+/// All files below a folder with this extension, in order; except built, downloaded, hidden or shared ones.
 pub(crate) fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     const NOT_OURS: [&str; 5] = ["target", "node_modules", "out", "shared", "pkg"];
     let mut found = Vec::new();
@@ -30,7 +30,7 @@ pub(crate) fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
     found
 }
 
-/// A path as it reads from the repository's folder.
+/// A path relative to the repository.
 pub(crate) fn shown(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).display().to_string()
 }

@@ -1,4 +1,4 @@
-//! The modules of a crate, and which of its files name what others define.
+//! The modules of a crate, and references between its files.
 
 mod words;
 
@@ -10,7 +10,7 @@ use std::{
 
 use words::words;
 
-/// From a file to another, the names that tie them.
+/// The names that link each pair of files, by the referring file and the defining one.
 pub(crate) type Links = BTreeMap<(PathBuf, PathBuf), BTreeSet<String>>;
 
 /// Names of modules from the root of the crate.
@@ -25,10 +25,10 @@ pub(crate) struct Crate {
 #[derive(Default)]
 struct Contents {
     file: PathBuf,
-    /// Imports by the name that they get here.
+    /// Imports by their local names.
     imports: BTreeMap<String, Import>,
     globs: Vec<Import>,
-    /// Names that are defined here.
+    /// Names of the items defined here.
     items: BTreeSet<String>,
     /// Paths outside of imports.
     paths: BTreeSet<Vec<String>>,
@@ -56,7 +56,7 @@ impl Crate {
         found
     }
 
-    /// Adds a file as a module whose children lie in `folder`.
+    /// Adds a file as a module whose children are in `folder`.
     fn add(&mut self, file: &Path, folder: &Path, module: Module) {
         let text = fs::read_to_string(file).unwrap();
         Reader { found: self, file, words: words(&text), at: 0 }.read(&module);
@@ -79,7 +79,7 @@ impl Crate {
         }
     }
 
-    /// Which files name what others define.
+    /// References between files.
     pub(crate) fn links(&self) -> Links {
         let mut links = Links::new();
         let mut link = |from: &Path, found: Option<Found>| {
@@ -93,7 +93,7 @@ impl Crate {
         for (module, contents) in &self.modules {
             let from = &contents.file;
             for (name, import) in &contents.imports {
-                // A name that is only passed on ties nothing here.
+                // A name that is only re-exported creates no link here.
                 if !import.is_public || contents.used.contains(name) {
                     link(from, self.find(module, &import.path));
                 }
@@ -132,7 +132,7 @@ impl Crate {
             (rest, is_own) = (more, true);
         }
         let Some(first) = rest.first() else { return Some(Found::Module(at)) };
-        // Something else is of another crate, or defined in this very module.
+        // Otherwise the path is in another crate, or starts in this module.
         let is_child = |at: &Module, name: &String| {
             let child = [&at[..], std::slice::from_ref(name)].concat();
             self.modules.contains_key(&child).then_some(child)
@@ -159,7 +159,7 @@ impl Crate {
         Some(Found::Module(at))
     }
 
-    /// The rest of a path behind a name.
+    /// Resolves the rest of a path after a name.
     fn inside(&self, found: Found, rest: &[String], depth: usize) -> Option<Found> {
         match found {
             Found::Module(module) if !rest.is_empty() => {
@@ -170,7 +170,7 @@ impl Crate {
         }
     }
 
-    /// What a name in a module stands for; if nothing there says so, it is taken for its own.
+    /// The target of a name in a module; `None` if the module neither defines nor imports it.
     fn item(&self, module: &[String], name: &str, depth: usize) -> Option<Found> {
         let contents = self.modules.get(module)?;
         if depth > 20 {
@@ -189,7 +189,7 @@ impl Crate {
     }
 }
 
-/// Reads the words of a file.
+/// Parser of the words of a file.
 struct Reader<'a> {
     found: &'a mut Crate,
     file: &'a Path,
@@ -240,7 +240,7 @@ impl Reader<'_> {
                 }
                 "macro_rules" => {
                     own.items.insert(self.word(2).to_owned());
-                    // A macro with an attribute of its own can be named from the root.
+                    // A macro with an attribute can be named from the root.
                     if !module.is_empty() {
                         let name = self.word(2).to_owned();
                         let path = [&["crate".to_owned()][..], module, std::slice::from_ref(&name)]
@@ -250,7 +250,7 @@ impl Reader<'_> {
                     }
                 }
                 word if DEFINE.contains(&word) && is_name(self.word(1)) && self.word(1) != "fn" => {
-                    // What is inside braces belongs to functions, types and implementations.
+                    // Definitions inside braces belong to functions, types and implementations.
                     let defines = braces == 0 && word != "mod";
                     own.items.extend(defines.then(|| self.word(1).to_owned()));
                 }
@@ -275,7 +275,7 @@ impl Reader<'_> {
         self.found.modules.insert(module.to_vec(), own);
     }
 
-    /// Reads a tree of imports, up to what ends it.
+    /// Reads a tree of imports, up to its end.
     fn import(&mut self, own: &mut Contents, prefix: Vec<String>, is_public: bool) {
         let mut path = prefix.clone();
         loop {
@@ -319,7 +319,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Whether an attribute stands here that keeps what follows for tests.
+    /// Whether an attribute `#[cfg(test)]` starts here.
     fn is_for_tests(&self) -> bool {
         ["[", "cfg", "(", "test", ")", "]"]
             .iter()
@@ -327,7 +327,7 @@ impl Reader<'_> {
             .all(|(k, word)| self.word(1 + k) == *word)
     }
 
-    /// Passes by an attribute and the item behind it.
+    /// Skips an attribute and the item after it.
     fn skip_item(&mut self) {
         let mut depth = 0;
         while self.at < self.words.len() {
@@ -335,7 +335,7 @@ impl Reader<'_> {
                 "{" => depth += 1,
                 "}" if depth == 1 => {
                     self.at += 1;
-                    // The list of a `use` ends behind its brace.
+                    // The list of a `use` ends after its brace.
                     if self.word(0) == ";" {
                         self.at += 1;
                     }

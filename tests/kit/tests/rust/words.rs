@@ -1,4 +1,4 @@
-/// The words and signs of a Rust text, without comments, texts and characters.
+/// The words and punctuation of a Rust text, without comments, strings and characters.
 pub(crate) fn words(text: &str) -> Vec<String> {
     let chars: Vec<char> = text.chars().collect();
     let at = |k: usize| chars.get(k).copied().unwrap_or('\0');
@@ -66,7 +66,7 @@ pub(crate) fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// Where the text of a raw string at `k` begins, and how many signs enclose it, if one is there.
+/// The start of the content of a raw string at `k`, and the number of signs that delimit it, if there is one.
 fn raw(chars: &[char], k: usize) -> Option<(usize, usize)> {
     let before = k.checked_sub(1).and_then(|k| chars.get(k));
     if before.is_some_and(|c| c.is_alphanumeric() || *c == '_') {
@@ -81,7 +81,7 @@ fn raw(chars: &[char], k: usize) -> Option<(usize, usize)> {
     (chars.get(quote) == Some(&'"')).then_some((quote + 1, hashes))
 }
 
-/// The place behind a text that begins at `k`.
+/// The position after a string that starts at `k`.
 fn behind(chars: &[char], k: usize, quote: char) -> usize {
     let mut k = k + 1;
     while k < chars.len() && chars[k] != quote {
