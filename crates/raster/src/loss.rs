@@ -7,7 +7,7 @@ use crate::{
     ops::ElementaryOp,
 };
 
-/// Soft IoU loss `1 - |p ∩ t| / |p ∪ t|` of each view: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
+/// Soft intersection over union loss `1 - |p ∩ t| / |p ∪ t|` of each view: `1 - Σ p t / (Σ (p + t - p t) + 1e-6)`.
 ///
 /// `image` and `target` are `[views, height, width]` in [0, 1]; the result is `[views]`. The loss of an empty image or target is 1, also if
 /// both are empty: such a target cannot be matched. Either of them may be `[1, height, width]`, for all views.
