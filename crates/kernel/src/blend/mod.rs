@@ -46,7 +46,7 @@ use super::{
 /// Data shared by passes over the same inputs.
 pub struct Kept<F> {
     reached: Reached,
-    /// Sums of each band of each view, set by the first pass that draws an image; empty if no later pass needs them.
+    /// Sums of each band of each view, set by the first pass without tangents; empty if they are not cached.
     sums: Vec<OnceLock<BandSums<F>>>,
 }
 

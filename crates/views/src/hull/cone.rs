@@ -6,7 +6,7 @@ use crate::{View, coloured_pixels, cut_sides};
 
 /// Side length in cells of the sampled square of each mask.
 const SIDE: usize = 128;
-/// Largest distance in cells of uncovered white cells from a silhouette: outlines of photographs have such errors.
+/// Distance in cells from a silhouette up to which uncovered white cells are tolerated: outlines of photographs have such errors.
 const TOLERATED: f64 = 1.5;
 
 /// The viewing cone of a mask.
