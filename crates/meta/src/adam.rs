@@ -3,7 +3,7 @@ use softrast_tensor::{Backend, Tensor};
 
 use crate::Optimizer;
 
-/// Adam whose step has a derivative everywhere, also where the gradient is zero.
+/// Adam with a step that is differentiable everywhere, including where the gradient is zero.
 ///
 /// With `m` and `v` the running means of the gradient and of its square, both corrected for their
 /// start at zero, a step is `θ - learning_rate · m / (sqrt(v + epsilon_root) + epsilon)`.
@@ -30,7 +30,7 @@ pub struct Adam {
     pub epsilon_root: f64,
 }
 
-/// What [`Adam`] remembers between steps.
+/// State of [`Adam`] between steps.
 #[derive(Clone, Debug)]
 pub struct AdamState<B: Backend, const D: usize> {
     /// Running mean of the gradient, not corrected.

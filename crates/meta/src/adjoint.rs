@@ -5,14 +5,14 @@ use crate::{
     inner_loop::{allowed, gradient_of},
 };
 
-/// Derivatives of the outer loss by the scene and by the optimiser's state after some step.
+/// Derivatives of the outer loss with respect to the scene and the optimiser's state after some step.
 pub(crate) struct Adjoint<B: Backend> {
     pub(crate) theta: Tensor<B, 1>,
     /// In the order of [`Optimizer::tensors`].
     pub(crate) state: Vec<Tensor<B, 1>>,
 }
 
-/// What stood before a step.
+/// State before a step.
 pub(crate) struct Stored<B: Backend> {
     pub(crate) step: usize,
     pub(crate) theta: Tensor<B, 1>,
@@ -24,15 +24,15 @@ impl<B: Backend> Adjoint<B> {
         norm(&numbers(self.theta.clone()))
     }
 
-    /// The adjoints of scene and state have to shrink alike: they are one vector of a linear map.
+    /// Scales the adjoints of scene and state alike: they form one vector of a linear map.
     pub(crate) fn scale(self, factor: f64) -> Self {
         let state = self.state.into_iter().map(|x| x * factor).collect();
         Self { theta: self.theta * factor, state }
     }
 
-    /// The adjoint before the stored step, and the derivative by what was `prepared` for it.
+    /// The adjoint before the stored step, and the derivative with respect to `prepared`.
     ///
-    /// Only the tape of this one step exists, and is gone afterwards.
+    /// Only the tape of this one step exists, and it is freed on return.
     pub(crate) fn back<P, O>(
         self,
         objective: &P,

@@ -7,11 +7,11 @@ use crate::{
     objective::loss_under,
 };
 
-/// The outer loss after an inner loop that moves the softness along with the scene, down the same
-/// loss, and how far `phi` `[P]` was left behind.
+/// The outer loss after an inner loop that optimises the softness jointly with the scene on the
+/// inner loss, and `phi` `[P]` minus the final softness.
 ///
-/// No meta-learning at all, and what the released pose code does: the baseline that meta-learning
-/// has to beat. Source: docs/notes.md, Joint softness.
+/// The baseline without meta-learning, as in the released pose code. Source: docs/notes.md, Joint
+/// softness.
 pub(crate) fn alternating_descent<B, P, R, O>(
     problem: &BilevelProblem<B, P, R, O>,
     phi: &Tensor<B, 1>,
@@ -24,7 +24,7 @@ where
     O: Optimizer,
 {
     let BilevelProblem { objective, inner, start, .. } = problem;
-    // On the level of the way back, as other inner loops.
+    // At the autodiff level of the backward pass, as in other inner loops.
     let [start, mut end] = [start, phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()));
     let adam = Adam::new(learning_rate);
     let mut state = adam.init(&end);

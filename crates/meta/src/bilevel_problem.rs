@@ -8,19 +8,19 @@ use crate::{
     objective::loss_under,
 };
 
-/// One instance of a task, to learn a softness on: what is optimised, and how the result is judged.
+/// One instance of a task to learn a softness on: the inner problem and its outer loss.
 #[derive(Clone, Debug)]
 pub struct BilevelProblem<B: Backend, P, R, O> {
-    /// What the inner loop minimises, under the softness that is learned; on the level of autodiff that second derivatives need.
+    /// The inner loss, under the learned softness; on the level of autodiff that second derivatives need.
     pub objective: P,
     /// The outer loss. It should not depend on φ, or a wide softness looks better than it is
-    /// (docs/notes.md, Outer loss); the paper takes the objective itself.
+    /// (docs/notes.md, Outer loss); the paper uses the objective itself.
     pub outer_loss: R,
-    /// How the inner loop steps, and how often.
+    /// Optimiser and number of steps of the inner loop.
     pub inner: InnerLoop<O>,
-    /// Where it starts, `[N]`.
+    /// Start of the inner loop, `[N]`.
     pub start: Tensor<B, 1>,
-    /// When the outer loss is taken.
+    /// Steps after which the outer loss is evaluated.
     pub outer_steps: OuterSteps,
 }
 
@@ -31,7 +31,7 @@ where
     R: Objective<Autodiff<B>>,
     O: Optimizer,
 {
-    /// The outer loss that the inner loop under `phi` `[P]` comes to.
+    /// The outer loss of the inner loop under `phi` `[P]`.
     pub fn loss(&self, phi: &Tensor<B, 1>) -> f64 {
         let at = self.outer_steps.at(self.inner.steps);
         let mut total = 0.0;
@@ -51,8 +51,8 @@ where
 }
 
 impl<B: Backend, P: Objective<Autodiff<Autodiff<B>>>, R, O: Optimizer> BilevelProblem<B, P, R, O> {
-    /// Runs the inner loop, showing the scene and the optimiser's state before the first step and
-    /// after each.
+    /// Runs the inner loop and passes `see` the scene and the optimiser's state before the first
+    /// step and after each.
     pub(crate) fn walk(
         &self,
         phi: &Tensor<B, 1>,
@@ -60,7 +60,7 @@ impl<B: Backend, P: Objective<Autodiff<Autodiff<B>>>, R, O: Optimizer> BilevelPr
     ) {
         let gradient = |step: usize, theta: &Tensor<B, 1>| {
             let [at, phi] = [theta, phi].map(|x| Tensor::<Autodiff<B>, 1>::from_inner(x.clone()));
-            // On the level of the way back: what the objective detaches, it detaches there.
+            // At the autodiff level of the backward pass, so that `detach` in the objective acts on that level.
             Ok(gradient(&self.objective, at, phi, step).inner())
         };
         let allowed = |theta| allowed(&self.objective, Tensor::from_inner(theta)).inner();

@@ -7,8 +7,8 @@ use crate::MetaEstimate;
 
 /// The mean of `(L(φ + σ ε) - L(φ - σ ε)) / 2σ · ε` over `pairs` normal ε drawn from `seed`.
 ///
-/// `run` gives the loss of a whole run. Both runs of a pair solve the same instance, so that what they have in common
-/// cancels.
+/// `run` gives the outer loss of a whole run. Both runs of a pair solve the same instance, so that
+/// their common noise cancels.
 ///
 /// Source: Salimans et al. 2017; docs/notes.md, Meta-gradients: clipping, for its quality here.
 pub(crate) fn evolution<B: Backend>(
@@ -35,7 +35,7 @@ pub(crate) fn evolution<B: Backend>(
     MetaEstimate::without_steps(loss, vector(&gradient))
 }
 
-/// A normal number, by Box and Muller.
+/// A standard normal number, by the Box-Muller transform.
 fn normal(random: &mut StdRng) -> f64 {
     // From (0, 1], where the logarithm is finite.
     let reach = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();

@@ -7,19 +7,18 @@ use crate::{Objective, Optimizer, objective::loss_under};
 /// A fixed number of steps of an optimiser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InnerLoop<O> {
-    /// How a step is taken.
+    /// The optimiser.
     pub optimizer: O,
-    /// How many are taken.
+    /// Number of steps.
     pub steps: usize,
 }
 
 impl<O: Optimizer> InnerLoop<O> {
-    /// The scene `[N]` that the optimiser reaches from `theta` `[N]` under the softness `phi` `[P]`.
+    /// Solves from `theta` `[N]` under the softness `phi` `[P]` and returns the final scene `[N]`.
     ///
-    /// On a plain backend this just solves. If `B` is itself an `Autodiff` backend, the result
-    /// depends on `theta` and `phi` through every step, second derivatives of the loss included:
-    /// the unrolled meta-gradient comes out of `backward()`. Its tape then holds all steps; detach
-    /// `phi` where that is not wanted.
+    /// If `B` is itself an `Autodiff` backend, the result is tracked with respect to `theta` and
+    /// `phi` through every step, second derivatives of the loss included: `backward()` gives the
+    /// unrolled meta-gradient. The tape then holds all steps; detach `phi` to avoid that.
     pub fn solve<B: Backend, P: Objective<Autodiff<B>>>(
         &self,
         objective: &P,
@@ -35,12 +34,12 @@ impl<O: Optimizer> InnerLoop<O> {
     }
 }
 
-/// Goes down the `gradient` that is found at each step, counted from 0, from `theta` `[N]` on: the scene at the end. `allowed` says where
-/// a step may end, and `see` is shown the scene and the optimiser's state before the first step and after each.
+/// Descends along `gradient` (called with the step, counted from 0) from `theta` `[N]` and returns the final scene. `allowed` projects the
+/// scene after each step, and `see` receives the scene and the optimiser's state before the first step and after each.
 ///
 /// # Errors
 ///
-/// That of `gradient`, which ends the descent.
+/// The error of `gradient`, which ends the descent.
 pub fn descend<B: Backend, O: Optimizer, E>(
     InnerLoop { optimizer, steps }: &InnerLoop<O>,
     mut theta: Tensor<B, 1>,
@@ -67,7 +66,7 @@ pub(crate) fn allowed<B: Backend, P: Objective<Autodiff<B>>>(
     objective.allowed(Tensor::from_inner(theta)).inner()
 }
 
-/// Gradient of the loss at inner step `step` to `theta` `[N]`; zero where it does not depend on it.
+/// Gradient of the loss at inner step `step` with respect to `theta` `[N]`; zero if independent of it.
 ///
 /// On an `Autodiff` backend the gradient is tracked in turn.
 pub(crate) fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
@@ -79,7 +78,7 @@ pub(crate) fn gradient<B: Backend, P: Objective<Autodiff<B>>>(
     gradient_of(&theta, |theta| loss_under(objective, theta, Tensor::from_inner(phi), step))
 }
 
-/// Gradient of a loss `[1]` to `theta` `[N]`.
+/// Gradient of a loss `[1]` with respect to `theta` `[N]`.
 pub(crate) fn gradient_of<B: Backend>(
     theta: &Tensor<B, 1>,
     loss: impl FnOnce(Tensor<Autodiff<B>, 1>) -> Tensor<Autodiff<B>, 1>,

@@ -1,10 +1,10 @@
-//! Optimisers that can be differentiated, inner loops, and learning through them, on burn.
+//! Differentiable optimisers, inner loops, and learning through them, on burn.
 //!
-//! A scene is one flat vector θ, a softness one flat vector φ. An [`Objective`] gives the loss of
-//! both, an [`InnerLoop`] solves for θ. A [`BilevelProblem`] adds an outer loss of the solution.
-//! [`MetaGradient`] is its derivative by φ, and an [`OuterLoop`] goes down it over the instances of a
-//! [`TaskDistribution`]. The same loop learns and evaluates: on a plain backend it just solves, on
-//! `Autodiff<B>` its result still depends on φ. Nothing here knows of rendering.
+//! A scene is one flat vector θ, a softness one flat vector φ. An [`Objective`] gives the loss of both, an
+//! [`InnerLoop`] solves for θ. A [`BilevelProblem`] adds an outer loss of the solution. [`MetaGradient`] is its
+//! derivative with respect to φ, and an [`OuterLoop`] descends along it over the instances of a [`TaskDistribution`].
+//! One inner loop serves learning and evaluation: on a plain backend it only solves, on `Autodiff<B>` its result
+//! depends on φ. This crate does not render.
 //!
 //! ```
 //! use softrast_tensor::{vector, Autodiff, Backend, NdArray, Tensor};
@@ -23,7 +23,7 @@
 //! let inner = InnerLoop { optimizer: Sgd { learning_rate: 0.25 }, steps: 4 };
 //! let theta = inner.solve(&Parabola, vector::<Outer>(&[0.0]), &phi);
 //! let by_phi = phi.grad(&theta.backward()).unwrap().into_scalar();
-//! // Each step halves what is left to φ.
+//! Each step halves the distance to φ.
 //! assert!((by_phi - (1.0 - 0.5_f32.powi(4))).abs() < 1e-6);
 //! ```
 

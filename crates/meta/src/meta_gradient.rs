@@ -6,38 +6,38 @@ use crate::{
     alternating_descent::alternating_descent, evolution::evolution, unrolled::unrolled,
 };
 
-/// How the derivative of the outer loss by the softness is taken.
+/// Estimator of the derivative of the outer loss with respect to the softness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MetaGradient {
     /// Exact second order, through every inner step.
     Unrolled {
-        /// Limit of the adjoint, as a multiple of what the outer loss put into it. Without it the
-        /// gradient is exact, and beyond some ten steps of Adam often useless
-        /// (docs/notes.md, Meta-gradients: chaos).
+        /// Limit of the adjoint, as a multiple of the contribution of the outer loss. `None` gives
+        /// the exact gradient, which beyond some ten steps of Adam is often useless (docs/notes.md,
+        /// Meta-gradients: chaos).
         clip: Option<f64>,
     },
-    /// The same through the last steps only.
+    /// [`Unrolled`](MetaGradient::Unrolled) through the last steps only.
     Truncated {
-        /// How many; with 0 it is [`Direct`](MetaGradient::Direct).
+        /// Number of steps; 0 gives [`Direct`](MetaGradient::Direct).
         steps: usize,
         /// As for [`Unrolled`](MetaGradient::Unrolled).
         clip: Option<f64>,
     },
-    /// The derivative of the outer loss by φ where the inner loop ends, as though the solution did not
-    /// depend on φ: what the released shape code does. Zero for an outer loss that ignores φ.
+    /// The partial derivative of the outer loss with respect to φ, with the solution held constant,
+    /// as in the released shape code. Zero for an outer loss that ignores φ.
     Direct,
-    /// An antithetic evolution strategy: differences of whole inner loops, no derivatives. Follows
-    /// the outer loss blurred by a normal distribution.
+    /// An antithetic evolution strategy: differences of whole inner loops, no derivatives. It
+    /// follows the outer loss smoothed by a normal distribution.
     EvolutionStrategy {
-        /// Standard deviation of the steps away from φ, the same for every parameter.
+        /// Standard deviation of the perturbations of φ, the same for every parameter.
         sigma: f64,
         /// Pairs of inner loops.
         pairs: usize,
     },
-    /// No derivative of the outer loss at all: the softness goes along with the scene, down the inner
-    /// loss, and stays where it ends. What the released pose code does. Its "gradient" is the way that
-    /// φ went, turned round, and a learner takes all of it.
+    /// The softness is optimised jointly with the scene on the inner loss, without a derivative of
+    /// the outer loss, as in the released pose code. The "gradient" is φ at the start minus φ at
+    /// the end, and an [`OuterLoop`](crate::OuterLoop) subtracts all of it.
     AlternatingDescent {
         /// Rate of the Adam that moves φ, once per inner step.
         learning_rate: f64,
@@ -45,10 +45,10 @@ pub enum MetaGradient {
 }
 
 impl Default for MetaGradient {
-    /// Through every step, with the adjoint kept within what the outer loss put into it.
+    /// [`Unrolled`](MetaGradient::Unrolled), with the adjoint clipped to the contribution of the outer loss.
     ///
-    /// Source: docs/notes.md, Meta-gradients: clipping. How often its sign is right on the tasks
-    /// stands in docs/studies/estimators.md.
+    /// Source: docs/notes.md, Meta-gradients: clipping. The accuracy of its sign on the tasks is in
+    /// docs/studies/estimators.md.
     fn default() -> Self {
         Self::Unrolled { clip: Some(1.0) }
     }
@@ -57,8 +57,8 @@ impl Default for MetaGradient {
 impl MetaGradient {
     /// The outer loss of `problem` under `phi` `[P]` and its derivative.
     ///
-    /// `seed` is that of the noise of an [evolution strategy](MetaGradient::EvolutionStrategy); all else has none. Memory holds one
-    /// inner step's tape, and the scene and the optimiser's state before each step walked back.
+    /// `seed` seeds the noise of an [evolution strategy](MetaGradient::EvolutionStrategy); other estimators ignore it. Memory holds the
+    /// tape of one inner step, and the scene and the optimiser's state before each differentiated step.
     ///
     /// # Panics
     ///
@@ -88,11 +88,12 @@ impl MetaGradient {
         }
     }
 
-    /// The same on the instance of `tasks` with this seed, which an evolution strategy prepares anew for every softness that it tries.
+    /// [`estimate`](MetaGradient::estimate) on the instance of `tasks` with this seed. An evolution
+    /// strategy prepares the instance anew for every softness it evaluates.
     ///
     /// # Panics
     ///
-    /// Those of [`MetaGradient::estimate`].
+    /// As [`MetaGradient::estimate`].
     pub fn estimate_on<B: Backend>(
         &self,
         tasks: &impl TaskDistribution<B>,

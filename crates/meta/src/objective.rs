@@ -1,32 +1,31 @@
 use softrast_tensor::{Backend, Tensor};
 
-/// What an inner loop minimises over `theta`, given `phi`; or what judges its result.
+/// A loss of `theta` given `phi`, minimised by an inner loop or used as outer loss.
 ///
 /// Generic over the backend, not per method: an objective that needs more of a backend than
-/// `Backend` says so in its `impl`. An inner loop on `B` asks for an objective on `Autodiff<B>`, and
-/// one that is learned through for `Autodiff<Autodiff<B>>`.
+/// `Backend` declares that in its `impl`. An inner loop on `B` needs an objective on `Autodiff<B>`,
+/// and one to differentiate through an objective on `Autodiff<Autodiff<B>>`.
 pub trait Objective<B: Backend> {
-    /// The loss `[1]` of a scene `theta` `[N]` after `step` steps, from what
-    /// [`prepared`](Objective::prepared) gave for it: a softness `phi` `[P]`, unless that says
-    /// otherwise.
+    /// The loss `[1]` of a scene `theta` `[N]` after `step` steps. `phi` is the result of
+    /// [`prepared`](Objective::prepared) for this step: by default the softness `[P]` itself.
     fn loss(&self, theta: Tensor<B, 1>, phi: Tensor<B, 1>, step: usize) -> Tensor<B, 1>;
 
-    /// What the loss after `step` steps needs of `phi` `[P]`, flat: `phi` itself unless something
-    /// costly can be worked out from it that does not depend on the scene.
+    /// Precomputes from `phi` `[P]` the flat input of the loss after `step` steps: by default `phi` itself. Use it for costly work that
+    /// does not depend on the scene.
     ///
-    /// Meta-gradients go to it first, and through it only once for each [`stage`](Objective::stage).
+    /// Meta-gradients are accumulated with respect to it, and backpropagated through it once per [`stage`](Objective::stage).
     fn prepared(&self, phi: Tensor<B, 1>, _step: usize) -> Tensor<B, 1> {
         phi
     }
 
-    /// Steps with the same number in a row share what [`prepared`](Objective::prepared) gives.
+    /// Stage of a step. Consecutive steps of one stage share the result of [`prepared`](Objective::prepared).
     fn stage(&self, _step: usize) -> usize {
         0
     }
 
-    /// The scene `[N]` nearest to `theta` `[N]` that is allowed: where every inner step ends.
+    /// Projects `theta` `[N]` onto the feasible scenes, after every inner step.
     ///
-    /// It is `theta` itself unless the scene has bounds.
+    /// By default it returns `theta`: the scene has no bounds.
     fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
         theta
     }

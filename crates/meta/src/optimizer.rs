@@ -4,10 +4,10 @@ use softrast_tensor::{Backend, Tensor};
 
 /// An optimiser as a pure function: state in, state out.
 ///
-/// A step is made of tensor ops, so that on `Autodiff<B>` its result depends on the parameters, the
-/// gradient and the state it was given, to any order.
+/// A step consists of tensor ops, so that on `Autodiff<B>` its result is differentiable with
+/// respect to the parameters, the gradient and the state, to any order.
 pub trait Optimizer {
-    /// What a step leaves for the next one.
+    /// State carried from one step to the next.
     type State<B: Backend, const D: usize>: Clone + Debug;
 
     /// The state before the first step for parameters shaped like `theta`.
@@ -24,14 +24,14 @@ pub trait Optimizer {
     /// The tensors of a state, in an order of the optimiser's choice.
     ///
     /// With [`state`](Optimizer::state) a state can be stored, moved between `B` and `Autodiff<B>`,
-    /// and differentiated by.
+    /// and differentiated with respect to.
     fn tensors<B: Backend, const D: usize>(&self, state: Self::State<B, D>) -> Vec<Tensor<B, D>>;
 
     /// The state after `steps` steps that consists of `tensors`.
     ///
     /// # Panics
     ///
-    /// If there are not as many as [`tensors`](Optimizer::tensors) gives.
+    /// If their number differs from that of [`tensors`](Optimizer::tensors).
     fn state<B: Backend, const D: usize>(
         &self,
         steps: usize,

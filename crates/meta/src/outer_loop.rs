@@ -9,49 +9,48 @@ use crate::{
 
 /// The outer loop: Adam on the mean meta-gradient of batches of instances.
 ///
-/// Source: Wu et al. 2024, Algorithm 1. What goes beyond it:
-/// docs/notes.md, Meta-gradients: outer loop.
+/// Source: Wu et al. 2024, Algorithm 1. Extensions: docs/notes.md, Meta-gradients: outer loop.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OuterLoop {
-    /// How the meta-gradient is taken.
+    /// Estimator of the meta-gradient.
     pub estimator: MetaGradient,
-    /// Steps φ.
+    /// Optimiser of φ.
     pub optimizer: Adam,
-    /// Largest norm of the mean gradient; longer ones are shortened to it.
+    /// Largest norm of the mean gradient; longer gradients are scaled to it.
     pub clip: f64,
     /// Updates of φ.
     pub steps: usize,
     /// Instances per update.
     pub batch: usize,
-    /// Seed of the first training instance; the others count on from it, none is used twice.
+    /// Seed of the first training instance; the others count on from it. No instance is used twice.
     pub seed: u64,
-    /// What decides which softness is kept, and when to stop.
+    /// Selects the best softness and determines when to stop.
     pub validation: Validation,
 }
 
-/// Instances apart from those that are learned on.
+/// Held-out instances.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Validation {
     /// Seed of the first instance; the others count on from it.
     pub seed: u64,
-    /// How many.
+    /// Number of instances.
     pub count: usize,
-    /// Updates between two validations. The first and the last softness always have one.
+    /// Updates between two validations. The first and the last softness are always validated.
     pub every: usize,
-    /// Learning ends after so many validations in a row that were not better than the best.
+    /// Learning ends after this many consecutive validations without an improvement.
     pub patience: Option<usize>,
 }
 
 /// Learning cannot go on.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
-    /// There is no gradient left to follow.
+    /// No gradient of the batch is finite.
     #[error(
         "outer step {step}: the loss or its gradient is not finite for any of the {batch} instances; \
          a lower inner learning rate, fewer inner steps or a wider softness may help"
     )]
     AllDropped {
-        /// Which outer step.
+        /// The outer step.
         step: usize,
         /// Instances tried.
         batch: usize,
@@ -61,7 +60,7 @@ pub enum LearnError {
 impl OuterLoop {
     /// Takes one outer step: `None` if learning has finished.
     ///
-    /// On an error `progress` is as it was.
+    /// On an error `progress` is unchanged.
     ///
     /// # Errors
     ///
@@ -78,12 +77,12 @@ impl OuterLoop {
         self.step_shared(tasks, progress, &Alone)
     }
 
-    /// The same with other processes, which all call this with the same numbers. Each makes some of the instances, and all get the same
-    /// result, to the last bit that of one process.
+    /// [`step`](OuterLoop::step) distributed over processes, which all call this with equal arguments. Each estimates
+    /// some of the instances, and all return the same result, bit by bit that of one process.
     ///
     /// # Errors
     ///
-    /// If no instance of the batch has a finite loss and gradient; the same on all ranks.
+    /// If no instance of the batch has a finite loss and gradient; on all ranks alike.
     ///
     /// # Panics
     ///
@@ -162,7 +161,7 @@ impl OuterLoop {
         Ok(())
     }
 
-    /// One step of the outer optimiser, whose state is in `progress`.
+    /// One step of the outer optimiser. Its state is in `progress`.
     fn descend<B: Backend>(
         &self,
         phi: Tensor<B, 1>,
@@ -182,14 +181,14 @@ impl OuterLoop {
     }
 }
 
-/// A gradient of this length, brought to the limit if it is longer.
+/// The gradient, whose norm is `length`, scaled to `limit` if it is longer.
 fn shortened<B: Backend>(gradient: Tensor<B, 1>, length: f64, limit: f64) -> Tensor<B, 1> {
     if length > limit { gradient * (limit / length) } else { gradient }
 }
 
 impl Validation {
-    /// The loss of `phi` if it is due now; keeps the softness if it is the best so far, and finishes
-    /// at the last step and when patience ends.
+    /// The loss of `phi` if a validation is due. Stores the best softness so far, and finishes at
+    /// the last step or when patience is exhausted.
     fn validate<B: Backend>(
         &self,
         tasks: &impl TaskDistribution<B>,
@@ -208,7 +207,7 @@ impl Validation {
             vec![tasks.validation_loss(self.seed.wrapping_add(k as u64), phi)]
         });
         let loss = losses.into_iter().flatten().sum::<f64>();
-        // A softness under which some instance breaks down is not a good one.
+        // A softness under which some instance has no finite loss is never the best.
         let loss = Some(loss / self.count as f64).filter(|loss| loss.is_finite());
         match loss.filter(|loss| progress.best.as_ref().is_none_or(|best| *loss < best.loss)) {
             Some(loss) => {
@@ -223,10 +222,10 @@ impl Validation {
     }
 }
 
-/// What an outer step needs of a [`MetaEstimate`], as numbers that can be sent.
+/// The fields of a [`MetaEstimate`] that an outer step uses, as numbers to send between processes.
 struct Estimated {
     loss: f64,
-    /// Not a number where no step was walked back.
+    /// NaN if no step was differentiated.
     adjoint_growth: f64,
     clips: f64,
     gradient: Vec<f64>,
@@ -257,7 +256,7 @@ impl Estimated {
     }
 }
 
-/// `None` where no mode walked back.
+/// The median growth of the adjoint; `None` if no estimate has one, or the median is not finite.
 fn median_growth(estimates: &[Estimated]) -> Option<f64> {
     let growth = estimates.iter().map(|estimate| estimate.adjoint_growth);
     let mut growth: Vec<f64> = growth.filter(|growth| !growth.is_nan()).collect();

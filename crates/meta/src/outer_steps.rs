@@ -1,20 +1,20 @@
 use serde::{Deserialize, Serialize};
 
-/// The steps of an inner loop after which the outer loss is taken; their mean counts.
+/// The inner steps after which the outer loss is evaluated; their mean counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OuterSteps {
-    /// After the last step alone, as in the paper.
+    /// After the last step only, as in the paper.
     #[default]
     Last,
-    /// After a quarter, half and all of the steps: rewards being fast, and is less short-sighted than
-    /// the end of a short loop. Not in the paper. Source:
-    /// docs/notes.md, Meta-gradients: outer loop.
+    /// After a quarter, half and all of the steps: rewards speed, with less short-horizon bias than
+    /// the end of a short loop. Not in the paper. Source: docs/notes.md, Meta-gradients: outer
+    /// loop.
     Quarters,
 }
 
 impl OuterSteps {
-    /// How many steps are done when the loss is taken, in ascending order, of a loop of `steps`.
+    /// Numbers of completed steps at which the loss is evaluated, ascending, in a loop of `steps`.
     pub(crate) fn at(self, steps: usize) -> Vec<usize> {
         let mut at = match self {
             OuterSteps::Last => vec![steps],

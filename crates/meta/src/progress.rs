@@ -1,27 +1,27 @@
 use serde::{Deserialize, Serialize};
 
-/// How far learning has come: all that has to be kept to go on as though it had never stopped.
+/// State of learning: all that a resumed run needs to continue exactly.
 ///
-/// There is no state of a random generator in it: instances are numbered through, and everything
-/// random about one follows from its seed.
+/// It holds no state of a random generator: instances are numbered consecutively, and everything
+/// random about an instance follows from its seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Progress {
-    /// Updates of φ so far; records of this and later steps, if some are on file, will come again.
+    /// Updates of φ so far. A resumed run writes the records of this and later steps again.
     pub step: usize,
     /// The softness `[P]`.
     pub phi: Vec<f64>,
     /// Tensors of the outer optimiser's state `[P]` each, in its order.
     pub(crate) optimizer: Vec<Vec<f64>>,
-    /// The best softness so far, once there was a validation.
+    /// The best softness so far; `None` before the first validation.
     pub best: Option<Best>,
-    /// Validations since then that were not better.
+    /// Validations without an improvement since then.
     pub(crate) stale: usize,
-    /// Whether all steps are done, or patience is at its end.
+    /// Whether all steps are done or patience is exhausted.
     pub finished: bool,
     /// Instances dropped so far.
     pub dropped: usize,
-    /// Instances tried so far, those of validations not counted.
+    /// Instances tried so far, without those of validations.
     pub tried: usize,
     /// Time spent so far.
     pub seconds: f64,
@@ -60,11 +60,11 @@ impl Progress {
         self.best.as_ref().map_or(&self.phi, |best| &best.phi)
     }
 
-    /// Whether learning of `steps` updates can go on from here with `parameters` numbers.
+    /// Checks that learning of `steps` updates can continue from here with `parameters` numbers.
     ///
     /// # Errors
     ///
-    /// What keeps it from that.
+    /// The reason why it cannot.
     pub fn check(&self, steps: usize, parameters: usize) -> Result<(), String> {
         let Self { step, phi, optimizer, best, seconds, dropped, tried, .. } = self;
         let best_phi = best.iter().map(|best| &best.phi);
@@ -80,7 +80,7 @@ impl Progress {
         if *step > steps || best_step > *step {
             return Err(format!("step {step} of {steps}, the best after {best_step}, cannot be"));
         }
-        // Adam remembers two vectors once it has made a step.
+        // Adam has two moments after its first step.
         if !(optimizer.is_empty() || optimizer.len() == 2 && *step > 0) {
             return Err(format!("{} moments after step {step} cannot be", optimizer.len()));
         }

@@ -1,16 +1,16 @@
-/// Processes that share the work of an outer step. Each is a rank of them, counted from 0.
+/// Processes that share the work of an outer step. Their ranks count from 0.
 pub trait Ranks {
-    /// Which one this is.
+    /// Rank of this process.
     fn rank(&self) -> usize;
 
-    /// How many there are.
+    /// Number of ranks.
     fn count(&self) -> usize;
 
-    /// The numbers of all ranks, in their order. Each may bring another number of them. All must call this, and wait for each other in it.
+    /// Concatenates the numbers of all ranks, in the order of ranks. Lengths may differ. All ranks must call this; it blocks until they do.
     fn gather(&self, numbers: &[f64]) -> Vec<f64>;
 }
 
-/// One process by itself.
+/// A single process.
 #[derive(Clone, Copy, Debug)]
 pub struct Alone;
 
@@ -28,11 +28,11 @@ impl Ranks for Alone {
     }
 }
 
-/// `of(k)` for every k below `count`, in order, on all ranks; each makes every so many-th of them.
+/// `of(k)` for every k below `count`, in order, on all ranks. Rank r of n computes k = r, r + n, ...
 ///
 /// # Panics
 ///
-/// If they are not of the same length.
+/// If the lengths of all results together are no multiple of `count`.
 pub(crate) fn shared(
     ranks: &dyn Ranks,
     count: usize,
@@ -43,7 +43,7 @@ pub(crate) fn shared(
     let gathered = ranks.gather(&own);
     assert!(gathered.len().is_multiple_of(count), "pieces of a batch are of one length");
     let width = gathered.len() / count;
-    // The pieces of a rank stand together, those of the first rank first.
+    // Pieces are grouped by rank, in the order of ranks.
     let first =
         |rank: usize| (0..rank).map(|before| (before..count).step_by(all).count()).sum::<usize>();
     let place = |k: usize| first(k % all) + k / all;
@@ -59,7 +59,7 @@ mod tests {
 
     use super::*;
 
-    /// Threads that stand for processes.
+    /// Threads as ranks.
     struct Threads<'a> {
         rank: usize,
         board: &'a [Mutex<Vec<f64>>],

@@ -2,30 +2,30 @@ use softrast_tensor::{Autodiff, Backend, Tensor};
 
 use crate::{BilevelProblem, Objective, Optimizer};
 
-/// What a softness is learned on: instances by seed.
+/// A distribution of instances to learn a softness on, indexed by seed.
 pub trait TaskDistribution<B: Backend> {
-    /// What the inner loops minimise.
+    /// Loss of the inner loops.
     type Objective: Objective<Autodiff<Autodiff<B>>>;
-    /// What judges their results.
+    /// Loss of their results.
     type OuterLoss: Objective<Autodiff<B>>;
-    /// What steps them.
+    /// Optimiser of the inner loops.
     type Optimizer: Optimizer;
 
-    /// The instance with this seed, always the same one; prepared for softnesses near `phi` `[P]`.
+    /// The instance with this seed, always the same; prepared for softnesses near `phi` `[P]`.
     fn problem(
         &self,
         seed: u64,
         phi: &Tensor<B, 1>,
     ) -> BilevelProblem<B, Self::Objective, Self::OuterLoss, Self::Optimizer>;
 
-    /// The outer loss of `phi` `[P]` on the instance with this seed, for what needs no derivative of it.
+    /// The outer loss of `phi` `[P]` on the instance with this seed, without derivatives.
     fn loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
         self.problem(seed, phi).loss(phi)
     }
 
-    /// The loss by which `phi` `[P]` is judged on the instance with this seed, in validation.
+    /// The validation loss of `phi` `[P]` on the instance with this seed.
     ///
-    /// It is the outer loss unless that may flatter some softnesses.
+    /// By default the outer loss; override it if that is biased towards some softnesses.
     fn validation_loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
         self.loss(seed, phi)
     }

@@ -8,12 +8,12 @@ use crate::{
     objective::loss_under,
 };
 
-/// The exact derivative of the outer loss by `phi` through the last `depth` inner steps, and where
-/// the outer loss itself depends on `phi`, all of that too.
+/// The exact derivative of the outer loss with respect to `phi` through the last `depth` inner
+/// steps, plus the explicit dependence of the outer loss on `phi`.
 ///
-/// The inner loop runs without a tape. Then each step is repeated, last first, on a tape of its own,
-/// so that memory holds the states of `depth` steps and the tape of one. With `clip`, the adjoint
-/// of the scene is kept within so many times what the losses so far have put into it.
+/// The inner loop runs without a tape. Then each step is repeated, last first, on a separate tape:
+/// memory holds the states of `depth` steps and the tape of one. `clip` limits the norm of the
+/// adjoint of the scene to this multiple of the summed norms of the loss gradients added so far.
 ///
 /// Source: docs/notes.md, Meta-gradients: Adam (the way back) and Meta-gradients: clipping.
 pub(crate) fn unrolled<B, P, R, O>(
@@ -49,16 +49,16 @@ where
     estimate
 }
 
-/// What an inner loop leaves for the way back.
+/// Result of an inner loop, as input of the backward pass.
 struct Run<B: Backend> {
-    /// The states before the last steps, and the solution, which no step goes on from.
+    /// The states before the last steps, and the final state.
     states: Vec<Stored<B>>,
     taken: Vec<Taken<B>>,
-    /// The loss, and its derivative by the softness where the loss itself depends on it.
+    /// The loss, and its explicit derivative with respect to the softness.
     estimate: MetaEstimate<B>,
 }
 
-/// The outer loss where it was taken.
+/// Gradient of the outer loss at one of its steps.
 struct Taken<B: Backend> {
     step: usize,
     by_theta: Tensor<B, 1>,
@@ -91,13 +91,13 @@ where
     Run { states: states.into(), taken, estimate }
 }
 
-/// The adjoint on its way back.
+/// The adjoint during the backward pass.
 struct WayBack<B: Backend> {
     adjoint: Adjoint<B>,
     norm: f64,
-    /// Losses that it has not come to, in ascending order of steps.
+    /// Loss gradients not yet added, in ascending order of steps.
     left: Vec<Taken<B>>,
-    /// Norms of what the others have put into it, added up.
+    /// Summed norms of the loss gradients added so far.
     put_in: f64,
 }
 
@@ -117,7 +117,7 @@ impl<B: Backend> WayBack<B> {
         Self { norm: self.adjoint.norm(), ..self }
     }
 
-    /// The same before a step.
+    /// Propagates the adjoint to before a step.
     fn over<P, R, O>(
         self,
         problem: &BilevelProblem<B, P, R, O>,
@@ -143,7 +143,7 @@ impl<B: Backend> WayBack<B> {
         earlier
     }
 
-    /// Not more than `clip` times what the losses put in, which it would keep within if no step amplified it.
+    /// Clips the norm to `clip` times that of the loss gradients added, a bound that holds if no step amplifies the adjoint.
     fn clipped(self, clip: Option<f64>, estimate: &mut MetaEstimate<B>) -> Self {
         match clip.map(|clip| clip * self.put_in).filter(|limit| self.norm > *limit) {
             None => self,
@@ -155,12 +155,12 @@ impl<B: Backend> WayBack<B> {
     }
 }
 
-/// What some steps in a row need of φ.
+/// The result of `prepared`, shared by consecutive steps of one stage.
 struct Prepared<B: Backend> {
     phi: Tensor<Autodiff<B>, 1>,
     tracked: Tensor<Autodiff<B>, 1>,
     value: Tensor<B, 1>,
-    /// Derivative of the outer loss by it, through the steps walked back so far.
+    /// Derivative of the outer loss with respect to `value`, through the steps differentiated so far.
     adjoint: Tensor<B, 1>,
 }
 
@@ -176,14 +176,14 @@ impl<B: Backend> Prepared<B> {
         Self { phi, tracked, adjoint: value.zeros_like(), value }
     }
 
-    /// The derivative by φ itself.
+    /// The derivative with respect to φ itself.
     fn by_phi(self) -> Tensor<B, 1> {
         let grads = (self.tracked * Tensor::from_inner(self.adjoint)).sum().backward();
         self.phi.grad(&grads).unwrap_or_else(|| self.phi.inner().zeros_like())
     }
 }
 
-/// The loss, and its derivatives by the scene and by the softness.
+/// The loss, and its derivatives with respect to the scene and the softness.
 fn derivatives<B: Backend>(
     loss: &impl Objective<Autodiff<B>>,
     theta: &Tensor<B, 1>,
