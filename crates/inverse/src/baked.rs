@@ -4,19 +4,19 @@ use anyhow::{Context, ensure};
 use image::{ImageFormat, Rgb, RgbImage};
 use softrast_mesh::{Mesh, Texture};
 
-/// Texels by which the side of a square is longer than the parts of an edge: two faces lie in it, corner to corner, and what is read
-/// between texels of one is none of the other's.
+/// Texels that a square's side has in addition to the parts of an edge. A square holds two faces,
+/// corner to corner, and interpolation within one must not read texels of the other.
 const APART: usize = 3;
 
-/// The mesh with a texture that shows the colours of `fine`: the same mesh, cut by [`Mesh::subdivided`] some times.
+/// The mesh with a texture of the vertex colours of `fine`, the mesh after some calls of [`Mesh::subdivided`].
 ///
-/// Each vertex of `fine` has a texel for each face that it lies in or on, and what is read between texels, as all programs do, is what
-/// `fine` has there. Colours are rounded to 8 bits. Texels beyond the longest side of a face go on as the face does, but are held within
-/// [0, 1]: so half way along that side what is read may be off, by a quarter of what is cut off.
+/// Each vertex of `fine` has a texel in each face that it lies in or on, and bilinear interpolation between texels reproduces the colours
+/// of `fine`. Colours are rounded to 8 bits. Texels beyond the longest side of a face are extrapolated from it, clamped to [0, 1]: half way
+/// along that side the interpolated colour may be off by a quarter of the clamped amount.
 ///
 /// # Errors
 ///
-/// If `fine` has no colours, or is not the mesh after some cuts.
+/// If `fine` has no colours, or is not the mesh after some subdivisions.
 pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
     let colours = fine.colours().context("a mesh without colours makes no texture")?;
     let (faces, parts) = (mesh.faces().len(), fine.faces().len());
@@ -30,7 +30,7 @@ pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
     let squares = faces.div_ceil(2);
     let across = squares.isqrt().max(1);
     let size = [across * side, squares.div_ceil(across) * side];
-    // What no face reads is read where a program makes the picture smaller.
+    // Texels outside all faces contribute where a program downsamples the texture.
     let mean = [0, 1, 2].map(|k| {
         let sum: f64 = colours.iter().map(|colour| colour[k]).sum();
         sum / colours.len() as f64
@@ -49,7 +49,7 @@ pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
         visit(fine, face, cuts, corners, &mut |vertex, at| {
             texels[number(at)] = colours[vertex as usize];
         });
-        // Beyond the long side, so that what is read there is as though the face went on.
+        // Beyond the long side, extrapolated for interpolation on that side.
         for i in 1..=along {
             let j = along + 1 - i;
             let [beside, below, behind] =
@@ -73,7 +73,7 @@ pub fn baked(mesh: &Mesh, fine: &Mesh) -> anyhow::Result<Mesh> {
     Ok(mesh.clone().with_texture(Texture::new(coordinates, corners)?.with_picture(file)?)?)
 }
 
-/// Tells the vertices of all parts of a face that was cut so many times, and where they are, if its own corners are at `corners`.
+/// Calls `tell` with each vertex of the parts of a face after `cuts` subdivisions, and its place in the grid spanned by `[a, b, c]`.
 fn visit(
     fine: &Mesh,
     face: usize,
@@ -105,7 +105,7 @@ mod tests {
 
     use super::*;
 
-    /// What a program reads at (u, v), between the middles of texels.
+    /// Bilinear interpolation at (u, v), between the centres of texels.
     fn read(picture: &RgbImage, [u, v]: [f64; 2]) -> [f64; 3] {
         let [x, y] = [u * f64::from(picture.width()), (1.0 - v) * f64::from(picture.height())];
         let [x, y] = [x - 0.5, y - 0.5].map(|at| at.max(0.0));

@@ -4,14 +4,14 @@ use softrast_meta::{OuterLoop, Progress};
 
 const FORMAT: &str = "softrast learning checkpoint 2";
 
-/// Learning as it stands in a file, with what it was learning.
+/// State of learning in a file, and its job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Everything that decides the result: task and settings, in the words of the program that
-    /// learns. A checkpoint of another job is refused.
+    /// Everything that determines the result: task and settings, as worded by the learning program.
+    /// A checkpoint of another job is refused.
     pub job: String,
-    /// How far it has come.
+    /// State of the outer loop.
     pub progress: Progress,
 }
 
@@ -35,11 +35,11 @@ impl Checkpoint {
         Ok(serde_json::to_string_pretty(&file)? + "\n")
     }
 
-    /// How far learning of `job` has come, by the text of a checkpoint; `outer_loop` goes on from it with `parameters` numbers.
+    /// Parses a checkpoint of `job`, for an `outer_loop` that continues it with `parameters` numbers.
     ///
     /// # Errors
     ///
-    /// If it is not a whole checkpoint as it was written, is of another job, or is nothing that it can go on from.
+    /// If it is damaged, is of another job, or its numbers do not suit the outer loop.
     pub fn parse(
         text: &[u8],
         job: &str,
@@ -63,7 +63,7 @@ impl Checkpoint {
         Ok(progress)
     }
 
-    /// FNV-1a of the text in short, which is the same before writing and after reading.
+    /// FNV-1a of the compact JSON text, the same before writing and after reading.
     fn checksum(&self) -> Result<String, serde_json::Error> {
         let bytes = serde_json::to_vec(self)?;
         let mix = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);

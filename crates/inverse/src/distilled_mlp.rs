@@ -5,17 +5,17 @@ use softrast_raster::HostBackend;
 use softrast_softness::{EdgeSoftness, Family, Softness, families::Mlp, initial_mlp};
 use softrast_tensor::{Autodiff, Backend, Tensor, numbers, vector};
 
-/// The fit reaches so many scales from the edge, and so large a logit. That is far above the 14.1 which an MLP
-/// needs far outside, so that many faces are not seen there: see [`initial_mlp`].
+/// The fit covers distances up to this many scales from the edge, and logits up to this size. That is far above the
+/// 14.1 that an MLP needs far outside so that many faces contribute nothing there: see [`initial_mlp`].
 const REACH: f64 = 24.0;
-/// Places on one side of the edge; the MLP is odd.
+/// Sample distances on one side of the edge; the MLP is odd.
 const PLACES: usize = 48;
-/// How much denser places are at the edge than at the end, as the argument of a hyperbolic sine.
+/// Ratio of the sample density at the edge to that at the end, as the argument of a hyperbolic sine.
 const DENSER: f64 = 3.0;
 /// Steps of the fit, and first and last learning rate.
 const STEPS: usize = 3000;
 const RATES: [f64; 2] = [0.1, 3e-4];
-/// What is covered on the two sides of an edge may differ from 1 by so much.
+/// Largest deviation from 1 of the summed coverage on both sides of an edge.
 const SYMMETRIC: f64 = 1e-4;
 
 /// Weights `[56]` of an MLP softness that is a logistic of scale 1, to 3e-3.
@@ -27,12 +27,12 @@ pub fn distilled_mlp() -> Vec<f64> {
     FITTED.clone()
 }
 
-/// Weights `[56]` of an MLP softness that is like another one of scale 1; none if that treats the two sides of
-/// an edge differently, which an MLP cannot.
+/// Weights `[56]` of an MLP softness that approximates a softness of scale 1; `None` if that is not
+/// symmetric about the edge, as an MLP is.
 ///
-/// Found by least squares on the logit up to `REACH`, always from the same random weights. The error of a place
-/// counts over one scale more than its distance: at the edge the logit decides the image, and far from it only has
-/// to be large.
+/// Fitted by least squares on the logit up to `REACH`, always from the same random weights. The
+/// error at a distance is divided by one scale plus the distance: at the edge the logit decides the
+/// image, and far from it the logit only has to be large.
 pub fn mlp_like(softness: EdgeSoftness, phi: &[f64]) -> Option<Vec<f64>> {
     type A = Autodiff<HostBackend>;
     let place = |k: usize| {

@@ -10,28 +10,28 @@ use crate::{
     ScheduledRenderer, ScheduledSoftness, SolveConfig, minimize, objectives::OuterImage,
 };
 
-/// Scale of the softness that judges, in pixels of the image that judges: the least one whose gradient does not depend on where between
-/// the pixels an edge lies.
+/// Scale of the softness of the outer loss, in pixels of its image: the smallest one whose gradient
+/// does not depend on the position of an edge between the pixels.
 const SHARP_PX: f64 = 0.25;
-/// The same for [`OuterLoss::Pixels`], nearly hard: at a quarter of a pixel, edges that run through the middle of pixels cost half of
-/// what they cost the hard image.
+/// Scale for [`OuterLoss::Pixels`], nearly hard: at a quarter of a pixel, edges through the centres
+/// of pixels cost half of their cost in the hard image.
 const NEARLY_HARD_PX: f64 = 0.05;
-/// The distribution that a softness is learned on: instances of a problem by seed, each solved as `solve` says.
+/// The distribution of instances that a softness is learned on: by seed, each solved with the settings `solve`.
 pub struct Instances<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     solve: SolveConfig,
     pub(crate) config: LearnConfig,
     pub(crate) layout: PhiLayout<S>,
     tolerance: f64,
-    /// What judges, where that does not depend on φ.
+    /// Image of the outer loss, if that does not depend on φ.
     judge: OuterImage<S>,
-    /// What draws under the latest φ.
+    /// Renderer under the latest φ.
     latest: RefCell<Option<Rc<ScheduledRenderer<S>>>>,
     backend: PhantomData<B>,
 }
 
 impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
-    /// Of a problem, whose softness begins with what `method` does.
+    /// Instances of a problem, with the softness of `method` as start.
     ///
     /// # Errors
     ///
@@ -54,13 +54,13 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         Ok(Self { problem, solve, config, layout, tolerance, judge, latest, backend: PhantomData })
     }
 
-    /// φ that learning starts from, with the logarithm of the inner learning rate behind it if that is learned.
+    /// φ at the start of learning, followed by the logarithm of the inner learning rate if that is learned.
     pub fn start(&self) -> Vec<f64> {
         let rate = self.config.learn_rate.then(|| self.solve.learning_rate.ln());
         self.layout.start().into_iter().chain(rate).collect()
     }
 
-    /// The part of φ that is the softness, and what steps the inner loop.
+    /// The entries of φ that are the softness, and the optimiser of the inner loop.
     pub(crate) fn split_phi<'a>(&self, phi: &'a [f64]) -> (&'a [f64], Adam) {
         match phi.split_last().filter(|_| self.config.learn_rate) {
             Some((rate, softness)) => (softness, self.problem.optimizer(rate.exp())),
@@ -68,7 +68,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         }
     }
 
-    /// What draws under a softness, the latest one kept.
+    /// The renderer under a softness; the latest one is cached.
     fn renderer(&self, phi: &[f64]) -> Rc<ScheduledRenderer<S>> {
         let mut latest = self.latest.borrow_mut();
         let kept = latest.take().filter(|renderer| renderer.phi() == phi);
@@ -81,7 +81,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         latest.insert(renderer).clone()
     }
 
-    /// The instance of a seed, with the inner loss as the outer one if `own`, else by what the configuration says.
+    /// The instance of a seed, with the inner loss as outer loss if `own`, else with the configured one.
     fn made(&self, seed: u64, phi: &[f64], own: bool) -> InstanceProblem<P, B, S> {
         let (softness, optimizer) = self.split_phi(phi);
         let (problem, renderer) = (&self.problem, self.renderer(softness));
@@ -114,7 +114,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
         self.made(seed, &phi, own).loss(&vector(softness))
     }
 
-    /// The least hard error of a whole run; not a number where none is finite.
+    /// The least hard error of a whole run; NaN if none is finite.
     fn returned(&self, seed: u64, phi: &[f64]) -> f64 {
         let (softness, Adam { learning_rate, .. }) = self.split_phi(phi);
         let (softness, _) = self.layout.softness(softness);
@@ -136,9 +136,9 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Instances<P, B, S> {
     }
 }
 
-/// A narrow logistic for all problems alike.
+/// A narrow logistic, the same for all problems.
 ///
-/// Judged by a softness that is being learned, wide ones flatter themselves.
+/// An outer loss under the learned softness would favour wide ones.
 fn sharp<P: InverseProblem>(problem: &P, size: usize, config: &LearnConfig) -> ScheduledRenderer {
     let pixels = match config.outer_loss {
         Some(OuterLoss::Pixels) => NEARLY_HARD_PX,
@@ -167,7 +167,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> TaskDistribution<B> for I
         self.outer_loss(seed, phi, self.is_own())
     }
 
-    /// Never by the inner loss, which the softness could flatter.
+    /// Never the inner loss, which favours wide softnesses.
     fn validation_loss(&self, seed: u64, phi: &Tensor<B, 1>) -> f64 {
         self.outer_loss(seed, phi, false)
     }

@@ -9,33 +9,33 @@ use crate::{
     InverseProblem, Method, PhiLayout, ScheduledRenderer, SolveConfig, problem::total_loss,
 };
 
-/// All instances after some steps.
+/// State of all instances after some steps.
 #[derive(Clone, Debug)]
 pub struct Iterate {
     /// Steps taken so far.
     pub step: usize,
-    /// How often a run with feedback was stuck and began again so far.
+    /// Restarts of a run with feedback so far.
     pub begun_again: usize,
-    /// Where on its path the softness is, 0 to 1.
+    /// Progress along the schedule, 0 to 1.
     pub progress: f64,
     /// Scale of the softness, in NDC (NDC² if squared).
     pub scale: f64,
     /// The parameters of the scene, on the CPU, `[N]`.
     pub theta: Tensor<HostBackend, 1>,
-    /// The total loss of each instance: of the image, and the regularizer.
+    /// The total loss of each instance: image loss plus regularizer.
     pub loss: Vec<f64>,
-    /// What is wrong with its soft image.
+    /// The loss of each instance's soft image.
     pub soft_loss: Vec<f64>,
-    /// What is wrong with its hard image at full size: what can be told without knowing the answer.
+    /// The loss of each instance's hard image at full size, which needs no knowledge of the true scene.
     pub hard_loss: Vec<f64>,
-    /// The soft image of the first instance, at full size, where pictures are wanted: row by row, the views or channels one after the
-    /// other.
+    /// The soft image of the first instance at full size, if pictures are enabled: row by row,
+    /// views or channels one after the other.
     pub image: Option<Vec<f64>>,
-    /// Time of the step that ended here, in seconds; none before the first.
+    /// Time of the step that ended here, in seconds; `None` before the first.
     pub seconds: Option<f64>,
 }
 
-/// Instances that are solved side by side, and what draws them.
+/// Instances that are solved together, and their renderer.
 pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R, S> {
     pub(crate) problem: R,
     instances: usize,
@@ -46,7 +46,7 @@ pub(crate) struct Run<P: InverseProblem, B: RasterBackend, R, S> {
     pub(crate) host: P::Scene<HostBackend>,
 }
 
-/// What is seen at a step, on the device.
+/// Results of drawing at a step, on the device.
 pub(crate) struct Seen<B: RasterBackend> {
     pub(crate) theta: Tensor<B, 1>,
     image: Option<Tensor<B, 4>>,
@@ -71,7 +71,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         Self { problem: of, instances: instances.len(), size, renderer, scene, host }
     }
 
-    /// Losses at `theta` `[N]`, under the softness at this progress of a run; with the image if pictures are wanted.
+    /// Losses at `theta` `[N]`, under the softness at this progress of a run; with the image if `pictures`.
     pub(crate) fn seen(
         &self,
         progress: f64,
@@ -80,7 +80,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
     ) -> Seen<B> {
         let (problem, Self { scene, renderer, .. }) = (self.problem.borrow(), self);
         let softness = renderer.at_progress(progress);
-        // Beside the loss, which is the same to the last bit with pictures and without.
+        // Separate from the loss, which is the same to the last bit with pictures and without.
         let image = pictures.then(|| problem.image(scene, theta.clone().detach(), &softness));
         let soft = problem.loss_at(scene, theta.clone(), &softness);
         let loss = total_loss(problem, scene, theta.clone(), soft.clone());
@@ -88,7 +88,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
         Seen { theta: theta.inner(), image, soft_loss: soft.inner(), loss }
     }
 
-    /// The numbers of what is seen, with its hard error.
+    /// Reads the results of drawing from the device, and adds the hard error.
     pub(crate) async fn read(
         &self,
         step: usize,
@@ -97,7 +97,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
     ) -> anyhow::Result<Iterate> {
         let image = seen.image.map(|image| of_first(image, self.instances));
         let rows = image.as_ref().map(|image| image.dims()[3]);
-        // One round trip to the device for all of it.
+        // One round trip to the device for all tensors.
         let read = Transaction::default().register(seen.theta).register(seen.loss.inner());
         let read = read.register(seen.soft_loss);
         let read = image.into_iter().fold(read, |read, image| read.register(image));
@@ -125,19 +125,19 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Run<P, B, R
     }
 }
 
-/// The views of the first of so many instances.
+/// The views of the first of `instances`.
 fn of_first<B: Backend>(image: Tensor<B, 4>, instances: usize) -> Tensor<B, 4> {
     let [views, ..] = image.dims();
     image.narrow(0, 0, views / instances)
 }
 
-/// What was read of a device as a tensor on the CPU, in the same float type.
+/// Data read from a device as a tensor on the CPU, in the same float type.
 fn on_host(data: TensorData) -> Tensor<HostBackend, 1> {
     let dtype = data.dtype;
     Tensor::from_data(data, (&Default::default(), dtype))
 }
 
-/// Views of `side` × `side` pixels on `size` × `size` ones: each pixel is repeated. Images of another shape stay as they are.
+/// Views of `side` × `side` pixels on `size` × `size` pixels: each pixel is repeated. Images of another shape are unchanged.
 fn enlarged(image: &[f64], side: usize, size: usize) -> Vec<f64> {
     if side >= size {
         return image.to_vec();

@@ -4,17 +4,17 @@ use softrast_tensor::{Tensor, tensor, vector};
 
 use crate::{Feedback, Input, LearnConfig, ScaleSchedule, ScheduledSoftness, Surrogate};
 
-/// Least share of a scale that stands above the floor where a learned schedule starts.
+/// Least share of a scale above the floor at the start of a learned schedule.
 const ABOVE_FLOOR: f64 = 0.05;
-/// Pixels that a learned scale stays above, and knots of a schedule that is learned, unless somebody says otherwise.
+/// Default floor of a learned scale, in pixels, and default number of knots of a learned schedule.
 const FLOOR_PX: f64 = 0.03;
 const KNOTS: usize = 3;
 
-/// What the entries of a vector mean that stands for a softness, and so can be learned.
+/// Layout of the vector φ that stands for a softness, and so can be learned.
 ///
-/// First come the knots of the schedule, if the scale moves or is learned apart. Then the parameters of the softness, at scale 1 and
-/// without the logarithm of the scale where there is a schedule, which replaces it. Then those of the surrogate, whole, as it keeps a
-/// ratio to the schedule that is its own. Then those of the feedback. Last come parameters of the problem's own.
+/// First come the knots of the schedule, if the scale moves or is learned separately. Then the parameters of the softness, at scale 1 and
+/// without the logarithm of the scale if a schedule replaces it. Then all parameters of the surrogate, which keeps its own ratio to the
+/// schedule. Then those of the feedback. Last come the problem's own parameters.
 ///
 /// ```
 /// use softrast_inverse::{PhiLayout, ScheduledSoftness};
@@ -33,7 +33,7 @@ const KNOTS: usize = 3;
 /// ```
 #[derive(Clone, Debug)]
 pub struct PhiLayout<S = EdgeSoftness> {
-    /// Parameters to start from, and what has none.
+    /// Parameters to start from, and the fields without parameters.
     start: ScheduledSoftness<S>,
     own: Vec<f64>,
     steps: usize,
@@ -41,13 +41,14 @@ pub struct PhiLayout<S = EdgeSoftness> {
 }
 
 impl<S: Softness> PhiLayout<S> {
-    /// Of a softness as it is, with `own` parameters of the problem, on runs of `steps` steps and images of `size` × `size` pixels.
+    /// The layout of a softness as it is, with the problem's `own` parameters, for runs of `steps`
+    /// steps on images of `size` × `size` pixels.
     pub fn new(start: ScheduledSoftness<S>, own: Vec<f64>, steps: usize, size: usize) -> Self {
         Self { start, own, steps, size }
     }
 
-    /// Of a softness as it is learned: a scale that stays is part of the parameters, or apart from them if `config` says so; one that
-    /// moves is a schedule with a floor.
+    /// The layout of a softness to learn: a fixed scale is one of its parameters, or a schedule of
+    /// one knot if `config` has [`Input::Relative`]; a moving scale is a schedule with a floor.
     pub fn learned(
         start: &ScheduledSoftness<S>,
         own: Vec<f64>,
@@ -87,7 +88,7 @@ impl<S: Softness> PhiLayout<S> {
         Self::new(start, own, steps, size)
     }
 
-    /// The vector that learning starts from.
+    /// The vector at the start of learning.
     pub fn start(&self) -> Vec<f64> {
         let knots = self.start.schedule.iter().flat_map(|schedule| &schedule.knots);
         let surrogate = self.start.surrogate.iter().flat_map(|surrogate| &surrogate.phi);
@@ -97,11 +98,11 @@ impl<S: Softness> PhiLayout<S> {
         edges.chain(feedback).chain(self.own.iter().copied()).collect()
     }
 
-    /// The softness that a vector stands for, and the parameters of the problem's own.
+    /// The softness that a vector stands for, and the problem's own parameters.
     ///
     /// # Panics
     ///
-    /// If the vector is shorter than that of [`start`](Self::start).
+    /// If the vector is shorter than [`start`](Self::start).
     pub fn softness(&self, learned: &[f64]) -> (ScheduledSoftness<S>, Vec<f64>) {
         let (knots, rest) = learned.split_at(self.knots());
         let (phi, rest) = rest.split_at(self.start.phi.len() - self.replaced());
@@ -138,7 +139,7 @@ impl<S: Softness> PhiLayout<S> {
         ScaleSchedule::progress(step, self.steps)
     }
 
-    /// Steps with the same number have the same softness.
+    /// Steps of one stage share a softness.
     pub fn stage(&self, step: usize) -> usize {
         if self.knots() > 1 { step.min(self.steps) } else { 0 }
     }
@@ -179,7 +180,7 @@ impl<S: Softness> PhiLayout<S> {
         })
     }
 
-    /// Parameters of the problem's own, `[P]`, which may be none.
+    /// The problem's own parameters, `[P]`; possibly empty.
     pub(crate) fn own<B: RasterBackend>(&self, learned: &Tensor<B, 1>) -> Tensor<B, 1> {
         let [all] = learned.dims();
         match self.own.len() {
@@ -204,13 +205,13 @@ impl<S: Softness> PhiLayout<S> {
         self.start.surrogate.as_ref().map_or(0, |surrogate| surrogate.phi.len())
     }
 
-    /// Leading parameters that the schedule replaces.
+    /// Number of leading parameters that the schedule replaces.
     fn replaced(&self) -> usize {
         usize::from(self.start.schedule.is_some() && self.edge().logarithms() > 0)
     }
 }
 
-/// The parameters at scale 1, for a schedule to go with.
+/// The softness with its parameters at scale 1, to combine with a schedule.
 fn at_unit_scale<S: Softness>(softness: &ScheduledSoftness<S>) -> ScheduledSoftness<S> {
     let mut unit = softness.clone();
     if softness.schedule.is_none() {

@@ -10,7 +10,7 @@ use crate::{
 
 /// Largest norm of the mean meta-gradient.
 const CLIP: f64 = 1.0;
-/// Validations during a run, beside that of the start.
+/// Validations during a run, in addition to that of the start.
 const VALIDATIONS: usize = 10;
 
 /// A softness that is being learned on a problem, one update at a time.
@@ -21,7 +21,7 @@ pub struct Learning<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
 }
 
 impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
-    /// Begins with what `method` does on runs as `solve` has them.
+    /// Starts from the softness of `method`, on runs with the settings `solve`.
     ///
     /// # Errors
     ///
@@ -34,7 +34,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
     ) -> anyhow::Result<Self> {
         let instances = Instances::<P, B, S>::new(problem, method, solve, config)?;
         let config = &instances.config;
-        // What would fail later fails here, where an error can be told.
+        // Checks here what would panic later.
         let last =
             config.seed.saturating_add((config.updates * config.batch).saturating_sub(1) as u64);
         for seed in [config.seed, last, config.validation_seed] {
@@ -58,12 +58,12 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
         Ok(Self { instances, outer_loop, progress })
     }
 
-    /// All that decides the result, beside the problem and the method.
+    /// Everything that determines the result, except the problem and the method.
     pub fn identity(&self) -> Value {
         json!({ "config": self.config(), "start": self.instances.start() })
     }
 
-    /// How it is learned, with what followed from the softness.
+    /// The configuration of learning, resolved for the softness.
     pub fn config(&self) -> &LearnConfig {
         &self.instances.config
     }
@@ -77,7 +77,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
         self.step_shared(&Alone)
     }
 
-    /// The same with other processes, which all do this at once: [`OuterLoop::step_shared`].
+    /// [`step`](Self::step) distributed over processes, which all call this at once: [`OuterLoop::step_shared`].
     ///
     /// # Errors
     ///
@@ -86,12 +86,12 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
         Ok(self.outer_loop.step_shared(&self.instances, &mut self.progress, ranks)?)
     }
 
-    /// How far it has come.
+    /// State of the outer loop.
     pub fn progress(&self) -> &Progress {
         &self.progress
     }
 
-    /// All that is needed to go on with `job`, as text.
+    /// The text of a checkpoint of `job`.
     ///
     /// # Errors
     ///
@@ -101,7 +101,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
         Ok(Checkpoint { job: job.to_owned(), progress }.text()?)
     }
 
-    /// Goes on from such a text of the same job.
+    /// Continues from the text of a checkpoint of the same job.
     ///
     /// # Errors
     ///
@@ -112,12 +112,12 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
         Ok(())
     }
 
-    /// The layout of the vector that is learned.
+    /// The layout of the learned vector.
     pub fn layout(&self) -> &PhiLayout<S> {
         &self.instances.layout
     }
 
-    /// The best softness so far, and the best parameters of the problem's own. It holds the learning rate of its runs.
+    /// The best softness so far, with the learning rate of its runs, and the best of the problem's own parameters.
     pub fn learned(&self) -> (ScheduledSoftness<S>, Vec<f64>) {
         let (phi, optimizer) = self.instances.split_phi(self.progress.best_phi());
         let (softness, own) = self.layout().softness(phi);
@@ -131,11 +131,11 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Learning<P, B, S> {
     }
 }
 
-/// Learns a softness on runs of a problem as `solve` has them, and shows every outer step to `visit`: the best softness.
+/// Learns a softness on runs of a problem with the settings `solve`, passes every outer step to `visit`, and returns the best softness.
 ///
 /// # Errors
 ///
-/// Those of [`Learning`] and of `visit`.
+/// The errors of [`Learning`] and of `visit`.
 pub fn learn<P: InverseProblem, B: RasterBackend, S: Softness>(
     problem: P,
     method: &Method<S>,

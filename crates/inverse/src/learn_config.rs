@@ -5,61 +5,62 @@ use softrast_softness::Softness;
 
 use crate::ScheduledSoftness;
 
-/// How a softness is learned.
+/// Settings for learning a softness.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LearnConfig {
-    /// How the gradient is taken; none for an evolution strategy where the softness has up to ten parameters, and exactly, through all
-    /// steps, where it has more.
+    /// Estimator of the meta-gradient. By default an evolution strategy if the softness has up to ten parameters or
+    /// feedback, or the outer loss is [`OuterLoss::Returned`]; else [`MetaGradient::default`].
     pub estimator: Option<MetaGradient>,
     /// Updates of the softness.
     pub updates: usize,
-    /// Instances for each update.
+    /// Instances per update.
     pub batch: usize,
     /// Learning rate of the updates.
     pub outer_rate: f64,
     /// Whether the logarithm of the inner learning rate is learned too.
     pub learn_rate: bool,
-    /// Whether a softness whose scale moves learns to move it by what a run sees, beginning with
+    /// Whether a softness with a moving scale learns an adaptive schedule, starting from
     /// [`Feedback::START`](crate::Feedback::START).
     pub feedback: bool,
     /// Seed of the first training instance.
     pub seed: u64,
     /// Seed of the first validation instance.
     pub validation_seed: u64,
-    /// Instances to validate on.
+    /// Number of validation instances.
     pub validation_runs: usize,
-    /// Validations in vain before learning ends early.
+    /// Validations without an improvement before learning ends early.
     pub patience: Option<usize>,
-    /// What judges a result; none for a sharp image, or for the inner loss where nothing else has a gradient.
+    /// The outer loss. By default [`OuterLoss::Own`] for [`MetaGradient::Direct`],
+    /// [`OuterLoss::Returned`] with feedback, else [`OuterLoss::Fixed`].
     pub outer_loss: Option<OuterLoss>,
-    /// After which steps it judges.
+    /// Steps after which the outer loss is evaluated.
     pub outer_steps: OuterSteps,
-    /// Knots of a scale that moves; none for three, or as many as the schedule of a file has.
+    /// Knots of a moving scale; by default three, or those of the softness file.
     pub knots: Option<usize>,
-    /// What a softness is a function of whose scale stays.
+    /// The variable of a softness with a fixed scale.
     pub input: Input,
-    /// What a learned scale stays above, in pixels; none for 0.03, or that of a file.
+    /// Floor of a learned scale, in pixels; by default 0.03, or that of the softness file.
     pub floor_px: Option<f64>,
 }
 
-/// What judges the result of an inner loop.
+/// The loss of the result of an inner loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OuterLoss {
-    /// A fixed narrow softness on a finer image, which no learned softness can flatter.
+    /// A fixed narrow softness on an image of twice the size, independent of the learned softness.
     Fixed,
-    /// The same on the image's own pixels, on which the hard errors of tables are taken as well.
+    /// A fixed narrow softness on the image's own pixels, on which the hard errors of tables are taken too.
     Pixels,
-    /// The hard image, by which tables compare. It has no gradient, so it goes with what takes none of it.
+    /// The hard image, by which tables compare. It has no gradient: only for estimators that do not differentiate it.
     Hard,
-    /// The hard image of the step that a run returns, that of the least error, under an evolution strategy. It is the root of the error,
-    /// so that few runs that fail do not hide how near the others come.
+    /// The hard image at the returned step, that of the least error, under an evolution strategy. It is the square root
+    /// of the error, so that a few failed runs do not hide the differences of the others.
     Returned,
-    /// The loss that was optimised, under the learned softness itself, as in the paper.
+    /// The inner loss itself, under the learned softness, as in the paper.
     Own,
 }
 
-/// What a softness whose scale stays is a function of.
+/// The variable of a softness with a fixed scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Input {
@@ -69,11 +70,11 @@ pub enum Input {
     Relative,
 }
 
-/// Seeds of training instances count from here, and those of validation from there; runs that are reported count from 0.
+/// First seeds of training and of validation; reported runs count from 0.
 const TRAINING_SEED: u64 = 1_000_000;
-/// A softness of no more parameters is learned by differences, which is as good there and cheaper (docs/studies/estimators.md).
+/// Up to this many parameters are learned by differences, which is as good there and cheaper (docs/studies/estimators.md).
 const FEW: usize = 10;
-/// How far apart the runs of an evolution strategy are unless somebody says otherwise: entries of φ are mostly logarithms.
+/// Default standard deviation of an evolution strategy: entries of φ are mostly logarithms.
 pub const SIGMA: f64 = 0.2;
 
 impl Default for LearnConfig {
@@ -99,7 +100,7 @@ impl Default for LearnConfig {
 }
 
 impl LearnConfig {
-    /// The same with what follows from the softness that learning begins with, and from the number of parameters of the problem's `own`.
+    /// This configuration with its defaults resolved for the start softness and the number of the problem's `own` parameters.
     ///
     /// # Errors
     ///
@@ -167,7 +168,7 @@ impl LearnConfig {
         Ok(Self { estimator: Some(estimator), outer_loss: Some(outer_loss), ..self.clone() })
     }
 
-    /// Pixels a side of the image that judges, over those of the image that is optimised.
+    /// Pixels a side of the image of the outer loss, as a multiple of those of the optimised image.
     pub(crate) fn finer(&self) -> usize {
         match self.outer_loss {
             None | Some(OuterLoss::Fixed | OuterLoss::Own) => 2,
@@ -175,7 +176,7 @@ impl LearnConfig {
         }
     }
 
-    /// Whether runs are differentiated.
+    /// Whether the estimator differentiates through runs.
     pub(crate) fn differentiates(&self) -> bool {
         !matches!(self.estimator, Some(MetaGradient::EvolutionStrategy { .. }))
     }

@@ -1,13 +1,13 @@
 //! Inverse rendering under a soft rasterizer: solving problems, and learning the softness on them.
 //!
-//! An [`InverseProblem`] says what is optimised, how its image is made and what is wrong with an image. A [`Method`] says how edges are
-//! softened over a run: its [`ScheduledSoftness`] has the parameters of a softness and how its scale moves, also in a file. [`minimize`]
-//! solves instances of a problem with a method and shows every step; [`learn()`] makes a better method, by the gradient of what whole runs
-//! end with. Both draw through a [`ScheduledRenderer`], with what a `SoftRenderer` of `softrast-raster` prepares: that decides when support
-//! and knots are chosen anew. [`PoseProblem`] finds a camera.
+//! An [`InverseProblem`] defines the parameters, the image and the loss. A [`Method`] defines how edges are softened over a run: its
+//! [`ScheduledSoftness`] has the parameters of a softness and the schedule of its scale, and can be stored in a file. [`minimize`] solves
+//! instances of a problem with a method and passes on every step; [`learn()`] improves a method by the gradient of the final error of whole
+//! runs. Both draw through a [`ScheduledRenderer`], on top of a `SoftRenderer` of `softrast-raster`, which decides when support and knots
+//! are chosen anew. [`PoseProblem`] finds a camera.
 //!
-//! The softness is a type parameter, by default an `EdgeSoftness` of a family. Any other `Softness` takes the same path, and a
-//! [`NamedSoftness`] has files too.
+//! The softness is a type parameter, by default an `EdgeSoftness` of a family. Any other `Softness` works as well, and a [`NamedSoftness`]
+//! can be stored in files.
 //!
 //! ```
 //! use softrast_tensor::NdArray;

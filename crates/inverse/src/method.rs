@@ -4,39 +4,39 @@ use softrast_softness::{EdgeSoftness, Softness};
 
 use crate::{Resolution, ScheduledSoftness};
 
-/// A way to solve any problem: a softness, how its scale moves, and how finely it is drawn.
+/// A method to solve any problem: a softness, the schedule of its scale, and the resolution it is drawn at.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Method<S = EdgeSoftness> {
-    /// What it is called in tables.
+    /// Name in tables.
     pub name: String,
     /// The softness of edges, with its schedule, surrogate and learning rate.
     pub softness: ScheduledSoftness<S>,
-    /// How many pixels the image has that is optimised on.
+    /// Resolution of the image that is optimised.
     #[serde(default)]
     pub resolution: Resolution,
-    /// Largest error of a pixel by leaving out faces that are far from it; none for the usual one.
+    /// Largest error of a pixel from culling distant faces; by default [`usual_tolerance`](Method::usual_tolerance).
     #[serde(default)]
     pub tolerance: Option<f64>,
 }
 
-/// Largest error of a pixel while learning by derivatives, unless another is asked for.
+/// Default of the largest error of a pixel while learning by derivatives.
 ///
-/// The second derivative of a table of cubics is its least exact one, so that meta-gradients are off by up to a tenth here, and by
-/// their own size at 1e-2 (`both_ways_to_draw_have_the_same_meta_gradient`).
+/// The second derivative of a table of cubics is its least accurate one: meta-gradients are off by up to a tenth at
+/// this tolerance, and by their own size at 1e-2 (`both_ways_to_draw_have_the_same_meta_gradient`).
 const LEARNING_TOLERANCE: f64 = 1e-3;
 
 impl Method {
-    /// The largest error of a pixel unless another is asked for, where the scale stays or `moves`.
+    /// Default of the largest error of a pixel, for a fixed scale or one that `moves`.
     ///
-    /// A scale that stays is narrow, and what reaches the pixels far from an edge is a gradient that nobody sees in the image but that
-    /// an optimiser follows. One that moves is wide first, when its near pixels tell as much, and is costly then.
+    /// A fixed scale is narrow. Its gradient far from an edge is invisible in the image, but an optimiser follows it. A
+    /// moving scale is wide at first: near pixels then give enough of the gradient, and drawing is costly.
     pub const fn usual_tolerance(moves: bool) -> f64 {
         if moves { 1e-2 } else { Rasterizer::TOLERANCE }
     }
 }
 
 impl<S: Softness> Method<S> {
-    /// A method that draws as usual.
+    /// A method with the default resolution and tolerance.
     pub fn new(name: &str, softness: ScheduledSoftness<S>) -> Self {
         Self { name: name.to_owned(), softness, resolution: Resolution::Full, tolerance: None }
     }
@@ -46,7 +46,7 @@ impl<S: Softness> Method<S> {
         self.tolerance.unwrap_or(Method::usual_tolerance(!self.softness.is_constant()))
     }
 
-    /// The same while the softness is learned: unless asked for, at most 1e-3 where that `differentiates` runs.
+    /// The largest error of a pixel while the softness is learned: by default at most 1e-3 if learning `differentiates` runs.
     pub fn learning_tolerance(&self, differentiates: bool) -> f64 {
         let usual = self.tolerance();
         let most = if differentiates { usual.min(LEARNING_TOLERANCE) } else { usual };

@@ -11,20 +11,20 @@ use crate::{
     Follower, InverseProblem, Iterate, Method, Place, ScaleSchedule, SolveConfig, iterate::Run,
 };
 
-/// Starts of a problem that a run with feedback goes through at most; then it begins again where it is.
+/// Most starts of a problem that a run with feedback uses; after these it restarts from its current scene.
 const STARTS: usize = 8;
 
-/// Goes down the gradient of a problem's loss from its start, all `instances` side by side: what it ends with.
+/// Minimizes a problem's loss from its start, with all `instances` solved together, and returns the final result.
 ///
-/// It shows every iterate from the start to the end to `visit`, along with the scene on the CPU. `visit` does not count as time of a
-/// step. Parameters without a gradient, as where nothing was drawn, stay as they are. Where the softness has feedback and a run is stuck, it
-/// begins again from the next start of the problem, as the softness says. A [`Minimization`] does the same one step at a time, and has images if
-/// they are wanted.
+/// Every iterate from start to end is passed to `visit`, with the scene on the CPU. Time spent in `visit` does not
+/// count as time of a step. Parameters without a gradient, for example where nothing was drawn, do not change. If the
+/// softness has feedback and a run is stuck, it restarts from the next start of the problem. A [`Minimization`] takes
+/// one step per call, and can return images.
 ///
 /// # Errors
 ///
-/// Those of `visit` and of the device, which end the descent; if there is no instance, or more than one where the softness has feedback:
-/// each run goes its own way then.
+/// The errors of `visit` and of the device, which end the descent; if there is no instance, or more than one with
+/// feedback, because each such run has its own progress.
 pub fn minimize<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     instances: &[P::Instance],
@@ -41,9 +41,9 @@ pub fn minimize<P: InverseProblem, B: RasterBackend>(
     last.context("a run shows its start at least")
 }
 
-/// [`minimize`] one step at a time, for programs that stop and go on: an iterator over all iterates from the start to the end.
+/// [`minimize`] one step at a time, for programs that pause and resume: an iterator over all iterates from start to end.
 ///
-/// It holds the problem, or borrows it. After an error nothing comes any more.
+/// It owns or borrows the problem. After an error it yields nothing.
 pub struct Minimization<
     P: InverseProblem,
     B: RasterBackend,
@@ -55,14 +55,14 @@ pub struct Minimization<
     config: SolveConfig,
     pictures: bool,
     follower: Option<Follower>,
-    /// What the learning rate is multiplied by at the end, without feedback.
+    /// Factor of the learning rate at the end, without feedback.
     rate_end: f64,
     optimizer: Adam,
     theta: Tensor<B, 1>,
     state: AdamState<B, 1>,
-    /// Where on its path the latest step was taken.
+    /// Progress and learning rate of the latest step.
     place: Place,
-    /// Starts that were begun from.
+    /// Starts used so far.
     starts: usize,
     latest: Option<Latest<B>>,
     ended: bool,
@@ -74,12 +74,12 @@ struct Latest<B: RasterBackend> {
     leaf: Tensor<Autodiff<B>, 1>,
     loss: Tensor<Autodiff<B>, 1>,
     hard_loss: f64,
-    /// Time of drawing it, which belongs to the step after it.
+    /// Time of drawing it, which counts to the next step.
     drawing: Duration,
 }
 
 impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimization<P, B, R, S> {
-    /// A run that has not begun.
+    /// A run before its first step.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         })
     }
 
-    /// This run, whose iterates have images.
+    /// This run, with images in its iterates.
     #[must_use]
     pub fn with_pictures(self) -> Self {
         Self { pictures: true, ..self }
@@ -135,13 +135,13 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         &self.run.host
     }
 
-    /// Takes the step from the latest iterate, if there is one: the number of steps taken then, and the time of drawing.
+    /// Takes the step from the latest iterate, if there is one. Returns the number of steps taken and the time of drawing.
     fn stepped(&mut self) -> (usize, Option<Duration>) {
         let Some(Latest { step, leaf, loss, drawing, .. }) = self.latest.take() else {
             return (0, None);
         };
         let theta = self.theta.clone();
-        // Backward from all losses at once is backward from their sum.
+        // The gradients of all losses at once are those of their sum.
         let gradient = leaf.grad(&loss.backward()).unwrap_or_else(|| theta.zeros_like());
         let learning_rate = self.place.rate * self.config.learning_rate;
         let optimizer = Adam { learning_rate, ..self.optimizer };
@@ -151,7 +151,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         (step + 1, Some(drawing))
     }
 
-    /// Goes on to where the next step is taken. A run that is stuck begins again there.
+    /// Moves to the progress of the next step, and restarts a run that is stuck.
     fn placed(&mut self, step: usize, hard_loss: Option<f64>) {
         self.place = match &mut self.follower {
             Some(run) => run.next(hard_loss),
@@ -166,7 +166,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         }
     }
 
-    /// The next iterate, as [`Iterator::next`] gives it. In a browser this is the only way to what a GPU has computed.
+    /// The next iterate, as by [`Iterator::next`]. In a browser this is the only way to read results of a GPU.
     pub async fn next_async(&mut self) -> Option<anyhow::Result<Iterate>> {
         if self.ended {
             return None;
@@ -190,7 +190,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Minimizatio
         let seconds = drawn.map(|drawing| (drawing + clock.elapsed()).as_secs_f64());
         let clock = Instant::now();
         let seen = self.run.seen(self.place.progress, leaf.clone(), self.pictures);
-        // A GPU has only been asked so far, also for the end of the step before. A browser does not wait for it.
+        // Waits for the GPU, including the end of the previous step. A browser cannot block.
         if cfg!(not(target_family = "wasm")) {
             B::sync(&seen.theta.device())?;
         }
@@ -213,7 +213,7 @@ impl<P: InverseProblem, B: RasterBackend, R: Borrow<P>, S: Softness> Iterator
     }
 }
 
-/// Where a step is taken without feedback.
+/// Progress and learning rate of a step without feedback.
 fn by_time(rate_end: f64, step: usize, steps: usize) -> Place {
     let progress = ScaleSchedule::progress(step, steps);
     Place { progress, rate: rate_end.powf(progress), again: false }

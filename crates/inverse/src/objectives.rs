@@ -9,7 +9,7 @@ use crate::{InverseProblem, ScheduledRenderer, SoftnessAt, problem::total_loss};
 
 type Twice<B> = Autodiff<Autodiff<B>>;
 
-/// What the inner loop lowers.
+/// The loss of the inner loop.
 pub struct Inner<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     pub(crate) scene: P::Scene<Twice<B>>,
@@ -30,7 +30,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Objective<Twice<B>> for I
         inner_loss(&*self.problem, &self.scene, theta, &softness)
     }
 
-    /// Nothing where the renderer draws from tables that it keeps: without a tape, under the φ that it was made for.
+    /// Empty if the renderer draws from its cached tables: without a tape, under the φ that it was made for.
     fn prepared(&self, phi: Tensor<Twice<B>, 1>, step: usize) -> Tensor<Twice<B>, 1> {
         let tracked = phi.is_require_grad() || phi.clone().inner().is_require_grad();
         match !tracked && self.renderer.is_of(&phi) {
@@ -48,7 +48,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Objective<Twice<B>> for I
     }
 }
 
-/// The outer loss: how far the result of an inner loop is from its target.
+/// The outer loss: the error of the result of an inner loop.
 pub struct Outer<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
     pub(crate) problem: Rc<P>,
     pub(crate) scene: P::Scene<Autodiff<B>>,
@@ -57,11 +57,11 @@ pub struct Outer<P: InverseProblem, B: RasterBackend, S = EdgeSoftness> {
 
 #[derive(Clone)]
 pub(crate) enum OuterImage<S> {
-    /// By a sharp soft image.
+    /// A soft image under a narrow softness.
     Sharp(Rc<ScheduledRenderer>),
-    /// By the hard image.
+    /// The hard image.
     Hard,
-    /// By the loss at the last step, under the softness itself.
+    /// The inner loss under the learned softness at the last step.
     Inner(Rc<ScheduledRenderer<S>>),
 }
 
@@ -86,7 +86,7 @@ impl<P: InverseProblem, B: RasterBackend, S: Softness> Objective<Autodiff<B>> fo
     }
 }
 
-/// What an inner loop lowers, `[1]`.
+/// The loss of an inner loop, `[1]`.
 fn inner_loss<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     scene: &P::Scene<B>,

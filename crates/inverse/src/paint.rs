@@ -15,30 +15,30 @@ use softrast_views::{Frame, PaintedView};
 
 type B = Autodiff<HostBackend>;
 
-/// Half the width of the edge of a face, in pixels. A face outweighs all that lie behind it up to where its softness ends, so this one ends
-/// soon: on spot, with its shape known, a logistic of 0.15 pixels ends at 28.5 dB, and a step takes 25 times as long.
+/// Half width of the edge of a face, in pixels. A face outweighs all faces behind it within its support, so the support
+/// is small: on spot with known shape, a logistic of 0.15 pixels reaches 28.5 dB, and a step takes 25 times as long.
 const EDGE_PX: f64 = 0.1;
-/// Scale of the depth softness, against the longest side of the mesh: less than the thickness of what is thin.
+/// Scale of the depth softness relative to the longest side of the mesh: below the thickness of thin parts.
 const DEPTH: f64 = 0.005;
-/// Weight of `Σ |c - mean of its neighbours|² / V` beside the mean squared difference of colours: so little that only what no view shows
-/// takes the colours around it.
+/// Weight of `Σ |c - mean of its neighbours|² / V` relative to the mean squared difference of
+/// colours: so small that only vertices visible in no view take the colours of their neighbours.
 const SMOOTH: f64 = 1e-3;
-/// Faces are cut into four while one covers more pixels on average. On spot with its shape known, whose faces cover 1.7 pixels, cutting them
-/// once more gains 0.3 dB for two and a half times the time.
+/// Faces are subdivided while they cover more pixels than this on average. On spot with known shape, whose faces cover
+/// 1.7 pixels, one more subdivision gains 0.3 dB for two and a half times the time.
 const FACE_PX: f64 = 4.0;
-/// Planes of nearness lie beyond the mesh by this part of the farthest depth.
+/// Margin of the planes of nearness beyond the mesh, as a share of the largest depth.
 const BEYOND: f64 = 1e-3;
 
-/// The mesh with the colours of its vertices that some views show, found by the gradient of what a [`ColourRenderer`] draws of it. Its shape
-/// stays; faces that cover many pixels are cut into four, so that the colours have room. Mesh and cameras may be anywhere, in any unit.
+/// The mesh with vertex colours that fit some views, by gradient descent through a [`ColourRenderer`]. The shape does not change; faces
+/// that cover many pixels are subdivided, for more colours. Mesh and cameras may be anywhere, in any unit.
 ///
-/// Of each view the square that is looked at of its mask counts, on `config.size` pixels a side. The loss is that of [`PaintTargets`] and a
-/// little smoothness; colours start at the mean of all views and stay within [0, 1]. `visit` is told the steps taken and the mean
-/// squared difference. It runs on the CPU.
+/// Each view is compared on the square around its mask, on `config.size` pixels a side. The loss is that of [`PaintTargets`] plus a small
+/// smoothness term; colours start at the mean of all views and stay within [0, 1]. `visit` receives the steps taken and the mean squared
+/// difference. It runs on the CPU.
 ///
 /// # Errors
 ///
-/// Those of `visit`, which end the descent; if there is no view, a mask is empty or full, or no camera has the mesh before it.
+/// The errors of `visit`, which end the descent; if there is no view, a mask is empty or full, or the mesh is in front of no camera.
 pub fn paint(
     mesh: &Mesh,
     views: &[PaintedView],
@@ -87,18 +87,18 @@ pub fn paint(
     Ok(mesh.with_colours(colours)?)
 }
 
-/// The mean colour of all that counts; none if there is nothing.
+/// The mean colour of all pixels that count; `None` if no pixel counts.
 fn mean_colour(views: &[PaintedView]) -> Option<[f64; 3]> {
     let sum = |of: &dyn Fn(&PaintedView) -> &[f32]| -> f64 {
         views.iter().flat_map(of).copied().map(f64::from).sum()
     };
     let total = sum(&|view| view.part.pixels());
-    // Sums of many numbers of 32 bits may be off by a little.
+    // A sum of many 32-bit numbers may have a small rounding error.
     let mean = |k: usize| (sum(&|view| view.over_black[k].pixels()) / total).clamp(0.0, 1.0);
     (total > 0.0).then(|| [0, 1, 2].map(mean))
 }
 
-/// The mesh with faces that cover few enough pixels on average, where all of it covers so many; half of them are seen.
+/// Subdivides the mesh until its faces cover few enough `pixels` on average, where all faces cover this many and half of them are visible.
 fn cut(mut mesh: Mesh, pixels: f64) -> Mesh {
     while 2.0 * pixels > FACE_PX * mesh.faces().len() as f64 {
         mesh = mesh.subdivided();
@@ -106,7 +106,7 @@ fn cut(mut mesh: Mesh, pixels: f64) -> Mesh {
     mesh
 }
 
-/// What draws a mesh whose vertices have these depths in all views.
+/// The renderer for a mesh with these vertex depths over all views.
 fn renderer(
     mesh: &Mesh,
     faces: &Arc<[[u32; 3]]>,

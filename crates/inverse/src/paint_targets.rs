@@ -2,22 +2,22 @@ use softrast_tensor::{Backend, Tensor, tensor};
 
 use softrast_views::PaintedView;
 
-/// Views in which fewer pixels count than this, where the loss is about 0 whatever is drawn, are no reason to divide by 0.
+/// Lower limit of the divisor: in views where fewer pixels count, the loss is about 0 for any image.
 const LEAST_PIXELS: f64 = 1e-6;
 
-/// Squares of the colours of views as targets.
+/// Colours of squares of views, as targets.
 #[derive(Clone, Debug)]
 pub struct PaintTargets<B: Backend> {
     /// Red, green and blue over black, `[views, 3, size, size]`.
     over_black: Tensor<B, 4>,
-    /// How much of each pixel counts, `[views, 1, size, size]`.
+    /// Weight of each pixel, `[views, 1, size, size]`.
     part: Tensor<B, 4>,
-    /// The sum of that.
+    /// Sum of the weights.
     pixels: f64,
 }
 
 impl<B: Backend> PaintTargets<B> {
-    /// A square of each view, given by its left, its top and its extent in pixels, on `size` × `size` pixels.
+    /// Squares of views, each given by its left, top and extent in pixels, resampled to `size` × `size` pixels.
     pub fn new<'a>(
         views: impl IntoIterator<Item = (&'a PaintedView, [f64; 3])>,
         size: usize,
@@ -40,17 +40,17 @@ impl<B: Backend> PaintTargets<B> {
         }
     }
 
-    /// How many pixels count in all views together.
+    /// Sum of the pixel weights over all views.
     pub fn pixels(&self) -> f64 {
         self.pixels
     }
 
-    /// The mean squared difference `[1]` of colours where a view and an image both show something: of an image `[views, 4, size, size]`
-    /// that a `ColourRenderer` drew over black, with the faces' share last.
+    /// The mean squared difference `[1]` of colours where both a view and an image show the object, for an image
+    /// `[views, 4, size, size]` that a `ColourRenderer` drew over black, with the faces' share last.
     ///
-    /// With S the share, S c what is drawn, a the part that counts and a C what is known over black, this is
-    /// `Σ (a S c - S a C)² / (3 Σ a)`: a pixel counts by `(a S)²`, no division can fail, and neither the background of the view nor that of the
-    /// image comes in.
+    /// With S the share, S c the drawn colour, a the weight and a C the known colour over black, this is `Σ (a S c - S
+    /// a C)² / (3 Σ a)`: a pixel is weighted by `(a S)²`, no division can fail, and neither the view's nor the image's
+    /// background contributes.
     pub fn loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
         let drawn = image.clone().narrow(1, 0, 3);
         let share = image.narrow(1, 3, 1);

@@ -7,26 +7,26 @@ use softrast_tensor::Tensor;
 
 use crate::SoftnessAt;
 
-/// A problem of inverse rendering: find the parameters θ of a scene whose image is that of a target.
+/// A problem of inverse rendering: find the parameters θ of a scene whose image matches a target.
 ///
-/// It is implemented once, for solving and for learning a softness. Everything is generic over the backend: solving needs a scene on
-/// its autodiff, learning on the autodiff of that too. θ is one flat vector that holds the parameters of all instances, one after the
-/// other.
+/// One implementation serves both solving and learning a softness. Everything is generic over the
+/// backend: solving needs a scene on its autodiff backend, learning also on the autodiff of that. θ
+/// is one flat vector that holds the parameters of all instances, one after the other.
 pub trait InverseProblem: 'static {
-    /// What one run is asked: targets and a start, as plain numbers.
+    /// Targets and start of one run, as plain numbers.
     type Instance: Clone;
 
-    /// Some instances on a backend, to be solved side by side.
+    /// Instances on a backend, to be solved together.
     type Scene<B: RasterBackend>;
 
-    /// The instance of a seed, always the same one.
+    /// The instance of a seed, always the same.
     ///
     /// # Errors
     ///
     /// If there is none.
     fn instance(&self, seed: u64) -> anyhow::Result<Self::Instance>;
 
-    /// Another start for the same targets, number `k` of `count`, counted from 1; none if there is but one start.
+    /// Another start for the same targets, number `k` of `count`, counted from 1; `None` if there is only one start.
     fn restart(
         &self,
         _instance: &Self::Instance,
@@ -36,13 +36,13 @@ pub trait InverseProblem: 'static {
         None
     }
 
-    /// Instances side by side, on images of `size` × `size` pixels.
+    /// The scene of these instances, on images of `size` × `size` pixels.
     fn scene<B: RasterBackend>(&self, instances: &[Self::Instance], size: usize) -> Self::Scene<B>;
 
-    /// Faces of the mesh whose silhouettes are seen, the same in all instances; none if edges are drawn in another way.
+    /// Faces of the mesh of the silhouettes, the same in all instances; `None` if edges are drawn differently.
     fn faces(&self) -> Option<Arc<[[u32; 3]]>>;
 
-    /// Parameters of a softness of the problem's own beside that of the edges, which is learned along with it.
+    /// Parameters of the problem's own softness, learned together with that of the edges.
     fn own_phi(&self) -> Vec<f64> {
         Vec::new()
     }
@@ -50,7 +50,7 @@ pub trait InverseProblem: 'static {
     /// θ before the first step, `[N]`.
     fn start<B: RasterBackend>(&self, scene: &Self::Scene<B>) -> Tensor<B, 1>;
 
-    /// The nearest θ that is allowed.
+    /// Projects θ onto the allowed parameters.
     fn allowed<B: RasterBackend>(
         &self,
         _scene: &Self::Scene<B>,
@@ -74,7 +74,7 @@ pub trait InverseProblem: 'static {
         theta: Tensor<B, 1>,
     ) -> Tensor<B, 4>;
 
-    /// The soft image by which the result of learning is judged, under the narrow softness that it is given.
+    /// The soft image of the outer loss, under the given narrow softness.
     fn sharp_image<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
@@ -84,15 +84,15 @@ pub trait InverseProblem: 'static {
         self.image(scene, theta, softness)
     }
 
-    /// What is wrong with an image, `[instances]`. It may have fewer pixels than the scene, whose number of pixels a side was halved
-    /// some times.
+    /// The loss of an image, `[instances]`. The image may have the pixels a side of the scene,
+    /// halved some times.
     fn image_loss<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
         image: Tensor<B, 4>,
     ) -> Tensor<B, 1>;
 
-    /// [`image_loss`](Self::image_loss) of the [`image`](Self::image) at θ, where the image itself is not asked for.
+    /// [`image_loss`](Self::image_loss) of the [`image`](Self::image) at θ, if the image itself is not needed.
     fn loss_at<B: RasterBackend>(
         &self,
         scene: &Self::Scene<B>,
@@ -102,7 +102,7 @@ pub trait InverseProblem: 'static {
         self.image_loss(scene, self.image(scene, theta, softness))
     }
 
-    /// A term added to the loss that keeps the scene regular, `[instances]`.
+    /// A regularization term of the loss, `[instances]`.
     fn regularizer<B: RasterBackend>(
         &self,
         _scene: &Self::Scene<B>,
@@ -111,27 +111,27 @@ pub trait InverseProblem: 'static {
         None
     }
 
-    /// Size of the image, steps and learning rate unless somebody says otherwise.
+    /// Default size of the image, steps and learning rate.
     fn defaults(&self) -> SolveConfig;
 
-    /// The optimiser that steps θ.
+    /// The optimiser of θ.
     fn optimizer(&self, learning_rate: f64) -> Adam {
         Adam::new(learning_rate)
     }
 }
 
-/// How a problem is solved, beside the method.
+/// Settings for solving a problem, apart from the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveConfig {
-    /// Width and height of the image by which results are judged, in pixels.
+    /// Width and height of the image of the hard error, in pixels.
     pub size: usize,
     /// Steps of the optimiser.
     pub steps: usize,
-    /// Its learning rate.
+    /// Learning rate of the optimiser.
     pub learning_rate: f64,
 }
 
-/// The total loss `[instances]`: that of an image at θ, and the regularizer.
+/// The total loss `[instances]`: `image` loss at θ plus regularizer.
 pub(crate) fn total_loss<P: InverseProblem, B: RasterBackend>(
     problem: &P,
     scene: &P::Scene<B>,

@@ -10,21 +10,21 @@ use crate::{PhiLayout, Resolution, ScheduledSoftness, Targets};
 
 /// Draws soft silhouettes of one mesh topology at every step of a run.
 ///
-/// Support and knots follow the softness as in a [`SoftRenderer`]. Those of every step are kept, with the tables of steps without a
-/// gradient to φ, as many runs under one softness need them again.
+/// Support and knots follow the softness as in a [`SoftRenderer`]. They are cached for every step, with the tables of
+/// steps without a gradient with respect to φ, because many runs under one softness use them again.
 #[derive(Debug)]
 pub struct ScheduledRenderer<S = EdgeSoftness> {
     layout: PhiLayout<S>,
     phi: Vec<f64>,
-    /// What is drawn where nothing is differentiated by φ.
+    /// The softness if nothing is differentiated with respect to φ.
     values: ScheduledSoftness<S>,
     own: Vec<f64>,
     size: usize,
     tolerance: f64,
     resolution: Resolution,
-    /// Renderers of silhouettes, if the problem has any.
+    /// Renderer of silhouettes, if the problem has any.
     renderer: Option<SoftRenderer<S>>,
-    /// Renderers of the progresses drawn so far, each with its table.
+    /// Renderers by progress drawn so far, each with its table.
     placed: RefCell<BTreeMap<u64, SoftRenderer<S>>>,
     /// The latest renderer of colours.
     colours: RefCell<Option<Colours<S>>>,
@@ -39,8 +39,8 @@ struct Colours<S> {
 }
 
 impl<S: Softness> ScheduledRenderer<S> {
-    /// Draws with the softness that the vector `phi` stands for, as the layout has it, at the size of the rasterizer or a lower
-    /// resolution. Without `faces` it draws nothing and only gives parameters.
+    /// A renderer with the softness of the vector `phi` in this layout, at the size of the rasterizer or a lower
+    /// resolution. Without `faces` it draws nothing and only provides parameters.
     pub fn new(
         layout: PhiLayout<S>,
         phi: &[f64],
@@ -56,17 +56,17 @@ impl<S: Softness> ScheduledRenderer<S> {
         Self { layout, phi, values, own, size, tolerance, resolution, renderer, placed, colours }
     }
 
-    /// The softness at a step of which nothing is differentiated by φ.
+    /// The softness at a step, not differentiated with respect to φ.
     pub fn at<B: RasterBackend>(&self, step: usize) -> SoftnessAt<'_, B, S> {
         self.at_progress(self.layout.progress(step))
     }
 
-    /// The softness at this progress of a run, 0 to 1, of which nothing is differentiated by φ.
+    /// The softness at this progress of a run, 0 to 1, not differentiated with respect to φ.
     pub(crate) fn at_progress<B: RasterBackend>(&self, progress: f64) -> SoftnessAt<'_, B, S> {
         SoftnessAt { renderer: self, progress, prepared: None }
     }
 
-    /// The softness at a step from what [`ScheduledRenderer::prepared`] gave.
+    /// The softness at a step from the result of [`ScheduledRenderer::prepared`].
     pub(crate) fn of_prepared<B: RasterBackend>(
         &self,
         step: usize,
@@ -75,7 +75,7 @@ impl<S: Softness> ScheduledRenderer<S> {
         SoftnessAt { prepared: Some(prepared), ..self.at(step) }
     }
 
-    /// All that the image at a step needs of the vector `phi` `[P]`, flat: the table where silhouettes are drawn, else parameters.
+    /// The inputs of the image at a step, computed from the vector `phi` `[P]`, flat: the table for silhouettes, else parameters.
     pub(crate) fn prepared<B: RasterBackend>(
         &self,
         phi: &Tensor<B, 1>,
@@ -89,7 +89,7 @@ impl<S: Softness> ScheduledRenderer<S> {
         let renderer = self.silhouettes::<B>(self.layout.progress(step));
         let own = [Some(&renderer), renderer.surrogate()].into_iter().flatten();
         let phi = [self.layout.phi(phi, step)].into_iter().chain(self.layout.surrogate(phi, step));
-        // By the knots of the values: nothing is read from the device.
+        // Uses the knots of the values: nothing is read from the device.
         let table = |(of, phi): (&SoftRenderer<S>, _)| of.prepared::<B>(of.phi()).table(phi);
         let tables = own.zip(phi).map(|both| table(both).flatten(0, 1));
         Tensor::cat(tables.collect(), 0)
@@ -100,13 +100,13 @@ impl<S: Softness> ScheduledRenderer<S> {
         &self.phi
     }
 
-    /// Whether these are the numbers that it was made for, as far as the float type of `phi` `[P]` can tell.
+    /// Whether `phi` `[P]` equals the vector that it was made for, up to its float type.
     pub(crate) fn is_of<B: RasterBackend>(&self, phi: &Tensor<B, 1>) -> bool {
         let own = numbers(vector::<B>(&self.phi));
         numbers(phi.clone()) == own
     }
 
-    /// How the vector is laid out.
+    /// The layout of the vector.
     pub fn layout(&self) -> &PhiLayout<S> {
         &self.layout
     }
@@ -116,7 +116,7 @@ impl<S: Softness> ScheduledRenderer<S> {
         self.values.scale_at(progress, self.layout.size())
     }
 
-    /// Parts of the path with the same number have the same softness.
+    /// A key of the progress; equal keys have the same softness.
     fn place(&self, progress: f64) -> u64 {
         if self.values.is_constant() { 0 } else { progress.to_bits() }
     }
@@ -143,19 +143,19 @@ impl<S: Softness> ScheduledRenderer<S> {
     }
 }
 
-/// The softness at one place of its path, as [`InverseProblem::image`](crate::InverseProblem::image) sees it.
+/// The softness at one progress of a run, as passed to [`InverseProblem::image`](crate::InverseProblem::image).
 #[derive(Clone, Debug)]
 pub struct SoftnessAt<'a, B: RasterBackend, S = EdgeSoftness> {
     renderer: &'a ScheduledRenderer<S>,
-    /// Part of the path.
+    /// Progress of the run, 0 to 1.
     progress: f64,
-    /// What was prepared of a vector φ; without it, the renderer's own values count.
+    /// The result of `prepared` for a vector φ; without it, the renderer's own values are used.
     prepared: Option<Tensor<B, 1>>,
 }
 
 impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
-    /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with the gradient of the surrogate if
-    /// there is one; the side is the size of the image or fewer pixels, as the resolution has it.
+    /// Coverage `[views, side, side]` of `vertices` `[views, vertices, 3]` (x and y in NDC, depth), with the gradient
+    /// of the surrogate if there is one; the side is the size of the image or less, by the resolution.
     ///
     /// # Panics
     ///
@@ -174,8 +174,8 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         seen.coverage_with_surrogate(vertices, table.narrow(0, 0, own), &surrogate, below)
     }
 
-    /// The [`Targets::iou_loss`] `[views]` of the [`silhouette`](Self::silhouette): in one op where nothing is differentiated by φ and there is
-    /// no surrogate.
+    /// The [`Targets::iou_loss`] `[views]` of the [`silhouette`](Self::silhouette): as one op if
+    /// nothing is differentiated with respect to φ and there is no surrogate.
     ///
     /// # Panics
     ///
@@ -189,7 +189,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         renderer.weighted_iou_loss(vertices, target, counted)
     }
 
-    /// The [`Targets::mse_loss`] `[views]`, likewise.
+    /// The [`Targets::mse_loss`] `[views]` of the silhouette, as one op as for `iou_loss`.
     ///
     /// # Panics
     ///
@@ -208,7 +208,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         self.renderer.side(self.progress)
     }
 
-    /// Largest error of a pixel by leaving out far faces.
+    /// Largest error of a pixel from culling distant faces.
     pub fn tolerance(&self) -> f64 {
         self.renderer.tolerance
     }
@@ -225,9 +225,9 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
 
     /// A renderer of these faces in colours under this softness of edges, on images of [`side`](Self::side) pixels a side.
     ///
-    /// `planes` are the depths of nearness 1 and 0 in world units, `depth_scale` is in units of the distance between them. The tables of the
-    /// latest renderer are kept for the next call with the same arguments. [`ColourRenderer::image_with`] passes gradients on to φ, under the
-    /// parameters of [`edge`](Self::edge).
+    /// `planes` are the depths of nearness 1 and 0 in world units, `depth_scale` is in units of the distance between them. The tables of
+    /// the latest renderer are cached for the next call with equal arguments. [`ColourRenderer::image_with`] passes gradients on to φ,
+    /// under the parameters of [`edge`](Self::edge).
     ///
     /// # Panics
     ///
@@ -259,7 +259,7 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         colours.insert(Colours { faces: faces.clone(), side, renderer }).renderer.clone()
     }
 
-    /// Parameters of the problem's own, `[P]`.
+    /// The problem's own parameters, `[P]`.
     pub fn own(&self) -> Tensor<B, 1> {
         match &self.prepared {
             Some(prepared) => self.renderer.layout.own(prepared),
@@ -267,8 +267,8 @@ impl<'a, B: RasterBackend, S: Softness> SoftnessAt<'a, B, S> {
         }
     }
 
-    /// A number for its place on the path, where nothing is differentiated by φ: what follows from the softness alone may be kept as
-    /// long as it is the same.
+    /// A key of the softness at this progress, if nothing is differentiated with respect to φ:
+    /// values that depend on the softness alone may be cached under it.
     pub fn fixed_place(&self) -> Option<u64> {
         self.prepared.is_none().then(|| self.renderer.place(self.progress))
     }

@@ -2,28 +2,28 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-/// How many pixels a side the image has that is optimised on. Errors and pictures are always those of the full one.
+/// Resolution of the image that is optimised. Errors and pictures always use the full resolution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Resolution {
-    /// As many as the image that judges.
+    /// The resolution of the hard error.
     #[default]
     Full,
-    /// As few as the softness can tell apart, anew at every step.
+    /// The smallest that the softness allows, chosen anew at every step.
     Auto,
-    /// So many.
+    /// This many pixels a side.
     Side(usize),
 }
 
-/// Fewest pixels a side that [`Resolution::Auto`] goes down to: with fewer a step takes no less time, because by then it is spent on
-/// the vertices.
+/// Fewest pixels a side of [`Resolution::Auto`]: below that, a step is not faster, because its time
+/// is spent on the vertices.
 const FEWEST: usize = 8;
 
 impl Resolution {
-    /// Pixels a side where the full image has `size`, for a softness of this `width` in NDC.
+    /// Pixels a side for a full image of `size`, under a softness of this `width` in NDC.
     ///
-    /// The automatic one is `size` halved for as long as a pixel is at most two widths wide; the image is 2 wide. What the gradient
-    /// then loses by the grid is below 0.2 % for a logistic, and 1.4 % for a Gauss curve.
+    /// The automatic resolution is `size` halved while a pixel is at most two widths wide; the image is 2 wide. The
+    /// error of the gradient from the grid is then below 0.2 % for a logistic, and 1.4 % for a Gauss curve.
     pub fn side(self, size: usize, width: f64) -> usize {
         let enough = |side: &usize| *side >= FEWEST.min(size) && *side as f64 * width >= 1.0;
         match self {
@@ -33,17 +33,17 @@ impl Resolution {
         }
     }
 
-    /// The numbers of pixels a side that a target of `size` can be averaged down to: `size`, and what is left of it when it is halved,
-    /// without remainder, again and again.
+    /// The sizes that a target of `size` can be averaged down to: `size`, halved repeatedly while
+    /// it is even.
     pub fn sides(size: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(Some(size), |side| side.is_multiple_of(2).then_some(side / 2))
     }
 
-    /// Refuses a number that is none of [`Resolution::sides`].
+    /// Refuses a size that is not one of [`Resolution::sides`].
     ///
     /// # Errors
     ///
-    /// A line that lists them.
+    /// A message that lists them.
     pub fn check(self, size: usize) -> Result<(), String> {
         match self {
             Resolution::Side(side) if !Self::sides(size).any(|known| known == side) => {

@@ -4,8 +4,8 @@ use anyhow::{Context, ensure};
 use image::{GrayImage, Luma};
 use softrast_tensor::{Backend, Tensor, numbers};
 
-/// Writes the views of an `image` `[views, height, width]` side by side into a gray PNG: 0 is black, 1 is white, what lies outside is
-/// clamped.
+/// Writes the views of an `image` `[views, height, width]` side by side to a gray PNG: 0 is black,
+/// 1 is white; other values are clamped.
 ///
 /// # Errors
 ///

@@ -3,7 +3,7 @@ use softrast_raster::{HostBackend, Pinhole, Pinholes, hard_silhouette, project, 
 use softrast_tensor::numbers;
 use softrast_views::Frame;
 
-/// The hard silhouette that a camera sees of a mesh: its pixels, row by row from the top. Mesh and camera may be anywhere, in any unit.
+/// The hard silhouette of a mesh in a camera: its pixels, row by row from the top. Mesh and camera may be anywhere, in any unit.
 pub fn silhouette_pixels(mesh: &Mesh, camera: &Pinhole) -> Vec<f64> {
     let device = Default::default();
     let frame = Frame::of_cameras(mesh, [camera]);

@@ -6,8 +6,8 @@ use softrast_tensor::{
     tensor_on,
 };
 
-/// The connections of a surface, for losses that keep it smooth. Each takes `vertices` `[1, vertices, 3]` in world units, as
-/// [`project`](softrast_raster::project) does, and gives `[1]`; other shapes panic.
+/// The connectivity of a surface, for losses that keep it smooth. Each loss takes `vertices` `[1, vertices, 3]` in
+/// world units, as [`project`](softrast_raster::project) does, and returns `[1]`; other shapes panic.
 ///
 /// ```
 /// use softrast_tensor::NdArray;
@@ -69,7 +69,7 @@ impl<B: Backend> Surface<B> {
 
     /// `Σ |v - mean of the neighbours of v|²`.
     ///
-    /// A vertex without neighbours, which cannot be seen, does not count. Source: docs/notes.md, Losses and errors.
+    /// Vertices without neighbours, which are invisible, do not count. Source: docs/notes.md, Losses and errors.
     pub fn laplacian(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         let vertices = by_axis(vertices);
         let neighbours = vertices.clone().gather(1, self.to.clone());
@@ -79,23 +79,23 @@ impl<B: Backend> Surface<B> {
         (away.clone() * away).sum()
     }
 
-    /// [`flatness`]; 0 where no two faces share an edge.
+    /// [`flatness`]; 0 if no two faces share an edge.
     pub fn flatness(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         gathered(vertices, self.hinges.as_ref(), flatness)
     }
 
-    /// [`normal_consistency`]; 0 where no two faces share an edge.
+    /// [`normal_consistency`]; 0 if no two faces share an edge.
     pub fn normal_consistency(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         gathered(vertices, self.hinges.as_ref(), normal_consistency)
     }
 
-    /// [`edge_length`] around this `length` in world units; 0 where there is no edge.
+    /// [`edge_length`] around this `length` in world units; 0 without edges.
     pub fn edge_length(&self, vertices: Tensor<B, 3>, length: f64) -> Tensor<B, 1> {
         gathered(vertices, self.ends.as_ref(), |ends| edge_length(ends, length))
     }
 }
 
-/// `[3, vertices]`: many times faster to gather on the CPU than rows of three.
+/// `[3, vertices]`: on the CPU, many times faster to gather than rows of three.
 fn by_axis<B: Backend>(vertices: Tensor<B, 3>) -> Tensor<B, 2> {
     let [sets, _, three] = vertices.dims();
     assert!(
@@ -106,7 +106,7 @@ fn by_axis<B: Backend>(vertices: Tensor<B, 3>) -> Tensor<B, 2> {
     vertices.squeeze_dim::<2>(0).transpose()
 }
 
-/// A loss of some vertices, or 0 of none.
+/// The loss of the gathered vertices; 0 if there are none.
 fn gathered<B: Backend>(
     vertices: Tensor<B, 3>,
     numbers: Option<&Tensor<B, 2, Int>>,

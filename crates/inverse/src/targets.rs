@@ -6,13 +6,13 @@ use softrast_tensor::{Backend, Tensor, tensor};
 use crate::Resolution;
 use softrast_views::Picture;
 
-/// A target image at every size that a run may draw at: its own and, averaged over areas, each
-/// half of the one before as long as that is a whole number.
+/// A target image at every size that a run may draw at: its own and, by averaging over areas, each
+/// half of the one before while that is a whole number.
 #[derive(Clone, Debug)]
 pub struct Targets<B: Backend> {
     /// `[views, size, size]`, the largest first.
     levels: Vec<Tensor<B, 3>>,
-    /// The share of each pixel that counts, in the same sizes, unless all of every pixel does.
+    /// The weight of each pixel, at the same sizes, unless all pixels count in full.
     counted: Option<Vec<Tensor<B, 3>>>,
 }
 
@@ -22,8 +22,8 @@ impl<B: Backend> Targets<B> {
         Self { levels: halves(target), counted: None }
     }
 
-    /// A square of each mask, given by its left, its top and its extent in pixels, on `size` × `size` pixels. What lies outside of a picture
-    /// does not count.
+    /// Squares of masks, each given by its left, top and extent in pixels, on `size` × `size`
+    /// pixels. Pixels outside a picture do not count.
     pub fn of_masks<'a>(
         masks: impl IntoIterator<Item = (&'a Picture, [f64; 3])>,
         size: usize,
@@ -37,7 +37,7 @@ impl<B: Backend> Targets<B> {
         Self { levels: images(0), counted: (!whole).then(|| images(1)) }
     }
 
-    /// The target as it was given.
+    /// The target at its full size.
     pub fn full(&self) -> Tensor<B, 3> {
         self.levels[0].clone()
     }
@@ -51,17 +51,17 @@ impl<B: Backend> Targets<B> {
     ///
     /// # Panics
     ///
-    /// If the image has another size than all of them.
+    /// If no size is that of the image.
     pub fn of(&self, image: &Tensor<B, 3>) -> Tensor<B, 3> {
         self.at(image.dims()[1]).0
     }
 
-    /// The target of `side` pixels a side, and the share of each pixel that counts, unless all of every pixel does; both
-    /// `[views, side, side]`.
+    /// The target of `side` pixels a side, and the weight of each pixel, unless all pixels count in
+    /// full; both `[views, side, side]`.
     ///
     /// # Panics
     ///
-    /// If there is none.
+    /// If there is no such size.
     pub fn at(&self, side: usize) -> (Tensor<B, 3>, Option<Tensor<B, 3>>) {
         let level = self.levels.iter().position(|level| level.dims()[1] == side);
         let level = level.unwrap_or_else(|| panic!("there is no target of {side} pixels a side"));
@@ -71,31 +71,32 @@ impl<B: Backend> Targets<B> {
 }
 
 impl<B: RasterBackend> Targets<B> {
-    /// The [`iou_loss`] `[views]` of what counts of an `image` `[views, side, side]`.
+    /// The [`iou_loss`] `[views]` of an `image` `[views, side, side]`, weighted by pixel.
     ///
     /// # Panics
     ///
-    /// If the image has another size than all targets.
+    /// If no size is that of the image.
     pub fn iou_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         let (image, target) = self.judged(image);
         iou_loss(image, target)
     }
 
-    /// The [`mse_loss`] `[views]`, likewise.
+    /// The [`mse_loss`] `[views]` of an `image` `[views, side, side]`, weighted by pixel.
     ///
     /// # Panics
     ///
-    /// If the image has another size than all targets.
+    /// If no size is that of the image.
     pub fn mse_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         let (image, target) = self.judged(image);
         mse_loss(image, target)
     }
 
-    /// The difference of an image `[views, size, size]` and the target where it counts, averaged down to `side` × `side` pixels: `[views, side, side]`.
+    /// The weighted difference of an image `[views, size, size]` and the target, averaged down to
+    /// `side` × `side` pixels: `[views, side, side]`.
     ///
     /// # Panics
     ///
-    /// If the image has another size than all targets, or `side` is none of its halves.
+    /// If no size is that of the image, or `side` is not reached by halving it.
     pub fn differences(&self, image: Tensor<B, 3>, side: usize) -> Tensor<B, 3> {
         let (mut image, mut target) = self.judged(image);
         while image.dims()[1] > side {
@@ -123,7 +124,7 @@ fn halves<B: Backend>(image: Tensor<B, 3>) -> Vec<Tensor<B, 3>> {
     })
 }
 
-/// Squares of pictures on `size` × `size` pixels, each with how much of each pixel the picture covers.
+/// Squares of pictures on `size` × `size` pixels, each with the share of each pixel that the picture covers.
 pub(crate) fn parts<'a>(
     pictures: impl IntoIterator<Item = (&'a Picture, [f64; 3])>,
     size: usize,
@@ -131,7 +132,7 @@ pub(crate) fn parts<'a>(
     let mut parts: Vec<Arc<[Vec<f64>; 2]>> = Vec::new();
     let mut last = None;
     for (picture, square) in pictures {
-        // Instances mostly share one picture, which may be large.
+        // Instances often share one picture, which may be large.
         let same = |&(other, at): &(&Picture, [f64; 3])| {
             std::ptr::eq(other.pixels(), picture.pixels()) && at == square
         };

@@ -13,7 +13,8 @@ use softrast_tensor::{
 
 use crate::Surface;
 
-/// A mesh whose vertices move, as a module of burn, for burn's own optimisers: they are its one parameter, `[1, vertices, 3]` in world units.
+/// A mesh with movable vertices as a module of burn, for burn's own optimisers: its one parameter
+/// are the vertices, `[1, vertices, 3]` in world units.
 ///
 /// ```
 /// use softrast_inverse::VertexModel;
@@ -37,7 +38,7 @@ pub struct VertexModel<B: Backend> {
 }
 
 impl<B: Backend> VertexModel<B> {
-    /// The vertices where they are in the mesh.
+    /// A model with the vertices of the mesh.
     pub fn new(mesh: &Mesh, device: &B::Device) -> Self {
         Self {
             vertices: Param::from_tensor(softrast_raster::vertices(mesh.positions(), device)),
@@ -66,7 +67,7 @@ impl<B: Backend> VertexModel<B> {
         self.surface.laplacian(self.vertices())
     }
 
-    /// The mesh with its vertices where they are now.
+    /// The mesh with its current vertices.
     ///
     /// # Errors
     ///
@@ -78,9 +79,10 @@ impl<B: Backend> VertexModel<B> {
 }
 
 impl<B: AutodiffBackend> VertexModel<B> {
-    /// The model after a step of an optimiser of burn down the gradient of a `loss` `[1]`.
+    /// The model after a step of a burn optimiser along the gradient of a `loss` `[1]`.
     ///
-    /// It is what a loop of burn has in its place:
+    /// It is equivalent to this in a loop of burn:
+    ///
     ///
     /// ```
     /// # use softrast_inverse::VertexModel;

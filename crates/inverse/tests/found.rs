@@ -1,4 +1,4 @@
-//! Files that the example `fuzz_pictures` found, replayed: `tests/found/files` has one for each fault that was mended, named after its reader.
+//! Replays files that the example `fuzz_pictures` found: `tests/found/files` has one for each fixed fault, named after its reader.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -5,30 +5,30 @@ use super::VertexColours;
 use crate::{Targets, targets::parts};
 use softrast_views::{PaintedView, Picture};
 
-/// Weight of the error of colours beside the `IoU` loss. With 5, 10 and 20, colours found 25, 24 and 24 of 28 poses that silhouettes did not
-/// (docs/notes.md, Pose by colour).
+/// Weight of the colour error relative to the `IoU` loss. With 5, 10 and 20, colours found 25, 24
+/// and 24 of 28 poses that silhouettes did not (docs/notes.md, Pose by colour).
 const COLOURS: f64 = 5.0;
-/// Colours are compared on pictures of so many pixels a side: on more, only what nearly fits pulls.
+/// Pixels a side of the images that colours are compared on: with more pixels, only nearly matching poses have a gradient.
 const SIDES: std::ops::RangeInclusive<usize> = 4..=8;
 
-/// Views of a mesh with colours, and the pictures that they should be.
+/// Views of a mesh with colours, and their target pictures.
 ///
-/// An image `[views, 4, side, side]` has red, green and blue over black, from 0 to 1, then the coverage. The side is the size of the
-/// pictures, or that halved some times.
+/// An image `[views, 4, side, side]` has red, green and blue over black, from 0 to 1, then the
+/// coverage. The side is the size of the pictures, possibly halved some times.
 #[derive(Debug)]
 pub struct ColouredViews<B: RasterBackend> {
     coat: VertexColours<B>,
-    /// Red, green and blue over black, `[3 views, size, size]`, and halves of halves of it.
+    /// Red, green and blue over black, `[3 views, size, size]`, repeatedly halved.
     over_black: Targets<B>,
-    /// The part of each pixel whose colour is known, unless that is all of every pixel; `[views, size, size]`.
+    /// The share of each pixel with a known colour, unless all colours are known; `[views, size, size]`.
     known: Option<Targets<B>>,
-    /// The part of each picture that shows the mesh, `[views]`, or a pixel of it.
+    /// The share of each picture that shows the mesh, `[views]`, at least a pixel.
     covered: Tensor<B, 1>,
 }
 
 impl<B: RasterBackend> ColouredViews<B> {
-    /// Views that should show these pictures: `over_black` `[views, 3, size, size]`, of which the mesh covers `coverage`
-    /// `[views, size, size]`.
+    /// Views with these target pictures: `over_black` `[views, 3, size, size]`, where the mesh has
+    /// `coverage` `[views, size, size]`.
     pub fn new(coat: VertexColours<B>, over_black: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Self {
         let [views, _, size, _] = over_black.dims();
         let mean = coverage.flatten::<2>(1, 2).mean_dim(1).reshape([views]);
@@ -40,8 +40,8 @@ impl<B: RasterBackend> ColouredViews<B> {
         }
     }
 
-    /// Views that should show these parts of pictures, each given by its left, its top and its extent in pixels, on `size` × `size` pixels.
-    /// What lies outside of a picture does not count, nor does an outline whose colours are not known.
+    /// Views with squares of pictures as targets, each given by its left, top and extent in pixels, on `size` × `size`
+    /// pixels. Pixels outside a picture do not count, nor do outlines with unknown colours.
     pub fn of_pictures(
         coat: VertexColours<B>,
         pictures: &[(&PaintedView, [f64; 3])],
@@ -67,14 +67,14 @@ impl<B: RasterBackend> ColouredViews<B> {
         Self { known, ..Self::new(coat, over_black, tensor(coverage, [views, size, size])) }
     }
 
-    /// The image to arrive at, with its coverage `[views, size, size]`.
+    /// The target image, with its coverage `[views, size, size]`.
     pub fn target(&self, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
         let [views, size, _] = coverage.dims();
         joined(self.over_black.full().reshape([views, 3, size, size]), coverage)
     }
 
-    /// The soft image `[views, 4, side, side]` of what is `seen`, `[views, vertices, 3]`, by cameras at this `distance` `[views, 1]` of the
-    /// mesh, with its soft `coverage` `[views, side, side]`.
+    /// The soft image `[views, 4, side, side]` of the projected mesh `seen` `[views, vertices, 3]`, for cameras at
+    /// `distance` `[views, 1]` from the mesh, with its soft `coverage` `[views, side, side]`.
     ///
     /// Colours are hardly softened, but multiplied by the coverage.
     pub fn image(
@@ -88,21 +88,21 @@ impl<B: RasterBackend> ColouredViews<B> {
         joined(colours * coverage.clone().unsqueeze_dim::<4>(1).expand(shape), coverage)
     }
 
-    /// The hard image `[views, 4, size, size]` of what is seen, with its hard `coverage`. It has no gradient.
+    /// The hard image `[views, 4, size, size]` of the projected mesh, with its hard `coverage`. It has no gradient.
     pub fn hard_image(&self, seen: Projected<B>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
         joined(self.coat.hard(seen, coverage.dims()[1]), coverage)
     }
 
-    /// [`ColouredViews::loss`] of the hard colours of what is seen, on `size` × `size` pixels.
+    /// [`ColouredViews::loss`] of the hard colours of the projected mesh, on `size` × `size` pixels.
     pub(crate) fn hard_loss(&self, seen: Projected<B>, size: usize) -> Tensor<B, 1> {
         self.loss(self.coat.hard(seen, size))
     }
 
-    /// What is wrong with the colours `[views, 3, side, side]` of an image, `[views]`: 5 times their error.
+    /// The colour loss `[views]` of the colours `[views, 3, side, side]` of an image: 5 times their error.
     ///
-    /// The error is their mean squared difference over black, divided by the part of the picture that shows the mesh, so that it does
-    /// not depend on how large the mesh is seen: the mean of it on pictures of 8 and 4 pixels a side, or whatever halves of halves of the
-    /// side there are from 4 to 8. Where there is none, it is that of the fewest pixels that halving leads to.
+    /// The error is the mean squared difference over black, divided by the share of the picture that shows the mesh, so that it does not
+    /// depend on the mesh's size in the picture. It is averaged over the images halved to 8 and 4 pixels a side, or to any sizes from 4 to
+    /// 8; if there is none, it is taken at the smallest size that halving reaches.
     pub fn loss(&self, colours: Tensor<B, 4>) -> Tensor<B, 1> {
         let [views, _, side, _] = colours.dims();
         let colours = match &self.known {
@@ -130,12 +130,12 @@ impl<B: RasterBackend> ColouredViews<B> {
     }
 }
 
-/// Colours `[views, 3, side, side]` and coverage `[views, side, side]` as an image.
+/// Joins colours `[views, 3, side, side]` and coverage `[views, side, side]` to an image.
 fn joined<B: RasterBackend>(colours: Tensor<B, 4>, coverage: Tensor<B, 3>) -> Tensor<B, 4> {
     Tensor::cat(vec![colours, coverage.unsqueeze_dim(1)], 1)
 }
 
-/// Colours `[views, 3, side, side]` and coverage `[views, side, side]` of an image `[views, 4, side, side]`.
+/// Splits an image `[views, 4, side, side]` into colours `[views, 3, side, side]` and coverage `[views, side, side]`.
 pub fn split_coverage<B: RasterBackend>(image: Tensor<B, 4>) -> (Tensor<B, 4>, Tensor<B, 3>) {
     let coverage = image.clone().narrow(1, 3, 1).squeeze_dim(1);
     (image.narrow(1, 0, 3), coverage)

@@ -7,10 +7,10 @@ use softrast_raster::Pinhole;
 pub struct FoundPose {
     /// The camera of the whole picture.
     pub camera: Pinhole,
-    /// Overlap over union of its hard silhouette and the mask, both of all pixels of the picture, where a pixel of the mask is in from one
-    /// half on.
+    /// Intersection over union of its hard silhouette and the mask, over all pixels of the picture,
+    /// with the mask thresholded at one half.
     pub iou: f64,
-    /// How near its colours come to the picture, in decibels, where they are asked for; see [`PaintedView::psnr`](softrast_views::PaintedView::psnr).
+    /// PSNR of its colours in decibels, for a search by colour; see [`PaintedView::psnr`](softrast_views::PaintedView::psnr).
     pub psnr: Option<f64>,
 }
 

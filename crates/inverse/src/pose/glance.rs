@@ -13,25 +13,25 @@ use super::{
 };
 use softrast_views::bounding_ball;
 
-/// Pixels a side, directions and rolls of the first look, and views that are drawn at once.
+/// Pixels a side, directions and rolls of the first stage, and views that are drawn at once.
 const COARSE_SIDE: usize = Window::SIDE;
 const DIRECTIONS: usize = 160;
 const ROLLS: usize = 16;
 const AT_ONCE: usize = 256;
-/// The middle of a mesh is at least so many radii before a camera.
+/// Least depth of the middle of a mesh, in its radii.
 const NEAREST: f64 = 1.2;
-/// Parts of an object that a picture may show which cuts it off.
+/// Visible shares of an object that the picture cuts off.
 const SHOWN: [f64; 7] = [1.0, 0.87, 0.76, 0.66, 0.57, 0.5, 0.43];
-/// Of each rotation the best so many of these go on.
+/// Candidates per rotation that are returned.
 const KEPT: usize = 2;
 
-/// A look at all directions and rolls on few pixels: cameras at which the mesh is where the mask is and as large, with their error.
+/// A coarse search over all directions and rolls at low resolution: cameras that match the place and size of the mask, with their error.
 pub(super) fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<(Pinhole, f64)> {
     let look = Look::new(mesh, target, camera);
     let all: Vec<_> = directions().collect();
     let found = all.chunks(AT_ONCE).flat_map(|some| match target.cut {
         false => look.moved(some),
-        // A picture may be too narrow for any place: then as if it showed all.
+        // A picture may be too narrow for any placement: then it is treated as if it showed the whole object.
         true => {
             Some(look.shifted(some)).filter(|it| !it.is_empty()).unwrap_or_else(|| look.moved(some))
         }
@@ -39,7 +39,7 @@ pub(super) fn glance(mesh: &Mesh, target: &Target<'_>, camera: &Pinhole) -> Vec<
     found.collect()
 }
 
-/// Inputs of the first look: mesh, mask and camera.
+/// Inputs of the coarse search: mesh, mask and camera.
 struct Look<'a> {
     mesh: &'a Mesh,
     corners: Tensor<HostBackend, 3>,
@@ -47,10 +47,10 @@ struct Look<'a> {
     radius: f64,
     camera: &'a Pinhole,
     square: [f64; 3],
-    /// The mask on few pixels, and how much of each the picture covers.
+    /// The mask at low resolution, and the share of each pixel that the picture covers.
     levels: Vec<f64>,
     covered: Vec<f64>,
-    /// Extent of what is white, in pixels of the picture.
+    /// Extent of the white pixels, in pixels of the picture.
     white: f64,
     colours: Option<ColouredViews<HostBackend>>,
 }
@@ -69,26 +69,26 @@ impl<'a> Look<'a> {
         Self { mesh, corners, middle, radius, camera, square, levels, covered, white, colours }
     }
 
-    /// Pixels of the picture along one of the few.
+    /// Pixels of the picture per low-resolution pixel.
     fn pixel(&self) -> f64 {
         self.square[2] / COARSE_SIDE as f64
     }
 
-    /// Where a place in the square is seen, as x and y at depth 1.
+    /// The direction of a place in the square, as x and y at depth 1.
     fn ray(&self, [column, row]: [f64; 2]) -> [f64; 2] {
         let [left, top, _] = self.square;
         let at = [left + self.pixel() * column, top + self.pixel() * row];
         [0, 1].map(|k| (at[k] - self.camera.centre[k]) / self.camera.focal[k])
     }
 
-    /// The camera of this rotation that sees the middle of the mesh there.
+    /// The camera of this rotation that sees the middle of the mesh in this direction, at this depth.
     fn place(&self, rotation: [[f64; 3]; 3], [x, y]: [f64; 2], depth: f64) -> Pinhole {
         let seen = rotation.map(|row| (0..3).map(|k| row[k] * self.middle[k]).sum::<f64>());
         let at = [x * depth, y * depth, depth];
         Pinhole { rotation, translation: [0, 1, 2].map(|k| at[k] - seen[k]), ..*self.camera }
     }
 
-    /// The silhouettes of cameras in a square of the picture, `[views, side, side]`, and the corners of the mesh there.
+    /// The silhouettes of cameras in a square of the picture, `[views, side, side]`, and the projected vertices.
     fn drawn(
         &self,
         cameras: &[Pinhole],
@@ -105,7 +105,7 @@ impl<'a> Look<'a> {
     fn judged(&self, cameras: &[Pinhole]) -> [Vec<f64>; 2] {
         let mut cameras = Cow::Borrowed(cameras);
         if self.colours.is_some() && cameras.len() < AT_ONCE {
-            // Pictures are there for as many.
+            // The colour targets have this many views.
             cameras.to_mut().resize(AT_ONCE, *self.camera);
         }
         let views = cameras.len();
@@ -113,7 +113,7 @@ impl<'a> Look<'a> {
             tensor::<HostBackend, 3>(image.repeat(views), [views, COARSE_SIDE, COARSE_SIDE])
         };
         let (drawn, seen) = self.drawn(&cameras, self.square, COARSE_SIDE);
-        // What lies outside of the picture does not count.
+        // Pixels outside the picture do not count.
         let drawn = drawn * of_views(&self.covered);
         let loss = iou_loss(drawn.clone(), of_views(&self.levels));
         let loss = match &self.colours {
@@ -123,24 +123,24 @@ impl<'a> Look<'a> {
         [numbers(drawn), numbers(loss)]
     }
 
-    /// Cameras of these rotations that are moved to where the mask is, with their error before they were moved there for the last time.
+    /// Cameras of these rotations moved to the mask, with their error before the last move.
     fn moved(&self, rotations: &[[[f64; 3]; 3]]) -> Vec<(Pinhole, f64)> {
         let target = moments(&self.levels);
-        // The mask, in the middle of its square, is that of a ball at first.
+        // The mask, centred in its square, is first taken as that of a ball.
         let ray = self.ray(target.middle);
         let depth = 2.0 * self.radius * self.camera.focal[0] / self.white;
         let towards = turned_to(ray);
         let placed = rotations.iter().map(|&local| self.place(times(towards, local), ray, depth));
         let mut cameras: Vec<Pinhole> = placed.collect();
         let mut losses = Vec::new();
-        // Twice moved to where the mask is, the second time as good as exactly.
+        // Two moves; the second is nearly exact.
         for _ in 0..2 {
             let [drawn, error] = self.judged(&cameras);
             losses = error;
             for (camera, image) in cameras.iter_mut().zip(drawn.chunks(COARSE_SIDE * COARSE_SIDE)) {
                 let now = moments(image);
                 let [x, y, z] = camera.transform(self.middle);
-                // Nothing is seen where the mesh is far out: as it was.
+                // If nothing is drawn, the mesh is far outside, and the camera does not move.
                 let larger = if now.area > 0.0 { (now.area / target.area).sqrt() } else { 1.0 };
                 let off = [0, 1].map(|k| {
                     let pixels = target.middle[k]
@@ -157,17 +157,17 @@ impl<'a> Look<'a> {
         cameras.into_iter().zip(losses).collect()
     }
 
-    /// Cameras of these rotations for a mask that the picture cuts off: place and size of what is left of it say little. So the whole
-    /// silhouette is tried in several sizes at all places, by what of it is in the picture.
+    /// Cameras of these rotations for a mask that the picture cuts off, whose place and size are unreliable. The whole
+    /// silhouette is tried in several sizes at all places, and compared within the picture.
     fn shifted(&self, rotations: &[[[f64; 3]; 3]]) -> Vec<(Pinhole, f64)> {
         let window = Window::new(&self.levels, &self.covered);
-        // In the middle, nearer than where a ball as large as what is left would be.
+        // In the middle, nearer than a ball as large as the visible mask would be.
         let [left, top, extent] = self.square;
         let ray = self.ray([COARSE_SIDE as f64 / 2.0; 2]);
         let towards = turned_to(ray);
         let depth = (2.0 * self.radius * self.camera.focal[0] / self.white / 1.3)
             .max(NEAREST * self.radius);
-        // A ball is seen as wide as its lines of sight touch it.
+        // The apparent radius of a ball is that of its tangent lines of sight.
         let across = (depth * depth - self.radius * self.radius).sqrt();
         let reach = 1.05 * self.radius * self.camera.focal[0].max(self.camera.focal[1]) / across;
         let middle = [left + extent / 2.0, top + extent / 2.0];
@@ -176,7 +176,7 @@ impl<'a> Look<'a> {
             rotations.iter().map(|&local| self.place(times(towards, local), ray, depth)).collect();
         let (drawn, _) = self.drawn(&placed, around, Stencil::SIDE);
         let drawn = numbers(drawn);
-        // Cells of the window along one of the stencil.
+        // Window cells per stencil cell.
         let cell = 2.0 * reach / Stencil::SIDE as f64 / self.pixel();
         let mut cameras = Vec::new();
         for (&local, image) in rotations.iter().zip(drawn.chunks(Stencil::SIDE * Stencil::SIDE)) {
@@ -203,7 +203,7 @@ impl<'a> Look<'a> {
     }
 }
 
-/// How large an image is, and where its middle is, in its pixels.
+/// Area and centroid of an image, in its pixels.
 struct Moments {
     area: f64,
     middle: [f64; 2],
@@ -217,7 +217,7 @@ fn moments(image: &[f64]) -> Moments {
     Moments { area, middle: [sum(|k| k % COARSE_SIDE) / area, sum(|k| k / COARSE_SIDE) / area] }
 }
 
-/// Rotations of a camera around what it looks at: directions spread evenly over the sphere, each with rolls all around.
+/// Rotations of a camera around its target: directions evenly spread over the sphere, each with evenly spaced rolls.
 ///
 /// Source: the Fibonacci sphere, González 2010.
 fn directions() -> impl Iterator<Item = [[f64; 3]; 3]> {
@@ -227,7 +227,7 @@ fn directions() -> impl Iterator<Item = [[f64; 3]; 3]> {
         let y = 1.0 - (2 * direction + 1) as f64 / DIRECTIONS as f64;
         let (sin, cos) = (golden * direction as f64).sin_cos();
         let around = (1.0 - y * y).sqrt();
-        // As a camera that orbits, then rolled. No direction is a pole.
+        // An orbiting camera, then rolled. No direction is a pole.
         let ahead = [around * cos, y, around * sin];
         let right = [-ahead[2] / around, 0.0, ahead[0] / around];
         let down = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| ahead[i] * right[j] - ahead[j] * right[i]);
@@ -240,7 +240,7 @@ fn directions() -> impl Iterator<Item = [[f64; 3]; 3]> {
     })
 }
 
-/// The least rotation that takes the axis ahead to where (x, y, 1) is.
+/// The smallest rotation that takes the forward axis to the direction (x, y, 1).
 fn turned_to([x, y]: [f64; 2]) -> [[f64; 3]; 3] {
     let length = (x * x + y * y + 1.0).sqrt();
     let [x, y, z] = [x / length, y / length, 1.0 / length];
@@ -276,7 +276,7 @@ mod tests {
                 a.as_flattened().iter().zip(b.as_flattened()).map(|(x, y)| x * y).sum();
             ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees()
         };
-        // Turned by any angles.
+        // Arbitrary angles.
         for k in 0..200u32 {
             let [x, y] = [0.7 * f64::from(k), 1.3 * f64::from(k)].map(|a| a.sin() * 2.0);
             let pose = times(

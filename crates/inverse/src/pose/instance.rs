@@ -1,29 +1,29 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_raster::Orbit;
 
-/// What one run is asked: from where to where.
+/// Target and start of one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseInstance {
     /// The camera of the target picture, in the frame of the mesh.
     pub target: Orbit,
-    /// Where the search starts, in the frame of the target camera: elevation and azimuth 0 are
-    /// right.
+    /// Start of the search, in the frame of the target camera: elevation and azimuth 0 are the
+    /// answer.
     pub start: Orbit,
 }
 
 /// Field of view of every target camera.
 const FOV_DEG: f64 = 40.0;
 
-/// How far further starts lie from the given one. Poses that look alike are mostly front for back
-/// or left for right, so steps much smaller than a right angle lead out of them.
+/// Angle between further starts and the given one. Poses that look alike are mostly front for back
+/// or left for right, so smaller steps rarely leave them.
 const AROUND_DEG: f64 = 50.0;
 
 impl PoseInstance {
     /// An instance that depends on `seed` alone.
     ///
     /// Target: distance 2.5 to 4, elevation and azimuth normal with a deviation of 60 degrees,
-    /// field of view 40. Start: distance 2 to 10, `least` to `largest` degrees away in a random direction
-    /// of (elevation, azimuth), field of view 20 to 60. Uniform unless said.
+    /// field of view 40. Start: distance 2 to 10, `least` to `largest` degrees away in a random
+    /// direction of (elevation, azimuth), field of view 20 to 60. Uniform unless stated otherwise.
     ///
     /// Source: docs/notes.md, Pose. In the paper distances end at 8; its code goes to 10.
     pub fn seeded(seed: u64, [least, largest]: [f64; 2]) -> Self {
@@ -45,9 +45,9 @@ impl PoseInstance {
         Self { target, start }
     }
 
-    /// The same target from start `k` of `count`: 0 is its own, the others lie on a circle of 50
-    /// degrees around it in the plane of elevation and azimuth, evenly spaced; neighbours in `k` are
-    /// far apart.
+    /// The instance with start `k` of `count`: start 0 is the given one, the others lie on a circle
+    /// of 50 degrees around it in the plane of elevation and azimuth, evenly spaced; consecutive
+    /// `k` are far apart.
     pub fn around(&self, k: usize, count: usize) -> Self {
         let mut instance = *self;
         if k > 0 {
@@ -61,7 +61,7 @@ impl PoseInstance {
     }
 }
 
-/// A standard normal number, by the method of Box and Muller.
+/// A standard normal number, by the Box-Muller transform.
 fn normal(random: &mut StdRng) -> f64 {
     let [u, v] = [(); 2].map(|()| random.random::<f64>());
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()

@@ -1,7 +1,7 @@
-//! Poses brought to the least squares of their hard images, by the method of Levenberg and Marquardt with differences for derivatives.
+//! Refines poses to the least squares of their hard images, by Levenberg-Marquardt with finite differences.
 //!
-//! Hard images are drawn with several pixels a side for each pixel that is compared. So they are as smooth as a mask that was reduced, and,
-//! unlike soft ones, they do not depend on how the faces of the mesh lie.
+//! Hard images are supersampled: several pixels a side per compared pixel. They are therefore as smooth as a
+//! downsampled mask and, unlike soft images, independent of the tessellation of the mesh.
 
 use softrast_mesh::Mesh;
 use softrast_raster::{HostBackend, Pinhole};
@@ -10,26 +10,26 @@ use softrast_tensor::{Tensor, numbers, tensor};
 use super::masks::{MaskPose, MaskPoses, MaskScene};
 use crate::InverseProblem;
 
-/// Pixels a side that are drawn for each pixel that is compared.
+/// Drawn pixels a side per compared pixel.
 const SAMPLES: usize = 4;
-/// Most pixels a side that are compared, which bounds memory: 14 images of 1024 × 1024 pixels are drawn.
+/// Most compared pixels a side, which bounds memory: 14 images of 1024 × 1024 pixels are drawn.
 const MOST: usize = 256;
 /// Most steps.
 const STEPS: usize = 12;
-/// A step that gains less than this share of the error is the last.
+/// The search ends after a step that reduces the error by less than this share.
 const LEAST_GAIN: f64 = 1e-3;
-/// Dampings of a step, all of which are tried; with 0 it is that of Gauss and Newton.
+/// Damping factors tried at every step; 0 is Gauss-Newton.
 const DAMPINGS: [f64; 4] = [0.0, 0.03, 0.3, 3.0];
-/// Least square of what a number of θ does, by damping, against the mean of all, for a move of a pixel: one that does nothing stays.
+/// Least diagonal entry under damping for a move of a pixel, relative to the mean of all: a parameter without effect does not move.
 const LEAST_SQUARE: f64 = 1e-2;
-/// How far a number of θ moves for a difference, in pixels that are compared: differences over less would see single pixels that are drawn.
+/// Step of the finite differences, in compared pixels: smaller steps would resolve single drawn pixels.
 const PIXELS: f64 = 1.0;
-/// A longer lens moves what is seen by so many times less than a turn does.
+/// Image motion per unit of the focal length's logarithm, relative to that per radian of a turn.
 const OF_ZOOM: f64 = 0.25;
 
-/// The pose near this one from which the silhouette of the mesh differs least from the mask, with the focal length or without, and the mean
-/// squared difference over `size` × `size` pixels (256 × 256 at most). It is the pose itself where none near it is better. `visit` sees the share
-/// that is done at each step; an error of it ends the search.
+/// The pose near this one that minimizes the squared difference between the silhouette of the mesh and the mask, with or without the focal
+/// length, and the mean squared difference over `size` × `size` pixels (256 × 256 at most). It is the given pose if none near it is better.
+/// `visit` receives the share that is done at each step; its error ends the search.
 pub(super) fn least_squares(
     mesh: &Mesh,
     pose: &MaskPose,
@@ -63,13 +63,13 @@ struct Views {
     instances: Vec<MaskPose>,
     scene: MaskScene<HostBackend>,
     size: usize,
-    /// How far each number of θ moves for a difference.
+    /// Step of each parameter of θ for finite differences.
     moves: Vec<f64>,
 }
 
 impl Views {
     fn new(mesh: &Mesh, pose: &MaskPose, optimise_fov: bool, size: usize) -> Self {
-        // Where the mesh fills the square that is looked at, its radius is about 0.4 of it.
+        // A mesh that fills the cropped square has a radius of about 0.4 of it.
         let turn = PIXELS / (0.4 * size as f64);
         let mut moves = vec![turn; 6];
         moves.extend(optimise_fov.then_some(turn / OF_ZOOM));
@@ -79,28 +79,28 @@ impl Views {
         Self { problem, instances, scene, size, moves }
     }
 
-    /// θ of all views: these, and the last again for the rest.
+    /// θ of all views: these, padded with the last one.
     fn theta(&self, thetas: &[Vec<f64>]) -> Vec<f64> {
         let last = thetas[thetas.len() - 1].clone();
         let all = thetas.iter().cloned().chain(std::iter::repeat(last));
         all.take(self.instances.len()).flatten().collect()
     }
 
-    /// These numbers as a tensor of all views, within what is allowed.
+    /// These θ as a tensor of all views, projected onto the allowed ones.
     fn allowed(&self, thetas: &[Vec<f64>]) -> Tensor<HostBackend, 1> {
         let theta = self.theta(thetas);
         let length = theta.len();
         self.problem.allowed(&self.scene, tensor(theta, [length]))
     }
 
-    /// θ within what is allowed.
+    /// θ projected onto the allowed ones.
     fn held(&self, theta: &[f64]) -> Vec<f64> {
         let mut all = numbers(self.allowed(&[theta.to_vec()]));
         all.truncate(theta.len());
         all
     }
 
-    /// The differences of image and mask at each of these.
+    /// The differences of image and mask at each of these θ.
     fn differences(&self, thetas: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let Self { problem, scene, size, .. } = self;
         let image = problem.hard_image(scene, self.allowed(thetas));
@@ -108,7 +108,7 @@ impl Views {
         all.chunks(size * size).take(thetas.len()).map(<[f64]>::to_vec).collect()
     }
 
-    /// The best of the steps that lead to the least squares of a linear image, with its differences; none where an image does not change.
+    /// The best of the damped least-squares steps of the linearized image, with its differences; `None` if no system can be solved.
     fn step(&self, theta: &[f64], now: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let count = theta.len();
         let moved = |k: usize| {
@@ -159,7 +159,7 @@ fn squares(a: &[f64]) -> f64 {
     dot(a, a)
 }
 
-/// The solution of symmetric equations with a positive definite matrix, none where it is not.
+/// The solution of a symmetric positive definite system; `None` if the matrix is not positive definite.
 fn solved(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Option<Vec<f64>> {
     let count = right.len();
     let least = 1e-12 * (0..count).map(|k| matrix[k][k]).fold(0.0, f64::max);
@@ -205,7 +205,7 @@ mod tests {
         MaskPose { mask: mask.clone(), square, start, painted: None }
     }
 
-    /// Pose and error after, and the error before.
+    /// The refined pose, and the errors after and before.
     fn found(pose: &MaskPose, optimise_fov: bool) -> (Pinhole, [f64; 2]) {
         let views = Views::new(&fox(), pose, optimise_fov, 64);
         let before = views.differences(&[vec![0.0; views.moves.len()]]);
@@ -254,7 +254,7 @@ mod tests {
 
     #[test]
     fn a_number_that_changes_nothing_does_not_stop_the_others() {
-        // Nobody can tell the focal length of a lens of a tenth of a degree: zoom and depth together change nothing.
+        // The focal length of a lens of a tenth of a degree is undetermined: zoom and depth together change nothing.
         let orbit =
             Orbit { distance: 1800.0, elevation_deg: 10.0, azimuth_deg: 40.0, fov_deg: 0.1 };
         let truth = Pinhole::from_orbit(&orbit, SIDE);

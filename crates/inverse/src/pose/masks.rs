@@ -13,38 +13,38 @@ use super::{ColouredViews, VertexColours, split_coverage};
 use crate::{InverseProblem, SoftnessAt, SolveConfig, Targets};
 use softrast_views::{Frame, PaintedView, Picture};
 
-/// How much nearer to the middle of a mesh than its farthest vertex a camera may not come, as a factor.
+/// Least distance of a camera from the middle of a mesh, as a multiple of that of the farthest vertex.
 const CLEARANCE: f64 = 1.05;
-/// Most that the logarithm of a distance or a focal length may move.
+/// Largest change of the logarithm of a distance or a focal length.
 const FARTHEST: f64 = 3.0;
 
-/// A mask, the part of it that is looked at, and a camera to start from.
+/// A mask, its compared square, and a start camera.
 #[derive(Clone, Debug)]
 pub struct MaskPose {
     /// The picture.
     pub mask: Picture,
-    /// Left, top and extent of the square of it that is looked at, in pixels.
+    /// Left, top and extent of the compared square, in pixels.
     pub square: [f64; 3],
-    /// The camera before the first step, for the whole picture.
+    /// The start camera, for the whole picture.
     pub start: Pinhole,
-    /// The colours of the same picture, if they tell the pose too.
+    /// The colours of the same picture, for poses by colour.
     pub painted: Option<PaintedView>,
 }
 
-/// Finds the camera of any pose from which a mesh has the silhouette of a mask.
+/// Finds the camera pose at which a mesh has the silhouette of a mask.
 ///
-/// θ holds for each instance a turn of the camera as a tangent vector in radians, where the middle of the mesh is seen (x and y, in
-/// radii of the mesh), and the logarithm of its depth, all from the start on; with an optimised focal length also its logarithm. The loss
-/// is the soft `IoU` loss over the part of the picture that is looked at; what lies outside of the picture does not count. Where the mesh
-/// and all instances have colours, images are those of [`ColouredViews`], and its loss is added.
+/// θ holds, for each instance and relative to the start: a rotation of the camera as a tangent vector in radians, the apparent position of
+/// the middle of the mesh (x and y, in radii of the mesh), and the logarithm of its depth; with an optimised focal length also its
+/// logarithm. The loss is the soft `IoU` loss over the compared square; pixels outside the picture do not count. If the mesh and all
+/// instances have colours, images are those of [`ColouredViews`], and its loss is added.
 ///
 /// Mesh and cameras may be anywhere, in any unit: images are computed in the [`Frame`] of the mesh.
 ///
-/// Not covered are cameras that stand within 1.05 times the distance of the farthest vertex from the middle of the mesh: depths are held
-/// beyond that, so that no part of the mesh comes behind the camera.
+/// Cameras nearer to the middle of the mesh than 1.05 times its farthest vertex are not supported: depths stay beyond that, so that no
+/// vertex is behind the camera.
 #[derive(Clone, Debug)]
 pub struct MaskPoses {
-    /// In its frame.
+    /// The mesh in its frame.
     mesh: Mesh,
     frame: Frame,
     optimise_fov: bool,
@@ -52,7 +52,7 @@ pub struct MaskPoses {
 }
 
 impl MaskPoses {
-    /// Poses of a mesh, number `k` of them as the instance of seed `k`.
+    /// Poses of a mesh; entry `k` is the instance of seed `k`.
     pub fn new(mesh: &Mesh, instances: Vec<MaskPose>, optimise_fov: bool) -> Self {
         let frame = Frame::of_mesh(mesh);
         Self { mesh: frame.mesh(mesh), frame, optimise_fov, instances }
@@ -148,15 +148,15 @@ impl InverseProblem for MaskPoses {
 pub struct MaskScene<B: RasterBackend> {
     vertices: Tensor<B, 3>,
     faces: Arc<[[u32; 3]]>,
-    /// Cameras at the start, for what is looked at.
+    /// Start cameras, for the compared squares.
     cameras: Pinholes<B>,
-    /// Where cameras see the middle of the mesh at the start, `[views, 2]`, as x and y at depth 1; its depth `[views, 1]`; the radius of the
-    /// mesh at that depth.
+    /// Apparent position of the middle of the mesh at the start, `[views, 2]`, as x and y at depth
+    /// 1; its depth `[views, 1]`; the radius of the mesh at that depth.
     seen: Tensor<B, 2>,
     depth: Tensor<B, 2>,
     radius: Tensor<B, 2>,
     frame: Frame,
-    /// Least logarithm of the depth against the start, `[views, 1]`.
+    /// Least logarithm of the depth relative to the start, `[views, 1]`.
     nearest: Tensor<B, 2>,
     optimise_fov: bool,
     targets: Targets<B>,
@@ -201,26 +201,26 @@ impl<B: RasterBackend> MaskScene<B> {
         }
     }
 
-    /// The difference of an image `[views, size, size]` and the mask where it counts, on `side` × `side` pixels: `[views, side, side]`.
+    /// The weighted difference of an image `[views, size, size]` and the mask, on `side` × `side` pixels: `[views, side, side]`.
     pub(super) fn differences(&self, image: Tensor<B, 3>, side: usize) -> Tensor<B, 3> {
         self.targets.differences(image, side)
     }
 
-    /// Views, and numbers of θ for each.
+    /// Number of views, and of parameters per view.
     fn shape(&self) -> [usize; 2] {
         [self.depth.dims()[0], if self.optimise_fov { 7 } else { 6 }]
     }
 
-    /// The depth of the middle of the mesh at θ, `[views, 1]`.
+    /// Depth of the middle of the mesh at θ, `[views, 1]`.
     fn depth(&self, theta: Tensor<B, 1>) -> Tensor<B, 2> {
         let theta = theta.reshape(self.shape());
         let farther = theta.clone().narrow(1, 5, 1);
-        // A longer lens is farther away, so that what is seen stays as large.
+        // A longer lens is moved away, to keep the apparent size.
         let farther = if self.optimise_fov { farther + theta.narrow(1, 6, 1) } else { farther };
         self.depth.clone() * farther.exp()
     }
 
-    /// Cameras at θ, for what is looked at.
+    /// Cameras at θ, for the compared squares.
     fn cameras(&self, theta: Tensor<B, 1>) -> Pinholes<B> {
         let depth = self.depth(theta.clone());
         let theta = theta.reshape(self.shape());
@@ -244,12 +244,12 @@ impl<B: RasterBackend> MaskScene<B> {
         project(self.vertices.clone(), self.cameras(theta))
     }
 
-    /// The mesh stays in front of the camera, and nothing grows without end.
+    /// Keeps the mesh in front of the camera, and depth and focal length bounded.
     fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
         let theta = theta.reshape(self.shape());
         let zoom =
             self.optimise_fov.then(|| theta.clone().narrow(1, 6, 1).clamp(-FARTHEST, FARTHEST));
-        // A longer lens is farther away already.
+        // A longer lens has been moved away already.
         let farther = zoom.clone().unwrap_or_else(|| self.nearest.zeros_like());
         let depth = theta.clone().narrow(1, 5, 1);
         let depth = (depth + farther.clone()).max_pair(self.nearest.clone()).clamp_max(FARTHEST);
@@ -281,7 +281,7 @@ impl MaskScene<HostBackend> {
     }
 }
 
-/// A rotation without the rounding of f32.
+/// A rotation, orthonormalized against rounding in f32.
 fn orthonormal([x, y, _]: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
     let unit = |a: [f64; 3]| a.map(|value| value / dot(a, a).sqrt());

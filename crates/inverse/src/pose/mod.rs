@@ -1,8 +1,8 @@
-//! POSE as a problem: from which camera does a mesh have a given silhouette?
+//! POSE as a problem: find the camera pose at which a mesh has a given silhouette.
 //!
-//! The mesh is first turned by the rotation of the target camera, then viewed from the pose (distance, elevation, azimuth). So the answer
-//! is elevation 0, azimuth 0 and the target's distance. Instances in a batch are independent, one view each. Source: Wu et al. 2024,
-//! Sec. 5.1; docs/notes.md, Pose.
+//! The mesh is first turned by the rotation of the target camera, then viewed from the pose (distance, elevation,
+//! azimuth). The answer is therefore elevation 0, azimuth 0 and the target's distance. Instances in a batch are
+//! independent, one view each. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Pose.
 
 mod coloured;
 mod found;

@@ -11,13 +11,13 @@ use super::{
 };
 use crate::{Method, ScheduledSoftness};
 
-/// Steps on many pixels unless asked for: by a mask, and by colours. Only silhouettes are brought to their least squares.
+/// Default steps at high resolution: by a mask, and by colours. Only silhouettes are refined by least squares afterwards.
 const FINE_STEPS: [usize; 2] = [20, 80];
 
-/// A function that receives the number of each step and the least loss.
+/// A function that receives the number of each step and the smallest loss.
 type Visit<'a> = Box<dyn FnMut(usize, f64) -> anyhow::Result<()> + 'a>;
 
-/// The search for the camera from which a mesh has a given silhouette.
+/// The search for the camera pose at which a mesh has a given silhouette.
 ///
 /// ```
 /// use softrast_inverse::pose::PoseSearch;
@@ -49,11 +49,11 @@ pub struct PoseSearch<'a, S = EdgeSoftness> {
 }
 
 impl<'a> PoseSearch<'a> {
-    /// Learning rate on few pixels unless asked for, in radians.
+    /// Default learning rate at low resolution, in radians.
     pub const LEARNING_RATE: f64 = 0.03;
 
-    /// A search for the pose of `mesh`, anywhere and in any unit, under the intrinsics of `lens`: all directions and rolls are tried, with the
-    /// softness that was learned on POSE.
+    /// A search for the pose of `mesh`, anywhere and in any unit, under the intrinsics of `lens`:
+    /// over all directions and rolls, with the learned softness of POSE.
     #[allow(
         clippy::missing_panics_doc,
         reason = "the softness comes with the crate, which tests read"
@@ -73,14 +73,14 @@ impl<'a> PoseSearch<'a> {
         }
     }
 
-    /// Steps that [`PoseSearch::starts`] takes for a mask.
+    /// Number of steps of [`PoseSearch::starts`] for a mask.
     pub fn steps_of_starts(mask: &Picture) -> usize {
         steps_of_starts(mask)
     }
 }
 
 impl<'a, S: Softness> PoseSearch<'a, S> {
-    /// From this pose alone: its rotation and translation.
+    /// Starts from the rotation and translation of this pose only.
     #[must_use]
     pub fn starting_at(mut self, pose: &Pinhole) -> Self {
         (self.camera.rotation, self.camera.translation) = (pose.rotation, pose.translation);
@@ -88,31 +88,31 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
         self
     }
 
-    /// With so many steps on many pixels.
+    /// Sets the number of steps at high resolution.
     #[must_use]
     pub fn with_fine_steps(self, steps: usize) -> Self {
         Self { fine_steps: Some(steps), ..self }
     }
 
-    /// With so many pixels a side of these.
+    /// Sets the pixels a side at high resolution.
     #[must_use]
     pub fn with_fine_size(self, size: usize) -> Self {
         Self { fine_size: size, ..self }
     }
 
-    /// With another learning rate on few pixels, in radians; on many it is a third of that.
+    /// Sets the learning rate at low resolution, in radians; at high resolution it is a third of that.
     #[must_use]
     pub fn with_learning_rate(self, learning_rate: f64) -> Self {
         Self { learning_rate, ..self }
     }
 
-    /// Optimises the focal length too, once poses have been found with the given one: of both the better is taken.
+    /// Also optimises the focal length, from the poses found with the given one; the better of both are returned.
     #[must_use]
     pub fn optimising_fov(self) -> Self {
         Self { optimise_fov: true, ..self }
     }
 
-    /// With another softness.
+    /// Sets the softness.
     #[must_use]
     pub fn with_method<T: Softness>(self, method: Method<T>) -> PoseSearch<'a, T> {
         PoseSearch {
@@ -128,47 +128,47 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
         }
     }
 
-    /// Shows `visit` the number of each step and the least loss. An error of it ends the search.
+    /// Passes the number of each step and the smallest loss to `visit`. An error of it ends the search.
     #[must_use]
     pub fn progress(self, visit: impl FnMut(usize, f64) -> anyhow::Result<()> + 'a) -> Self {
         Self { visit: Box::new(visit), ..self }
     }
 
-    /// Steps that [`run`](Self::run) takes for a mask.
+    /// Number of steps of [`run`](Self::run) for a mask.
     pub fn steps(&self, mask: &Picture) -> usize {
         self.search(false).steps(mask, false, self.started)
     }
 
-    /// Steps that [`run_by_colour`](Self::run_by_colour) takes for a view.
+    /// Number of steps of [`run_by_colour`](Self::run_by_colour) for a view.
     pub fn steps_by_colour(&self, view: &PaintedView) -> usize {
         self.search(true).steps(&view.view.mask, true, self.started)
     }
 
-    /// Checks what [`run`](Self::run) would refuse at once.
+    /// Checks the inputs of [`run`](Self::run).
     ///
     /// # Errors
     ///
-    /// If nothing or all of the mask is white, the mesh has no extent, or the start does not see it.
+    /// If nothing or all of the mask is white, the mesh has no extent, or the mesh is not in front of the start camera.
     pub fn check(&self, mask: &Picture) -> anyhow::Result<()> {
         check(self.mesh, mask, &self.camera, self.started)
     }
 
-    /// The poses from which the mesh has the silhouette of `mask`, the best first: those after it are at least 6 degrees from all before,
-    /// look otherwise from some side, and fit nearly as well: their `IoU` is less by 0.03 at most.
+    /// The poses at which the mesh has the silhouette of `mask`, best first. Further poses are at least 6 degrees from all before them,
+    /// have other silhouettes from some side, and an `IoU` that is at most 0.03 lower.
     ///
-    /// A mask that reaches a side of the picture ([`cut_sides`](softrast_views::cut_sides)) may belong to an object that goes on there: only
-    /// what is in the picture is compared, and sizes and places of the whole object are tried.
+    /// A mask that reaches a side of the picture ([`cut_sides`](softrast_views::cut_sides)) may belong to an object that extends beyond it:
+    /// then only pixels in the picture are compared, and several sizes and places of the whole object are tried.
     ///
     /// # Errors
     ///
-    /// The errors of [`check`](Self::check), of the function that sees the progress and of the device.
+    /// The errors of [`check`](Self::check), of the progress function and of the device.
     pub fn run<B: RasterBackend>(mut self, mask: &Picture) -> anyhow::Result<Vec<FoundPose>> {
         self.found::<B>(&Target::new(mask, None)?)
     }
 
-    /// Finds poses by the colours of a picture too, where the vertices of the mesh have colours: they tell apart poses that look alike as
-    /// silhouettes. Poses are ranked by the `IoU` loss and the error of colours together; those after the first may look like it as
-    /// silhouettes, and have losses that are larger by 0.03 at most. The camera of the view is not read.
+    /// Finds poses by the colours of a picture too, if the vertices of the mesh have colours: they distinguish poses
+    /// with similar silhouettes. Poses are ranked by the sum of the `IoU` loss and the colour loss; further poses may
+    /// have the silhouettes of the first, and have losses at most 0.03 higher. The camera of the view is ignored.
     ///
     /// # Errors
     ///
@@ -182,8 +182,8 @@ impl<'a, S: Softness> PoseSearch<'a, S> {
         self.found::<B>(&Target::new(&view.view.mask, Some(view))?)
     }
 
-    /// The poses that [`run`](Self::run) improves on many pixels where nothing is known, the most promising first: at most six, or ten
-    /// where the picture cuts the object off.
+    /// The poses that [`run`](Self::run) without a start improves at high resolution, the most
+    /// promising first: at most six, or ten if the picture cuts the object off.
     ///
     /// # Errors
     ///

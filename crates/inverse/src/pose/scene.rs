@@ -8,9 +8,9 @@ use softrast_tensor::{Tensor, numbers, tensor};
 
 use crate::{Targets, pose::PoseInstance};
 
-/// How much nearer than its farthest vertex a camera may not come, as a factor.
+/// Least distance of a camera from the origin, as a multiple of that of the farthest vertex.
 const CLEARANCE: f64 = 1.05;
-/// Half the field of view stays within these bounds, in degrees.
+/// Bounds of half the field of view, in degrees.
 const HALF_FOV_DEG: [f64; 2] = [1.0, 80.0];
 
 /// Instances of POSE that are solved together, one view each.
@@ -19,7 +19,7 @@ const HALF_FOV_DEG: [f64; 2] = [1.0, 80.0];
 /// an optimised field of view `[views, 4]`, the last being half of it in degrees.
 #[derive(Clone, Debug)]
 pub struct PoseScene<B: RasterBackend> {
-    /// The mesh as each target camera sees it, turned but not moved: `[views, vertices, 3]`.
+    /// The mesh along the axes of each target camera, rotated but not translated: `[views, vertices, 3]`.
     turned: Tensor<B, 3>,
     /// Field of view of each view in degrees, `[views, 1]`, unless θ holds half of it.
     fov: Option<Tensor<B, 2>>,
@@ -34,7 +34,7 @@ pub struct PoseScene<B: RasterBackend> {
 impl<B: RasterBackend> PoseScene<B> {
     /// Instances of `mesh` on images of `size` × `size` pixels.
     ///
-    /// The start's field of view is used as it is, and optimised if `optimise_fov`.
+    /// The start's field of view is used unchanged, and optimised if `optimise_fov`.
     ///
     /// # Panics
     ///
@@ -47,7 +47,7 @@ impl<B: RasterBackend> PoseScene<B> {
             (orbits(|of| of.target), orbits(|of| of.start));
         let [turned, target] = match B::ON_HOST {
             true => seen_by::<B>(mesh, &ends, size),
-            // In a browser nothing that lies on a GPU can be read at once, and a hard silhouette is drawn on the CPU.
+            // In a browser, data on a GPU cannot be read synchronously, and hard silhouettes are drawn on the CPU.
             false => seen_by::<HostBackend>(mesh, &ends, size).map(|seen| {
                 let shape = seen.dims();
                 tensor(numbers(seen), shape)
@@ -77,24 +77,24 @@ impl<B: RasterBackend> PoseScene<B> {
         theta.reshape(self.start.dims())
     }
 
-    /// Hard silhouettes to arrive at, `[views, size, size]`.
+    /// Target hard silhouettes, `[views, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
     }
 
-    /// The mesh as seen at θ, `[views, vertices, 3]`.
+    /// The projected mesh at θ, `[views, vertices, 3]`.
     pub fn project(&self, theta: Tensor<B, 2>) -> Projected<B> {
         let fov = self.fov.clone().unwrap_or_else(|| theta.clone().narrow(1, 3, 1) * 2.0);
         project(self.turned.clone(), Tensor::cat(vec![theta.narrow(1, 0, 3), fov], 1))
     }
 
-    /// Hard silhouettes `[views, size, size]` of vertices that [`PoseScene::project`] gave.
+    /// Hard silhouettes `[views, size, size]` of vertices from [`PoseScene::project`].
     pub fn hard(&self, projected: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(projected, &self.faces, self.size)
     }
 
-    /// `IoU` loss of each `image` `[views, side, side]`, `[views]`; the side is the size of the scene, or
-    /// that halved some times.
+    /// `IoU` loss `[views]` of each `image` `[views, side, side]`; the side is the size of the
+    /// scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         self.targets.iou_loss(image)
     }
@@ -104,11 +104,11 @@ impl<B: RasterBackend> PoseScene<B> {
         &self.targets
     }
 
-    /// θ moved to the nearest pose that is allowed.
+    /// Projects θ onto the allowed poses.
     ///
-    /// The camera stays outside the ball around the origin that holds the mesh, with 5 % to spare,
-    /// so that the whole mesh is in front of it (a step of Adam can be 0.3 world units, whatever
-    /// there is to gain); an instance that starts or ends nearer may go that near. Half the field of
+    /// The camera stays outside the ball around the origin that contains the mesh, with a margin of
+    /// 5 %, so that the whole mesh is in front of it (a step of Adam can be 0.3 world units for any
+    /// gradient); an instance that starts or ends nearer may approach that far. Half the field of
     /// view stays within 1 to 80 degrees. Not in the paper, whose released code lets the mesh pass
     /// through the camera (docs/notes.md, Faces behind the camera).
     pub fn allowed(&self, theta: Tensor<B, 2>) -> Tensor<B, 2> {
@@ -122,7 +122,7 @@ impl<B: RasterBackend> PoseScene<B> {
     }
 }
 
-/// A mesh along the axes of each camera `[views, vertices, 3]`, and its hard silhouettes there `[views, size, size]`.
+/// The mesh along the axes of each camera `[views, vertices, 3]`, and its hard silhouettes `[views, size, size]`.
 fn seen_by<B: RasterBackend>(mesh: &Mesh, cameras: &[Orbit], size: usize) -> [Tensor<B, 3>; 2] {
     let (views, count, device) = (cameras.len(), mesh.positions().len(), Default::default());
     let cameras = Orbit::tensors::<B>(cameras, &device);
@@ -135,7 +135,7 @@ fn seen_by<B: RasterBackend>(mesh: &Mesh, cameras: &[Orbit], size: usize) -> [Te
     [turned, silhouettes]
 }
 
-/// Distance from the origin beyond which a camera has the whole mesh in front of it.
+/// Distance from the origin beyond which the whole mesh is in front of a camera.
 pub fn nearest_distance(mesh: &Mesh) -> f64 {
     let radius = |p: [f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
     CLEARANCE * mesh.triangles().flatten().map(radius).fold(0.0, f64::max)

@@ -16,43 +16,43 @@ use super::{
 use crate::{InverseProblem, Iterate, Method, SolveConfig, minimize, silhouette_pixels};
 use softrast_views::{Frame, Picture, bounding_ball, coloured_pixels, cut_sides, mask_iou};
 
-/// A look and coarse steps are at the mesh with detail of this fraction of its diameter merged, about a pixel and a half.
+/// Low-resolution stages use the mesh with details of this fraction of its diameter merged, about a pixel and a half.
 const DETAIL: f64 = 1.0 / 20.0;
-/// A mesh whose surface is mostly such detail is looked at as it is.
+/// Least share of the surface that remains after merging details; otherwise the mesh is used unchanged.
 const LEAST_AREA: f64 = 0.4;
-/// A pose whose error on few pixels is larger than the least by more than this is given up.
+/// Poses are dropped if their low-resolution error exceeds the smallest by more than this.
 const PROMISING_MARGIN: f64 = 0.08;
-/// Starts that differ by less are one.
+/// Starts that differ by less are merged.
 const APART_DEG: f64 = 12.0;
-/// Answers that differ by less are one.
+/// Answers that differ by less are merged.
 const ANSWERS_APART_DEG: f64 = 6.0;
-/// Poses are one, however they are turned, if the silhouettes of the mesh from three sides overlap by so much, as those of a vase do.
+/// Poses with any rotation are merged if the mesh's silhouettes from three sides have at least this `IoU`, as for the turns of a vase.
 pub(super) const DUPLICATE_IOU: f64 = 0.985;
-/// Pixels a side of these.
+/// Pixels a side of these silhouettes.
 const SIDE_VIEW: usize = 48;
-/// Poses of the first look that are improved on few pixels, a little, and the steps of that.
+/// Poses of the coarse search that are improved a little at low resolution, and the steps of that stage.
 const STARTS: (usize, usize) = (128, 12);
-/// Pixels a side of that, and of what follows on few pixels.
+/// Pixels a side of the low-resolution stages.
 const COARSE_SIZE: usize = 48;
 /// Most answers.
 const ANSWERS: usize = 6;
-/// How much less than the best `IoU` a pose may have to count as another answer.
+/// Largest difference to the best `IoU` of a further answer.
 const BEST_MARGIN: f64 = 0.03;
 
-/// What follows for the poses that were improved a little.
+/// Stages after the first improvement of poses.
 struct Stages {
-    /// Those that are improved on few pixels further, and the steps of that.
+    /// Poses that are improved further at low resolution, and the steps of that stage.
     coarse: (usize, usize),
-    /// Those of them that are improved on many pixels.
+    /// Poses of the coarse stage that are improved at high resolution.
     fine: usize,
-    /// Those of them that are improved on many pixels once more.
+    /// Poses of the fine stage that are improved at high resolution once more.
     last: usize,
 }
 
 impl Stages {
     const OF_WHOLE: Self = Self { coarse: (24, 48), fine: 6, last: 0 };
-    /// A part of an outline fits more poses nearly as well, and size, place and rotation make up for each other, so it takes more steps. Of 20
-    /// views of the fox that lack 30 to 60 % of its silhouette, one more was found than with the stages for whole ones.
+    /// A partial outline fits more poses nearly as well, and size, place and rotation compensate for each other, so it takes more steps. On
+    /// 20 views of the fox without 30 to 60 % of its silhouette, these stages find one more than those for whole silhouettes.
     const OF_CUT: Self = Self { coarse: (40, 72), fine: 10, last: 3 };
 
     fn of(cut: bool) -> Self {
@@ -60,32 +60,33 @@ impl Stages {
     }
 }
 
-/// Poses that are brought to their least squares.
+/// Poses that are refined by least squares.
 const SHARPENED: usize = 3;
-/// Steps that the last stage counts as.
+/// Steps that least squares count as in the progress.
 const SHARPENING_STEPS: usize = 16;
-/// Factors of the focal length from which the best pose begins where it is optimised (with colours the best few), and the least depth of the middle of the mesh, in its radii.
+/// Factors of the focal length for the start of the best pose (by colour, of the best few) if it is
+/// optimised, and the least depth of the middle of the mesh, in its radii.
 const ZOOMS: [f64; 3] = [0.65, 1.0, 1.5];
 const NEAREST: f64 = 1.2;
 
-/// How poses are looked for; see [`PoseSearch`](super::PoseSearch).
+/// Settings of a search for poses; see [`PoseSearch`](super::PoseSearch).
 #[derive(Clone, Copy)]
 pub(super) struct Search {
-    /// Steps on many pixels.
+    /// Steps at high resolution.
     pub(super) fine_steps: usize,
-    /// Pixels a side of these.
+    /// Pixels a side at high resolution.
     pub(super) fine_size: usize,
-    /// Learning rate on few pixels, in radians; on many it is a third of that.
+    /// Learning rate at low resolution, in radians; at high resolution it is a third of that.
     pub(super) learning_rate: f64,
     pub(super) optimise_fov: bool,
 }
 
-/// Steps of a search for the poses from which it goes on, where nothing is known.
+/// Steps of the search for starts, without a given start.
 pub(super) fn steps_of_starts(mask: &Picture) -> usize {
     STARTS.1 + Stages::of(!cut_sides(mask).is_empty()).coarse.1
 }
 
-/// Checks what a search refuses at once.
+/// Checks the inputs of a search.
 pub(super) fn check(
     mesh: &Mesh,
     mask: &Picture,
@@ -105,7 +106,7 @@ pub(super) fn check(
 }
 
 impl Search {
-    /// Steps that a search takes for a mask, or for a picture that is `painted` too, from a start or from anywhere.
+    /// Steps of a search for a mask, or by colour if `painted`; from a given start, or without.
     pub(super) fn steps(&self, mask: &Picture, painted: bool, started: bool) -> usize {
         let Stages { last, .. } = Stages::of(!cut_sides(mask).is_empty());
         let fine = (1 + usize::from(last > 0)) * self.fine_steps;
@@ -117,7 +118,7 @@ impl Search {
         fine + last + if started { 0 } else { steps_of_starts(mask) }
     }
 
-    /// The poses that fit the target, the best first. `camera` has the intrinsics, and where to start if it is `started`.
+    /// The poses that fit the target, best first. `camera` has the intrinsics, and the start pose if `started`.
     pub(super) fn found<B: RasterBackend>(
         &self,
         mesh: &Mesh,
@@ -177,7 +178,7 @@ impl Search {
         Ok(nearly.map(|(pose, _)| in_world(pose)).collect())
     }
 
-    /// The poses that a search improves on many pixels where nothing is known, the most promising first.
+    /// The poses that a search without a start improves at high resolution, the most promising first.
     pub(super) fn starts<B: RasterBackend>(
         &self,
         mesh: &Mesh,
@@ -210,10 +211,10 @@ impl Search {
             "no pose can be searched for in a mask that is so narrow: give a pose to start from (--start)"
         );
         let mut begun = 0;
-        // Few steps already tell the hopeless apart: many starts are had for little.
+        // A few steps suffice to drop hopeless poses, so many starts are cheap.
         let Stages { coarse, fine, .. } = Stages::of(target.cut);
         for ((_, steps), left) in [(STARTS, coarse.0), (coarse, fine)] {
-            // Silhouettes bring a pose near for less time than colours; these say then which it is.
+            // Silhouettes approach a pose faster than colours do; colours then rank the results.
             let poses = target.poses(found.into_iter().map(|(start, _)| start), false);
             let stage = SolveConfig { steps, size: COARSE_SIZE, learning_rate: self.learning_rate };
             let better = self.improved::<B>(&few, poses, method, &stage, begun, visit)?;
@@ -225,8 +226,8 @@ impl Search {
         Ok(found.map(|(start, _)| start).collect())
     }
 
-    /// These poses, the first few at their least squares: with the focal length that they have and, if it is optimised, with any. `visit` sees
-    /// the share that is done.
+    /// These poses, the first few refined by least squares: with their focal length and, if it is
+    /// optimised, with a free one. `visit` receives the share that is done.
     fn sharpened(
         &self,
         mesh: &Mesh,
@@ -250,12 +251,12 @@ impl Search {
             poses.collect::<anyhow::Result<Vec<_>>>()
         };
         let (fixed, free) = (sharp(best, false)?, sharp(zoomed, true)?);
-        // Squares choose among several focal lengths of one pose: an IoU counts whole pixels.
+        // Squared differences rank the focal lengths of one pose: an IoU counts whole pixels.
         let free = apart(free, ANSWERS, ANSWERS_APART_DEG, None);
         Ok([&fixed, others, &free].concat())
     }
 
-    /// Poses with the error of their hard image on few pixels: with colours, if they are asked for.
+    /// Poses with the low-resolution error of their hard image: by colour, if the target has colours; else as given.
     fn judged(
         &self,
         mesh: &Mesh,
@@ -273,13 +274,13 @@ impl Search {
         poses.into_iter().zip(losses).map(|((camera, _), loss)| (camera, loss)).collect()
     }
 
-    /// How poses are improved on many pixels.
+    /// Settings of the high-resolution stage.
     fn fine(&self) -> SolveConfig {
         let learning_rate = self.learning_rate / 3.0;
         SolveConfig { size: self.fine_size, steps: self.fine_steps, learning_rate }
     }
 
-    /// Poses that are improved side by side: the best of the way of each by its hard image, and the error of that.
+    /// Poses that are improved together: the iterate of each with the smallest error of the hard image, and that error.
     fn improved<B: RasterBackend>(
         &self,
         mesh: &Mesh,
@@ -305,7 +306,7 @@ impl Search {
     }
 }
 
-/// The camera of a frame of the mesh with other focal lengths, from where the middle of the mesh looks as large.
+/// The camera, in the frame of the mesh, with other focal lengths and depths at which the mesh appears equally large.
 fn zoomed(camera: &Pinhole) -> impl Iterator<Item = Pinhole> {
     let [x, y, depth] = camera.translation;
     let zooms = ZOOMS.into_iter().filter(move |zoom| zoom * depth > NEAREST);
@@ -317,7 +318,7 @@ fn zoomed(camera: &Pinhole) -> impl Iterator<Item = Pinhole> {
     })
 }
 
-/// A mesh without what cannot be told on few pixels.
+/// A mesh without details below the low resolution.
 pub(super) fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
     let (_, radius) = bounding_ball(mesh);
     let merged = mesh.clustered(DETAIL * 2.0 * radius);
@@ -325,8 +326,8 @@ pub(super) fn coarse(mesh: &Mesh) -> Cow<'_, Mesh> {
     merged.map_or(Cow::Borrowed(mesh), Cow::Owned)
 }
 
-/// The best so many of these, each at least so many degrees from all that are better; with a mesh, only those at which it looks otherwise,
-/// so that the turns of a vase are one pose.
+/// The best `count` of these, each at least this many degrees from all better ones; with a mesh,
+/// also only those with different silhouettes, so that the turns of a vase are one pose.
 fn apart<P: Copy + Borrow<Pinhole>>(
     mut poses: Vec<(P, f64)>,
     count: usize,
@@ -354,7 +355,7 @@ fn apart<P: Copy + Borrow<Pinhole>>(
     kept.into_iter().map(|(pose, _)| pose).collect()
 }
 
-/// Silhouettes of a mesh that is turned about the middle of a ball, along each of its axes then: from the camera, from beside and from above.
+/// Silhouettes of a rotated mesh along each axis, centred on a ball: from the front, the side and above.
 pub(super) fn from_three_sides(
     mesh: &Mesh,
     (middle, radius): ([f64; 3], f64),
@@ -366,7 +367,7 @@ pub(super) fn from_three_sides(
     });
     let positions: Vec<[f64; 3]> = positions.collect();
     let views = [[0, 1], [2, 1], [0, 2]];
-    // Without perspective, at depth 1.
+    // Orthographic, at depth 1.
     let seen =
         views.iter().flat_map(|&[x, y]| positions.iter().flat_map(move |p| [p[x], p[y], 1.0]));
     let seen = tensor::<HostBackend, 3>(seen.collect(), [views.len(), positions.len(), 3]);
@@ -374,7 +375,7 @@ pub(super) fn from_three_sides(
     drawn.into_iter().map(|level| level > 0.5).collect()
 }
 
-/// Overlap over union.
+/// Intersection over union.
 pub(super) fn overlap(a: &[bool], b: &[bool]) -> f64 {
     let count = |of: fn(bool, bool) -> bool| a.iter().zip(b).filter(|&(&a, &b)| of(a, b)).count();
     count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64

@@ -1,11 +1,11 @@
-//! Where a silhouette lies in a picture that cuts it off: all places on few pixels, of which each row is a number of as many bits.
+//! The place of a silhouette in a picture that cuts it off: searches all places at low resolution, with rows as bit masks.
 
-/// Cells between places that are tried first.
+/// Cells between the places of the first pass.
 const STRIDE: isize = 2;
-/// A silhouette of which the picture shows a smaller or larger area than that of the mask, by this factor, is not compared.
+/// Silhouettes are skipped if their area within the picture differs from that of the mask by more than this factor.
 const AREAS: f64 = 1.3;
 
-/// A mask, and the part of its square that the picture covers.
+/// A mask, and the covered part of its square.
 pub(super) struct Window {
     rows: [u32; Self::SIDE],
     area: u32,
@@ -13,10 +13,10 @@ pub(super) struct Window {
     covered: [[isize; 2]; 2],
 }
 
-/// A whole silhouette in some size, with the middle of the mesh in its middle.
+/// A whole silhouette at some size, with the middle of the mesh at its centre.
 pub(super) struct Stencil {
     rows: [u64; Self::SIDE],
-    /// How many cells are on above and to the left of each corner of cells.
+    /// Summed-area table: number of cells that are on above and to the left of each corner.
     sums: Vec<u16>,
 }
 
@@ -24,7 +24,7 @@ impl Stencil {
     /// Cells a side.
     pub(super) const SIDE: usize = 64;
 
-    /// An image `[SIDE * SIDE]`, each cell of which becomes so many; what is beyond the sides then is left out.
+    /// An image `[SIDE * SIDE]`, enlarged by this factor about its centre and cropped.
     pub(super) fn new(image: &[f64], larger: f64) -> Self {
         let half = Self::SIDE as f64 / 2.0;
         let from = |k: usize| {
@@ -51,7 +51,7 @@ impl Stencil {
         Self { rows, sums }
     }
 
-    /// How many cells are on between these columns and rows.
+    /// Number of cells that are on between these columns and rows.
     fn area(&self, [low, high]: [[isize; 2]; 2]) -> u32 {
         let held = |at: isize| at.clamp(0, Self::SIDE as isize) as usize;
         let sum = |x: isize, y: isize| u32::from(self.sums[held(y) * (Self::SIDE + 1) + held(x)]);
@@ -63,7 +63,7 @@ impl Window {
     /// Cells a side.
     pub(super) const SIDE: usize = 32;
 
-    /// A mask on few pixels, and how much of each the picture covers.
+    /// A mask at low resolution, and the share of each pixel that the picture covers.
     pub(super) fn new(levels: &[f64], covered: &[f64]) -> Self {
         let mut rows = [0; Window::SIDE];
         let [mut low, mut high] = [[Window::SIDE as isize; 2], [0; 2]];
@@ -80,13 +80,13 @@ impl Window {
         Self { rows, area, covered: [low, high] }
     }
 
-    /// Cells of the mask.
+    /// Number of mask cells.
     pub(super) fn area(&self) -> f64 {
         f64::from(self.area)
     }
 
-    /// Where the middle of a silhouette lies in the window, in cells, if it overlaps the mask most within the picture, and overlap over
-    /// union of that.
+    /// The position of a silhouette's middle in the window, in cells, at the largest overlap with
+    /// the mask within the picture, and the intersection over union there.
     pub(super) fn best(&self, stencil: &Stencil) -> Option<([f64; 2], f64)> {
         let (side, window) = (Stencil::SIDE as isize, Window::SIDE as isize);
         let all = || (1 - side..window).step_by(STRIDE as usize);
@@ -101,7 +101,7 @@ impl Window {
         Some((at.map(|k| (k + side / 2) as f64), overlap))
     }
 
-    /// Overlap over union of the mask and a silhouette whose first cell is there, if their areas are alike.
+    /// Intersection over union of the mask and a silhouette at this first cell; `None` if their areas differ too much.
     fn overlap(&self, stencil: &Stencil, [left, top]: [isize; 2]) -> Option<f64> {
         let shown = stencil.area(self.covered.map(|[x, y]| [x - left, y - top]));
         let larger = f64::from(shown) / f64::from(self.area);
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_silhouette_is_found_where_the_picture_cuts_it_off() {
-        // A flag on a pole, of which the picture shows what is right of column 10 of the window.
+        // A flag on a pole; the picture covers the columns right of column 10 of the window.
         let on = |x: f64, y: f64| {
             (x.abs() < 9.0 && y.abs() < 4.0) || (x + 7.0).abs() < 2.0 && y > 0.0 && y < 15.0
         };

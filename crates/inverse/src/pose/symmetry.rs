@@ -3,26 +3,26 @@ use softrast_views::bounding_ball;
 
 use super::search::{DUPLICATE_IOU, coarse, from_three_sides, overlap};
 
-/// Turns by a whole part of 360 degrees that are tried, from many parts to two.
+/// Orders of rotational symmetry that are tried, highest first.
 const PARTS: [u32; 5] = [6, 5, 4, 3, 2];
-/// Turns of a round thing, in degrees: no two are parts of one circle.
+/// Angles that together only a round body has as symmetries, in degrees.
 const ANY: [f64; 2] = [10.0, 37.0];
-/// Steps towards an eigenvector. Two that are still mixed then are as good as each other.
+/// Power iterations. Two eigenvectors still mixed after these have nearly equal eigenvalues.
 const STEPS: usize = 60;
-/// The cosine of the angle between axes that count as one.
+/// Axes with a larger cosine of their angle are merged.
 const SAME_AXIS: f64 = 0.999;
 
-/// A turn after which a mesh has the same silhouettes.
+/// A rotation that preserves the silhouettes of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symmetry {
     /// The axis, of length 1, through the middle of the mesh.
     pub axis: [f64; 3],
-    /// The least such turn about it; None if any turn is one, as for a bottle.
+    /// The smallest such rotation about it; None if all rotations are symmetries, as for a bottle.
     pub degrees: Option<f64>,
 }
 
-/// The axes about which a mesh can be turned so that its silhouettes from three sides, on a few pixels, stay the same: no mask tells such poses
-/// apart. The axes tried are those of its file and of its inertia.
+/// The axes of rotations that preserve the silhouettes of a mesh from three sides, at low resolution: no mask
+/// distinguishes such poses. The candidate axes are the mesh's coordinate axes and its principal axes of inertia.
 ///
 /// ```
 /// use softrast_inverse::pose::symmetries;
@@ -45,7 +45,7 @@ pub fn symmetries(mesh: &Mesh) -> Vec<Symmetry> {
         }
     }
     let found = axes.into_iter().filter_map(|axis| {
-        // The axis first, so that the sides are along and across it.
+        // The axis comes first, so that the views are along and across it.
         let frame = frame(axis);
         let seen = |rotation| from_three_sides(mesh, (middle, radius), rotation);
         let still = seen(frame);
@@ -92,7 +92,7 @@ fn turn(axis: [f64; 3], angle: f64) -> [[f64; 3]; 3] {
     })
 }
 
-/// A rotation whose first row is an axis.
+/// A rotation whose first row is `axis`.
 fn frame(axis: [f64; 3]) -> [[f64; 3]; 3] {
     let least = (0..3).min_by(|&a, &b| axis[a].abs().total_cmp(&axis[b].abs())).unwrap_or(0);
     let mut other = [0.0; 3];
@@ -101,13 +101,13 @@ fn frame(axis: [f64; 3]) -> [[f64; 3]; 3] {
     [axis, second, cross(axis, second)]
 }
 
-/// The middle of the surface, which lies on every axis of symmetry; and the axes along which it reaches farthest and least far from there, and the one
-/// across both.
+/// The centroid of the surface, which lies on every axis of symmetry, and the principal axes of
+/// inertia: that of largest extent, that of smallest, and the axis orthogonal to both.
 fn inertia(mesh: &Mesh) -> ([f64; 3], Vec<[f64; 3]>) {
     let (near_middle, radius) = bounding_ball(mesh);
     let positions = mesh.positions();
     let place = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - near_middle[k]) / radius);
-    // The middle of each face, by its area.
+    // The centroid of each face, weighted by area.
     let middles = mesh.faces().iter().map(|face| {
         let [a, b, c] = face.map(|vertex| place(positions[vertex as usize]));
         let side = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
@@ -139,7 +139,7 @@ fn inertia(mesh: &Mesh) -> ([f64; 3], Vec<[f64; 3]>) {
     (middle, axes)
 }
 
-/// The eigenvector of the largest eigenvalue, about.
+/// The eigenvector of the largest eigenvalue, approximately.
 fn eigenvector(matrix: [[f64; 3]; 3]) -> [f64; 3] {
     let mut vector = unit([0.9, 0.7, 0.5]);
     for _ in 0..STEPS {

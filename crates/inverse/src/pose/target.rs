@@ -3,12 +3,12 @@ use softrast_raster::Pinhole;
 use super::masks::MaskPose;
 use softrast_views::{PaintedView, Picture, cut_sides};
 
-/// What a pose is told by: a mask, its square that is looked at, and colours if they tell it too.
+/// The target of a pose search: a mask, its compared square, and colours if available.
 #[derive(Clone, Copy)]
 pub(super) struct Target<'a> {
     pub(super) mask: &'a Picture,
     pub(super) square: [f64; 3],
-    /// Whether the object may go on beyond the picture.
+    /// Whether the object may extend beyond the picture.
     pub(super) cut: bool,
     pub(super) painted: Option<&'a PaintedView>,
 }
@@ -19,7 +19,7 @@ impl<'a> Target<'a> {
         Ok(Self { mask, square, cut: !cut_sides(mask).is_empty(), painted })
     }
 
-    /// Starts of poses, told by silhouettes alone or by colours too.
+    /// Pose problems from these starts, by silhouettes alone or by colours too.
     pub(super) fn poses(
         &self,
         starts: impl IntoIterator<Item = Pinhole>,

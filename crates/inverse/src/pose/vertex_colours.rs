@@ -7,29 +7,29 @@ use softrast_softness::{DepthSoftness, EdgeSoftness, Family, Softness};
 use softrast_tensor::{Tensor, TensorData, numbers};
 
 const EDGE: EdgeSoftness = EdgeSoftness::new(Family::Uniform);
-/// Half the width of the edge of a face, in pixels. A near face outweighs those behind it up to where its softness ends, so this one ends
-/// soon (docs/notes.md, Colour).
+/// Half width of the edge of a face, in pixels. A near face outweighs faces behind it within its
+/// support, so the support is small (docs/notes.md, Colour).
 const EDGE_PX: f64 = 0.1;
 const DEPTH: DepthSoftness = DepthSoftness::Family(Family::Exp);
-/// A face that is nearer by this part of the distance of the camera counts e times as much.
+/// A face nearer by this share of the camera's distance has e times the weight.
 const DEPTH_SCALE: f64 = 0.01;
-/// Depths of nearness 1 and 0, in distances of the camera from the origin, which is in the middle of the mesh.
+/// Depths of nearness 1 and 0, in units of the camera's distance from the origin, which is in the middle of the mesh.
 const PLANES: [f64; 2] = [0.0, 2.0];
 /// Largest error of a channel.
 const TOLERANCE: f64 = 1e-3;
 
-/// The colours of the vertices of a mesh, as cameras at any distance see them.
+/// The vertex colours of a mesh, for cameras at any distance.
 #[derive(Debug)]
 pub struct VertexColours<B: RasterBackend> {
     colours: Vec<[f64; 3]>,
     attributes: Attributes<B>,
     faces: Arc<[[u32; 3]]>,
-    /// By pixels a side. They are kept because their tables are.
+    /// Renderers by pixels a side, cached because of their tables.
     renderers: RefCell<BTreeMap<usize, ColourRenderer>>,
 }
 
 impl<B: RasterBackend> VertexColours<B> {
-    /// Of faces between vertices of these colours.
+    /// Vertex colours with the faces of their mesh.
     ///
     /// # Panics
     ///
@@ -44,14 +44,14 @@ impl<B: RasterBackend> VertexColours<B> {
         }
     }
 
-    /// What the mesh shows, `[views, 3, side, side]`, hardly softened: over black where it shows nothing.
+    /// The colours of the mesh `[views, 3, side, side]`, hardly softened, over black.
     ///
     /// `seen` `[views, vertices, 3]` holds x and y in NDC and the depth, `distance` `[views, 1]` that of each camera.
     pub fn soft(&self, seen: Projected<B>, distance: Tensor<B, 2>, side: usize) -> Tensor<B, 4> {
         let seen = seen.tensor();
         let [views, count, _] = seen.dims();
         let distance = distance.reshape([views, 1, 1]).expand([views, count, 1]);
-        // Perspective is the same in any unit, and in this one all meshes lie between the same planes.
+        // Perspective is the same in any unit; in this one all meshes lie between the same planes.
         let depth = seen.clone().narrow(2, 2, 1) / distance;
         let seen = Tensor::cat(vec![seen.narrow(2, 0, 2), depth], 2);
         let mut kept = self.renderers.borrow_mut();
@@ -68,7 +68,7 @@ impl<B: RasterBackend> VertexColours<B> {
         renderer.image(Projected::new(seen), &self.attributes, &background).narrow(1, 0, 3)
     }
 
-    /// The same without softness: at the centre of each pixel the colour of the nearest face. It has no gradient.
+    /// The hard colours `[views, 3, size, size]`: at the centre of each pixel the colour of the nearest face. They have no gradient.
     pub fn hard(&self, seen: Projected<B>, size: usize) -> Tensor<B, 4> {
         let nearest = nearest_faces(seen.clone(), &self.faces, size);
         let seen = seen.tensor();
@@ -87,7 +87,7 @@ impl<B: RasterBackend> VertexColours<B> {
                 for k in 0..3 {
                     let share = |corner: usize| weights[corner] * self.colours[face[corner]][k];
                     let level: f64 = (0..3).map(share).sum();
-                    // Rounding may place a centre just outside of its face.
+                    // By rounding, a centre may lie just outside its face.
                     image[k * size * size + pixel] = level.clamp(0.0, 1.0);
                 }
             }
@@ -96,7 +96,7 @@ impl<B: RasterBackend> VertexColours<B> {
     }
 }
 
-/// How much the corners of a face count in space at a place on the screen; of a face that has an area there and is before the camera.
+/// Barycentric coordinates in space of a point on the screen, for a face with non-zero area in front of the camera.
 fn in_space(corners: [[f64; 3]; 3], [x, y]: [f64; 2]) -> [f64; 3] {
     let on_screen = [0, 1, 2].map(|k| {
         let ([ax, ay, _], [bx, by, _]) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);

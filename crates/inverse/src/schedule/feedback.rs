@@ -2,48 +2,51 @@ use serde::{Deserialize, Serialize};
 
 use crate::softness_file::stored::LARGEST_LOGARITHM;
 
-/// How a run goes along the path of its scale by what it sees, and not by time: a closed loop.
+/// Adaptive schedule: the error of a run determines its progress, as a closed loop, instead of
+/// time.
 ///
-/// A run has a place on its path, 0 at first. From there it goes to the end, 1, in a number of steps, the slower the more its error falls. Where its error is too large for its place it is stuck: then it goes back to the beginning, from another start if the problem has
-/// one, as often as time allows. All fields but `patience` and `early` are logarithms.
+/// The progress goes from 0 to 1 in a number of steps, more slowly while the error falls. A run
+/// whose error is too large for its progress is stuck: it restarts at progress 0, from another
+/// start if the problem has one, while enough steps are left. All fields except `patience` and
+/// `early` are logarithms.
 ///
-/// A run of fewer steps than it was learned on goes the same way in larger steps: the path takes so many fewer of them, at a learning rate
-/// that is so much larger, but at most twice as large.
+/// A run of fewer steps than `steps` scales the schedule: proportionally fewer steps at a
+/// proportionally larger learning rate, at most twice as large.
 ///
-/// The error is that of the hard image, which a run can tell without knowing the answer. Not in the paper, whose softness is the same
-/// whatever happens.
+/// The error is that of the hard image, which needs no knowledge of the true scene. Not in the
+/// paper, whose softness is constant over a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Feedback {
     /// Steps of the runs that it was learned on; not learned itself.
     pub steps: usize,
-    /// Logarithm of the number of steps that the path takes while the error stays as it is, in a run of `steps` or more.
+    /// Logarithm of the number of steps from progress 0 to 1 at constant error, in a run of `steps` or more.
     pub passage: f64,
-    /// How much slower it goes while the error falls: the pace is multiplied by `(recent / earlier)^patience`, two running means of the
-    /// error over about 5 and 20 steps.
+    /// Exponent of the slowdown while the error falls: the pace is multiplied by `(recent /
+    /// earlier)^patience`, two running means of the error over about 5 and 20 steps.
     pub patience: f64,
-    /// Logarithm of the least error so far above which a run at the end of its path is stuck.
+    /// Logarithm of the error above which a run at progress 1 is stuck; it is compared with the least error since the last start.
     pub stuck: f64,
-    /// What is added to that at the beginning of the path, in proportion on the way to the end.
+    /// Added to `stuck` at progress 0, decreasing linearly to 0 at progress 1.
     pub early: f64,
-    /// Logarithm of the share of a passage that has to be left of a run to go back.
+    /// Logarithm of the steps that must be left for a restart, as a share of those from progress 0 to 1.
     pub room: f64,
-    /// Logarithm of what the learning rate is multiplied by at the end of the path, in proportion on the way there.
+    /// Logarithm of the factor of the learning rate at progress 1; proportional to the progress before.
     pub rate_end: f64,
 }
 
-/// Where a run is that follows its softness: a step of it is taken there.
+/// Progress and learning rate of a run at one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Part of the path, 0 to 1.
+    /// Progress along the schedule, 0 to 1.
     pub progress: f64,
-    /// What the learning rate is multiplied by.
+    /// Factor of the learning rate.
     pub rate: f64,
-    /// Whether the run was stuck, and begins again here.
+    /// Whether the run was stuck and restarts here.
     pub again: bool,
 }
 
-/// A run that follows a [`Feedback`].
+/// State of a run under a [`Feedback`].
 #[derive(Clone, Debug)]
 pub struct Follower {
     feedback: Feedback,
@@ -54,7 +57,7 @@ pub struct Follower {
     seen: Option<Seen>,
 }
 
-/// What a run has seen of its error since it last began.
+/// Running means and minimum of the error since the last start.
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     recent: f64,
@@ -62,21 +65,21 @@ struct Seen {
     least: f64,
 }
 
-/// Shares of the newest error in its running means.
+/// Weights of the newest error in the running means.
 const RECENT: f64 = 0.2;
 const EARLIER: f64 = 0.05;
-/// Added to both means, so that an error of 0 has a trend too.
+/// Added to both means, so that the trend is defined at an error of 0.
 const SMALL: f64 = 1e-3;
-/// Least share of the steps that it was learned on in which a run goes the same way: in larger steps it would miss the pose.
+/// Lower limit of the scaling of shorter runs, as a share of the steps learned on: larger steps would miss the pose.
 const SHORTEST: f64 = 0.5;
-/// Places are multiples of one over this, so that what is drawn with can be kept for the next time.
+/// Progress is rounded to multiples of one over this, so that renderers can be cached.
 const PLACES: f64 = 512.0;
 
 impl Feedback {
-    /// How many numbers it has.
+    /// Number of learned parameters.
     pub const PARAMETERS: usize = 6;
 
-    /// Where learning begins: a path that takes 100 steps, and an error above 0.05 at its end, or 0.22 halfway, that is too large.
+    /// Start of learning: 100 steps from progress 0 to 1; stuck above an error of 0.05 at the end, or 0.22 halfway.
     pub const START: Self = Self {
         steps: 300,
         passage: 4.6,
@@ -87,13 +90,13 @@ impl Feedback {
         rate_end: 0.0,
     };
 
-    /// Its numbers, in the order of the fields but the first.
+    /// Its parameters, in the order of the fields after the first.
     pub fn parameters(&self) -> [f64; Self::PARAMETERS] {
         let Self { steps: _, passage, patience, stuck, early, room, rate_end } = *self;
         [passage, patience, stuck, early, room, rate_end]
     }
 
-    /// The same with these numbers, in the order of the fields but the first.
+    /// This feedback with other parameters, in the order of the fields after the first.
     #[must_use]
     pub fn with(
         self,
@@ -102,12 +105,12 @@ impl Feedback {
         Self { passage, patience, stuck, early, room, rate_end, ..self }
     }
 
-    /// A run of so many steps that begins.
+    /// The state of a run of this many steps before the first.
     pub fn follow(&self, steps: usize) -> Follower {
         Follower { feedback: *self, steps, step: 0, progress: 0.0, seen: None }
     }
 
-    /// If it cannot be followed, says what was found and what was expected.
+    /// Returns the found and the expected value if it is invalid.
     pub(crate) fn check(&self) -> Result<(), String> {
         match self.parameters().into_iter().find(|x| x.is_nan() || x.abs() > LARGEST_LOGARITHM) {
             None => Ok(()),
@@ -119,8 +122,8 @@ impl Feedback {
 }
 
 impl Follower {
-    /// Where the next step is taken, given the error of the latest hard image; none before the first. An error that is not finite tells
-    /// nothing.
+    /// Progress and learning rate of the next step, given the error of the latest hard image, or
+    /// `None` before the first. A non-finite error is ignored.
     pub fn next(&mut self, error: Option<f64>) -> Place {
         if let Some(error) = error.filter(|error| error.is_finite()) {
             let seen = self.seen.unwrap_or(Seen { recent: error, earlier: error, least: error });
@@ -145,7 +148,7 @@ impl Follower {
         let place = Place { progress, rate: (rate_end * progress).exp() / shorter, again };
         let trend =
             self.seen.map_or(0.0, |seen| ((seen.recent + SMALL) / (seen.earlier + SMALL)).ln());
-        // A run always comes to the end of its path.
+        // The last step of a run is at progress 1.
         let pace = ((patience * trend).exp() / passage).max((1.0 - self.progress) / (left + 1.0));
         self.progress = (self.progress + pace).min(1.0);
         place
@@ -156,7 +159,7 @@ impl Follower {
 mod tests {
     use super::*;
 
-    /// All places of a run with these errors at its steps.
+    /// The results of a run with these errors at its steps.
     fn places(feedback: Feedback, steps: usize, error: impl Fn(usize) -> f64) -> Vec<Place> {
         let mut run = feedback.follow(steps);
         (0..steps).map(|step| run.next(step.checked_sub(1).map(&error))).collect()

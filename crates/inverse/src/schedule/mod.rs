@@ -1,4 +1,4 @@
-//! A softness over a run: how its scale moves, by time or by what the run sees, and what it comes with.
+//! A softness over a run: the schedule of its scale, by time or by the error, and its other settings.
 
 mod feedback;
 mod own_file;

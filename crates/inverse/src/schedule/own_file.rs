@@ -5,9 +5,9 @@ use serde_json::Value;
 use super::scheduled::{ScheduledSoftness, Surrogate};
 use crate::softness_file::{NamedSoftness, SoftnessFileError, stored};
 
-/// Files of a softness of one's own. Their fields are those of families, but for the softness, which is its name.
+/// Files of custom softnesses. Their fields are those of families, except `softness`, which is the name.
 impl<S: NamedSoftness> ScheduledSoftness<S> {
-    /// Reads and checks the file at `path`, which holds numbers of this softness.
+    /// Reads and checks the file at `path` with parameters of this softness.
     ///
     /// # Errors
     ///
@@ -46,7 +46,7 @@ impl<S: NamedSoftness> ScheduledSoftness<S> {
         stored::save(&self.text(path.as_ref())?, path.as_ref())
     }
 
-    /// Checks the numbers; what [`save`](Self::save) would write at `path`.
+    /// Checks the numbers and returns the text that [`save`](Self::save) would write at `path`.
     ///
     /// # Errors
     ///
@@ -57,7 +57,7 @@ impl<S: NamedSoftness> ScheduledSoftness<S> {
     }
 }
 
-/// Whether a file's softness has the name of `S`; if not, says what was found and what was expected.
+/// Checks that a file's softness has the name of `S`; the error has the found and the expected name.
 fn named<S: NamedSoftness>(found: &Value, what: &str) -> Result<(), String> {
     let name = found.as_str();
     if name == Some(S::NAME) {
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::{Feedback, ScaleSchedule};
 
-    /// A step of two parameters. A constant of it is code, which no file holds.
+    /// A step with two parameters. A constant of it is code and not in files.
     #[derive(Clone, Debug, PartialEq)]
     struct Bent {
         stretch: f64,
@@ -98,7 +98,7 @@ mod tests {
             2
         }
 
-        /// The second parameter is one over the scale too.
+        /// The second parameter is one over the scale.
         fn with_scale_values(&self, phi: &[f64], factor: f64) -> Vec<f64> {
             vec![phi[0] + factor.ln(), phi[1] / factor]
         }

@@ -4,32 +4,31 @@ use softrast_tensor::{Backend, Tensor};
 
 use crate::softness_file::stored::LARGEST_LOGARITHM;
 
-/// How wide a softness is in the course of a run: at progress t of it, s is seen at `d / scale(t)`.
+/// Width of a softness over a run: at progress t, s is evaluated at `d / scale(t)`.
 ///
-/// `scale(t) = floor + exp(l(t))`, where `l` joins the knots by straight lines. So the scale stays
-/// above the floor, which is given in pixels because that is what an image can resolve, and its
-/// gradient never vanishes, as it would under a hard limit.
+/// `scale(t) = floor + exp(l(t))`, where `l` interpolates the knots linearly. The scale therefore
+/// stays above the floor, which is given in pixels because the pixel is the resolution of an image,
+/// and its gradient never vanishes, as it would under a hard limit.
 ///
 /// Not in the paper, whose softness is the same at every step: a wide softness has a gradient far
-/// from the edges of the target, a narrow one has a sharp image, and a run needs one after the other.
+/// from the edges of the target, a narrow one a sharp image, and a run needs one after the other.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScaleSchedule {
-    /// Logarithms of the scale above the floor at evenly spaced times, the first at the first step
-    /// and the last at the last; in NDC, or NDC² if the softness is squared.
+    /// Logarithms of the scale above the floor at evenly spaced progress, the first at the first
+    /// step and the last at the last; in NDC, or NDC² if the softness is squared.
     pub knots: Vec<f64>,
-    /// What the scale stays above, in pixels, 0 to 1e6.
+    /// Floor of the scale, in pixels, 0 to 1e6.
     pub floor_px: f64,
 }
 
-/// A schedule has at most so many knots.
+/// Most knots of a schedule.
 const MOST_KNOTS: usize = 16;
-/// A floor is at most so many pixels, so that its square in NDC fits an f32.
+/// Largest floor in pixels, so that its square in NDC fits an f32.
 const LARGEST_FLOOR_PX: f64 = 1e6;
 
 impl ScaleSchedule {
-    /// The progress of a run at `step` of `steps`, 0 to 1: the last gradient is taken at the
-    /// end.
+    /// The progress of a run at `step` of `steps`, 0 to 1: the last gradient is taken at 1.
     pub fn progress(step: usize, steps: usize) -> f64 {
         let last = steps.saturating_sub(1).max(1);
         step.min(last) as f64 / last as f64
@@ -59,7 +58,7 @@ impl ScaleSchedule {
         (self.knots[before] * (1.0 - share) + self.knots[after] * share).exp() + floor
     }
 
-    /// If it cannot be followed, says what was found and what was expected.
+    /// Returns the found and the expected value if it is invalid.
     pub(crate) fn check(&self) -> Result<(), String> {
         let Self { knots, floor_px } = self;
         if !(1..=MOST_KNOTS).contains(&knots.len()) {
@@ -77,7 +76,7 @@ impl ScaleSchedule {
     }
 }
 
-/// The two of `count` knots around `progress` of a run, and the share of the second.
+/// The two knots of `count` around `progress` of a run, and the weight of the second.
 fn between(count: usize, progress: f64) -> ([usize; 2], f64) {
     assert!(count > 0, "a schedule has at least one knot");
     assert!((0.0..=1.0).contains(&progress), "progress {progress} of a run is not in [0, 1]");

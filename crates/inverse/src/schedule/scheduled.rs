@@ -9,24 +9,24 @@ use crate::softness_file::stored::{
     SoftnessFileError, Stored, check_phi, fits_f32, learned, stored,
 };
 
-/// A second softness whose slope stands for that of the first in the backward pass.
+/// A second softness whose slope replaces that of the first in the backward pass: a surrogate gradient.
 ///
-/// The image is that of the first, the gradient that of this one: a sharp image with a wide gradient.
-/// What comes back is not the derivative of the image. Where the scale of the first moves along a
-/// [`ScaleSchedule`], this one is seen at `d / scale(t)` too: it keeps its ratio to the first.
+/// The image is that of the first softness: a sharp image with a wide gradient, which is not the derivative of the
+/// image. If the scale of the first follows a [`ScaleSchedule`], this one is evaluated at `d / scale(t)` too: it keeps
+/// its ratio to the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Surrogate<S = EdgeSoftness> {
-    /// Which softness.
+    /// The softness.
     pub softness: S,
     /// Its parameters φ, as many as [`Softness::parameters`] says.
     pub phi: Vec<f64>,
 }
 
-/// A softness with its parameters, and how its scale moves over a run.
+/// A softness with its parameters and the schedule of its scale.
 ///
-/// In a JSON file its fields have these names; `path` is an older name of `schedule`. A file of a softness of one's own holds its
-/// [`NAME`](crate::NamedSoftness::NAME) in the field `softness`.
+/// In a JSON file its fields have these names; `path` is an older name of `schedule`. A file of a
+/// custom softness has its [`NAME`](crate::NamedSoftness::NAME) in the field `softness`.
 ///
 /// ```
 /// use softrast_inverse::ScheduledSoftness;
@@ -38,39 +38,38 @@ pub struct Surrogate<S = EdgeSoftness> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound(deserialize = "S: Deserialize<'de>"))]
 pub struct ScheduledSoftness<S = EdgeSoftness> {
-    /// Which softness.
+    /// The softness.
     pub softness: S,
     /// Its parameters φ, as many as [`Softness::parameters`] says.
     pub phi: Vec<f64>,
-    /// How its width moves over a run; a softness without one stays as it is.
+    /// Schedule of its width; without one the width is fixed.
     #[serde(alias = "path", default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<ScaleSchedule>,
-    /// How a run goes along its schedule by what it sees; without it, by time.
+    /// Adaptive schedule; without it, progress follows time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub feedback: Option<Feedback>,
-    /// What the gradient is taken of, where that is not the softness itself; it moves along the same
-    /// schedule.
+    /// Surrogate of the gradient, if that is not the softness's own; it follows the same schedule.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surrogate: Option<Surrogate<S>>,
-    /// The learning rate of the optimisations that it was learned on, which suits it best.
+    /// Learning rate of the optimisations that it was learned on, which suits it best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub learning_rate: Option<f64>,
-    /// What the learning rate is multiplied by at the end of a run, in (0, 1]; it falls geometrically. Feedback has a fall of its own.
+    /// Factor of the learning rate at the end of a run, in (0, 1], reached geometrically. Feedback has its own factor instead.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_end: Option<f64>,
-    /// The task that it was learned on; without one, the rate is for any.
+    /// The task that it was learned on; without one, the learning rate applies to any task.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
-    /// Where the parameters come from, in words.
+    /// Origin of the parameters, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
 }
 
 impl ScheduledSoftness {
-    /// What the program of a task takes where nobody says otherwise: the best that is known, whoever found it. Its note says how.
+    /// The default of a task's program: the best known, learned or searched. Its note describes its origin.
     ///
-    /// It is what was learned on the task, for `pose` and `shape3d` with [feedback](Feedback), but for `occlusion`, where a
-    /// search found a better one.
+    /// Presets are learned on their task, for `pose` and `shape3d` with [feedback](Feedback), except for `occlusion`,
+    /// whose preset a search found.
     ///
     /// # Errors
     ///
@@ -83,7 +82,7 @@ impl ScheduledSoftness {
         }
     }
 
-    /// What a search found for a task with more freedom than families have by default. Its note says how.
+    /// The result of a search for a task, with more free parameters than families have by default. Its note describes the search.
     ///
     /// # Errors
     ///
@@ -101,7 +100,7 @@ impl ScheduledSoftness {
 }
 
 impl<S: Softness> ScheduledSoftness<S> {
-    /// A softness that stays at `scale`, in NDC (NDC² if squared).
+    /// A softness with a fixed `scale`, in NDC (NDC² if squared).
     ///
     /// # Panics
     ///
@@ -111,11 +110,11 @@ impl<S: Softness> ScheduledSoftness<S> {
     }
 
     /// A softness whose scale goes geometrically from `first` to `last`, in NDC (NDC² if squared);
-    /// where the two are the same, it stays.
+    /// fixed if both are equal.
     ///
     /// # Panics
     ///
-    /// If one of them is not positive.
+    /// If one of the scales is not positive.
     pub fn decay(softness: S, first: f64, last: f64) -> Self {
         let mut knots = vec![ln_scale(first), ln_scale(last)];
         knots.dedup();
@@ -129,10 +128,10 @@ impl<S: Softness> ScheduledSoftness<S> {
         Self { softness, phi, schedule, feedback, surrogate, learning_rate, rate_end, task, note }
     }
 
-    /// With the same softness at `scale`, in NDC (NDC² if squared), as its surrogate.
+    /// Adds the same softness at `scale`, in NDC (NDC² if squared), as surrogate.
     ///
-    /// Where the scale moves, this is the surrogate's first one; a floor of the schedule is left out
-    /// of the ratio of the two, as it depends on the size of the image.
+    /// With a moving scale, this is the surrogate's first scale; the floor of the schedule is
+    /// excluded from the ratio of both, as it depends on the size of the image.
     ///
     /// # Panics
     ///
@@ -145,13 +144,13 @@ impl<S: Softness> ScheduledSoftness<S> {
         Self { surrogate: Some(Surrogate { softness, phi }), ..self }
     }
 
-    /// Whether the scale stays as it is.
+    /// Whether the width is fixed.
     pub fn is_constant(&self) -> bool {
         self.schedule.as_ref().is_none_or(|schedule| schedule.knots.len() == 1)
     }
 
-    /// How many numbers may be chosen: φ and that of the surrogate, the knots of a schedule, which
-    /// take the place of a family's own scale, and what moves a run along them.
+    /// Number of free parameters: φ, that of the surrogate, the knots of the schedule, which
+    /// replace a family's own scale, and those of the feedback.
     pub fn parameters(&self) -> usize {
         let replaced = self.softness.logarithms().min(1);
         let knots = self.schedule.as_ref().map_or(0, |schedule| schedule.knots.len() - replaced);
@@ -199,7 +198,7 @@ impl<S: Softness> ScheduledSoftness<S> {
         Some(Surrogate { softness: softness.clone(), phi })
     }
 
-    /// A renderer with this softness as it is at `progress` of a run, 0 to 1; its surrogate, if it has one, comes along.
+    /// A renderer with this softness at `progress` of a run, 0 to 1, and its surrogate, if it has one.
     ///
     /// # Panics
     ///
@@ -219,13 +218,13 @@ impl<S: Softness> ScheduledSoftness<S> {
         }
     }
 
-    /// What the schedule multiplies the scale of the parameters by.
+    /// The schedule's factor of the scale of the parameters.
     fn factor_at(&self, progress: f64, size: usize) -> Option<f64> {
         let schedule = self.schedule.as_ref()?;
         Some(schedule.at(schedule.floor(&self.softness, size), progress))
     }
 
-    /// If it cannot be used, says what was found and what was expected; `name` is what a softness is called.
+    /// Returns the found and the expected value if it is invalid; `name` gives the name of a softness.
     pub(super) fn check_as(&self, name: impl Fn(&S) -> &'static str) -> Result<(), String> {
         let surrogate = self.surrogate.iter().map(|of| (&of.softness, &of.phi));
         let parameters: Vec<_> =
@@ -270,7 +269,7 @@ impl<S: Softness> ScheduledSoftness<S> {
 }
 
 impl<S> ScheduledSoftness<S> {
-    /// These numbers with each softness replaced by `softness` of it.
+    /// This value with each softness replaced by `softness` of it.
     pub(super) fn map<T>(self, softness: impl Fn(S) -> T) -> ScheduledSoftness<T> {
         let of =
             |found: Surrogate<S>| Surrogate { softness: softness(found.softness), phi: found.phi };

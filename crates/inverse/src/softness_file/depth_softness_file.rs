@@ -5,21 +5,21 @@ use softrast_softness::DepthSoftness;
 
 use super::stored::{SoftnessFileError, Stored, check_phi, learned, stored};
 
-/// A depth softness and its parameters, as kept in a JSON file; they stay as they are over a run.
+/// A depth softness and its parameters, as stored in a JSON file; fixed over a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DepthSoftnessFile {
-    /// Which depth softness.
+    /// The depth softness.
     pub depth_softness: DepthSoftness,
     /// Its parameters φ, as many as [`DepthSoftness::parameters`] says.
     pub phi: Vec<f64>,
-    /// Where the parameters come from, in words.
+    /// Origin of the parameters, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub note: Option<String>,
 }
 
 impl DepthSoftnessFile {
-    /// What the program of a task takes along with [`ScheduledSoftness::preset`](crate::ScheduledSoftness::preset).
+    /// The default of a task's program, together with [`ScheduledSoftness::preset`](crate::ScheduledSoftness::preset).
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Softnesses in JSON files: how they are read, checked and written, and those that come with the crate.
+//! Softnesses in JSON files: reading, checking, writing, and those bundled with the crate.
 
 mod depth_softness_file;
 mod name_or_file;

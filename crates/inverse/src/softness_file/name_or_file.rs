@@ -1,10 +1,10 @@
 use std::{fmt, path::PathBuf, str::FromStr};
 
-/// A softness as a command line says it, `NAME|FILE.json`: a [`Family`](softrast_softness::Family) or a
+/// A softness on a command line, `NAME|FILE.json`: a [`Family`](softrast_softness::Family) or a
 /// [`DepthSoftness`](softrast_softness::DepthSoftness) by its name, or a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NameOrFile<T> {
-    /// By its name.
+    /// A name.
     Name(T),
     /// A file, not opened yet. Its name ends in `.json`.
     File(PathBuf),

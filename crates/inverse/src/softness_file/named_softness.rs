@@ -1,9 +1,9 @@
 use softrast_softness::Softness;
 
-/// A softness of one's own that files hold by a name.
+/// A custom softness that files refer to by a name.
 ///
-/// A file has the name and the numbers; the formula, with any constants of the value that implements this, is code. So
-/// [`ScheduledSoftness::load_own`](crate::ScheduledSoftness::load_own) is given the softness, and refuses files of another name.
+/// A file has the name and the parameters; the formula, with any constants of the implementing value, is code. Therefore
+/// [`ScheduledSoftness::load_own`](crate::ScheduledSoftness::load_own) takes the softness, and refuses files of another name.
 ///
 /// ```
 /// use softrast_inverse::{NamedSoftness, ScheduledSoftness};
@@ -28,6 +28,6 @@ use softrast_softness::Softness;
 /// # Ok::<(), softrast_inverse::SoftnessFileError>(())
 /// ```
 pub trait NamedSoftness: Softness {
-    /// Name in files, where a family of the crate has an object.
+    /// Name in files, where families have an object.
     const NAME: &'static str;
 }

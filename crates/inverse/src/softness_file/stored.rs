@@ -1,4 +1,4 @@
-//! Values that are kept in JSON files, and those that come with the crate.
+//! Values that are stored in JSON files, and those bundled with the crate.
 
 use std::{
     fs,
@@ -8,10 +8,10 @@ use std::{
 
 use serde::{Serialize, de::DeserializeOwned};
 
-/// The largest size of a parameter that is a logarithm: its exponential must fit an f32.
+/// Largest absolute value of a parameter that is a logarithm: its exponential must fit an f32.
 pub(crate) const LARGEST_LOGARITHM: f64 = 80.0;
 
-/// Bytes of a softness file at most.
+/// Largest softness file, in bytes.
 const LARGEST_FILE: u64 = 1 << 24;
 
 /// A softness file could not be read or written.
@@ -22,49 +22,49 @@ pub enum SoftnessFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         reason: io::Error,
     },
-    /// The file, or the temporary one beside it, could not be written.
+    /// The file, or the temporary file next to it, could not be written.
     #[error("cannot write softness {path:?}: {reason}")]
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         reason: io::Error,
     },
-    /// The text is not what a softness file holds.
+    /// The text is not a softness file.
     #[error("softness {path:?} is not valid: {reason}")]
     Parse {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and where.
+        /// The error and its place.
         reason: serde_json::Error,
     },
-    /// The parameters, the schedule or the learning rate are not what the softness can have.
+    /// The parameters, the schedule or the learning rate do not suit the softness.
     #[error("softness {path:?}{wrong}")]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// What was found and what was expected: how the sentence goes on.
+        /// The found and the expected value: the end of the sentence.
         wrong: String,
     },
-    /// No softness of this name comes with the crate.
+    /// No softness of this name is bundled.
     #[error("no softness of that kind is called {name:?}; there are {known}")]
     Unknown {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// The names that there are.
+        /// The bundled names.
         known: String,
     },
 }
 
-/// A value that is kept in a JSON file; [`stored`] gives it the methods.
+/// A value that is stored in a JSON file; [`stored`] adds the methods.
 pub(crate) trait Stored: Serialize + DeserializeOwned {
-    /// Names of those that come with the crate, and the texts of their files.
+    /// Names of the bundled values, and the texts of their files.
     const LEARNED: &'static [(&'static str, &'static str)];
 
-    /// If it cannot be used, says what was found and what was expected.
+    /// Returns the found and the expected value if it is invalid.
     fn check(&self) -> Result<(), String>;
 }
 
@@ -94,7 +94,7 @@ macro_rules! stored {
             ///
             /// # Errors
             ///
-            /// Those of `load` but for reading.
+            /// The errors of `load`, except those of reading.
             pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SoftnessFileError> {
                 let stored = crate::softness_file::stored::parsed(text, path.as_ref())?;
                 let checked = crate::softness_file::stored::Stored::check(&stored);
@@ -102,10 +102,10 @@ macro_rules! stored {
                 Ok(stored)
             }
 
-            /// Checks the parameters and writes the file at `path`, replacing what was there.
+            /// Checks the parameters and writes the file at `path`, replacing an existing one.
             ///
-            /// The text goes to a temporary file in the same folder first, so that `path` never holds
-            /// half a softness.
+            /// The text first goes to a temporary file in the same folder, so that `path` never
+            /// holds half a softness.
             ///
             /// # Errors
             ///
@@ -114,7 +114,7 @@ macro_rules! stored {
                 crate::softness_file::stored::save(&self.text(path.as_ref())?, path.as_ref())
             }
 
-            /// Checks the parameters; what `save` would write at `path`.
+            /// Checks the parameters and returns the text that `save` would write at `path`.
             ///
             /// # Errors
             ///
@@ -125,16 +125,16 @@ macro_rules! stored {
                 crate::softness_file::stored::text(self, path.as_ref())
             }
 
-            /// What was learned on a task and comes with the crate; its note says how it was learned.
+            /// A value learned on a task and bundled with the crate; its note describes the learning.
             ///
             /// # Errors
             ///
-            /// If there is none of this name.
+            /// If no bundled value has this name.
             pub fn learned(name: &str) -> Result<Self, SoftnessFileError> {
                 Self::parse(crate::softness_file::stored::learned_text::<Self>(name)?, name)
             }
 
-            /// The names of those that come with the crate.
+            /// The names of the bundled values.
             pub fn learned_names() -> impl Iterator<Item = &'static str> {
                 <Self as crate::softness_file::stored::Stored>::LEARNED
                     .iter()
@@ -145,7 +145,7 @@ macro_rules! stored {
 }
 pub(crate) use stored;
 
-/// The text of a regular file: a pipe could be waited for, and a device read, for ever.
+/// The text of a regular file: reading a pipe or a device could block for ever.
 pub(crate) fn read(path: &Path) -> Result<String, SoftnessFileError> {
     let read = || {
         if !fs::metadata(path)?.is_file() {
@@ -162,7 +162,7 @@ pub(crate) fn read(path: &Path) -> Result<String, SoftnessFileError> {
 }
 
 pub(crate) fn parsed<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, SoftnessFileError> {
-    // Editors of Windows write a byte order mark.
+    // Editors on Windows may write a byte order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     serde_json::from_str(text)
         .map_err(|reason| SoftnessFileError::Parse { path: path.to_owned(), reason })
@@ -173,12 +173,12 @@ pub(crate) fn text(stored: &impl Serialize, path: &Path) -> Result<String, Softn
     text.map(|text| text + "\n").map_err(|reason| unwritten(path, reason))
 }
 
-/// Writes the text through a temporary file beside `path`.
+/// Writes the text through a temporary file next to `path`.
 pub(crate) fn save(text: &str, path: &Path) -> Result<(), SoftnessFileError> {
     let mut beside = path.as_os_str().to_owned();
     beside.push(format!(".{}.tmp", std::process::id()));
     fs::write(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|reason| {
-        // What is left of it is of no use; that it may not exist is no second error.
+        // The partial file is useless; it may not exist, so an error here is ignored.
         let _ = fs::remove_file(&beside);
         unwritten(path, reason)
     })
@@ -193,7 +193,7 @@ pub(crate) fn learned_text<T: Stored>(name: &str) -> Result<&'static str, Softne
     Ok(text)
 }
 
-/// An error of a check as that of a file.
+/// Turns an error of a check into that of a file.
 pub(crate) fn checked(check: Result<(), String>, path: &Path) -> Result<(), SoftnessFileError> {
     check.map_err(|wrong| SoftnessFileError::Invalid { path: path.to_owned(), wrong })
 }
@@ -202,12 +202,12 @@ fn unwritten(path: &Path, reason: io::Error) -> SoftnessFileError {
     SoftnessFileError::Write { path: path.to_owned(), reason }
 }
 
-/// Whether `x` is finite in f32 too, in which images are drawn.
+/// Whether `x` is finite in f32 too, the type of images.
 pub(crate) fn fits_f32(x: f64) -> bool {
     x.abs() <= f64::from(f32::MAX)
 }
 
-/// Checks that `phi` has the expected length, of which so many at the front are logarithms.
+/// Checks that `phi` has the expected length, and that its leading logarithms are in range.
 pub(crate) fn check_phi(
     softness: &str,
     [expected, logarithms]: [usize; 2],

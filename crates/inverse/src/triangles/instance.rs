@@ -2,24 +2,24 @@ use std::f64::consts::TAU;
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
-/// Where the triangles of one run start.
+/// Start of the triangles of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// Corners in NDC, three to a triangle.
     pub corners: Vec<[f64; 2]>,
 }
 
-/// Area of all triangles together over that of the image.
+/// Total area of the triangles relative to that of the image.
 const COVER: f64 = 0.5;
 
 impl Instance {
-    /// An instance that depends on `seed` and the number of triangles alone.
+    /// An instance that depends only on `seed` and the number of triangles.
     ///
-    /// Equilateral triangles of one size stand evenly over the image, each turned at random. Their
-    /// areas add up to half the image. Their centres are Halton's points with bases 2 and 3, moved
-    /// by a random offset that wraps around.
+    /// Equilateral triangles of one size are spread evenly over the image, each with a random
+    /// rotation. Their areas add up to half the image. Their centres are Halton points with bases 2
+    /// and 3, shifted by a random offset that wraps around.
     ///
-    /// Not as in the released code (docs/notes.md, 2D shape): its centres fill a wider box, and its
+    /// Unlike the released code (docs/notes.md, 2D shape), whose centres fill a wider box and whose
     /// triangles are unequal and all of one shape.
     pub fn seeded(seed: u64, triangles: usize) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
@@ -40,7 +40,7 @@ impl Instance {
     }
 }
 
-/// The digits of `k` to this base, mirrored behind the point. Source: Halton 1960.
+/// The digits of `k` in this base, mirrored at the point. Source: Halton 1960.
 fn radical_inverse(mut k: usize, base: usize) -> f64 {
     let (mut result, mut digit) = (0.0, 1.0);
     while k > 0 {

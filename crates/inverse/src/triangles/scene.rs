@@ -9,13 +9,13 @@ use crate::{Targets, triangles::Instance};
 ///
 /// Source: docs/notes.md, 2D shape: 0.03, on coordinates that the camera multiplies by 2.155.
 const LAPLACIAN: f64 = 0.03 / (2.155 * 2.155);
-/// A corner is this much farther from the middle of the other two than from the centroid.
+/// Distance of a corner from the middle of the other two, relative to that from the centroid.
 const FROM_CENTROID: f64 = 1.5;
 
 /// Loose triangles, and the picture that they should cover.
 ///
-/// The optimised θ is flat, `[6 triangles]`: x and y of every corner in NDC. There is no camera, and
-/// corners move freely. Not as in the released code, whose log-odds keep each coordinate on its
+/// The optimised θ is flat, `[6 triangles]`: x and y of every corner in NDC. There is no camera,
+/// and corners move freely, unlike in the released code, whose log-odds keep each coordinate on its
 /// side of the centre.
 #[derive(Clone, Debug)]
 pub struct Scene<B: RasterBackend> {
@@ -31,7 +31,7 @@ impl<B: RasterBackend> Scene<B> {
     ///
     /// # Panics
     ///
-    /// If the picture does not have as many pixels.
+    /// If the picture does not have `size * size` pixels.
     pub fn new(target: &[f64], instance: &Instance, size: usize) -> Self {
         let corners = &instance.corners;
         let faces = (0..corners.len() as u32 / 3).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
@@ -48,7 +48,7 @@ impl<B: RasterBackend> Scene<B> {
         self.start.clone()
     }
 
-    /// The picture to cover, `[1, size, size]`.
+    /// The target picture, `[1, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
     }
@@ -60,13 +60,13 @@ impl<B: RasterBackend> Scene<B> {
         Projected::new(Tensor::cat(vec![theta.reshape([1, count, 2]), depth], 2))
     }
 
-    /// Hard silhouette `[1, size, size]` of corners that [`Scene::vertices`] gave.
+    /// Hard silhouette `[1, size, size]` of corners from [`Scene::vertices`].
     pub fn hard(&self, vertices: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(vertices, &self.faces, self.size)
     }
 
-    /// Mean squared difference of `image` `[1, side, side]` to the picture, `[1]`; the side is the size
-    /// of the scene, or that halved some times.
+    /// Mean squared difference of `image` `[1, side, side]` and the picture, `[1]`; the side is the
+    /// size of the scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         self.targets.mse_loss(image)
     }
@@ -76,7 +76,7 @@ impl<B: RasterBackend> Scene<B> {
         &self.targets
     }
 
-    /// What keeps triangles small: the Laplacian loss of each by itself, weighted, `[1]`.
+    /// Regularizer of the triangles' sizes: the weighted Laplacian loss of each triangle, `[1]`.
     ///
     /// `Σ |corner - middle of the other two|²` over all corners, times 0.0065. Source: docs/notes.md, 2D shape.
     pub fn smoothness_loss(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {

@@ -1,11 +1,11 @@
-//! The readers of pictures, cameras and softnesses, each with sound files to begin with, and the checks of what they return.
+//! The readers of pictures, cameras and softnesses, each with valid seed files and checks of the results.
 
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage};
 use serde_json::json;
 use softrast_inverse::{ScheduledSoftness, SoftnessFileError};
 use softrast_views::{CameraFile, Lens, MaskRules, Picture, PictureFile, PoseFile};
 
-/// A reader under test. The names of files that were found begin with the `name`.
+/// A reader under test. The names of its files begin with the `name`.
 pub(crate) struct Kind {
     pub(crate) name: &'static str,
     pub(crate) ending: &'static str,
@@ -76,7 +76,7 @@ fn picture(bytes: &[u8]) {
     assert!(file.size().pixels() > 0);
     let inverted = MaskRules { invert: true, threshold: Some(0.5), label: None };
     let class = MaskRules { label: Some(1), ..MaskRules::default() };
-    // A large picture is read by one rule, as a program reads it: what is timed is not the sum of several.
+    // A large picture is read by one rule, as a program reads it: the timing is not the sum of several.
     let rules = [MaskRules::default(), inverted, class];
     let few = if file.size().pixels() > 1 << 20 { 1 } else { rules.len() };
     for rules in &rules[..few] {
@@ -186,7 +186,7 @@ fn transforms() -> Vec<Vec<u8>> {
     ])
 }
 
-/// Both files of a model of COLMAP, one behind the other: the cameras end with a line that says so.
+/// Both files of a COLMAP model, concatenated; this line ends the cameras.
 const PARTED: &[u8] = b"\n#parted#\n";
 
 fn models() -> Vec<Vec<u8>> {
@@ -228,7 +228,7 @@ fn model(bytes: &[u8]) {
             let path = folder.path().join(format!("{name}.{ending}"));
             std::fs::write(path, content).expect("a file");
         }
-        // The folder has another name each time.
+        // The folder name is random.
         let name = folder.path().display().to_string();
         checked(
             CameraFile::load(&folder)
