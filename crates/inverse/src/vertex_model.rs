@@ -83,7 +83,6 @@ impl<B: AutodiffBackend> VertexModel<B> {
     ///
     /// It is equivalent to this in a loop of burn:
     ///
-    ///
     /// ```
     /// # use softrast_inverse::VertexModel;
     /// # use softrast_mesh::icosphere;

@@ -5,30 +5,30 @@ use plotters::coord::{
     types::RangedCoordf64,
 };
 
-/// Larger values are not shown on an axis of even steps: ranges around them would not be finite.
+/// Larger values are not drawn on a linear axis: ranges around them would not be finite.
 const LARGEST: f64 = 1e300;
 
-/// Name with unit, and whether it is divided in decades.
+/// Name with unit, and whether the axis is logarithmic.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Name with unit.
     pub name: String,
-    /// Whether it is divided in decades; values must be positive then, others are left out.
+    /// Whether the axis is logarithmic; values must then be positive, others are omitted.
     pub logarithmic: bool,
 }
 
 impl Axis {
-    /// One of even steps.
+    /// A linear axis.
     pub fn linear(name: &str) -> Self {
         Self { name: name.to_owned(), logarithmic: false }
     }
 
-    /// One of decades.
+    /// A logarithmic axis.
     pub fn logarithmic(name: &str) -> Self {
         Self { name: name.to_owned(), logarithmic: true }
     }
 
-    /// Where a value stands; NaN if it cannot be shown.
+    /// Coordinate of a value on the axis; NaN if it cannot be drawn.
     pub(crate) fn place(&self, value: f64) -> f64 {
         match self.logarithmic {
             true => value.log10(),
@@ -53,7 +53,7 @@ impl Axis {
         }
     }
 
-    /// Least and largest place with some room.
+    /// Smallest and largest coordinate with a margin.
     pub(crate) fn range(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
         let places = values.map(|value| self.place(value)).filter(|place| place.is_finite());
         let [low, high] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
@@ -66,18 +66,18 @@ impl Axis {
         low - room..high + room
     }
 
-    /// The axis over a range of places, with about `most` numbers and light marks between them.
+    /// The axis over a range of coordinates, with about `most` numbers and light marks between them.
     ///
-    /// A linear axis is marked at round numbers, a logarithmic one at decades; over less than two decades at 1, 2 and 5 times a power
-    /// of ten, and over a range too narrow for these at round numbers again.
+    /// A linear axis is marked at round numbers, a logarithmic one at decades; below two decades at 1, 2 and 5 times a
+    /// power of ten, and below the range of these at round numbers again.
     pub(crate) fn over(&self, range: Range<f64>, most: usize) -> MarkedAxis {
         let round = |range: Range<f64>| {
-            // The mark at 0 comes with what rounding leaves of it.
+            // The mark at 0 has a rounding error.
             let least = 1e-9 * (range.end - range.start);
             let marks = RangedCoordf64::from(range).key_points(most).into_iter();
             marks.map(|mark| if mark.abs() < least { 0.0 } else { mark }).collect::<Vec<_>>()
         };
-        // Of a logarithmic axis only: there are as many as the range is long.
+        // For a logarithmic axis only: the number of marks grows with the range.
         let multiples = |of: &[u32]| -> Vec<f64> {
             let powers = range.start.floor() as i32..=range.end.floor() as i32;
             let places = powers
@@ -109,7 +109,7 @@ impl Axis {
     }
 }
 
-/// A range with marks of its own. The combinator of plotters for that has no labels over floats.
+/// A range with custom marks. The combinator of plotters for custom marks has no labels over floats.
 pub(crate) struct MarkedAxis {
     range: RangedCoordf64,
     numbers: Vec<f64>,

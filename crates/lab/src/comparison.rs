@@ -10,38 +10,38 @@ use crate::{
     statistics::mean_interval_at,
 };
 
-/// A second experiment on the same seeds, and how the first differs from it.
+/// A second experiment on the same seeds, and the differences of the first to it.
 #[derive(Clone, Debug)]
 pub struct Comparison {
     titles: [String; 2],
     about: Map<String, Value>,
-    /// On the seeds that both have solved.
+    /// Outcome on the seeds that both have solved.
     second: Outcome,
-    /// Wall time of its runs.
+    /// Wall time of the second experiment's runs.
     seconds: f64,
     differences: Vec<Difference>,
 }
 
-/// How two experiments differ in one error at the last step; below 0 the first is the better one.
+/// Difference of two experiments in one metric at the last step; below 0 the first has the smaller value.
 #[derive(Clone, Debug, Serialize)]
 struct Difference {
     #[serde(skip)]
     metric: Metric,
     mean: f64,
     ci95: [f64; 2],
-    /// Shares of the seeds on which either has the smaller error.
+    /// Shares of the seeds on which either is better.
     first_better: f64,
     second_better: f64,
     per_run: Vec<f64>,
 }
 
-/// Mean of the differences of two lists, place by place, and its 95 % interval.
+/// Mean of the elementwise differences of two lists, and its 95 % interval.
 pub fn paired(values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
     let differences: Vec<f64> = values.iter().zip(reference).map(|(a, b)| a - b).collect();
     (mean(&differences), mean_interval(&differences))
 }
 
-/// The same, with an interval so wide that those of so many `comparisons` all hold together at 95 %. Source: Bonferroni's correction.
+/// [`paired`] with joint 95 % intervals for this number of `comparisons`. Source: Bonferroni's correction.
 pub fn paired_among(comparisons: usize, values: &[f64], reference: &[f64]) -> (f64, [f64; 2]) {
     let differences: Vec<f64> = values.iter().zip(reference).map(|(a, b)| a - b).collect();
     let level = 1.0 - 0.05 / comparisons.max(1) as f64;
@@ -49,12 +49,12 @@ pub fn paired_among(comparisons: usize, values: &[f64], reference: &[f64]) -> (f
 }
 
 impl Comparison {
-    /// Compares two experiments on the seeds that both have solved, which come first in both. `titles` tell them apart, `about` is
-    /// what the results say of the second.
+    /// Compares two experiments on the seeds that both have solved, which come first in both.
+    /// `titles` are their names, `about` is the description of the second in the results.
     ///
     /// # Errors
     ///
-    /// If a run of the second has no finite number even before its first step.
+    /// If a run of the second has a non-finite number even before its first step.
     pub fn new(
         titles: [String; 2],
         about: Map<String, Value>,
@@ -80,7 +80,7 @@ impl Comparison {
         json.into()
     }
 
-    /// Which seeds both have solved, and how often the second succeeded there.
+    /// The seeds that both have solved, and the success rate of the second on them.
     fn head(&self) -> String {
         let (runs, success) = (self.second.successes[1], self.second.success_share());
         format!("on the same {runs} seeds, at the last step; it succeeds in {success}")
@@ -143,7 +143,7 @@ impl Difference {
         }
     }
 
-    /// Whether the interval of the mean leaves no doubt which is the better one.
+    /// The verdict: `better` or `worse` if the interval of the mean excludes 0.
     fn verdict(&self) -> &'static str {
         let [below, above] = match self.metric.is_gain() {
             false => ["better", "worse"],

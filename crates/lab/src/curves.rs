@@ -1,4 +1,4 @@
-//! How runs go on, step by step: tables and charts.
+//! Runs over their steps: tables and charts.
 
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -7,16 +7,16 @@ use crate::{
     plot::{Axis, Plot, Series},
 };
 
-/// Of the first experiment and of the one it is compared with.
+/// Colours of the first experiment and of the one it is compared with.
 const COLOURS: [[u8; 3]; 2] = [[31, 96, 168], [196, 84, 24]];
 
-/// All points of all runs as CSV, one row per seed and step: `seed,step` and a column for every metric. Numbers keep all their digits.
+/// All points of all runs as CSV, one row per seed and step: `seed,step` and a column for every metric. Numbers have all their digits.
 pub fn csv(metrics: &[Metric], runs: &[Run]) -> String {
     let mut text = String::from("seed,step");
     text.extend(metrics.iter().map(|metric| format!(",{}", metric.column())));
     text.push('\n');
     for (run, point) in runs.iter().flat_map(|run| run.curve.iter().map(move |p| (run, p))) {
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = write!(text, "{},{}", run.seed, point.step);
         text.extend(point.values.iter().map(|number| format!(",{number}")));
         text.push('\n');
@@ -24,14 +24,14 @@ pub fn csv(metrics: &[Metric], runs: &[Run]) -> String {
     text
 }
 
-/// How all runs of an experiment go on.
+/// Means of all runs of an experiment over the steps.
 pub struct Convergence {
-    /// In the order of the steps: the step, the runs that got there, and mean, low and high end of its 95 % interval of each metric.
+    /// Ascending steps: the step, the number of runs that reached it, and for each metric the mean and both ends of its 95 % interval.
     rows: Vec<(usize, usize, Vec<[f64; 3]>)>,
 }
 
 impl Convergence {
-    /// Of these runs. The intervals hold at each step by itself, not jointly.
+    /// The convergence of these runs. The intervals hold for each step separately, not jointly.
     pub fn new(metrics: &[Metric], runs: &[Run]) -> Self {
         let mut steps = BTreeMap::<usize, Vec<&Point>>::new();
         for point in runs.iter().flat_map(|run| &run.curve) {
@@ -73,8 +73,8 @@ pub fn convergence_csv(metrics: &[Metric], experiments: &[(&str, &Convergence)])
     text
 }
 
-/// The score and the main errors over the steps, a chart each: for every experiment a line, around the mean of several runs a band
-/// that is its interval.
+/// The score and the main errors over the steps, one chart each: a line for every experiment, with
+/// the interval as a band if it has several runs.
 pub fn charts(metrics: &[Metric], experiments: &[Convergence]) -> Vec<Plot> {
     let shown = |metric: &Metric| {
         metric.role == Role::Score || metric.role == Role::Error && !metric.key.contains('.')

@@ -2,10 +2,10 @@ use std::{fmt, path::PathBuf};
 
 use crate::printable;
 
-/// An error that programs treat apart from all others.
+/// An error that programs handle specially.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The command line asks for something that does not exist or make sense. Exit code 2.
+    /// The command line requests something that does not exist or makes no sense. Exit code 2.
     #[error("{0}")]
     Usage(String),
     /// The folder for the results cannot be written.
@@ -13,31 +13,31 @@ pub enum Error {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         reason: std::io::Error,
     },
-    /// A file that a result would replace is not the program's to replace.
+    /// A file in the place of a result is not the program's to replace.
     #[error("{} {why}", path.display())]
     Taken {
         /// The file.
         path: PathBuf,
-        /// Whose it is, and what to do: how the sentence goes on.
+        /// Owner of the file, and the remedy: the end of the sentence.
         why: String,
     },
-    /// The user asked the program to stop. Exit code 130.
+    /// The user stopped the program. Exit code 130.
     #[error("stopped before it was finished")]
     Interrupted,
 }
 
-/// Exit code of an interrupted program: 128 and the number of SIGINT.
+/// Exit code of an interrupted program: 128 plus the number of SIGINT.
 pub const INTERRUPTED: u8 = 130;
 
-/// How a program that could not do its work ends: one line on stderr and an exit code.
+/// The end of a program that failed: one line on stderr and an exit code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// 2 where the command line is at fault, 130 where the user stopped the program, 1 for the rest.
+    /// 2 for a wrong command line, 130 for an interrupt, 1 for all other failures.
     pub code: u8,
-    /// The line behind `error: `, or behind `interrupted: `.
+    /// The line after `error: ` or `interrupted: `.
     pub message: String,
 }
 
@@ -69,13 +69,13 @@ impl From<anyhow::Error> for Failure {
 }
 
 impl From<clap::Error> for Failure {
-    /// Keeps what clap found and its tip; its usage and the pointer to `--help` become a bracket.
+    /// Keeps clap's message and tip; its usage and the pointer to `--help` become a bracket.
     fn from(error: clap::Error) -> Self {
         Failure { code: 2, message: format!("{} (see --help)", found(&error)) }
     }
 }
 
-/// What clap found wrong and its tip, in one line.
+/// The message and tip of a clap error, in one line.
 pub fn found(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let found = text.split("\n\nUsage:").next().unwrap_or_default();

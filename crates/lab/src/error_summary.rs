@@ -13,7 +13,7 @@ pub(crate) struct ErrorSummary {
     /// Mean after the last step.
     #[serde(rename = "final")]
     pub(crate) last: f64,
-    /// Mean over the runs at the step that each returns.
+    /// Mean over the runs at the returned step.
     pub(crate) returned: f64,
     /// Mean over the runs of the best over all steps.
     pub(crate) best: f64,
@@ -25,7 +25,7 @@ pub(crate) struct ErrorSummary {
     pub(crate) per_run: Option<Vec<f64>>,
 }
 
-/// What runs are judged by among metrics, and their places, those of a group one after the other.
+/// The metrics that runs are judged by, with their indices, sorted by key so that groups are contiguous.
 pub(crate) fn errors_of(metrics: &[Metric]) -> impl Iterator<Item = (usize, Metric)> {
     let errors = metrics.iter().copied().enumerate().filter(|(_, metric)| metric.is_measure());
     let mut errors: Vec<_> = errors.collect();
@@ -34,7 +34,7 @@ pub(crate) fn errors_of(metrics: &[Metric]) -> impl Iterator<Item = (usize, Metr
 }
 
 impl ErrorSummary {
-    /// The error of the metric at `place`, where the metric at `score` decides which step of a run is returned.
+    /// Summary of the metric at index `place`; the metric at index `score` determines the returned step of a run.
     pub(crate) fn new(
         metric: Metric,
         [place, score]: [usize; 2],
@@ -64,7 +64,7 @@ impl ErrorSummary {
     }
 }
 
-/// Objects by the keys of their metrics: that of `a.b` stands inside that of `a`.
+/// Objects by the keys of their metrics: that of `a.b` is nested in that of `a`.
 pub(crate) fn nested<'a>(objects: impl Iterator<Item = (&'a Metric, Value)>) -> Map<String, Value> {
     let mut all: Map<String, Value> = Map::new();
     for (metric, mut object) in objects {

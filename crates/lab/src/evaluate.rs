@@ -6,15 +6,15 @@ use crate::{
     Batch, Encoded, Error, Experiment, Progress, Role, Run, Store, mean, place, store::key,
 };
 
-/// Runs experiments, and recalls what an earlier call has finished.
+/// Runs experiments, and reuses the finished runs of earlier calls.
 pub struct Runner {
-    /// How far the work is.
+    /// Progress display.
     pub progress: Progress,
-    /// What is finished.
+    /// Finished runs.
     pub store: Store<Finished>,
 }
 
-/// A run that is finished, and its pictures if it was asked for them.
+/// A finished run, with its pictures if requested.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Finished {
     pub(crate) run: Run,
@@ -28,7 +28,7 @@ pub struct Finished {
 pub struct Evaluation {
     /// The runs.
     pub runs: Vec<Run>,
-    /// Of the first, if they were asked for.
+    /// Pictures of the first run, if requested.
     pub pictures: Option<Encoded>,
     /// Wall time of the runs, with errors and pictures.
     pub seconds: f64,
@@ -42,19 +42,19 @@ impl Evaluation {
 }
 
 impl Runner {
-    /// One that shows and keeps nothing, for experiments that are run as a library.
+    /// A runner without progress and files, for experiments that run as a library.
     pub fn hidden() -> Self {
         Self { progress: Progress::hidden(), store: Store::in_memory() }
     }
 
-    /// Runs all seeds with each of the experiments, and says whether the user cut that short.
+    /// Runs all seeds with each of the experiments, and returns whether the user stopped it early.
     ///
-    /// A batch goes through all experiments before the next begins, so that what is finished stays paired. With `pictures`, the first
-    /// seed brings them. `label` stands beside the progress bar.
+    /// A batch runs with all experiments before the next batch, so that finished runs stay paired. `pictures` requests
+    /// those of the first seed. `label` is the text of the progress bar.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the store; [`Error::Interrupted`] if a single run was stopped.
+    /// The errors of the experiments and of the store; [`Error::Interrupted`] if a single run was stopped.
     pub fn evaluate(
         &mut self,
         experiments: &[&dyn Experiment],
@@ -86,8 +86,8 @@ impl Runner {
         Ok((evaluations, false))
     }
 
-    /// Runs one experiment on all seeds, and scores each run as `of` does, which gets the place of the score among the metrics; none
-    /// where the numbers do not stay finite. `label` stands beside the progress bar.
+    /// Runs one experiment on all seeds, and scores each run by `of`, which receives the index of the score among the
+    /// metrics; `None` if the numbers become non-finite. `label` is the text of the progress bar.
     pub(crate) fn score(
         &mut self,
         experiment: &dyn Experiment,
@@ -111,7 +111,7 @@ impl Runner {
         seeds.iter().all(|&seed| self.store.get(&key_of(&experiment, seed)).is_some())
     }
 
-    /// The runs of some seeds: from the store, or made together.
+    /// The runs of some seeds: from the store, or run together.
     pub(crate) fn batch(
         &mut self,
         experiment: &dyn Experiment,
@@ -159,7 +159,7 @@ impl Evaluation {
     }
 }
 
-/// What a run is kept under.
+/// The key of a run in the store.
 pub(crate) fn key_of(experiment: &str, seed: u64) -> String {
     format!("{experiment}-{seed}")
 }
@@ -198,7 +198,7 @@ pub fn was_interrupted(error: &anyhow::Error) -> bool {
     matches!(error.downcast_ref(), Some(Error::Interrupted))
 }
 
-/// `runs` seeds from the first on.
+/// `runs` consecutive seeds from `first`.
 pub fn seeds(first: u64, runs: usize) -> Vec<u64> {
     (0..runs as u64).map(|k| first.wrapping_add(k)).collect()
 }

@@ -1,6 +1,6 @@
 //! Numbers as text.
 
-/// A number with about four digits that count.
+/// A number with about four significant digits.
 pub fn short(x: f64) -> String {
     match x.abs() {
         0.0 => "0".into(),
@@ -23,15 +23,15 @@ pub fn exact(x: f64) -> String {
     if (1e-3..1e6).contains(&x.abs()) || x == 0.0 { x.to_string() } else { format!("{x:e}") }
 }
 
-/// A number of a thing, such as `1 parameter` or `3 parameters`.
+/// A count of a thing, such as `1 parameter` or `3 parameters`.
 pub fn counted(n: usize, thing: &str) -> String {
     if n == 1 { format!("1 {thing}") } else { format!("{n} {thing}s") }
 }
 
-/// Intersection over union from which on a silhouette fits its mask.
+/// Least intersection over union at which a silhouette fits its mask.
 pub const FITS: f64 = 0.95;
 
-/// Whether a silhouette with this intersection over union fits its mask, in words: `fits`, `partly fits` or `does not fit`.
+/// The fit of a silhouette with this intersection over union, in words: `fits`, `partly fits` or `does not fit`.
 pub fn fit(iou: f64) -> &'static str {
     match iou {
         FITS.. => "fits",
@@ -40,7 +40,7 @@ pub fn fit(iou: f64) -> &'static str {
     }
 }
 
-/// A line for a terminal: what it is about, and that.
+/// A line for a terminal: a name and its text.
 pub fn line(name: &str, text: &str) -> String {
     format!("  {name:<22} {text}")
 }

@@ -1,4 +1,4 @@
-//! The files that a run reads, none of which it may replace or remove.
+//! The input files of a run, none of which it may replace or remove.
 
 use std::{
     ffi::{OsStr, OsString},
@@ -8,19 +8,19 @@ use std::{
 
 use serde_json::Value;
 
-/// The files that a run reads.
+/// The input files of a run.
 ///
-/// They are compared as files and not as names, so that links and detours (`./x/../a.png`) make no difference.
+/// They are compared by identity and not by name, so that links and detours (`./x/../a.png`) make no difference.
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     files: Vec<PathBuf>,
 }
 
 impl Inputs {
-    /// Every file that a word of a command line names, by itself or as a part of it (`--flag=FILE`, `FILE,FILE`, `"FILE --flag 1"`),
-    /// except behind the flags that name results. So a new flag is protected without a line of code.
+    /// Every file named by a word of a command line, by itself or as a part of it (`--flag=FILE`, `FILE,FILE`, `"FILE
+    /// --flag 1"`), except after the flags of results. New flags are therefore protected without further code.
     ///
-    /// Files of a folder that a flag names are not among them: a result never replaces a file that no manifest lists.
+    /// Files in a folder that a flag names are not included: a result never replaces a file that no manifest lists.
     pub fn of_words(words: &[OsString], outputs: &[&str]) -> Self {
         let mut inputs = Self::default();
         let mut names_result = false;
@@ -37,7 +37,7 @@ impl Inputs {
         inputs
     }
 
-    /// Adds a file, if there is one, and the files that it names if it is a mesh: materials and pictures.
+    /// Adds a file, if it exists, and, if it is a mesh, the material and picture files that it refers to.
     pub fn add(&mut self, path: &Path) {
         if !path.is_file() {
             return;
@@ -50,7 +50,7 @@ impl Inputs {
             Some(ending) if ending == "gltf" => of_json(&fs::read(path).unwrap_or_default()),
             _ => Vec::new(),
         };
-        // The last part alone too: readers look there for what is outside of the folder.
+        // The file name alone too: readers look there for files outside the folder.
         for name in named.iter().map(|name| name.replace('\\', "/")) {
             let last = name.rsplit('/').next().unwrap_or_default();
             self.files.extend([&*name, last].map(|name| folder.join(name)));
@@ -64,7 +64,7 @@ impl Inputs {
     }
 }
 
-/// The identity of a file; none where there is no file.
+/// The identity of a file; `None` if it does not exist.
 #[cfg(unix)]
 fn identity(path: &Path) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt;
@@ -76,7 +76,7 @@ fn identity(path: &Path) -> Option<PathBuf> {
     fs::canonicalize(path).ok()
 }
 
-/// A word, and its parts between commas, spaces and behind a `=`.
+/// A word, and its parts between commas, spaces and after a `=`.
 fn parts(word: &OsStr) -> Vec<OsString> {
     let mut all = vec![word.to_owned()];
     #[cfg(unix)]
@@ -102,7 +102,7 @@ fn parts(word: &OsStr) -> Vec<OsString> {
     all
 }
 
-/// What follows the first word of each line that begins with one of these.
+/// The rest of each line whose first word satisfies `begins`.
 fn lines(path: &Path, begins: impl Fn(&str) -> bool) -> Vec<String> {
     let text = fs::read(path).unwrap_or_default();
     let line = |line: &[u8]| {
@@ -118,7 +118,7 @@ fn lines(path: &Path, begins: impl Fn(&str) -> bool) -> Vec<String> {
     text.split(|&byte| byte == b'\n').filter_map(line).collect()
 }
 
-/// The material files that an OBJ file names, and the pictures that these name, behind options or not.
+/// The material files that an OBJ file refers to, and their pictures, with or without options.
 fn of_obj(path: &Path, folder: &Path) -> Vec<String> {
     let mut named = lines(path, |word| word == "mtllib");
     for library in named.clone() {
@@ -133,7 +133,7 @@ fn of_obj(path: &Path, folder: &Path) -> Vec<String> {
     named
 }
 
-/// The pictures and buffers that a GLB file names.
+/// The pictures and buffers that a GLB file refers to.
 fn of_glb(path: &Path) -> Vec<String> {
     let bytes = fs::read(path).unwrap_or_default();
     let length = bytes.get(12..16).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes);
@@ -141,7 +141,7 @@ fn of_glb(path: &Path) -> Vec<String> {
     of_json(bytes.get(20..end).unwrap_or_default())
 }
 
-/// The files that the JSON of a glTF file names, as it is written and with `%20` as a blank.
+/// The files that the JSON of a glTF file refers to, literally and with percent-decoding.
 fn of_json(text: &[u8]) -> Vec<String> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let Ok(json) = serde_json::from_slice::<Value>(text) else { return Vec::new() };
@@ -151,7 +151,7 @@ fn of_json(text: &[u8]) -> Vec<String> {
     named.flat_map(|uri| [uri.to_owned(), decoded(uri)]).collect()
 }
 
-/// A text whose escapes, `%` and two hexadecimal digits, stand for bytes.
+/// A text with its escapes, `%` and two hexadecimal digits, decoded to bytes.
 fn decoded(uri: &str) -> String {
     let mut parts = uri.split('%');
     let mut bytes = parts.next().unwrap_or_default().as_bytes().to_vec();

@@ -1,12 +1,12 @@
-//! What serves every experiment that is run on seeds, whatever it is about.
+//! Infrastructure for experiments that are run on seeds.
 //!
-//! An [`Experiment`] is something that can be run on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same
-//! seeds and keeps what is finished in a [`Store`]; a [`Summary`] and a [`Comparison`] say what came of it. [`Halving`](halving::Halving) searches
-//! for a setting, [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws, and
-//! [`report::Report`] writes pages, on which a [`Viewer`] turns a mesh.
+//! An [`Experiment`] runs on seeds and is measured by [`Metric`]s. A [`Runner`] runs several of them on the same seeds and stores finished
+//! runs in a [`Store`]; a [`Summary`] and a [`Comparison`] report the results. [`Halving`](halving::Halving) searches for a setting,
+//! [`Runner::select`] takes the cheapest of several answers that is as good as the best. [`plot::Plot`] draws charts, and
+//! [`report::Report`] writes pages, on which a [`Viewer`] shows a mesh.
 //!
-//! Nothing here draws or differentiates: it sees seeds, numbers, RGB images, and meshes and cameras as plain numbers. A page shows them
-//! ([`Viewer`], [`overlay`]), and advice names flags of the programs.
+//! This crate does not rasterize or differentiate. Its inputs are seeds, numbers, RGB images, and meshes and cameras as plain numbers, for
+//! pages ([`Viewer`], [`overlay`]); its advice names flags of the programs.
 
 mod axis;
 mod checksum;

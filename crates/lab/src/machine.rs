@@ -1,6 +1,6 @@
 use std::{fs, thread::available_parallelism};
 
-/// Most memory this process has held so far, in MiB; `None` where the system does not say.
+/// Peak memory of this process so far, in MiB; `None` if the system does not report it.
 ///
 /// Read from `VmHWM` of `/proc/self/status`, so Linux only.
 pub fn peak_rss_mib() -> Option<f64> {
@@ -10,7 +10,7 @@ pub fn peak_rss_mib() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-/// How many cores of which processor there are, as far as the system tells.
+/// Number of cores and name of the processor, as far as the system reports them.
 pub fn machine() -> String {
     let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let mut names = cpuinfo.lines().filter_map(|line| line.strip_prefix("model name"));

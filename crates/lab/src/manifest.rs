@@ -1,11 +1,11 @@
-//! Which files of an output folder are results, and of which command.
+//! The list of results in an output folder, each with its command.
 //!
-//! A run replaces and removes nothing but files that an earlier run of the same command has listed, in `.softrast.json` in the folder, and
-//! that still have the content that it gave them: their length and a checksum. A file that a user has changed, or put there under the name of
-//! a result, is the user's. So is everything in a folder without the list, as versions before it left.
+//! A run replaces and removes only files that an earlier run of the same command has listed, in `.softrast.json` in the
+//! folder, and that still have the recorded content: their length and a checksum. A file that a user has changed, or
+//! created under the name of a result, is the user's. So is everything in a folder without a list.
 //!
-//! The list is written before the files are: while a run writes, it names the content that a file has and the one that it will have. A
-//! program that is killed at any moment leaves files of either content, which the next run knows as results.
+//! The list is written before the files: while a run writes, it has the old and the new content of each file. A program
+//! that is killed at any moment leaves files of either content, which the next run recognizes as results.
 
 use std::{
     collections::BTreeMap,
@@ -42,11 +42,11 @@ struct Entry {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum What {
-    /// A result, and what it may contain.
+    /// A result, and its possible contents.
     Result(Vec<String>),
-    /// What a later call goes on from: it stays where results are replaced.
+    /// A file that a later call continues from: it remains when results are replaced.
     Kept(Vec<String>),
-    /// A file that grows, and how it begins.
+    /// A file that grows, and its beginning.
     Journal(String),
 }
 
@@ -56,16 +56,16 @@ impl Default for Manifest {
     }
 }
 
-/// Whose a file is, for a command.
+/// Owner of a file, from the view of a command.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
-    /// The command's, as it left it.
+    /// The command; the file is unchanged.
     Own,
-    /// Listed, but no longer as the command left it.
+    /// The command; the file has changed since.
     Changed,
-    /// A result of another command.
+    /// Another command.
     Other(String),
-    /// Nobody has listed it.
+    /// The user: the file is not listed.
     User,
 }
 
@@ -80,7 +80,7 @@ impl Manifest {
             Ok(_) => return Err(no_list()),
         }
         let mut list: Self = serde_json::from_slice(&fs::read(&path)?).map_err(|_| no_list())?;
-        // Nothing outside of the folder is ever a result.
+        // A result is never outside the folder.
         list.files.retain(|name, _| is_name(name));
         Ok(list)
     }
@@ -90,7 +90,7 @@ impl Manifest {
         text.expect("a list of names is JSON")
     }
 
-    /// Whose the regular file of this name at `path` is.
+    /// The owner of the regular file of this name at `path`.
     pub(crate) fn owner(&self, name: &str, path: &Path, command: &str) -> io::Result<Owner> {
         let Some(Entry { by, what }) = self.files.get(name) else { return Ok(Owner::User) };
         if by != command {
@@ -117,12 +117,12 @@ impl Manifest {
         self.files.keys().map(String::as_str)
     }
 
-    /// Lists a result, which has one of these contents.
+    /// Lists a result with these possible contents.
     pub(crate) fn result(&mut self, name: &str, command: &str, contents: Vec<String>) {
         self.insert(name, command, What::Result(contents));
     }
 
-    /// Lists what a later call goes on from.
+    /// Lists a file that a later call continues from.
     pub(crate) fn kept(&mut self, name: &str, command: &str, contents: Vec<String>) {
         self.insert(name, command, What::Kept(contents));
     }
@@ -145,7 +145,7 @@ fn no_list() -> io::Error {
     io::Error::other(format!("{MANIFEST} in it is not a list of results"))
 }
 
-/// Whether it is the name of a file, and not a path that leads elsewhere.
+/// Whether it is a file name, and not a path that leads elsewhere.
 pub(crate) fn is_name(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
@@ -162,7 +162,7 @@ pub(crate) fn content(path: &Path) -> io::Result<String> {
     Ok(content_of(&fs::read(path)?))
 }
 
-/// Whether a file begins so, or ends before it can; an empty one does.
+/// Whether a file begins with `head` or is a prefix of it; an empty file is.
 pub(crate) fn begins(path: &Path, head: &str) -> io::Result<bool> {
     let mut found = Vec::new();
     File::open(path)?.take(head.len() as u64).read_to_end(&mut found)?;

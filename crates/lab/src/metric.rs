@@ -1,29 +1,29 @@
 /// A number that every point of a run has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Metric {
-    /// Its place in the results, such as `image_error.hard`, which stands inside `image_error`.
+    /// Key in the results, such as `image_error.hard`, which is nested in `image_error`.
     pub key: &'static str,
-    /// Name as it stands on a chart axis, such as `camera angle`.
+    /// Name on a chart axis, such as `camera angle`.
     pub name: &'static str,
     /// Unit, such as `degrees`; empty for a pure number.
     pub unit: &'static str,
-    /// What it counts for.
+    /// Role of the metric.
     pub role: Role,
 }
 
-/// What a metric counts for.
+/// Role of a metric.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// What the optimiser lowers.
+    /// The loss that the optimiser minimises.
     Loss,
-    /// The error that methods are compared by, and that decides which step of a run is returned. It must be one that can be seen
-    /// without the answer. There is exactly one.
+    /// The error that methods are compared by, and that determines the returned step of a run. It
+    /// must not need the true answer. There is exactly one.
     Score,
     /// Another error: lower is better.
     Error,
     /// Another measure: higher is better.
     Gain,
-    /// Recorded beside the errors.
+    /// Recorded in addition to the errors.
     Trace,
 }
 
@@ -52,7 +52,7 @@ impl Metric {
     }
 }
 
-/// Place of the metric with this role.
+/// Index of the metric with this role.
 ///
 /// # Panics
 ///

@@ -6,22 +6,22 @@ use crate::{
     place, wilson_interval,
 };
 
-/// The errors of some runs, and how many succeeded.
+/// The errors of some runs, and the number of successes.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub(crate) errors: Vec<ErrorSummary>,
-    /// How many runs succeeded, of how many.
+    /// Number of successful runs, and of all runs.
     pub successes: [usize; 2],
     /// Whether there are intervals and values of each run.
     pub many: bool,
 }
 
 impl Outcome {
-    /// A summary of finished runs; `many` asks for intervals.
+    /// A summary of finished runs, with intervals if `many`.
     ///
     /// # Errors
     ///
-    /// If a run has no finite number even before its first step.
+    /// If a run has a non-finite number even before its first step.
     pub(crate) fn new(
         experiment: &dyn Experiment,
         runs: &[Run],
@@ -43,7 +43,7 @@ impl Outcome {
         })
     }
 
-    /// What stands in the results of any runs: how many they are, their errors, how often they succeeded.
+    /// The fields of runs in the results: their number, their errors, their success rate.
     pub(crate) fn json(&self) -> Map<String, Value> {
         let [successes, runs] = self.successes;
         let mut json = nested(self.errors.iter().map(|error| (&error.metric, json!(error))));
@@ -55,7 +55,7 @@ impl Outcome {
         json
     }
 
-    /// How many of the runs succeeded.
+    /// The share of successful runs.
     pub(crate) fn success_share(&self) -> String {
         let [successes, runs] = self.successes;
         let [low, high] = wilson_interval(successes, runs).map(|rate| rate * 100.0);

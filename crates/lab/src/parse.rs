@@ -9,7 +9,7 @@ use serde::{
 ///
 /// # Errors
 ///
-/// What was expected.
+/// The expected form.
 pub fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|&x: &f64| x > 0.0 && x.is_finite());
     number.ok_or_else(|| "expected a positive number".into())
@@ -19,7 +19,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 ///
-/// What was expected.
+/// The expected form.
 pub fn share(text: &str) -> Result<f64, String> {
     let share = text.parse().ok().filter(|&x: &f64| x > 0.0 && x < 1.0);
     share.ok_or_else(|| "expected a number above 0 and below 1".into())
@@ -29,17 +29,17 @@ pub fn share(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 ///
-/// What was expected.
+/// The expected form.
 pub fn whole<const LOW: usize, const HIGH: usize>(text: &str) -> Result<usize, String> {
     let number = text.parse().ok().filter(|n| (LOW..=HIGH).contains(n));
     number.ok_or_else(|| format!("expected a whole number from {LOW} to {HIGH}"))
 }
 
-/// A number of steps or runs: more than a million are a slip of the finger.
+/// A number of steps or runs, at most a million: more are probably a typing error.
 ///
 /// # Errors
 ///
-/// What was expected.
+/// The expected form.
 pub fn count(text: &str) -> Result<usize, String> {
     whole::<1, 1_000_000>(text)
 }
@@ -48,16 +48,16 @@ pub fn count(text: &str) -> Result<usize, String> {
 ///
 /// # Errors
 ///
-/// What was expected.
+/// The expected form.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| "expected a whole number from 0".into())
 }
 
-/// The variant of an enum that has this name in the results.
+/// The variant of an enum by its name in the results.
 ///
 /// # Errors
 ///
-/// What names there are.
+/// The list of names.
 pub fn named<T: for<'de> Deserialize<'de>>(text: &str) -> Result<T, String> {
     T::deserialize(text.into_deserializer()).map_err(|error: Error| error.to_string())
 }

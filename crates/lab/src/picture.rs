@@ -49,7 +49,7 @@ fn level(value: f64) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// Where two images of the same size differ, and in which direction.
+/// The signed difference of two images of the same size.
 ///
 /// White where they agree, red where the target is brighter, blue where the result is brighter;
 /// the deeper the colour, the larger the difference of the channel that differs most.
@@ -95,7 +95,7 @@ pub fn contact_sheet(images: &[RgbImage], columns: usize) -> RgbImage {
     sheet
 }
 
-/// Pictures of a run as files.
+/// The picture files of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Encoded {
     /// PNG: from left to right the target, the start, the result and the difference of target and result.
@@ -104,16 +104,16 @@ pub struct Encoded {
     /// GIF: the target on the left, the run on the right.
     #[serde(with = "as_base64")]
     pub animation: Vec<u8>,
-    /// SVG of the result, where the task draws it.
+    /// SVG of the result, if the task draws one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drawing: Option<String>,
 }
 
 /// Small pictures are enlarged to at least these widths, in pixels: in the row of four, and in the animation.
 const WIDTHS: [u32; 2] = [256, 192];
-/// Quality of a palette, 1 best to 30 fastest, for pictures that are not enlarged. Up to 256 colours are kept exactly in any case.
+/// Quality of a palette, 1 best to 30 fastest, for pictures that are not enlarged. Up to 256 colours are always exact.
 const SPEED: u32 = 10;
-/// How long frames are shown, and the last of them, in hundredths of a second.
+/// Durations of the frames, and of the last frame, in hundredths of a second.
 const DELAYS: [u16; 2] = [8, 200];
 
 impl Encoded {
@@ -148,10 +148,10 @@ pub fn png(image: &RgbImage) -> anyhow::Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
-/// Widths and heights of pictures on a page: small ones are enlarged to about the first, none is larger than the second, in pixels.
+/// Widths and heights of pictures on a page, in pixels: small ones are enlarged to about the first, larger ones reduced to the second.
 const ON_PAGE: [u32; 2] = [320, 640];
 
-/// A mask, row by row from 0 to 1, as a gray PNG for a page: large ones are made smaller.
+/// A mask, row by row from 0 to 1, as a gray PNG for a page: large masks are reduced.
 ///
 /// # Errors
 ///
@@ -171,7 +171,7 @@ pub fn mask_png(mask: &[f32], width: usize) -> anyhow::Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
-/// A picture for a page: small ones are enlarged so that their pixels show, large ones made smaller, whichever side is the longer one.
+/// A picture for a page: small ones are enlarged to show their pixels, large ones reduced, by their longer side.
 pub fn for_page(image: RgbImage) -> RgbImage {
     match image.width().max(image.height()) < ON_PAGE[1] {
         true => enlarged(&image, ON_PAGE[0]),
@@ -193,7 +193,7 @@ fn gif(target: &RgbImage, frames: &[RgbImage]) -> anyhow::Result<Vec<u8>> {
             .with_context(|| format!("{length} pixels a side are too many for a GIF"))
     };
     let (width, height) = (side(columns.len())?, side(rows.len())?);
-    // The palette is found with as many samples as on the enlarged picture: with fewer it is worse.
+    // The palette takes as many samples as on the enlarged picture: fewer make it worse.
     let larger = factor(target, WIDTHS[1]).pow(2);
     let (speed, times) = ((SPEED / larger).max(1), (larger / SPEED).max(1));
     let mut encoder = Encoder::new(&mut bytes, width, height, &[])?;
@@ -221,7 +221,7 @@ fn gif(target: &RgbImage, frames: &[RgbImage]) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Images of one size in one row; small ones enlarged so that their pixels show.
+/// Images of one size in one row; small ones are enlarged to show their pixels.
 fn row(images: &[RgbImage], width_at_least: u32) -> RgbImage {
     let small = sheet(images);
     let [columns, rows] = stretched(&images[0], images.len(), width_at_least);
@@ -279,8 +279,8 @@ mod as_base64 {
     }
 }
 
-/// A silhouette over a mask of the same shape, row by row, from 0 to 1: grey where both are, orange where only the mask is, blue where only
-/// the silhouette is.
+/// A silhouette over a mask of the same shape, row by row, from 0 to 1: grey in both, orange in the
+/// mask only, blue in the silhouette only.
 ///
 /// # Panics
 ///
@@ -378,7 +378,7 @@ mod tests {
     #[test]
     fn an_animation_shows_target_and_frame_enlarged() {
         let few = RgbImage::from_fn(5, 4, |x, y| Rgb([(50 * x) as u8, (60 * y) as u8, 9]));
-        // More colours than a palette has.
+        // More colours than a palette can hold.
         let many = RgbImage::from_fn(24, 16, |x, y| Rgb([(10 * x) as u8, (15 * y) as u8, 99]));
         for target in [few, many] {
             let frame = difference(&target, &plain(target.width(), target.height(), 200));
@@ -390,7 +390,7 @@ mod tests {
             for (found, shown) in found.iter().zip([&target, &frame]) {
                 let expected = row(&[target.clone(), shown.clone()], WIDTHS[1]);
                 assert_eq!(found.buffer().dimensions(), expected.dimensions());
-                // Mean over pixels and channels of how far colours are from those of the row.
+                // Mean difference of the colours to those of the row, over pixels and channels.
                 let off = |colours: &mut dyn Iterator<Item = [u8; 3]>| {
                     let pairs = colours.zip(expected.pixels());
                     let apart = pairs.map(|(a, b)| {

@@ -10,14 +10,14 @@ use crate::axis::MarkedAxis;
 
 const WIDTH: u32 = 900;
 const HEIGHT: u32 = 380;
-/// Room for the names of the methods, right of the axes.
+/// Width for the names of the methods, right of the axes.
 const LEGEND: u32 = 230;
 const ROW: i32 = 19;
 const GRID: RGBColor = RGBColor(225, 228, 232);
 const LIGHT: RGBColor = RGBColor(243, 244, 246);
 const BEHIND: RGBColor = RGBColor(150, 150, 150);
 
-/// Colours of series that have none of their own; told apart also by those who see no red.
+/// Default colours of series, distinguishable also without seeing red.
 const PALETTE: [[u8; 3]; 8] = [
     [31, 96, 168],
     [196, 84, 24],
@@ -29,16 +29,16 @@ const PALETTE: [[u8; 3]; 8] = [
     [90, 90, 90],
 ];
 
-/// One pair of axes and what is drawn over them.
+/// A chart: a pair of axes and the series drawn over them.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// From left to right.
+    /// Horizontal axis, to the right.
     pub x: Axis,
-    /// Upwards.
+    /// Vertical axis, upwards.
     pub y: Axis,
-    /// What is drawn; those that have a name stand in the legend.
+    /// The series; those with a name are in the legend.
     pub series: Vec<Series>,
-    /// Points joined by a line under the others.
+    /// Points joined by a line below the series.
     pub front: Vec<[f64; 2]>,
     /// Whether a linear y axis begins at 0.
     pub from_zero: bool,
@@ -49,23 +49,23 @@ pub struct Plot {
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// Red, green and blue; black stands for a colour of its own among the series.
+    /// Red, green and blue; black is replaced by a separate colour among the series.
     pub colour: [u8; 3],
     /// Whether the line is dashed, or the mark open.
     pub dashed: bool,
-    /// Drawn as a line; a single one as a mark.
+    /// Points of a line; a single one is drawn as a mark.
     pub points: Vec<[f64; 2]>,
-    /// What a single point looks like.
+    /// Shape of a single point.
     pub mark: Mark,
     /// Lower and upper end at every point, or nothing.
     pub band: Vec<[f64; 2]>,
-    /// Whether a ring around its dots marks it.
+    /// Whether its dots are ringed.
     pub marked: bool,
-    /// Whether a box around its dots marks it.
+    /// Whether its dots are boxed.
     pub boxed: bool,
 }
 
-/// What a single point is drawn as.
+/// Shape of a single point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mark {
     /// A disc.
@@ -85,7 +85,7 @@ impl Series {
         RGBColor(r, g, b)
     }
 
-    /// Its mark around a place in pixels: filled where nothing moves, open where the scale does.
+    /// Its mark at a position in pixels: filled, or open if the series is dashed.
     fn mark_at<DB: DrawingBackend>(&self, at: (i32, i32)) -> DynElement<'static, DB, (i32, i32)> {
         let colour = self.rgb();
         let style = if self.dashed { colour.stroke_width(2) } else { colour.filled() };
@@ -102,12 +102,12 @@ impl Series {
 }
 
 impl Plot {
-    /// Axes with nothing on them yet.
+    /// A chart without series.
     pub fn new(x: Axis, y: Axis) -> Self {
         Self { x, y, series: Vec::new(), front: Vec::new(), from_zero: false }
     }
 
-    /// The chart as SVG. Values that an axis cannot show are left out.
+    /// The chart as SVG. Values that an axis cannot show are omitted.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl Plot {
         Ok(text)
     }
 
-    /// The points behind it, one a line.
+    /// The points of the chart as CSV, one per line.
     pub fn csv(&self) -> String {
         let mut text = String::from("series,x,y,low,high\n");
         for Series { name, points, band, .. } in &self.series {
@@ -215,7 +215,7 @@ impl Plot {
         Ok(())
     }
 
-    /// As much as the names of all methods need.
+    /// Height of the chart, enough for all names.
     fn height(&self) -> u32 {
         HEIGHT.max((ROW as u32) * (self.series.len() as u32 + 3))
     }
@@ -227,7 +227,7 @@ impl Plot {
         let named = self.series.iter().filter(|series| !series.name.is_empty());
         for (row, series) in named.enumerate() {
             let (style, y) = (series.rgb().stroke_width(3), 26 + ROW * row as i32);
-            // A dashed line as long as its name allows: two dashes.
+            // The sample of a dashed line has two dashes.
             let dashes = if series.dashed { vec![(0, 8), (13, 21)] } else { vec![(0, 21)] };
             match series.points.len() {
                 1 => area.draw(&series.mark_at((10, y)))?,

@@ -1,4 +1,4 @@
-//! What every program does around its work: words in, one error line or results out.
+//! The frame of every program: parses the command line, prints one error line or the results.
 
 use std::{
     ffi::OsString,
@@ -14,30 +14,30 @@ use crate::{
     Failure, error::INTERRUPTED, printable, progress::stop_on_ctrl_c, shown::printable_json,
 };
 
-/// What a command has to say once its files are written.
+/// Output of a command after its files are written.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
     /// For programs.
     pub json: Value,
     /// For people, line by line.
     pub text: Vec<String>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
-    /// How far the work came if the user stopped it.
+    /// Progress of the work if the user stopped it.
     pub partial: Option<String>,
 }
 
-/// Bytes of stack for each thread: as much as a program's own has.
+/// Stack of each thread in bytes, as that of the main thread.
 const STACK: usize = 8 << 20;
 
-/// The whole `main` of a program: `execute` gets the words of the command line, the name of the program first, and a place for results.
+/// The whole `main` of a program: `execute` gets the words of the command line, the name of the program first, and a writer for results.
 ///
-/// It runs on a thread of the pool that parallel ops use. From outside, each of them would have to wake that pool, about 40 microseconds.
+/// It runs on a thread of the pool that parallel ops use. From another thread, each op would have to wake the pool, about 40 microseconds.
 pub fn run_main(
     execute: impl FnOnce(Vec<OsString>, &mut dyn Write) -> Result<(), Failure> + Send,
 ) -> ExitCode {
     stop_on_ctrl_c();
-    // Fails where threads run already, and those do as well.
+    // Fails if a pool exists already, which serves as well.
     let _ = rayon::ThreadPoolBuilder::new().stack_size(STACK).build_global();
     match rayon::scope(|_| execute(std::env::args_os().collect(), &mut io::stdout().lock())) {
         Ok(()) => ExitCode::SUCCESS,
@@ -48,11 +48,11 @@ pub fn run_main(
     }
 }
 
-/// Parses a command line. If it asks for help, that is printed and there is nothing else to do: none.
+/// Parses a command line. If it requests help, prints it and returns `None`.
 ///
 /// # Errors
 ///
-/// What is wrong with it, in one line.
+/// The mistake, in one line.
 pub fn parse<P: Parser>(
     command: clap::Command,
     words: &[OsString],
@@ -71,13 +71,13 @@ pub fn parse<P: Parser>(
 }
 
 impl Output {
-    /// Prints warnings to stderr and the rest to `stdout`; `again` is the command that goes on.
+    /// Prints warnings to stderr and the rest to `stdout`; `again` is the command to continue with.
     ///
     /// # Errors
     ///
-    /// If it cannot be written, or the work is not finished.
+    /// If it cannot be written, or the work is unfinished.
     pub fn print(&self, as_json: bool, again: &str, stdout: &mut dyn Write) -> Result<(), Failure> {
-        /// More of them are in the results.
+        /// Most warnings printed; the results have all of them.
         const SHOWN: usize = 3;
         for warning in self.warnings.iter().take(SHOWN) {
             eprintln!("warning: {}", printable(warning));
@@ -98,14 +98,14 @@ impl Output {
     }
 }
 
-/// Prints a line to stderr beside the progress of a program.
+/// Prints a line to stderr, above the progress bar.
 pub fn say(line: &str) {
     eprintln!("{}", printable(line));
 }
 
 const STDOUT: &str = "cannot write to the standard output";
 
-/// The command line that gives the same results again from the beginning.
+/// The command line that reproduces the results from the beginning.
 pub fn repeated(package: &str, words: &[OsString]) -> String {
     let words = words.iter().skip(1).filter(|word| *word != "--resume");
     let words: Vec<String> = words.map(|word| word.to_string_lossy().into_owned()).collect();

@@ -9,10 +9,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::{Error, error::INTERRUPTED, printable};
 
-/// Shows on stderr how far the work is, and stops it when the user asks for that.
+/// Shows the progress of the work on stderr, and stops it on request of the user.
 ///
-/// On a terminal it is a bar with steps, loss and time left; elsewhere a line every ten seconds. Each
-/// step counts once for every run that makes it, so that batches of any size share one bar.
+/// On a terminal it is a bar with steps, loss and remaining time; elsewhere a line every ten seconds. Each step counts
+/// once for every run that makes it, so that batches of any size share one bar.
 pub struct Progress {
     bar: ProgressBar,
     lines: bool,
@@ -20,7 +20,7 @@ pub struct Progress {
     stop: &'static AtomicBool,
     /// Steps of all runs of earlier batches.
     before: u64,
-    /// Steps of those that an earlier call of the program has made.
+    /// Steps made by an earlier call of the program.
     skipped: u64,
     /// Runs and steps of this batch.
     runs: usize,
@@ -28,15 +28,15 @@ pub struct Progress {
     prefix: String,
 }
 
-/// Time between two lines where there is no terminal.
+/// Time between two lines without a terminal.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// For work that nobody stops.
+/// For work that cannot be stopped.
 static NEVER: AtomicBool = AtomicBool::new(false);
-/// Whether the user has asked the program to stop.
+/// Whether the user has requested a stop.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Lets Ctrl-C stop the work after the step in progress; a second one ends the program at once.
+/// Makes Ctrl-C stop the work after the current step; a second one ends the program at once.
 pub fn stop_on_ctrl_c() {
     // Without a handler Ctrl-C ends the program at once, which loses no finished run either.
     let _ = ctrlc::set_handler(|| {
@@ -48,7 +48,7 @@ pub fn stop_on_ctrl_c() {
 }
 
 impl Progress {
-    /// Progress that nobody sees or stops, for what is run as a library.
+    /// Progress that is neither shown nor stopped, for library use.
     pub fn hidden() -> Self {
         Self::new(ProgressDrawTarget::hidden(), false, &NEVER)
     }
@@ -81,16 +81,16 @@ impl Progress {
         }
     }
 
-    /// Says how many steps all runs of all batches have together.
+    /// Sets the total number of steps of all runs of all batches.
     pub fn expect(&self, steps: usize) {
         self.bar.set_length(steps as u64);
     }
 
-    /// Starts a batch of `runs` that make `steps` each; `prefix` says which.
+    /// Starts a batch of `runs` of `steps` steps each; `prefix` is its label.
     ///
     /// # Errors
     ///
-    /// [`Error::Interrupted`] if the user has asked the program to stop.
+    /// [`Error::Interrupted`] if the user has requested a stop.
     pub fn begin(&mut self, prefix: String, runs: usize, steps: usize) -> Result<(), Error> {
         if self.stop.load(Ordering::SeqCst) {
             return Err(Error::Interrupted);
@@ -102,11 +102,11 @@ impl Progress {
         Ok(())
     }
 
-    /// Tells that `step` steps of this batch are done, and the loss they led to.
+    /// Reports that `step` steps of this batch are done, and their last loss.
     ///
     /// # Errors
     ///
-    /// [`Error::Interrupted`] when the work should stop here; pass it on.
+    /// [`Error::Interrupted`] if the work should stop here; pass it on.
     pub fn step(&mut self, step: usize, loss: f64) -> anyhow::Result<()> {
         let done = self.before + (step * self.runs) as u64;
         self.bar.set_position(done);
@@ -117,14 +117,14 @@ impl Progress {
             let steps = self.bar.length().unwrap_or(done);
             eprintln!("{}: step {done}/{steps}, loss {loss:.4e}{left}", self.prefix);
         }
-        // After the last step the batch is as good as finished, and would be lost.
+        // After the last step the batch is nearly finished, and would be lost.
         if step < self.steps && self.stop.load(Ordering::SeqCst) {
             return Err(Error::Interrupted.into());
         }
         Ok(())
     }
 
-    /// The time left, once a tenth of the steps is done: the first steps of a program say little about the others.
+    /// The remaining time, once a tenth of the steps is done: the first steps of a program are not representative.
     fn left(&self, done: u64) -> String {
         let steps = self.bar.length().unwrap_or(done) - self.skipped;
         if 10 * (done - self.skipped) < steps {
@@ -139,12 +139,12 @@ impl Progress {
         self.bar.set_position(self.before);
     }
 
-    /// Passes over steps that an earlier call of the program has made.
+    /// Skips steps that an earlier call of the program has made.
     pub fn skip(&mut self, runs: usize, steps: usize) {
         self.before += (runs * steps) as u64;
         self.skipped += (runs * steps) as u64;
         self.bar.set_position(self.before);
-        // They took no time now, so they say nothing about the time left.
+        // They took no time in this call, and must not affect the estimate.
         self.bar.reset_eta();
     }
 

@@ -4,33 +4,33 @@ use serde_json::Value;
 
 use crate::{Metric, Progress};
 
-/// Something that can be run on seeds: a problem with a method to solve it.
+/// An experiment that can be run on seeds: a problem with a method to solve it.
 pub trait Experiment {
-    /// What it is called beside others, such as `gauss`.
+    /// Name among other experiments, such as `gauss`.
     fn name(&self) -> &str;
 
-    /// All that decides the numbers but the seed. Finished runs are kept by it.
+    /// Everything that determines the numbers, except the seed. It is the key of finished runs.
     fn identity(&self) -> Value;
 
-    /// What is measured at every point, always the same list.
+    /// The metrics of every point, always the same list.
     fn metrics(&self) -> &[Metric];
 
     /// Steps of a run.
     fn steps(&self) -> usize;
 
-    /// How many seeds one call of [`run`](Experiment::run) should solve together.
+    /// Number of seeds that one call of [`run`](Experiment::run) should solve together.
     fn batch_size(&self) -> usize {
         1
     }
 
     /// Runs every seed of the batch, and returns the runs in the order of the seeds.
     ///
-    /// A run depends on its seed alone, not on the others in its batch. Call [`Progress::step`] after every step, and pass its
-    /// error on with `?`: that is how Ctrl-C ends a batch.
+    /// A run depends only on its seed, not on the others in its batch. Call [`Progress::step`]
+    /// after every step, and pass its error on with `?`: that is how Ctrl-C ends a batch.
     ///
     /// # Errors
     ///
-    /// Whatever keeps the batch from being run. A value that stops being finite is no error.
+    /// Any reason that prevents the batch from running. A value that becomes non-finite is no error.
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>>;
 }
 
@@ -39,11 +39,11 @@ pub trait Experiment {
 pub struct Batch {
     /// One run per seed; never empty.
     pub seeds: Vec<u64>,
-    /// Whether the run of the first seed should bring its [`Pictures`].
+    /// Whether the run of the first seed should have its [`Pictures`].
     pub pictures: bool,
 }
 
-/// Most frames that an animation shows.
+/// Most frames of an animation.
 const FRAMES: usize = 80;
 
 impl Batch {
@@ -60,22 +60,22 @@ impl Batch {
 /// One run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// What it was drawn from.
+    /// The seed of its instance.
     pub seed: u64,
     /// State before the first step, and after the steps that follow, the last included.
     pub curve: Vec<Point>,
-    /// Whether it reached what was asked for.
+    /// Whether it reached the goal.
     pub success: bool,
     /// Wall time of each step, in seconds: its share of the batch; without pictures and errors.
     pub step_seconds: Vec<f64>,
-    /// Steps at which it was stuck and began again from another start.
+    /// Steps at which it was stuck and restarted.
     #[serde(default)]
     pub begun_again: Vec<usize>,
-    /// What the user should know, one line each, such as an empty target.
+    /// Warnings for the user, one line each, such as an empty target.
     pub warnings: Vec<String>,
-    /// The first step whose numbers were not finite; the curve ends before it.
+    /// The first step with non-finite numbers; the curve ends before it.
     pub broke_at: Option<usize>,
-    /// Pictures, where [`Batch::pictures`] asked for them and this run is the first.
+    /// Pictures, if [`Batch::pictures`] requested them and this run is the first.
     #[serde(skip)]
     pub pictures: Option<Pictures>,
 }
@@ -89,18 +89,18 @@ pub struct Point {
     pub values: Vec<f64>,
 }
 
-/// What a run looks like. All images have the same size.
+/// The pictures of a run. All images have the same size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pictures {
-    /// What the run should arrive at.
+    /// The target image.
     pub target: RgbImage,
-    /// Before the first step.
+    /// The image before the first step.
     pub start: RgbImage,
-    /// After the step that is returned.
+    /// The image after the returned step.
     pub result: RgbImage,
     /// The steps for which [`Batch::wants_frame`] is true, in order.
     pub frames: Vec<RgbImage>,
-    /// The result as SVG, where the task draws it.
+    /// The result as SVG, if the task draws one.
     pub drawing: Option<String>,
 }
 
@@ -110,13 +110,13 @@ impl Run {
         self.step_seconds.iter().sum()
     }
 
-    /// The point that the run returns: where the metric at `score` is least, of equal ones the last; none where it is nowhere a
-    /// finite number.
+    /// The returned point of the run: the one with the smallest metric at `score`, the last of
+    /// equal ones; `None` if that is finite nowhere.
     pub fn returned(&self, score: usize) -> Option<&Point> {
         best_point(&self.curve, score)
     }
 
-    /// Ends the curve before the first point that is not finite; that run is no success.
+    /// Ends the curve before the first non-finite point; such a run is no success.
     pub(crate) fn keep_finite(&mut self) {
         let finite = |point: &Point| point.values.iter().all(|x| x.is_finite());
         let Some(bad) = self.curve.iter().position(|point| !finite(point)) else { return };
@@ -130,7 +130,7 @@ impl Run {
         (self.broke_at, self.success) = (Some(step), false);
     }
 
-    /// Whether it has this seed and these metrics, at steps from 0 on.
+    /// Whether the run has this seed and number of metrics, and its points are complete, at steps from 0 on.
     pub(crate) fn fits(&self, seed: u64, metrics: usize, steps: usize) -> bool {
         let in_order = self.curve.iter().enumerate().all(|(k, point)| point.step == k);
         let whole = self.curve.iter().all(|point| point.values.len() == metrics);
@@ -140,7 +140,7 @@ impl Run {
     }
 }
 
-/// The point of a curve where the metric at `score` is least, of equal ones the last; none where it is nowhere finite.
+/// The point of a curve with the smallest metric at `score`, the last of equal ones; `None` if that is finite nowhere.
 pub fn best_point(curve: &[Point], score: usize) -> Option<&Point> {
     let finite = curve.iter().filter(|point| point.values[score].is_finite());
     finite

@@ -11,41 +11,41 @@ use crate::{
 
 /// One answer to a question of a selection.
 pub struct Candidate<A> {
-    /// The flags that give it.
+    /// The flags of this answer.
     pub flags: String,
-    /// What it computes with, such as `2 parameters`.
+    /// Its resources, such as `2 parameters`.
     pub with: String,
-    /// What is run.
+    /// The experiment to run.
     pub experiment: Box<dyn Experiment>,
-    /// Whatever the caller wants back of the chosen one.
+    /// The caller's value, returned for the chosen answer.
     pub answer: A,
 }
 
-/// One question, and which of its answers is the cheapest that is as good as the best.
+/// One question, and the cheapest of its answers that is as good as the best.
 ///
-/// As good means: its error is above that of the best by at most one standard error of their difference, seed by seed. Source: Breiman
-/// et al. 1984, Sec. 3.4.3 (the one-standard-error rule).
+/// As good means: its error exceeds that of the best by at most one standard error of their difference, paired by seed.
+/// Source: Breiman et al. 1984, Sec. 3.4.3 (the one-standard-error rule).
 #[derive(Clone, Debug, Serialize)]
 pub struct Selection {
-    /// What is asked for, such as `softness`.
+    /// The subject of the question, such as `softness`.
     of: &'static str,
-    /// Places among the reasons: of the chosen answer, and of the one with the least error.
+    /// Indices among the reasons: of the chosen answer, and of the one with the smallest error.
     chosen: usize,
     best: usize,
-    /// All that were tried, the cheapest first.
+    /// All tried answers, the cheapest first.
     reasons: Vec<Reason>,
 }
 
-/// An answer and what speaks for or against it.
+/// An answer and its results.
 #[derive(Clone, Debug, Serialize)]
 struct Reason {
     flags: String,
     with: String,
-    /// Error of what each seed returns, in their order; none where it is not finite.
+    /// Error of the returned step for each seed, in their order; `None` if not finite.
     errors: Vec<Option<f64>>,
     /// Time of the steps of one run.
     seconds: f64,
-    /// Mean error; none if a run has no finite one.
+    /// Mean error; `None` if a run has no finite error.
     mean: Option<f64>,
     /// Mean difference from the best, and its standard error.
     above_best: Option<f64>,
@@ -53,25 +53,25 @@ struct Reason {
     verdict: &'static str,
 }
 
-/// Time that is left for trials.
+/// Remaining time for trials.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     /// Seconds.
     pub left: f64,
-    /// Whether it lasted for everything so far.
+    /// Whether it has sufficed so far.
     pub lasted: bool,
 }
 
 impl Runner {
-    /// Tries the answers to one question in their order, and takes the cheapest that is as good as the best: the answer and its
-    /// reasons. None if no answer has only finite errors.
+    /// Tries the answers to one question in their order, and returns the cheapest that is as good as the best, with the reasons. None if no
+    /// answer has only finite errors.
     ///
-    /// The first answer is always tried. Another is left out when it would go beyond the budget; it is expected to take as long as
-    /// those so far on average. What was run before costs nothing. Shards have no budget: they share all answers.
+    /// The first answer is always tried. A further one is skipped if it would exceed the budget; it is expected to take as long as the mean
+    /// of those before. Runs already in the store cost nothing. Shards have no budget: they share all answers.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the store.
+    /// The errors of the experiments and of the store.
     pub fn select<A>(
         &mut self,
         of: &'static str,
@@ -112,7 +112,7 @@ impl Reason {
 }
 
 impl Selection {
-    /// Among answers in the order of their cost; none if none has only finite errors.
+    /// Selects among answers in ascending cost; `None` if no answer has only finite errors.
     fn among(of: &'static str, mut reasons: Vec<Reason>) -> Option<Self> {
         let finite = reasons.iter().enumerate().filter_map(|(k, reason)| Some((k, reason.mean?)));
         let (best, _) = finite.reduce(|a, b| if b.1 < a.1 { b } else { a })?;
@@ -140,7 +140,7 @@ impl Selection {
         &self.reasons[self.chosen]
     }
 
-    /// The reasons, the chosen one marked.
+    /// The reasons, with the chosen answer marked.
     pub fn table(&self) -> Table {
         let mut table =
             Table::new([self.of, "with", "error", "above best", "s per run", "verdict"]);
@@ -159,12 +159,12 @@ impl Selection {
     }
 }
 
-/// The flags that ask for all that is chosen, on one line.
+/// The flags of all chosen answers, on one line.
 pub fn chosen_flags(stages: &[Selection]) -> String {
     stages.iter().map(|stage| stage.answer().flags.as_str()).collect::<Vec<_>>().join(" ")
 }
 
-/// What the choices cost and gain against the best answer to the first question; empty if nothing was asked.
+/// Cost and gain of the choices relative to the best answer to the first question; empty without questions.
 pub fn price(stages: &[Selection]) -> String {
     let (Some(first), Some(last)) = (stages.first(), stages.last()) else {
         return String::new();
@@ -194,13 +194,13 @@ pub fn section(stages: &[Selection], report: &mut Report) {
     );
 }
 
-/// Mean difference of errors from the best ones, seed by seed, and its standard error.
+/// Mean paired difference of errors to the best ones, and its standard error.
 fn difference(errors: &[Option<f64>], best: &[Option<f64>]) -> Option<[f64; 2]> {
     let pairs = errors.iter().zip(best);
     let off = pairs.map(|(a, b)| Some((*a)? - (*b)?)).collect::<Option<Vec<f64>>>()?;
     let middle = mean(&off);
     let n = off.len() as f64;
-    // One seed has no spread, so that only the best is as good as the best.
+    // A single seed has no spread: then only the best is as good as the best.
     let variance = off.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
     Some([middle, (variance / n).sqrt()])
 }

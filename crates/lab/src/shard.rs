@@ -1,22 +1,22 @@
 use std::{env, fmt};
 
-/// Which part of a job a process does: every N-th run, N being the number of shards.
+/// The share of a process in a job: every N-th run, N being the number of shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// From 0 on.
+    /// Counted from 0.
     index: usize,
     of: usize,
 }
 
-/// More processes than that are a slip of the finger.
+/// More processes are probably a typing error.
 const MOST: usize = 100_000;
 
 impl Shard {
-    /// From `I/N`, with I from 1 to N; or from `auto`, which takes both from the environment of a Slurm array or of `mpirun`.
+    /// From `I/N`, with I from 1 to N; or from `auto`, which reads both from the environment of a Slurm array or of `mpirun`.
     ///
     /// # Errors
     ///
-    /// What was expected.
+    /// The expected form.
     pub fn parse(text: &str) -> Result<Self, String> {
         if text == "auto" {
             return Self::of_environment(|name| env::var(name).ok());
@@ -33,7 +33,7 @@ impl Shard {
         (index < of && of <= MOST).then_some(Self { index, of })
     }
 
-    /// Sources: the manual of `sbatch`, Open MPI's `mpirun`, and what Hydra and Slurm's PMI set.
+    /// Sources: the manual of `sbatch`, Open MPI's `mpirun`, and the variables of Hydra and Slurm's PMI.
     fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         let number = |name: &str| variable(name)?.parse::<usize>().ok();
         let array = |part: &str| number(&format!("SLURM_ARRAY_TASK_{part}"));
@@ -58,22 +58,22 @@ impl Shard {
         Err("neither an array of Slurm nor mpirun is around: say --shard I/N".into())
     }
 
-    /// Whether the `k`-th run of a job is its.
+    /// Whether the `k`-th run of a job belongs to it.
     pub fn takes(self, k: usize) -> bool {
         k % self.of == self.index
     }
 
-    /// A place among `count`, another one for each of that many shards.
+    /// An index below `count`, different for each of up to `count` shards.
     pub(crate) fn place(self, count: usize) -> usize {
         self.index % count
     }
 
-    /// As it stands in the name of a file.
+    /// The shard as in the name of a file.
     pub(crate) fn in_name(self) -> String {
         format!("{}-of-{}", self.index + 1, self.of)
     }
 
-    /// Whether a part of a file's name is that of a shard, or of one that was run again, such as `3-of-8.2`.
+    /// Whether a part of a file's name is that of a shard, possibly run again, such as `3-of-8.2`.
     pub(crate) fn is_in_name(part: &str) -> bool {
         let (shard, again) = part.split_once('.').unwrap_or((part, "2"));
         let is_number = |text: &str| text.parse::<usize>().is_ok();

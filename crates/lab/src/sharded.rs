@@ -6,23 +6,23 @@ use crate::{
     store::key,
 };
 
-/// An experiment and the seeds that it is to be run on.
+/// An experiment and its seeds.
 pub struct Work<'a> {
-    /// What is run.
+    /// The experiment.
     pub experiment: &'a dyn Experiment,
-    /// On which seeds.
+    /// The seeds to run it on.
     pub seeds: &'a [u64],
-    /// Whether the first seed brings pictures.
+    /// Whether the first seed has pictures.
     pub pictures: bool,
 }
 
 impl Runner {
-    /// Makes the runs of a job that are its shard's; all of them where there is no shard. How many of those are finished, and of how many;
-    /// fewer if the user stopped it.
+    /// Makes the shard's runs of a job, or all runs without a shard. Returns the numbers of
+    /// finished and of requested runs; they differ if the user stopped it.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the store.
+    /// The errors of the experiments and of the store.
     pub fn part(&mut self, job: &[Work<'_>]) -> anyhow::Result<Partial> {
         let mine = self.mine(job);
         let steps = |(work, seeds): &(&Work<'_>, Vec<u64>)| work.experiment.steps() * seeds.len();
@@ -39,12 +39,12 @@ impl Runner {
         Ok(Partial { finished, asked })
     }
 
-    /// Makes sure that these experiments are finished on all seeds, where there is a shard: makes its own, then those that no other shard has
-    /// finished by then. So no shard waits for another, and one that was killed holds nobody up.
+    /// With a shard, completes these experiments on all seeds: makes the shard's own runs, then those that no other shard has finished by
+    /// then. Therefore no shard waits for another, and a killed one blocks nobody.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the store; [`Error::Interrupted`](crate::Error::Interrupted) if the user stopped it.
+    /// The errors of the experiments and of the store; [`Error::Interrupted`](crate::Error::Interrupted) if the user stopped it.
     pub(crate) fn complete(
         &mut self,
         experiments: &[&dyn Experiment],
@@ -65,14 +65,14 @@ impl Runner {
                     |seed: &&u64| self.store.get(&key_of(&experiment, **seed)).is_none();
                 missing.extend(work.seeds.iter().filter(is_missing).map(|&seed| (work, seed)));
             }
-            // From the end, which their owners come to last.
+            // From the end, which their owners reach last.
             let Some(last) = missing.len().checked_sub(1) else { return Ok(()) };
             let (work, seed) = missing[last - shard.place(missing.len())];
             self.make(work, &[seed], &mut 0)?;
         }
     }
 
-    /// What of a job is its shard's.
+    /// The shard's runs of a job.
     fn mine<'a, 'b>(&self, job: &'a [Work<'b>]) -> Vec<(&'a Work<'b>, Vec<u64>)> {
         let (shard, mut before) = (self.store.shard(), 0);
         let of = |work: &'a Work<'b>| {

@@ -1,13 +1,13 @@
-//! How paths and messages are printed.
+//! Printing of paths and messages.
 
 use std::{borrow::Cow, path::Path};
 
-/// A path as text, for JSON, pages and lines, which hold UTF-8 alone: bytes that are none become U+FFFD.
+/// A path as text, for JSON, pages and lines, which are UTF-8: invalid bytes become U+FFFD.
 pub fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-/// The text with its control characters escaped, except line feeds and tabs, so that the name of a file cannot command a terminal.
+/// The text with its control characters escaped, except line feeds and tabs, so that a file name cannot send commands to a terminal.
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_default().to_string())
 }
@@ -25,7 +25,7 @@ fn escaped(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     text.chars().map(part).collect::<String>().into()
 }
 
-/// Whether a terminal acts on a character: control characters, and those that turn the direction of a line.
+/// Whether a terminal interprets a character: control characters, and those that change the direction of text.
 fn commands(c: char) -> bool {
     let turns = matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     (c.is_control() && !matches!(c, '\n' | '\t')) || turns

@@ -1,18 +1,18 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Arithmetic mean; NaN of nothing.
+/// Arithmetic mean; NaN for no values.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Middle value; between two, their mean. NaN of nothing.
+/// Median: the middle value, or the mean of the middle two. NaN for no values.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
 /// Value below which the fraction `q` of the values lies, interpolated linearly between them.
 ///
-/// With the `n` values sorted, that is position `q (n - 1)`; NaN of nothing. The order of the
+/// With the `n` values sorted, that is position `q (n - 1)`; NaN for no values. The order of the
 /// values does not matter. NaN among them sorts last.
 ///
 /// # Panics
@@ -31,15 +31,15 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[below] + (sorted[above] - sorted[below]) * (position - below as f64)
 }
 
-/// 95 % interval of a mean, as all results have it: `[low, high]`. One value gives an interval of no width; none gives NaN.
+/// 95 % interval of a mean, as in all results: `[low, high]`. One value gives an interval of width zero; none gives NaN.
 pub fn mean_interval(values: &[f64]) -> [f64; 2] {
     mean_interval_at(0.95, values)
 }
 
-/// Interval that holds the mean with this probability: `[low, high]`.
+/// Interval that contains the mean with this probability: `[low, high]`.
 ///
-/// It is Student's: the standard error of the mean times a quantile of the t distribution, which suits few values too. Source: Student
-/// 1908.
+/// Student's interval: the standard error of the mean times a quantile of the t distribution, which
+/// is valid for few values too. Source: Student 1908.
 pub(crate) fn mean_interval_at(level: f64, values: &[f64]) -> [f64; 2] {
     let middle = mean(values);
     let freedom = values.len().saturating_sub(1) as f64;
@@ -50,10 +50,10 @@ pub(crate) fn mean_interval_at(level: f64, values: &[f64]) -> [f64; 2] {
     [middle - half, middle + half]
 }
 
-/// 95 % interval of a rate of which `successes` of `trials` were seen: `[low, high]`.
+/// 95 % interval of a rate, given `successes` out of `trials`: `[low, high]`.
 ///
-/// Source: Wilson 1927, the score interval, with z = 1.96: it stays in [0, 1] and is of use for a
-/// few trials and for rates near 0 or 1. No trials give [0, 1].
+/// Source: Wilson 1927, the score interval, with z = 1.96: it stays in [0, 1] and is useful for few
+/// trials and for rates near 0 or 1. No trials give [0, 1].
 pub fn wilson_interval(successes: usize, trials: usize) -> [f64; 2] {
     /// 97.5 % quantile of the normal distribution.
     const Z: f64 = 1.959_963_984_540_054;

@@ -14,21 +14,23 @@ use crate::{OutputFolder, Shard, checksum::checksum, write_atomically};
 
 /// Finished work by key, in a file that outlives the program.
 ///
-/// The file has a line of JSON for every piece, which holds a checksum of itself. A line is written at once and then synced: a program
-/// that is killed leaves half a line at most. Lines of several jobs may stand in one file, in any order.
+/// The file has a line of JSON for every piece, with its own checksum. Each line is written at once
+/// and then synced: a program that is killed leaves at most half a line. Lines of several jobs may
+/// share a file, in any order.
 ///
-/// Each shard of a job writes a file of its own beside it, `evaluate.3-of-8.jsonl` for `evaluate.jsonl`, and reads those of all others.
+/// Each shard of a job writes a separate file in the same folder, `evaluate.3-of-8.jsonl` for
+/// `evaluate.jsonl`, and reads those of all others.
 pub struct Store<T> {
     path: Option<PathBuf>,
     shard: Option<Shard>,
     found: BTreeMap<String, T>,
-    /// Whether what the file held before stays.
+    /// Whether the existing content of the file is kept.
     appends: bool,
-    /// How far the files of shards have been read.
+    /// Read positions in the files of shards.
     read: BTreeMap<PathBuf, u64>,
 }
 
-/// A line of the file but for its checksum.
+/// A line of the file without its checksum.
 #[derive(Serialize, Deserialize)]
 struct Entry<T> {
     key: String,
@@ -38,23 +40,23 @@ struct Entry<T> {
 }
 
 impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
-    /// One that keeps nothing on file.
+    /// A store without a file.
     pub fn in_memory() -> Self {
         let (found, read) = (BTreeMap::new(), BTreeMap::new());
         Self { path: None, shard: None, found, appends: false, read }
     }
 
-    /// An empty one, which replaces the file as soon as a piece is finished.
+    /// An empty store, which replaces the file once a piece is finished.
     pub fn fresh(path: &Path) -> Self {
         Self { path: Some(path.into()), ..Self::in_memory() }
     }
 
-    /// What stands in the file and in those of shards, if there are any, and a word on lines that are damaged. Those are taken out of the
-    /// file, but not out of those of shards, which may be at work.
+    /// Reads the file and those of shards, if there are any, and returns a note on damaged lines.
+    /// Damaged lines are removed from the file, but not from those of shards, which may be running.
     ///
     /// # Errors
     ///
-    /// If a file cannot be read, or damaged lines cannot be taken out.
+    /// If a file cannot be read, or damaged lines cannot be removed.
     pub fn open(path: &Path) -> anyhow::Result<(Self, Option<String>)> {
         let mut store = Self { appends: true, ..Self::fresh(path) };
         let is_there = path.exists();
@@ -78,7 +80,8 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
         Ok((store, note))
     }
 
-    /// The one of a command in its folder: of its shard, else what there is if it resumes, else a fresh one; and a word on what is damaged.
+    /// The store of a command in its folder: that of its shard, else the existing one if it
+    /// resumes, else a fresh one; and a note on damaged lines.
     ///
     /// # Errors
     ///
@@ -97,7 +100,7 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
         if resumes { Self::open(&path) } else { Ok((Self::fresh(&path), None)) }
     }
 
-    /// What stands in all files of the job, to go on from with a shard, which writes a new file.
+    /// The pieces in all files of the job, for a shard to continue from; it writes a new file.
     ///
     /// # Errors
     ///
@@ -112,7 +115,7 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
         Ok(store)
     }
 
-    /// The shard that it belongs to.
+    /// The shard of this store.
     pub fn shard(&self) -> Option<Shard> {
         self.shard
     }
@@ -122,7 +125,7 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
         self.found.get(key)
     }
 
-    /// Keeps a piece; `name` is for people who read the file.
+    /// Stores a piece; `name` is for human readers of the file.
     ///
     /// # Errors
     ///
@@ -139,12 +142,12 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
         Ok(())
     }
 
-    /// How many pieces are finished and kept on file.
+    /// Number of finished pieces on file.
     pub fn kept(&self) -> usize {
         if self.path.is_some() { self.found.len() } else { 0 }
     }
 
-    /// Reads what shards have written since the last time; nothing where nothing is on file.
+    /// Reads new lines of other shards; empty without a file.
     ///
     /// # Errors
     ///
@@ -162,17 +165,17 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
         Ok(all)
     }
 
-    /// Takes in the lines of a file from a byte on. Of two of the same key the last stays.
+    /// Reads the lines of a file from a byte on. Of two lines with one key the last counts.
     fn read(&mut self, path: &Path, from: u64) -> anyhow::Result<Lines> {
         let named = || format!("cannot read {path:?}");
-        // A pipe could be waited for for ever.
+        // Opening a pipe could block for ever.
         ensure!(fs::metadata(path).with_context(named)?.is_file(), "{path:?} is no regular file");
         let mut file = File::open(path).with_context(named)?;
         let mut bytes = Vec::new();
         file.seek(SeekFrom::Start(from))
             .and_then(|_| file.read_to_end(&mut bytes))
             .with_context(named)?;
-        // What stands behind the last line feed is being written, or was when the program was killed.
+        // Bytes after the last line feed are still being written, or were when the program was killed.
         let end = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
         let mut lines = Lines { bytes: bytes.len(), end, ..Lines::default() };
         for line in bytes[..end].split_inclusive(|&byte| byte == b'\n') {
@@ -190,7 +193,7 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
 
     fn append(&mut self, path: &Path, line: &str) -> io::Result<()> {
         if !self.appends {
-            // A new file under the old name: another name that the old one may have still leads to it.
+            // A new file under the old name: another link to the old file stays as it is.
             write_atomically(path, line.as_bytes())?;
             self.appends = true;
             return Ok(());
@@ -201,19 +204,19 @@ impl<T: Clone + Serialize + DeserializeOwned> Store<T> {
     }
 }
 
-/// What was read of a file.
+/// Result of reading a file.
 #[derive(Default)]
 pub(crate) struct Lines {
-    /// Bytes, and how many of them are whole lines.
+    /// Number of bytes, and of those in whole lines.
     bytes: usize,
     end: usize,
-    /// The bytes of the lines that are as they were written, and how many there are.
+    /// The bytes of the undamaged lines, and the numbers of lines.
     intact: Vec<u8>,
     whole: usize,
     damaged: usize,
 }
 
-/// The files that shards wrote beside a file, in the order of their names.
+/// The files of shards next to a file, in the order of their names.
 fn files_of_shards(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
@@ -231,7 +234,7 @@ fn files_of_shards(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// A new file of a shard. Another process may be at work on the same shard, and has a file of its own.
+/// A new file of a shard. Another process may be running the same shard, with its own file.
 fn new_file(path: &Path, shard: Shard) -> anyhow::Result<PathBuf> {
     let (job, shard) = (job(path), shard.in_name());
     for k in 1.. {
@@ -254,16 +257,16 @@ fn job(path: &Path) -> &str {
 
 const SUFFIX: &str = ".jsonl";
 
-/// A hash of what decides some results, to keep them under.
+/// A hash of the inputs that determine some results, as their key.
 pub fn key(identity: &Value) -> String {
     checksum(identity.to_string().as_bytes())
 }
 
-/// How every file begins.
+/// Beginning of every file.
 pub(crate) const HEAD: &str = "{\"checksum\":\"";
 const MIDDLE: &str = "\",\"finished\":";
 
-/// What a line holds, if it is as it was written.
+/// The content of a line, if it is undamaged.
 fn entry<T: DeserializeOwned>(line: &[u8]) -> Option<Entry<T>> {
     let line = line.strip_prefix(HEAD.as_bytes())?;
     let (sum, line) = line.split_at_checked(16)?;
@@ -291,7 +294,7 @@ mod tests {
         Shard::parse(text).unwrap()
     }
 
-    /// A folder, and the path of a file in it that holds three pieces.
+    /// A folder, and the path of a file in it with three pieces.
     fn written() -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("runs.jsonl");
@@ -346,7 +349,7 @@ mod tests {
             (one.get("b"), one.get("c"), one.kept()),
             (Some(&piece(11)), Some(&piece(12)), 6)
         );
-        // A line that is not whole yet is read when it is.
+        // An incomplete line is read once it is complete.
         let file = folder.path().join("runs.2-of-2.jsonl");
         let whole = fs::read_to_string(&file).unwrap();
         other.put("d", "method", &piece(13)).unwrap();

@@ -8,10 +8,10 @@ use crate::{
     report::{Report, Table},
 };
 
-/// What the runs of one experiment came to.
+/// The results of the runs of one experiment.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// Their errors, and how many succeeded.
+    /// Their errors, and the number of successes.
     pub outcome: Outcome,
     returned: Returned,
     /// First of the seeds.
@@ -20,15 +20,15 @@ pub struct Summary {
     pub(crate) seconds: f64,
     /// Wall time of a step of a run, median, and of all steps of a run, mean.
     step_seconds: [f64; 2],
-    /// What the user should know, each line once.
+    /// Warnings for the user, each line once.
     pub warnings: Vec<String>,
-    /// Finished runs of how many, where the user stopped the program.
+    /// Finished and requested runs, if the user stopped the program.
     pub partial: Option<Partial>,
     /// Another experiment on the same seeds.
     pub against: Option<Box<Comparison>>,
 }
 
-/// Which step of its runs a program returns: the one where the score is least.
+/// The returned step of the runs: the one with the smallest score.
 #[derive(Clone, Debug, Serialize)]
 struct Returned {
     /// Name of the score.
@@ -41,28 +41,28 @@ struct Returned {
     of: usize,
 }
 
-/// How much of the work is finished.
+/// Progress of stopped work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Partial {
-    /// So much.
+    /// Number of finished runs.
     pub finished: usize,
-    /// Of so much.
+    /// Number of requested runs.
     pub asked: usize,
 }
 
 impl Partial {
-    /// How much that is, in words.
+    /// The progress in words.
     pub fn of(self, what: &str) -> String {
         format!("{} of {} {what} are finished", self.finished, self.asked)
     }
 }
 
 impl Summary {
-    /// Of finished runs and their wall time; `many` asks for intervals.
+    /// A summary of finished runs and their wall time, with intervals if `many`.
     ///
     /// # Errors
     ///
-    /// If a run has no finite number even before its first step.
+    /// If a run has a non-finite number even before its first step.
     pub fn new(
         experiment: &dyn Experiment,
         runs: &[Run],
@@ -89,7 +89,7 @@ impl Summary {
         })
     }
 
-    /// As it stands in `result.json`, behind what `about` says of what was run.
+    /// The fields of `result.json`, after the description `about`.
     pub fn json(&self, about: &Map<String, Value>, success_means: &str) -> Map<String, Value> {
         let mut json = about.clone();
         json.extend(self.outcome.json());
@@ -116,7 +116,7 @@ impl Summary {
         format!("{succeeded} (asked: {means})")
     }
 
-    /// Which seeds were run.
+    /// The seeds that were run.
     pub fn seeds(&self) -> String {
         match self.outcome.successes[1] {
             1 => format!("seed {}", self.seed),
@@ -218,7 +218,7 @@ impl Returned {
     }
 }
 
-/// What was run, in a line: `pose (original): gauss with 1 parameter, 300 steps, seed 0`.
+/// The experiment in a line: `pose (original): gauss with 1 parameter, 300 steps, seed 0`.
 pub fn headline(what: &str, method: &str, parameters: usize, steps: usize, seeds: &str) -> String {
     let parameters = counted(parameters, "parameter");
     format!("{what}: {method} with {parameters}, {steps} steps, {seeds}")

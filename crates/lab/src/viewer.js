@@ -1,5 +1,6 @@
-// Makes the mesh of every `div.viewer` turn. Each holds a picture, which gives way to a canvas where there is WebGL, and its data as JSON:
-// `positions` (f32), `faces` (u32) and, if the mesh has some, `colours` (u8) in base64, and `views`: cameras with x right, y down, z ahead, and their masks.
+// Makes the mesh of every `div.viewer` rotatable. Each holds a picture, replaced by a canvas if
+// there is WebGL, and its data as JSON: `positions` (f32), `faces` (u32), optional `colours` (u8)
+// in base64, and `views`: cameras with x right, y down, z ahead, and their masks.
 (() => {
   "use strict";
 
@@ -278,7 +279,7 @@
         const length = (a) => Math.hypot(a[0] - other[0], a[1] - other[1]) || 1;
         if (other) this.zoom(length(before) / length(now));
         const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
-        // Each of two fingers moves the point between them by half its own way.
+        // Each of two fingers moves their midpoint by half of its own motion.
         if (other) this.pan(dx / 2, dy / 2);
         else if (event.shiftKey) this.pan(dx, dy);
         else this.turn(dx, dy);
@@ -294,7 +295,7 @@
     }
 
     wheel(event) {
-      // A page that is being scrolled should not stop at a viewer that comes under the pointer.
+      // Scrolling a page should not stop at a viewer under the pointer.
       if (performance.now() - scrolled < 250) return;
       event.preventDefault();
       const pixels = event.deltaY * [1, 30, 300][event.deltaMode];
@@ -341,7 +342,7 @@
       this.pivot = this.mesh.centre;
       this.seen = sum(apply(view.rotation, this.pivot), view.translation);
       if (view.mask && !view.outline) {
-        // Later entries find the promise of the first.
+        // Later entries reuse the first promise.
         view.outline = outline(view.mask).then((made) => { view.drawn = made; this.schedule(); }, () => {});
       }
       this.note.replaceChildren(...(view.mask ? [element("span", { className: "viewer-key" }), "target mask. "] : []), view.note);
@@ -362,7 +363,7 @@
       const angle = Math.PI / Math.min(this.stage.clientWidth, this.stage.clientHeight);
       const yawed = product(this.rotation, rotation(up, dx * angle));
       const pitched = product(rotation([1, 0, 0], dy * angle), yawed);
-      // Past the pole, left and right would change sides.
+      // Beyond the pole, left and right would be swapped.
       const tilt = (m) => Math.abs(dot(m[2], up));
       this.rotation = tilt(pitched) > 0.99 && tilt(pitched) > tilt(yawed) ? yawed : pitched;
       this.leave();
@@ -404,13 +405,13 @@
       const painted = this.coloured && this.colours.checked;
       this.painter.mesh(this.buffers[0], this.mesh.data.length / CORNER, painted);
       if (this.cameras.checked) {
-        // The frustum of the view that is looked through would be the border of the image.
+        // The frustum of the current view would be the border of the image.
         const own = this.view ? this.views.indexOf(this.view) : this.views.length;
         this.painter.lines(this.buffers[1], 0, own * LINE_ENDS);
         this.painter.lines(this.buffers[1], (own + 1) * LINE_ENDS, (this.views.length - own - 1) * LINE_ENDS);
       }
       this.canvas.getContext("2d").drawImage(this.painter.canvas, 0, 0);
-      // A canvas that was only cleared may stay on the screen as it was.
+      // A canvas that was only cleared may not be repainted.
       this.overlay.style.visibility = this.view ? "visible" : "hidden";
       if (this.view) this.drawOverlay(width, height, ratio);
     }

@@ -1,4 +1,4 @@
-//! A mesh on a page that can be turned, zoomed, and seen through the cameras that saw it.
+//! A mesh on a page that can be rotated, zoomed, and viewed through its cameras.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use serde::{Serialize, Serializer};
@@ -6,41 +6,41 @@ use serde_json::json;
 
 use crate::report::{Report, escape, image};
 
-/// A mesh and the cameras that see it, to be turned and zoomed on a page.
+/// A mesh and its cameras, to rotate and zoom on a page.
 ///
-/// Vertices and faces take 16 characters of the page each: a closed mesh of 200 000 faces makes a page of 5 MB, which opens in a second.
-/// From a million faces on there is only the picture.
+/// Vertices and faces take 16 characters of the page each: a closed mesh of 200 000 faces makes a
+/// page of 5 MB, which opens in a second. From a million faces on only the picture is shown.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Viewer {
-    /// Vertices in world units; the page keeps them as f32.
+    /// Vertices in world units; the page stores them as f32.
     #[serde(serialize_with = "positions")]
     pub positions: Vec<[f64; 3]>,
     /// Triangles as indices of `positions`. Both sides are drawn, so their orientation does not matter.
     #[serde(serialize_with = "faces")]
     pub faces: Vec<[u32; 3]>,
-    /// Red, green and blue of each vertex from 0 to 1, if the mesh has colours; the page keeps them as bytes.
+    /// Red, green and blue of each vertex from 0 to 1, if the mesh has colours; the page stores them as bytes.
     #[serde(serialize_with = "colours", skip_serializing_if = "Option::is_none")]
     pub colours: Option<Vec<[f64; 3]>>,
-    /// In the order in which the page offers them; there may be none.
+    /// Views in the order of the page; may be empty.
     pub views: Vec<ViewerView>,
-    /// The view through which the page opens, with the outline of its mask; none shows the mesh from beside the cameras.
+    /// The view that the page opens with, with the outline of its mask; `None` shows the mesh from beside the cameras.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub opens: Option<usize>,
 }
 
 /// A pinhole camera with the mask that the mesh should fill in it.
 ///
-/// A point `p` of the world is at `c = rotation · p + translation` in the camera, with x to the right, y down and z ahead, and is seen at
-/// `focal · c.xy / c.z + centre` in the image.
+/// A point `p` of the world is at `c = rotation · p + translation` in the camera, with x to the
+/// right, y down and z ahead, and appears at `focal · c.xy / c.z + centre` in the image.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ViewerView {
-    /// What the page calls it.
+    /// Name on the page.
     pub name: String,
     /// Rows of the rotation from world to camera.
     pub rotation: [[f64; 3]; 3],
-    /// World units.
+    /// Translation in world units.
     pub translation: [f64; 3],
-    /// Along x and y, in pixels.
+    /// Focal lengths along x and y, in pixels.
     pub focal: [f64; 2],
     /// Principal point in pixels; (0, 0) is the outer corner of the first pixel.
     pub centre: [f64; 2],
@@ -51,19 +51,19 @@ pub struct ViewerView {
     /// The target mask as a gray PNG, inside from 128 on. It is stretched over the image, so it may be smaller; empty if there is none.
     #[serde(rename = "mask", serialize_with = "base64")]
     pub mask_png: Vec<u8>,
-    /// What is to be said about the view, such as "intersection over union 0.97, held out".
+    /// A note on the view, such as "intersection over union 0.97, held out".
     pub note: String,
 }
 
 impl Report {
-    /// A mesh to be turned and zoomed, and the outlines of the target masks over it.
+    /// A mesh to rotate and zoom, with the outlines of the target masks over it.
     ///
-    /// The PNG `fallback_png` is what those see who have no WebGL or no scripts. It is all that there is to see if the mesh has no faces or a
-    /// million, or if a number is not finite.
+    /// The PNG `fallback_png` is shown without WebGL or scripts, and in any case if the mesh has no
+    /// faces or at least a million, or if a number is not finite.
     ///
     /// # Panics
     ///
-    /// If a face refers to a vertex that there is not, there are not as many colours as vertices, or a view has an image without pixels.
+    /// If a face refers to a missing vertex, the number of colours differs from that of vertices, or a view has an image without pixels.
     pub fn viewer(&mut self, viewer: &Viewer, fallback_png: &[u8], caption: &str) {
         viewer.check();
         if !viewer.can_be_drawn() {
@@ -103,9 +103,9 @@ impl Viewer {
         has_faces && self.views.iter().all(is_camera)
     }
 
-    /// JSON that may stand in a script element.
+    /// JSON that is safe inside a script element.
     fn json(&self) -> String {
-        // A name may hold `</script>`; outside of strings, JSON has no such sign.
+        // A name may contain `</script>`; outside strings, JSON has no `<`.
         json!(self).to_string().replace('<', "\\u003c")
     }
 }

@@ -2,16 +2,16 @@ use std::env;
 
 use crate::Error;
 
-/// The processes that `mpirun` started together, each a rank; one alone where it started none.
+/// The processes that `mpirun` started together, each a rank; a single one without `mpirun`.
 ///
-/// Processes find each other where the program is built with the feature `mpi`.
+/// Several processes need the feature `mpi`.
 pub struct World {
     #[cfg(feature = "mpi")]
     joined: Option<joined::Joined>,
 }
 
 impl World {
-    /// One process by itself.
+    /// A single process.
     pub fn alone() -> Self {
         Self {
             #[cfg(feature = "mpi")]
@@ -19,13 +19,13 @@ impl World {
         }
     }
 
-    /// Joins the other processes, for as long as this lives.
+    /// Joins the other processes, for the lifetime of this value.
     ///
-    /// A rank that panics ends them all.
+    /// A rank that panics ends all.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if there are several, but the program is built without `mpi`.
+    /// [`Error::Usage`] if there are several processes, but the program is built without `mpi`.
     pub fn join() -> Result<Self, Error> {
         let number = |name| env::var(name).ok()?.parse::<usize>().ok();
         let started = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().find_map(number);
@@ -40,7 +40,7 @@ impl World {
         }
     }
 
-    /// Which of them this is, counted from 0.
+    /// Rank of this process, counted from 0.
     pub fn rank(&self) -> usize {
         #[cfg(feature = "mpi")]
         return self.joined.as_ref().map_or(0, joined::Joined::rank);
@@ -48,7 +48,7 @@ impl World {
         0
     }
 
-    /// How many there are.
+    /// Number of ranks.
     pub fn count(&self) -> usize {
         #[cfg(feature = "mpi")]
         return self.joined.as_ref().map_or(1, joined::Joined::count);
@@ -56,12 +56,12 @@ impl World {
         1
     }
 
-    /// Whether this is the one that writes and prints.
+    /// Whether this rank writes and prints.
     pub fn is_first(&self) -> bool {
         self.rank() == 0
     }
 
-    /// The numbers of all ranks, in their order. Each may bring another number of them. All must call this, and wait for each other in it.
+    /// Concatenates the numbers of all ranks, in their order. Lengths may differ. All must call this; it blocks until they do.
     pub fn gather(&self, numbers: &[f64]) -> Vec<f64> {
         #[cfg(feature = "mpi")]
         if let Some(joined) = &self.joined {
@@ -70,7 +70,7 @@ impl World {
         numbers.to_vec()
     }
 
-    /// Gives all ranks the numbers that `root` has. All must call this, with as many of them.
+    /// Copies the numbers of `root` to all ranks. All must call this, with slices of one length.
     pub fn broadcast(&self, root: usize, numbers: &mut [f32]) {
         #[cfg(feature = "mpi")]
         if let Some(joined) = &self.joined {
@@ -79,12 +79,12 @@ impl World {
         let _ = (root, numbers);
     }
 
-    /// Whether any rank says yes. All must call this.
+    /// Whether `yes` is true on any rank. All must call this.
     pub fn any(&self, yes: bool) -> bool {
         self.gather(&[f64::from(u8::from(yes))]).iter().any(|&said| said > 0.0)
     }
 
-    /// Ends all ranks where this one has failed, so that none waits for it; alone, it gives the error back.
+    /// Ends all ranks because this one has failed, so that none waits for it; a single process returns the error.
     pub fn fail(&self, error: anyhow::Error) -> anyhow::Error {
         #[cfg(feature = "mpi")]
         if let Some(joined) = &self.joined {
@@ -105,14 +105,14 @@ mod joined {
 
     use crate::Failure;
 
-    /// Processes that are joined. The universe is left first, and then waited after.
+    /// Joined processes. On drop, the universe is left first, and then waited after.
     pub(super) struct Joined {
         universe: Universe,
         _left: Left,
     }
 
-    /// Waits a little when it is dropped: on a busy machine, `mpirun` of Open MPI 4 may take a process that ends right after it has left for
-    /// one that crashed.
+    /// Waits briefly on drop: on a busy machine, `mpirun` of Open MPI 4 may treat a process that
+    /// ends right after leaving as crashed.
     struct Left;
 
     impl Drop for Left {
@@ -165,7 +165,7 @@ mod joined {
         }
 
         pub(super) fn fail(&self, failure: &Failure) -> ! {
-            // What is wrong for all is said once: by the first, which ends the others.
+            // An error on all ranks is printed once: by the first, which ends the others.
             if self.rank() > 0 {
                 thread::sleep(Duration::from_secs(1));
             }

@@ -4,11 +4,11 @@ use std::{
     path::Path,
 };
 
-/// Writes a file; whenever the program dies, the file is the old one or the new one, whole.
+/// Writes a file atomically: if the program dies, the file is the old one or the new one, complete.
 ///
 /// # Errors
 ///
-/// What the system says.
+/// The error of the system.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     let mut file = hidden().tempfile_in(folder.unwrap_or(Path::new(".")))?;
@@ -25,7 +25,7 @@ pub(super) fn hidden() -> tempfile::Builder<'static, 'static> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private by default; results are as readable as any new file.
+        // Temporary files are private by default; results get the permissions of any new file.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder

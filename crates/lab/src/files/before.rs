@@ -10,7 +10,7 @@ use super::atomic::hidden;
 /// The previous content of a path.
 pub(super) struct Before {
     path: PathBuf,
-    /// The file under another name; none if there was none.
+    /// The file under another name; `None` if there was none.
     file: Option<TempPath>,
 }
 
@@ -20,7 +20,7 @@ impl Before {
             return Ok(Self { path: path.into(), file: None });
         }
         let folder = path.parent().unwrap_or(Path::new("."));
-        // Not all file systems have links.
+        // Not all file systems support links.
         let second = |hidden: &Path| {
             fs::hard_link(path, hidden).or_else(|_| fs::copy(path, hidden).map(drop))
         };
@@ -29,12 +29,12 @@ impl Before {
     }
 
     pub(super) fn restore(self) {
-        // There is nothing left to try where this fails.
+        // If this fails, there is nothing left to try.
         let _ = match self.file {
             Some(file) => {
                 let hidden = file.to_path_buf();
                 let restored = file.persist(self.path).map_err(|failed| failed.error);
-                // Two names of one file are not renamed into each other.
+                // Renaming does nothing if both names are links to one file.
                 let _ = fs::remove_file(hidden);
                 restored
             }

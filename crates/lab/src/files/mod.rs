@@ -1,9 +1,9 @@
-//! Files of results: they appear whole or not at all, and replace nothing that is not theirs.
+//! Result files: they appear complete or not at all, and replace only files of their own command.
 //!
-//! A run replaces and removes only files that an earlier run of the same command has listed as its own and that nobody has changed since
-//! (`manifest.rs` says how); never a file that it reads ([`Inputs`]), never by a pattern. All else is refused in one line, by
-//! [`OutputFolder::claim`] before the work and again where files are written. A file that a flag names, as `render --out FILE` does, is
-//! the user's choice: an [`OutputFile`] replaces one of its own kind, but no other and no input.
+//! A run replaces and removes only files that an earlier run of the same command has listed as its own and that are unchanged since (see
+//! `manifest.rs`); never a file that it reads ([`Inputs`]), never by a pattern. Anything else is refused in one line, by
+//! [`OutputFolder::claim`] before the work and again when files are written. A file named by a flag, as by `render --out FILE`, is the
+//! user's choice: an [`OutputFile`] replaces one of its own kind, but no other and no input.
 
 mod atomic;
 mod before;

@@ -6,15 +6,15 @@ use std::{
 use super::{atomic::write_atomically, output_folder::OutputFolder};
 use crate::{Error, Inputs};
 
-/// A file that a flag names for a result; its folder is made if missing.
+/// A result file named by a flag; its folder is created if missing.
 pub struct OutputFile {
     path: PathBuf,
     folder: OutputFolder,
 }
 
 impl OutputFile {
-    /// Makes sure that it can be written: there is none, an empty one, or one of the same `kind` that the run does not read. `is_kind` says
-    /// whether the file at a path is of the kind.
+    /// Checks that it can be written: it does not exist, is empty, or is of the same `kind` and not
+    /// an input of the run. `is_kind` tests whether the file at a path is of the kind.
     ///
     /// # Errors
     ///
@@ -48,7 +48,7 @@ impl OutputFile {
         Ok(Self { path: path.into(), folder })
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes it, completely or not at all.
     ///
     /// # Errors
     ///

@@ -15,35 +15,35 @@ use crate::{
     manifest::{MANIFEST, Manifest, Owner, begins, content, content_of, is_name},
 };
 
-/// The folder for the results of a command, in which files appear together, each whole or not at all.
+/// The folder for the results of a command, in which files appear together, each complete or not at all.
 ///
-/// Files are first written under hidden names, and get their own in [`commit`](OutputFolder::commit), where results of an earlier run of
-/// the command that this one does not have are removed. Without it nothing stays behind, not even the folder if it was made for this.
+/// Files are first written under hidden names, and renamed in [`commit`](OutputFolder::commit), which also removes results of an earlier
+/// run of the command that this one does not have. Without `commit` nothing remains, not even the folder if it was newly created.
 pub struct OutputFolder {
     path: PathBuf,
     /// Program and command.
     command: String,
     inputs: Inputs,
     pub(super) made: Vec<PathBuf>,
-    /// Whether the list of results was made for this.
+    /// Whether the list of results was created for this run.
     lists: bool,
     pub(super) staged: Vec<(String, NamedTempFile)>,
 }
 
 impl OutputFolder {
-    /// Makes the folder if it is missing, and makes sure that files can be written to it. `command` is whose results are replaced, such as
-    /// `pose evaluate`.
+    /// Creates the folder if it is missing, and checks that files can be written to it. `command`
+    /// owns the results that are replaced, such as `pose evaluate`.
     ///
     /// # Errors
     ///
-    /// [`Error::Folder`] if they cannot.
+    /// [`Error::Folder`] if files cannot be written.
     pub fn open(path: &Path, command: &str, inputs: &Inputs) -> Result<Self, Error> {
         let folder = Self::writable(path, command, inputs)?;
         folder.list()?;
         Ok(folder)
     }
 
-    /// Without a list yet.
+    /// The folder, without a list yet.
     pub(super) fn writable(path: &Path, command: &str, inputs: &Inputs) -> Result<Self, Error> {
         let missing = path.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
         let made = missing.map(Path::to_path_buf).collect();
@@ -56,12 +56,12 @@ impl OutputFolder {
         }
     }
 
-    /// Where a file of this name is.
+    /// The path of the file of this name.
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// Makes sure that files of these names may be written: before the work, so that nobody waits for a refusal.
+    /// Checks that files of these names may be written: before the work, so that a refusal comes early.
     ///
     /// # Errors
     ///
@@ -89,17 +89,17 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Gives all files their names, and removes the results of earlier runs of the command that this one does not have.
+    /// Renames all files to their names, and removes the results of earlier runs of the command that this one does not have.
     ///
     /// # Errors
     ///
-    /// [`Error::Folder`] if a file cannot be renamed or removed, [`Error::Taken`] as [`claim`](OutputFolder::claim). The earlier results are
-    /// all in place then.
+    /// [`Error::Folder`] if a file cannot be renamed or removed, [`Error::Taken`] as
+    /// [`claim`](OutputFolder::claim). All earlier results are then in place.
     pub fn commit(&mut self) -> Result<(), Error> {
         self.commit_beside(|_| false)
     }
 
-    /// The same, but earlier results of these names stay.
+    /// [`commit`](OutputFolder::commit), except that earlier results whose names satisfy `stays` are not removed.
     ///
     /// # Errors
     ///
@@ -118,7 +118,7 @@ impl OutputFolder {
         let mut stale = Vec::new();
         for name in list.results(&self.command) {
             if staged.iter().all(|(staged, _)| staged != name) && !stays(name) {
-                // A file that the user has changed is no result any more; an input of this run is one still.
+                // A file that the user has changed is no longer a result; an input of this run still is.
                 match self.check(name, &list) {
                     Ok(true) => stale.push(name.to_owned()),
                     Err(_) if self.inputs.holds(&self.file(name)) => {}
@@ -132,12 +132,12 @@ impl OutputFolder {
         }
         stale.iter().for_each(|name| settled.remove(name));
         self.made.clear();
-        // The list from before names the same files, so nothing is lost if it stays.
+        // The old list names the same files, so nothing is lost if it remains.
         let _ = self.write_list(&settled);
         Ok(())
     }
 
-    /// Renames and removes; where that fails in the middle, all is undone.
+    /// Renames and removes; if that fails midway, everything is undone.
     pub(super) fn replace(
         &self,
         staged: Vec<(String, NamedTempFile)>,
@@ -164,7 +164,7 @@ impl OutputFolder {
         done
     }
 
-    /// Writes a file at once that a later call goes on from. It stays where results are replaced.
+    /// Writes a file at once, for a later call to continue from. It remains when results are replaced.
     ///
     /// # Errors
     ///
@@ -180,7 +180,7 @@ impl OutputFolder {
         write_atomically(&path, bytes).map_err(|reason| self.refused(reason))
     }
 
-    /// Lists a file as one that a later call goes on from: the caller has read it, and knows that it is.
+    /// Lists a file that a later call continues from: the caller has read and verified it.
     ///
     /// # Errors
     ///
@@ -193,9 +193,9 @@ impl OutputFolder {
         self.write_list(&list)
     }
 
-    /// The path of a file that grows while the command works and always begins with `begins`, as the records of finished runs.
+    /// The path of a file that grows while the command works and always begins with `begins`, such as the records of finished runs.
     ///
-    /// A command that `resumes` goes on with one that it finds, and sets aside, as `NAME.damaged`, one of its own that begins otherwise.
+    /// A command that `resumes` continues an existing file, and renames its own file with another beginning to `NAME.damaged`.
     ///
     /// # Errors
     ///
@@ -223,7 +223,7 @@ impl OutputFolder {
         Ok(path)
     }
 
-    /// Whether a file is a journal of this command that begins otherwise now.
+    /// Whether a file is a journal of this command whose beginning has changed.
     fn is_damaged(&self, name: &str, list: &Manifest, head: &str) -> bool {
         let path = self.file(name);
         let is_file = fs::symlink_metadata(&path).is_ok_and(|found| found.is_file());
@@ -244,7 +244,7 @@ impl OutputFolder {
         unreachable!("there is a number that is not taken")
     }
 
-    /// Whether there is a file of this name that may be replaced.
+    /// Whether a file of this name exists that may be replaced.
     fn check(&self, name: &str, list: &Manifest) -> Result<bool, Error> {
         let path = self.file(name);
         let found = match fs::symlink_metadata(&path) {
@@ -306,7 +306,7 @@ impl Drop for OutputFolder {
             let _ = fs::remove_file(self.file(MANIFEST));
         }
         for folder in &self.made {
-            // Fails where somebody else has put a file there meanwhile, which is right.
+            // Fails if another process has put a file there meanwhile, as it should.
             let _ = fs::remove_dir(folder);
         }
     }

@@ -14,7 +14,7 @@ fn names(path: &Path) -> Vec<String> {
     names
 }
 
-/// The content of every file but the list, by name.
+/// The content of every file except the list, by name.
 fn files(path: &Path) -> BTreeMap<String, String> {
     let names = names(path).into_iter().filter(|name| name != MANIFEST);
     names.map(|name| (name.clone(), fs::read_to_string(path.join(&name)).unwrap())).collect()
@@ -24,7 +24,7 @@ fn open(path: &Path, command: &str) -> OutputFolder {
     OutputFolder::open(path, command, &Inputs::default()).unwrap()
 }
 
-/// What a command that writes files of these names and contents comes to.
+/// Runs a command that writes files of these names and contents.
 fn run(path: &Path, command: &str, files: &[(&str, &str)]) -> Result<(), Error> {
     let mut folder = open(path, command);
     files.iter().try_for_each(|(name, text)| folder.stage(name, text.as_bytes()))?;
@@ -74,7 +74,7 @@ fn a_result_that_the_user_has_changed_is_the_users() {
     let before = files(out);
     refusal(run(out, "pose solve", &[("r.json", "new")]), "r.json was changed");
     assert_eq!(files(out), before);
-    // Neither is it removed.
+    // It is not removed either.
     run(out, "pose solve", &[("b.csv", "b")]).unwrap();
     assert_eq!(names(out), [MANIFEST, "b.csv", "r.json"]);
     refusal(run(out, "pose solve", &[("r.json", "new")]), "r.json is not a recorded");
@@ -103,7 +103,7 @@ fn an_input_is_never_replaced_or_removed_even_if_it_is_a_result() {
     folder.stage("b.csv", b"b").unwrap();
     folder.commit().unwrap();
     assert_eq!(names(out), [MANIFEST, "b.csv", "softness.json"]);
-    // It is a result still.
+    // It is still a result.
     run(out, "learn", &[("b.csv", "b")]).unwrap();
     assert_eq!(names(out), [MANIFEST, "b.csv"]);
 }
@@ -118,13 +118,13 @@ fn an_error_amid_renaming_leaves_the_earlier_results_whole() {
     for name in ["a", "b", "c", "d"] {
         folder.stage(name, b"2").unwrap();
     }
-    // As if somebody had made it between the check and the renaming.
+    // As if another process had created it between the check and the renaming.
     let staged = std::mem::take(&mut folder.staged);
     fs::create_dir(out.join("d")).unwrap();
     assert!(folder.replace(staged, &["old".to_owned()]).is_err());
     fs::remove_dir(out.join("d")).unwrap();
     assert_eq!((files(out), names(out).len()), (before, 4), "nothing hidden is left");
-    // A folder that was there before is told by its name.
+    // A folder that existed before is reported by its name.
     fs::create_dir(out.join("e")).unwrap();
     refusal(run(out, "pose solve", &[("a", "2"), ("e", "2")]), "e is a folder");
 }
@@ -139,7 +139,7 @@ fn a_run_that_was_killed_at_any_moment_locks_nobody_out() {
     for name in ["a", "b", "c"] {
         list.result(name, "pose solve", vec![old.clone(), new.clone()]);
     }
-    // The list is there, and some of the files have their names.
+    // The list exists, and some of the files have their names.
     fs::write(out.join(MANIFEST), list.text()).unwrap();
     fs::write(out.join("a"), "new").unwrap();
     run(out, "pose solve", &[("a", "last"), ("c", "last")]).unwrap();
@@ -163,7 +163,7 @@ fn what_a_later_call_goes_on_from_stays_and_is_known_again() {
     folder.journal("steps.jsonl", "{\"step", false).unwrap();
     fs::write(out.join("point.json"), "mine").unwrap();
     refusal(folder.keep("point.json", b"3"), "was changed");
-    // One that begins otherwise is not replaced, and set aside where the command goes on.
+    // A file that begins differently is not replaced, and renamed if the command resumes.
     fs::write(&journal, "mine").unwrap();
     let fresh = folder.journal("steps.jsonl", "{\"step", false);
     refusal(fresh.map(drop), "was changed");

@@ -1,7 +1,7 @@
 //! A search by successive halving: many settings on a few seeds, the better half of them on twice as many, and so on.
 //!
-//! Half of the work of a round goes to settings near the best of the round before. Source: Jamieson and Talwalkar 2016 for the halving;
-//! what is near the best is not in it.
+//! Half of the work of a round goes to new settings near the best of the previous round. Source: Jamieson and Talwalkar
+//! 2016 for the halving; the new settings are an addition.
 
 use std::cmp::Ordering;
 
@@ -15,45 +15,45 @@ mod space;
 
 pub use space::{SearchAxis, SearchSpace, Setting, rounded};
 
-/// First of the seeds that settings are compared on, far from those that they are scored on.
+/// First of the seeds that settings are compared on, far from the held-out seeds.
 pub const TRAINING_SEED: u64 = 1_000_000;
 
-/// Seed of the settings that are drawn.
+/// Seed of the random settings.
 const DRAWN: u64 = 7;
-/// Rounds at most; each has half the seeds of the next.
+/// Most rounds; each has half the seeds of the next.
 const ROUNDS: u32 = 4;
-/// The best lies at an end of a range if it is nearer than this share of it.
+/// The best value is at an end of a range if it is nearer to it than this share of the range.
 const EDGE: f64 = 0.03;
-/// A setting and how it did on the training seeds.
+/// A setting and its results on the training seeds.
 #[derive(Clone, Debug)]
 pub struct Trial {
     /// The setting.
     pub setting: Setting,
-    /// The last round that it was in, from 1 on.
+    /// The last round that it was in, counted from 1.
     round: usize,
-    /// The score of what each seed returned; none where the numbers did not stay finite.
+    /// The score of the returned step for each seed; `None` if the numbers became non-finite.
     scores: Vec<Option<f64>>,
-    /// How many runs succeeded.
+    /// Number of successful runs.
     successes: usize,
     /// Wall time of the runs.
     seconds: f64,
 }
 
-/// A search and what it found.
+/// A search and its results.
 #[derive(Clone, Debug)]
 pub struct Halving {
-    /// The flags of the best setting, with all that they need.
+    /// The flags of the best setting, complete.
     pub best_flags: String,
-    /// The score of what runs of it on other seeds returned.
+    /// The scores of its returned steps on other seeds.
     pub held_out: Vec<f64>,
     space: SearchSpace,
-    /// Name and unit.
+    /// Name and unit of the score.
     score: [&'static str; 2],
     /// Training seeds.
     seeds: Vec<u64>,
-    /// Runs that it may make.
+    /// Most runs of the search.
     loops: usize,
-    /// What it has tried so far.
+    /// The trials so far.
     trials: Vec<Trial>,
     /// Whether the user stopped it.
     stopped: bool,
@@ -75,7 +75,7 @@ impl Trial {
 pub type MakeSetting<'a> = dyn FnMut(&Setting) -> anyhow::Result<Box<dyn Experiment>> + 'a;
 
 impl Halving {
-    /// One that has not tried anything yet, and may make `loops` runs; `score` has a name and a unit.
+    /// A search without trials, of at most `loops` runs; `score` has a name and a unit.
     pub fn new(
         space: SearchSpace,
         score: [&'static str; 2],
@@ -86,13 +86,15 @@ impl Halving {
         Self { best_flags, held_out, space, score, seeds, loops, trials, stopped: false }
     }
 
-    /// Goes through all rounds, until the user stops it, and returns the best setting.
+    /// Runs all rounds, until the user stops it, and returns the best setting.
     ///
-    /// `each` are the steps of a run, `later` those of all runs that follow the search, for the progress bar.
+    /// `each` is the number of steps of a run, `later` that of all runs after the search, for the
+    /// progress bar.
     ///
     /// # Errors
     ///
-    /// Those of the experiments and of the store; if no setting is valid or gave finite numbers; [`Error::Interrupted`] if none has yet.
+    /// The errors of the experiments and of the store; if no setting is valid or gave finite
+    /// numbers; [`Error::Interrupted`] if none has yet.
     pub fn run(
         &mut self,
         runner: &mut Runner,
@@ -134,19 +136,19 @@ impl Halving {
         )
     }
 
-    /// Seeds of each round.
+    /// Number of seeds of each round.
     fn rounds(&self) -> Vec<usize> {
         let mut rounds: Vec<usize> =
             (0..ROUNDS).rev().map(|k| self.seeds.len().div_ceil(1 << k)).collect();
         rounds.dedup();
-        // As many rounds as there is work for.
+        // As many rounds as the number of runs allows.
         while rounds.len() > 1 && self.loops < 2 * rounds.len() * rounds[rounds.len() - 1] {
             rounds.remove(0);
         }
         rounds
     }
 
-    /// The settings of a round: those that are kept of the one before it, and others near them.
+    /// The settings of a round: the best of the previous round, and new ones near them.
     fn settings(
         &self,
         round: usize,
@@ -172,7 +174,7 @@ impl Halving {
         Ok(settings)
     }
 
-    /// Makes sure that a round is finished where shards share it.
+    /// Completes a round that shards share.
     fn complete(
         &self,
         runner: &mut Runner,
@@ -204,23 +206,23 @@ impl Halving {
         Ok(Trial { setting: setting.clone(), round, scores, successes, seconds: tried.seconds })
     }
 
-    /// Runs that it has made. Those of an earlier round are not made again.
+    /// Number of runs made. Runs of earlier rounds are not repeated.
     fn made(&self) -> usize {
         self.trials.iter().map(|trial| trial.scores.len() - self.earlier(trial)).sum()
     }
 
-    /// Runs of the same setting in earlier rounds.
+    /// Number of runs of the same setting in earlier rounds.
     fn earlier(&self, trial: &Trial) -> usize {
         let same = self.trials.iter().filter(|one| one.setting == trial.setting);
         same.filter(|one| one.round < trial.round).map(|one| one.scores.len()).max().unwrap_or(0)
     }
 
-    /// How many runs are made, of how many that it may make, where the user stopped it.
+    /// Number of runs made, out of the allowed ones, if the user stopped the search.
     pub fn partial(&self) -> Option<Partial> {
         self.stopped.then(|| self.done())
     }
 
-    /// The same, stopped or not.
+    /// Number of runs made, out of the allowed ones, whether stopped or not.
     pub fn done(&self) -> Partial {
         Partial { finished: self.made(), asked: self.loops }
     }
@@ -232,7 +234,7 @@ impl Halving {
         finite.min_by(|a, b| better_first(a, b))
     }
 
-    /// The flags, without dashes, whose best value lies at an end of its range.
+    /// The flags, without dashes, whose best value is at an end of its range.
     fn at_edge(&self) -> Vec<&'static str> {
         let Some(best) = self.best() else { return Vec::new() };
         let edge = |(axis, value): (&SearchAxis, &Option<f64>)| {
@@ -243,7 +245,7 @@ impl Halving {
         self.space.axes.iter().zip(&best.setting).filter_map(edge).collect()
     }
 
-    /// What the user should know.
+    /// Warnings for the user.
     pub fn warnings(&self) -> Vec<String> {
         let edges = if self.stopped { Vec::new() } else { self.at_edge() };
         let warning = |flag: &str| {
@@ -256,13 +258,13 @@ impl Halving {
     }
 }
 
-/// Fewer runs that went wrong, then a lower mean.
+/// Orders by fewer failed runs, then by lower mean.
 fn better_first(a: &Trial, b: &Trial) -> Ordering {
     let mean = |trial: &Trial| trial.mean().unwrap_or(f64::INFINITY);
     a.broken().cmp(&b.broken()).then(mean(a).total_cmp(&mean(b)))
 }
 
-/// Refuses held-out seeds that are trained on.
+/// Refuses held-out seeds that are also training seeds.
 ///
 /// # Errors
 ///
@@ -311,7 +313,7 @@ mod tests {
             let made = halving.made();
             assert!(made <= loops && made * 10 >= loops * 6, "{made} of {loops}");
             let least = halving.trials.iter().filter_map(Trial::mean).fold(1.0, f64::min);
-            // Means of more or fewer equal numbers differ by rounding.
+            // Means of different numbers of equal values differ by rounding.
             assert!(halving.best().unwrap().mean().unwrap() <= least * (1.0 + 1e-9), "{loops}");
         }
     }

@@ -1,4 +1,4 @@
-//! What a search tells: files, lines and a section of a page.
+//! Reports of a search: files, lines and a section of a page.
 
 use serde_json::{Map, Value, json};
 
@@ -10,7 +10,7 @@ use crate::{
     report::{Report, Table},
 };
 
-/// Settings in the table of a page.
+/// Number of settings in the table of a page.
 const SHOWN: usize = 24;
 
 /// From light to dark.
@@ -21,7 +21,7 @@ const CRITERION: &str = "lowest mean of the score of what is returned over the t
                          the fewest runs whose numbers stop being finite";
 
 impl Trial {
-    /// What is known of it, in the order of the columns of a table.
+    /// The fields of a trial, in the order of the columns of a table.
     fn fields(&self, space: &SearchSpace) -> Vec<(String, Value)> {
         let mut fields = vec![("round".into(), self.round.into())];
         let values = space.axes.iter().zip(&self.setting);
@@ -46,7 +46,7 @@ impl Trial {
 }
 
 impl Halving {
-    /// As it stands in `search.json`.
+    /// The search as in `search.json`.
     pub fn json(&self) -> Value {
         let held_out = (!self.held_out.is_empty()).then(|| {
             let (values, ends) = (&self.held_out, mean_interval(&self.held_out));
@@ -69,8 +69,8 @@ impl Halving {
         })
     }
 
-    /// All trials as CSV, one row each: `round`, a column for every axis, `mean,n,non_finite,success_rate,seconds`; what has no value
-    /// is empty.
+    /// All trials as CSV, one row each: `round`, a column for every axis,
+    /// `mean,n,non_finite,success_rate,seconds`; missing values are empty.
     pub fn csv(&self) -> String {
         let text = |value: &Value| match value {
             Value::Null => String::new(),
@@ -109,7 +109,7 @@ impl Halving {
         lines
     }
 
-    /// What was tried and what is best, as a section of a page.
+    /// The trials and the best setting, as a section of a page.
     ///
     /// # Errors
     ///
@@ -141,7 +141,7 @@ impl Halving {
         Ok(())
     }
 
-    /// Score against the values of an axis that is searched, a colour for each round.
+    /// Score over the values of a searched axis, with a colour per round.
     fn chart(&self, axis: usize) -> Option<Plot> {
         let SearchAxis { flag, range, .. } = &self.space.axes[axis];
         range.filter(|[low, high]| low < high)?;

@@ -2,34 +2,34 @@ use rand::{Rng, rngs::StdRng};
 
 use crate::format::exact;
 
-/// A setting near another has each number up to this factor, as a logarithm, away from its.
+/// Largest change of the logarithm of a value for a setting near another.
 const NEAR: f64 = 0.5;
-/// How often it has a flag that the other leaves out, or the other way round.
+/// Probability that an optional flag is added or removed for a setting near another.
 const OTHERWISE: f64 = 0.15;
-/// Draws before it is given up that none is valid.
+/// Most draws for a valid setting.
 const DRAWS: usize = 1000;
 
-/// The settings among which a search looks.
+/// The settings of a search.
 #[derive(Clone, Debug)]
 pub struct SearchSpace {
     /// The axes.
     pub axes: Vec<SearchAxis>,
-    /// Whether there is such a setting.
+    /// Whether a setting is valid.
     pub valid: fn(&Setting) -> bool,
 }
 
-/// What is tried for a flag.
+/// The values of a flag that are searched.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchAxis {
     /// The flag without dashes, such as `scale-end`.
     pub flag: &'static str,
-    /// Least and largest value, positive; none if the flag is always left out.
+    /// Smallest and largest value, positive; `None` if the flag is always omitted.
     pub range: Option<[f64; 2]>,
-    /// Whether half of the settings leave it out.
+    /// Whether half of the settings omit it.
     pub optional: bool,
 }
 
-/// The value of every axis; none where its flag is left out.
+/// The value of every axis; `None` if its flag is omitted.
 pub type Setting = Vec<Option<f64>>;
 
 impl SearchSpace {
@@ -54,7 +54,7 @@ impl SearchSpace {
         self.axes.iter().any(is_free)
     }
 
-    /// The flags that ask for a setting.
+    /// The flags of a setting.
     pub fn flags(&self, setting: &Setting) -> String {
         let flag = |(axis, value): (&SearchAxis, &Option<f64>)| {
             value.map(|value| format!("--{} {}", axis.flag, exact(value)))
@@ -64,7 +64,7 @@ impl SearchSpace {
 }
 
 impl SearchAxis {
-    /// One that has values between the least and the largest of a list.
+    /// An axis between the smallest and the largest value of a list.
     pub fn among(flag: &'static str, values: &[f64]) -> Self {
         let [low, high] = values
             .iter()
@@ -95,7 +95,7 @@ impl SearchAxis {
     }
 }
 
-/// To three digits, so that a value found can be typed.
+/// Rounds to three digits, so that a result is easy to type.
 pub fn rounded(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
@@ -106,7 +106,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// One free axis, one that half of the settings leave out, one that is fixed and one without values.
+    /// One free axis, one that half of the settings omit, one that is fixed and one without values.
     pub(in crate::halving) fn space() -> SearchSpace {
         let optional = |axis| SearchAxis { optional: true, ..axis };
         let axes = vec![

@@ -2,7 +2,7 @@
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 
-/// A picture, PNG or GIF, as an element. The caption stands for it to those who cannot see it.
+/// A picture, PNG or GIF, as an element. The caption is its alternative text.
 pub(crate) fn image(bytes: &[u8], caption: &str) -> String {
     let kind = if bytes.starts_with(b"GIF") { "gif" } else { "png" };
     let (data, caption) = (STANDARD.encode(bytes), escape(caption));

@@ -9,26 +9,26 @@ pub use self::table::Table;
 /// Style and script of a page with a viewer.
 pub(crate) const VIEWER: [&str; 2] = [include_str!("../viewer.css"), include_str!("../viewer.js")];
 
-/// A picture, PNG or GIF, with a few words on what it is.
+/// A picture, PNG or GIF, with a short label.
 #[derive(Clone, Debug)]
 pub struct Labelled {
     /// The file.
     pub picture: Vec<u8>,
-    /// The words under it.
+    /// The text under it.
     pub label: String,
 }
 
 /// A file in the folder of a page.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Its name.
+    /// Its content, in a few words.
     pub file: String,
     /// Its content, in a few words.
     pub holds: String,
 }
 
 impl Beside {
-    /// A file and what it holds.
+    /// A file name and its content.
     pub fn new(file: &str, holds: &str) -> Self {
         Self { file: file.into(), holds: holds.into() }
     }
@@ -44,7 +44,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// An empty page; `about` is what it is about, in a line without a full stop.
+    /// An empty page; `about` describes its subject, in a line without a full stop.
     pub fn new(title: &str, about: &str) -> Self {
         Self { title: escape(title), about: escape(about), body: String::new(), has_viewer: false }
     }
@@ -74,21 +74,21 @@ impl Report {
         self.add(format!("<p class=\"note\">{}</p>", escape(text)));
     }
 
-    /// How far the work came, if the user stopped it.
+    /// A note on the progress of the work, if the user stopped it.
     pub fn stopped(&mut self, finished: Option<&str>) {
         let line =
             finished.map(|finished| format!("Stopped: {finished}; --resume goes on from them"));
         self.warnings(line.as_slice());
     }
 
-    /// Lines in boxes that catch the eye.
+    /// Warnings in highlighted boxes.
     pub fn warnings(&mut self, lines: &[String]) {
         for line in lines {
             self.add(format!("<p class=\"warning\">{}</p>", escape(line)));
         }
     }
 
-    /// Text as it would stand on a terminal.
+    /// Text as on a terminal.
     pub fn code(&mut self, text: &str) {
         self.add(format!("<pre>{}</pre>", escape(text)));
     }
@@ -98,7 +98,7 @@ impl Report {
         self.add(table.html());
     }
 
-    /// A section that `fill` adds, folded away.
+    /// A collapsed section, filled by `fill`.
     pub fn folded(&mut self, summary: &str, fill: impl FnOnce(&mut Self)) {
         self.add(format!("<details>\n<summary>{}</summary>", escape(summary)));
         fill(self);
@@ -120,12 +120,12 @@ impl Report {
         self.figure(&format!("<div class=\"gallery\">\n{cells}</div>"), &escape(caption));
     }
 
-    /// A chart with what is to be seen in it.
+    /// A chart with a caption.
     pub fn chart(&mut self, svg: &str, caption: &str) {
         self.figure(svg, &escape(caption));
     }
 
-    /// A picture, PNG or GIF, with what is to be seen in it.
+    /// A picture, PNG or GIF, with a caption.
     pub fn picture(&mut self, bytes: &[u8], caption: &str) {
         self.figure(&image(bytes, caption), &escape(caption));
     }
@@ -135,7 +135,7 @@ impl Report {
         self.add(format!("<figure>\n{content}\n<figcaption>{caption}</figcaption>\n</figure>"));
     }
 
-    /// The page. `command` makes it again, `beside` are the files that lie beside it.
+    /// The page. `command` reproduces it, `beside` are the files in the same folder.
     pub fn finish(self, command: &str, beside: &[Beside]) -> String {
         let Self { title, about, body, has_viewer } = self;
         let command = escape(command);

@@ -41,7 +41,7 @@ impl Table {
         self.rows.iter_mut().last().into_iter().for_each(|row| row.chosen = true);
     }
 
-    /// Gives the cells of the last row a background: 0 is dark, 1 light, none is white.
+    /// Sets the backgrounds of the last row's cells: 0 is dark, 1 light, `None` white.
     pub fn shade_last(&mut self, shades: Vec<Option<f64>>) {
         self.rows.iter_mut().last().into_iter().for_each(|row| row.shades = shades.clone());
     }
@@ -71,13 +71,13 @@ impl Table {
         let mut text = String::from("<table>\n");
         if !self.head.is_empty() {
             let cells = self.head.iter().map(|cell| format!("<th>{}</th>", escape(cell)));
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "<tr>{}</tr>", cells.collect::<String>());
         }
         for Row { cells, chosen, shades } in &self.rows {
             let mark = if *chosen { " class=\"chosen\"" } else { "" };
             let shade = |k: usize| shades.get(k).copied().flatten();
-            // Beside names, numbers of a column have nothing in common.
+            // Without a head, cells next to names are not aligned as a column.
             let in_column = !self.head.is_empty();
             let cells = cells.iter().enumerate();
             let cells = cells.map(|(k, cell)| cell_html(cell, shade(k), in_column));
