@@ -1,4 +1,4 @@
-//! The smallest task: a ball moves until its silhouette is where it should be.
+//! The smallest task: moves a ball until its silhouette matches the target.
 //!
 //! `cargo run --release -p softrast-cli --example disc -- evaluate --runs 20`
 
@@ -29,21 +29,21 @@ pub(crate) struct Args {
     radius: f64,
 }
 
-/// A ball, given as a mesh.
+/// A ball as a mesh.
 pub(crate) struct Disc {
     radius: f64,
     vertices: Vec<f64>,
     faces: Arc<[[u32; 3]]>,
 }
 
-/// Where the ball is and where it should be, in NDC.
+/// Start and target centre of the ball, in NDC.
 #[derive(Clone, Copy)]
 pub(crate) struct Places {
     start: [f64; 2],
     target: [f64; 2],
 }
 
-/// Instances side by side, a view each.
+/// Instances that are solved together, one view each.
 pub(crate) struct Scene<B: RasterBackend> {
     /// `[1, vertices, 3]`.
     ball: Tensor<B, 3>,

@@ -16,23 +16,23 @@ pub(crate) struct CommandLine<A: Args, P: Args> {
     pub(crate) command: Command<A, P>,
 }
 
-/// What a program can be asked to do; `solve` if nothing else is said.
+/// The commands of a program; `solve` by default.
 #[derive(Clone, Debug, Subcommand)]
 pub(crate) enum Command<A: Args, P: Args> {
-    /// Solve one instance and show it; what is done where no command is named
+    /// Solve one instance and show the result; the default command
     Solve(Box<Solve<A, P>>),
-    /// Solve many seeds and give means with confidence intervals
+    /// Solve many seeds and report means with confidence intervals
     Evaluate(Evaluate<A>),
     /// Find the best scales, surrogate and learning rate on training seeds, then evaluate them on others
     Search(Search<A>),
     /// Find the simplest softness, the fewest pixels, the largest tolerance and the coarsest mesh that are as good as the best
     Choose(Choose<A>),
-    /// Learn the softness on training seeds, by the gradient of what a whole run ends with
+    /// Learn the softness on training seeds, by the gradient of the outer loss of whole runs
     Learn(Learn<A>),
 }
 
 impl<A: Args, P: Args> Command<A, P> {
-    /// Its name, and the flags that every command has.
+    /// Name of the command, and the shared flags.
     pub(crate) fn shared(&self) -> (&'static str, &Shared<A>) {
         match self {
             Self::Solve(solve) => ("solve", &solve.shared),
@@ -44,7 +44,7 @@ impl<A: Args, P: Args> Command<A, P> {
     }
 }
 
-/// Flags that every command has.
+/// The flags of every command.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Shared<A: Args> {
     #[command(flatten)]
@@ -72,7 +72,7 @@ pub(crate) struct Evaluate<A: Args> {
     /// Number of seeds
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub(crate) runs: Option<usize>,
-    /// Second method for the same seeds, with flags of its own in quotes: "gauss --scale 0.01"
+    /// Second method for the same seeds, with its own flags in quotes: "gauss --scale 0.01"
     #[arg(long, value_name = "NAME|FILE.json", value_parser = MethodArgs::parse)]
     pub(crate) against: Option<MethodArgs>,
     #[command(flatten)]
@@ -85,16 +85,16 @@ pub(crate) struct Evaluate<A: Args> {
 pub(crate) struct Search<A: Args> {
     #[command(flatten)]
     pub(crate) shared: Shared<A>,
-    /// Number of seeds to evaluate what is found on
+    /// Number of held-out seeds to evaluate the result on
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub(crate) runs: Option<usize>,
-    /// Runs that the search may make: inner loops
+    /// Most runs of the search (inner loops)
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 400, allow_negative_numbers = true)]
     pub(crate) loops: usize,
-    /// Least and largest scale to try
+    /// Smallest and largest scale to try
     #[arg(long, value_name = "X,X", value_delimiter = ',', value_parser = positive)]
     pub(crate) scales: Vec<f64>,
-    /// Least and largest learning rate to try
+    /// Smallest and largest learning rate to try
     #[arg(long, value_name = "X,X", value_delimiter = ',', value_parser = positive)]
     pub(crate) learning_rates: Vec<f64>,
     #[command(flatten)]
@@ -125,36 +125,36 @@ pub(crate) struct Learn<A: Args> {
     pub(crate) resume: Resume,
 }
 
-/// How long may be looked for a method.
+/// Limits of the automatic choice of a method.
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Auto {
-    /// Seconds that choosing a method may take [default: no limit]
+    /// Seconds for choosing a method [default: no limit]
     #[arg(long, value_name = "SECONDS", value_parser = positive, help_heading = EXPERIMENTS)]
     pub(crate) budget: Option<f64>,
 }
 
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Training {
-    /// Training seeds, counted from 1000000, that answers, or the last settings of a search, are compared on
+    /// Training seeds, counted from 1000000, to compare answers, or the last settings of a search, on
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     pub(crate) search_runs: usize,
 }
 
-/// What of earlier calls is used, and what part of the runs is made.
+/// Reuse of earlier calls, and the share of the runs to make.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub(crate) struct Kept {
-    /// Go on from what an interrupted call, or shards, have finished
+    /// Continue from the finished runs of an interrupted call, or of shards
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Make only every N-th run, from the I-th on, as one of N processes that share the output folder; auto takes both numbers from
-    /// Slurm or mpirun
+    /// Make only every N-th run, from the I-th on, as one of N processes that share the output
+    /// folder; auto reads both numbers from Slurm or mpirun
     #[arg(long, value_name = "I/N|auto", value_parser = Shard::parse)]
     pub(crate) shard: Option<Shard>,
 }
 
 #[derive(Args, Clone, Copy, Debug)]
 pub(crate) struct Resume {
-    /// Go on from what an interrupted call has finished
+    /// Continue from the checkpoint of an interrupted call
     #[arg(long)]
     pub(crate) resume: bool,
 }

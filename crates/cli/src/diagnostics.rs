@@ -6,15 +6,14 @@ use crate::task::{HARD, PARAMETER, SCALE, SOFT};
 
 /// Width and height of an image in NDC.
 const IMAGE: f64 = 2.0;
-/// A soft and a hard image whose errors differ by less than this share are the same image.
+/// Soft and hard images with a relative difference of their errors below this are taken as equal.
 const SAME: f64 = 1e-6;
-/// The end is worse than the best step where its error is larger by this share and this much.
+/// The end is worse than the best step if its error is larger by this share plus this amount.
 const WORSE: [f64; 2] = [0.05, 2e-3];
 
-/// What curves say about the choice of the softness, a line each; said once for all runs on images of `size` × `size` pixels.
+/// Warnings about the choice of the softness, from the curves of all runs on images of `size` × `size` pixels; each at most once.
 ///
-/// A softness wider than the image; no pixel in the soft band, so that an image has no gradient; a decay that went on past the best
-/// step.
+/// A softness wider than the image; no pixel in the soft band, so that images have no gradient; a decay that went on past the best step.
 pub(crate) fn diagnostics(softness: &ScheduledSoftness, size: usize, runs: &[Run]) -> Vec<String> {
     let surrogate = softness.surrogate_at(0.0, size);
     let surrogate = surrogate.map(|Surrogate { softness, phi }| softness.scale(&phi));
@@ -40,7 +39,7 @@ fn too_wide(squared: bool, runs: &[Run]) -> Option<String> {
 fn too_narrow(surrogate: Option<f64>, size: usize, runs: &[Run]) -> Option<String> {
     let still = runs.iter().filter(|run| has_no_band(&run.curve, surrogate.is_some())).count();
     let first = runs.first()?.curve.first()?.values[SCALE];
-    // With a surrogate an image without a band has a gradient.
+    // With a surrogate, an image without a soft band has a gradient.
     let (flag, scale) = surrogate.map_or(("scale", first), |scale| ("surrogate-scale", scale));
     (still > 0).then(|| {
         format!(
@@ -52,14 +51,14 @@ fn too_narrow(surrogate: Option<f64>, size: usize, runs: &[Run]) -> Option<Strin
     })
 }
 
-/// Whether the soft image is the hard one at the start, or at most steps, and so nothing can move; with a surrogate, whether nothing
-/// does.
+/// Whether the soft image equals the hard one at the start, or at most steps, so that nothing can
+/// move; with a surrogate, only if nothing moves.
 fn has_no_band(curve: &[Point], has_surrogate: bool) -> bool {
     let sharp = |place: &usize| {
         let point = &curve[*place].values;
         let (soft, hard) = (point[SOFT], point[HARD]);
         let same = (soft - hard).abs() <= SAME * hard.abs();
-        // Images that do not meet their target have the same error too, but may still move.
+        // Images that do not overlap their target have equal errors too, but may still move.
         let next = curve.get(place + 1);
         let stays = next.is_none_or(|next| next.values[PARAMETER] == point[PARAMETER]);
         same && (hard < 1.0 && !has_surrogate || stays)
@@ -85,8 +84,8 @@ fn past_the_best(runs: &[Run]) -> Option<String> {
     ))
 }
 
-/// The best step of a run whose scale falls after it, to no good: the last tenth of the steps is worse throughout, because single steps
-/// are noise.
+/// The best step of a run whose scale falls after it without improving: the whole last tenth of the
+/// steps is worse. Single steps are noisy.
 fn passed(curve: &[Point]) -> Option<&Point> {
     let tenth = &curve[curve.len() - curve.len().div_ceil(10)..];
     let (best, last) = (best_point(curve, HARD)?, best_point(tenth, HARD)?);
@@ -105,7 +104,7 @@ mod tests {
 
     use super::*;
 
-    /// What is found in a run with these soft errors, hard errors and scales, whose parameter error falls by this much at each step.
+    /// The warnings for a run with these soft errors, hard errors and scales, whose parameter error falls by this much at each step.
     fn found(surrogate: bool, points: [[f64; 3]; 3], falls: f64) -> Vec<String> {
         let point = |(step, [soft, hard, scale]): (usize, [f64; 3])| {
             let values = vec![soft, soft, 5.0 - falls * step as f64, scale, hard];
@@ -137,7 +136,7 @@ mod tests {
     #[test]
     fn an_image_without_a_soft_band_is_told_once() {
         one(&found(false, [[0.4, 0.4, 1e-9]; 3], 0.0), "no pixel lies");
-        // Nothing is drawn where the target is, and nothing moves.
+        // Nothing is drawn at the target, and nothing moves.
         one(&found(false, [[1.0, 1.0, 1e-9]; 3], 0.0), "no pixel lies");
     }
 
@@ -153,7 +152,7 @@ mod tests {
     fn a_decay_past_the_best_step_names_the_scale_to_end_at() {
         let lines = found(false, [[0.5, 0.4, 0.1], [0.3, 0.1, 0.01], [0.6, 0.5, 1e-5]], 0.0);
         one(&lines, "try --scale-end 1.0e-2");
-        // The same without a decay is noise.
+        // Without a decay this is noise.
         let still = [[0.5, 0.4, 0.1], [0.3, 0.1, 0.1], [0.6, 0.5, 0.1]];
         assert!(found(false, still, 0.0).is_empty());
     }

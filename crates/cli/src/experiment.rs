@@ -19,9 +19,9 @@ pub struct TaskExperiment<T: Task> {
     pub method: Method,
     /// Size, steps and learning rate.
     pub solve: SolveConfig,
-    /// Which variant.
+    /// The variant.
     pub variant: Variant,
-    /// What the task says of itself.
+    /// Description of the task.
     pub description: Description,
     backend: BackendChoice,
     starts: usize,
@@ -30,7 +30,7 @@ pub struct TaskExperiment<T: Task> {
 }
 
 impl<T: Task> TaskExperiment<T> {
-    /// The task and the method that flags ask for.
+    /// The task and the method of the flags.
     ///
     /// # Errors
     ///
@@ -41,7 +41,7 @@ impl<T: Task> TaskExperiment<T> {
         method_args: &MethodArgs,
         purpose: Purpose,
     ) -> anyhow::Result<Self> {
-        // Before the first tensor.
+        // Must precede the first tensor.
         let backend = backend(common.backend.as_deref())?;
         let preset_by_default = matches!(purpose, Purpose::Solving | Purpose::Evaluating);
         let mut method_args = method_args.clone();
@@ -77,7 +77,7 @@ impl<T: Task> TaskExperiment<T> {
         let usual = task.defaults();
         let size = common.size.unwrap_or(usual.size);
         method.resolution.check(size).map_err(Error::usage)?;
-        // A passage of so many steps goes as far as the rate takes it.
+        // With feedback, the number of steps is tuned to the learning rate.
         let takes = task.takes_learning_rate() || method.softness.feedback.is_some();
         let of_method = method.softness.learning_rate.filter(|_| takes);
         let learning_rate = method_args.learning_rate.or(of_method).unwrap_or(usual.learning_rate);
@@ -100,7 +100,7 @@ impl<T: Task> TaskExperiment<T> {
         self.method.softness.parameters() + self.task.own_phi().len()
     }
 
-    /// Every choice that decides the numbers, as it stands in the results.
+    /// All settings that determine the numbers, as in the results.
     pub fn settings(&self) -> Map<String, Value> {
         let (softness, size) = (&self.method.softness, self.solve.size);
         let mut settings = self.description.settings.clone();
@@ -136,7 +136,7 @@ impl<T: Task> TaskExperiment<T> {
         settings
     }
 
-    /// What the results say of it.
+    /// The description in the results.
     pub fn about(&self) -> Map<String, Value> {
         let about = json!({
             "variant": self.variant.name(),
@@ -151,7 +151,7 @@ impl<T: Task> TaskExperiment<T> {
         about.as_object().cloned().unwrap_or_default()
     }
 
-    /// Solves instances side by side from one start.
+    /// Solves instances together from one start.
     fn solve_once(
         &self,
         instances: &[T::Instance],
@@ -187,7 +187,7 @@ impl<T: Task> TaskExperiment<T> {
                 let at = [iterate.loss[k], iterate.soft_loss[k], errors[0], iterate.scale];
                 let values = [&at[..], &[iterate.hard_loss[k]], &errors[1..]].concat();
                 solved.run.curve.push(Point { step: iterate.step, values });
-                // The steps of a batch are shared by its runs.
+                // The time of a step is split over the runs of the batch.
                 let share = iterate.seconds.map(|time| time / instances.len() as f64);
                 solved.run.step_seconds.extend(share);
                 if iterate.begun_again > solved.run.begun_again.len() {
@@ -211,7 +211,7 @@ impl<T: Task> TaskExperiment<T> {
         Ok(all)
     }
 
-    /// Keeps an image as the result, if no step before had a lower error of the hard one, and as a frame if so asked.
+    /// Stores an image as the result, if no earlier step had a lower hard error, and as a frame if requested.
     fn keep_picture(
         &self,
         solved: &mut Solved,
@@ -253,21 +253,21 @@ impl<T: Task> TaskExperiment<T> {
     }
 }
 
-/// What an experiment is for.
+/// Purpose of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// One instance, as well as possible.
+    /// One instance, solved as well as possible.
     Solving,
-    /// Many instances, by the protocol.
+    /// Many instances, by the protocol of the task.
     Evaluating,
-    /// Finding a method, from a family on unless another is named.
+    /// Finding a method, starting from a family by default.
     Finding,
-    /// The same by learning: a family has a surrogate only where one is asked for, whatever a search found.
+    /// Finding a method by learning: a family has a surrogate only if requested, regardless of search results.
     Learning,
 }
 
 impl Entry {
-    /// The task `T` with the method that flags ask for.
+    /// The task `T` with the method of the flags.
     ///
     /// # Errors
     ///
@@ -317,7 +317,7 @@ impl<T: Task> Experiment for TaskExperiment<T> {
         if self.method.softness.feedback.is_some() { 1 } else { self.task.batch_size() }
     }
 
-    /// Where the image does not fit, other starts are tried, and that with the best image is kept.
+    /// Tries further starts if the hard error is too large, and returns the result with the smallest.
     fn run(&self, batch: &Batch, progress: &mut Progress) -> anyhow::Result<Vec<Run>> {
         let instances = batch.seeds.iter().map(|&seed| self.task.instance(seed));
         let instances = instances.collect::<anyhow::Result<Vec<_>>>()?;
@@ -347,15 +347,15 @@ impl<T: Task> Experiment for TaskExperiment<T> {
 /// One instance, solved from one start.
 #[derive(Default)]
 struct Solved {
-    /// Without its seed and a verdict.
+    /// The run, without its seed and success.
     run: Run,
     target: Vec<f64>,
-    /// After the last step.
+    /// Parameters after the last step.
     theta: Vec<f64>,
 }
 
 impl Solved {
-    /// Error of the hard image that is returned: what can be told without knowing the answer.
+    /// Hard error of the returned step, which needs no knowledge of the true answer.
     fn hard(&self) -> f64 {
         best_point(&self.run.curve, HARD).map_or(f64::INFINITY, |point| point.values[HARD])
     }

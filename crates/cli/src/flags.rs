@@ -1,4 +1,4 @@
-//! The flags that all tasks have.
+//! The flags of all tasks.
 
 use std::{fmt, path::PathBuf, str::FromStr};
 
@@ -11,15 +11,15 @@ use softrast_lab::{
 };
 use softrast_softness::Family;
 
-/// Heading of the flags that only runs on seeds need, and nobody with pictures.
+/// Heading of flags that apply to runs on seeds only, not to pictures.
 pub const EXPERIMENTS: &str = "Experiments";
-/// Heading of the flags that few need.
+/// Heading of rarely needed flags.
 pub(crate) const RARE: &str = "Rarely needed";
 
-/// What is solved, and where results go.
+/// The problem, and the folder for results.
 #[derive(Args, Clone, Debug, PartialEq)]
 pub struct Common {
-    /// Folder for the results; made if missing [default: out/TASK, or out/TASK-COMMAND]
+    /// Folder for the results; created if missing [default: out/TASK, or out/TASK-COMMAND]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
@@ -58,7 +58,7 @@ impl Default for Common {
     }
 }
 
-/// Flags of which none is given.
+/// The defaults of all flags.
 ///
 /// # Panics
 /// If a flag of `A` has no default, an error in the program.
@@ -68,7 +68,7 @@ pub fn usual_args<A: Args>() -> A {
     parsed.unwrap_or_else(|error| panic!("every flag has a default: {error}"))
 }
 
-/// The method: a softness, how its scale moves, and how finely it is drawn. What is `None` is as the task has it.
+/// The method: a softness, the schedule of its scale, and the resolution. `None` is the task's default.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
 pub struct MethodArgs {
     /// A family such as logistic, gauss, exp, gamma or mlp, a file, preset, learned[-KIND], searched, or auto
@@ -83,7 +83,7 @@ pub struct MethodArgs {
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
     pub scale_end: Option<f64>,
 
-    /// Whether the width stays or falls geometrically
+    /// Whether the width is fixed or falls geometrically
     #[arg(long, value_enum, help_heading = "Softness")]
     pub schedule: Option<Schedule>,
 
@@ -91,27 +91,27 @@ pub struct MethodArgs {
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = "Softness")]
     pub learning_rate: Option<f64>,
 
-    /// Share of the learning rate that is left at the last step, to which it falls geometrically
+    /// Learning rate at the last step as a share of the first, reached geometrically
     #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true, help_heading = RARE)]
     pub rate_end: Option<f64>,
 
-    /// Feed the softness the squared distance; widths are in NDC² then
+    /// Use the squared distance as the softness's input; widths are then in NDC²
     #[arg(long, help_heading = RARE)]
     pub squared: bool,
 
-    /// Take the gradient of the same softness at this width instead; it moves along with --scale
+    /// Surrogate gradient: that of the same softness at this width; it moves along with --scale
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, help_heading = RARE)]
     pub surrogate_scale: Option<f64>,
 
-    /// Weights of an mlp: at random, or fitted to the logistic or the file that is named
+    /// Weights of an mlp: random, or fitted to the logistic or to the given file
     #[arg(long, value_enum, help_heading = RARE)]
     pub init: Option<Init>,
 
-    /// Pixels a side to optimise on: all, as few as the softness can tell apart, or so many
+    /// Pixels a side to optimise on: full, as few as the softness allows (auto), or a number
     #[arg(long, value_name = "full|auto|N", help_heading = RARE)]
     pub resolution: Option<Resolution>,
 
-    /// Largest error of a pixel by leaving out far faces [default: 1e-5, or 1e-2 in a decay]
+    /// Largest error of a pixel from culling distant faces [default: 1e-5, or 1e-2 in a decay]
     #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true, help_heading = RARE)]
     pub tolerance: Option<f64>,
 }
@@ -120,14 +120,14 @@ pub struct MethodArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Variant {
-    /// The one a softness is tuned on
+    /// The variant that a softness is tuned on
     Original,
-    /// The one a tuned softness must also work on
+    /// The variant that a tuned softness must also work on
     Transfer,
 }
 
 impl Variant {
-    /// Both.
+    /// Both variants.
     pub const ALL: [Self; 2] = [Self::Original, Self::Transfer];
 
     /// Name on the command line and in the results.
@@ -139,21 +139,21 @@ impl Variant {
     }
 }
 
-/// How the scale changes over a run.
+/// Schedule of the scale over a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Schedule {
-    /// It does not
+    /// Fixed
     Static,
     /// Geometrically from --scale to --scale-end
     Decay,
 }
 
-/// What the weights of an untrained MLP softness are.
+/// Weights of an untrained MLP softness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Init {
     /// Random, as in the paper
     Uniform,
-    /// Such that it is like another softness
+    /// Fitted to another softness
     Fitted,
 }
 
@@ -164,23 +164,23 @@ pub enum SoftnessChoice {
     Family(Family),
     /// A file, not opened yet.
     File(PathBuf),
-    /// What the task takes where nobody says otherwise, whoever found it.
+    /// The default of the task, learned or searched.
     Preset,
-    /// What a learning run found for the task and comes with the program, or that of this kind.
+    /// The bundled softness learned on the task, or that of this kind.
     Learned(Option<String>),
-    /// What a search with more freedom than those of families found for the task and comes with the program.
+    /// The bundled softness of a search with more freedom than families have.
     Searched,
-    /// What `choose` finds.
+    /// The result of `choose`.
     Auto,
 }
 
-/// What the preset of a task is called.
+/// Name of the preset of a task.
 pub const PRESET: &str = "preset";
 
-/// What a search found for a task is called.
+/// Name of the searched softness of a task.
 const SEARCHED: &str = "searched";
 
-/// With what the names of learned softnesses that come with the program begin.
+/// Beginning of the names of bundled learned softnesses.
 const LEARNED: &str = "learned";
 
 impl fmt::Display for SoftnessChoice {
@@ -225,11 +225,11 @@ impl FromStr for SoftnessChoice {
 }
 
 impl MethodArgs {
-    /// A method as one word of a command line names it: a softness, and behind it flags of its own.
+    /// A method as one word of a command line: a softness, followed by its own flags.
     ///
     /// # Errors
     ///
-    /// What is wrong with it, in one line.
+    /// The mistake, in one line.
     pub fn parse(text: &str) -> Result<Self, String> {
         #[derive(Parser)]
         #[command(no_binary_name = true, disable_help_flag = true)]
@@ -237,7 +237,7 @@ impl MethodArgs {
             #[command(flatten)]
             method: MethodArgs,
         }
-        // The name of a file may hold spaces.
+        // A file name may contain spaces.
         let words: Vec<&str> = match text.parse::<SoftnessChoice>() {
             Ok(SoftnessChoice::File(_)) => vec![text],
             _ => text.split_whitespace().collect(),
@@ -248,9 +248,9 @@ impl MethodArgs {
         Ok(method)
     }
 
-    /// This method beside a first one: its scales are its own or the task's, never those of the first, whose scale may mean another
-    /// width; its resolution and tolerance are its own or those of the first. A family also takes the learning rate and its fall of the first;
-    /// what a file holds was found at a rate of its own.
+    /// This method as the second next to a first one: its scales are its own or the task's, never those of the first,
+    /// where a scale may mean another width; its resolution and tolerance default to those of the first. A family also
+    /// takes the learning rate of the first and its end; a file brings its own rate.
     #[must_use]
     pub fn beside(self, first: &Self) -> Self {
         let is_family = matches!(self.softness, None | Some(SoftnessChoice::Family(_)));
@@ -263,7 +263,7 @@ impl MethodArgs {
         }
     }
 
-    /// Fills in what one flag says about another.
+    /// Completes flags that follow from others.
     pub(crate) fn reconcile(&mut self) -> Result<(), String> {
         match (self.schedule, self.scale_end) {
             (Some(Schedule::Static), Some(_)) => {
@@ -277,17 +277,17 @@ impl MethodArgs {
         }
     }
 
-    /// The schedule that is asked for: a scale without one stays as it is.
+    /// The requested schedule: a scale without a schedule is fixed.
     pub(crate) fn asked_schedule(&self) -> Option<Schedule> {
         self.schedule.or(self.scale.map(|_| Schedule::Static))
     }
 
-    /// Whether it says of scales what a file says itself.
+    /// Whether it sets scales, which a file has itself.
     pub(crate) fn is_scaled(&self) -> bool {
         self.scale.is_some() || self.scale_end.is_some() || self.squared
     }
 
-    /// Whether it says nothing of the softness.
+    /// Whether it has no flag of the softness.
     pub(crate) fn is_silent(&self) -> bool {
         let moved = self.schedule.is_some() || self.surrogate_scale.is_some();
         self.softness.is_none() && !moved && self.init.is_none() && !self.is_scaled()
@@ -308,7 +308,7 @@ mod tests {
         assert_eq!(second.softness, Some(SoftnessChoice::Family(Family::Gauss)));
         assert_eq!((second.scale, second.surrogate_scale), (None, None));
         assert_eq!(second.learning_rate, Some(0.3));
-        // What comes along keeps the rate that it was found at.
+        // A file or bundled softness keeps its own learning rate.
         for name in ["preset", "learned.json"] {
             let own = MethodArgs::parse(name).unwrap().beside(&first);
             assert_eq!((own.learning_rate, own.rate_end), (None, None), "{name}");

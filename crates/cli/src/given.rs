@@ -1,4 +1,4 @@
-//! `solve` for pictures that the user gives.
+//! `solve` for the user's pictures.
 
 use std::path::{Path, PathBuf};
 
@@ -19,11 +19,11 @@ use crate::{
     session::{RESULT, Session},
 };
 
-/// The flags that every `solve` has, for pictures that the user gives.
+/// The shared flags of `solve`, for the user's pictures.
 pub struct Given<'a, A> {
-    /// Those of the task.
+    /// The flags of the task.
     pub args: &'a A,
-    /// What is solved, and where results go.
+    /// The problem, and the folder for results.
     pub common: &'a Common,
     pub(crate) method: &'a MethodArgs,
     /// Name of the task, and the scales of its method.
@@ -31,21 +31,21 @@ pub struct Given<'a, A> {
     pub(crate) session: &'a Session,
 }
 
-/// What came of pictures that the user gave.
+/// The result for the user's pictures.
 pub struct Answer {
     /// Its page.
     pub page: Report,
-    /// What is said, to people and programs.
+    /// Printed output, for people and programs.
     pub output: Output,
-    /// Names and contents of files beside the page.
+    /// Names and contents of files next to the page.
     pub files: Vec<(String, Vec<u8>)>,
     /// Files that the page links to.
     pub beside: Vec<Beside>,
 }
 
 impl<A> Given<'_, A> {
-    /// The softness; without a word the preset of the task, or where that has feedback what a search found for it, else what was learned on
-    /// it: feedback goes with one run at a time, and pictures are solved from many starts side by side.
+    /// The method of the command line; by default the preset of the task. A preset with feedback is replaced by the searched softness of
+    /// the task, else by the learned one: feedback controls a single run, and pictures are solved from many starts together.
     ///
     /// # Errors
     ///
@@ -68,7 +68,7 @@ impl<A> Given<'_, A> {
         MethodArgs { softness, ..self.method.clone() }.method(name, scales, true)
     }
 
-    /// Whether the command line says which softness.
+    /// Whether the command line names a softness.
     pub fn names_softness(&self) -> bool {
         !self.method.is_silent()
     }
@@ -78,12 +78,12 @@ impl<A> Given<'_, A> {
         self.method.learning_rate
     }
 
-    /// Makes sure, before the work, that files of these names may be written beside the results. `reads` are files that the work reads
-    /// without a flag that names them, which no result replaces.
+    /// Checks, before the work, that files of these names may be written to the results. `reads`
+    /// are input files that no flag names; no result replaces them.
     ///
     /// # Errors
     ///
-    /// If a name is that of a file which is no earlier result, or the folder cannot be written.
+    /// If a name is taken by a file that is no earlier result, or the folder cannot be written.
     pub fn will_write<'n>(
         &self,
         names: impl IntoIterator<Item = &'n str>,
@@ -93,21 +93,21 @@ impl<A> Given<'_, A> {
         self.session.claim(names.into_iter().chain([RESULT]))
     }
 
-    /// Where results go.
+    /// The folder for results.
     pub fn folder(&self) -> &Path {
         &self.session.out
     }
 
-    /// The backend, set up.
+    /// The backend, initialized.
     ///
     /// # Errors
     ///
-    /// If there is none of that name or no adapter for it.
+    /// If no backend has that name, or it has no adapter.
     pub fn backend(&self) -> anyhow::Result<BackendChoice> {
         backend(self.common.backend.as_deref())
     }
 
-    /// Progress over so many steps, which ends on Ctrl-C.
+    /// Progress over this many steps, which stops on Ctrl-C.
     ///
     /// # Errors
     ///
@@ -120,28 +120,29 @@ impl<A> Given<'_, A> {
     }
 }
 
-/// How pictures become masks.
+/// Conversion of pictures to masks.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct MaskFlags {
-    /// Take what is black for the mask
+    /// Use black as the mask
     #[arg(long)]
     pub invert: bool,
 
-    /// Take for the mask what is at least so bright, 0 to 1, instead of keeping soft edges
+    /// Threshold of the mask: brighter pixels belong to it, 0 to 1, instead of soft edges
     #[arg(long, value_name = "X", value_parser = share, allow_negative_numbers = true)]
     pub threshold: Option<f64>,
 
-    /// Take for the mask the pixels of class N: an entry of the palette, or the level as a whole number
+    /// Use the pixels of class N as the mask: an index of the palette, or the level as a whole number
     #[arg(long, value_name = "N", conflicts_with = "threshold")]
     pub label: Option<u32>,
 
-    /// Folder of masks with the names of the pictures, whatever their endings [default: masks that the camera file names, a folder masks beside the pictures, or the pictures themselves]
+    /// Folder of masks with the names of the pictures, with any file extension [default: masks that
+    /// the camera file names, a folder masks beside the pictures, or the pictures themselves]
     #[arg(long, value_name = "DIR")]
     pub masks: Option<PathBuf>,
 }
 
 impl MaskFlags {
-    /// Whether the command line says something of masks.
+    /// Whether the command line has a flag of masks.
     pub fn asked(&self) -> bool {
         let Self { invert, threshold, label, masks } = self;
         *invert || threshold.is_some() || label.is_some() || masks.is_some()
@@ -160,11 +161,11 @@ impl MaskFlags {
         })
     }
 
-    /// The mask in a file.
+    /// Loads the mask from a file.
     ///
     /// # Errors
     ///
-    /// If it is missing, no picture, or has nothing that is half white.
+    /// If it is missing, no picture, or has no pixel that is at least half white.
     pub fn load(&self, path: &Path) -> anyhow::Result<Picture> {
         let Self { invert, threshold, label, .. } = *self;
         let rules = MaskRules { invert, threshold, label };
@@ -172,7 +173,7 @@ impl MaskFlags {
     }
 }
 
-/// A camera and the mask that it took, for a page that shows them with a mesh.
+/// A camera and its mask, for a page that shows them with a mesh.
 ///
 /// # Errors
 ///

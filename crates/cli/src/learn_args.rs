@@ -5,53 +5,54 @@ use softrast_inverse::{Input, LearnConfig, OuterLoss, SIGMA};
 use softrast_lab::parse::{count, named, positive, whole};
 use softrast_meta::{MetaGradient, OuterSteps};
 
-/// Flags that say how to learn.
+/// Settings of learning.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct LearnArgs {
-    /// How the meta-gradient is taken: unrolled, truncated:K, direct, alternating, es or es:S [default: es for few parameters, else unrolled]
+    /// Estimator of the meta-gradient: unrolled, truncated:K, direct, alternating, es or es:S
+    /// [default: es for few parameters, else unrolled]
     #[arg(long, value_name = "NAME", value_parser = estimator)]
     estimator: Option<MetaGradient>,
     /// Updates of the softness
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 50, allow_negative_numbers = true)]
     outer: usize,
-    /// Instances for each update
+    /// Instances per update
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     batch: usize,
     /// Largest move of a parameter in an update, roughly
     #[arg(long, value_name = "X", value_parser = positive, default_value_t = 0.03, allow_negative_numbers = true)]
     outer_rate: f64,
-    /// Learn the inner learning rate along with the softness; with --estimator es
+    /// Also learn the inner learning rate; with --estimator es
     #[arg(long)]
     learn_rate: bool,
-    /// Learn to move the scale, and the size of steps, by what a run sees; it begins with a decay
+    /// Learn an adaptive schedule: the error of a run controls its scale, learning rate and restarts; starts from a decay
     #[arg(long)]
     feedback: bool,
-    /// Instances that decide which softness is kept
+    /// Held-out instances for selecting the softness
     #[arg(long, value_name = "N", value_parser = count, default_value_t = 8, allow_negative_numbers = true)]
     validation_runs: usize,
-    /// End after so many validations that found nothing better [default: never]
+    /// End after this many consecutive validations without an improvement [default: never]
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     patience: Option<usize>,
-    /// What the outer loss is taken of: a fixed narrow softness on a finer image or on the image's own pixels, the hard image of the last
-    /// step or of the one that a run returns, which have no gradient, or the loss that was optimised, as in the paper [default: fixed;
-    /// own for direct, which sees nothing else; returned with feedback]
+    /// Outer loss: a fixed narrow softness on a finer image or on the image's own pixels, the hard image of the last
+    /// step or of the returned one, which have no gradient, or the inner loss itself, as in the paper [default: fixed;
+    /// own for direct, which needs it; returned with feedback]
     #[arg(long, value_name = "fixed|pixels|hard|returned|own", value_parser = named::<OuterLoss>)]
     outer_loss: Option<OuterLoss>,
-    /// The inner steps after which the outer loss is taken: the last, or a quarter, half and all of them [default: last]
+    /// The inner steps after which the outer loss is evaluated: the last, or a quarter, half and all of them [default: last]
     #[arg(long, value_name = "last|quarters", value_parser = named::<OuterSteps>)]
     outer_steps: Option<OuterSteps>,
-    /// Numbers that describe how a moving scale moves [default: 3, or those of the file]
+    /// Knots of the schedule of a moving scale [default: 3, or those of the file]
     #[arg(long, value_name = "N", value_parser = whole::<1, 5>, allow_negative_numbers = true)]
     knots: Option<usize>,
-    /// What a softness whose scale stays is a function of: the distance in NDC, as in the paper, or that over a learned width [default: ndc]
+    /// Variable of a softness with a fixed width: the distance in NDC, as in the paper, or the distance over a learned width [default: ndc]
     #[arg(long, value_name = "ndc|relative", value_parser = named::<Input>)]
     input: Option<Input>,
-    /// Pixels that a learned width or a moving scale stays above [default: 0.03]
+    /// Lower limit of a learned width or a moving scale, in pixels [default: 0.03]
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true)]
     floor: Option<f64>,
 }
 
-/// How the gradient is taken; an alternating descent gets the learning rate of the updates later.
+/// Parses an estimator; the learning rate of alternating descent is set later to that of the updates.
 fn estimator(text: &str) -> Result<MetaGradient, String> {
     let es = |sigma| MetaGradient::EvolutionStrategy { sigma, pairs: 1 };
     Ok(match (text, text.split_once(':')) {

@@ -1,4 +1,4 @@
-//! What a learned softness looks like.
+//! Charts of a learned softness.
 
 use softrast_inverse::{PhiLayout, ScheduledSoftness};
 use softrast_lab::plot::{Axis, Plot, Series};
@@ -6,7 +6,7 @@ use softrast_raster::HostBackend;
 use softrast_softness::{EdgeSoftness, Softness};
 use softrast_tensor::{numbers, tensor, vector};
 
-/// The learned softness beside that of the start, and how its scale moves: charts and captions.
+/// The learned softness next to that of the start, and the schedule of its scale: charts and captions.
 pub(crate) fn learned_charts(
     layout: &PhiLayout,
     learned: &ScheduledSoftness,
@@ -64,7 +64,7 @@ pub(crate) fn learned_charts(
     charts
 }
 
-/// How far from the edge a softness is still above a hundredth, in NDC.
+/// Distance from the edge up to which a softness is above a hundredth, in NDC.
 fn reach(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     let places: Vec<f64> = (0..60).map(|k| 1e-4 * 1.2f64.powi(k)).collect();
     let value = values(softness, phi, places.iter().map(|d| -d).collect());
@@ -72,7 +72,7 @@ fn reach(softness: EdgeSoftness, phi: &[f64]) -> f64 {
     last.min(1.0)
 }
 
-/// Points of a softness, by the distance in pixels.
+/// Points of a softness over the distance in pixels.
 fn curve(softness: EdgeSoftness, phi: &[f64], reach: f64, pixels: f64) -> Vec<[f64; 2]> {
     const HALF: i32 = 150;
     let place = |k: i32| 1.3 * reach * f64::from(k) / f64::from(HALF);

@@ -1,7 +1,7 @@
 //! The command line of a task: `solve`, `evaluate`, `search`, `choose` and `learn`.
 //!
-//! A program is a type that implements [`Task`] and a `main` of one call of [`main()`], or of [`main_of_two`]. [`MethodArgs`] are the flags of a method; together
-//! with a task they make a [`TaskExperiment`], which is what `softrast-lab` runs, keeps and compares.
+//! A program is a type that implements [`Task`] and a `main` of one call of [`main()`], or of [`main_of_two`]. [`MethodArgs`] are the flags
+//! of a method; together with a task they make a [`TaskExperiment`], which `softrast-lab` runs, stores and compares.
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("a program needs a backend: turn on one of the features ndarray, flex and wgpu");
@@ -23,8 +23,8 @@ mod searched;
 mod session;
 mod task;
 
-/// Images come and go by the thousand, each too large for the system's allocator to keep: it maps their pages anew every time, which
-/// costs a seventh of a step. Every program of a task has this crate, and no library.
+/// Images are allocated by the thousand, each too large for the system's allocator to reuse: it would map their pages
+/// anew every time, which costs a seventh of a step. Every program of a task links this crate, and no library does.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -1,4 +1,4 @@
-//! From flags to a [`Method`].
+//! Conversion of flags to a [`Method`].
 
 use softrast_inverse::{
     Method, ScheduledSoftness, SoftnessFileError, Surrogate, distilled_mlp, mlp_like,
@@ -8,27 +8,27 @@ use softrast_softness::{EdgeSoftness, Family, Softness};
 
 use crate::{Init, MethodArgs, PRESET, Schedule, Searched, SoftnessChoice};
 
-/// Scales of a task that neither the command line nor a [`Searched`] names, as widths in NDC.
+/// Default scales of a task, as widths in NDC, if neither the command line nor a [`Searched`] sets them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scales {
-    /// How the scale moves if neither a schedule nor a scale is given.
+    /// Schedule of the scale if neither a schedule nor a scale is given.
     pub schedule: Schedule,
     /// First and last scale of a decay.
     pub decay: [f64; 2],
-    /// Scale of a static softness.
+    /// Scale of a softness of fixed width.
     pub fixed: f64,
 }
 
 impl MethodArgs {
-    /// The method that the flags ask for on a task. Where they say nothing of the softness, it is the preset of the task if there is one
-    /// and that is `preset_by_default`; else it is a logistic.
+    /// The method of the flags on a task. Without flags of the softness, it is the preset of the
+    /// task, if there is one and `preset_by_default`; else a logistic.
     ///
-    /// A scale without an end or a schedule stays as it is. With `--squared` the default scales are squared, so that they mean the same
-    /// widths.
+    /// A scale without an end or a schedule is fixed. With `--squared` the default scales are
+    /// squared, so that they mean the same widths.
     ///
     /// # Errors
     ///
-    /// If a softness file cannot be used or none comes with the program that is asked for, or flags contradict each other.
+    /// If a softness file cannot be used, the requested softness is not bundled, or flags contradict each other.
     pub fn method(
         &self,
         task: &str,
@@ -62,7 +62,7 @@ impl MethodArgs {
         Ok(Method { name, softness, resolution, tolerance })
     }
 
-    /// That no flag says what a softness file says.
+    /// Checks that no flag repeats a setting of a softness file.
     fn check_goes_with_file(&self) -> anyhow::Result<()> {
         let moved = self.schedule == Some(Schedule::Decay);
         let begun = self.init == Some(Init::Uniform);
@@ -75,7 +75,7 @@ impl MethodArgs {
         Ok(())
     }
 
-    /// A softness of a file, with the learning rate if that suits the task.
+    /// The softness of a file, with its learning rate if that is for this task.
     fn of_file(&self, file: ScheduledSoftness, task: &str) -> anyhow::Result<ScheduledSoftness> {
         let suits = file.task.as_ref().is_none_or(|learned_on| learned_on == task);
         if file.feedback.is_some() && self.rate_end.is_some() {
@@ -95,7 +95,7 @@ impl MethodArgs {
         Ok(softness)
     }
 
-    /// A family, and its name.
+    /// The softness of a family, and its name.
     fn of_family(
         &self,
         task: &str,
@@ -112,7 +112,7 @@ impl MethodArgs {
         }
         let fitted = self.init == Some(Init::Fitted);
         let like = if fitted { Family::Logistic } else { family };
-        // Found together, so taken whole or not at all.
+        // Found together, therefore used together or not at all.
         let searched = Searched::of(task, like.name(), self.asked_schedule(), scales.schedule);
         let searched = searched.filter(|_| !self.is_scaled());
         let [first, last] =
@@ -156,7 +156,7 @@ impl MethodArgs {
     }
 }
 
-/// Colour of a method in every chart; told apart also by those who see no red. Methods that have none share one dark colour.
+/// Colour of a method in every chart, distinguishable also without seeing red. Methods without an entry share one dark colour.
 pub fn method_colour(name: &str) -> [u8; 3] {
     match name.split([' ', '.']).next().unwrap_or_default() {
         "preset" => [110, 110, 110],
@@ -173,7 +173,7 @@ pub fn method_colour(name: &str) -> [u8; 3] {
 }
 
 impl Scales {
-    /// With the schedule and the scale of what was searched for.
+    /// These flags with the schedule and the scale of a search result.
     fn with(self, searched: &Searched) -> Self {
         match searched.scale_end {
             None => Self { schedule: Schedule::Static, fixed: searched.scale, ..self },
@@ -182,18 +182,18 @@ impl Scales {
     }
 }
 
-/// A softness that comes with the program, or should.
+/// A bundled softness, or the error that there is none.
 pub(crate) struct Shipped {
-    /// What the flags call it.
+    /// Its name in the flags.
     called: String,
-    /// The name under which a task may have one of its own beside it.
+    /// The name of a task's own bundled softness that goes with it.
     pub(crate) name: String,
     file: Result<ScheduledSoftness, SoftnessFileError>,
 }
 
 impl MethodArgs {
-    /// What flags mean of what comes with the program, whether it is there or not: they say so, or they say nothing, the task has a preset
-    /// and that is `preset_by_default`.
+    /// The bundled softness of these flags, whether it exists or not: the named one, or the preset
+    /// if no flag of the softness is given, the task has a preset, and `preset_by_default`.
     pub(crate) fn shipped(&self, task: &str, preset_by_default: bool) -> Option<Shipped> {
         let preset = |called: &SoftnessChoice| Shipped {
             called: called.to_string(),
@@ -221,24 +221,24 @@ impl MethodArgs {
     }
 }
 
-/// The name of what `learned-KIND` means on a task: that of this kind for the task, or else what was learned on the task of that name.
+/// The name of `learned-KIND` on a task: that of this kind for the task, or else that learned on the task of this name.
 pub fn learned_kind(task: &str, kind: &str) -> String {
     let (own, there) =
         (format!("{task}-{kind}"), |name: &str| ScheduledSoftness::learned(name).is_ok());
     if !there(&own) && there(kind) { kind.to_owned() } else { own }
 }
 
-/// Whether the preset of a task is what was learned on it.
+/// Whether the preset of a task is its learned softness.
 pub fn is_preset_learned(task: &str) -> bool {
     is_preset(task, ScheduledSoftness::learned(task))
 }
 
-/// Whether this is the preset of a task, if there is such a softness.
+/// Whether this is the preset of a task; false for an error.
 pub fn is_preset(task: &str, softness: Result<ScheduledSoftness, SoftnessFileError>) -> bool {
     softness.is_ok_and(|softness| ScheduledSoftness::preset(task).ok() == Some(softness))
 }
 
-/// A network, and its weights, in the place of a softness.
+/// An MLP fitted to a softness, and its weights.
 fn network_like(softness: EdgeSoftness, phi: &[f64]) -> anyhow::Result<(EdgeSoftness, Vec<f64>)> {
     let scale = softness.scale(phi);
     let squared = softness.scale_is_squared();
@@ -265,7 +265,7 @@ mod tests {
         args.method("none", &SCALES, true)
     }
 
-    /// First, middle and last scale of the method that a line gives.
+    /// First, middle and last scale of the method of a line.
     fn assert_scales(line: &str, expected: [f64; 3]) {
         let softness = method(line).unwrap().softness;
         for (part, expected) in [0.0, 0.5, 1.0].into_iter().zip(expected) {

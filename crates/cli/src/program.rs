@@ -18,7 +18,7 @@ pub fn main<T: Task>() -> ExitCode {
     run_main(execute::<T>)
 }
 
-/// The whole `main` of a program that does a second task, with the same flags, where these say so.
+/// The whole `main` of a program with two tasks that share their flags; `is_second` selects the second.
 pub fn main_of_two<T, U>(is_second: fn(&T::Args) -> bool) -> ExitCode
 where
     T: Task,
@@ -27,19 +27,19 @@ where
     run_main(move |words, stdout| execute_one_of::<T, U>(words, is_second, stdout))
 }
 
-/// Does what a command line asks, the name of the program being its first word.
+/// Runs a command line; its first word is the name of the program.
 ///
 /// Results go to `stdout` and to the output folder, progress and warnings to stderr.
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line. Unless only `stdout` failed or the user stopped the work, no result file
-/// was touched then. What a user who stops it has finished is written and printed before, as partial.
+/// Every error that ends the program with an error line. Unless only `stdout` failed or the user stopped the work, no
+/// result file has been changed then. After a stop, finished runs are written and printed first, as partial results.
 pub fn execute<T: Task>(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     execute_one_of::<T, T>(words, |_| false, stdout)
 }
 
-/// As [`execute`], by the task `U` where `is_second` of the flags, else by `T`.
+/// [`execute`] for the task `U` if `is_second` of the flags, else for `T`.
 fn execute_one_of<T, U>(
     words: Vec<OsString>,
     is_second: fn(&T::Args) -> bool,
@@ -51,7 +51,7 @@ where
 {
     let words = with_command::<T>(words);
     let command = CommandLine::<T::Args, T::Pictures>::command();
-    // Help lists them where no command is named; a command line gets `solve` there before it is parsed.
+    // Help without a command lists the flags of `solve`; command lines get `solve` inserted before parsing.
     let solve = command.find_subcommand("solve").into_iter();
     let of_solve: Vec<_> = solve.flat_map(clap::Command::get_arguments).cloned().collect();
     let command = command
@@ -71,7 +71,7 @@ where
     }
 }
 
-/// Does what a parsed command line asks; `words` are those that it was parsed from.
+/// Runs a parsed command line; `words` are its words.
 fn run<T: Task>(
     line: CommandLine<T::Args, T::Pictures>,
     words: &[OsString],
@@ -79,7 +79,7 @@ fn run<T: Task>(
 ) -> Result<(), Failure> {
     let (command, shared) = line.command.shared();
     let Common { json, quiet, ref out, .. } = shared.common;
-    // Results of different commands do not mix.
+    // Results of different commands are kept separate.
     let folder = if command == "solve" { T::NAME.into() } else { format!("{}-{command}", T::NAME) };
     let session = Session {
         again: repeated(T::PROGRAM, words),
@@ -103,7 +103,7 @@ fn run<T: Task>(
     output.print(json, &session.again, stdout)
 }
 
-/// An error about a flag that the command does not have, with the commands that do.
+/// An error about a flag that the command lacks, with the commands that have it.
 fn with_owner(mut failure: Failure, command: &clap::Command) -> Failure {
     let flag = failure.message.strip_prefix("unexpected argument '--");
     let Some(flag) = flag.and_then(|rest| rest.split('\'').next()) else {
@@ -120,7 +120,7 @@ fn with_owner(mut failure: Failure, command: &clap::Command) -> Failure {
     failure
 }
 
-/// The words with `solve` in them if they name no command.
+/// The words, with `solve` inserted if they name no command.
 fn with_command<T: Task>(mut words: Vec<OsString>) -> Vec<OsString> {
     let general = ["-h", "--help", "-V", "--version", "help"];
     let command = CommandLine::<T::Args, T::Pictures>::command();

@@ -4,31 +4,31 @@ use serde::Deserialize;
 
 use crate::Schedule;
 
-/// What `search` found best for a softness family on a task's original variant, on training seeds; in OCCLUSION, where most settings solve
-/// the original without an error, on the transfer.
+/// The best setting that `search` found for a softness family on a task's original variant, on training seeds; for
+/// OCCLUSION, whose original most settings solve without an error, on the transfer.
 ///
-/// All stand in `searched.json` beside this file, with the command that made each: for every task and family a static setting, a
-/// decay, or both.
+/// All settings are in `searched.json` next to this file, with their commands: for every task and family a fixed width,
+/// a decay, or both.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Searched {
-    /// Scale, at first if it decays, in NDC.
+    /// Scale in NDC; of a decay the first.
     pub scale: f64,
-    /// Scale at the last step of a decay; none for a static one.
+    /// Scale at the last step of a decay; `None` for a fixed width.
     pub scale_end: Option<f64>,
-    /// Width of the gradient, at first if it moves, where that is another.
+    /// Width of the surrogate gradient, of a moving one the first, if it differs.
     #[serde(default)]
     pub surrogate_scale: Option<f64>,
-    /// Learning rate in the original variant; none leaves the task's own.
+    /// Learning rate in the original variant; `None` means the task's own.
     pub learning_rate: Option<f64>,
-    /// Width of the soft depth, where the task has one.
+    /// Width of the depth softness, if the task has one.
     pub depth_scale: Option<f64>,
-    /// Mean over the training seeds of the error that the search went by.
+    /// Mean over the training seeds of the error that was minimised.
     pub error: f64,
-    /// Runs that the search made; none where an earlier grid search did not count them.
+    /// Runs of the search; `None` for a grid search that did not count them.
     #[serde(default)]
     pub loops: Option<usize>,
-    /// The flags of the search; without `--loops` those of a grid search that `search` was before.
+    /// The flags of the search; without `--loops` those of a grid search.
     pub command: String,
 }
 
@@ -49,8 +49,8 @@ static TASKS: LazyLock<Tasks> = LazyLock::new(|| {
 });
 
 impl Searched {
-    /// The setting of a family in a task under the schedule that is asked for; else under the better of the two, or under the `usual`
-    /// one of the task as long as not both were searched for. None where nothing was.
+    /// The setting of a family in a task under the requested schedule; by default the better one if both schedules were
+    /// searched, else that under the task's `usual` schedule. `None` if it was not searched.
     pub fn of(
         task: &str,
         family: &str,

@@ -11,18 +11,18 @@ use softrast_lab::{
 
 use crate::{command_line::Kept, commands::ended};
 
-/// What a command works with, beside its flags.
+/// The context of a command, apart from its flags.
 pub(crate) struct Session {
-    /// The command line that gives the same results again.
+    /// The command line that reproduces the results.
     pub(crate) again: String,
     /// Name of the command.
     pub(crate) command: &'static str,
     /// Name of the task, and of its program.
     pub(crate) task: &'static str,
     pub(crate) program: &'static str,
-    /// Files that it reads, and therefore never replaces.
+    /// Input files, which it never replaces.
     pub(crate) inputs: RefCell<Inputs>,
-    /// Where results go.
+    /// Folder for results.
     pub(crate) out: PathBuf,
     pub(crate) quiet: bool,
 }
@@ -34,12 +34,12 @@ impl Session {
         Ok(OutputFolder::open(&self.out, &command, &self.inputs.borrow())?)
     }
 
-    /// Makes sure, before the work, that files of these names may be written to the folder, and the page.
+    /// Checks, before the work, that files of these names and the page may be written to the folder.
     pub(crate) fn claim<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> anyhow::Result<()> {
         Ok(self.folder()?.claim(names.into_iter().chain([PAGE]))?)
     }
 
-    /// Somebody to run experiments, who keeps what is finished on file unless the command is `solve`.
+    /// The runner of experiments, which stores finished runs on file unless the command is `solve`.
     pub(crate) fn runner(&self, folder: &mut OutputFolder, kept: Kept) -> anyhow::Result<Runner> {
         let progress = Progress::of_program(self.quiet);
         if self.command == "solve" {
@@ -51,7 +51,7 @@ impl Session {
         Ok(Runner { progress, store })
     }
 
-    /// Does the part of a job that is the shard's, and says what is still to do. No result file is written.
+    /// Makes the shard's runs of a job, and reports the next command. No result file is written.
     pub(crate) fn part(&self, runner: &mut Runner, job: &[Work<'_>]) -> anyhow::Result<Output> {
         let shard = runner.store.shard().map(|shard| shard.to_string()).unwrap_or_default();
         let part = runner.part(job);
@@ -70,8 +70,8 @@ impl Session {
         Ok(Output { json, text, partial, ..Output::default() })
     }
 
-    /// Writes the page, and the JSON if it has a `file` of its own, beside what `folder` holds, and says where they are. `beside` are the
-    /// files to which the page links.
+    /// Writes the page, and the JSON if it has its own `file`, to `folder` with its other files,
+    /// and reports their paths. `beside` are the files that the page links to.
     pub(crate) fn finish(
         &self,
         mut folder: OutputFolder,
@@ -97,7 +97,7 @@ impl Session {
 const PAGE: &str = "report.html";
 /// The results of runs, as JSON.
 pub(crate) const RESULT: &str = "result.json";
-/// Files that tell of runs: of one, of several, of several with two methods, and of those of a task with drawings.
+/// Files of runs: of one, of several, of several with two methods, and of a task with drawings.
 pub(crate) const OF_RUN: [&str; 4] = ["before_after.png", "animation.gif", "curve.csv", RESULT];
 pub(crate) const OF_RUNS: &str = "convergence.csv";
 pub(crate) const OF_OTHERS: &str = "against_curve.csv";

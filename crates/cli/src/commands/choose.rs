@@ -19,21 +19,21 @@ use crate::{
     session::Session,
 };
 
-/// Methods from the least complex one on: parameters of the family first, then whether the scale moves.
+/// Families by ascending complexity: first by number of parameters, then fixed before moving scale.
 ///
 /// Source: Wu et al. 2024, Table 1, for the numbers of parameters.
 const FAMILIES: [Family; 5] =
     [Family::Logistic, Family::Gauss, Family::Exp, Family::Gamma, Family::Mlp];
-/// All errors.
+/// The file of all errors.
 const CHOICE: &str = "choose.json";
-/// Images are not tried below this many pixels a side.
+/// Fewest pixels a side of an image that are tried.
 const FEWEST: usize = 8;
-/// Largest errors of a pixel, from what a decay has if nobody says otherwise to what a softness has that stays.
+/// Largest errors of a pixel, from the default of a decay to that of a fixed width.
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
-/// Training seeds that every answer is tried on where nobody says.
+/// Default number of training seeds per answer.
 const RUNS: usize = 8;
 
-/// Finds the cheapest way to solve the task that is as good as the best, and gives its reasons.
+/// Finds the cheapest method for the task that is as good as the best, and reports the reasons.
 pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyhow::Result<Output> {
     let Choose { mut shared, auto, training, kept } = flags;
     shared.method.reconcile().map_err(Error::usage)?;
@@ -79,7 +79,7 @@ pub(crate) fn choose<T: Task>(session: &Session, flags: Choose<T::Args>) -> anyh
     session.finish(folder, report, &beside, Some(CHOICE), output)
 }
 
-/// What `--softness auto` stands for.
+/// The method of `--softness auto`.
 pub(crate) fn chosen<T: Task>(
     shared: &Shared<T::Args>,
     budget: Option<f64>,
@@ -93,9 +93,9 @@ pub(crate) fn chosen<T: Task>(
     found
 }
 
-/// Asks one question after the other, each with the answers to those before: the least complex softness, then the fewest pixels to
-/// optimise on, the largest tolerance and the coarsest mesh. What the flags name of these is not asked, nor is what the task does not
-/// know.
+/// Asks one question after the other, each under the previous answers: the least complex softness,
+/// then the fewest pixels to optimise on, the largest tolerance and the coarsest mesh. Questions
+/// that the flags answer, or that do not apply to the task, are skipped.
 fn find<T: Task>(
     shared: &Shared<T::Args>,
     budget: Option<f64>,
@@ -108,7 +108,7 @@ fn find<T: Task>(
         ));
     }
     check_held_out(training, &[shared.common.seed])?;
-    // Not the learned one, which is none of the methods that there are to choose from.
+    // Not the learned softness, which is not one of the candidates.
     let method = MethodArgs { softness: None, ..shared.method.clone() };
     let mut now = Answer { flags: String::new(), args: shared.args.clone(), method };
     let mut budget = Budget { left: budget.unwrap_or(f64::INFINITY), lasted: true };
@@ -149,7 +149,7 @@ fn find<T: Task>(
 pub(crate) struct Found<A> {
     pub(crate) answer: Answer<A>,
     stages: Vec<Selection>,
-    /// Whether the time was enough for all answers.
+    /// Whether the time sufficed for all answers.
     whole: bool,
 }
 
@@ -163,17 +163,17 @@ impl<A> Found<A> {
     }
 }
 
-/// What flags ask for.
+/// An answer as flags and their values.
 #[derive(Clone)]
 pub(crate) struct Answer<A> {
-    /// Those that answer the last question.
+    /// The flags that answer the last question.
     flags: String,
     pub(crate) args: A,
     pub(crate) method: MethodArgs,
 }
 
 impl<A: Clone> Answer<A> {
-    /// The same with an answer to the next question.
+    /// This answer extended by one to the next question.
     fn with(&self, flags: String, change: impl FnOnce(&mut Self)) -> Self {
         let mut answer = Self { flags, ..self.clone() };
         change(&mut answer);
@@ -181,7 +181,7 @@ impl<A: Clone> Answer<A> {
     }
 }
 
-/// What an answer makes more or less of.
+/// The resource that an answer saves.
 fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
     let (size, method) = (experiment.solve.size, &experiment.method);
     match of {
@@ -195,15 +195,15 @@ fn with<T: Task>(of: &str, experiment: &TaskExperiment<T>) -> String {
     }
 }
 
-/// The softness families and how their scale moves, at the scales of the task.
+/// The softness families with fixed and moving scale, at the scales of the task.
 fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
     let paths = |family| [(family, Schedule::Static), (family, Schedule::Decay)];
     let mut all: Vec<_> = FAMILIES.into_iter().flat_map(paths).collect();
-    // Both static ones of one parameter come before those that move.
+    // Both fixed families of one parameter come before the moving ones.
     all.swap(1, 2);
     let answer = |(family, schedule): (Family, Schedule)| {
         let name = if schedule == Schedule::Static { "static" } else { "decay" };
-        // A random start reaches the whole image, and takes over twenty times as long as a logistic.
+        // A random start covers the whole image, and takes over twenty times as long as a logistic.
         let init = (family == Family::Mlp).then_some(Init::Fitted);
         let from = if init.is_some() { " --init fitted" } else { "" };
         now.with(format!("--softness {family}{from} --schedule {name}"), |answer| {
@@ -220,7 +220,7 @@ fn softnesses<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
     all.into_iter().map(answer).collect()
 }
 
-/// Resolutions of images of `size`, the fewest pixels first; none if one was asked for. Where the scale moves, so may the resolution.
+/// Resolutions of images of `size`, the fewest pixels first; none if the flags fix it. The automatic one is tried too if the scale moves.
 fn resolutions<A: Clone>(now: &Answer<A>, size: usize) -> Vec<Answer<A>> {
     if now.method.resolution.is_some() {
         return Vec::new();
@@ -237,7 +237,7 @@ fn resolutions<A: Clone>(now: &Answer<A>, size: usize) -> Vec<Answer<A>> {
     smaller.chain(auto).chain([Resolution::Full]).map(answer).collect()
 }
 
-/// Tolerances of culling, the largest first; none if one was asked for.
+/// Tolerances of culling, the largest first; none if the flags fix it.
 fn tolerances<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
     let asked = now.method.tolerance.is_some();
     let tolerances = TOLERANCES.into_iter().filter(|_| !asked);
@@ -248,7 +248,7 @@ fn tolerances<A: Clone>(now: &Answer<A>) -> Vec<Answer<A>> {
     tolerances.map(answer).collect()
 }
 
-/// Details of the task's mesh, the coarsest first; none if it has none to choose.
+/// Levels of detail of the task's mesh, the coarsest first; none if it has no choice.
 fn details<T: Task>(now: &Answer<T::Args>, task: &T) -> Vec<Answer<T::Args>> {
     let Some(Detail { flag, values, set }) = task.detail(&now.args) else { return Vec::new() };
     let answer =

@@ -16,7 +16,7 @@ use crate::{
     session::{DRAWING, OF_OTHERS, OF_RUN, OF_RUNS, RESULT, Session},
 };
 
-/// Solves one instance, or what the user gives.
+/// Solves one instance, or the user's pictures.
 pub(crate) fn solve<T: Task>(
     session: &Session,
     flags: Solve<T::Args, T::Pictures>,
@@ -30,7 +30,7 @@ pub(crate) fn solve<T: Task>(
     run(session, &first, None, &[shared.common.seed], false, Kept::default())
 }
 
-/// What the task makes of the pictures, if the flags name some.
+/// The task's answer for the user's pictures, if the flags name some.
 fn solve_given<T: Task>(
     session: &Session,
     shared: &mut Shared<T::Args>,
@@ -51,7 +51,7 @@ fn solve_given<T: Task>(
     }))
 }
 
-/// Solves many instances with one method or two.
+/// Solves many instances with one or two methods.
 pub(crate) fn evaluate<T: Task>(
     session: &Session,
     flags: Evaluate<T::Args>,
@@ -70,12 +70,12 @@ pub(crate) fn evaluate<T: Task>(
     });
     let second = second.transpose().context("--against")?;
     let seeds = seeds(shared.common.seed, runs.unwrap_or(first.description.runs));
-    // What would fail in the middle fails at once.
+    // Checks at once what would fail midway.
     seeds.iter().try_for_each(|&seed| first.task.instance(seed).map(drop))?;
     run(session, &first, second.as_ref(), &seeds, true, kept)
 }
 
-/// Names of the files that tell of runs.
+/// Names of the files of runs.
 pub(super) fn names_of_runs<T: Task>(
     many: bool,
     others: bool,
@@ -85,7 +85,7 @@ pub(super) fn names_of_runs<T: Task>(
     OF_RUN.into_iter().chain(more)
 }
 
-/// The experiment of the flags; `--softness auto` is what `choose` finds.
+/// The experiment of the flags; `--softness auto` is resolved by `choose`.
 fn prepared<T: Task>(
     shared: &mut Shared<T::Args>,
     auto: Auto,
@@ -143,7 +143,7 @@ fn run<T: Task>(
     write(session, folder, &finished, other.as_ref(), &summary, None)
 }
 
-/// The name of a method, and where the other has the same what else is different.
+/// The name of a method; if both methods have the same, with their differences.
 fn title<T: Task>(one: &TaskExperiment<T>, other: &TaskExperiment<T>) -> String {
     if one.name() != other.name() {
         return one.name().to_owned();

@@ -31,16 +31,16 @@ use crate::{
 
 const SOFTNESS: &str = "softness.json";
 const RESULT: &str = "learn.json";
-/// What `--resume` goes on from, and the records of all steps; each begins so.
+/// The checkpoint of `--resume`, and the records of all steps; every such file begins like this.
 const CHECKPOINT: &str = "learn.checkpoint.json";
 const RECORDS: &str = "learn.jsonl";
 const BEGINS: &str = "{\"step\":";
 
-/// Learns a softness, and writes it with a report; with the other processes that `mpirun` started, of which the first alone writes and has
-/// something to say.
+/// Learns a softness, and writes it with a report; together with the other processes of `mpirun`,
+/// of which only the first writes and prints.
 ///
-/// Every outer step leaves a line in `learn.jsonl` and then a checkpoint, so that a program that was killed at any moment goes on with
-/// `--resume` as though it had not been.
+/// Every outer step appends a line to `learn.jsonl` and then writes a checkpoint, so that
+/// `--resume` continues a program killed at any moment as if it had never stopped.
 pub(crate) fn learn<T: Task>(
     session: &Session,
     flags: Learn<T::Args>,
@@ -98,7 +98,7 @@ fn learn_with<T: Task>(
     write(session, folder, &learning, &log, &about, &learned).map(Some)
 }
 
-/// What came of learning.
+/// Result of learning.
 struct Learned {
     softness: ScheduledSoftness,
     /// Parameters of the task's own softness, before and after.
@@ -107,7 +107,7 @@ struct Learned {
     stopped: bool,
 }
 
-/// Writes what was learned, and says so.
+/// Writes and reports the learned softness.
 fn write<T: Task>(
     session: &Session,
     mut folder: OutputFolder,
@@ -167,7 +167,7 @@ fn write<T: Task>(
     session.finish(folder, report, &beside, Some(RESULT), output)
 }
 
-/// Takes outer steps until learning has finished, or the user stops it: then true.
+/// Takes outer steps until learning has finished, or the user stops it; returns whether it was stopped.
 fn walk<T: Task>(
     learning: &mut Learning<T, HostBackend>,
     log: &mut Log,
@@ -212,9 +212,9 @@ impl Ranks for Processes<'_> {
     }
 }
 
-/// The records of all outer steps so far, on file and here.
+/// The records of all outer steps so far, on file and in memory.
 struct Log {
-    /// Whether it writes them.
+    /// Whether this process writes them.
     writes: bool,
     records: PathBuf,
     checkpoint: PathBuf,
@@ -222,7 +222,7 @@ struct Log {
     steps: Vec<Point>,
 }
 
-/// What the charts need of a record.
+/// The fields of a record that the charts use.
 #[derive(Deserialize)]
 struct Point {
     step: usize,
@@ -230,7 +230,7 @@ struct Point {
     validation_loss: Option<f64>,
 }
 
-/// The contents of a regular file; a pipe would be waited for, and a device read, for ever.
+/// The contents of a regular file; opening a pipe or a device could block for ever.
 fn whole(path: &Path) -> io::Result<Vec<u8>> {
     match fs::metadata(path)?.is_file() {
         true => fs::read(path),
@@ -239,7 +239,7 @@ fn whole(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 impl Log {
-    /// Goes on from the checkpoint in the folder if asked to; else from the beginning.
+    /// Continues from the checkpoint in the folder if requested; otherwise starts anew.
     fn new<T: Task>(
         folder: &mut OutputFolder,
         resume: bool,
@@ -256,11 +256,11 @@ impl Log {
             let checkpoint = whole(&log.checkpoint).with_context(named)?;
             learning.resume(&checkpoint, &log.job).with_context(named)?;
             let progress = learning.progress();
-            // The record of the last step, after which there is no update, is on file too.
+            // The file also has the record of the last step, which makes no update.
             let next = progress.step + usize::from(progress.finished);
             let text = whole(&log.records).unwrap_or_default();
-            // A step that came after the checkpoint was written will come again, and the line behind the last line feed was being
-            // written when the program was killed.
+            // Steps after the checkpoint are repeated, and the text after the last line feed is an
+            // incomplete line of a killed program.
             for line in String::from_utf8_lossy(&text).split_inclusive('\n') {
                 let Ok(point) = serde_json::from_str::<Point>(line) else { continue };
                 let follows = log.steps.last().is_none_or(|last| last.step < point.step);
@@ -325,7 +325,7 @@ impl Log {
     }
 }
 
-/// Where a softness comes from, for its file.
+/// Origin of a softness, for its file.
 fn note<T: Task>(session: &Session, learning: &Learning<T, HostBackend>, log: &Log) -> String {
     let from = log.start().map(|loss| format!(", from a validation loss of {}", short(loss)));
     let progress = learning.progress();
@@ -342,7 +342,7 @@ fn note<T: Task>(session: &Session, learning: &Learning<T, HostBackend>, log: &L
     )
 }
 
-/// Files for the command line: name and text.
+/// Softness files to pass on the command line: name and text.
 fn files<T: Task>(
     learning: &Learning<T, HostBackend>,
     softness: &ScheduledSoftness,

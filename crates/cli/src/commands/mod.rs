@@ -1,4 +1,4 @@
-//! What the commands do.
+//! The commands of a task.
 
 pub(crate) mod choose;
 pub(crate) mod evaluate;
@@ -16,20 +16,20 @@ use softrast_lab::{
 fn in_words((key, value): (&String, &Value)) -> [String; 2] {
     let text = match value {
         Value::String(text) => text.clone(),
-        // All digits are in the JSON beside the page.
+        // The JSON next to the page has all digits.
         Value::Number(number) if number.is_f64() => short(number.as_f64().unwrap_or(f64::NAN)),
         other => other.to_string(),
     };
     [key.replace('_', " "), text]
 }
 
-/// Every choice behind the numbers, as a section of a page.
+/// All settings that determine the numbers, as a section of a page.
 fn settings_section(report: &mut Report, settings: [&Map<String, Value>; 2]) {
     report.heading("Settings");
     report.table(&Table::pairs(settings.into_iter().flatten().map(in_words)));
 }
 
-/// An error that ended the work, with a word on what is kept.
+/// An error that ended the work, with a note on stored runs.
 pub(crate) fn ended(error: anyhow::Error, kept: usize) -> anyhow::Error {
     if kept == 0 {
         return error;

@@ -1,4 +1,4 @@
-//! What runs came to, as files, a page, JSON and lines.
+//! Results of runs, as files, a page, JSON and lines.
 
 use softrast_lab::{
     Evaluation, Experiment, OutputFolder, Run, Summary,
@@ -16,7 +16,7 @@ use crate::{
     session::{DRAWING, OF_OTHERS, OF_RUNS, RESULT, Session, TRIED, TRIED_TABLE},
 };
 
-/// An experiment and what it came to.
+/// An experiment and its results.
 pub(super) struct Finished<'a, T: Task> {
     pub(super) experiment: &'a TaskExperiment<T>,
     pub(super) evaluation: &'a Evaluation,
@@ -36,8 +36,8 @@ impl<T: Task> Finished<'_, T> {
     }
 }
 
-/// Writes all files that tell of runs, which `folder` may have others beside, and says what they tell. `search` is what led to the
-/// method.
+/// Writes all files of runs to `folder`, which may have others, and returns their summary. `search`
+/// is the search that found the method.
 pub(super) fn write<T: Task>(
     session: &Session,
     mut folder: OutputFolder,
@@ -127,7 +127,7 @@ fn page<T: Task>(
     Ok(report)
 }
 
-/// A sentence about runs that were stuck, if there are any.
+/// A sentence about runs that restarted, if there are any.
 fn begun_again(runs: &[Run]) -> String {
     match runs {
         [Run { begun_again, .. }] if !begun_again.is_empty() => {

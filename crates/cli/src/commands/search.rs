@@ -26,19 +26,19 @@ use crate::{
 const RATIO: f64 = 3.162_277_660_168_379_5;
 /// Most steps from the last scale of the default decay to its first.
 const STEPS: f64 = 4.0;
-/// Places of the axes.
+/// Indices of the axes.
 const SCALE: usize = 0;
 const END: usize = 1;
 const RATE: usize = 2;
 const SURROGATE: usize = 3;
 const RATE_END: usize = 4;
 const OWN: usize = 5;
-/// How wide a surrogate may be, as a share of the scale.
+/// Range of a surrogate's width, as a multiple of the scale.
 const SURROGATES: [f64; 2] = [0.7, 6.0];
-/// What a learning rate may fall to, as a share of itself.
+/// Range of the learning rate at the end, as a share of that at the start.
 const RATE_ENDS: [f64; 2] = [0.05, 0.5];
 
-/// Searches for the best setting, then evaluates it on seeds that the search never saw.
+/// Searches for the best setting, then evaluates it on held-out seeds.
 pub(crate) fn search<T: Task>(
     session: &Session,
     mut flags: Search<T::Args>,
@@ -102,7 +102,7 @@ pub(crate) fn search<T: Task>(
     write(session, folder, &finished, None, &summary, Some(&halving))
 }
 
-/// Writes what a search found that ended before the first run on other seeds.
+/// Writes the results of a search that ended before the first held-out run.
 fn stopped_early<T: Task>(
     session: &Session,
     folder: OutputFolder,
@@ -124,7 +124,7 @@ fn stopped_early<T: Task>(
     )
 }
 
-/// Evaluates what was found, and says whether the user cut that short.
+/// Evaluates the best setting, and returns whether the user stopped that early.
 fn on_held_out<T: Task>(
     runner: &mut Runner,
     found: &TaskExperiment<T>,
@@ -139,8 +139,8 @@ fn on_held_out<T: Task>(
     }
 }
 
-/// What is tried: what the command line fixes is fixed, a range that it gives is searched, the rest is searched around the task's own numbers.
-/// Where a silhouette is drawn, half of the settings have a surrogate.
+/// The search space: values fixed by the command line are fixed, ranges that it gives are searched, everything else is
+/// searched around the task's own numbers. For silhouettes, half of the settings have a surrogate.
 fn space<T: Task>(
     flags: &Search<T::Args>,
     base: &TaskExperiment<T>,
@@ -172,7 +172,7 @@ fn space<T: Task>(
         around.iter().flat_map(|scale| SURROGATES.map(|ratio| scale * ratio)).collect();
     let wider = if has_surrogate && method.surrogate_scale.is_none() { &wider } else { none };
     let surrogate = SearchAxis { optional: true, ..SearchAxis::among("surrogate-scale", wider) };
-    // A rate that is given stays unless its end is given too, and feedback moves it itself.
+    // A given rate is fixed unless its end is given too; feedback moves the rate itself.
     let stays = method.learning_rate.is_some() || base.method.softness.feedback.is_some();
     let falls = if stays { none } else { &RATE_ENDS };
     let mut axes = vec![
@@ -195,7 +195,7 @@ fn space<T: Task>(
     Ok(space)
 }
 
-/// Whether a decay narrows and a surrogate is about as wide as the softness.
+/// Whether a decay narrows, and a surrogate's width is in its range.
 fn is_valid(setting: &Setting) -> bool {
     let [scale, end, surrogate] = [SCALE, END, SURROGATE].map(|axis| setting[axis]);
     let Some(scale) = scale else { return true };
@@ -205,8 +205,8 @@ fn is_valid(setting: &Setting) -> bool {
 
 /// Scales around the first and the last one of a softness on images of `size` pixels a side.
 ///
-/// They go from one below the narrower of the two to the wider, or two to either side if they are the same. Neighbours are half a decade
-/// apart, as widths in NDC: a decade if `squared` is true.
+/// They range from one below the narrower of the two to the wider, or two to either side if both
+/// are equal. Neighbours are half a decade apart, as widths in NDC: a decade if `squared` is true.
 fn scales_around(softness: &ScheduledSoftness, size: usize) -> Vec<f64> {
     let [scale, end] = [0.0, 1.0].map(|part| softness.scale_at(part, size));
     let ratio = if softness.softness.scale_is_squared() { RATIO * RATIO } else { RATIO };
@@ -222,7 +222,7 @@ fn geometric(from: f64, ratio: f64, steps: std::ops::RangeInclusive<i32>) -> Vec
     steps.map(|k| rounded(from * ratio.powi(k))).collect()
 }
 
-/// The flags that ask for a setting of this method and variant.
+/// The flags of a setting of this method and variant.
 fn all_flags(
     variant: Variant,
     method: &MethodArgs,
@@ -238,7 +238,7 @@ fn all_flags(
         flags.push("--squared".into());
     }
     flags.extend(method.surrogate_scale.map(|x| format!("--surrogate-scale {}", exact(x))));
-    // Nobody should have to know what a scale alone means to a task that decays by default.
+    // Explicit, since a scale alone could be misread in a task whose default is a decay.
     if setting[SCALE].is_some() && setting[END].is_none() {
         flags.push("--schedule static".into());
     }

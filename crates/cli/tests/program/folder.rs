@@ -54,7 +54,7 @@ fn a_file_that_the_user_has_put_in_the_place_of_a_result_stops_the_run_before_it
             assert!(files(out.path()) == before, "{line} touches files beside {name}");
             fs::write(&path, bytes).unwrap();
         }
-        // What versions before left has no list.
+        // Without the list, as in folders of earlier versions.
         fs::remove_file(out.path().join(".softrast.json")).unwrap();
         let before = files(out.path());
         run_in::<Disc>(out.path(), line).1.unwrap_err();

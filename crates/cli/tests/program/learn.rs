@@ -1,4 +1,4 @@
-//! Learning that is gone on from, also from files that somebody has damaged.
+//! Resumed learning, also from damaged files.
 
 use std::{fs, path::Path, sync::LazyLock};
 
@@ -37,7 +37,7 @@ fn assert_one_line(failure: &Failure, file: &str) {
     assert!(failure.message.contains(file), "{failure}");
 }
 
-/// Bytes changed, left out, put in, doubled, and the end cut off.
+/// Bytes changed, removed, inserted, doubled, and the end cut off.
 fn damaged(text: &str, changes: &[(Index, u8, u8)]) -> Vec<u8> {
     let mut bytes = text.as_bytes().to_vec();
     for (at, byte, kind) in changes {
@@ -94,7 +94,7 @@ proptest! {
         }
     }
 
-    /// What is not whole is left out; what cannot be steps is one line.
+    /// Incomplete lines are omitted; invalid steps give one error line.
     #[test]
     fn damaged_steps_are_one_line_or_an_intact_rest(changes in changes()) {
         let (checkpoint, steps, expected) = &*WHOLE;
@@ -104,7 +104,7 @@ proptest! {
         }
     }
 
-    /// Another value at some place, and a checksum that fits.
+    /// Another value at some place, with a matching checksum.
     #[test]
     fn a_checkpoint_with_other_values_is_one_line_or_something_to_go_on_from(
         place in any::<Index>(),
@@ -123,7 +123,7 @@ proptest! {
             Err(_) => file.to_string(),
         };
         if let Err(failure) = resumed(text.as_bytes(), steps.as_bytes()) {
-            // A softness may also be one that breaks down, which is told without a file.
+            // A softness may also break down, which is reported without a file.
             prop_assert_eq!(failure.code, 1, "{}", failure);
             prop_assert_eq!(failure.to_string().lines().count(), 1, "{}", failure);
         }

@@ -53,7 +53,7 @@ pub(crate) fn numbers(list: &Value) -> Vec<f64> {
     list.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
 }
 
-/// The object without what differs from one day to another.
+/// The object without fields that differ between runs.
 pub(crate) fn timeless(mut json: Value) -> Value {
     fn strip(json: &mut Value) {
         match json {

@@ -9,7 +9,7 @@ use softrast_cli::execute;
 use softrast_lab::Failure;
 use tempfile::TempDir;
 
-/// The first is the list of the others.
+/// The first file is the list of the others.
 const FILES: [&str; 6] = [
     ".softrast.json",
     "animation.gif",
@@ -234,7 +234,7 @@ fn bad_input_gives_one_line_and_leaves_nothing_behind() {
 fn a_folder_that_cannot_be_written_is_told_before_the_work() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("file"), "").unwrap();
-    // So many steps would take hours.
+    // These many steps would take hours.
     let line = "evaluate --runs 1000000 --steps 1000000";
     let failure = run_in(&root.path().join("file/out"), line).unwrap_err();
     assert_eq!(failure.code, 1);

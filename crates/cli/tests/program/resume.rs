@@ -1,4 +1,4 @@
-//! A job that ends in the middle keeps what it has finished, and goes on from it.
+//! An interrupted job stores its finished runs, and resumes from them.
 
 use std::{fs, path::Path};
 
@@ -13,7 +13,7 @@ const COMPARE: &str =
 const SEARCH: &str = "search --runs 6 --search-runs 5 --size 16 --steps 4 --schedule static --scales 0.1,0.2 \
                       --learning-rates 0.02,0.5 --loops 40";
 
-/// Runs the line to its end, going on from what is in the folder.
+/// Runs the line to its end, continuing from the folder.
 fn resumed(out: &Path, line: &str) -> Value {
     let (stdout, ended) = run_in::<Disc>(out, &format!("{line} --resume"));
     ended.unwrap();
@@ -26,7 +26,7 @@ fn assert_same_files(one: &Path, other: &Path, names: &[&str]) {
     }
 }
 
-/// The first part of a text, so many of its lines whole and half of the next.
+/// The beginning of a text: this many whole lines and half of the next.
 fn cut(text: &str, lines: usize) -> String {
     let mut parts = text.split_inclusive('\n');
     let mut whole: String = parts.by_ref().take(lines).collect();
@@ -106,7 +106,7 @@ proptest! {
         }
         let out = tempfile::tempdir().unwrap();
         fs::write(out.path().join("evaluate.jsonl"), bytes).unwrap();
-        // A folder where runs were kept has a list that says so.
+        // A folder with stored runs has a list that names them.
         fs::write(out.path().join(".softrast.json"), list).unwrap();
         prop_assert_eq!(&timeless(resumed(out.path(), "evaluate --runs 3 --size 8 --steps 2")), expected);
     }

@@ -1,4 +1,4 @@
-//! The search finds what is known to be best, and scores it on other seeds.
+//! The search finds the known optimum, and scores it on held-out seeds.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use crate::disc::Disc;
 use crate::line::{file, files, numbers, run_in, solved};
 use serde_json::Value;
 
-/// In so few steps a small rate goes nowhere, and a large one far beyond.
+/// In so few steps a small rate barely moves, and a large one overshoots.
 const KNOWN: &str = "search --size 16 --steps 3 --runs 6 --search-runs 4 --loops 60 --schedule static \
                      --scale 0.05 --learning-rates 0.001,10";
 

@@ -1,4 +1,4 @@
-//! Processes that share a job: any split, order and interruption gives what one process gives.
+//! Processes that share a job: any split, order and interruption gives the results of one process.
 
 use std::{fs, path::Path, thread};
 
@@ -12,7 +12,7 @@ const EVALUATE: &str =
 const SEARCH: &str = "search --runs 6 --search-runs 5 --size 16 --steps 4 --schedule static --scales 0.1,0.2 \
                       --learning-rates 0.02,0.5 --loops 40";
 
-/// Does the part of a shard: how many runs it says are finished.
+/// Runs a shard, and returns the reported number of finished runs.
 fn shard(out: &Path, line: &str, shard: &str) -> u64 {
     let (stdout, ended) = run_in::<Disc>(out, &format!("{line} --shard {shard}"));
     ended.unwrap();
@@ -41,7 +41,7 @@ fn shards_part_the_runs_and_together_make_the_results() {
     let out = tempfile::tempdir().unwrap();
     let finished: Vec<u64> =
         (1..=3).map(|k| shard(out.path(), EVALUATE, &format!("{k}/3"))).collect();
-    // 14 runs, those of the second method counted on from those of the first.
+    // 14 runs; those of the second method are numbered after those of the first.
     assert_eq!(finished, [5, 5, 4]);
     assert!(!out.path().join("result.json").exists(), "a shard has no results");
     assert_eq!(merged(out.path(), EVALUATE), timeless(expected));
@@ -117,7 +117,7 @@ proptest! {
         for (of, index, part) in calls {
             let before: Vec<_> = fs::read_dir(out.path()).unwrap().map(|file| file.unwrap().path()).collect();
             shard(out.path(), EVALUATE, &format!("{}/{of}", index.index(of) + 1));
-            // A process that is killed leaves the first part of its file.
+            // A killed process leaves the beginning of its file.
             for file in fs::read_dir(out.path()).unwrap().map(|file| file.unwrap().path()) {
                 if !before.contains(&file) && part < 60 {
                     let bytes = fs::read(&file).unwrap();
@@ -149,7 +149,7 @@ fn killed_and_doubled_processes_change_nothing() {
     let shards = ["1/8", "2/8", "3/8", "4/8", "5/8", "6/8", "7/8", "8/8", "8/8"];
     let mut children = shards.map(|shard| start(out.path(), &["--shard", shard])).into_iter();
     for (k, mut child) in (1..).zip(children.by_ref().take(2)) {
-        // As soon as it has a file, if not before it has finished.
+        // As soon as it has a file, unless it has finished before.
         let file = out.path().join(format!("evaluate.{k}-of-8.jsonl"));
         while !file.exists() && child.try_wait().unwrap().is_none() {
             thread::yield_now();
