@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Resolution {
-    /// The resolution of the hard error.
+    /// The full resolution.
     #[default]
     Full,
     /// The smallest that the softness allows, chosen anew at every step.

@@ -21,7 +21,7 @@ pub struct Labelled {
 /// A file in the folder of a page.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Its content, in a few words.
+    /// Its name.
     pub file: String,
     /// Its content, in a few words.
     pub holds: String,
