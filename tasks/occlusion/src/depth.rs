@@ -8,27 +8,27 @@ use softrast_tensor::{numbers, tensor, vector};
 
 use crate::{Args, args::NAME};
 
-/// Width of the soft depth unless the command line names one, in units of the distance between the planes.
+/// Default width of the depth softness, in units of the distance between the planes.
 ///
-/// Narrower, gradients vanish where the order is wrong; wider, hidden quads shine through. Success of 50 seeds with `evaluate --runs 50
-/// --size 32 --depth-scale X`, original and transfer: 98 and 98 % at 0.05, 100 and 100 % at 0.1, 100 and 98 % at 0.2, 100 and 90 % at
-/// 0.4; 88 % at 0.02 (original).
+/// Narrower widths have vanishing gradients at a wrong order; wider ones let hidden quads shine through. Success of 50
+/// seeds with `evaluate --runs 50 --size 32 --depth-scale X`, original and transfer: 98 and 98 % at 0.05, 100 and 100 %
+/// at 0.1, 100 and 98 % at 0.2, 100 and 90 % at 0.4; 88 % at 0.02 (original).
 const DEPTH_SCALE: f64 = 0.1;
 
-/// A depth softness with its parameters; they stay as they are over a run.
+/// A depth softness with its parameters, fixed over a run.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Depth {
     pub(crate) softness: DepthSoftness,
     pub(crate) phi: Vec<f64>,
-    /// Name of the softness, or of the file.
+    /// Name of the softness or of the file.
     pub(crate) name: String,
-    /// The width, where it is what the parameters came from.
+    /// The width, if the parameters were derived from it.
     pub(crate) scale: Option<f64>,
 }
 
 impl Depth {
-    /// The depth softness that the command line asks for; by default the one that comes with the program along with such edges, else of
-    /// the family of the edges, and the network of Eq. 3 where that is the network of Eq. 2.
+    /// The depth softness of the command line; by default the one bundled with the edge softness in
+    /// use, else the family of the edges, and for the network of Eq. 2 that of Eq. 3.
     ///
     /// # Errors
     ///
@@ -66,7 +66,7 @@ impl Depth {
         Self { softness: depth_softness, phi, name, scale: None }.checked()
     }
 
-    /// The largest ratio of two depth weights, as a logarithm: 0 where no depth is told from another.
+    /// The largest ratio of two depth weights, as a logarithm; 0 if all depths have equal weight.
     pub(crate) fn contrast(&self) -> f64 {
         let weights = || self.log_weights(&self.phi).into_iter().map(|[_, weight]| weight);
         weights().fold(f64::NEG_INFINITY, f64::max) - weights().fold(f64::INFINITY, f64::min)
@@ -78,7 +78,7 @@ impl Depth {
         Ok(self)
     }
 
-    /// Logarithms of the weights over the nearness, from the far plane to the near one, in the float type of the program.
+    /// Logarithms of the weights over the nearness, from the far plane to the near one, in the program's float type.
     pub(crate) fn log_weights(&self, phi: &[f64]) -> Vec<[f64; 2]> {
         const PLACES: usize = 100;
         let places: Vec<f64> = (0..=PLACES).map(|k| k as f64 / PLACES as f64).collect();
@@ -88,7 +88,7 @@ impl Depth {
     }
 }
 
-/// The depth softness that was found along with the edges that come with the program, where those are used; and what it is called.
+/// The depth softness bundled with the edge softness, if that is in use, and its name.
 fn shipped(args: &Args, edges: &EdgeChoice) -> Option<(&'static str, DepthSoftnessFile)> {
     let name = edges.shipped.as_ref().filter(|_| args.depth_scale.is_none())?;
     let (called, file) = match name.as_str() {

@@ -1,15 +1,15 @@
 use crate::instance::{front, pairs};
 
-/// How far depths are from those of the target.
+/// Error of the depths relative to the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthError {
     /// Share of all pairs of quads that are in the wrong order, also of pairs whose order a nearer
     /// quad hides in the target; a tie is wrong.
     pub wrong_pairs: f64,
-    /// Mean absolute difference of the depths. An image without perspective does not show depths,
-    /// only their order, so this need not fall.
+    /// Mean absolute difference of the depths. An image without perspective determines only the
+    /// order of depths, so this need not fall.
     pub distance: f64,
-    /// Whether the front quad is that of the target, with no other as near.
+    /// Whether the front quad is that of the target, without a tie.
     pub right_front: bool,
 }
 

@@ -2,14 +2,14 @@ use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 
 use crate::{Pattern, Problem, Quad, Texture};
 
-/// What one run is asked: which of these quads hides which.
+/// One instance: quads with unknown depths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
-    /// The quads; they stay where they are in the image.
+    /// The quads, whose positions in the image are fixed.
     pub quads: Vec<Quad>,
     /// Depth of each quad in the target picture; smaller is nearer.
     pub target: Vec<f64>,
-    /// Depth of each quad where the search starts.
+    /// Depth of each quad at the start.
     pub start: Vec<f64>,
 }
 
@@ -25,23 +25,23 @@ const PALETTE: [[f64; 3]; 8] = [
     [0.95, 0.95, 0.95],
 ];
 
-/// Places a side of the grid on which overlaps are measured.
+/// Sample points per side of the grid for measuring overlaps.
 const GRID: usize = 40;
-/// Places of that grid that show the order of two quads: 1 % of the image.
+/// Sample points that suffice to show the order of two quads: 1 % of the image.
 const ENOUGH: usize = GRID * GRID / 100;
-/// How often quads are placed anew before their overlaps are taken as they are.
+/// Most attempts to place quads before insufficient overlaps are accepted.
 const TRIES: usize = 10_000;
 
 impl Instance {
     /// An instance that depends on `seed` alone.
     ///
     /// Depths are uniform in the range of the problem. Quads lie inside the image, turned by up to
-    /// 35 degrees either way, each in a colour of its own. They are placed so that the target can
-    /// tell the answer: at each pair whose order is asked for, at least 1 % of the image shows one
-    /// of the two with the other behind it. The start is drawn until its answer is wrong, because
-    /// otherwise nothing would be to be found.
+    /// 35 degrees either way, each in a separate colour. They are placed so that the target
+    /// determines the answer: for each pair whose order is to be found, at least 1 % of the image
+    /// shows one of the two in front of the other. The start is drawn until its answer is wrong, so
+    /// that there is something to find.
     ///
-    /// Not in the paper, which gives the number of quads and their depths alone.
+    /// Not in the paper, which gives only the number of quads and their depths.
     pub fn seeded(seed: u64, problem: &Problem) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
         let target = depths(&mut random, problem);
@@ -63,19 +63,19 @@ impl Instance {
         Self { quads, target, start }
     }
 
-    /// How many of the pixels of an image of `size` × `size` show, for each pair of quads, one of
-    /// the two with the other behind it; pairs (0, 1), (0, 2), …, (1, 2), ….
+    /// For each pair of quads, the number of pixels in an image of `size` × `size` that show one of
+    /// the two in front of the other; pairs (0, 1), (0, 2), …, (1, 2), ….
     pub fn visible_overlaps(&self, size: usize) -> Vec<usize> {
         visible_overlaps(&self.quads, &self.target, size)
     }
 }
 
-/// Pairs of numbers below `count`, the smaller one first.
+/// Pairs of indices below `count`, the smaller one first.
 pub(crate) fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
-/// The quad with the smallest depth; of equal ones the first.
+/// Index of the quad with the smallest depth, the first of equal ones.
 pub(crate) fn front(depths: &[f64]) -> usize {
     (0..depths.len()).reduce(|a, b| if depths[b] < depths[a] { b } else { a }).unwrap_or(0)
 }
@@ -91,10 +91,10 @@ fn depths(random: &mut StdRng, problem: &Problem) -> Vec<f64> {
     (0..problem.quads).map(|_| least + (largest - least) * random.random::<f64>()).collect()
 }
 
-/// A quad somewhere in the image.
+/// A random quad in the image.
 fn quad(random: &mut StdRng, colour: [f64; 3], problem: &Problem) -> Quad {
     let mut between = |least: f64, largest: f64| least + (largest - least) * random.random::<f64>();
-    // Many quads have to lie closer to one another to overlap in pairs.
+    // Many quads must be closer together to overlap in pairs.
     let reach = if problem.front_only { 0.3 } else { 0.4 };
     loop {
         let pattern = Pattern::ALL[between(0.0, 3.0) as usize];
@@ -126,7 +126,7 @@ fn visible_overlaps(quads: &[Quad], depths: &[f64], size: usize) -> Vec<usize> {
     counts
 }
 
-/// Whether the target shows all that is asked for.
+/// Whether the target determines the answer.
 fn tells_the_answer(quads: &[Quad], target: &[f64], problem: &Problem) -> bool {
     let nearest = front(target);
     let asked = |(i, j): (usize, usize)| !problem.front_only || i == nearest || j == nearest;
@@ -134,7 +134,7 @@ fn tells_the_answer(quads: &[Quad], target: &[f64], problem: &Problem) -> bool {
     counts.into_iter().zip(pairs(quads.len())).all(|(count, pair)| !asked(pair) || count >= ENOUGH)
 }
 
-/// Whether `depths` have the answer of `target` already.
+/// Whether `depths` already have the answer of `target`.
 fn is_answered(depths: &[f64], target: &[f64], problem: &Problem) -> bool {
     if problem.front_only {
         return front(depths) == front(target);

@@ -1,19 +1,19 @@
 use softrast_cli::Variant;
 
-/// What the instances of a variant have in common.
+/// Parameters of all instances of a variant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Problem {
     /// Quads of an instance, at least one.
     pub quads: usize,
     /// Smallest and largest depth that targets and starts are drawn from; smaller is nearer.
     pub depths: [f64; 2],
-    /// Whether only the front quad is asked for, instead of the order of all.
+    /// Whether only the front quad is to be found, instead of the order of all.
     pub front_only: bool,
 }
 
-/// How far depths may leave the range they are drawn from, in units of that range.
+/// Allowed excess of depths beyond the range they are drawn from, in units of that range.
 const ROOM: f64 = 0.5;
-/// How far the planes lie beyond that, in the same unit.
+/// Distance of the planes from the allowed depths, in the same unit.
 const MARGIN: f64 = 0.02;
 
 impl Problem {
@@ -22,12 +22,12 @@ impl Problem {
     /// Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Occlusion.
     pub const ORIGINAL: Self = Self { quads: 3, depths: [0.5, 1.5], front_only: false };
 
-    /// Eight quads, the front one of which is to be found.
+    /// Eight quads, of which the front one is to be found.
     ///
     /// Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, Occlusion.
     pub const TRANSFER: Self = Self { quads: 8, depths: [-1.5, 2.0], front_only: true };
 
-    /// That of a variant.
+    /// The problem of a variant.
     pub fn of(variant: Variant) -> Self {
         match variant {
             Variant::Original => Self::ORIGINAL,
@@ -41,8 +41,8 @@ impl Problem {
         self.widened(ROOM)
     }
 
-    /// Depth of the near and of the far plane, between which depths are measured: a little beyond
-    /// the room, so that no quad lies on a plane, where some softness has a kink.
+    /// Depth of the near and of the far plane, between which depths are measured: slightly outside
+    /// the room, so that no quad is on a plane, where some softnesses have a kink.
     pub fn planes(&self) -> [f64; 2] {
         self.widened(ROOM + MARGIN)
     }

@@ -1,15 +1,15 @@
 use crate::Texture;
 
-/// A textured rectangle that faces the camera; its depth is not its own but what is optimised.
+/// A textured rectangle that faces the camera. Its depth is optimised and stored separately.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quad {
     /// Centre in NDC (the image is [-1, 1]², x right, y up).
     pub centre: [f64; 2],
     /// Half of its width and of its height, in NDC.
     pub half: [f64; 2],
-    /// How far it is turned, counterclockwise.
+    /// Rotation in degrees, counterclockwise.
     pub angle_deg: f64,
-    /// What is painted on it.
+    /// Texture of the rectangle.
     pub texture: Texture,
 }
 
@@ -36,7 +36,7 @@ impl Quad {
         })
     }
 
-    /// A place seen from the centre, along the sides.
+    /// A place relative to the centre, along the sides.
     fn local(&self, place: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = self.angle_deg.to_radians().sin_cos();
         let [x, y] = [0, 1].map(|axis| place[axis] - self.centre[axis]);

@@ -6,11 +6,11 @@ use softrast_tensor::{Tensor, tensor};
 
 use crate::{Instance, Problem, instance::places};
 
-/// Weight of the background relative to a quad that covers the pixel as far away as quads may go.
+/// Weight of the background relative to a quad that covers the pixel at the largest allowed depth.
 ///
-/// Not on the far plane itself, where the depth network is 0. Where a quad covers a pixel, the background takes at most this share of it; beside the quads it
-/// prevails. Not in the paper, whose Eq. 4 is 0/0 far from all faces; this is the least weight that
-/// docs/notes.md, Colour, asks for.
+/// That depth is in front of the far plane, where the depth network is 0. If a quad covers a pixel, the background has
+/// at most this share of it; outside all quads it dominates. Not in the paper, whose Eq. 4 is 0/0 far from all faces;
+/// this is the smallest weight in the range of docs/notes.md, Colour.
 pub const BACKGROUND: f64 = 1e-3;
 
 /// Colour behind all quads.
@@ -18,8 +18,8 @@ const BLACK: [f64; 3] = [0.0; 3];
 
 /// Instances of OCCLUSION that are solved together, one view each.
 ///
-/// The optimised θ is `[views, quads]`: the depth of each quad, smaller is nearer. Quads keep their
-/// place in the image, so distances and textures are computed once.
+/// The optimised θ is `[views, quads]`: the depth of each quad, smaller is nearer. Positions of
+/// quads are fixed, so distances and textures are computed once.
 #[derive(Clone, Debug)]
 pub struct Scene<B: RasterBackend> {
     problem: Problem,
@@ -29,7 +29,7 @@ pub struct Scene<B: RasterBackend> {
     colour: Tensor<B, 4>,
     start: Tensor<B, 2>,
     target: Tensor<B, 3>,
-    /// The edge part of a softness that nothing is differentiated by, and its place on the path.
+    /// The edge factor of a softness that is not differentiated with respect to φ, and the key of its progress.
     fixed_edges: RefCell<Option<(u64, Tensor<B, 3>)>>,
 }
 
@@ -38,8 +38,8 @@ impl<B: RasterBackend> Scene<B> {
     ///
     /// # Panics
     ///
-    /// If there is no instance or no pixel, if an instance has not as many quads as the problem, or
-    /// if a number of an instance is not finite.
+    /// If there is no instance or no pixel, if the number of quads of an instance is not the
+    /// problem's, or if a number of an instance is not finite.
     pub fn new(problem: &Problem, instances: &[Instance], size: usize) -> Self {
         assert!(!instances.is_empty() && size > 0, "a scene needs an instance and a pixel");
         instances.iter().for_each(|instance| check(problem, instance));
@@ -70,18 +70,19 @@ impl<B: RasterBackend> Scene<B> {
         self.start.clone()
     }
 
-    /// The image to arrive at, hard, `[views, 3, pixels]`, top row first.
+    /// The target hard image, `[views, 3, pixels]`, top row first.
     pub fn target(&self) -> Tensor<B, 3> {
         self.target.clone()
     }
 
-    /// Logarithm of the edge part `a(d)` of Eq. 4, `[views, quads, pixels]`, for a softness with the
-    /// parameters `phi`. It does not depend on θ: compute it once for every `phi`.
+    /// Logarithm of the edge factor `a(d)` of Eq. 4, `[views, quads, pixels]`, for a softness with
+    /// the parameters `phi`. It does not depend on θ: compute it once per `phi`.
     pub fn edges(&self, softness: &impl Softness, phi: Tensor<B, 1>) -> Tensor<B, 3> {
         softness.log_value(phi, self.distance.clone())
     }
 
-    /// [`Scene::edges`] of a softness that nothing is differentiated by, made anew only at another `place` on its path.
+    /// [`Scene::edges`] of a softness that is not differentiated with respect to φ, recomputed only
+    /// for another `place` (key of the progress).
     pub(crate) fn fixed_edges(
         &self,
         place: u64,
@@ -130,16 +131,16 @@ impl<B: RasterBackend> Scene<B> {
         hard_colour(self.distance.clone(), theta, self.colour.clone(), black)
     }
 
-    /// Mean squared difference of an image `[views, 3, pixels]` from the target, `[views]`.
+    /// Mean squared difference of an image `[views, 3, pixels]` and the target, `[views]`.
     pub fn loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         mse_loss(image, self.target())
     }
 
-    /// θ within the room that [`Problem::room`] gives: where a depth has left it, all depths of that
-    /// view are drawn together about its middle, by the factor that brings the farthest back.
+    /// Brings θ into the range of [`Problem::room`]: if a depth is outside, all depths of that view
+    /// are scaled about the middle of the range, by the factor that brings the farthest back.
     ///
-    /// That keeps their order, which a clamp would turn into ties. Not in the paper: without it,
-    /// depths would drift apart for ever once their order is right.
+    /// This preserves their order, which a clamp would turn into ties. Not in the paper: without
+    /// it, depths drift apart without bound once their order is right.
     pub fn allowed(&self, theta: Tensor<B, 2>) -> Tensor<B, 2> {
         let [least, largest] = self.problem.room();
         let [middle, reach] = [0.5 * (largest + least), 0.5 * (largest - least)];

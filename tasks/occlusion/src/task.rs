@@ -26,14 +26,14 @@ use crate::{
 /// Instances solved together in `evaluate`.
 const BATCH: usize = 10;
 
-/// Widths of the soft depth that a search tries.
+/// Widths of the depth softness that a search tries.
 const DEPTH_SCALES: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
 
-/// Scales of the softnesses that judge what is learned: edges in NDC, depths in units of the distance between the planes. The second is a
-/// fifth of the default of the task: narrower than any that can be optimised, and wide enough to have a gradient.
+/// Scales of the softnesses of the outer loss: edges in NDC, depths in units of the distance between the planes. The second is a fifth of
+/// the task's default: narrower than any that can be optimised, and wide enough to have a gradient.
 const SHARP: [f64; 2] = [0.0005, 0.02];
 
-/// OCCLUSION: textured quads, and the image that shows which hides which.
+/// OCCLUSION: textured quads, and the image that shows their order.
 pub struct Occlusion {
     problem: Problem,
     depth: Depth,
@@ -52,12 +52,12 @@ impl InverseProblem for Occlusion {
         Scene::new(&self.problem, instances, size)
     }
 
-    /// None: colours are blended in tensor ops.
+    /// None: colours are blended by tensor ops.
     fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
         None
     }
 
-    /// Those of the depth softness.
+    /// The parameters of the depth softness.
     fn own_phi(&self) -> Vec<f64> {
         self.depth.phi.clone()
     }
@@ -88,7 +88,7 @@ impl InverseProblem for Occlusion {
         in_rows(scene.hard(scene.by_view(theta)))
     }
 
-    /// Under two narrow logistics of its own.
+    /// The image under two narrow logistics.
     fn sharp_image<B: RasterBackend>(
         &self,
         scene: &Scene<B>,
@@ -106,8 +106,8 @@ impl InverseProblem for Occlusion {
         scene.loss(image.flatten(2, 3))
     }
 
-    /// The transfer has to cross 3.5 world units in ten steps. Front quads found of 50 with `evaluate --variant transfer --size 32
-    /// --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 % at 0.7 and at 1.4.
+    /// The transfer has to cross 3.5 world units in ten steps. Front quads found out of 50 with `evaluate --variant
+    /// transfer --size 32 --learning-rate X`: 74 % at 0.2, 92 % at 0.35, 100 % at 0.7 and at 1.4.
     fn defaults(&self) -> SolveConfig {
         match self.variant {
             Variant::Original => SolveConfig { size: 64, steps: 100, learning_rate: 0.03 },
@@ -128,7 +128,7 @@ impl Task for Occlusion {
     const TITLE: &'static str = "OCCLUSION";
     const ABOUT: &'static str = "Finds which of several overlapping quads is in front";
 
-    /// Narrow, because edges stay where they are, and wide ones only blur the image.
+    /// Narrow, because edges do not move, and wide edges only blur the image.
     ///
     /// Success of 50 seeds with `evaluate --runs 50 --size 32 --scale X`, original and transfer: 100 and 100 % at 0.0005 and at 0.002, 90
     /// and 100 % at 0.005, 48 and 70 % at 0.02, where near quads bleed over the background and over one another. At 64 pixels, `evaluate
@@ -191,7 +191,7 @@ impl Task for Occlusion {
         }
     }
 
-    /// Methods are found on the transfer, because most settings solve the original without an error.
+    /// Methods are searched on the transfer, because most settings solve the original without an error.
     fn takes_learning_rate(&self) -> bool {
         self.variant == Variant::Transfer
     }
@@ -249,7 +249,7 @@ impl Task for Occlusion {
                 counts.len()
             ));
         }
-        // The start went through the float type of the backend.
+        // The start has been rounded to the backend's float type.
         let stayed = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-6;
         if instance.quads.len() > 1 && theta.iter().zip(&instance.start).all(stayed) {
             warnings.push(format!(
@@ -268,7 +268,7 @@ impl Task for Occlusion {
         })
     }
 
-    /// The edge of the task and a wider one, because edges stay where they are.
+    /// The scale of the task and a wider one, because edges do not move.
     fn searched_scales(around: Vec<f64>) -> Vec<f64> {
         around.into_iter().skip(2).step_by(2).collect()
     }

@@ -1,15 +1,15 @@
-/// What is painted on a quad: two shades of a colour in a pattern.
+/// Texture of a quad: two shades of a colour in a pattern.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
     /// Red, green and blue of the brighter shade, in [0, 1].
     pub colour: [f64; 3],
-    /// How the shades alternate.
+    /// Pattern of the shades.
     pub pattern: Pattern,
-    /// How many fields of the pattern lie side by side.
+    /// Number of fields of the pattern side by side.
     pub fields: usize,
 }
 
-/// How the two shades of a texture alternate.
+/// Pattern of the two shades of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pattern {
     /// Like a chess board.
@@ -29,7 +29,7 @@ impl Pattern {
 const DARK: f64 = 0.55;
 
 impl Texture {
-    /// Colour at `(u, v)`, which are -1 and 1 at opposite sides of the quad; what lies outside has
+    /// Colour at `(u, v)`, which are -1 and 1 at opposite sides of the quad; points outside have
     /// the colour of the nearest point of the quad.
     pub fn colour_at(&self, [u, v]: [f64; 2]) -> [f64; 3] {
         // Just below 1, so that the last field includes its far side.

@@ -1,4 +1,4 @@
-//! The whole program on small scenes: what it finds, and what it says when it cannot.
+//! The whole program on small scenes: its results and its errors.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -11,7 +11,7 @@ use softrast_test_kit::{Failure, Program, assert_finite, warnings};
 
 const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_occlusion"));
 
-/// Runs a command line with results in `out`; its JSON line.
+/// Runs a command line with results in `out`, and returns its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
     PROGRAM.run_in(out, line)
 }
@@ -134,7 +134,7 @@ fn where_any_softness_finds_the_order_a_logistic_is_chosen() {
     let line = "choose --size 24 --search-runs 3";
     let chosen = run(line).unwrap();
     assert_eq!(chosen["flags"], "--softness logistic --schedule static", "{chosen}");
-    // There is no image to draw on fewer pixels, and no mesh.
+    // There is neither an image to draw at lower resolution nor a mesh.
     assert_eq!(chosen["choice"]["stages"].as_array().unwrap().len(), 1);
 }
 
@@ -225,7 +225,7 @@ fn learning_goes_on_only_from_its_own_checkpoint() {
     let out = tempfile::tempdir().unwrap();
     let whole = run_in(out.path(), LEARN).unwrap();
     let softness = fs::read(out.path().join("softness.json")).unwrap();
-    // A line that was being written when the program was killed.
+    // An incomplete line of a killed program.
     let log = out.path().join("learn.jsonl");
     let lines = fs::read_to_string(&log).unwrap();
     fs::write(&log, format!("{lines}{{\"step\": 9, \"lo")).unwrap();
