@@ -1,5 +1,5 @@
-//! Makes `data/views/fox`: masks of the fox, the cameras that took them, and the truth; and `data/views/fox_lens`: the same cameras with a lens
-//! that distorts, pictures over a grey wall, masks beside them, and the cameras as nerfstudio and COLMAP write them.
+//! Makes `data/views/fox`: masks of the fox, their cameras, and the ground truth; and `data/views/fox_lens`: the same cameras with a
+//! distorting lens, pictures over a grey wall, separate masks, and the cameras in the formats of nerfstudio and COLMAP.
 //!
 //! `cargo run --release -p pose --example make_views`
 
@@ -28,7 +28,7 @@ const COAT: [f64; 3] = [0.85, 0.45, 0.15];
 fn main() -> anyhow::Result<()> {
     let views = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/views");
     let cameras: Vec<Pinhole> = (0..VIEWS).map(camera).collect();
-    // R, t, K and the size say it all.
+    // R, t, K and the size are sufficient.
     let truth = |camera: &Pinhole| {
         let mut truth = camera_json(camera);
         if let Some(fields) = truth.as_object_mut() {
@@ -88,7 +88,7 @@ fn write(folder: &Path, transforms: &Value, truth: &Value) -> anyhow::Result<()>
     Ok(())
 }
 
-/// How much of each pixel the fox covers, where `straight` gives the place in pixels at which a pinhole shows what lies at a place.
+/// Coverage of each pixel by the fox; `straight` maps a place to the place of the same point in a pinhole image, in pixels.
 fn mask(camera: &Pinhole, straight: impl Fn([f64; 2]) -> [f64; 2]) -> GrayImage {
     let [height, width] = [SAMPLES * HEIGHT, SAMPLES * WIDTH];
     let fine = camera.cropped([0.0; 2], [WIDTH as f64, HEIGHT as f64], [height, width]);
@@ -107,11 +107,11 @@ fn mask(camera: &Pinhole, straight: impl Fn([f64; 2]) -> [f64; 2]) -> GrayImage 
     })
 }
 
-/// Where a pinhole shows what the lens shows at a place, in pixels.
+/// The place in a pinhole image of the point at a place in the lens image, in pixels.
 fn unbent(camera: &Pinhole, place: [f64; 2]) -> [f64; 2] {
     let Pinhole { focal, centre, .. } = *camera;
     let shown = [0, 1].map(|k| (place[k] - centre[k]) / focal[k]);
-    // What the lens adds is nearly the same at a place near by.
+    // Fixed-point iteration: the distortion is nearly the same at nearby places.
     let ray = (0..60).fold(shown, |ray, _| {
         let bent = LENS.bend(ray);
         [0, 1].map(|k| ray[k] + shown[k] - bent[k])
@@ -145,7 +145,7 @@ fn colmap(cameras: &[Pinhole]) -> (Vec<u8>, Vec<u8>) {
     (one.concat(), images)
 }
 
-/// Cameras all around, none upright, none that looks at the middle, with the principal point off the middle.
+/// Cameras all around, none upright, none looking at the middle, with an off-centre principal point.
 fn camera(k: usize) -> Pinhole {
     let turn = 2.4 * k as f64;
     let height = 0.8 - 1.6 * (k as f64 + 0.5) / VIEWS as f64;

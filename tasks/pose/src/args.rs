@@ -3,22 +3,22 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use softrast_cli::EXPERIMENTS;
 
-/// Flags that only POSE has.
+/// Flags of POSE only.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
     /// Mesh to view (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side of its box scaled to 2 [default: the project's own fox]
     #[arg(long, value_name = "FILE", display_order = 0)]
     pub mesh: Option<PathBuf>,
 
-    /// Find the camera by a picture in colours, of a mesh with a texture or with colours at its vertices
+    /// Find the camera from a colour picture, of a mesh with a texture or vertex colours
     #[arg(long)]
     pub colour: bool,
 
-    /// Optimise the field of view too, from a random start, instead of knowing it
+    /// Also optimise the field of view, from a random start; by default it is known
     #[arg(long)]
     pub optimise_fov: bool,
 
-    /// Take the mesh as it stands, as the paper's experiments do
+    /// Use the mesh without centring and scaling, as the paper's experiments do
     #[arg(long, requires = "mesh")]
     pub raw: bool,
 
@@ -26,16 +26,16 @@ pub struct Args {
     #[arg(long, value_enum, help_heading = EXPERIMENTS)]
     pub range: Option<Range>,
 
-    /// Where the pairs of start and target come from
+    /// Source of the pairs of start and target
     #[arg(long, value_enum, default_value_t, help_heading = EXPERIMENTS)]
     pub instances: Instances,
 
-    /// Poses to start from while the image does not fit [default: 8 to solve a seed, else 1]
+    /// Starts to try while the image does not fit [default: 8 to solve a seed, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64), help_heading = EXPERIMENTS)]
     pub starts: Option<u32>,
 }
 
-/// How far from the target a run starts.
+/// Angle between start and target of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Range {
     /// 15 to 35 degrees.
@@ -54,7 +54,7 @@ pub enum Range {
 }
 
 impl Range {
-    /// Least and largest angle, in degrees.
+    /// Smallest and largest angle, in degrees.
     ///
     /// Source: Wu et al. 2024, Sec. 5.1 (three parts of [15, 75]).
     pub fn degrees(self) -> [f64; 2] {
@@ -77,10 +77,10 @@ impl Range {
     }
 }
 
-/// Where the pairs of start and target come from.
+/// Source of the pairs of start and target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Instances {
-    /// Drawn from the seed.
+    /// Random, by seed.
     #[default]
     Seeded,
     /// The 24 pairs of the released runs; the seed counts from 0 to 23.

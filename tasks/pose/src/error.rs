@@ -1,4 +1,4 @@
-/// How far a pose is from the answer.
+/// Error of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseError {
     /// Great-circle angle between the directions of both cameras.
@@ -9,11 +9,11 @@ pub struct PoseError {
 
 impl PoseError {
     /// The error of a pose at this distance, elevation and azimuth in the frame of the target
-    /// camera, which stands at `target_distance`.
+    /// camera, which is at `target_distance`.
     pub fn new([distance, elevation_deg, azimuth_deg]: [f64; 3], target_distance: f64) -> Self {
         let (sin_e, cos_e) = elevation_deg.to_radians().sin_cos();
         let (sin_a, cos_a) = azimuth_deg.to_radians().sin_cos();
-        // Unlike an arc cosine this keeps its digits near 0 and 180 degrees.
+        // Unlike an arc cosine, this is accurate near 0 and 180 degrees.
         let angle = (cos_e * sin_a).hypot(sin_e).atan2(cos_e * cos_a);
         Self { angle_deg: angle.to_degrees(), distance: (distance - target_distance).abs() }
     }

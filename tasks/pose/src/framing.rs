@@ -5,17 +5,17 @@ use softrast_views::{Frame, painted_by_texture};
 
 use crate::{Args, Instances};
 
-/// The mesh that is viewed.
+/// The mesh of the problem.
 pub(crate) struct Viewed {
     pub(crate) mesh: Mesh,
     pub(crate) name: String,
-    /// The frame of its file in which it is viewed.
+    /// The frame, in coordinates of its file, in which it is viewed.
     pub(crate) frame: Frame,
-    /// Notes on its colours.
+    /// Warnings about its colours.
     pub(crate) notes: Vec<String>,
 }
 
-/// The mesh to view.
+/// Loads the mesh.
 pub(crate) fn viewed(args: &Args) -> anyhow::Result<Viewed> {
     let ((mesh, notes), name) = match &args.mesh {
         None if args.colour => ((painted_fox(), vec![]), "fox".to_owned()),
@@ -33,10 +33,10 @@ pub(crate) fn viewed(args: &Args) -> anyhow::Result<Viewed> {
     })
 }
 
-/// Faces of a mesh that is cut until its vertices are close enough for the colours of its texture.
+/// Most faces of a mesh that is subdivided to sample the colours of its texture at vertices.
 const MOST_FACES: usize = 20_000;
 
-/// The mesh of a file with colours at its vertices, those of its texture if it has one; and notes on what is not shown.
+/// The mesh of a file with vertex colours, sampled from its texture if it has one; and warnings about colours that are lost.
 fn in_colours(path: &Path) -> anyhow::Result<(Mesh, Vec<String>)> {
     let (mesh, warnings) = Mesh::load_textured(path)?;
     let (painted, errors) = painted_by_texture(&mesh, MOST_FACES);

@@ -1,4 +1,4 @@
-//! POSE: recovers the pose of a camera from a silhouette.
+//! POSE: finds the pose of a camera from a silhouette.
 
 fn main() -> std::process::ExitCode {
     pose::main()

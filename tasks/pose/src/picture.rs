@@ -1,10 +1,10 @@
 use image::{Rgb, RgbImage};
 
-/// Colour of the target's outline in frames, and how much of the frame shows through.
+/// Colour of the target's outline in frames, and its transparency.
 const OUTLINE: [f64; 3] = [255.0, 120.0, 0.0];
 const SHINE: f64 = 0.35;
 
-/// A square picture with the outline of a target over it, a silhouette `[size * size]`.
+/// A square picture with the outline of a target silhouette `[size * size]` over it.
 pub(crate) fn outlined(mut picture: RgbImage, target: &[f64]) -> RgbImage {
     let size = picture.width() as usize;
     for (x, y, pixel) in picture.enumerate_pixels_mut() {
@@ -16,7 +16,7 @@ pub(crate) fn outlined(mut picture: RgbImage, target: &[f64]) -> RgbImage {
     picture
 }
 
-/// Whether a pixel of the target has a neighbour that is none.
+/// Whether a pixel of the target has a neighbour outside it.
 fn is_outline(target: &[f64], size: usize, x: usize, y: usize) -> bool {
     let covered = |x: usize, y: usize| x < size && y < size && target[y * size + x] > 0.5;
     let around = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];

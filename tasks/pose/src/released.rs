@@ -7,7 +7,7 @@ use softrast_raster::Orbit;
 ///
 /// # Errors
 ///
-/// If the file that is part of the program is broken.
+/// If the bundled file is broken.
 pub fn released24() -> anyhow::Result<Vec<PoseInstance>> {
     /// Distance, elevation, azimuth and half the field of view of each camera.
     #[derive(Deserialize)]

@@ -24,14 +24,14 @@ use crate::{
     released::released24,
 };
 
-/// A run succeeds when the camera ends at most this far from the target.
+/// Largest angle to the target at the end of a successful run.
 const SUCCESS_DEG: f64 = 5.0;
-/// Starts that `solve` may try, unless asked for another number.
+/// Default number of starts of `solve`.
 const STARTS: usize = 8;
 /// Instances solved together in `evaluate`: all released pairs fit.
 const BATCH: usize = 25;
 
-/// POSE: a camera that orbits a mesh, and the silhouette that it should see.
+/// POSE: a camera that orbits a mesh, and its target silhouette.
 pub struct Pose {
     problem: PoseProblem,
     mesh_name: String,
@@ -40,14 +40,14 @@ pub struct Pose {
     variant: Variant,
 }
 
-/// Where instances come from.
+/// Source of the instances.
 enum Source {
     Seeded(Range),
     Released(Vec<PoseInstance>),
 }
 
 impl Pose {
-    /// What is solved, wherever its instances come from.
+    /// The problem, independent of the source of its instances.
     pub(crate) fn problem(&self) -> &PoseProblem {
         &self.problem
     }
@@ -135,15 +135,15 @@ impl Task for Pose {
     const TITLE: &'static str = "POSE";
     const ABOUT: &'static str = "Recovers the pose of a camera from a silhouette";
 
-    /// Wide enough at first to pull from afar, and at last as narrow as still gives the best hard silhouettes.
+    /// Wide enough at first to have a gradient from afar, and at last as narrow as the best hard silhouettes allow.
     ///
-    /// Measured with a logistic. The 24 released pairs on spot end at a hard `IoU` loss, summed, of 1.09 at 0.0015, 1.12 at 0.002, 1.26
-    /// at 0.003 and 3.2 at 0.01. Of 50 seeds on the fox that start 35 to 55 degrees away 41 succeed at 0.002, and 48 with a decay to it
-    /// from 0.03 (from 0.01: 45, from 0.05: 47). This is below a quarter of a pixel, because thousands of small faces add up to an edge
-    /// that is wider than that of one.
+    /// Measured with a logistic. The 24 released pairs on spot end at a hard `IoU` loss, summed, of 1.09 at 0.0015,
+    /// 1.12 at 0.002, 1.26 at 0.003 and 3.2 at 0.01. On the fox, 41 of 50 seeds that start 35 to 55 degrees away
+    /// succeed at 0.002, and 48 with a decay to it from 0.03 (from 0.01: 45, from 0.05: 47). The last scale is below a
+    /// quarter of a pixel, because thousands of small faces add up to an edge wider than that of a single face.
     const SCALES: Scales = Scales { schedule: Schedule::Decay, decay: [0.03, 0.002], fixed: 0.002 };
 
-    /// Poses within 5 degrees end below 0.08, others hardly ever below 0.2.
+    /// Poses within 5 degrees end below 0.08, others rarely below 0.2.
     const RESTART_ABOVE: f64 = 0.1;
 
     type Args = Args;

@@ -1,4 +1,4 @@
-//! Poses of masks whose focal length nobody knows, and the page that shows one.
+//! Poses from masks with unknown focal length, and the page of one.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -28,7 +28,7 @@ fn an_unknown_focal_length_is_found_to_five_percent_and_the_fit_is_never_worse()
     assert!(iou(&found) >= iou(&assumed), "{} after {}", iou(&found), iou(&assumed));
     let ratio = of(&found["camera"]) / of(&truth["views"][4]);
     assert!((ratio - 1.0).abs() < 0.05 && iou(&found) > 0.97, "{ratio}, {found}");
-    // Nor is it worse where the given one is right.
+    // It is no worse if the given focal length is right.
     let given = ["--target", &fox("images/03.png"), "--camera", &fox("transforms.json")];
     let (known, found) = (solved(&given), solved(&[&given[..], &["--optimise-fov"]].concat()));
     assert!(found["iou"].as_f64() >= known["iou"].as_f64(), "{found} after {known}");

@@ -1,4 +1,4 @@
-//! The program leaves files alone that it has not made.
+//! The program does not touch files of others.
 
 #![allow(
     clippy::unwrap_used,
@@ -17,7 +17,7 @@ use kept::{OCTAHEDRON, Program, SOFTNESS};
 const POSE: Program =
     Program { path: env!("CARGO_BIN_EXE_pose"), inputs, short: "--size 8 --steps 1 --quiet" };
 
-/// Meshes, masks, a camera that is a start too, and a softness, under names of results.
+/// Meshes, masks, a camera that is also a start, and a softness, under names of results.
 fn inputs(folder: &Path) {
     let path = |name: &str| folder.join(name);
     let camera = r#"{ "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "t": [0, 0, 5], "fx": 20, "fy": 20, "cx": 8, "cy": 8, "width": 16, "height": 16 }"#;

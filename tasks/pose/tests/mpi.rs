@@ -17,11 +17,11 @@ use softrast_test_kit::mpirun;
 const EXACT: &str = "learn --estimator unrolled --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness logistic --quiet --json";
 const ES: &str = "learn --size 16 --steps 12 --batch 3 --outer 3 --validation-runs 5 --softness gauss --estimator es:0.2 --quiet --json";
 
-/// A mesh of few faces, because programs for tests may be slow.
+/// A mesh of few faces, because test builds may be slow.
 const MESH: &str =
     "v 0 0 0\nv 1 0 0\nv 0 0.7 0\nv 0.2 0.1 0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 
-/// The program alone, or so many processes of it.
+/// The program alone, or this many processes of it.
 fn start(out: &Path, processes: Option<usize>, line: &str) -> Child {
     let pose = env!("CARGO_BIN_EXE_pose");
     let mut command = match processes {
@@ -29,13 +29,13 @@ fn start(out: &Path, processes: Option<usize>, line: &str) -> Child {
         Some(count) => mpirun(pose, count),
     };
     let mesh = out.join("mesh.obj");
-    // Where that is not possible the program says so.
+    // If this fails, the program reports it.
     let _ = fs::write(&mesh, MESH);
     command.args(line.split_whitespace()).arg("--mesh").arg(mesh).arg("--out").arg(out);
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// The JSON of a command that succeeds, without times; with what it learned.
+/// The JSON of a successful command, without times, and the learned softness.
 fn learned(out: &Path, processes: Option<usize>, line: &str) -> [Value; 2] {
     let output = start(out, processes, line).wait_with_output().unwrap();
     assert!(output.status.success(), "{output:?}");
@@ -47,7 +47,7 @@ fn learned(out: &Path, processes: Option<usize>, line: &str) -> [Value; 2] {
     for key in ["seconds", "peak_memory_mib", "out", "files", "settings"] {
         result.as_object_mut().unwrap().remove(key);
     }
-    // It tells of the command and the seconds.
+    // It contains the command and the seconds.
     softness.as_object_mut().unwrap().remove("note");
     [result, softness]
 }
@@ -57,7 +57,7 @@ fn any_number_of_processes_learns_the_same_to_the_last_bit() {
     for line in [EXACT, ES] {
         let alone = tempfile::tempdir().unwrap();
         let expected = learned(alone.path(), None, line);
-        // More processes than instances too.
+        // Also more processes than instances.
         for processes in [1, 2, 4] {
             let out = tempfile::tempdir().unwrap();
             assert_eq!(learned(out.path(), Some(processes), line), expected, "{processes}: {line}");

@@ -1,4 +1,4 @@
-//! Poses from pictures: what is found, and what is said of bad ones.
+//! Poses from pictures: results and error messages.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -99,7 +99,7 @@ fn a_result_is_a_start_and_a_camera_for_the_mesh_as_it_is_in_its_file() {
     let moved = run(out.path(), &words).unwrap();
     let of_file = &moved["camera"];
     assert!(angle_deg(of_file, &plain["camera"]) < 3.0, "{moved}");
-    // Both see the origin of the fox in one place, three times as far away.
+    // Both see the origin of the fox at the same place, three times as far away.
     let seen = |camera: &Value, p: [f64; 3]| {
         [0, 1, 2].map(|row| {
             let along = (0..3).map(|k| camera["R"][row][k].as_f64().unwrap() * p[k]).sum::<f64>();
@@ -112,7 +112,7 @@ fn a_result_is_a_start_and_a_camera_for_the_mesh_as_it_is_in_its_file() {
     assert!((z / w / 3.0 - 1.0).abs() < 0.05, "{z} and {w}");
 }
 
-/// The fox in millimetres where a map has metres: with its start in the coordinates of the file, and found in a frame of its own.
+/// The fox in millimetres on a map in metres: with a start in the coordinates of the file, and searched in its own frame.
 #[test]
 fn a_mesh_on_a_map_is_seen_from_where_it_is() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -272,7 +272,7 @@ fn a_mask_may_be_black_and_a_field_of_view_unknown() {
     let off = angle_deg(&found["camera"], &truth["views"][4]);
     assert!(off < 8.0 && found["iou"].as_f64().unwrap() > 0.95, "{off} degrees off, {found}");
     assert!(found["warnings"][0].as_str().unwrap().contains("field of view"), "{found}");
-    // Pictures that no run has made stay, whatever their names.
+    // Pictures of others are not removed, whatever their names.
     fs::write(out.path().join("overlay-a.png"), b"mine").unwrap();
     fs::write(out.path().join("mine.png"), b"mine").unwrap();
     let again = run(out.path(), &[&target[..], &["--size", "32", "--steps", "1"]].concat());
@@ -282,7 +282,7 @@ fn a_mask_may_be_black_and_a_field_of_view_unknown() {
     }
 }
 
-/// A mask of 0 and 1 that is turned in its file, from a start whose rotation has three decimals: as the mask itself, and both are said.
+/// A mask of 0 and 1, rotated in its file, from a start with three decimals: the result of the plain mask, with two warnings.
 #[test]
 fn masks_as_tools_write_them_give_the_pose_of_the_plain_mask() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -292,7 +292,7 @@ fn masks_as_tools_write_them_give_the_pose_of_the_plain_mask() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (target, start) = (path("classes.png"), path("start.json"));
     let mut encoder = png_of(&upside_down);
-    // Exif data that ask for half a turn, in a chunk after the head.
+    // Exif data for a rotation by 180 degrees, in a chunk after the head.
     let exif = b"\0\0\0\x1aeXIfII*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x03\0\0\0\0\0\0\0";
     let sum = exif[4..].iter().fold(u32::MAX, |sum, &byte| {
         (0..8).fold(sum ^ u32::from(byte), |sum, _| {
@@ -334,7 +334,7 @@ fn a_lens_that_distorts_is_undone_whether_nerfstudio_or_colmap_tells_it() {
         assert!(off < 1.5 && found["iou"].as_f64().unwrap() > 0.97, "{off} degrees off, {found}");
         assert_eq!(found["undistorted"]["k1"], json!(-0.15));
         assert!(found["warnings"].to_string().contains("the lens distorts"), "{found}");
-        // The pose in the ways of others is the same.
+        // The pose in other formats is the same.
         let again = out.path().join("again.json");
         let frame = json!({ "transform_matrix": found["camera"]["transform_matrix"] });
         fs::write(&again, frame.to_string()).unwrap();
@@ -345,7 +345,7 @@ fn a_lens_that_distorts_is_undone_whether_nerfstudio_or_colmap_tells_it() {
         };
         assert!(pairs.into_iter().all(same), "{found}");
     }
-    // Without coefficients nothing is undone, and a picture without a mask is refused.
+    // Without coefficients nothing is undistorted, and a picture without a mask is refused.
     let plain = out.path().join("camera.json");
     let k = &truth["views"][5]["K"];
     fs::write(&plain, json!({ "K": k }).to_string()).unwrap();
@@ -376,7 +376,7 @@ fn a_tall_picture_takes_no_more_memory_than_its_pixels_ask_for() {
     assert!(page < 2_000_000, "{page} bytes");
 }
 
-/// The picture shows two fifths of the fox, so that neither its place nor its size is that of the mask.
+/// The picture shows two fifths of the fox, so that the mask has neither its place nor its size.
 #[test]
 fn a_fox_that_the_picture_cuts_off_is_found() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -393,7 +393,7 @@ fn a_fox_that_the_picture_cuts_off_is_found() {
         centre: [80.90161451093375, 119.34375],
         size: [120, 160].into(),
     };
-    // Four by four samples in a pixel.
+    // Four by four samples per pixel.
     let fine = silhouette_pixels(
         &softrast_mesh::fox(),
         &camera.cropped([0.0; 2], [160.0, 120.0], [480, 640]),
@@ -414,7 +414,7 @@ fn a_fox_that_the_picture_cuts_off_is_found() {
     assert!(warning.contains("mask.png: the mask reaches the bottom of the picture"), "{warning}");
 }
 
-/// A bottle looks the same however it is turned around itself: that is one answer, not six.
+/// A bottle looks the same at every rotation about its axis: one answer, not six.
 #[test]
 fn the_turns_of_a_bottle_are_one_pose() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -444,9 +444,9 @@ fn the_turns_of_a_bottle_are_one_pose() {
     let words = ["--mesh", mesh.to_str().unwrap(), "--target", path.to_str().unwrap()];
     let found = run(out.path(), &words).unwrap();
     assert!(found["iou"].as_f64().unwrap() > 0.97, "{found}");
-    // From the front, or tilted away as far as towards. Rounding decides whether one of its turns counts as another pose too.
+    // From the front, or tilted away as far as towards. Rounding decides whether one of its rotations counts as another pose.
     assert!(found["alternatives"].as_array().unwrap().len() <= 3, "{found}");
-    // And it is said that its turn is not known.
+    // The unknown rotation is reported.
     assert!(
         found["warnings"].to_string().contains("turned by any angle about (0.00, 1.00, 0.00)"),
         "{found}"
@@ -454,7 +454,7 @@ fn the_turns_of_a_bottle_are_one_pose() {
     assert_eq!(found["mesh"]["symmetries"][0]["degrees"], json!(null), "{found}");
 }
 
-/// Specks all over and a gap in the outline: a pose near the right one all the same.
+/// Specks all over and a gap in the outline: the pose is still near the right one.
 #[test]
 fn specks_and_gaps_do_not_lead_astray() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -480,7 +480,7 @@ fn specks_and_gaps_do_not_lead_astray() {
     assert_eq!(found["mesh"]["symmetries"], json!([]));
 }
 
-/// A ball looks the same from everywhere but for its colours.
+/// A ball looks the same from everywhere except for its colours.
 #[test]
 fn a_ball_is_found_by_its_colours() {
     let (out, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
@@ -505,7 +505,7 @@ fn a_ball_is_found_by_its_colours() {
     fs::write(&lens, json!({ "K": truth["K"], "width": 80, "height": 60 }).to_string()).unwrap();
     let words = ["--mesh", &mesh, "--target", &target, "--camera", &lens, "--size", "64"];
     let found = run(out.path(), &[&words[..], &["--colour"]].concat()).unwrap();
-    // The same colours as a texture, as shape3d writes it.
+    // With these colours as a texture, as shape3d writes it.
     let textured = folder.path().join("textured.glb");
     baked(&ball, &ball).unwrap().save(&textured).unwrap();
     let of_texture = ["--mesh", textured.to_str().unwrap(), "--raw", "--colour"];
@@ -518,7 +518,7 @@ fn a_ball_is_found_by_its_colours() {
     }
     let page = fs::read_to_string(out.path().join("report.html")).unwrap();
     assert!(page.contains("The mesh in its own colours"), "the colours are not shown");
-    // By its silhouette alone it may be anywhere.
+    // By its silhouette alone, any pose fits.
     let found = run(out.path(), &words).unwrap();
     assert!(angle_deg(&found["camera"], &truth) > 10.0 && found["psnr"].is_null(), "{found}");
 }

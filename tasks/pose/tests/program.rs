@@ -1,4 +1,4 @@
-//! The whole program on small scenes: what it recovers, and what it says when it cannot.
+//! The whole program on small scenes: its results and its errors.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -10,7 +10,7 @@ use softrast_test_kit::{Failure, Program, assert_finite, warnings};
 
 const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_pose"));
 
-/// Runs a command line with results in `out`; its JSON line.
+/// Runs a command line with results in `out`, and returns its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
     PROGRAM.run_in(out, line)
 }
@@ -19,7 +19,7 @@ fn run(line: &str) -> Result<Value, Failure> {
     run_in(tempfile::tempdir().unwrap().path(), line)
 }
 
-/// A mesh file of one triangle, or of whatever the text says.
+/// A mesh file of one triangle, or of this text.
 fn with_mesh(text: &str, line: &str) -> Result<Value, Failure> {
     let folder = tempfile::tempdir().unwrap();
     let mesh = folder.path().join("mesh.obj");
@@ -151,7 +151,7 @@ fn every_named_softness_ends_with_finite_numbers_at_any_scale() {
 fn a_camera_that_its_silhouette_leaves_elsewhere_is_found_by_colour() {
     let out = tempfile::tempdir().unwrap();
     let line = "--starts 1 --seed 1116 --size 32 --steps 100";
-    // The preset begins again from other starts, and so finds it without colour.
+    // The preset restarts from other starts, and therefore finds it without colour.
     let json = run(&format!("--softness learned {line}")).unwrap();
     assert_eq!(json["success_rate"], 0.0, "{json}");
     let json = run_in(out.path(), &format!("--colour {line}")).unwrap();
@@ -275,7 +275,7 @@ fn a_surrogate_is_learned_kept_and_named() {
     );
 }
 
-/// Source: docs/notes.md, Values before any step. The mesh belongs to others and is not part of this repository.
+/// Source: docs/notes.md, Values before any step. The mesh is not ours and not in this repository.
 #[test]
 #[ignore = "needs the paper's meshes"]
 fn the_first_step_with_a_gamma_moves_as_the_released_one() {

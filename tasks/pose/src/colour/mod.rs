@@ -1,8 +1,8 @@
-//! POSE by colour: recovers the pose of a camera from a picture in colours.
+//! POSE by colour: finds the pose of a camera from a colour picture.
 //!
-//! **Definition.** The mesh has a colour at each vertex. The silhouette is that of POSE, and its `IoU` loss is part of the loss; beside it
-//! stands the squared difference of colours on few pixels, see [`softrast_inverse::pose::ColouredViews`]. Instances, starts and errors are those of POSE, seed by seed. Not
-//! in the paper: docs/notes.md, Pose by colour.
+//! **Definition.** The mesh has a colour at each vertex. The silhouette is that of POSE; the loss is its `IoU` loss
+//! plus the squared difference of colours at low resolution, see [`softrast_inverse::pose::ColouredViews`]. Instances,
+//! starts and errors are those of POSE, seed by seed. Not in the paper: docs/notes.md, Pose by colour.
 
 mod scene;
 mod task;
@@ -15,7 +15,7 @@ use crate::Args;
 pub use scene::Scene;
 pub use task::Coloured;
 
-/// The colours of the vertices of a mesh.
+/// The vertex colours of a mesh.
 ///
 /// # Errors
 ///

@@ -39,12 +39,12 @@ impl<B: RasterBackend> Scene<B> {
         Self { silhouettes, colours }
     }
 
-    /// What is the same without colours.
+    /// The scene without colours.
     pub fn silhouettes(&self) -> &PoseScene<B> {
         &self.silhouettes
     }
 
-    /// The hard image to arrive at, `[views, 4, size, size]`.
+    /// The target hard image, `[views, 4, size, size]`.
     pub fn target(&self) -> Tensor<B, 4> {
         self.colours.target(self.silhouettes.target())
     }
@@ -58,7 +58,8 @@ impl<B: RasterBackend> Scene<B> {
         self.image_with(theta, |seen| softness.silhouette(seen))
     }
 
-    /// The same with what draws silhouettes `[views, side, side]` of vertices `[views, vertices, 3]`.
+    /// The soft image `[views, 4, side, side]` with another renderer of silhouettes `[views, side,
+    /// side]`, given vertices `[views, vertices, 3]`.
     pub fn image_with(
         &self,
         theta: Tensor<B, 1>,
@@ -77,7 +78,7 @@ impl<B: RasterBackend> Scene<B> {
         self.colours.hard_image(seen.clone(), self.silhouettes.hard(seen))
     }
 
-    /// What is wrong with an image `[views, 4, side, side]`, `[views]`: the `IoU` loss of its silhouette, and [`ColouredViews::loss`].
+    /// The loss `[views]` of an image `[views, 4, side, side]`: the `IoU` loss of its silhouette plus [`ColouredViews::loss`].
     pub fn image_loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
         let (colours, coverage) = split_coverage(image);
         self.silhouettes.image_loss(coverage) + self.colours.loss(colours)

@@ -17,7 +17,7 @@ use crate::{Args, Pictures, Pose, picture::outlined};
 /// Larger than that of silhouettes (docs/notes.md, Pose by colour).
 const LEARNING_RATE: f64 = 1.0;
 
-/// POSE by colour: a camera that orbits a mesh with colours, and the picture that it should see.
+/// POSE by colour: a camera that orbits a mesh with colours, and its target picture.
 pub struct Coloured {
     pose: Pose,
     colours: Vec<[f64; 3]>,
@@ -82,7 +82,7 @@ impl Task for Coloured {
     const ABOUT: &'static str = "Recovers the pose of a camera from a picture in colours";
     const SCALES: Scales = Pose::SCALES;
 
-    /// Poses within 5 degrees end below 0.1, others hardly ever below 0.4.
+    /// Poses within 5 degrees end below 0.1, others rarely below 0.4.
     const RESTART_ABOVE: f64 = 0.2;
 
     type Args = Args;
@@ -147,7 +147,7 @@ impl Task for Coloured {
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {
         let Ended { seed, instance, target, size, theta, .. } = *run;
-        // The loss is not that of silhouettes alone, so it does not say that the mesh ends outside of the target's.
+        // The loss includes colours, so it cannot show that the mesh is outside the target; 0 disables that warning.
         let run =
             Ended { seed, instance, target: silhouette(target, size), size, hard: 0.0, theta };
         self.pose.warnings(&run)
@@ -159,7 +159,7 @@ fn colours(image: &[f64], size: usize) -> &[f64] {
     &image[..3 * size * size]
 }
 
-/// Its coverage.
+/// The coverage of an image of one instance.
 fn silhouette(image: &[f64], size: usize) -> &[f64] {
     &image[3 * size * size..]
 }

@@ -1,4 +1,4 @@
-//! The report of the poses found, and the files written with it.
+//! The report of the poses, and its files.
 
 use std::{
     collections::HashSet,
@@ -26,35 +26,35 @@ use softrast_views::{
     Distortion, Frame, PaintedView, Picture, camera_json, coloured_pixels, cut_sides,
 };
 
-/// Answers that a picture of many shows.
+/// Most answers in a picture of many.
 const SHOWN: usize = 12;
 
-/// The mesh that is looked for.
+/// The mesh of the search.
 pub(super) struct Framed {
     pub(super) mesh: Mesh,
     pub(super) name: String,
-    /// In which it is looked for, of its file.
+    /// The frame of the search, in coordinates of the file.
     pub(super) frame: Frame,
-    /// Whether one pose was given to start from, and no other tried.
+    /// Whether the search used a given start only.
     pub(super) started: bool,
-    /// Turns after which it has the same silhouettes.
+    /// Rotations that preserve its silhouettes.
     pub(super) symmetries: Vec<Symmetry>,
 }
 
-/// A mask and what was found for it, the best first.
+/// A mask and its poses, best first.
 pub(super) struct Solved {
     pub(super) path: PathBuf,
     pub(super) mask: Picture,
-    /// How the lens distorted it, if it did.
+    /// Distortion of the lens, if any.
     pub(super) distortion: Option<Distortion>,
-    /// Its colours, where they count.
+    /// Its colours, in a search by colour.
     pub(super) painted: Option<PaintedView>,
     pub(super) poses: Vec<FoundPose>,
     pub(super) seconds: f64,
 }
 
 impl Solved {
-    /// A pose with the camera of the picture in its file, which may have more pixels than the mask, for the mesh as it is in its file.
+    /// A pose in the coordinates of the mesh's file, with the camera of the picture's file, which may have more pixels than the mask.
     fn of_file(&self, frame: &Frame, pose: &FoundPose) -> FoundPose {
         let camera = frame.camera_to_world(&self.mask.whole_camera(&pose.camera));
         FoundPose { camera, ..*pose }
@@ -92,11 +92,11 @@ pub(super) fn answer(
     Ok(Answer { page, output, files, beside })
 }
 
-/// A line for each pose of many pictures.
+/// A table with a line per pose, for many pictures.
 pub(super) const POSES: &str = "poses.csv";
 
-/// The files with mask and silhouette of the answers, one for each picture: `overlay-NAME.png`, and `overlay-NAME.png-2.png` where a
-/// picture before has that, also where upper and lower case are one.
+/// Names of the files with mask and silhouette, one per picture: `overlay-NAME.png`, or
+/// `overlay-NAME.png-2.png` if an earlier picture has that name, ignoring case.
 pub(super) fn overlay_names(pictures: &[PathBuf], single: bool) -> Vec<String> {
     if single {
         return vec!["overlay.png".to_owned()];
@@ -158,7 +158,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Whether the poses fit, in a sentence or two.
+/// The fit of the poses, in a sentence or two.
 fn verdict(mesh: &Framed, solved: &[Solved], single: bool) -> String {
     let best = |one: &Solved| one.poses[0].iou;
     if let (true, [one]) = (single, solved) {
@@ -179,7 +179,7 @@ fn verdict(mesh: &Framed, solved: &[Solved], single: bool) -> String {
     )
 }
 
-/// The pose of a picture, with what can be looked at and copied.
+/// The pose of a picture, as a section with pictures and text to copy.
 fn section(
     page: &mut Report,
     mesh: &Framed,
@@ -221,12 +221,12 @@ fn section(
     Ok(())
 }
 
-/// A camera in the forms of other programs, each with a label.
+/// A camera in the formats of other programs, each with a label.
 fn in_other_forms(camera: &Pinhole, name: &str) -> [(&'static str, String); 3] {
     let json = camera_json(camera);
     let ([fx, fy], [cx, cy]) = (camera.focal, camera.centre);
     let (w, h) = (camera.size.width, camera.size.height);
-    // OpenCV has (0, 0) in the middle of the first pixel.
+    // OpenCV has (0, 0) at the centre of the first pixel.
     let k = [[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]];
     let opencv = json!({ "R": json["R"], "t": json["t"], "K": k });
     let frame = json!({
@@ -299,13 +299,13 @@ fn json(mesh: &Framed, solved: &[Solved], warnings: &[String], single: bool) -> 
     json
 }
 
-/// The mask with the silhouette at the pose over it.
+/// The silhouette at the pose over the mask.
 fn drawn(mesh: &Mesh, one: &Solved, pose: &FoundPose) -> RgbImage {
     let silhouette = silhouette_pixels(mesh, &pose.camera);
     overlay(&silhouette, one.mask.pixels(), pose.camera.size.width)
 }
 
-/// The colours of a picture, and those of the mesh at the answer.
+/// The colours of a picture, and those of the mesh at its best pose.
 fn beside(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
     let view = one.painted.as_ref()?;
     let camera = &one.poses[0].camera;
@@ -317,9 +317,9 @@ fn beside(mesh: &Mesh, one: &Solved) -> Option<[RgbImage; 2]> {
     }))
 }
 
-/// The mesh with all poses that were found, seen first through the only one.
+/// The mesh with all poses; opens with the view of a single one.
 fn viewer(mesh: &Mesh, solved: &[Solved], single: bool) -> anyhow::Result<Viewer> {
-    // A page keeps coordinates in 32 bits.
+    // A page stores coordinates in 32 bits.
     let frame = Frame::of_mesh(mesh);
     let views = solved.iter().flat_map(|Solved { path, mask, poses, .. }| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -1,4 +1,4 @@
-//! Poses from pictures that the user gives.
+//! Poses from the user's pictures.
 
 mod answer;
 
@@ -20,35 +20,39 @@ use crate::{
     framing::{Viewed, viewed},
 };
 
-/// Field of view along the shorter side where no camera is given, in degrees.
+/// Default field of view along the shorter side without a camera, in degrees.
 const ASSUMED_FOV_DEG: f64 = 45.0;
 
-/// A picture and the camera that took it.
+/// A picture and its camera.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Pictures {
-    /// Picture of the object. Its mask is what --masks or --camera names, or its transparency, or its luminance if all of it is opaque. With --colour the colours count too
+    /// Picture of the object. Its mask is the one of --masks or --camera, else its transparency, or
+    /// its luminance if it is opaque. With --colour its colours are compared too
     #[arg(long, value_name = "PICTURE")]
     pub target: Option<PathBuf>,
 
-    /// Folder of such pictures; a table of all is written
+    /// Folder of pictures; writes a table of all
     #[arg(long, value_name = "DIR", conflicts_with = "target")]
     pub targets: Option<PathBuf>,
 
-    /// Camera: JSON with fx, fy, cx, cy, width and height, or K. Or cameras of many pictures, where that of the picture is found by its name: transforms.json, or a folder with that or a model of COLMAP [default: 45 degrees are assumed]
+    /// Camera: JSON with fx, fy, cx, cy, width and height, or K. Or cameras of many pictures,
+    /// matched by name: transforms.json, or a folder with that or a COLMAP model [default: a field
+    /// of view of 45 degrees]
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
 
-    /// Where to start instead of everywhere, for the mesh as it is in its file: JSON with R and t, `transform_matrix`, or a result of this program
+    /// Start pose instead of a search over all poses, for the mesh as it is in its file: JSON with
+    /// R and t, `transform_matrix`, or a result of this program
     #[arg(long, value_name = "FILE.json", requires = "target")]
     pub start: Option<PathBuf>,
 
-    /// How pictures become masks.
+    /// Conversion of pictures to masks.
     #[command(flatten)]
     pub masks: MaskFlags,
 }
 
 impl Pictures {
-    /// Whether there is one.
+    /// Whether a flag names pictures.
     pub(crate) fn asked(&self) -> bool {
         let Self { target, targets, camera, start, masks } = self;
         [target, targets, camera, start].into_iter().any(Option::is_some) || masks.asked()
@@ -114,7 +118,7 @@ pub(crate) fn solve_pictures(
         search.with_learning_rate(given.learning_rate().unwrap_or(PoseSearch::LEARNING_RATE))
     };
     let paths = pictures.paths()?;
-    // What would fail in the middle fails at once.
+    // Checks at once what would fail midway.
     let mut tasks = Vec::new();
     let mut reads = cameras.as_ref().map_or(Vec::new(), |cameras| cameras.files().to_vec());
     for path in paths {
@@ -182,7 +186,7 @@ pub(crate) fn solve_pictures(
     let best = solved.iter().map(|one| (one.path.display(), one.poses[0].camera));
     let across = faces_across_note(&mesh, best, NEAR);
     let mut warnings = warnings(cameras.is_some(), args.optimise_fov, &solved);
-    // A pose that was given tells the turn, and so do colours.
+    // A given start or colours determine the rotation.
     let symmetries = if started || args.colour { Vec::new() } else { symmetries(&mesh) };
     warnings
         .extend(of_mesh.into_iter().chain(notes).chain(across).chain(symmetry_note(&symmetries)));
@@ -191,7 +195,7 @@ pub(crate) fn solve_pictures(
     answer(&mesh, &solved, &overlays, warnings, single)
 }
 
-/// Flags that say what is drawn as a target.
+/// Refuses flags that apply to seeds only.
 fn refuse_flags_of_seeds(given: &Given<'_, Args>) -> anyhow::Result<()> {
     let (args, common) = (given.args, given.common);
     let flags = [
@@ -209,7 +213,7 @@ fn refuse_flags_of_seeds(given: &Given<'_, Args>) -> anyhow::Result<()> {
     }
 }
 
-/// A line on the turns of a mesh that masks do not tell.
+/// A warning about the symmetries of a mesh, which masks cannot resolve.
 fn symmetry_note(symmetries: &[Symmetry]) -> Option<String> {
     let turns = symmetries.iter().map(|Symmetry { axis: [x, y, z], degrees }| {
         let turn = degrees.map_or_else(|| "any angle".to_owned(), |by| format!("{by} degrees"));
