@@ -18,8 +18,8 @@ pub(crate) struct CommandLine {
     #[command(subcommand)]
     pub(crate) command: Command,
 
-    /// What to compute on: flex, ndarray or wgpu, if the program was built with it; the first of these by
-    /// default.
+    /// Backend: flex, ndarray or wgpu, if the program was built with it; by default the first of
+    /// these that is available.
     #[arg(long, global = true, value_name = "NAME")]
     pub(crate) backend: Option<String>,
 
@@ -32,7 +32,7 @@ pub(crate) struct CommandLine {
 pub(crate) enum Command {
     /// Train a network; writes a checkpoint, a contact sheet and the report after every epoch.
     Train(TrainArgs),
-    /// Score a trained network on shapes that it has never seen.
+    /// Score a trained network on held-out shapes.
     Evaluate(EvaluateArgs),
     /// Make a mesh of the shape in a picture.
     Predict(PredictArgs),
@@ -40,15 +40,15 @@ pub(crate) enum Command {
     Compare(CompareArgs),
 }
 
-/// What trainings share whatever their softness.
+/// Flags of all trainings, independent of the softness.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Common {
-    /// Folder with <class>_<split>_images.npz and ..._voxels.npz for the splits train, val and test; by
-    /// default shapes are made up.
+    /// Folder with <class>_<split>_images.npz and ..._voxels.npz for the splits train, val and
+    /// test; by default shapes are generated.
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
 
-    /// Made-up shapes of each class to learn from [default: 1000].
+    /// Generated shapes per class to learn from [default: 1000].
     #[arg(long, value_name = "N", value_parser = count, conflicts_with = "data")]
     pub(crate) shapes: Option<usize>,
 
@@ -60,32 +60,32 @@ pub(crate) struct Common {
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) learning_rate: Option<f64>,
 
-    /// Learning rate of the parameters of the softness; 0 leaves them as they are.
+    /// Learning rate of the parameters of the softness; 0 keeps them fixed.
     #[arg(long, value_name = "X", default_value_t = 0.001, value_parser = rate)]
     pub(crate) softness_rate: f64,
 
-    /// Pairs of pictures in a step [default: 16].
+    /// Pairs of pictures per step [default: 16].
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) pairs: Option<usize>,
 
-    /// Parts of a step, which the processes of mpirun share; batch norms see a part at a time.
+    /// Parts of a step, which the processes of mpirun share; batch norms see one part at a time.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = count)]
     pub(crate) parts: usize,
 
-    /// Steps in an epoch [default: 100].
+    /// Steps per epoch [default: 100].
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) steps: Option<usize>,
 
-    /// Epochs in all; the rates fall to 0.3 of themselves after 60 % of them [default: 50].
+    /// Number of epochs; the rates fall to 0.3 of their values after 60 % of them [default: 50].
     #[arg(long, value_name = "N", value_parser = count)]
     pub(crate) epochs: Option<usize>,
 
-    /// Held-out shapes of a class that are scored after every epoch.
+    /// Held-out shapes per class that are scored after every epoch.
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = count)]
     pub(crate) val: usize,
 
-    /// A training of a few minutes on two cores, not of about an hour: other defaults for learning rate,
-    /// pairs and epochs.
+    /// Train for a few minutes on two cores instead of about an hour: changes the defaults of
+    /// learning rate, pairs and epochs.
     #[arg(long)]
     pub(crate) quick: bool,
 
@@ -93,7 +93,7 @@ pub(crate) struct Common {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = seed)]
     pub(crate) seed: u64,
 
-    /// Go on from the checkpoint in the folder.
+    /// Continue from the checkpoint in the folder.
     #[arg(long)]
     pub(crate) resume: bool,
 
@@ -107,8 +107,8 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     pub(crate) common: Common,
 
-    /// Softness: the name of a family, such as logistic, gauss or mlp, or a softness file in JSON, which
-    /// begins as at its last step if its scale moves.
+    /// Softness: the name of a family, such as logistic, gauss or mlp, or a softness file in JSON,
+    /// whose schedule, if any, starts at its last step.
     #[arg(long, value_name = "NAME|FILE.json", default_value = "logistic")]
     pub(crate) softness: NameOrFile<Family>,
 
@@ -117,7 +117,7 @@ pub(crate) struct TrainArgs {
     #[arg(long, value_name = "X", value_parser = positive)]
     pub(crate) scale: Option<f64>,
 
-    /// Feed the softness the squared distance.
+    /// Use the squared distance as the softness's input.
     #[arg(long)]
     pub(crate) squared: bool,
 
@@ -125,7 +125,7 @@ pub(crate) struct TrainArgs {
     #[arg(long, value_name = "NAME", default_value = "probabilistic")]
     pub(crate) t_conorm: TConorm,
 
-    /// Folder for the results; made if missing.
+    /// Folder for the results; created if missing.
     #[arg(long, value_name = "DIR", default_value = "out/reconstruct")]
     pub(crate) out: PathBuf,
 }
@@ -140,25 +140,25 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
 
-    /// Test shapes of each class.
+    /// Test shapes per class.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = count)]
     pub(crate) shapes: usize,
 
-    /// Views of each shape, 1 to 24.
+    /// Views per shape, 1 to 24.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = whole::<1, { crate::VIEWS }>)]
     pub(crate) views: usize,
 }
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct PredictArgs {
-    /// Picture of one object, with alpha 0 around it: 64 x 64 pixels, others are scaled.
+    /// Picture of one object with alpha 0 around it: 64 x 64 pixels, other sizes are scaled.
     pub(crate) picture: PathBuf,
 
     /// Checkpoint of a training.
     #[arg(long, value_name = "FILE", default_value = "out/reconstruct/checkpoint.bin")]
     pub(crate) checkpoint: PathBuf,
 
-    /// Mesh to write: OBJ, PLY or GLB by its ending.
+    /// Mesh to write: OBJ, PLY or GLB by its extension.
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
 }
@@ -168,7 +168,7 @@ pub(crate) struct CompareArgs {
     #[command(flatten)]
     pub(crate) common: Common,
 
-    /// What to compare: a softness and, after a plus, a T-conorm; the probabilistic sum without one.
+    /// Methods to compare: a softness and, after a plus, a T-conorm; by default the probabilistic sum.
     #[arg(
         long,
         value_name = "LIST",
@@ -177,11 +177,11 @@ pub(crate) struct CompareArgs {
     )]
     pub(crate) methods: Vec<String>,
 
-    /// Test shapes of each class for the table.
+    /// Test shapes per class for the table.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = count)]
     pub(crate) test_shapes: usize,
 
-    /// Folder for the results, one folder in it for each method; made if missing.
+    /// Folder for the results, with a subfolder for each method; created if missing.
     #[arg(long, value_name = "DIR", default_value = "out/reconstruct-compare")]
     pub(crate) out: PathBuf,
 }
@@ -193,7 +193,7 @@ impl Common {
         (softness, phi): (EdgeSoftness, Vec<f64>),
         t_conorm: TConorm,
     ) -> Settings {
-        // Quick: as much as a few minutes hold, at a rate that shows within them.
+        // Quick: as many pairs as fit a few minutes, at a rate that has an effect within them.
         let (rate, pairs) = if self.quick { (1e-3, 8) } else { (5e-4, 16) };
         Settings {
             data: match &self.data {
@@ -214,14 +214,14 @@ impl Common {
         }
     }
 
-    /// Epochs in all.
+    /// Number of epochs.
     pub(crate) fn epochs(&self) -> usize {
         self.epochs.unwrap_or(if self.quick { 6 } else { 50 })
     }
 }
 
-/// A softness and its first parameters, from a family or a file; of a file whose scale moves those of the
-/// last step.
+/// A softness and its first parameters, from a family or a file; a file with a schedule gives those
+/// of the last step.
 ///
 /// # Errors
 ///
@@ -237,7 +237,7 @@ pub(crate) fn softness(
         )),
         NameOrFile::File(path) => {
             let file = ScheduledSoftness::load(path)?;
-            // Where its scale moves, as at the last step: a file with a schedule keeps φ at scale 1.
+            // With a schedule those of the last step: a file with a schedule stores φ at scale 1.
             Ok((file.softness, file.phi_at(1.0, crate::SIZE)))
         }
         &NameOrFile::Name(family) => {
@@ -248,12 +248,12 @@ pub(crate) fn softness(
     }
 }
 
-/// Scale of a family for the probabilistic sum. Source: docs/notes.md, Reconstruction; families that are not named there
-/// take that of the logistic.
+/// Scale of a family for the probabilistic sum. Source: docs/notes.md, Reconstruction; families
+/// that are not listed there use that of the logistic.
 fn default_scale(softness: EdgeSoftness) -> f64 {
     match (softness.family, softness.scale_is_squared()) {
         (Family::Uniform | Family::Gauss, false) => 10_f64.powf(-1.5),
-        // Its tails are long, and a wider one covers the whole picture.
+        // It has long tails, and a wider one covers the whole picture.
         (Family::Mlp, false) => 10_f64.powf(-2.5),
         (Family::Cauchy, false) => 10_f64.powf(-3.5),
         (Family::Cauchy, true) => 10_f64.powf(-4.5),

@@ -6,16 +6,16 @@ use softrast_mesh::read_bounded;
 
 use crate::Header;
 
-/// What a file of a training begins with; the number counts changes of the format or the network.
+/// Beginning of a training's file; the number is the version of the format and the network.
 const MAGIC: &[u8] = b"softrast reconstruct 2\n";
 
-/// Bytes of a file at most.
+/// Largest file, in bytes.
 const LARGEST_FILE: u64 = 1 << 32;
 
-/// A training as it stood after an epoch.
+/// State of a training after an epoch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
-    /// What is being trained and its history.
+    /// Settings of the training, and its history.
     pub header: Header,
     /// Weights and the state of the optimisers, as burn's recorder writes them.
     pub records: Vec<u8>,
@@ -56,7 +56,7 @@ impl Checkpoint {
         Ok(Self { header, records: records.to_vec() })
     }
 
-    /// Writes the file at `path`, which appears whole or not at all.
+    /// Writes the file at `path` atomically.
     ///
     /// # Errors
     ///
@@ -71,13 +71,13 @@ impl Checkpoint {
     }
 }
 
-/// The bytes of a file with a header in JSON and records, whatever they are.
+/// The bytes of a file with a header in JSON and arbitrary records.
 pub fn sealed(header: &[u8], records: &[u8]) -> Vec<u8> {
     let body = [&(header.len() as u64).to_le_bytes(), header, records].concat();
     [MAGIC, &checksum(&body).to_le_bytes(), &body].concat()
 }
 
-/// Writes a file that appears whole or not at all, and its folder if that is missing.
+/// Writes a file atomically, and creates its folder if missing.
 ///
 /// # Errors
 ///
@@ -88,7 +88,7 @@ fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     written.with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// FNV-1a over words of eight bytes: finds what a disk or a copy breaks, not what a forger does.
+/// FNV-1a over words of eight bytes: detects accidental damage, not forgery.
 fn checksum(bytes: &[u8]) -> u64 {
     let mut sum = 0xcbf2_9ce4_8422_2325_u64 ^ bytes.len() as u64;
     for chunk in bytes.chunks(8) {

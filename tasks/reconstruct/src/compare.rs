@@ -25,10 +25,10 @@ const VIEWS: usize = 4;
 /// table, not the same data, budget or classes.
 const PAPER: [(&str, f64); 2] = [("MLP", 0.6076), ("best of 30 renderers for each class", 0.6232)];
 
-/// Trains each method on the same shapes in the same order from the same weights, scores all of them
-/// on the same test shapes, and gives the table that is also written to the folder.
+/// Trains each method on the same shapes in the same order from the same weights, scores all of
+/// them on the same test shapes, and returns the table that is also written to the folder.
 ///
-/// What is finished is kept; with `--resume` it is not done again.
+/// Finished trainings are stored; `--resume` does not repeat them.
 ///
 /// # Errors
 ///
@@ -74,7 +74,7 @@ pub(crate) fn compare<B: RasterBackend>(
     Ok(Output { json: json!({ "methods": json }), text: vec![table], ..Output::default() })
 }
 
-/// What is known of a method.
+/// Results of a method.
 struct Row {
     name: String,
     classes: Vec<String>,
@@ -107,7 +107,7 @@ fn method(text: &str) -> anyhow::Result<Method> {
     Ok((text.to_owned(), softness.with_context(|| format!("method {text}"))?, t_conorm))
 }
 
-/// The table of all methods, and how they were trained.
+/// The table of all methods, and their training settings.
 fn markdown(args: &CompareArgs, rows: &[Row], command: &str) -> String {
     let Some(Row { classes, score, settings, .. }) = rows.first() else { return String::new() };
     let classes = classes.iter().map(String::as_str);

@@ -2,14 +2,14 @@ use std::sync::Arc;
 
 use crate::{Data, NpzFolder, Procedural, Shapes, Split};
 
-/// Shapes of a class for watching and for the figures at the end, in the procedural set.
+/// Shapes per class of the validation and test splits, in the procedural set.
 const HELD_OUT: usize = 200;
 
 /// The shapes of a split of a data set.
 ///
 /// # Errors
 ///
-/// If there are files, and they are missing or not as they should be.
+/// If files are used, and they are missing or invalid.
 pub(crate) fn open(data: &Data, split: Split, seed: u64) -> anyhow::Result<Arc<dyn Shapes>> {
     Ok(match data {
         Data::Procedural(per_class) => {

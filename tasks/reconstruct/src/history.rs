@@ -1,4 +1,4 @@
-//! What a training does and what has come of it until now.
+//! Settings and history of a training.
 
 use std::{
     fmt,
@@ -13,22 +13,22 @@ use softrast_softness::EdgeSoftness;
 
 use crate::Width;
 
-/// What a checkpoint says about itself.
+/// Header of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// The training.
     pub settings: Settings,
     /// Names of the classes of its shapes.
     pub classes: Vec<String>,
-    /// Epochs until now, the first one before any step.
+    /// Epochs so far, the first one before any step.
     pub epochs: Vec<Epoch>,
 }
 
-/// What a training does; kept in its checkpoint, so that going on means the same training.
+/// Settings of a training, stored in its checkpoint, so that resuming continues the same training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Where the shapes come from.
+    /// Source of the shapes.
     pub data: Data,
     /// Widths of the layers.
     pub width: Width,
@@ -36,36 +36,36 @@ pub struct Settings {
     pub softness: EdgeSoftness,
     /// Its parameters before the first step.
     pub phi: Vec<f64>,
-    /// How the coverages of several faces make one, as the command line names it.
+    /// T-conorm of the coverages of several faces, by its name on the command line.
     pub t_conorm: String,
     /// Learning rate of the network.
     pub learning_rate: f64,
-    /// Learning rate of the parameters of the softness; 0 leaves them as they are.
+    /// Learning rate of the parameters of the softness; 0 keeps them fixed.
     pub softness_rate: f64,
-    /// Pairs of pictures in a step.
+    /// Pairs of pictures per step.
     pub pairs: usize,
-    /// Parts of a step: gradients are means over them, and batch norms see one at a time.
+    /// Parts of a step: gradients are averaged over them, and batch norms see one at a time.
     #[serde(default = "one")]
     pub parts: usize,
-    /// Steps in an epoch.
+    /// Steps per epoch.
     pub steps: usize,
-    /// Shapes of a class that the `IoU` after every epoch is taken from.
+    /// Shapes per class for the `IoU` after every epoch.
     pub val: usize,
     /// Seed of the weights, the shapes and their order.
     pub seed: u64,
 }
 
-/// Where shapes come from.
+/// Source of shapes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Data {
-    /// [`Procedural`](crate::Procedural), with so many shapes of a class to learn from.
+    /// [`Procedural`](crate::Procedural), with this many shapes per class to learn from.
     Procedural(usize),
     /// The files of a folder, see [`NpzFolder`](crate::NpzFolder).
     Files(#[serde(serialize_with = "as_text")] PathBuf),
 }
 
-/// A path as text, also where it is not UTF-8.
+/// A path as text, even if it is not UTF-8.
 fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&shown(path))
 }
@@ -81,7 +81,7 @@ impl fmt::Display for Data {
     }
 }
 
-/// Before a step had parts it was one.
+/// The default for checkpoints without parts: one part.
 fn one() -> usize {
     1
 }
@@ -96,7 +96,7 @@ impl Settings {
         Ok(self.t_conorm.parse()?)
     }
 
-    /// What differs from `other`, in words; nothing if they are the same training.
+    /// The differences to `other`, in words; `None` if both are the same training.
     pub(crate) fn difference(&self, other: &Self) -> Option<String> {
         let [mine, theirs] = [self, other].map(|settings| serde_json::to_value(settings).ok());
         let (mine, theirs) = (mine?, theirs?);
@@ -111,12 +111,12 @@ impl Settings {
     }
 }
 
-/// What is known after an epoch; number 0 is before the first step.
+/// Results of an epoch; number 0 is before the first step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Epoch {
     /// Its number, from 1.
     pub number: usize,
-    /// Mean loss over its steps: silhouettes and smoothness; none before the first step.
+    /// Mean loss over its steps: silhouettes and smoothness; `None` before the first step.
     pub loss: Option<f64>,
     /// Mean soft `IoU` of the silhouettes over its steps.
     pub silhouette_iou: Option<f64>,
@@ -128,10 +128,10 @@ pub struct Epoch {
     pub time: Time,
 }
 
-/// Seconds that the steps of an epoch took, in all and by what they did.
+/// Seconds of the steps of an epoch, in total and by component.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Time {
-    /// All of it.
+    /// Total time.
     pub all: f64,
     /// Making or reading pictures.
     pub data: f64,
@@ -139,11 +139,11 @@ pub struct Time {
     pub network: f64,
     /// The rasterizer and the loss of silhouettes, forward and back.
     pub rasterizer: f64,
-    /// What keeps surfaces smooth, forward and back.
+    /// The smoothness term, forward and back.
     pub smoothness: f64,
     /// The optimisers.
     pub optimizer: f64,
-    /// Pictures that the network saw.
+    /// Pictures processed by the network.
     pub pictures: usize,
 }
 
@@ -160,7 +160,7 @@ impl Time {
         if self.all > 0.0 { self.pictures as f64 / self.all } else { 0.0 }
     }
 
-    /// Part of the time that the rasterizer takes, 0 to 1.
+    /// Share of the rasterizer in the time, 0 to 1.
     pub fn rasterizer_share(&self) -> f64 {
         if self.all > 0.0 { self.rasterizer / self.all } else { 0.0 }
     }
@@ -177,7 +177,7 @@ impl Time {
 }
 
 impl Header {
-    /// Checks that this version of the program has the softness and the T-conorm. All else a checksum guards.
+    /// Checks that this version of the program has the softness and the T-conorm. The checksum covers everything else.
     pub(crate) fn check(&self, path: &Path) -> anyhow::Result<()> {
         let Settings { softness, phi, .. } = &self.settings;
         let file = serde_json::json!({ "softness": softness, "phi": phi });

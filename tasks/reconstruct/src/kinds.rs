@@ -1,4 +1,4 @@
-//! The classes of the procedural set: what each draws at random. All shapes have y up, look along -z
+//! The classes of the procedural set, with their random shapes. All shapes have y up, look along -z
 //! and are at most 0.96 long, wide and high, around the origin; no part is thinner than a cell of
 //! [`Voxels`](crate::Voxels).
 
@@ -9,7 +9,7 @@ use crate::solid::{Part, Solid};
 /// The parts of a shape, at random.
 type Draw = fn(&mut StdRng) -> Vec<Part>;
 
-/// The classes: the name of each, and what draws its shapes.
+/// The classes: their names, and the functions that draw their shapes.
 pub(crate) const KINDS: [(&str, Draw); 5] =
     [("airplane", airplane), ("car", car), ("chair", chair), ("lamp", lamp), ("table", table)];
 
@@ -79,7 +79,7 @@ fn car(random: &mut StdRng) -> Vec<Part> {
     let deck = random.random_range(0.0..0.06);
     let roof = deck + random.random_range(0.07..0.16);
     let cabin = half_length * random.random_range(0.35..0.75);
-    // From a pick-up, whose cabin is ahead, to a hatchback.
+    // From a pick-up, with its cabin in front, to a hatchback.
     let cabin_z = (half_length - cabin) * random.random_range(-0.5..1.0);
     let wheel = random.random_range(0.06..0.085);
     let axle = half_length * random.random_range(0.55..0.68);
@@ -167,7 +167,7 @@ fn lamp(random: &mut StdRng) -> Vec<Part> {
         Part::Cone { centre, low: shade_low, high: top, radii: [wide, narrow] },
     ];
     if random.random_bool(0.4) {
-        // A bulb of a body above the foot.
+        // A bulbous body above the foot.
         let radius = random.random_range(0.07..0.13);
         let y = base_top + 0.8 * radius;
         parts.push(Part::stroke([0.0, y, 0.0], [0.0, y + 0.04, 0.0], [radius, 0.7 * radius]));
@@ -229,7 +229,7 @@ mod tests {
                 let solid = solid(kind, &mut StdRng::seed_from_u64(seed));
                 let inside = Voxels::of_solid(|p| solid.distance(p) < 0.0).count();
                 assert!((150..16_000).contains(&inside), "{name} {seed}: {inside} cells");
-                // Just beyond the sides of the cube there is nothing.
+                // There is nothing just outside the sides of the cube.
                 for k in 0..3 {
                     for (u, v) in (0..20 * 20).map(|i| (i / 20, i % 20)) {
                         let [u, v] = [u, v].map(|i| f64::from(i) / 19.0 - 0.5);

@@ -25,10 +25,10 @@ use crate::{
     parts::{received, sent},
 };
 
-/// Added to the root of Adam's second moment. Source: the default that the released code leaves as it is.
+/// Added to the root of Adam's second moment. Source: the default, which the released code does not change.
 const EPSILON: f32 = 1e-8;
 
-/// A network and a softness, each with an optimiser of its own.
+/// A network and a softness, with separate optimisers.
 pub(crate) struct Learner<B: RasterBackend> {
     network: Network<Autodiff<B>>,
     softness: SoftStep<Autodiff<B>>,
@@ -37,7 +37,7 @@ pub(crate) struct Learner<B: RasterBackend> {
     objective: Objective<Autodiff<B>>,
 }
 
-/// What a step found.
+/// Results of a step.
 pub(crate) struct Step {
     /// Before the step: `1 - IoU` of the silhouettes, and the smoothness.
     pub(crate) silhouette: f64,
@@ -45,7 +45,7 @@ pub(crate) struct Step {
     pub(crate) time: Time,
 }
 
-/// What a batch gives.
+/// Losses and gradients of a batch.
 struct Gradients {
     silhouette: f64,
     smoothness: f64,
@@ -54,24 +54,24 @@ struct Gradients {
     time: Time,
 }
 
-/// burn has one seed for the whole process: held while weights are drawn from it.
+/// burn has one seed for the whole process: locked while weights are drawn from it.
 static DRAWING: Mutex<()> = Mutex::new(());
 
-/// Of burn's recorders to bytes the one that gives an error, not a panic, where they do not fit.
+/// The recorder of burn to bytes that returns an error for invalid data, instead of a panic.
 type Bytes = NamedMpkBytesRecorder<FullPrecisionSettings>;
 
 impl<B: RasterBackend> Learner<B> {
-    /// One that has learned nothing.
+    /// An untrained learner.
     ///
     /// # Errors
     ///
-    /// If the T-conorm has no such name.
+    /// If the T-conorm's name is unknown.
     pub(crate) fn new(settings: &Settings, device: &B::Device) -> anyhow::Result<Self> {
         let vertices = Template::<B>::new(device).vertices();
         let drawing = DRAWING.lock().unwrap_or_else(PoisonError::into_inner);
         B::seed(device, settings.seed);
         let network = Network::new(settings.width, vertices, device);
-        // burn draws weights when they are first read: now, while the seed holds.
+        // burn draws weights at their first use: now, while the seed is locked.
         let _count = network.num_params();
         drop(drawing);
         let softness = soft_step(settings.softness, &settings.phi, device);
@@ -80,12 +80,12 @@ impl<B: RasterBackend> Learner<B> {
         Ok(Self { network, softness, of_network: adam.init(), of_softness: adam.init(), objective })
     }
 
-    /// The network as it stands, without gradients.
+    /// The current network, without gradients.
     pub(crate) fn network(&self) -> Network<B> {
         self.network.valid()
     }
 
-    /// Parameters of the softness as they stand.
+    /// The current parameters of the softness.
     pub(crate) fn phi(&self) -> Vec<f64> {
         numbers(self.softness.phi.val())
     }
@@ -103,10 +103,10 @@ impl<B: RasterBackend> Learner<B> {
         self.apply(gradients, rates, start)
     }
 
-    /// One step on a batch that comes in `parts` of one size, which the processes of `world` share: each brings every so many-th. The means
-    /// of what the parts give are summed in their order, so that the number of processes changes nothing.
+    /// One step on a batch that comes in `parts` of equal size, distributed over the processes of `world`: rank r of n computes parts r, r
+    /// + n, ... The means over the parts are summed in their order, so that the result does not depend on the number of processes.
     ///
-    /// Batch norms see a part at a time.
+    /// Batch norms see one part at a time.
     pub(crate) fn step_in_parts(
         &mut self,
         own: &[PairBatch<Autodiff<B>>],
@@ -121,7 +121,7 @@ impl<B: RasterBackend> Learner<B> {
         for part in own {
             self.network = received(self.network.clone(), &before).0;
             let gradients = self.gradients(part);
-            // Its states are there once a record is taken.
+            // Taking a record updates its states.
             let _ = self.network.clone().into_record();
             time.add(&gradients.time);
             let losses = [gradients.silhouette, gradients.smoothness].map(|loss| loss as f32);
@@ -157,14 +157,14 @@ impl<B: RasterBackend> Learner<B> {
 
     /// Losses and gradients of a batch.
     ///
-    /// The way back has parts, so that what each takes is known: from either loss to the vertices (and
+    /// The backward pass is split, to time its components: from either loss to the vertices (and
     /// φ), then from the vertices through the network.
     fn gradients(&mut self, batch: &PairBatch<Autodiff<B>>) -> Gradients {
         let start = Instant::now();
         let mut time = Time { pictures: batch.views.len(), ..Time::default() };
         let (centre, displacement) = self.network.forward(batch.pictures.clone());
         let vertices = self.objective.template().deformed(centre, displacement);
-        // Some backends work while the program goes on: waiting makes the times true.
+        // Some backends are asynchronous: waiting makes the times accurate.
         wait::<B>(&vertices);
         let mut network = start.elapsed();
 
@@ -196,7 +196,7 @@ impl<B: RasterBackend> Learner<B> {
         Gradients { silhouette, smoothness, of_network, of_softness, time }
     }
 
-    /// A step down gradients that took their time since `start`.
+    /// Applies gradients, whose computation began at `start`.
     fn apply(&mut self, gradients: Gradients, rates: [f64; 2], start: Instant) -> Step {
         let Gradients { silhouette, smoothness, of_network, of_softness, mut time } = gradients;
         let [network_rate, softness_rate] = rates;
@@ -211,7 +211,7 @@ impl<B: RasterBackend> Learner<B> {
         Step { silhouette, smoothness, time }
     }
 
-    /// Everything that learns, as bytes.
+    /// The state of all modules and optimisers, as bytes.
     ///
     /// # Errors
     ///
@@ -223,11 +223,11 @@ impl<B: RasterBackend> Learner<B> {
         Ok(Recorder::<Autodiff<B>>::record(&recorder, (modules, optimizers), ())?)
     }
 
-    /// The same learner with what [`Learner::to_bytes`] has kept.
+    /// The learner with the state of [`Learner::to_bytes`].
     ///
     /// # Errors
     ///
-    /// If they are not that.
+    /// If the bytes are invalid.
     pub(crate) fn with_bytes(mut self, bytes: Vec<u8>, device: &B::Device) -> anyhow::Result<Self> {
         let recorder = Bytes::default();
         let loaded = Recorder::<Autodiff<B>>::load::<Records<B>>(&recorder, bytes, device);
@@ -243,7 +243,7 @@ impl<B: RasterBackend> Learner<B> {
     }
 }
 
-/// What a learner keeps: both modules, then both optimisers.
+/// State of a learner: both modules, then both optimisers.
 type Records<B> = (
     (ModuleRecord<B, Network<Autodiff<B>>>, ModuleRecord<B, SoftStep<Autodiff<B>>>),
     (OptimizerRecord<B, Network<Autodiff<B>>>, OptimizerRecord<B, SoftStep<Autodiff<B>>>),
@@ -252,7 +252,7 @@ type ModuleRecord<B, M> = <M as Module<Autodiff<B>>>::Record;
 type OptimizerRecord<B, M> =
     <OptimizerAdaptor<Adam, M, Autodiff<B>> as Optimizer<M, Autodiff<B>>>::Record;
 
-/// Waits until a tensor is there.
+/// Waits until a tensor has been computed.
 fn wait<B: RasterBackend>(tensor: &Tensor<Autodiff<B>, 3>) {
     let _ = tensor.clone().inner().narrow(2, 0, 1).into_data();
 }

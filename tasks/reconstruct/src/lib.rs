@@ -1,18 +1,18 @@
 //! Single-view 3D reconstruction: a network that learns shapes from their silhouettes.
 //!
-//! An encoder sees one picture of 64×64 pixels, a decoder says how the 642 vertices of a sphere move.
-//! Nothing tells them the shape: the loss compares soft silhouettes of what they made with those of
-//! two pictures, from both cameras. Source: Wu et al. 2024, Sec. 5.2; docs/notes.md, Reconstruction.
+//! An encoder takes one picture of 64×64 pixels, and a decoder returns the displacements of the 642 vertices of a
+//! sphere. There is no 3D supervision: the loss compares soft silhouettes of the predictions with those of two
+//! pictures, from both cameras. Source: Wu et al. 2024, Sec. 5.2; docs/notes.md, Reconstruction.
 //!
-//! **Loss.** `1 - IoU` of the silhouettes, mean over the four of each pair of pictures, plus what keeps
-//! surfaces smooth ([`Smoothness`]).
+//! **Loss.** `1 - IoU` of the silhouettes, mean over the four of each pair of pictures, plus a
+//! smoothness term ([`Smoothness`]).
 //!
-//! **Softness.** Its parameters learn beside the network, by an optimiser of their own. In the released
-//! script they do not: its optimiser is made before they are.
+//! **Softness.** Its parameters are learned together with the network, by a separate optimiser. In
+//! the released script they are not: its optimiser is made before they are.
 //!
 //! **Metric.** `IoU` of [`Voxels`], mean over the shapes of a class, then over the classes.
 //!
-//! **Data.** [`Procedural`] makes shapes up; [`NpzFolder`] reads the public files of earlier papers.
+//! **Data.** [`Procedural`] generates shapes; [`NpzFolder`] reads the public files of earlier papers.
 
 #[cfg(not(any(feature = "ndarray", feature = "flex", feature = "wgpu")))]
 compile_error!("reconstruct needs a backend: turn on one of the features flex, ndarray and wgpu");

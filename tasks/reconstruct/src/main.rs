@@ -1,6 +1,6 @@
 //! Single-view 3D reconstruction: a network that learns shapes from their silhouettes.
 
-/// Pictures come and go by the thousand, each too large for the system's allocator to keep.
+/// Images are allocated by the thousand, each too large for the system's allocator to reuse.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

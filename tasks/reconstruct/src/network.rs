@@ -18,9 +18,9 @@ use crate::SIZE;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Width {
-    /// Those of the paper: 26 million parameters.
+    /// The widths of the paper: 26 million parameters.
     Paper,
-    /// A quarter of them everywhere: 2.3 million parameters, for a CPU.
+    /// A quarter of these widths: 2.3 million parameters, for a CPU.
     Quarter,
 }
 
@@ -41,11 +41,11 @@ impl Width {
     }
 }
 
-/// An encoder that sees a picture and a decoder that says how the vertices of a sphere move.
+/// An encoder of a picture, and a decoder to displacements of the vertices of a sphere.
 ///
-/// Three convolutions of 5×5 with stride 2 to 64, 128 and 256 channels, each with a batch norm; fully
+/// Three 5×5 convolutions with stride 2 to 64, 128 and 256 channels, each with a batch norm; fully
 /// connected layers of 1024, 1024 and 512 (the code), then of 1024 and 2048, and from there to a
-/// centre and to all vertices. Rectifiers between all of them. Source: docs/notes.md, Reconstruction.
+/// centre and to all vertices. ReLUs between all of them. Source: docs/notes.md, Reconstruction.
 #[derive(Module, Debug)]
 pub struct Network<B: Backend> {
     convolutions: Vec<Conv2d<B>>,
@@ -59,11 +59,11 @@ pub struct Network<B: Backend> {
 const CHANNELS: [usize; 3] = [64, 128, 256];
 /// Outputs of the fully connected layers of the encoder, then of the decoder.
 const CONNECTED: [usize; 5] = [1024, 1024, 512, 1024, 2048];
-/// The centre moves slowly at first. Source: docs/notes.md, Reconstruction.
+/// Scale of the centre's output, so that it moves slowly at first. Source: docs/notes.md, Reconstruction.
 const CENTRE: f64 = 0.1;
 
 impl<B: Backend> Network<B> {
-    /// A network that has learned nothing, for a template of so many `vertices`.
+    /// An untrained network, for a template with this many `vertices`.
     pub fn new(width: Width, vertices: usize, device: &B::Device) -> Self {
         let mut channels = vec![4];
         channels.extend(CHANNELS.map(|channels| width.of(channels)));
@@ -111,12 +111,12 @@ impl<B: Backend> Network<B> {
     }
 }
 
-/// Width and height of the window, the stride, and the zeros around a picture.
+/// Width and height of the window, the stride, and the padding.
 const WINDOW: usize = 5;
 const STRIDE: usize = 2;
 const PADDING: usize = 2;
 
-/// A layer of 5×5 windows at every second pixel, with two zeros around the picture.
+/// A layer of 5×5 windows at every second pixel, with zero padding of two pixels.
 pub fn convolution<B: Backend>(ends: [usize; 2], device: &B::Device) -> Conv2d<B> {
     Conv2dConfig::new(ends, [WINDOW; 2])
         .with_stride([STRIDE; 2])
@@ -127,8 +127,8 @@ pub fn convolution<B: Backend>(ends: [usize; 2], device: &B::Device) -> Conv2d<B
 /// The layer's `forward` as one product of matrices: `[pictures, channels, height, width]` to
 /// `[pictures, outputs, height / 2, width / 2]`, for an even height and width.
 ///
-/// Pixels at every second place are four pictures of a quarter; of these a window's 25 pixels are
-/// slices. burn-ndarray itself multiplies pixel by pixel, which takes several times as long.
+/// Pixels at every second place form four pictures of a quarter; a window's 25 pixels are slices of
+/// these. burn-ndarray itself multiplies pixel by pixel, which takes several times as long.
 pub fn convolved<B: Backend>(layer: &Conv2d<B>, pictures: Tensor<B, 4>) -> Tensor<B, 4> {
     let [count, channels, height, width] = pictures.dims();
     let [rows, columns] = [height, width].map(|size| size / STRIDE);

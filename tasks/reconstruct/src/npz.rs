@@ -11,18 +11,18 @@ use anyhow::{Context, anyhow, bail, ensure};
 use softrast_mesh::open_regular;
 use zip::{CompressionMethod, ZipArchive};
 
-/// The only array of an NPZ file, whose rows are read when they are asked for.
+/// The only array of an NPZ file; rows are read on demand.
 ///
-/// An array that is not compressed is read where it lies. A compressed one is unpacked to a temporary
-/// file when it is opened, because deflated bytes cannot be reached out of order; the system removes
-/// that file at the end. Neither is ever in memory as a whole.
+/// An uncompressed array is read in place. A compressed one is unpacked to a temporary file when it
+/// is opened, because deflated bytes have no random access; the system removes that file at the
+/// end. Neither is ever completely in memory.
 #[derive(Debug)]
 pub(crate) struct NpzArray {
     path: PathBuf,
     file: Mutex<File>,
     element: Element,
     rows: usize,
-    /// Bytes of a row, and where the first one begins.
+    /// Bytes of a row, and the position of the first one.
     row: usize,
     start: u64,
 }
@@ -32,7 +32,7 @@ impl NpzArray {
     ///
     /// # Errors
     ///
-    /// One line that names the file and what is wrong with it.
+    /// A message of one line with the file and its fault.
     pub(crate) fn open(path: &Path, shape: &[usize]) -> anyhow::Result<Self> {
         Self::opened(path, shape).with_context(|| format!("cannot use {}", path.display()))
     }
@@ -102,7 +102,7 @@ impl NpzArray {
     }
 }
 
-/// The rest of an entry in a temporary file; checks its sum.
+/// Unpacks the rest of an entry to a temporary file, and checks its checksum.
 fn unpacked(entry: &mut impl Read, size: u64) -> anyhow::Result<File> {
     let mut file = tempfile::tempfile().context("cannot make a temporary file to unpack it")?;
     let copied = io::copy(entry, &mut file);
@@ -130,7 +130,7 @@ impl Element {
     }
 }
 
-/// What an array holds.
+/// Header of an array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Head {
     pub(crate) element: Element,
@@ -144,7 +144,7 @@ impl Head {
     ///
     /// # Errors
     ///
-    /// If it is not that of an array in C order of a type that is known here.
+    /// If it is not the header of an array in C order with a supported type.
     pub(crate) fn read(from: &mut impl Read) -> anyhow::Result<Self> {
         let mut start = [0; 8];
         from.read_exact(&mut start).context("it is cut off")?;
@@ -160,7 +160,7 @@ impl Head {
         ensure!(size <= 1 << 16, "its head of {size} bytes is too long");
         let mut text = vec![0; size];
         from.read_exact(&mut text).context("it is cut off")?;
-        // So that a message that quotes it is one line.
+        // Keeps a message that quotes it on one line.
         let text = String::from_utf8_lossy(&text).replace(char::is_control, " ");
         let value = |key: &str| -> anyhow::Result<&str> {
             let found = text.split_once(&format!("'{key}':")).map(|(_, rest)| rest.trim_start());
@@ -185,7 +185,7 @@ impl Head {
         Ok(Self { element, shape, length: 8 + digits + size })
     }
 
-    /// Bytes of all elements; nothing if there are more than can be counted.
+    /// Bytes of all elements; `None` on overflow.
     pub(crate) fn data_bytes(&self) -> Option<u64> {
         let mut sizes = self.shape.iter().map(|&size| size as u64);
         sizes.try_fold(self.element.bytes() as u64, u64::checked_mul)

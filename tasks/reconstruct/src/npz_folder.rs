@@ -14,10 +14,10 @@ use crate::{
 
 /// Shapes in the public files of earlier papers.
 ///
-/// A class has two files for each split: `<class>_<split>_images.npz` with `[shapes, 24, 4, 64, 64]`
-/// bytes (24 views of red, green, blue and alpha) and `<class>_<split>_voxels.npz` with `[shapes, 32,
-/// 32, 32]` truth values. View k is taken from azimuth -15 k degrees; the order of the voxels is told
-/// at [`Voxels`]. Rows are read when they are asked for.
+/// A class has two files per split: `<class>_<split>_images.npz` with `[shapes, 24, 4, 64, 64]`
+/// bytes (24 views of red, green, blue and alpha) and `<class>_<split>_voxels.npz` with `[shapes,
+/// 32, 32, 32]` truth values. View k is taken from azimuth -15 k degrees; for the order of the
+/// voxels see [`Voxels`]. Rows are read on demand.
 ///
 /// Source: the layout of Kato et al. 2018; docs/notes.md, Reconstruction.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ impl NpzFolder {
     ///
     /// # Errors
     ///
-    /// One line that names the file that is missing or cannot be used, and says why.
+    /// A message of one line with the missing or invalid file and the reason.
     pub fn open(folder: &Path, split: Split) -> anyhow::Result<Self> {
         let name = folder.display();
         let entries =
@@ -40,7 +40,7 @@ impl NpzFolder {
         let mut classes = Vec::new();
         for entry in entries {
             let file = entry?.file_name();
-            // A class is there if any split of it is: what is missing of it is an error below.
+            // A class exists if any of its splits does; missing files are reported below.
             let class = [Split::Train, Split::Val, Split::Test].into_iter().find_map(|split| {
                 let tail = format!("_{}_images.npz", split.name());
                 Some(file.to_str()?.strip_suffix(&tail)?.to_owned())
@@ -93,7 +93,7 @@ impl Shapes for NpzFolder {
     fn picture(&self, class: usize, shape: usize, view: usize) -> anyhow::Result<Vec<u8>> {
         let mut planes = self.images[class].part(shape, [view, VIEWS])?;
         debug_assert_eq!(planes.len(), PICTURE);
-        // The axes of their cameras are left-handed, which shows the shapes mirrored.
+        // Their camera axes are left-handed, which mirrors the shapes.
         planes.chunks_mut(SIZE).for_each(<[u8]>::reverse);
         Ok(planes)
     }

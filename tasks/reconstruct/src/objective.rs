@@ -1,4 +1,4 @@
-//! What a training lowers: `1 - IoU` of silhouettes, and what keeps surfaces smooth.
+//! The loss of a training: `1 - IoU` of silhouettes, and a smoothness term.
 
 use softrast_mesh::Edges;
 use softrast_raster::{
@@ -11,11 +11,11 @@ use softrast_tensor::{Backend, Element, Int, Tensor, TensorData, tensor_on};
 
 use crate::{SIZE, Template, orbit};
 
-/// Steps after which support and knots follow a softness that learns.
+/// Number of steps between updates of support and knots to the learned softness.
 const RENEW: usize = 25;
 
-/// Largest error of a pixel. Steps are noisy anyway, and an MLP that has not learned yet, whose tails
-/// end late, would draw every face on every pixel at a tenth of it.
+/// Largest error of a pixel. Steps are noisy anyway, and an untrained MLP, whose tails end late,
+/// would draw every face on every pixel at a tenth of it.
 const TOLERANCE: f64 = 1e-3;
 
 /// The silhouettes of predicted shapes against those of their pictures.
@@ -38,8 +38,8 @@ impl<B: RasterBackend> Objective<B> {
         Self { rasterizer, template, smoothness, silhouette, uses: 0 }
     }
 
-    /// Starts an epoch: what is prepared does not depend on those before, so that a training which is
-    /// resumed goes on as it would have.
+    /// Starts an epoch: prepared data do not depend on earlier epochs, so that a resumed training
+    /// gives the same results.
     pub(crate) fn begin(&mut self) {
         self.uses = 0;
     }
@@ -59,14 +59,14 @@ impl<B: RasterBackend> Objective<B> {
         &self.template
     }
 
-    /// What keeps the shapes with these `vertices` `[shapes, 3, vertices]` smooth, `[1]`.
+    /// The smoothness loss `[1]` of the shapes with these `vertices` `[shapes, 3, vertices]`.
     pub(crate) fn smoothness(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         self.smoothness.loss(vertices)
     }
 
-    /// `1 - IoU` of soft silhouettes, `[1]`: of the shapes with `vertices` `[2 pairs, 3, vertices]` that
-    /// were predicted from `pictures` `[2 pairs, 4, 64, 64]` in these views, first all first pictures of
-    /// the pairs, then all second ones.
+    /// `1 - IoU` of soft silhouettes, `[1]`, for the shapes with `vertices` `[2 pairs, 3,
+    /// vertices]` that were predicted from `pictures` `[2 pairs, 4, 64, 64]` in these views: all
+    /// first pictures of the pairs, then all second ones.
     ///
     /// Either prediction of a pair is drawn from both of its views, four silhouettes; the mean is over
     /// all of them. Source: docs/notes.md, Reconstruction.
@@ -79,7 +79,7 @@ impl<B: RasterBackend> Objective<B> {
     ) -> Tensor<B, 1> {
         let pairs = views.len() / 2;
         let alpha = pictures.clone().narrow(1, 3, 1).reshape([2 * pairs, SIZE, SIZE]);
-        // Each prediction from its own view, then from that of the other picture of its pair.
+        // Each prediction from its own view, then from the other view of its pair.
         let swapped = |x: &Tensor<B, 3>| {
             Tensor::cat(vec![x.clone().narrow(0, pairs, pairs), x.clone().narrow(0, 0, pairs)], 0)
         };
@@ -102,7 +102,7 @@ pub(crate) fn orbits<B: Backend>(
     tensor_on(values, [views, 4], device)
 }
 
-/// A softness that learns, in the float type of the backend.
+/// A learnable softness, in the float type of the backend.
 pub(crate) fn soft_step<B: Backend>(
     softness: EdgeSoftness,
     phi: &[f64],
@@ -115,18 +115,18 @@ pub(crate) fn soft_step<B: Backend>(
 const LAPLACIAN: f64 = 5e-3;
 const FLATNESS: f64 = 5e-4;
 
-/// What keeps the surfaces of many shapes with the same closed topology smooth.
+/// Smoothness loss of many shapes with the same closed topology.
 #[derive(Clone, Debug)]
 pub struct Smoothness<B: Backend> {
-    /// Column v tells how far vertex v is from the mean of its neighbours, `[vertices, vertices]`. A
-    /// dense product costs less than gathering neighbours where there are many shapes.
+    /// Column v maps to the offset of vertex v from the mean of its neighbours, `[vertices,
+    /// vertices]`. A dense product costs less than gathering neighbours if there are many shapes.
     away: Tensor<B, 2>,
     /// Four vertices of each hinge, all first ones before all second ones: `[4 hinges]`.
     corners: Tensor<B, 1, Int>,
 }
 
 impl<B: Backend> Smoothness<B> {
-    /// For shapes with these faces and so many vertices.
+    /// The loss for shapes with these faces and this many vertices.
     ///
     /// # Panics
     ///
@@ -158,8 +158,8 @@ impl<B: Backend> Smoothness<B> {
     /// Mean over the shapes of 0.005 `Σ |v - mean of the neighbours of v|²` and 0.0005 `Σ (cos α + 1)²`,
     /// `[1]`, of `vertices` `[shapes, 3, vertices]`.
     ///
-    /// The first sum is over the vertices; the second over the edges between two faces, whose heights
-    /// on the edge enclose α: half a turn where the surface is flat. Source: docs/notes.md, Losses and errors.
+    /// The first sum is over the vertices; the second over the edges between two faces, whose heights on the edge
+    /// enclose α, 180 degrees on a flat surface. Source: docs/notes.md, Losses and errors.
     pub fn loss(&self, vertices: Tensor<B, 3>) -> Tensor<B, 1> {
         let [shapes, _, count] = vertices.dims();
         let rows = vertices.reshape([3 * shapes, count]);

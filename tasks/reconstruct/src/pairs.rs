@@ -6,7 +6,7 @@ use softrast_tensor::{Backend, Element, Tensor, TensorData};
 
 use crate::{SIZE, Shapes, VIEWS};
 
-/// Values of a picture: four planes.
+/// Number of values of a picture: four planes.
 pub(crate) const PICTURE: usize = 4 * SIZE * SIZE;
 
 /// A shape and two of its views.
@@ -17,10 +17,10 @@ pub(crate) struct Pair {
     views: [usize; 2],
 }
 
-/// The pairs of one epoch: classes, shapes and views are all drawn evenly.
+/// The pairs of one epoch: classes, shapes and views are drawn uniformly.
 ///
-/// Which pairs they are depends on the seed, the epoch and the number of the pair alone, so that a
-/// training that is resumed sees what it would have seen.
+/// A pair depends only on the seed, the epoch and its number, so that a resumed training sees the
+/// same pairs.
 #[derive(Debug)]
 pub(crate) struct Pairs {
     pub(crate) shapes: Arc<dyn Shapes>,
@@ -40,7 +40,7 @@ impl Pairs {
         Pair { class, shape, views: [(); 2].map(|()| random.random_range(0..VIEWS)) }
     }
 
-    /// The pictures of the pairs with these numbers, made all at once.
+    /// The pictures of the pairs with these numbers, made in parallel.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! What the parts of a step send to each other: gradients, and the states that a forward pass moves, as plain numbers.
+//! Messages between the parts of a step: gradients, and the states that a forward pass updates, as plain numbers.
 
 use softrast_tensor::{
     AutodiffBackend, Tensor, TensorData,
@@ -8,7 +8,7 @@ use softrast_tensor::{
     },
 };
 
-/// Gradients of a module, 0 where there is none, and its states, in the order of its parameters.
+/// Gradients of a module, 0 if missing, and its states, in the order of its parameters.
 pub(crate) fn sent<B: AutodiffBackend, M: Module<B>>(
     module: &M,
     gradients: &GradientsParams,
@@ -18,7 +18,7 @@ pub(crate) fn sent<B: AutodiffBackend, M: Module<B>>(
     sender.numbers
 }
 
-/// The module with other states, and the gradients, from what [`sent`] gave.
+/// The module with other states, and the gradients, from the numbers of [`sent`].
 pub(crate) fn received<B: AutodiffBackend, M: Module<B>>(
     module: M,
     numbers: &[f32],

@@ -2,10 +2,10 @@ use rand::{SeedableRng, rngs::StdRng};
 
 use crate::{Shapes, Split, Voxels, kinds, solid::Solid, view};
 
-/// Shapes that are drawn at random and made when they are asked for: any number of them, in no memory.
+/// Random shapes that are generated on demand: any number of them, without memory.
 ///
-/// Five classes: airplanes, cars, chairs, lamps and tables. Not in the paper, which learns from
-/// 13 classes of `ShapeNet`: this set needs no download.
+/// Five classes: airplanes, cars, chairs, lamps and tables. Not in the paper, which learns from 13
+/// classes of `ShapeNet`: this set needs no download.
 #[derive(Clone, Debug)]
 pub struct Procedural {
     classes: Vec<String>,
@@ -15,7 +15,7 @@ pub struct Procedural {
 }
 
 impl Procedural {
-    /// `per_class` shapes of every class; those of the three splits and of different seeds differ.
+    /// `per_class` shapes of every class; splits and seeds have different shapes.
     ///
     /// # Panics
     ///
@@ -28,7 +28,7 @@ impl Procedural {
 
     fn solid(&self, class: usize, shape: usize) -> Solid {
         let parts = [self.seed, self.split as u64, class as u64, shape as u64];
-        // A different stream for each: the generator's own seeding spreads the bits of every part.
+        // A different stream for each shape: the generator's own seeding mixes the bits of every part.
         let mut seed = [0; 32];
         for (bytes, part) in seed.chunks_mut(8).zip(parts) {
             bytes.copy_from_slice(&part.to_le_bytes());

@@ -26,13 +26,13 @@ use crate::{
     train::table,
 };
 
-/// Does what a command line asks, the name of the program being its first word.
+/// Runs a command line; its first word is the name of the program.
 ///
 /// Results go to `stdout` and to files, progress and warnings to stderr.
 ///
 /// # Errors
 ///
-/// Everything that should end the program with an error line.
+/// Every error that ends the program with an error line.
 pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failure> {
     let Some(line) = parse::<CommandLine>(CommandLine::command(), &words, stdout)? else {
         return Ok(());
@@ -45,7 +45,7 @@ pub fn execute(words: Vec<OsString>, stdout: &mut dyn Write) -> Result<(), Failu
     output.map_or(Ok(()), |output| output.print(line.json, &again, stdout))
 }
 
-/// A training that the user stops has kept the epochs before.
+/// The epochs before a stop by the user are stored.
 fn stopped(error: anyhow::Error, again: &str) -> Failure {
     let failure = Failure::from(error);
     match failure.code {
@@ -59,7 +59,7 @@ fn stopped(error: anyhow::Error, again: &str) -> Failure {
     }
 }
 
-/// The backend that was asked for, set up; of those there are flex is the quickest on a CPU.
+/// The requested backend, initialized; by default flex, the fastest on a CPU, if available.
 fn backend(asked: Option<&str>) -> anyhow::Result<BackendChoice> {
     let asked = asked.or(cfg!(feature = "flex").then_some("flex"));
     let backend = BackendChoice::among(compiled_backends!(), asked)
@@ -82,7 +82,7 @@ fn work<B: RasterBackend>(
     }
 }
 
-/// Trains, with the other processes that `mpirun` started; the first of them alone has something to say.
+/// Trains, together with the other processes of `mpirun`; only the first of them prints.
 fn train<B: RasterBackend>(
     args: &TrainArgs,
     command: String,
@@ -140,7 +140,7 @@ fn evaluate<B: RasterBackend>(args: &EvaluateArgs, device: &B::Device) -> anyhow
     Ok(Output { json, text, ..Output::default() })
 }
 
-/// Voxel `IoU` under the names of the classes.
+/// Voxel `IoU` by class name.
 fn by_class(classes: &[String], iou: &[f64]) -> serde_json::Map<String, serde_json::Value> {
     classes.iter().zip(iou).map(|(name, &iou)| (name.clone(), iou.into())).collect()
 }
@@ -166,7 +166,7 @@ fn predict_mesh<B: RasterBackend>(
     Ok(Output { json, text, ..Output::default() })
 }
 
-/// The writer of a mesh file, by its ending.
+/// The writer of a mesh file, by its extension.
 fn writer(path: &Path) -> Result<fn(&Mesh) -> Vec<u8>, MeshError> {
     let ending = path.extension().map(OsStr::to_ascii_lowercase);
     match ending.as_deref().and_then(OsStr::to_str) {
@@ -177,10 +177,10 @@ fn writer(path: &Path) -> Result<fn(&Mesh) -> Vec<u8>, MeshError> {
     }
 }
 
-/// A picture file as the network takes it: planes of red, green, blue and alpha, `[4 * 64 * 64]`.
+/// A picture file as input of the network: planes of red, green, blue and alpha, `[4 * 64 * 64]`.
 ///
-/// Others than 64×64 pixels are scaled. Colours are multiplied by alpha, because pictures that are
-/// learned from are black where nothing is.
+/// Other sizes than 64×64 pixels are scaled. Colours are multiplied by alpha, because the
+/// background of training pictures is black.
 ///
 /// # Errors
 ///

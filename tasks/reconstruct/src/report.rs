@@ -7,10 +7,10 @@ use softrast_softness::Softness;
 
 use crate::{Epoch, Header, Time, score::with_mean};
 
-/// The page of a training: figures, curves and contact sheets, in one file that needs no other.
+/// The page of a training: figures, curves and contact sheets, in one self-contained file.
 ///
-/// `sheets` are PNG files with the epochs they show; `sphere` is the voxel `IoU` of each class of the
-/// sphere that nothing has deformed.
+/// `sheets` are PNG files with their epochs; `sphere` is the voxel `IoU` of each class for the
+/// undeformed sphere.
 ///
 /// # Errors
 ///

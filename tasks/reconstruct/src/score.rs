@@ -3,26 +3,26 @@ use softrast_tensor::{Backend, numbers, tensor_on};
 
 use crate::{Network, Shapes, Template, VIEWS, Voxels, pairs, template::points};
 
-/// Pictures that the network sees at once.
+/// Pictures per batch of the network.
 const BATCH: usize = 32;
 
-/// How well shapes are told from single pictures.
+/// Scores of shapes predicted from single pictures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Score {
     /// Mean voxel `IoU` of each class, 0 to 1.
     pub classes: Vec<f64>,
-    /// The same of the sphere that no network has deformed.
+    /// Mean voxel `IoU` of each class for the undeformed sphere, 0 to 1.
     pub sphere: Vec<f64>,
     /// Pictures of each class.
     pub pictures: Vec<usize>,
 }
 
-/// Scores `network` on the first `per_class` shapes of every class, each seen from `views` views
-/// that are spread around it and differ from shape to shape.
+/// Scores `network` on the first `per_class` shapes of every class, each from `views` views that
+/// are spread around it and differ between shapes.
 ///
 /// # Errors
 ///
-/// If a shape cannot be read, or the network gives coordinates that are not finite.
+/// If a shape cannot be read, or the network returns non-finite coordinates.
 pub fn score<B: Backend>(
     network: &Network<B>,
     template: &Template<B>,
@@ -64,13 +64,13 @@ pub(crate) fn with_mean(classes: &[f64]) -> impl Iterator<Item = f64> {
     classes.iter().copied().chain([softrast_lab::mean(classes)])
 }
 
-/// Which view is the k-th of so many of a shape.
+/// The k-th of `views` views of a shape.
 pub(crate) fn view_of(shape: usize, k: usize, views: usize) -> usize {
-    // 7 and 24 have no common factor: neighbours differ, and all views come up.
+    // 7 and 24 are coprime: neighbours differ, and all views occur.
     (7 * shape + k * VIEWS / views) % VIEWS
 }
 
-/// The vertices of the shapes that the network sees in `pictures`.
+/// The vertices that the network predicts from `pictures`.
 pub(crate) fn predict<B: Backend>(
     network: &Network<B>,
     template: &Template<B>,
@@ -82,7 +82,7 @@ pub(crate) fn predict<B: Backend>(
     planes.chunks(3 * template.vertices()).map(points).collect()
 }
 
-/// The vertices that nothing has moved.
+/// The undeformed vertices.
 fn sphere<B: Backend>(template: &Template<B>, device: &B::Device) -> Vec<[f64; 3]> {
     let count = template.vertices();
     let displacement = tensor_on(vec![0.0; 3 * count], [1, 3, count], device);

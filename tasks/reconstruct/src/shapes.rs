@@ -25,14 +25,14 @@ pub trait Shapes: Debug + Send + Sync {
     fn voxels(&self, class: usize, shape: usize) -> anyhow::Result<Voxels>;
 }
 
-/// What part of a data set shapes belong to: no shape is in two.
+/// Split of a data set; the shapes of splits are disjoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Split {
     /// For learning.
     Train,
-    /// For watching how learning goes.
+    /// For validation during learning.
     Val,
-    /// For the figures at the end.
+    /// For the final scores.
     Test,
 }
 

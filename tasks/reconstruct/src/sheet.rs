@@ -1,4 +1,4 @@
-//! What the network sees and what it makes of it.
+//! Contact sheets of inputs and predictions.
 
 use image::{Rgb, RgbImage, imageops};
 use softrast_lab::contact_sheet;
@@ -12,16 +12,16 @@ use crate::{
 
 /// Small pictures are enlarged by this factor.
 const ENLARGED: u32 = 2;
-/// At most so many classes have a row, and each of them so many shapes.
+/// Most classes with a row, and shapes in each row.
 const CLASSES: usize = 13;
 const SHAPES: usize = 2;
-/// The second view is so many views away from the one that the network sees: 105 degrees.
+/// Views between the input view and the second view: 105 degrees.
 const TURNED: usize = 7;
 /// Colour of predicted shapes.
 const COLOUR: [f64; 3] = [0.55, 0.68, 0.9];
 
-/// One row for each class, and in it two shapes: what the network sees, its prediction from there, then
-/// the prediction and the truth from another side.
+/// One row per class, with two shapes each: the input, the prediction from the same view, then the
+/// prediction and the ground truth from another view.
 ///
 /// # Errors
 ///
@@ -51,7 +51,7 @@ pub(crate) fn sheet<B: Backend>(
     Ok(contact_sheet(&cells, 4 * SHAPES))
 }
 
-/// A picture of planes of red, green, blue and alpha before white.
+/// A picture from planes of red, green, blue and alpha, on white.
 fn on_white(planes: &[u8]) -> RgbImage {
     let pixels = SIZE * SIZE;
     RgbImage::from_fn(SIZE as u32, SIZE as u32, |x, y| {
@@ -64,7 +64,7 @@ fn on_white(planes: &[u8]) -> RgbImage {
     })
 }
 
-/// A mesh in a view, with the light of the pictures of solids; nearest faces win.
+/// A mesh in a view, with the light of the pictures of solids and hidden faces removed.
 pub(crate) fn drawn(vertices: &[[f64; 3]], faces: &[[u32; 3]], view: usize) -> RgbImage {
     let [distance, _, _, fov] = view::orbit(view);
     let axes = view::axes(view);

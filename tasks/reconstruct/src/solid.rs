@@ -1,13 +1,13 @@
-//! Solids made of a few simple parts: what the shapes of the procedural set are.
+//! Solids made of a few simple parts, for the shapes of the procedural set.
 
 /// A simple solid, in world units.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Part {
     /// A box with round edges: its half extents include the rounding.
     Block { centre: [f64; 3], half: [f64; 3], rounding: f64 },
-    /// A tapered stroke with round ends, along each axis thinned by a factor of at least 1.
+    /// A tapered stroke with round ends, thinned along each axis by a factor of at least 1.
     Stroke { from: [f64; 3], to: [f64; 3], radii: [f64; 2], thinned: [f64; 3] },
-    /// A cut cone around the y axis, from `low` to `high` along y, with a radius at either end.
+    /// A truncated cone around the y axis, from `low` to `high` along y, with a radius at either end.
     Cone { centre: [f64; 2], low: f64, high: f64, radii: [f64; 2] },
 }
 
@@ -17,12 +17,12 @@ impl Part {
         Self::Stroke { from, to, radii, thinned: [1.0; 3] }
     }
 
-    /// A box without round edges to speak of.
+    /// A box with practically sharp edges.
     pub(crate) fn block(centre: [f64; 3], half: [f64; 3]) -> Self {
         Self::Block { centre, half, rounding: 0.01 }
     }
 
-    /// Centre and radius of a ball around the part.
+    /// Centre and radius of a bounding ball of the part.
     pub(crate) fn ball(&self) -> ([f64; 3], f64) {
         match self {
             Self::Block { centre, half, .. } => (*centre, norm(*half)),
@@ -38,7 +38,7 @@ impl Part {
         }
     }
 
-    /// At most the distance from `p` to the part; negative inside.
+    /// A lower bound of the distance from `p` to the part; negative inside.
     pub(crate) fn distance(&self, p: [f64; 3]) -> f64 {
         match self {
             Self::Block { centre, half, rounding } => {
@@ -46,8 +46,8 @@ impl Part {
                 outside(&beyond) - rounding
             }
             Self::Stroke { from, to, radii, thinned } => {
-                // In a space stretched along the thin axes the part is round; there no distance is
-                // shorter than here, and none longer by more than the largest factor.
+                // In a space stretched along the thin axes the part is round; distances there are
+                // at least those here, and at most the largest factor times them.
                 let p = [0, 1, 2].map(|k| p[k] * thinned[k]);
                 let [from, to] = [from, to].map(|end| [0, 1, 2].map(|k| end[k] * thinned[k]));
                 let along = [0, 1, 2].map(|k| to[k] - from[k]);
@@ -55,7 +55,7 @@ impl Part {
                 let t = (dot(offset, along) / dot(along, along)).clamp(0.0, 1.0);
                 let away = norm([0, 1, 2].map(|k| offset[k] - t * along[k]));
                 let factor = thinned.iter().copied().fold(1.0, f64::max);
-                // Where it tapers, the surface is nearer than straight across the stroke.
+                // On a tapered stroke, the surface is nearer than perpendicular to its axis.
                 let slope = (radii[1] - radii[0]) / norm(along);
                 (away - radii[0] - t * (radii[1] - radii[0])) / (factor * slope.hypot(1.0))
             }
@@ -71,7 +71,7 @@ impl Part {
     }
 }
 
-/// The parts of a shape together.
+/// A shape as a union of parts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Solid {
     pub(crate) parts: Vec<Part>,
@@ -80,13 +80,13 @@ pub(crate) struct Solid {
 }
 
 impl Solid {
-    /// At most the distance from `p` to the nearest part, up to rounding; negative inside.
+    /// A lower bound of the distance from `p` to the nearest part, up to rounding; negative inside.
     pub(crate) fn distance(&self, p: [f64; 3]) -> f64 {
         self.parts.iter().map(|part| part.distance(p)).fold(f64::INFINITY, f64::min)
     }
 }
 
-/// Distance from a corner, given how far a point is beyond each side; negative inside.
+/// Distance of a point from a box, given its offset beyond each side; negative inside.
 fn outside<const N: usize>(beyond: &[f64; N]) -> f64 {
     let inside = beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max).min(0.0);
     let square: f64 = beyond.iter().map(|x| x.max(0.0).powi(2)).sum();

@@ -3,10 +3,10 @@ use std::sync::Arc;
 use softrast_mesh::icosphere;
 use softrast_tensor::{Backend, Tensor, tensor_on};
 
-/// A coordinate this near to a plane through the origin, in world units, stays in that plane: its
-/// log-odds would be about minus infinity.
+/// A coordinate this near to a plane through the origin, in world units, remains in that plane: its
+/// log-odds would be close to minus infinity.
 const ON_PLANE: f64 = 1e-6;
-/// Radius of the sphere before it is deformed, and by how much everything is scaled in the end.
+/// Radius of the sphere before it is deformed, and the factor of everything at the end.
 ///
 /// Source: docs/notes.md, Reconstruction.
 const RADIUS: f64 = 0.5;
@@ -19,7 +19,7 @@ const OUTPUT: f64 = 0.5;
 /// planes through the centre. A coordinate of 0 is that of the centre. Source: docs/notes.md, 3D shape.
 #[derive(Clone, Debug)]
 pub struct Template<B: Backend> {
-    /// `logit |v|` of each coordinate, `[1, 3, vertices]`; 0 where the sign is 0.
+    /// `logit |v|` of each coordinate, `[1, 3, vertices]`; 0 if the sign is 0.
     log_odds: Tensor<B, 3>,
     /// -1, 0 or 1, `[1, 3, vertices]`.
     sign: Tensor<B, 3>,
@@ -46,12 +46,12 @@ impl<B: Backend> Template<B> {
         self.sign.dims()[2]
     }
 
-    /// The triangles, of the sphere as of every shape that it is deformed to.
+    /// The faces, the same for the sphere and every deformed shape.
     pub fn faces(&self) -> &Arc<[[u32; 3]]> {
         &self.faces
     }
 
-    /// Where the vertices are, `[shapes, 3, vertices]` in world units, for centres `[shapes, 3]` and
+    /// The vertices, `[shapes, 3, vertices]` in world units, for centres `[shapes, 3]` and
     /// displacements `[shapes, 3, vertices]`.
     pub fn deformed(&self, centre: Tensor<B, 2>, displacement: Tensor<B, 3>) -> Tensor<B, 3> {
         let [shapes, _] = centre.dims();
@@ -63,7 +63,7 @@ impl<B: Backend> Template<B> {
     }
 }
 
-/// Vertices from their planes `[3 * vertices]`, all x first.
+/// Points from planes `[3 * vertices]`, all x first.
 pub(crate) fn points(planes: &[f64]) -> Vec<[f64; 3]> {
     let count = planes.len() / 3;
     (0..count).map(|v| [0, 1, 2].map(|k| planes[k * count + v])).collect()

@@ -23,40 +23,39 @@ pub(crate) const CHECKPOINT: &str = "checkpoint.bin";
 pub(crate) const REPORT: &str = "report.html";
 const HISTORY: &str = "history.json";
 
-/// After this part of the epochs the learning rates fall to this factor.
+/// Share of the epochs after which the learning rates fall, and their factor.
 ///
 /// Source: docs/notes.md, Reconstruction (after 150,000 of 250,000 steps, times 0.3).
 const LATE: (f64, f64) = (0.6, 0.3);
 
-/// A training and where it goes.
+/// A training and its output folder.
 #[derive(Clone, Debug)]
 pub struct Training {
-    /// What is trained.
+    /// The settings.
     pub settings: Settings,
-    /// Epochs in all.
+    /// Number of epochs.
     pub epochs: usize,
     /// Folder for checkpoint, contact sheets and report.
     pub out: PathBuf,
-    /// Whether to go on from the checkpoint in the folder.
+    /// Whether to continue from the checkpoint in the folder.
     pub resume: bool,
     /// Whether to show progress.
     pub visible: bool,
-    /// Command line that does the same again.
+    /// The command line that reproduces it.
     pub command: String,
-    /// Files that it reads, and therefore never replaces.
+    /// Input files, which it never replaces.
     pub inputs: Inputs,
 }
 
 impl Training {
-    /// Trains until the last epoch, and gives the history with the scores of the undeformed sphere.
+    /// Trains until the last epoch, and returns the history with the scores of the undeformed sphere.
     ///
-    /// After every epoch the checkpoint, a contact sheet and the report are written, each whole or
-    /// not at all.
+    /// After every epoch the checkpoint, a contact sheet and the report are written atomically, each by itself.
     ///
     /// # Errors
     ///
-    /// If shapes cannot be read, the folder holds another training, files cannot be written, or the
-    /// loss is not finite any more.
+    /// If shapes cannot be read, the folder has another training, files cannot be written, or the
+    /// loss becomes non-finite.
     pub fn run<B: RasterBackend>(
         &self,
         world: &World,
@@ -124,11 +123,11 @@ impl Training {
         Ok((header, sphere))
     }
 
-    /// The folder, in which all files of the training may be written.
+    /// The output folder, after checking that all files of the training may be written.
     fn folder(&self) -> anyhow::Result<OutputFolder> {
         let mut folder = OutputFolder::open(&self.out, "reconstruct train", &self.inputs)?;
         if folder.file(CHECKPOINT).exists() {
-            // It has been read, so it is what a training wrote.
+            // It has been read, therefore a training wrote it.
             folder.adopt(CHECKPOINT)?;
         }
         folder.claim([REPORT, HISTORY])?;
@@ -196,7 +195,7 @@ impl Training {
         let (mut loss, mut soft, mut time) = (0.0, 0.0, Time::default());
         let mut clock = Instant::now();
         for step_number in 0..steps {
-            // Those of this process.
+            // The parts of this process.
             let size = pairs / parts;
             let own = (step_number * parts..(step_number + 1) * parts).skip(world.rank());
             let own = own.step_by(world.count()).map(|part| part * size..(part + 1) * size);
@@ -232,7 +231,7 @@ impl Training {
         })
     }
 
-    /// Writes what there is after an epoch.
+    /// Writes the results after an epoch.
     #[expect(clippy::too_many_arguments, reason = "they are all that a training holds")]
     fn write<B: RasterBackend>(
         &self,
@@ -247,7 +246,7 @@ impl Training {
         let number = header.epochs.len() - 1;
         let sheet = sheet::sheet(&learner.network(), template, held_out, device)?;
         let sheet = softrast_lab::png(&sheet)?;
-        // Sheets of a few epochs tell how it went: the first, one amid, and the last.
+        // Sheets of a few epochs summarize the training: the first, one in between, and the last.
         let shown = [1.min(number), number.div_ceil(3), number];
         let mut sheets: Vec<(usize, Vec<u8>)> = Vec::new();
         for number in shown {
@@ -268,7 +267,7 @@ impl Training {
         Ok(folder.commit_beside(|name| sheets.iter().any(|sheet| sheet == name))?)
     }
 
-    /// Tells on stderr what an epoch brought.
+    /// Prints the results of an epoch to stderr.
     fn say(&self, epoch: &Epoch, world: &World) {
         if self.visible && world.is_first() {
             let loss = epoch.loss.map_or_else(String::new, |loss| format!("loss {loss:.4}, "));
@@ -284,7 +283,7 @@ fn sheet_name(epoch: usize) -> String {
     format!("epoch_{epoch:03}.png")
 }
 
-/// A line for each class and the mean, against the sphere.
+/// A line for each class and the mean, with the `IoU` of the sphere.
 pub(crate) fn table(classes: &[String], iou: &[f64], sphere: &[f64]) -> String {
     let mut text = format!("{:<14} {:>9} {:>9}", "voxel IoU", "network", "sphere");
     let names = classes.iter().map(String::as_str).chain(["mean"]);

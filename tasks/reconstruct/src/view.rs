@@ -1,5 +1,5 @@
-//! Pictures of solids by rays, without any rasterizer: what a network is taught must not depend on
-//! what it is taught with.
+//! Pictures of solids by ray casting, without the rasterizer: training data must not depend on the
+//! renderer in training.
 
 use crate::solid::{Part, Solid, dot, norm};
 
@@ -14,13 +14,13 @@ const DISTANCE: f64 = 2.732;
 const ELEVATION_DEG: f64 = 30.0;
 const FOV_DEG: f64 = 30.0;
 
-/// Nearer to a surface than this, in world units, a ray has met it: a thirtieth of a pixel.
+/// Largest distance at which a ray has met a surface, in world units: a thirtieth of a pixel.
 const MET: f64 = 8e-4;
-/// A ray that takes more steps grazes a surface for ever.
+/// Most steps of a ray; more occur only where it grazes a surface.
 const STEPS: usize = 96;
 
-/// Camera of a view: distance, elevation, azimuth and field of view, in world units and
-/// degrees, as [`softrast_raster::project`] wants them. Azimuth falls by 15 degrees from view to view.
+/// Camera of a view: distance, elevation, azimuth and field of view, in world units and degrees, as
+/// in [`softrast_raster::project`]. Azimuth falls by 15 degrees from view to view.
 pub fn orbit(view: usize) -> [f64; 4] {
     [DISTANCE, ELEVATION_DEG, -360.0 / VIEWS as f64 * view as f64, FOV_DEG]
 }
@@ -32,17 +32,17 @@ pub(crate) fn axes(view: usize) -> [[f64; 3]; 3] {
     [[-ca, 0.0, -sa], [-se * sa, ce, se * ca], [-ce * sa, -se, ce * ca]]
 }
 
-/// Light that a surface with the unit `normal` sends to the camera with these [`axes`], 0 to 1: from
-/// above, and a little from the camera's left shoulder.
+/// Light that a surface with the unit `normal` reflects to the camera with these [`axes`], 0 to 1:
+/// from above, and a little from behind the camera's left.
 pub(crate) fn light(normal: [f64; 3], axes: &[[f64; 3]; 3]) -> f64 {
     let towards = [0, 1, 2].map(|k| 0.7 * axes[1][k] - 0.8 * axes[2][k] - 0.4 * axes[0][k]);
     let facing = dot(normal, towards) / norm(towards);
     0.25 + 0.45 * facing.max(0.0) + 0.3 * (0.5 + 0.5 * normal[1])
 }
 
-/// The picture of `solid` in a view: planes of red, green, blue and alpha, `[4 * 64 * 64]`, each row
-/// by row from the top. Alpha is 255 where the ray through the centre of the pixel meets the solid,
-/// else 0, and so are the colours.
+/// The picture of `solid` in a view: planes of red, green, blue and alpha, `[4 * 64 * 64]`, each
+/// row by row from the top. Alpha is 255 if the ray through the centre of the pixel meets the
+/// solid, otherwise alpha and colours are 0.
 pub(crate) fn picture(solid: &Solid, view: usize) -> Vec<u8> {
     let axes = axes(view);
     let focal = (FOV_DEG / 2.0).to_radians().tan();
@@ -57,7 +57,7 @@ pub(crate) fn picture(solid: &Solid, view: usize) -> Vec<u8> {
         let ray = [0, 1, 2].map(|k| x * axes[0][k] + y * axes[1][k] + axes[2][k]);
         let length = norm(ray);
         let ray = ray.map(|x| x / length);
-        // Only parts whose ball the ray passes through can be met.
+        // Only parts whose bounding ball the ray passes through can be met.
         near.clear();
         let (mut start, mut end) = (f64::INFINITY, 0.0_f64);
         for (part, ball) in solid.parts.iter().zip(&balls) {
@@ -76,7 +76,7 @@ pub(crate) fn picture(solid: &Solid, view: usize) -> Vec<u8> {
     planes
 }
 
-/// Where a ray enters a ball and where it leaves it, as distances from the eye.
+/// Entry and exit of a ray through a ball, as distances from the eye.
 fn passage(eye: [f64; 3], ray: [f64; 3], (centre, radius): &([f64; 3], f64)) -> Option<(f64, f64)> {
     let offset = [0, 1, 2].map(|k| centre[k] - eye[k]);
     let along = dot(offset, ray);
@@ -84,7 +84,7 @@ fn passage(eye: [f64; 3], ray: [f64; 3], (centre, radius): &([f64; 3], f64)) -> 
     (square > 0.0).then(|| (along - square.sqrt(), along + square.sqrt()))
 }
 
-/// Where a ray first meets one of the parts: steps as long as nothing can be in the way.
+/// The first intersection of a ray with the parts, by sphere tracing.
 fn meeting(
     parts: &[&Part],
     eye: [f64; 3],
@@ -106,7 +106,7 @@ fn meeting(
     None
 }
 
-/// Which way the surface looks near `p`.
+/// The surface normal near `p`.
 fn normal(solid: &Solid, p: [f64; 3]) -> [f64; 3] {
     const H: f64 = 1e-4;
     let at = |k: usize, by: f64| {

@@ -1,14 +1,14 @@
-/// Cells of a grid along each axis.
+/// Grid cells along each axis.
 pub(crate) const CELLS: usize = 32;
 
-/// Which cells of a cube of `32³` are full.
+/// Occupancy of a grid of `32³` cells.
 ///
-/// The centre of cell `i` along an axis lies at `(i - 15.5) / 31` world units, so that the outermost
-/// centres are at ±0.5. A cell is full where its centre is inside the shape. Kept in the order of the
-/// public files: y rises with the first index, x with the second, and z falls with the third.
+/// The centre of cell `i` along an axis lies at `(i - 15.5) / 31` world units, so that the outermost centres are at
+/// ±0.5. A cell is full if its centre is inside the shape. Stored in the order of the public files: y rises with the
+/// first index, x with the second, and z falls with the third.
 ///
 /// Source: docs/notes.md, Reconstruction (grid of 32³). Not in the paper: thin surfaces do not fill the cells that they
-/// touch, because only the rule of centres can be held against solids whose volume is known.
+/// touch, because only the rule of centres can be tested against solids of known volume.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Voxels(Vec<bool>);
 
@@ -17,13 +17,13 @@ fn centre(cell: usize) -> f64 {
     (cell as f64 - 15.5) / 31.0
 }
 
-/// Where cell `[x, y, z]` is kept.
+/// Index of cell `[x, y, z]`.
 fn place([x, y, z]: [usize; 3]) -> usize {
     (y * CELLS + x) * CELLS + (CELLS - 1 - z)
 }
 
 impl Voxels {
-    /// The cells whose centres are `inside`.
+    /// The cells whose centres satisfy `inside`.
     pub fn of_solid(inside: impl Fn([f64; 3]) -> bool) -> Self {
         let mut full = vec![false; CELLS.pow(3)];
         for x in 0..CELLS {
@@ -36,15 +36,15 @@ impl Voxels {
         Self(full)
     }
 
-    /// The cells that the closed surface of `faces` winds around, however often and in whichever
-    /// direction; so it may cut through itself.
+    /// The cells with a non-zero winding number of the closed surface of `faces`, in either
+    /// direction; the surface may intersect itself.
     ///
-    /// Rays along z are counted with their signs. Two faces that share an edge test it in the same
-    /// way, so that no ray slips between them or is counted twice.
+    /// Crossings of rays along z are counted with their signs. Two faces that share an edge test it
+    /// identically, so that no ray slips between them or is counted twice.
     ///
     /// # Panics
     ///
-    /// If a face uses a vertex that is not there.
+    /// If a face uses a missing vertex.
     pub fn of_mesh(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Self {
         let mut winding = vec![0_i32; CELLS.pow(3)];
         for face in faces {
@@ -68,7 +68,7 @@ impl Voxels {
     ///
     /// # Panics
     ///
-    /// If there are not `32³`.
+    /// If their number is not `32³`.
     pub(crate) fn from_file_order(full: Vec<bool>) -> Self {
         assert_eq!(full.len(), CELLS.pow(3), "cells of a grid");
         Self(full)
@@ -92,7 +92,7 @@ impl Voxels {
     }
 }
 
-/// Cells whose centres lie from the least to the greatest of three coordinates.
+/// Cells whose centres lie between the smallest and the largest of three coordinates.
 fn cells_between(coordinates: [f64; 3]) -> std::ops::Range<usize> {
     let low = coordinates.into_iter().fold(f64::INFINITY, f64::min);
     let high = coordinates.into_iter().fold(f64::NEG_INFINITY, f64::max);
@@ -102,7 +102,7 @@ fn cells_between(coordinates: [f64; 3]) -> std::ops::Range<usize> {
     first..end.min(CELLS)
 }
 
-/// How often, with its sign, a triangle turns around the line through (x, y), and at which z the two meet.
+/// The signed crossing of a triangle by the line through (x, y) along z, and its z.
 fn crossing(corners: &[[f64; 3]; 3], x: f64, y: f64) -> Option<(i32, f64)> {
     let sign: i32 = (0..3).map(|k| passes(corners[k], corners[(k + 1) % 3], x, y)).sum();
     if sign == 0 {
@@ -113,20 +113,20 @@ fn crossing(corners: &[[f64; 3]; 3], x: f64, y: f64) -> Option<(i32, f64)> {
     let weights = [part(b, c), part(c, a), part(a, b)];
     let area: f64 = weights.iter().sum();
     let height = (weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2]) / area;
-    // Where the triangle is seen from its side, rounding may throw the height anywhere.
+    // If the triangle is seen edge-on, the height has a large rounding error.
     let low = a[2].min(b[2]).min(c[2]);
     let height = if height.is_finite() { height } else { low };
     Some((sign, height.clamp(low, a[2].max(b[2]).max(c[2]))))
 }
 
-/// 1 or -1 where the edge from `a` to `b` passes to the right of (x, y), upwards or downwards.
+/// 1 or -1 if the edge from `a` to `b` passes to the right of (x, y), upwards or downwards.
 fn passes(a: [f64; 3], b: [f64; 3], x: f64, y: f64) -> i32 {
     let up = match (a[1] <= y, b[1] <= y) {
         (true, false) => 1,
         (false, true) => -1,
         _ => return 0,
     };
-    // Always from the lower end, so that both faces of an edge round alike.
+    // Always from the lower end, so that both faces of an edge round equally.
     let (low, high) = if up == 1 { (a, b) } else { (b, a) };
     let left = (high[0] - low[0]) * (y - low[1]) - (x - low[0]) * (high[1] - low[1]);
     if left > 0.0 { up } else { 0 }
@@ -142,7 +142,7 @@ mod tests {
         Voxels::of_mesh(mesh.positions(), mesh.faces())
     }
 
-    /// A mesh whose vertices are those of `mesh` after `map`.
+    /// A mesh with the vertices of `mesh` after `map`.
     fn mapped(mesh: &Mesh, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
         let positions = mesh.positions().iter().map(|&p| map(p)).collect();
         Mesh::new(positions, mesh.faces().to_vec()).unwrap()

@@ -11,7 +11,7 @@ use softrast_test_kit::mpirun;
 const LINE: &str =
     "train --shapes 3 --pairs 4 --parts 4 --steps 2 --val 1 --softness gauss --quiet --json";
 
-/// What the program alone, or so many processes of it, trained: the history, and the checkpoint, both without times.
+/// Results of the program alone, or of this many processes: the history, and the checkpoint, both without times.
 fn trained(out: &Path, processes: Option<usize>, more: &str) -> [Value; 2] {
     let program = env!("CARGO_BIN_EXE_reconstruct");
     let mut command = match processes {
@@ -41,7 +41,7 @@ fn any_number_of_processes_trains_the_same_to_the_last_bit() {
         let out = tempfile::tempdir().unwrap();
         assert_eq!(trained(out.path(), Some(processes), "--epochs 3"), expected, "{processes}");
     }
-    // The first epochs by two, the rest by three; rates fall in the second epoch of two as of three.
+    // The first epochs by two processes, the rest by three; rates fall in the second epoch of two as of three.
     let out = tempfile::tempdir().unwrap();
     trained(out.path(), Some(2), "--epochs 2");
     assert_eq!(trained(out.path(), Some(3), "--epochs 3 --resume"), expected);

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::program::run;
 
-/// The file of a training that is as small as it can be: its header, and what follows it.
+/// The file of the smallest possible training: its header, and the bytes after it.
 fn written() -> &'static (Value, Vec<u8>) {
     static WRITTEN: OnceLock<(Value, Vec<u8>)> = OnceLock::new();
     WRITTEN.get_or_init(|| {
@@ -22,7 +22,7 @@ fn written() -> &'static (Value, Vec<u8>) {
     })
 }
 
-/// Evaluates a file: fine, or one line that names it and says what to do.
+/// Evaluates a file: succeeds, or fails with one line that names it and the remedy.
 fn evaluate(bytes: &[u8]) -> Result<(), TestCaseError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("checkpoint.bin");

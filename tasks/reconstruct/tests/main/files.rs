@@ -34,7 +34,7 @@ pub(crate) fn class(folder: &Path, name: &str, of: usize, split: Split, method: 
     let mut voxels = Vec::new();
     for shape in 0..2 {
         for view in 0..VIEWS {
-            // Files of that layout show the shapes mirrored.
+            // Files of this layout have mirrored shapes.
             let mut planes = shapes.picture(of, shape, view).unwrap();
             planes.chunks_mut(64).for_each(<[u8]>::reverse);
             images.extend(planes);
@@ -46,7 +46,7 @@ pub(crate) fn class(folder: &Path, name: &str, of: usize, split: Split, method: 
     npz(&path(folder, name, split, "voxels"), &npy("|b1", "2, 32, 32, 32", &voxels), method);
 }
 
-/// Where a file of a class stands.
+/// The path of a file of a class.
 pub(crate) fn path(folder: &Path, name: &str, split: Split, what: &str) -> PathBuf {
     folder.join(format!("{name}_{}_{what}.npz", split.name()))
 }

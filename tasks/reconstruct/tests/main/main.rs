@@ -1,4 +1,4 @@
-//! The program as its user sees it, and the parts that cross crates.
+//! The whole program, and tests across crates.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -73,7 +73,7 @@ fn what_is_wrong_with_a_file_is_said_in_one_line_that_names_it() {
     npz(&images, &single, CompressionMethod::Deflated);
     check(error(), &["car_train_images.npz holds 1 shapes, but", "car_train_voxels.npz holds 2"]);
 
-    // A byte of the compressed pictures that a disk has lost.
+    // A damaged byte of the compressed pictures.
     class(folder, "car", 1, Split::Train, CompressionMethod::Deflated);
     let mut bytes = fs::read(&images).unwrap();
     let middle = bytes.len() / 2;
@@ -82,7 +82,7 @@ fn what_is_wrong_with_a_file_is_said_in_one_line_that_names_it() {
     check(error(), &["cannot use", "car_train_images.npz", "damaged"]);
 }
 
-/// The bytes of both files of a class, not compressed and compressed: made once, because pictures take a while.
+/// The bytes of both files of a class, uncompressed and compressed: made once, because pictures are slow.
 fn whole() -> &'static [[Vec<u8>; 2]; 2] {
     static WHOLE: OnceLock<[[Vec<u8>; 2]; 2]> = OnceLock::new();
     WHOLE.get_or_init(|| {
@@ -99,7 +99,7 @@ const WHAT: [&str; 2] = ["images", "voxels"];
 proptest! {
     #![proptest_config(softrast_test_kit::cases(200))]
 
-    /// Heads stand at both ends of a file, so most of the damage is done there.
+    /// Headers are at both ends of a file, so most of the damage is done there.
     #[test]
     fn a_damaged_file_is_read_or_ends_in_one_line_that_names_it(
         compressed: bool, voxels: bool, cut: bool, from_end: bool, at in 0..260_usize, bytes: [u8; 3],

@@ -7,7 +7,7 @@ use reconstruct::{Checkpoint, execute};
 use serde_json::Value;
 use softrast_test_kit::Program;
 
-/// Runs the program; what it prints, or its error line.
+/// Runs the program, and returns its output or its error line.
 pub(crate) fn run(line: &str) -> Result<String, String> {
     let words =
         ["reconstruct"].into_iter().chain(line.split_whitespace()).map(Into::into).collect();
@@ -18,7 +18,7 @@ pub(crate) fn run(line: &str) -> Result<String, String> {
     }
 }
 
-/// A training that is as small as it can be.
+/// The smallest possible training.
 fn train(out: &Path, more: &str) -> Result<String, String> {
     run(&format!(
         "train --quick --pairs 2 --steps 2 --shapes 4 --val 1 --quiet --out {} {more}",
@@ -46,7 +46,7 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not() {
     let [whole, parts] = ["whole", "parts"].map(|name| root.path().join(name));
     let printed = train(&whole, "--epochs 3").unwrap();
     assert!(printed.contains("voxel IoU") && printed.contains("airplane"), "{printed}");
-    // A folder where a picture should go stops the second epoch at its very end.
+    // A folder in the place of a picture stops the second epoch at its very end.
     let obstacle = parts.join("epoch_002.png");
     fs::create_dir_all(obstacle.join("x")).unwrap();
     assert!(train(&parts, "--epochs 3").unwrap_err().contains("epoch_002.png"));
@@ -161,7 +161,7 @@ fn methods_are_compared_in_one_table() {
         assert!(table.contains(part), "{table}");
     }
     assert!(run(&line).unwrap_err().contains("is there already"));
-    // What is done is not done again: the times are the same.
+    // Finished work is not repeated: the times are the same.
     assert_eq!(run(&format!("{line} --resume")).unwrap(), table);
 }
 
