@@ -3,14 +3,14 @@ use std::path::PathBuf;
 use softrast_cli::{Detail, Variant};
 use softrast_lab::parse::whole;
 
-/// Flags that only 2D SHAPE has.
+/// Flags of 2D SHAPE only.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
-    /// Cover a picture in its colours, by triangles that each have a colour and a depth
+    /// Cover a picture in colour, by triangles with a colour and a depth each
     #[arg(long)]
     pub colour: bool,
 
-    /// Picture to cover, by its luminance or with --colour in its colours [default: our logo of the variant, or our landscape]
+    /// Picture to cover, by its luminance or, with --colour, its colours [default: our logo of the variant, or our landscape]
     #[arg(long, value_name = "FILE.png")]
     pub target: Option<PathBuf>,
 
@@ -20,7 +20,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// The number of triangles of a variant, unless it is fixed.
+    /// The default number of triangles of a variant.
     pub(crate) fn usual_triangles(variant: Variant) -> usize {
         match variant {
             Variant::Original => 800,

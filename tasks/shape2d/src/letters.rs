@@ -1,6 +1,6 @@
 //! Letters made of strokes.
 
-/// From a point to a point, in units of the height of the letter.
+/// A line between two points, in units of the height of the letter.
 pub(crate) type Line = [[f64; 2]; 2];
 
 /// Width of every letter, and of the gap between two, in units of its height.
@@ -9,16 +9,16 @@ const GAP: f64 = 0.2;
 /// Half the width of a stroke in units of the height.
 pub(crate) const HALF_STROKE: f64 = 0.09;
 
-/// Where strokes run: at the edges of the letter, less half their width.
+/// Positions of strokes: half their width inside the edges of the letter.
 const LOW: f64 = HALF_STROKE;
 const HIGH: f64 = 1.0 - HALF_STROKE;
 const MIDDLE: f64 = 0.5;
 const LEFT: f64 = HALF_STROKE;
 const RIGHT: f64 = WIDTH - HALF_STROKE;
 
-/// The lines of a word from (0, 0) to the right, as high as 1, and its width.
+/// The lines of a word from (0, 0) to the right, of height 1, and its width.
 ///
-/// Only the letters S, O, F and T are known; others are blanks.
+/// Only the letters S, O, F and T are defined; others are blank.
 pub(crate) fn word(text: &str) -> (Vec<Line>, f64) {
     let placed = text.chars().enumerate().flat_map(|(k, character)| {
         let x = k as f64 * (WIDTH + GAP);
@@ -57,7 +57,7 @@ fn letter(character: char) -> Vec<Line> {
     }
 }
 
-/// Short lines along a circle, from an angle to a larger one in degrees; 0 is right, 90 up.
+/// Short lines along a circle, between two ascending angles in degrees; 0 is right, 90 up.
 pub(crate) fn arc(centre: [f64; 2], radius: f64, [from, to]: [f64; 2]) -> Vec<Line> {
     const PIECES: usize = 24;
     let at = |k: usize| {

@@ -8,7 +8,7 @@ use crate::letters::{HALF_STROKE, Line, arc, word};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Logo {
     strokes: Vec<(Line, f64)>,
-    /// Lower left and upper right corner of each.
+    /// Lower left and upper right corner of each box.
     boxes: Vec<[[f64; 2]; 2]>,
 }
 
@@ -16,7 +16,7 @@ impl Logo {
     /// The logo of a variant: letters that cover about 9 % of the image, or a skyline below letters
     /// that together cover about 29 %.
     ///
-    /// Drawn for this project. The paper's pictures cover as much (docs/notes.md, 2D shape).
+    /// Drawn for this project. The paper's pictures have the same coverage (docs/notes.md, 2D shape).
     pub fn of(variant: Variant) -> Self {
         match variant {
             Variant::Original => Self::letters(0.0, 0.53),
@@ -59,7 +59,7 @@ impl Logo {
 
     /// The image `[size * size]`, top row first, 0 black to 1 white; edges are smooth.
     pub fn image(&self, size: usize) -> Vec<f64> {
-        /// Points looked at along either side of a pixel.
+        /// Samples along either side of a pixel.
         const SAMPLES: usize = 4;
         let step = 2.0 / (size * SAMPLES) as f64;
         let at = |sample: usize| (sample as f64 + 0.5) * step - 1.0;
@@ -80,7 +80,7 @@ impl Logo {
     }
 }
 
-/// Squared distance from a point to a line that has a length.
+/// Squared distance from a point to a line of non-zero length.
 fn squared_distance(p: [f64; 2], &[from, to]: &Line) -> f64 {
     let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
     let along = [to[0] - from[0], to[1] - from[1]];

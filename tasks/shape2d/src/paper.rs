@@ -1,6 +1,6 @@
 use softrast_cli::Paper;
 
-/// Nothing is printed.
+/// Not printed in the paper.
 const NONE: f64 = f64::NAN;
 
 /// Source: Wu et al. 2024, Tables 2 and 3. Its row of the logistic has no label.

@@ -26,7 +26,7 @@ impl Target {
         Self { name: name.to_owned(), source: Source::Logo(Logo::of(variant)) }
     }
 
-    /// The luminance of a picture file; what is transparent is black.
+    /// The luminance of a picture file; transparent pixels are black.
     ///
     /// # Errors
     ///
@@ -42,7 +42,7 @@ impl Target {
 
     /// The image `[size * size]`, top row first, 0 black to 1 white.
     ///
-    /// The longer side of a picture takes up the whole image; the rest is black. Each pixel is the mean of the picture over its area.
+    /// The longer side of a picture fills the image; the rest is black. Each pixel is the mean of the picture over its area.
     pub(crate) fn image(&self, size: usize) -> Vec<f64> {
         match &self.source {
             Source::Logo(logo) => logo.image(size),

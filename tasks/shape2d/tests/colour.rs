@@ -55,7 +55,7 @@ fn a_few_steps_come_nearer_to_our_landscape_and_write_every_file() {
     assert!(
         page.contains("-p shape2d -- --colour") || page.contains("-p shape2d -- solve --colour")
     );
-    // A black-and-white run beside it leaves no drawing of another.
+    // A black-and-white run in the same folder removes the drawing.
     run_in(out.path(), "--size 8 --triangles 5 --steps 1").unwrap();
     assert!(!out.path().join("result.svg").exists());
 }

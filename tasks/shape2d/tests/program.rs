@@ -1,4 +1,4 @@
-//! The whole program on small scenes: what it makes of them, and what it says when it cannot.
+//! The whole program on small scenes: its results and its errors.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -1,4 +1,4 @@
-/// A square picture in colour.
+/// A square colour picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colours {
     /// Red, green and blue from 0 to 1, row by row from the top.
@@ -7,11 +7,11 @@ pub struct Colours {
 }
 
 impl Colours {
-    /// Of its pixels, row by row from the top.
+    /// A picture from its pixels, row by row from the top.
     ///
     /// # Panics
     ///
-    /// If there are not `size * size` of them, or none.
+    /// If their number is not `size * size`, or there are none.
     pub fn new(pixels: Vec<[f64; 3]>, size: usize) -> Self {
         assert!(size > 0 && pixels.len() == size * size, "{} pixels, size {size}", pixels.len());
         Self { pixels, size }
@@ -22,7 +22,7 @@ impl Colours {
         self.size
     }
 
-    /// First all of red, then green, then blue: `[3 * size * size]`.
+    /// All of red, then green, then blue: `[3 * size * size]`.
     pub fn planes(&self) -> Vec<f64> {
         (0..3).flat_map(|k| self.pixels.iter().map(move |pixel| pixel[k])).collect()
     }
@@ -33,7 +33,7 @@ impl Colours {
         [0, 1, 2].map(|k| mean(k) / self.pixels.len() as f64)
     }
 
-    /// The colour at a place in NDC; outside it is that of the nearest pixel.
+    /// The colour at a place in NDC; outside the picture, that of the nearest pixel.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         let index = |place: f64| {
             let pixel = 0.5 * (place + 1.0) * self.size as f64;
@@ -42,7 +42,7 @@ impl Colours {
         self.pixels[index(-y) * self.size + index(x)]
     }
 
-    /// Visits the colour of each pixel whose centre lies in a triangle in NDC.
+    /// Calls `visit` with the colour of each pixel whose centre is in a triangle in NDC.
     pub fn inside(&self, corners: &[[f64; 2]; 3], mut visit: impl FnMut([f64; 3])) {
         let size = self.size as f64;
         let centre = |index: usize| (2.0 * index as f64 + 1.0) / size - 1.0;

@@ -1,6 +1,6 @@
 type Colour = [f64; 3];
 
-/// Height of the shore, and place of the sun, in NDC with y up.
+/// Height of the shore, and position of the sun, in NDC with y up.
 const SHORE: f64 = -0.12;
 const SUN: [f64; 2] = [0.38, 0.3];
 
@@ -8,7 +8,7 @@ const SUN: [f64; 2] = [0.38, 0.3];
 ///
 /// Drawn for this project, with the gradients, edges and texture of a photograph, at any size.
 pub fn landscape(size: usize) -> Vec<[f64; 3]> {
-    /// Points looked at along either side of a pixel.
+    /// Samples along either side of a pixel.
     const SAMPLES: usize = 3;
     let at = |sample: usize| (2 * sample + 1) as f64 / (size * SAMPLES) as f64 - 1.0;
     let pixel = |pixel: usize| {
@@ -30,7 +30,7 @@ fn colour_at(x: f64, y: f64) -> Colour {
     if y > SHORE {
         return beyond(x, y);
     }
-    // Water: what is beyond it upside down, moved by waves that are longer where it is near.
+    // Water: the reflected view, displaced by waves that are longer at the near end.
     let near = (SHORE - y).max(1e-3);
     let wave = noise(7.0 * x, 30.0 * (y + 1.0).ln_1p() * (1.0 + near), 3) - 0.5;
     let seen = beyond(x + 0.05 * near * wave, 2.0 * SHORE - y + 0.25 * near.sqrt() * wave);
@@ -76,7 +76,7 @@ fn meadow(x: f64, y: f64) -> Colour {
     let patches = noise(3.0 * x, 5.0 * y, 3);
     let green = mix([0.10, 0.16, 0.05], [0.46, 0.50, 0.16], blades);
     let green = mix(green, [0.50, 0.36, 0.14], 0.7 * patches * patches);
-    // Flowers stand on a lattice, those of some places only.
+    // Flowers on some cells of a lattice.
     let cell = [(x * 16.0).floor(), (y * 16.0).floor()];
     let [dx, dy] = [0, 1].map(|k| 0.3 + 0.4 * hash(cell[0] + 50.0 * k as f64, cell[1]));
     let off = (x * 16.0 - cell[0] - dx).hypot(y * 16.0 - cell[1] - dy);
@@ -124,7 +124,7 @@ fn noise(x: f64, y: f64, octaves: i32) -> f64 {
     sum / all
 }
 
-/// Random numbers on a lattice, and a smooth surface between them.
+/// Smooth interpolation of random numbers on a lattice.
 fn lattice(x: f64, y: f64) -> f64 {
     let (left, low) = (x.floor(), y.floor());
     let [u, v] = [x - left, y - low].map(|t| t * t * (3.0 - 2.0 * t));
@@ -132,7 +132,7 @@ fn lattice(x: f64, y: f64) -> f64 {
     (1.0 - v) * row(low) + v * row(low + 1.0)
 }
 
-/// A number in [0, 1) that looks random, of two whole numbers.
+/// A pseudorandom number in [0, 1) from two whole numbers.
 fn hash(x: f64, y: f64) -> f64 {
     let mut bits = (x as i64 as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     bits ^= (y as i64 as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);

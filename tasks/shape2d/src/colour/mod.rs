@@ -1,7 +1,7 @@
 //! 2D SHAPE in colour: loose triangles, each with a colour and a depth, cover any picture.
 //!
-//! **Definition.** The loss is the mean squared difference of colours between the soft blend of all triangles and the picture. The hard
-//! image, where the nearest triangle covers a pixel alone, is what is scored, as PSNR: `-10 log₁₀` of its mean squared error. θ holds
+//! **Definition.** The loss is the mean squared difference of colours between the soft blend of all triangles and the picture. The score is
+//! the PSNR of the hard image, which has the colour of the nearest triangle at each pixel: `-10 log₁₀` of its mean squared error. θ holds
 //! corners, colours and depths, see [`Scene`]. Not in the paper: docs/notes.md, 2D shape in colour.
 
 mod colours;

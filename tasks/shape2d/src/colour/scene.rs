@@ -12,20 +12,22 @@ use crate::colour::{Colours, Start};
 /// Depths of nearness 1 and 0.
 const PLANES: [f64; 2] = [1.0, 2.0];
 const DEPTH: DepthSoftness = DepthSoftness::Family(Family::Exp);
-/// A triangle that is nearer by this part of the distance between the planes weighs e times as much.
+/// A triangle that is nearer by this share of the distance between the planes has e times the
+/// weight.
 ///
-/// Wider, the soft image mixes what the hard one does not. Narrower, edges of what is nearest decide alone, and too few pixels see them: on
-/// pictures with many edges the hard image lost more than 1 dB in a decay from 0.2 to 0.02, in place of 0.1 all along.
+/// Wider depths make the soft image mix colours that the hard one does not. With narrower ones the
+/// edges of the nearest triangles decide alone, and few pixels see them: on pictures with many
+/// edges the hard image lost more than 1 dB with a decay from 0.2 to 0.02 instead of a fixed 0.1.
 const DEPTH_SCALE: f64 = 0.1;
-/// Entries of θ for a triangle: corners, colour, nearness.
+/// Entries of θ per triangle: corners, colour, nearness.
 const ENTRIES: usize = 10;
 
-/// Loose triangles in colours, and the picture that they should look like.
+/// Loose triangles in colours, and their target picture.
 ///
-/// The optimised θ is flat, `[10 triangles]`: first x and y of every corner in NDC, then red, green and blue of every triangle, then
-/// its nearness, which is 1 at the near plane and 0 at the far one. Colours and nearness are held in [0, 1].
+/// The optimised θ is flat, `[10 triangles]`: first x and y of every corner in NDC, then red, green and blue of every triangle, then its
+/// nearness, which is 1 at the near plane and 0 at the far one. Colours and nearness are clamped to [0, 1].
 ///
-/// Behind all triangles lies the mean colour of the picture.
+/// The background has the mean colour of the picture.
 #[derive(Debug)]
 pub struct Scene<B: RasterBackend> {
     start: Tensor<B, 1>,
@@ -40,7 +42,7 @@ impl<B: RasterBackend> Scene<B> {
     ///
     /// # Panics
     ///
-    /// If there is no triangle, or one lacks a part.
+    /// If there is no triangle, or one lacks a colour or a nearness.
     pub fn new(picture: &Colours, start: &Start) -> Self {
         let Start { corners, colours, nearness } = start;
         let count = nearness.len();
@@ -69,7 +71,7 @@ impl<B: RasterBackend> Scene<B> {
         self.targets.full()
     }
 
-    /// θ with colours and nearness held in [0, 1]: a colour beyond it cannot be shown, and beyond the planes depths would drift apart.
+    /// θ with colours and nearness clamped to [0, 1]: colours outside cannot be displayed, and depths beyond the planes would drift apart.
     pub fn allowed(&self, theta: Tensor<B, 1>) -> Tensor<B, 1> {
         let [corners, colours, nearness] = self.parts(theta);
         Tensor::cat(vec![corners, colours.clamp(0.0, 1.0), nearness.clamp(0.0, 1.0)], 0)
@@ -77,8 +79,8 @@ impl<B: RasterBackend> Scene<B> {
 
     /// The soft image at θ under the softness of a step, `[1, 3, side, side]`.
     ///
-    /// The weight of a triangle among those that overlap is its edge softness times its depth softness, so its depth is its opacity too:
-    /// there is no other.
+    /// The weight of a triangle among overlapping ones is its edge softness times its depth
+    /// softness: its depth also acts as its opacity, and there is no separate one.
     pub fn image(
         &self,
         theta: Tensor<B, 1>,
@@ -89,7 +91,7 @@ impl<B: RasterBackend> Scene<B> {
         self.drawn(theta, &renderer, tracked)
     }
 
-    /// [`image`](Self::image) at full size under the parameters `phi` of an edge softness, which get a gradient.
+    /// [`image`](Self::image) at full size under the parameters `phi` of an edge softness, which receive a gradient.
     pub fn image_with(
         &self,
         theta: Tensor<B, 1>,
@@ -138,13 +140,13 @@ impl<B: RasterBackend> Scene<B> {
         tensor(planes.collect(), [1, 3, size, size])
     }
 
-    /// Mean squared difference of `image` `[1, 3, side, side]` to the picture, `[1]`; the side is the size of the scene, or that halved some
-    /// times.
+    /// Mean squared difference of `image` `[1, 3, side, side]` and the picture, `[1]`; the side is
+    /// the size of the scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 4>) -> Tensor<B, 1> {
         self.targets.mse_loss(image.squeeze_dim(0)).mean()
     }
 
-    /// The hard image at θ as SVG: the background, and one polygon a triangle, the farthest first.
+    /// The hard image at θ as SVG: the background, and one polygon per triangle, the farthest first.
     pub fn svg(&self, theta: &[f64]) -> String {
         let (count, size) = (self.faces.len(), self.size);
         let (corners, rest) = theta.split_at(6 * count);
@@ -179,7 +181,7 @@ impl<B: RasterBackend> Scene<B> {
         [part(0, 6), part(6, 3), part(9, 1)]
     }
 
-    /// What the rasterizer draws, `[1, corners, 3]`.
+    /// The vertices for the rasterizer, `[1, corners, 3]`.
     fn vertices(&self, corners: Tensor<B, 1>, nearness: Tensor<B, 1>) -> Projected<B> {
         let count = self.faces.len();
         let depth = (nearness.neg() + PLANES[1]).reshape([count, 1, 1]).expand([count, 3, 1]);
@@ -196,7 +198,7 @@ mod tests {
 
     use super::*;
 
-    /// A dark triangle over the left half and all below it, and a nearer bright one at the right, on 4 × 4 pixels.
+    /// A dark triangle over the left half and everything below it, and a nearer bright one at the right, on 4 × 4 pixels.
     fn scene() -> Scene<HostBackend> {
         let picture = Colours::new(vec![[0.2, 0.4, 0.6]; 16], 4);
         let start = Start {
@@ -236,7 +238,7 @@ mod tests {
         let phi = vector(&edge.default_phi(1e-3));
         let soft = numbers(scene.image_with(scene.start(), edge, phi, 1e-4));
         let hard = numbers(scene.hard(scene.start()));
-        // Where both overlap the farther one has a weight of exp(-4).
+        // Where both overlap, the farther one has a weight of exp(-4).
         assert!(soft.iter().zip(&hard).all(|(a, b)| (a - b).abs() < 0.02), "{soft:?}");
     }
 

@@ -4,39 +4,39 @@ use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::colour::Colours;
 
-/// Where the triangles of one run start, and what they show.
+/// Start of the triangles of one run, with colours and depths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Corners in NDC, three to a triangle.
     pub corners: Vec<[f64; 2]>,
     /// Red, green and blue of each triangle.
     pub colours: Vec<[f64; 3]>,
-    /// How near each triangle is, from 0 to 1.
+    /// Nearness of each triangle, from 0 to 1.
     pub nearness: Vec<f64>,
 }
 
-/// How far a cut may be from the middle of a side, as a part of the side.
+/// Largest distance of a cut from the middle of a side, as a share of the side.
 const OFF_MIDDLE: f64 = 0.1;
-/// What area adds to the squared error of a triangle, for each pixel: next to nothing, but where the picture is even, the largest is cut.
+/// Error per pixel of area in addition to the squared error of a triangle: negligible, except that in uniform regions the largest is cut.
 const FOR_AREA: f64 = 1e-6;
-/// Least and largest nearness: depths have room to move either way.
+/// Smallest and largest nearness at the start: depths have room to move either way.
 const NEARNESS: [f64; 2] = [0.25, 0.75];
 
-/// A triangle, and what it shows of the picture.
+/// A triangle, with the colours of the picture in it.
 #[derive(Clone, Copy)]
 struct Piece {
     corners: [[f64; 2]; 3],
     mean: [f64; 3],
-    /// How much is wrong with it: the squared error summed over its pixels and their channels.
+    /// Its error: the squared error summed over its pixels and their channels, plus a term for its area.
     wrong: f64,
 }
 
 impl Start {
-    /// So many triangles that together are the image, each in the mean colour of what it covers; one is half the image.
+    /// This many triangles that tile the image, each in the mean colour of its pixels; a single one covers half the image.
     ///
-    /// Both halves of the image are cut again and again: always that triangle which shows the picture worst, by the summed squared
-    /// error, from near the middle of its longest side to the corner across. So there are many small ones where the picture is rich. Which
-    /// diagonal halves the image, where cuts are and how near triangles are depends on `seed`.
+    /// Both halves of the image are cut repeatedly: always the triangle with the largest summed squared error, from near the middle of its
+    /// longest side to the opposite corner. Detailed regions therefore get many small ones. The diagonal that halves the image, the places
+    /// of cuts and the nearness of triangles depend on `seed`.
     pub fn seeded(seed: u64, triangles: usize, picture: &Colours) -> Self {
         let mut random = StdRng::seed_from_u64(seed);
         let mut diagonals = [[[-1.0, -1.0], [1.0, 1.0]], [[1.0, -1.0], [-1.0, 1.0]]];
@@ -46,7 +46,7 @@ impl Start {
         let [[from, to], others] = diagonals;
         let halves = others.map(|corner| Piece::new([from, to, corner], picture));
         let mut pieces = halves[..triangles.min(2)].to_vec();
-        // Of numbers that are not negative the bits have the same order.
+        // The bits of non-negative numbers have the order of the numbers.
         let ranked = |(k, piece): (usize, &Piece)| (piece.wrong.to_bits(), k);
         let mut worst: BinaryHeap<_> = pieces.iter().enumerate().map(ranked).collect();
         while let Some((_, k)) = worst.pop().filter(|_| pieces.len() < triangles) {
@@ -84,11 +84,11 @@ impl Piece {
         }
         let mean = sum.map(|sum| sum / count);
         let error = squares - count * mean.iter().map(|level| level * level).sum::<f64>();
-        // Rounding can make nothing negative.
+        // Rounding can make the error negative.
         Self { corners, mean, wrong: error.max(0.0) + FOR_AREA * area }
     }
 
-    /// Both parts, when its longest side is cut at this part of it.
+    /// Both parts after a cut at this share of the longest side.
     fn cut(&self, at: f64) -> [[[f64; 2]; 3]; 2] {
         let side = |k: usize| [self.corners[k], self.corners[(k + 1) % 3]];
         let length = |k: usize| {

@@ -18,22 +18,22 @@ use crate::{
     colour::{Colours, Scene, Start, landscape},
 };
 
-/// A run succeeds when its hard image ends with this PSNR or more.
+/// Least final PSNR of the hard image of a successful run.
 const SUCCESS_DB: f64 = 24.0;
-/// A mean squared error below this counts as this, so that no PSNR is infinite: 100 dB at most.
+/// Lower limit of the mean squared error in a PSNR, so that it is finite: at most 100 dB.
 const LEAST_MSE: f64 = 1e-10;
-/// Pixels a side of the picture by which triangles start, whatever the size of the image.
+/// Pixels a side of the picture for the start of triangles, independent of the size of the image.
 const START_SIZE: usize = 256;
 
-/// 2D SHAPE in colour: loose triangles with colours and depths, and the picture that they should look like.
+/// 2D SHAPE in colour: loose triangles with colours and depths, and their target picture.
 pub struct Coloured {
     name: String,
-    /// Red, green and blue of the picture; none for our own.
+    /// Red, green and blue of the picture; `None` for our own.
     picture: Option<[Picture; 3]>,
-    /// The picture at every size that was asked for.
+    /// The picture at every size requested so far.
     sizes: RefCell<BTreeMap<usize, Rc<Colours>>>,
     triangles: usize,
-    /// The number of triangles if nobody says.
+    /// The default number of triangles.
     usual_triangles: usize,
 }
 
@@ -61,13 +61,13 @@ impl InverseProblem for Coloured {
         Ok(Start::seeded(seed, self.triangles, &self.target(START_SIZE)))
     }
 
-    /// Of one instance.
+    /// The scene of the single instance.
     fn scene<B: RasterBackend>(&self, instances: &[Start], size: usize) -> Scene<B> {
         assert_eq!(instances.len(), 1, "a scene has one instance");
         Scene::new(&self.target(size), &instances[0])
     }
 
-    /// None: colours are blended, and no silhouette is seen.
+    /// None: colours are blended, and there is no silhouette.
     fn faces(&self) -> Option<Arc<[[u32; 3]]>> {
         None
     }
@@ -108,7 +108,8 @@ impl Task for Coloured {
     const TITLE: &'static str = "2D SHAPE in colour";
     const ABOUT: &'static str = "Moves loose triangles until they cover a picture in its colours";
 
-    /// From a third of a pixel of the default size, so that edges find their place, down to where the soft image is nearly the hard one.
+    /// From a third of a pixel of the default size, so that edges find their place, down to where
+    /// the soft image nearly equals the hard one.
     const SCALES: Scales =
         Scales { schedule: Schedule::Decay, decay: [0.003, 0.0001], fixed: 0.0004 };
     const DRAWS: bool = true;
@@ -175,7 +176,7 @@ impl Task for Coloured {
 
     fn warnings(&self, run: &Ended<'_, Self>) -> Vec<String> {
         let Ended { seed, size, target, hard, .. } = *run;
-        // What the mean colour alone would end with.
+        // The error of the mean colour alone.
         let variance = target.chunks(size * size).map(|plane| {
             let mean = plane.iter().sum::<f64>() / plane.len() as f64;
             plane.iter().map(|level| (level - mean).powi(2)).sum::<f64>() / plane.len() as f64

@@ -8,7 +8,7 @@ pub(crate) use softrast_test_kit::{assert_finite, warnings};
 
 pub(crate) const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_shape2d"));
 
-/// Runs a command line with results in `out`; its JSON line.
+/// Runs a command line with results in `out`, and returns its JSON line.
 pub(crate) fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
     PROGRAM.run_in(out, line)
 }
