@@ -1,21 +1,21 @@
 use std::path::PathBuf;
 
-/// Flags that only 3D SHAPE has.
+/// Flags of 3D SHAPE only.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Args {
     /// Mesh whose silhouettes are the target (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side of its box scaled to 1 [default: our airplane, or chair]
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
 
-    /// Take the target mesh as it stands, as the paper's experiments do
+    /// Use the target mesh without centring and scaling, as the paper's experiments do
     #[arg(long, requires = "mesh")]
     pub raw: bool,
 
-    /// Mesh that is deformed (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side scaled to 1 [default: a sphere]
+    /// Mesh to deform (OBJ, PLY, STL, OFF, GLB or glTF), centred and with the longest side scaled to 1 [default: a sphere]
     #[arg(long, value_name = "FILE", conflicts_with = "detail")]
     pub template: Option<PathBuf>,
 
-    /// How finely the sphere is divided: 162, 642 or 2,562 vertices [default: 3]
+    /// Subdivisions of the sphere: 162, 642 or 2,562 vertices [default: 3]
     #[arg(long, value_name = "2|3|4", value_parser = detail)]
     pub detail: Option<usize>,
 
@@ -24,7 +24,7 @@ pub struct Args {
     pub elevation: Option<f64>,
 }
 
-/// Levels of the icosphere, the coarsest first, and the one that is taken if nobody says.
+/// Levels of the icosphere, the coarsest first, and the default.
 pub(crate) const DETAILS: [usize; 3] = [2, 3, 4];
 pub(crate) const DETAIL: usize = 3;
 

@@ -1,23 +1,23 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_kernel::Nearest;
 
-/// Points on either surface.
+/// Points per surface.
 const POINTS: usize = 10_000;
 /// Seeds of the points on the target and on the other surface: the same in every run, so that
-/// numbers compare, and different from one another, so that no two surfaces share their points.
+/// numbers compare, and different from each other, so that no two surfaces share their points.
 const SEEDS: [u64; 2] = [1, 2];
-/// Squared distances are small; the distance is reported times this.
+/// Factor of the reported distance: squared distances are small.
 const FACTOR: f64 = 1e3;
 
 /// Chamfer distance of surfaces to one target.
 ///
-/// 10,000 points are spread over each surface, evenly by area, one in each of as many parts of equal
+/// 10,000 points are spread over each surface, evenly by area, one in each of 10,000 parts of equal
 /// area. The distance is the mean over the points of one surface of the squared distance to the
 /// nearest point of the other, averaged over both directions, times 1000; in squared world units. A
 /// surface of area `a` has a distance of about `1000 a / (π · 10000)` to itself, because its two
-/// sets of points differ: 0.016 for one of area 0.5.
+/// sets of points differ: 0.016 for an area of 0.5.
 ///
-/// Not in the paper, which names the Chamfer distance and does not define it: this definition.
+/// The paper names the Chamfer distance without defining it; this definition is ours.
 pub struct Chamfer {
     target: Nearest,
 }
@@ -27,7 +27,7 @@ impl Chamfer {
     ///
     /// # Panics
     ///
-    /// If there is no face, or a face uses a vertex that is not there.
+    /// If there is no face, or a face uses a missing vertex.
     pub fn new(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Self {
         Self { target: Nearest::new(spread(positions, faces, SEEDS[0])) }
     }
@@ -89,7 +89,7 @@ mod tests {
     fn parallel_squares_are_as_far_as_the_square_of_their_distance() {
         let chamfer = Chamfer::new(&square(1.0, 0.0), &SQUARE);
         let found = chamfer.distance(&square(1.0, 0.5), &SQUARE);
-        // Points do not lie opposite one another: a little is added.
+        // Points are not exactly opposite each other, which adds a little.
         assert!((250.0..250.1).contains(&found), "{found}");
     }
 
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn either_direction_counts() {
-        // From the small square to the large one it is near, back it is not.
+        // From the small square to the large one it is near, but not in reverse.
         let chamfer = Chamfer::new(&square(1.0, 0.0), &SQUARE);
         let found = chamfer.distance(&square(0.5, 0.0), &SQUARE);
         // Beyond one edge: 1/4 of the area, mean square 1/12; beyond the corner: the same twice.

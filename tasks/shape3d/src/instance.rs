@@ -1,24 +1,24 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use softrast_mesh::Mesh;
 
-/// Elevations of the cameras in degrees, in the order of the seeds: `solve` takes the first.
+/// Elevations of the cameras in degrees, in the order of the seeds; `solve` uses the first.
 pub(crate) const ELEVATIONS_DEG: [f64; 5] = [30.0, 60.0, 0.0, -30.0, -60.0];
 
-/// What one run is asked: from where the target is seen, and how the template lies at the start.
+/// Cameras and start of one run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// Elevation of all cameras.
     pub elevation_deg: f64,
-    /// Seed of the rotation of the template; 0 leaves it as it stands.
+    /// Seed of the rotation of the template; 0 does not rotate it.
     pub turn: u64,
 }
 
 impl Instance {
-    /// The instance of `seed`, all of them at `elevation_deg` if it is given.
+    /// The instance of `seed`, at `elevation_deg` if given.
     ///
-    /// Otherwise seeds 0 to 4 stand for elevations 30, 60, 0, -30 and -60, seeds 5 to 9 for the same
-    /// with the template turned at random, and so on: the paper's task has no chance in it but the
-    /// order of sums, so that is what further seeds vary. Not in the paper: the turn.
+    /// Otherwise seeds 0 to 4 are elevations 30, 60, 0, -30 and -60, seeds 5 to 9 the same with the
+    /// template rotated at random, and so on: the only randomness of the paper's task is the order
+    /// of sums, which further seeds vary by the rotation. Not in the paper: the rotation.
     pub fn seeded(seed: u64, elevation_deg: Option<f64>) -> Self {
         let count = ELEVATIONS_DEG.len() as u64;
         match elevation_deg {
@@ -29,8 +29,8 @@ impl Instance {
         }
     }
 
-    /// The vertices of `template` as this instance starts with them: scaled to a box whose longest
-    /// side is 1, around the origin, then turned.
+    /// The start vertices of `template` in this instance: scaled to a box whose longest side is 1,
+    /// around the origin, then rotated.
     pub(crate) fn start(&self, template: &Mesh) -> Vec<[f64; 3]> {
         let rotation = rotation(self.turn);
         let placed =
@@ -39,13 +39,13 @@ impl Instance {
     }
 }
 
-/// A rotation drawn evenly from all, by a unit quaternion; none for 0.
+/// A uniformly random rotation, by a unit quaternion; the identity for 0.
 fn rotation(turn: u64) -> [[f64; 3]; 3] {
     if turn == 0 {
         return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     }
     let mut random = StdRng::seed_from_u64(turn);
-    // A point of the ball in four dimensions has an even direction.
+    // The direction of a point in the 4-dimensional ball is uniform.
     let (q, square) = loop {
         let q = [(); 4].map(|()| random.random_range(-1.0..1.0));
         let square = q.iter().map(|x: &f64| x * x).sum::<f64>();

@@ -1,21 +1,21 @@
 //! 3D SHAPE: deforms a sphere until it has the silhouettes of a target.
 //!
-//! 24 cameras stand around a target mesh, all at one elevation. A template, by default a sphere of
-//! 642 vertices, is moved vertex by vertex by Adam, by the gradient of soft silhouettes, until its
-//! silhouettes are those of the target.
+//! 24 cameras surround a target mesh, all at one elevation. Adam moves the vertices of a template,
+//! by default a sphere of 642 vertices, by the gradient of soft silhouettes, until its silhouettes
+//! match the target's.
 //!
 //! **Definition.** The loss is the soft `IoU` loss against the target's hard silhouettes, mean over
-//! the views, plus 0.03 times the Laplacian and 0.0003 times the flatness of the surface. How θ moves
-//! the vertices is told by [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, 3D shape.
+//! the views, plus 0.03 times the Laplacian and 0.0003 times the flatness of the surface. For the
+//! vertices at θ see [`Scene`]. Source: Wu et al. 2024, Sec. 5.1; docs/notes.md, 3D shape.
 //!
-//! **Errors.** Seen in the image: the `IoU` loss, soft and hard. Of the shape: the [`Chamfer`]
-//! distance to the target's surface. Both from cameras at one elevation only: what none of them
-//! sees counts in the Chamfer distance alone.
+//! **Errors.** Of the image: the `IoU` loss, soft and hard. Of the shape: the [`Chamfer`] distance
+//! to the target's surface. All cameras are at one elevation: surfaces that none of them sees count
+//! in the Chamfer distance only.
 //!
 //! **Seeds.** Seeds 0 to 4 are the elevations 30, 60, 0, -30 and -60 degrees; further ones repeat
-//! them with the template turned at random, see [`Instance::seeded`].
+//! them with the template rotated at random, see [`Instance::seeded`].
 //!
-//! **Transfer.** The same on a chair instead of an airplane; `--mesh` names any other.
+//! **Transfer.** A chair instead of an airplane; `--mesh` sets any other mesh.
 
 mod args;
 mod chamfer;

@@ -7,7 +7,7 @@ use softrast_tensor::{Tensor, tensor};
 
 use crate::Instance;
 
-/// Cameras around the target, evenly in azimuth.
+/// Number of cameras around the target, evenly in azimuth.
 pub const VIEWS: usize = 24;
 /// Distance of the cameras in world units, and their field of view in degrees.
 ///
@@ -19,19 +19,19 @@ const FOV_DEG: f64 = 30.0;
 const LAPLACIAN: f64 = 0.03;
 const FLATNESS: f64 = 0.0003;
 
-/// A coordinate this near to a plane through the origin, in world units, stays in that plane: its
-/// log-odds would be about minus infinity.
+/// A coordinate this near to a plane through the origin, in world units, remains in that plane: its
+/// log-odds would be close to minus infinity.
 const ON_PLANE: f64 = 1e-6;
 
-/// A template that is deformed, and the silhouettes that it should have.
+/// A deformable template and its target silhouettes.
 ///
-/// The optimised θ is flat, `[3 vertices + 3]`: a displacement `d` of each coordinate, then the centre
-/// `k`. A coordinate that starts at `v` is at `s·σ(logit|v| + d)·(1 - s·c) + c` with `s` the sign of `v`
-/// and `c = tanh k`, all within -1 to 1. So no vertex crosses the planes through the centre, and a
-/// coordinate that starts at 0 stays at that of the centre. Source: docs/notes.md, 3D shape.
+/// The optimised θ is flat, `[3 vertices + 3]`: a displacement `d` of each coordinate, then the centre `k`. A
+/// coordinate that starts at `v` is at `s·σ(logit|v| + d)·(1 - s·c) + c` with `s` the sign of `v` and `c = tanh k`, all
+/// within -1 to 1. Therefore no vertex crosses the planes through the centre, and a coordinate that starts at 0 stays
+/// at that of the centre. Source: docs/notes.md, 3D shape.
 #[derive(Clone, Debug)]
 pub struct Scene<B: RasterBackend> {
-    /// `logit |v|` of each coordinate, `[vertices, 3]`; 0 where the sign is 0.
+    /// `logit |v|` of each coordinate, `[vertices, 3]`; 0 if the sign is 0.
     log_odds: Tensor<B, 2>,
     /// -1, 0 or 1, `[vertices, 3]`.
     sign: Tensor<B, 2>,
@@ -76,12 +76,12 @@ impl<B: RasterBackend> Scene<B> {
         tensor(vec![0.0; 3 * vertices + 3], [3 * vertices + 3])
     }
 
-    /// Hard silhouettes to arrive at, `[views, size, size]`.
+    /// Target hard silhouettes, `[views, size, size]`.
     pub fn target(&self) -> Tensor<B, 3> {
         self.targets.full()
     }
 
-    /// Where the vertices are at θ, `[vertices, 3]` in world units.
+    /// The vertices at θ, `[vertices, 3]` in world units.
     pub fn vertices(&self, theta: Tensor<B, 1>) -> Tensor<B, 2> {
         let [vertices, _] = self.sign.dims();
         let displacement = theta.clone().narrow(0, 0, 3 * vertices).reshape([vertices, 3]);
@@ -92,18 +92,18 @@ impl<B: RasterBackend> Scene<B> {
         size * away + centre
     }
 
-    /// Vertices `[vertices, 3]` as each camera sees them, `[views, vertices, 3]`.
+    /// Vertices `[vertices, 3]` projected by each camera, `[views, vertices, 3]`.
     pub fn project(&self, vertices: Tensor<B, 2>) -> Projected<B> {
         project(vertices.unsqueeze(), self.orbits.clone())
     }
 
-    /// Hard silhouettes `[views, size, size]` of vertices that [`Scene::project`] gave.
+    /// Hard silhouettes `[views, size, size]` of vertices from [`Scene::project`].
     pub fn hard(&self, projected: Projected<B>) -> Tensor<B, 3> {
         hard_silhouette(projected, &self.faces, self.size)
     }
 
-    /// `IoU` loss of `image` `[views, side, side]`, mean over the views, `[1]`; the side is the size of
-    /// the scene, or that halved some times.
+    /// `IoU` loss of `image` `[views, side, side]`, mean over the views, `[1]`; the side is the
+    /// size of the scene, possibly halved some times.
     pub fn image_loss(&self, image: Tensor<B, 3>) -> Tensor<B, 1> {
         self.targets.iou_loss(image).mean()
     }
@@ -113,8 +113,8 @@ impl<B: RasterBackend> Scene<B> {
         &self.targets
     }
 
-    /// What keeps the surface of `vertices` `[vertices, 3]` smooth: 0.03 times the Laplacian loss
-    /// and 0.0003 times the flatness loss, `[1]`. Second derivatives are finite everywhere.
+    /// The smoothness loss `[1]` of `vertices` `[vertices, 3]`: 0.03 times the Laplacian loss and
+    /// 0.0003 times the flatness loss. Second derivatives are finite everywhere.
     pub fn smoothness_loss(&self, vertices: Tensor<B, 2>) -> Tensor<B, 1> {
         let vertices: Tensor<B, 3> = vertices.unsqueeze();
         let laplacian = self.surface.laplacian(vertices.clone());

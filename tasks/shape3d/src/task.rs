@@ -23,23 +23,23 @@ use crate::{
     views::solve_views,
 };
 
-/// A run succeeds when its hard `IoU` loss ends below this.
+/// Upper limit of the final hard `IoU` loss of a successful run.
 const SUCCESS: f64 = 0.3;
 
 /// Largest move of a parameter in a step, roughly.
 ///
-/// The middle of the three that the released script tries, 10^-1.25, 10^-1.5 and 10^-1.75. At a scale of 0.003, hard `IoU` losses at
-/// elevation 30 end at 0.266, 0.104 and 0.161.
+/// The middle of the three in the released script, 10^-1.25, 10^-1.5 and 10^-1.75. At a scale of
+/// 0.003, hard `IoU` losses at elevation 30 end at 0.266, 0.104 and 0.161.
 const LEARNING_RATE: f64 = 0.0316;
 
-/// Decays of the means of Adam, those of the inner loop of the released script.
+/// Decay rates of the means of Adam, those of the inner loop of the released script.
 const BETAS: [f64; 2] = [0.5, 0.95];
 
-/// Views that are shown: from ahead, from a corner, from the side and from behind; and how many in a row.
+/// Views in pictures: from the front, from a corner, from the side and from behind; and their number per row.
 const SHOWN: [usize; 4] = [0, VIEWS / 8, VIEWS / 4, VIEWS / 2];
 const COLUMNS: usize = 2;
 
-/// 3D SHAPE: a template that is deformed, and the mesh whose silhouettes it should have.
+/// 3D SHAPE: a deformable template, and the mesh of its target silhouettes.
 pub struct Shape3d {
     target: Mesh,
     target_name: String,
@@ -58,7 +58,7 @@ impl InverseProblem for Shape3d {
         Ok(Instance::seeded(seed, self.elevation_deg))
     }
 
-    /// Of one instance.
+    /// The scene of the single instance.
     fn scene<B: RasterBackend>(&self, instances: &[Instance], size: usize) -> Scene<B> {
         assert_eq!(instances.len(), 1, "a scene has one instance");
         Scene::new(&self.target, &self.template, &instances[0], size)
@@ -121,12 +121,12 @@ impl Task for Shape3d {
     const TITLE: &'static str = "3D SHAPE";
     const ABOUT: &'static str = "Deforms a sphere until it has the silhouettes of a target";
 
-    /// Wide enough at first to keep parts from folding, and at last narrow for the sake of the hard silhouettes.
+    /// Wide enough at first to prevent folding, and narrow at last for accurate hard silhouettes.
     ///
-    /// Measured with a logistic on our airplane, hard `IoU` loss at the last step, mean of the five elevations: 0.101 for a decay from
-    /// 0.03 to 0.003, 0.137 at 0.003 throughout. At elevation 30 alone: 0.103 for a decay from 0.03 to 0.003, 0.104 to 0.002, 0.127 to
-    /// 0.005 and 0.128 from 0.02 to 0.003; without a decay 0.126 at 0.002, 0.104 at 0.003, 0.139 at 0.005, 0.172 at 0.007, 0.261 at 0.01
-    /// and 0.507 at 0.02. The decay also has the smaller Chamfer distance, 0.28 against 0.53 at 0.003.
+    /// Measured with a logistic on our airplane, hard `IoU` loss at the last step, mean of the five elevations: 0.101 for a decay from 0.03
+    /// to 0.003, 0.137 at a fixed 0.003. At elevation 30 alone: 0.103 for a decay from 0.03 to 0.003, 0.104 to 0.002, 0.127 to 0.005 and
+    /// 0.128 from 0.02 to 0.003; fixed, 0.126 at 0.002, 0.104 at 0.003, 0.139 at 0.005, 0.172 at 0.007, 0.261 at 0.01 and 0.507 at 0.02.
+    /// The decay also has the smaller Chamfer distance, 0.28 compared with 0.53 at 0.003.
     const SCALES: Scales = Scales { schedule: Schedule::Decay, decay: [0.03, 0.003], fixed: 0.003 };
 
     type Args = Args;
@@ -250,7 +250,7 @@ impl Task for Shape3d {
     }
 }
 
-/// The mesh to arrive at and its name.
+/// The target mesh and its name.
 fn target(variant: Variant, args: &Args) -> anyhow::Result<(Mesh, String)> {
     let (mesh, name) = match (&args.mesh, variant) {
         (Some(path), _) => (Mesh::load(path)?, name(path)),

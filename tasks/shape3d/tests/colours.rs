@@ -1,4 +1,4 @@
-//! Colours from pictures: of a shape that is known, of one that is found, and what is said of flags and files that do not go together.
+//! Colours from pictures: of a known shape, of a found one, and error messages for flags and files that contradict each other.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -26,7 +26,7 @@ fn ball() -> Mesh {
     ball.with_positions(wide).unwrap().with_colours(colours).unwrap()
 }
 
-/// Pictures of the ball in a folder: over nothing, or over white with masks beside them.
+/// Pictures of the ball in a folder: transparent, or over white with separate masks.
 fn pictures(folder: &Path, opaque: bool) {
     let size = [60usize, 44];
     let frame = |k: usize| {
@@ -99,7 +99,7 @@ fn a_known_shape_gets_its_colours_back_over_nothing_and_over_white() {
                 .flatten()
                 .zip(obj.colours().unwrap().iter().flatten());
             assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() <= tolerance), "{name}");
-            // Faces may have been cut: vertices that were there come first.
+            // Faces may have been subdivided: the original vertices come first.
             let before = ball().positions().to_vec();
             let moved = before
                 .iter()
@@ -133,7 +133,7 @@ fn shape_and_colours_are_found_together_and_without_the_flag_there_are_none() {
     assert!(!out.join("plain/colours.png").exists());
 }
 
-/// A hundredth of the size, in metres of a map.
+/// A hundredth of the size, and in metres on a map.
 #[test]
 fn colours_are_found_on_a_map_and_in_a_small_unit() {
     let folder = tempfile::tempdir().unwrap();
@@ -172,7 +172,7 @@ fn a_luminance_that_is_the_mask_is_a_white_mesh() {
     let words = ["--views", fox.to_str().unwrap(), "--colour", "--steps", "5"];
     run(out.path(), &words).unwrap();
     let mesh = Mesh::load(out.path().join("mesh.obj")).unwrap();
-    // Where grey pixels lie within the mask, as in a gap between legs, there is some grey.
+    // Grey pixels within the mask, as in a gap between legs, leave some grey.
     let colours = mesh.colours().unwrap();
     let white = colours.iter().filter(|colour| colour.iter().all(|&x| x > 0.95)).count();
     assert!(white * 10 > colours.len() * 9, "{white} of {}", colours.len());
@@ -202,7 +202,7 @@ fn what_does_not_go_together_is_one_line() {
         &["--smooth", "--mesh"],
     );
     error(&["--views", views, "--colour", "--mesh", "no.ply"], &["no.ply"]);
-    // A mesh that lies elsewhere is painted by nothing: that is said.
+    // A mesh that lies elsewhere is visible in no view, which is reported.
     let words = ["--views", views, "--colour", "--mesh", far.to_str().unwrap(), "--steps", "1"];
     match run(&out.join("far"), &words) {
         Ok(found) => {
@@ -210,7 +210,7 @@ fn what_does_not_go_together_is_one_line() {
         }
         Err(error) => assert!(error.contains("no camera has the mesh before it"), "{error}"),
     }
-    // The picture of a mask of another size.
+    // A picture whose mask has another size.
     RgbImage::new(3, 3).save(folder.path().join("04.png")).unwrap();
     let words = ["--views", views, "--colour", "--mesh", known];
     error(&words, &["04.png", "3 x 3 pixels", "60 x 44"]);

@@ -1,4 +1,4 @@
-//! The whole program on small scenes: what it makes of them, and what it says when it cannot.
+//! The whole program on small scenes: its results and its errors.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -9,7 +9,7 @@ use softrast_test_kit::{Failure, Program, assert_finite, warnings};
 
 const PROGRAM: Program = Program::new(env!("CARGO_BIN_EXE_shape3d"));
 
-/// Runs a command line with results in `out`; its JSON line.
+/// Runs a command line with results in `out`, and returns its JSON line.
 fn run_in(out: &Path, line: &str) -> Result<Value, Failure> {
     PROGRAM.run_in(out, line)
 }
@@ -18,7 +18,7 @@ fn run(line: &str) -> Result<Value, Failure> {
     run_in(tempfile::tempdir().unwrap().path(), line)
 }
 
-/// Runs with `flag` naming a file of this text.
+/// Runs with a file of this text for `flag`.
 fn with_file(flag: &str, text: &str, line: &str) -> Result<Value, Failure> {
     let folder = tempfile::tempdir().unwrap();
     let mesh = folder.path().join("mesh.obj");
@@ -26,7 +26,7 @@ fn with_file(flag: &str, text: &str, line: &str) -> Result<Value, Failure> {
     run(&format!("{line} {flag} {}", mesh.display()))
 }
 
-/// A template of few faces, for tests of other things.
+/// A template with few faces.
 const OCTAHEDRON: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n\
                           f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
 

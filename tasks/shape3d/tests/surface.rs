@@ -1,4 +1,5 @@
-//! The surface that pictures show: closed, of as many faces as asked for, and where normals and colours pull it right where masks say nothing.
+//! The surface from pictures: closed, with the requested number of faces, and corrected by normals
+//! and colours where masks carry no information.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -18,10 +19,10 @@ fn run(out: &Path, words: &[&str]) -> Result<Value, String> {
     found.map_err(|failure| failure.message.trim_end().to_owned())
 }
 
-/// How far the dent reaches inwards at +z.
+/// Depth of the dent at +z.
 const DEPTH: f64 = 0.35;
 
-/// A ball with a dent at +z, which no silhouette shows.
+/// A ball with a dent at +z that is invisible in every silhouette.
 fn dented() -> Mesh {
     let ball = icosphere(5);
     let place = |&[x, y, z]: &[f64; 3]| {
@@ -56,7 +57,7 @@ fn in_stripes() -> Mesh {
     mesh.with_colours(colours).unwrap()
 }
 
-/// Pictures of a mesh over nothing, in a folder.
+/// Transparent pictures of a mesh, in a folder.
 fn pictures(mesh: &Mesh, folder: &Path) {
     const SIZE: usize = 96;
     let frame = |k: usize| {
@@ -81,7 +82,7 @@ fn pictures(mesh: &Mesh, folder: &Path) {
     fs::write(folder.join("transforms.json"), lens.to_string()).unwrap();
 }
 
-/// The depth of the dent of a result: how far its surface lies below 1 on the axis z.
+/// The depth of the dent of a result: the distance of its surface from 1 on the axis z.
 fn dent(out: &Path) -> f64 {
     let mesh = Mesh::load(out.join("mesh.ply")).unwrap();
     ClosedSurface::new(&mesh, 1.0, 0).unwrap();
@@ -103,12 +104,12 @@ fn normals_show_a_dent_that_masks_do_not() {
     };
     let found = with(&[]);
     assert!(found["train_iou"].as_f64().unwrap() > 0.97, "{found}");
-    // From its rim on it is filled.
+    // Up to its rim it is filled.
     assert!(dent(&out) < 0.22, "{}", dent(&out));
     let found = with(&["--normals"]);
     assert!(found["train_iou"].as_f64().unwrap() > 0.97, "{found}");
     assert!((dent(&out) - DEPTH).abs() < 0.04, "{}", dent(&out));
-    // Those of another folder, and with few faces.
+    // With normals from another folder, and with few faces.
     let apart = tempfile::tempdir().unwrap();
     pictures(&in_stripes(), folder.path());
     pictures(&in_normals(), apart.path());

@@ -1,4 +1,4 @@
-//! Meshes from pictures: what is made of them, and what is said of bad ones.
+//! Meshes from pictures: results and error messages.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -36,7 +36,7 @@ fn views_that_were_kept_aside_are_met() {
     }
 }
 
-/// The fox through a lens that distorts, opaque pictures and masks apart.
+/// The fox through a distorting lens, with opaque pictures and separate masks.
 fn lens(name: &str) -> String {
     format!("{}_lens/{name}", fox())
 }
@@ -52,7 +52,7 @@ fn pictures_of_a_lens_that_distorts_make_a_mesh_and_so_does_a_model_of_colmap() 
     let iou = |found: &Value, name: &str| found[name].as_f64().unwrap();
     assert!(iou(&found, "train_iou") > 0.95 && iou(&found, "held_out_iou") > 0.93, "{found}");
     assert!(found["warnings"].to_string().contains("the lens distorts the pictures"), "{found}");
-    // The fox of these pictures has one colour, and nothing of the wall is on it.
+    // The fox of these pictures has one colour, without any of the wall.
     let mesh = Mesh::load(found["mesh"].as_str().unwrap()).unwrap();
     let colours = mesh.colours().unwrap();
     for (channel, of_fox) in [0.85, 0.45, 0.15].into_iter().enumerate() {
@@ -63,7 +63,7 @@ fn pictures_of_a_lens_that_distorts_make_a_mesh_and_so_does_a_model_of_colmap() 
     for name in ["train_iou", "held_out_iou"] {
         assert!((iou(&found, name) - iou(&model, name)).abs() < 0.01, "{name}: {model}");
     }
-    // What is no mask is refused, and what is missing is named.
+    // A picture that is no mask is refused, and a missing file is named.
     let error = with(&lens(""), &["--masks", &lens("images")]).unwrap_err();
     assert!(error.contains("looks like a photograph") && error.contains("--masks"), "{error}");
     let error = with(&lens(""), &["--masks", out.path().to_str().unwrap()]).unwrap_err();
@@ -112,7 +112,7 @@ fn with_results(
     found
 }
 
-/// Cameras of a map in metres, of a map in millimetres, and of a scene a thousandth of the size.
+/// Cameras on a map in metres, on a map in millimetres, and of a scene a thousandth of the size.
 #[test]
 fn the_unit_and_the_origin_of_the_cameras_do_not_matter() {
     let more = ["--hold-out", "2"];
@@ -144,7 +144,7 @@ fn the_unit_and_the_origin_of_the_cameras_do_not_matter() {
             assert!(off < 0.005, "scale {scale}, offset {offset:?}: {found}");
         }
         assert!(found["warnings"].as_array().unwrap().is_empty(), "{found}");
-        // The fox reaches from about -1 to 1, and is where the cameras look.
+        // The fox extends from about -1 to 1, at the point that the cameras look at.
         for [low, high] in &boxes {
             let relative = |x: f64, k: usize| (x - offset[k]) / scale;
             for k in 0..3 {
@@ -165,7 +165,7 @@ fn the_unit_and_the_origin_of_the_cameras_do_not_matter() {
 
 #[test]
 fn cameras_come_in_many_ways() {
-    // Intrinsics of each frame, paths without an ending, or an angle alone.
+    // Intrinsics per frame, paths without an extension, or an angle alone.
     let each = |cameras: &mut Value| {
         let of_all = cameras.clone();
         for frame in cameras["frames"].as_array_mut().unwrap() {
@@ -187,10 +187,10 @@ fn cameras_come_in_many_ways() {
         }
     };
     assert!(with(angle(130.0), &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
-    // Beside an angle that is none, a length.
+    // An invalid angle next to a length.
     let error = with(angle(-1.0), &[]).unwrap_err();
     assert!(error.contains("camera_angle_x") && error.contains("radians"), "{error}");
-    // A mask beside the picture goes before it.
+    // A mask named next to the picture has priority.
     let masks = |cameras: &mut Value| {
         for frame in cameras["frames"].as_array_mut().unwrap() {
             frame["mask_path"] = frame["file_path"].clone();
@@ -200,7 +200,7 @@ fn cameras_come_in_many_ways() {
     assert!(with(masks, &[]).unwrap()["train_iou"].as_f64().unwrap() > 0.9);
 }
 
-/// As Blender's NeRF data come: views to work with and views to test.
+/// The format of Blender's NeRF data: training views and test views.
 #[test]
 fn views_of_another_file_of_cameras_are_held_out() {
     let train = |cameras: &mut Value| cameras["frames"].as_array_mut().unwrap().truncate(9);
@@ -221,7 +221,7 @@ fn views_of_another_file_of_cameras_are_held_out() {
     assert!(found["held_out_iou"].as_f64().unwrap() > 0.8, "{found}");
 }
 
-/// Rotations of three decimals, names as Windows writes them, and names with a dot and no ending.
+/// Rotations of three decimals, Windows file names, and names with a dot and no extension.
 #[test]
 fn cameras_as_tools_write_them_are_taken_and_what_was_rounded_is_said() {
     let change = |cameras: &mut Value| {
@@ -238,7 +238,7 @@ fn cameras_as_tools_write_them_are_taken_and_what_was_rounded_is_said() {
     let said = found["warnings"].as_array().unwrap();
     let rounded = |line: &&Value| line.as_str().unwrap().contains("rounded");
     assert_eq!(said.iter().filter(rounded).count(), 1, "{said:?}");
-    // From a hundredth on nothing is taken.
+    // Deviations of a hundredth or more are refused.
     let scaled = |cameras: &mut Value| {
         for at in 0..9 {
             let number = &mut cameras["frames"][5]["transform_matrix"][at / 3][at % 3];
@@ -328,7 +328,7 @@ fn a_template_is_deformed_and_pictures_may_cut_the_object_off() {
     let words = ["--views", &fox(), "--template", template.to_str().unwrap(), "--steps", "30"];
     let found = run(&folder.path().join("out"), &words).unwrap();
     assert!(found["train_iou"].as_f64().unwrap() > 0.7, "{found}");
-    // All that is left of column 60 of one picture is missing, the object's left half with it.
+    // Column 60 of one picture and everything left of it is missing, including the object's left half.
     let cut = folder.path().join("cut.png");
     let whole = image::open(Path::new(&fox()).join("images/03.png")).unwrap();
     whole.crop_imm(60, 0, 60, 90).save(&cut).unwrap();
