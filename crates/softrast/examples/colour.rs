@@ -1,4 +1,4 @@
-//! Finds the colours of the vertices of a fox from pictures of it, with burn's own Adam.
+//! Fits the vertex colours of a fox to pictures, with burn's own Adam.
 //!
 //! `cargo run --release -p softrast --example colour`
 

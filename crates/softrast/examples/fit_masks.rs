@@ -1,4 +1,4 @@
-//! Moves the vertices of a sphere until they fit the masks of a folder, with burn's own Adam, and saves the mesh.
+//! Fits the vertices of a sphere to the masks of a folder, with burn's own Adam, and saves the mesh.
 //!
 //! `cargo run --release -p softrast --example fit_masks -- data/views/fox`
 

@@ -1,4 +1,4 @@
-//! Learns how the scale of a softness should move while a camera is found, by differentiating through whole runs; then solves with it.
+//! Learns the schedule of a softness for finding a camera, by differentiating through whole runs; then solves with it.
 //!
 //! `cargo run --release -p softrast --example learn`
 

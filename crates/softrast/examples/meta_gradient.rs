@@ -1,4 +1,4 @@
-//! A meta-gradient by hand: how should the softness change so that ten steps of gradient descent end nearer to their target?
+//! A meta-gradient by hand: the derivative of the error after ten steps of gradient descent with respect to the softness.
 //!
 //! `cargo run --release -p softrast --example meta_gradient`
 
@@ -20,7 +20,7 @@ fn main() {
     // Only the angles move.
     let rates = Orbit { distance: 0.0, elevation_deg: 300.0, azimuth_deg: 300.0, fov_deg: 0.0 };
     for step in 0..10 {
-        // One level further in: its gradient is an ordinary tensor of `Outer`, which remembers where it comes from.
+        // One level further in: its gradient is an ordinary tensor of `Outer`, tracked back to `phi`.
         let leaf = Tensor::<Inner, 2>::from_inner(pose.clone()).require_grad();
         let corners = project(vertices(mesh.positions(), &device), leaf.clone());
         let image = renderer.silhouette_with(corners, &Tensor::from_inner(phi.clone()));

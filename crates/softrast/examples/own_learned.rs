@@ -1,4 +1,4 @@
-//! A softness of one's own over whole runs: its schedule is learned, saved under a name, loaded and followed.
+//! A custom softness over whole runs: learns its schedule, saves it under a name, loads it and solves with it.
 //!
 //! `cargo run --release -p softrast --example own_learned`
 

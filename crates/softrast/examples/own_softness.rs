@@ -1,4 +1,4 @@
-//! A softness of one's own: one method. This one has heavy tails and is given an end; it then fits a sphere to 12 masks of a fox.
+//! A custom softness is one method. This one has heavy tails and is truncated; it then fits a sphere to 12 masks of a fox.
 //!
 //! `cargo run --release -p softrast --example own_softness`
 
@@ -22,7 +22,7 @@ fn main() {
     let masks = hard_silhouette(seen, fox.faces(), [90, 120]);
     let mut shape = VertexModel::new(&mesh::icosphere(3), &device);
     let width = Width::pixels(1.0).to(0.1);
-    // The image is 2.7 NDC wide: a face that reaches farther is drawn at every pixel.
+    // The image is 2.7 NDC wide: a softness with a larger reach draws every face at every pixel.
     let endless = SoftRenderer::new(shape.faces(), [90, 120], Arctan, width.at(0.0));
     let softness = Truncated::new(Arctan, 3.0); // the remedy
     let mut renderer = SoftRenderer::new(shape.faces(), [90, 120], softness, width.at(0.0));

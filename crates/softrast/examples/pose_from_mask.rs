@@ -1,4 +1,4 @@
-//! Finds the camera that took a picture, from its mask.
+//! Finds the camera of a picture from its mask.
 //!
 //! `cargo run --release -p softrast --example pose_from_mask`
 
@@ -7,7 +7,7 @@ use softrast::{mesh::fox, prelude::*, tensor::NdArray};
 fn main() -> anyhow::Result<()> {
     let (mesh, device) = (fox(), Default::default()); // of your own: Mesh::load("my.obj")?
 
-    // A mask, here drawn from a known place. Of your own: Picture::load_mask("mask.png")?
+    // A mask, here drawn from a known pose. For your own: Picture::load_mask("mask.png")?
     let truth = Pinhole::look_at([2.0, 1.5, -2.5], [0.0; 3], [0.0, 1.0, 0.0], 45.0, [90, 120]);
     let corners = vertices::<NdArray>(mesh.positions(), &device);
     let seen = project(corners, Pinholes::new(&[truth], &device));
@@ -15,7 +15,7 @@ fn main() -> anyhow::Result<()> {
     save_picture(hard_silhouette(seen, mesh.faces(), [90, 120]), &file)?;
     let mask = Picture::load_mask(&file)?;
 
-    // The lens is known, the pose is not. Of your own: Lens::load("camera.json")?.pinhole(mask.size())?
+    // The lens is known, the pose is not. For your own: Lens::load("camera.json")?.pinhole(mask.size())?
     let camera = Lens::of_fov(45.0, mask.size()).pinhole(mask.size())?;
     let found = PoseSearch::new(&mesh, camera).run::<NdArray>(&mask)?;
     let FoundPose { camera, iou, .. } = found[0]; // the best; others that fit nearly as well stand behind it

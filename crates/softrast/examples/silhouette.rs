@@ -1,4 +1,4 @@
-//! A soft silhouette, and its gradient by the camera, the vertices and the softness.
+//! A soft silhouette, and its gradient with respect to the camera, the vertices and the softness.
 //!
 //! `cargo run --release -p softrast --example silhouette`
 

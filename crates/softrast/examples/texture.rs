@@ -1,4 +1,4 @@
-//! Finds the texture of a fox from pictures of it in a light that is known, with burn's own Adam.
+//! Fits the texture of a fox to pictures under known light, with burn's own Adam.
 //!
 //! `cargo run --release -p softrast --example texture`
 
@@ -19,7 +19,7 @@ fn main() {
     let lit = lambert(world.clone(), normals, &[Light::Directional { towards, colour }]);
     let light = Attributes::of_vertices(lit * 0.7 + 0.3, fox.faces());
     let light = renderer.image(seen.clone(), &light, &renderer.background(&[1.0; 3], &device));
-    // x and y are places on the texture; a file has its own: Mesh::load_textured("fox.glb")?
+    // x and y are texture coordinates; a file has its own: Mesh::load_textured("fox.glb")?
     let places = Attributes::of_vertices(world.narrow(2, 0, 2) * 0.5 + 0.5, fox.faces());
     let black = renderer.background(&[0.0; 3], &device);
     let draw = |texture: Tensor<B, 3>| {

@@ -1,6 +1,6 @@
 //! Fit a shape to masks, one step at a time, in Rust.
 //!
-//! The programs in full are the [examples], each below 40 lines. What is below runs as it stands.
+//! The [examples] are complete programs, each below 40 lines. The snippets below run as shown.
 //!
 //! # An image and its gradient
 //!
@@ -21,12 +21,13 @@
 //! assert_eq!(by_cameras.dims(), [3, 4]);
 //! ```
 //!
-//! [`Family`] names the softness, [`Width`] how far it blurs an edge: in pixels, or as a scale in NDC, where the shorter side of an image is 2 long.
+//! [`Family`] is the softness, [`Width`] the blur of an edge: in pixels, or as a scale in NDC,
+//! where the shorter side of an image is 2 long.
 //!
 //! # A fit
 //!
-//! A [`VertexModel`] is a mesh whose vertices are the parameter of a module of burn, so that burn's optimisers move them. [`Views`] reads masks `[views, H, W]`
-//! and cameras of a folder; here both are made. A width that narrows finds the shape first and its edges later.
+//! A [`VertexModel`] is a mesh whose vertices are the parameter of a burn module, for burn's optimisers. [`Views`] reads masks `[views, H,
+//! W]` and cameras of a folder; here both are generated. A width that narrows finds first the shape, then its edges.
 //!
 //! ```
 //! # use softrast::{mesh::{fox, icosphere}, prelude::*, tensor::{Autodiff, NdArray, burn::optim::AdamConfig}};
@@ -54,12 +55,14 @@
 //! # Ok::<(), softrast::mesh::MeshError>(())
 //! ```
 //!
-//! The image is a tensor, so any loss of your own goes in the place of [`iou_loss`]. Other losses of the surface are those of [`Surface`].
+//! The image is a tensor, so any other loss can replace [`iou_loss`]. [`Surface`] has further losses of the surface.
 //!
 //! # A softness of your own
 //!
-//! One method makes a [`Softness`]; renderers, schedules, files and learning take it like those of the crate. Tails that fall slowly reach far: then every face
-//! is drawn at every pixel, which takes many times longer. [`SoftRenderer::reach`] is the distance in NDC, and [`Truncated`] the remedy.
+//! A [`Softness`] needs one method; renderers, schedules, files and learning accept it like those
+//! of the crate. Slowly falling tails have a large reach: then every face is drawn at every pixel,
+//! which takes many times longer. [`SoftRenderer::reach`] is the distance in NDC, and [`Truncated`]
+//! the remedy.
 //!
 //! ```
 //! use softrast::{prelude::*, tensor::NdArray};
@@ -80,10 +83,12 @@
 //! assert!(ended.reach::<NdArray>() < 0.1, "3 pixels");
 //! ```
 //!
-//! # Colours, and twice
+//! # Colours, and second derivatives
 //!
-//! A [`ColourRenderer`] draws colours, textures and light, with gradients to all of them. On `Autodiff<Autodiff<_>>` every gradient has a gradient of its own, as for
-//! a meta-gradient through an optimisation: the example `meta_gradient` is one by hand, and [`learn`](fn@crate::inverse::learn) does it at large.
+//! A [`ColourRenderer`] draws colours, textures and light, with gradients to all of them. On
+//! `Autodiff<Autodiff<_>>` every gradient is differentiable in turn, as for a meta-gradient through
+//! an optimisation: the example `meta_gradient` computes one by hand, and
+//! [`learn`](fn@crate::inverse::learn) learns a softness with it.
 //!
 //! [examples]: https://github.com/softrast/softrast/tree/main/crates/softrast/examples
 //! [`project`]: crate::raster::project

@@ -16,12 +16,13 @@
 //! | differentiate through an optimisation | [`meta`], `Autodiff<Autodiff<_>>` | [`meta_gradient`] |
 //! | read and write meshes | [`Mesh`](mesh::Mesh) | [`fit_masks`] |
 //!
-//! The [`guide`] goes from an image to a fitted mesh. Each module is a crate that can be used alone; [`prelude`] has what most programs need. Derivatives are exact to second order. Errors are
-//! returned for what comes from files; wrong shapes panic, with what was found and what was expected.
+//! The [`guide`] leads from an image to a fitted mesh. Each module is a crate that can be used
+//! alone; [`prelude`] has the items of most programs. Derivatives are exact to second order. Errors
+//! in files are returned; wrong shapes panic, with the found and the expected shape.
 //!
-//! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other releases of burn do not fit. The Cargo features
-//! `ndarray` (default), `flex` and `wgpu` choose the backend. [`inverse`], [`views`] and [`meta`] are in the feature `inverse`, which builds burn's modules
-//! and optimisers and the readers of pictures too; images of meshes and their derivatives need no feature but the backend.
+//! [`tensor`] re-exports the tensors, backends and autodiff of burn 0.21; types of other burn releases are incompatible. The Cargo features
+//! `ndarray` (default), `flex` and `wgpu` select the backend. [`inverse`], [`views`] and [`meta`] need the feature `inverse`, which also
+//! builds burn's modules and optimisers and the readers of pictures; images of meshes and their derivatives need only a backend.
 //!
 //! ```
 //! use softrast::{mesh::fox, prelude::*, tensor::{Autodiff, NdArray}};
@@ -46,7 +47,7 @@
 //! [`own_learned`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/own_learned.rs
 //! [`meta_gradient`]: https://github.com/softrast/softrast/blob/main/crates/softrast/examples/meta_gradient.rs
 
-// Without the feature `inverse` the map still names what is in it.
+// Without the feature `inverse` the table still names its items.
 #![cfg_attr(not(feature = "inverse"), allow(rustdoc::broken_intra_doc_links))]
 
 #[cfg(feature = "inverse")]
@@ -76,7 +77,7 @@ pub use softrast_views as views;
 #[doc = include_str!("../README.md")]
 pub struct Readme;
 
-/// The same of the guide to colours.
+/// Compiles and runs the guide to colours.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/guide/colour.md")]
 pub struct Colours;

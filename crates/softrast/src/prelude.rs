@@ -1,4 +1,4 @@
-//! What most programs need, for `use softrast::prelude::*`.
+//! The items of most programs, for `use softrast::prelude::*`.
 
 #[cfg(feature = "inverse")]
 pub use softrast_inverse::{

@@ -1,4 +1,4 @@
-//! Every example runs to its end, with the right result. `cargo test` builds them beside this test.
+//! Runs every example and checks its result. `cargo test` builds them next to this test.
 
 use std::{env, fs, path::PathBuf, process::Command};
 
@@ -17,7 +17,7 @@ fn runs(example: &str) -> String {
     runs_on(example, &[]).0
 }
 
-/// The output of an example, and the folder that it ran in.
+/// The output of an example, and its working folder.
 fn runs_on(example: &str, words: &[&str]) -> (String, tempfile::TempDir) {
     let program = folder().join(format!("{example}{}", env::consts::EXE_SUFFIX));
     let elsewhere = tempfile::tempdir().expect("a temporary folder");
@@ -28,14 +28,14 @@ fn runs_on(example: &str, words: &[&str]) -> (String, tempfile::TempDir) {
     (said.into_owned(), elsewhere)
 }
 
-/// The number behind the last occurrence of some words.
+/// The number after the last occurrence of some words.
 fn number_after(text: &str, words: &str) -> f64 {
     let rest = text.rsplit(words).next().unwrap_or_default().trim_start();
     let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
     rest[..end].parse().unwrap_or_else(|_| panic!("no number behind {words:?} in {text}"))
 }
 
-/// The mean coverage of the example's silhouette, by camera, scale and vertices that are moved, in f64.
+/// The mean coverage of the example's silhouette in f64, for a camera, a scale and a factor of the vertices.
 fn mean_coverage(camera: Orbit, scale: f64, moved: f64) -> f64 {
     type Exact = NdArray<f64>;
     let mesh = fox();
@@ -51,7 +51,7 @@ fn mean_coverage(camera: Orbit, scale: f64, moved: f64) -> f64 {
     renderer.silhouette(project(corners, camera)).mean().into_scalar()
 }
 
-/// The number behind a name in a line of debug output.
+/// The number after a name in a line of debug output.
 fn field(text: &str, name: &str) -> f64 {
     let rest = text.rsplit(name).next().unwrap_or_default();
     let end = rest.find([',', ')', ' ', '}']).unwrap_or(rest.len());
@@ -80,7 +80,7 @@ fn a_silhouette_has_the_gradients_of_differences() {
     ] {
         assert!((found - expected).abs() < 2e-2 * expected.abs() + 1e-5, "{found} not {expected}");
     }
-    // The norm of the gradient is at least its part along a direction: that in which the mesh grows.
+    // The norm of the gradient is at least its component along a direction: the one that enlarges the mesh.
     let norm = field(&said, "norm    Some(");
     let grown = slope(&|h| mean_coverage(at, 0.01, 1.0 + h), 1e-4);
     let length = fox().positions().iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
@@ -135,7 +135,7 @@ fn learning_lowers_the_validation_loss() {
     assert!(best < 0.8 * losses[0], "{said}");
 }
 
-/// What the example's ten steps leave of the pose, with a logarithm of the scale that is moved by `h`.
+/// The loss of the pose after the example's ten steps, with the logarithm of the scale increased by `h`.
 fn after_ten_steps(renderer: &SoftRenderer<Family>, h: f64) -> f64 {
     type Exact = NdArray<f64>;
     let (mesh, device) = (fox(), Default::default());
