@@ -35,8 +35,8 @@ struct Scene<S> {
 }
 
 impl<S: Softness> Colours<S> {
-    /// Draws what this renderer draws of attributes of vertices, where `faces` are those that the renderer was made with; `background`
-    /// `[channels]` is the colour behind them, of the weight that [`ColourRenderer::background`] gives it.
+    /// Wraps a renderer for vertex attributes; `faces` must be those of the renderer, and `background` `[channels]` is
+    /// the colour behind them, with the weight of [`ColourRenderer::background`].
     pub fn new(renderer: ColourRenderer<S>, faces: &[[u32; 3]], background: &[f64]) -> Self {
         let (faces, background) = (faces.into(), background.to_vec());
         Self(Arc::new(Scene { renderer, faces, background }))
@@ -48,7 +48,7 @@ impl<S: Softness> Colours<S> {
     }
 
     /// Draws the blended channels and, last, the share of the faces, `[views, channels + 1, height, width]`, top row first. `vertices`
-    /// `[views, vertices, 3]` are projected ones, `attributes` `[1 or views, vertices, channels]` what they show; both receive gradients.
+    /// `[views, vertices, 3]` are projected, `attributes` are `[1 or views, vertices, channels]`; both receive gradients.
     ///
     /// # Panics
     ///

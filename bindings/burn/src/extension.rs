@@ -1,6 +1,6 @@
-//! One op of burn 0.22 for everything that softrast computes.
+//! One op of burn 0.22 for all computations of softrast.
 
-// NdArray is deprecated by burn, and offered as long as it is there. The macro's own code names it, so no narrower place will do.
+// NdArray is deprecated by burn, and offered while it exists. The macro's own code names it, so a narrower `allow` does not suffice.
 #![cfg_attr(feature = "ndarray", allow(deprecated))]
 
 use std::sync::Arc;
@@ -26,7 +26,7 @@ use burn::{
 
 use crate::op::{Function, Of, Op};
 
-/// A backend that hands its numbers to softrast. The op's inputs are one or two: an extension takes no list of tensors.
+/// A backend whose tensor data is passed to softrast. The op has one or two inputs: an extension accepts no list of tensors.
 #[backend_extension(
     Autodiff,
     Flex: cfg(feature = "flex"),
@@ -72,7 +72,7 @@ pub(crate) fn of_one<const D: usize>(function: impl Function<D>, input: Tensor<3
     Tensor::from_dispatch(<Dispatch as HostBackend>::of_one(input.into_dispatch(), op))
 }
 
-/// The value of a function of two.
+/// The value of a function of two tensors.
 pub(crate) fn of_two<const D: usize>(
     function: impl Function<D>,
     inputs: [Tensor<3>; 2],

@@ -1,7 +1,7 @@
 //! softrast for tensors of burn 0.22: soft silhouettes, colours, losses and cameras as ops of its automatic differentiation.
 //!
-//! softrast itself computes on tensors of burn 0.21, since exact second derivatives need autodiff that nests. This crate hands each op's
-//! numbers over and takes the result and its gradient back.
+//! softrast itself computes on tensors of burn 0.21, since exact second derivatives need nested
+//! autodiff. This crate copies each op's data over, and the result and its gradient back.
 //!
 //! | to | there is |
 //! |---|---|
@@ -12,9 +12,9 @@
 //!
 //! Renderers, softnesses and meshes are those of [`softrast`], re-exported here.
 //!
-//! Tensors are `f32` or `f64` and lie on burn's CPU backends `Flex` (default feature `flex`) or `NdArray` (feature `ndarray`); a result has
-//! the float type and the device of its inputs. Images, losses and projections panic with tensors of another backend; every function does
-//! with another float type, or with two.
+//! Tensors are `f32` or `f64` on burn's CPU backends `Flex` (default feature `flex`) or `NdArray` (feature `ndarray`);
+//! a result has the float type and the device of its inputs. Images, losses and projections panic for tensors of
+//! another backend; every function panics for another float type, or for mixed ones.
 
 #[cfg(not(any(feature = "flex", feature = "ndarray")))]
 compile_error!("softrast-burn needs a backend: turn on one of the features flex, ndarray");

@@ -1,4 +1,4 @@
-//! Numbers on their way between both releases of burn.
+//! Conversion of numbers between both releases of burn.
 
 use burn::tensor::TensorData;
 use softrast::{

@@ -1,4 +1,4 @@
-//! Functions that softrast computes: their values, and derivatives from its own automatic differentiation.
+//! Functions computed by softrast: their values, and derivatives from its own autodiff.
 
 use std::{fmt, sync::Arc};
 
@@ -10,23 +10,23 @@ use softrast::{
 
 use crate::numbers::{Number, export, import};
 
-/// A function of tensors in terms of softrast.
+/// A function of tensors, computed by softrast.
 pub(crate) trait Function<const D: usize>: fmt::Debug + Send + Sync + 'static {
-    /// How many of its inputs receive gradients, the first ones: an op of softrast may refuse a constant that asks for one.
+    /// Number of leading inputs that receive gradients: a softrast op may refuse a constant that requires a gradient.
     const MOVING: usize;
 
     fn value<B: RasterBackend>(&self, inputs: Vec<Tensor<B, 3>>) -> Tensor<B, D>;
 }
 
-/// A [`Function`] for tensors of any release, of which it sees the numbers.
+/// A [`Function`] on tensor data, independent of the release.
 pub(crate) trait Op: fmt::Debug + Send + Sync {
     /// The value.
     fn forward(&self, inputs: Vec<TensorData>) -> TensorData;
-    /// The value, and what takes a gradient back from it.
+    /// The value, and its backward function.
     fn recorded(&self, inputs: Vec<TensorData>) -> (TensorData, Pull);
 }
 
-/// From the gradient of a value to those of its moving inputs; once, as with every recorded graph.
+/// Backward function from the gradient of a value to those of its moving inputs; single use, as with every recorded graph.
 #[derive(Clone)]
 pub(crate) struct Pull(Arc<dyn Fn(TensorData) -> Vec<TensorData> + Send + Sync>);
 
@@ -42,7 +42,7 @@ impl fmt::Debug for Pull {
     }
 }
 
-/// Runs a body with the backend and the float type that suit a tensor.
+/// Runs a body with the backend and the float type of a tensor.
 macro_rules! in_float_type {
     ($data:expr, |$backend:ident, $number:ident| $body:expr) => {
         match $data.dtype() {
@@ -84,7 +84,7 @@ impl<T: Function<D>, const D: usize> Of<T, D> {
         in_float_type!(inputs[0], |B, F| jvp::<B, F, D>(&self.0, inputs, direction))
     }
 
-    /// The Hessian of `Σ weights · value` by the first input, times `direction`; all weights are 1 where none are given.
+    /// The Hessian of `Σ weights · value` with respect to the first input, times `direction`; by default all weights are 1.
     pub(crate) fn hvp(
         &self,
         inputs: Vec<TensorData>,
@@ -114,7 +114,7 @@ fn recorded<B: RasterBackend, F: Number, T: Function<D>, const D: usize>(
     (data, Pull(Arc::new(pull)))
 }
 
-/// The gradient `Jᵀu` is linear in `u`, so the gradient of `v · Jᵀu` by `u` is `J v`, whatever `u` is.
+/// The gradient `Jᵀu` is linear in `u`, so the gradient of `v · Jᵀu` with respect to `u` is `J v`, for any `u`.
 fn jvp<B: RasterBackend, F: Number, const D: usize>(
     function: &impl Function<D>,
     inputs: Vec<TensorData>,
@@ -151,7 +151,7 @@ fn hvp<B: RasterBackend, F: Number, const D: usize>(
     export::<B, F, 3>(product.unwrap_or_else(|| outer.inner().zeros_like()))
 }
 
-/// The first input as a leaf, and the value there.
+/// The first input as a leaf, and the value at it.
 fn at_leaf<B: RasterBackend, const D: usize>(
     function: &impl Function<D>,
     mut inputs: Vec<Tensor<B, 3>>,

@@ -17,8 +17,8 @@ pub fn vertices(positions: &[[f64; 3]], device: &Device) -> Tensor<3> {
     Tensor::from_data(TensorData::new(positions.concat(), [1, positions.len(), 3]), device)
 }
 
-/// Projects `vertices` `[views, vertices, 3]`, or `[1, vertices, 3]` for all views, from the world to what these cameras see, one for each
-/// view: `[views, vertices, 3]`, x and y in NDC and the depth. The vertices receive gradients.
+/// Projects `vertices` `[views, vertices, 3]`, or `[1, vertices, 3]` for all views, from the world by these cameras,
+/// one per view: `[views, vertices, 3]`, x and y in NDC and the depth. The vertices receive gradients.
 ///
 /// # Panics
 ///
@@ -27,7 +27,8 @@ pub fn project(vertices: Tensor<3>, cameras: &[Pinhole]) -> Tensor<3> {
     of_one(Seen(cameras.to_vec()), vertices)
 }
 
-/// Projects them for `orbits` `[views, 4]`: the distance in world units, then elevation, azimuth and the whole field of view in degrees.
+/// Projects `vertices` by `orbits` `[views, 4]`: the distance in world units, then elevation,
+/// azimuth and the full field of view in degrees.
 /// Vertices and orbits receive gradients.
 ///
 /// # Panics

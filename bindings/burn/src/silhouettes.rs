@@ -14,11 +14,11 @@ use crate::{
 
 /// Draws soft silhouettes of one mesh topology: a [`SoftRenderer`] for tensors of burn 0.22.
 ///
-/// Vertices are projected ones, as [`project`](crate::project) returns them.
+/// Vertices must be projected, as by [`project`](crate::project).
 #[derive(Clone, Debug)]
 pub struct Silhouettes<S>(Arc<SoftRenderer<S>>);
 
-/// A number that silhouettes have, for [`Silhouettes::hvp`].
+/// A scalar function of silhouettes, for [`Silhouettes::hvp`].
 #[derive(Clone, Debug)]
 pub enum Objective {
     /// The sum of the image times these weights, `[views, height, width]`.
@@ -30,7 +30,7 @@ pub enum Objective {
 }
 
 impl<S: Softness> Silhouettes<S> {
-    /// Draws what this renderer draws.
+    /// Wraps a renderer.
     pub fn new(renderer: SoftRenderer<S>) -> Self {
         Self(Arc::new(renderer))
     }
@@ -40,7 +40,7 @@ impl<S: Softness> Silhouettes<S> {
         &self.0
     }
 
-    /// The renderer, to change its width for example. Images that were drawn before keep their gradients.
+    /// The renderer, to change its width for example. Images drawn before keep their gradients.
     pub fn renderer_mut(&mut self) -> &mut SoftRenderer<S> {
         Arc::make_mut(&mut self.0)
     }
@@ -49,32 +49,32 @@ impl<S: Softness> Silhouettes<S> {
     ///
     /// # Panics
     ///
-    /// If a vertex has not three numbers.
+    /// If the last axis of the vertices is not 3.
     pub fn silhouette(&self, vertices: Tensor<3>) -> Tensor<3> {
         of_one(self.coverage(), vertices)
     }
 
-    /// Compares the silhouettes of `vertices` `[views, vertices, 3]` with a `target` `[1 or views, height, width]`: 1 less intersection over
-    /// union of each view, `[views]`. Gradients reach the vertices alone.
+    /// The `IoU` loss of the silhouettes of `vertices` `[views, vertices, 3]` against a `target` `[1 or views, height,
+    /// width]`: 1 minus intersection over union per view, `[views]`. Only the vertices receive gradients.
     ///
     /// # Panics
     ///
-    /// If the target is of another size, or a vertex has not three numbers.
+    /// If the target has another size, or the last axis of the vertices is not 3.
     pub fn iou_loss(&self, vertices: Tensor<3>, target: Tensor<3>) -> Tensor<1> {
         of_two(self.loss(Kind::Iou), [vertices, target.inner()])
     }
 
-    /// Compares them by the mean squared error of each view, `[views]`, likewise.
+    /// The mean squared error per view, `[views]`, with the shapes and gradients of [`iou_loss`](Silhouettes::iou_loss).
     ///
     /// # Panics
     ///
-    /// If the target is of another size, or a vertex has not three numbers.
+    /// If the target has another size, or the last axis of the vertices is not 3.
     pub fn mse_loss(&self, vertices: Tensor<3>, target: Tensor<3>) -> Tensor<1> {
         of_two(self.loss(Kind::Mse), [vertices, target.inner()])
     }
 
-    /// Differentiates the silhouette as `vertices` move along `direction`, both `[views, vertices, 3]`; the derivative is
-    /// `[views, height, width]`, without gradients.
+    /// Derivative of the silhouette as `vertices` move along `direction`, both `[views, vertices,
+    /// 3]`: `[views, height, width]`, without gradients.
     ///
     /// # Panics
     ///
@@ -87,8 +87,8 @@ impl<S: Softness> Silhouettes<S> {
         Tensor::from_data(data, (&device, dtype))
     }
 
-    /// Multiplies the Hessian of an objective by `vertices` with `direction`, both `[views, vertices, 3]`, as is the product, which has no
-    /// gradients. This and [`jvp`](Self::jvp) are for renderers without a surrogate, whose backward pass is not that of their image.
+    /// The Hessian of an objective with respect to `vertices`, times `direction`, both `[views, vertices, 3]`, as is the product, which has
+    /// no gradients. This and [`jvp`](Self::jvp) are for renderers without a surrogate, whose backward pass is not that of their image.
     ///
     /// # Panics
     ///
@@ -124,7 +124,7 @@ impl<S: Softness> From<SoftRenderer<S>> for Silhouettes<S> {
     }
 }
 
-/// Both without gradients.
+/// Checks that both shapes are equal, and detaches both tensors.
 fn alike(vertices: Tensor<3>, direction: Tensor<3>) -> [Tensor<3>; 2] {
     assert_eq!(vertices.dims(), direction.dims(), "vertices and their direction have one shape");
     [vertices.inner(), direction.inner()]

@@ -1,4 +1,4 @@
-//! Values are those of softrast on burn 0.21, and derivatives those of differences.
+//! Values equal those of softrast on burn 0.21, and derivatives agree with finite differences.
 
 use softrast_burn::{
     Colours, Objective, Silhouettes,
@@ -22,11 +22,11 @@ type Plain = NdArray<f64>;
 
 const FACES: [[u32; 3]; 2] = [[0, 1, 2], [1, 3, 2]];
 const SIZE: [usize; 2] = [6, 5];
-/// Half of a step of differences.
+/// Half a step of the finite differences.
 const H: f64 = 1e-6;
 
-/// Projected vertices, `[2, 4, 3]`. No pixel is as near to an edge as to its end, where second derivatives jump, nor so near to an edge that
-/// differences of this step miss them.
+/// Projected vertices, `[2, 4, 3]`. No pixel is so near to the end of an edge, where second
+/// derivatives jump, or so near to an edge, that differences of this step miss it.
 const SEEN: [[f64; 3]; 8] = [
     [-0.613, -0.487, 2.113],
     [0.521, -0.573, 1.807],
@@ -50,7 +50,7 @@ fn inner_seen() -> Projected<Plain> {
     Projected::new(tensor(SEEN.concat(), [2, 4, 3]))
 }
 
-/// Numbers in [-1, 1] that are not alike.
+/// Distinct numbers in [-1, 1].
 fn wave_numbers(count: usize, phase: f64) -> Vec<f64> {
     (0..count).map(|k| (1.7 * k as f64 + phase).sin()).collect()
 }
@@ -75,7 +75,7 @@ fn colours() -> Colours<Family> {
     Colours::new(colour_renderer(), &FACES, &[0.1, 0.2])
 }
 
-/// A mask `[1, 6, 5]` with a hole, which all views are compared with.
+/// A mask `[1, 6, 5]` with a hole, the target of all views.
 fn mask_numbers() -> Vec<f64> {
     (0..30).map(|k| f64::from(u8::from(k % 5 > 0 && k != 12))).collect()
 }
@@ -116,7 +116,7 @@ fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
     tensor.into_data().iter().collect()
 }
 
-/// The gradient of `Σ w f` by each input, along a direction.
+/// The gradient of `Σ w f` with respect to each input, along a direction.
 fn gradients_are_those_of_differences<const D: usize>(
     inputs: &[Tensor<3>],
     f: impl Fn(&[Tensor<3>]) -> Tensor<D>,
@@ -250,7 +250,7 @@ fn constants_have_no_gradient() {
     let device = Device::flex().autodiff();
     let constant = of(SEEN.concat(), [2, 4, 3], &device);
     assert!(!silhouettes().silhouette(constant.clone()).is_tracked());
-    // Of two inputs one is tracked, and the other has no autodiff at all.
+    // One of two inputs is tracked, and the other has no autodiff at all.
     let shown = wave([1, 4, 2], 0.0).autodiff().require_grad();
     let image = colours().image(seen(), shown.clone());
     let gradients = image.sum().backward();
