@@ -1,4 +1,4 @@
-//! The run of the page's test on a computer: losses of its first steps, and how long a step takes.
+//! The run of the page's test outside a browser: losses of its first steps, and time per step.
 //!
 //! `RAYON_NUM_THREADS=1 cargo run --release --example native > tests/native.json`
 
@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use softrast_web::{Backend, PoseRun, Run, Settings};
 
-/// Steps whose losses are told. After some 35, runs have gone apart by the rounding of sines and exponentials.
+/// Steps whose losses are printed. After some 35, runs diverge by the rounding of sines and exponentials.
 const TOLD: usize = 30;
 
 fn main() -> anyhow::Result<()> {

@@ -1,4 +1,4 @@
-// Canvases that are as sharp as the screen, in the colours of the page.
+// Canvases at the resolution of the screen, in the colours of the page.
 
 /** The colours of the style sheet, as they are now. */
 export function colours() {

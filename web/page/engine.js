@@ -1,4 +1,4 @@
-// The worker as the page sees it: requests that are promises, and frames that come by themselves.
+// The page's interface to the worker: requests as promises, and pushed frames.
 
 export class Engine {
   #worker = null;
@@ -14,7 +14,7 @@ export class Engine {
 
   #begin() {
     this.#given = {};
-    // From a blob, so that the worker is bound by this page's content security policy too: a file would bring one of its own, or none.
+    // From a blob, so that the page's content security policy also binds the worker: a file would have its own policy, or none.
     const source = `import ${JSON.stringify(new URL("./worker.js", import.meta.url).href)};`;
     const url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
     this.#worker = new Worker(url, { type: "module" });

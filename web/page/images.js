@@ -1,4 +1,4 @@
-// Square images of bytes or floats, drawn as pixels, and outlines of what is covered.
+// Square images of bytes or floats, drawn as pixels, and outlines of covered pixels.
 
 import { channels, cleared, colours } from "./canvas.js";
 

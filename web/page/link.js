@@ -1,4 +1,4 @@
-// The part of the address behind #: which tab, and all settings of a run that are not as usual.
+// The part of the address after #: the tab, and all settings of a run that differ from the defaults.
 
 /** The settings in the address, as text by name. */
 export function read() {

@@ -1,4 +1,4 @@
-// The page: tabs, files that are dropped, errors.
+// The page: tabs, dropped files, errors.
 
 import { Engine } from "./engine.js";
 import * as link from "./link.js";
@@ -33,7 +33,7 @@ async function route() {
   }
   const first = !tabs[name].entered;
   tabs[name].entered = true;
-  // The link of a tab without settings leaves it as it was.
+  // A link without settings does not change its tab.
   const anew = Object.keys(told).length > 1;
   if (first || anew) tabs[name].settings = told;
   await tabs[name].enter({ runs: (first || anew) && !matchMedia("(prefers-reduced-motion: reduce)").matches, anew });
@@ -84,7 +84,7 @@ async function begin() {
 }
 
 if ("serviceWorker" in navigator && location.protocol !== "file:") {
-  // Without it the page needs a network the next time, and works all the same.
+  // Without it the page needs a network the next time, but still works.
   navigator.serviceWorker.register("sw.js").catch(() => {});
 }
 begin();

@@ -1,4 +1,4 @@
-// The mesh, the camera of the target and the cameras of runs, seen from outside. Dragging and arrow keys turn it.
+// The mesh, the camera of the target and the cameras of runs, from outside. Dragging and arrow keys rotate the view.
 
 import { channels, cleared, colours, scheduled } from "./canvas.js";
 
@@ -117,7 +117,7 @@ export class OrbitView {
       context.lineTo(c[0], c[1]);
       context.closePath();
       context.fill();
-      // Without it the background shows between two faces.
+      // Without it the background shows between adjacent faces.
       context.stroke();
     }
   }

@@ -1,4 +1,4 @@
-// Controls that choose a softness.
+// Controls for choosing a softness.
 
 const WIDTHS = [1e-3, 0.3];
 export const USUAL = { name: "preset", squared: false, first: 0.03, last: 0.002 };

@@ -149,7 +149,7 @@ export class Solver {
       this.#fail(error);
       return;
     }
-    // A search from a mask takes a while and waits until it is asked for.
+    // A search from a mask is slow and starts only on request.
     await this.#restart(this.#kind !== "mask" && !still.matches);
   }
 
@@ -270,7 +270,7 @@ export class Solver {
   }
 
   async #stop() {
-    // Frames come until then.
+    // Frames arrive until then.
     await this.engine.ask("stop");
     if (this.state === "running") this.state = "ready";
     this.draw();
@@ -338,12 +338,12 @@ export class Solver {
       const run = this.runs[k];
       run.latest = { ...numbers, soft, hard };
       run.frames.push(numbers);
-      // Of steps that are equally good the last, as in the other programs.
+      // The last of equally good steps is used, as in the other programs.
       if (!run.best || frame.hard_loss <= run.best.hard_loss) run.best = run.latest;
     });
     if (ended) {
       this.state = "ended";
-      // What a run returns is what fits best, which can be told without knowing the answer.
+      // A run returns its best-fitting step, which needs no knowledge of the true answer.
       for (const run of this.runs) run.latest = run.best;
       this.draw();
     }
@@ -370,7 +370,7 @@ export class Solver {
     if (error instanceof Ended) return;
     this.say(error.message);
     this.state = "new";
-    // What panicked cannot be used again.
+    // After a panic the engine cannot be used again.
     if (error.fault) this.engine.renew();
     this.#show();
   }
@@ -439,7 +439,7 @@ export class Solver {
     overTime(this.canvases(null, "loss"), { lines: lines((frame) => frame.loss), steps: this.steps, log: true });
     const hasAngle = this.kind === "pose";
     overTime(this.canvases(null, "error"), { lines: lines((frame) => (hasAngle ? frame.angle_deg : frame.hard_loss)), steps: this.steps, log: this.kind === "shape", unit: hasAngle ? "°" : "" });
-    // A new start is no way from the old one.
+    // A restart is not connected to the previous trail.
     const trail = ({ frames }) => frames.flatMap(({ camera, start }, k) => (k && frames[k - 1].start[0] !== start[0] ? [null, camera?.eye] : [camera?.eye]));
     this.orbit?.move(this.runs.map((run, k) => ({ colour: RUNS[k], camera: run.latest?.camera, trail: trail(run) })).filter(({ camera }) => camera));
     if (this.state === "running") this.#curve();

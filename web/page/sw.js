@@ -1,8 +1,8 @@
-// The service worker: keeps all files of the page, so that it works without a network. The build fills in what stands in quotes here.
+// The service worker: caches all files of the page for use without a network. The build fills in the quoted placeholders.
 
 const VERSION = "VERSION";
 const FILES = ["FILES"];
-// Two copies of the page on one host do not share them.
+// Two copies of the page on one host have separate caches.
 const OWN = `softrast ${registration.scope} `;
 const KEPT = OWN + VERSION;
 

@@ -1,6 +1,6 @@
-// The worker: it owns the WebAssembly, and answers requests one after the other. It never asks anything of a network but its own files.
+// The worker: owns the WebAssembly, and answers requests one after the other. It loads nothing from a network except its own files.
 //
-// A request is { id, ask, ... }, an answer { id, ok } or { id, error }. Frames of a run that goes on come unasked: { frame }.
+// A request is { id, ask, ... }, an answer { id, ok } or { id, error }. Frames of a running run are pushed: { frame }.
 
 import init, * as softrast from "./softrast.js";
 
@@ -174,7 +174,7 @@ const turn = () => new Promise((done) => {
 });
 
 const fail = (error) => postMessage({ error: told(error), fault: isFault(error) });
-// What panics while it is waited for answers nobody.
+// A panic during an await leaves its request without an answer.
 addEventListener("error", (event) => {
   event.preventDefault();
   fail(event.error ?? event);
@@ -189,7 +189,7 @@ function told(error) {
   try {
     panic = softrast.fault();
   } catch {
-    // Where the WebAssembly has not been loaded there is none.
+    // The WebAssembly has not been loaded, so there is no fault.
   }
   return `this page has a fault: ${panic || error?.message || error}`;
 }

@@ -1,4 +1,4 @@
-//! What the page's worker calls. Numbers that belong together come as JSON, pictures as bytes, errors as one line of text.
+//! Functions for the page's worker. Structured results are JSON, pictures bytes, errors one line of text.
 
 use std::cell::RefCell;
 
@@ -16,7 +16,7 @@ thread_local! {
     static FAULT: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Keeps what a panic says, which a browser shows as `unreachable` only.
+/// Stores the message of a panic, which a browser shows only as `unreachable`.
 #[wasm_bindgen(start)]
 fn start() {
     std::panic::set_hook(Box::new(|panic| {
@@ -24,13 +24,13 @@ fn start() {
     }));
 }
 
-/// What the latest panic said.
+/// The message of the latest panic.
 #[wasm_bindgen]
 pub fn fault() -> String {
     FAULT.with(|fault| fault.borrow().clone())
 }
 
-/// Sets the GPU up, before the first run on it. Where a browser has no adapter it panics.
+/// Initializes the GPU, before the first run on it. Panics if the browser has no adapter.
 #[cfg(target_family = "wasm")]
 #[wasm_bindgen]
 pub async fn set_up_gpu() {
@@ -38,15 +38,15 @@ pub async fn set_up_gpu() {
     init_setup_async::<AutoGraphicsApi>(&WgpuDevice::default(), Default::default()).await;
 }
 
-/// Names that can be chosen, as JSON: `preset`, `families` and `learned`.
+/// Names of softnesses, as JSON: `preset`, `families` and `learned`.
 #[wasm_bindgen]
 pub fn names() -> String {
     let [preset, families, learned] = SoftnessChoice::names();
     json!({ "preset": preset, "families": families, "learned": learned }).to_string()
 }
 
-/// The curve of a softness at `progress` of its path, on images of `size` pixels, as JSON: `curves` (that of the softness, and of its surrogate
-/// if it has one, at `count` distances from `-reach` to `reach` in NDC), `width` in NDC, `scale`, `moves`, `feedback` and `note`.
+/// The curve of a softness at `progress` of a run, on images of `size` pixels, as JSON: `curves` (of the softness, and of its surrogate, if
+/// any, at `count` distances from `-reach` to `reach` in NDC), `width` in NDC, `scale`, `moves`, `feedback`, `family` and `note`.
 #[wasm_bindgen]
 pub fn curve(
     choice: &str,
@@ -69,14 +69,14 @@ pub fn curve(
     Ok(told.to_string())
 }
 
-/// The file of a softness, as other programs read it.
+/// The file of a softness, in the format of other programs.
 #[wasm_bindgen]
 pub fn softness_file(choice: &str, task: &str) -> Result<String, String> {
     let choice: SoftnessChoice = serde_json::from_str(choice).map_err(|e| e.to_string())?;
     choice.of_task(task).map_err(line)?.text(&choice.name).map_err(|e| e.to_string())
 }
 
-/// A mesh to look for.
+/// A mesh for the runs.
 #[wasm_bindgen]
 pub struct PageMesh {
     mesh: Mesh,
@@ -96,7 +96,7 @@ impl PageMesh {
         loaded(bytes, name).map(|of| Self { mesh: of.mesh, faces: of.faces }).map_err(line)
     }
 
-    /// Faces of the file, which may be more than are used.
+    /// Faces of the file, which may be more than those of the mesh.
     pub fn file_faces(&self) -> usize {
         self.faces
     }
@@ -112,7 +112,7 @@ impl PageMesh {
     }
 }
 
-/// A run of a task, on a GPU where `gpu` says so.
+/// A run of a task, on a GPU if `gpu`.
 #[wasm_bindgen]
 pub struct PageRun {
     run: Box<dyn Run>,
@@ -122,7 +122,7 @@ pub struct PageRun {
 
 #[wasm_bindgen]
 impl PageRun {
-    /// POSE with a target of its own.
+    /// POSE with a seeded target.
     pub fn pose(mesh: &PageMesh, settings: &str, gpu: bool) -> Result<Self, String> {
         fn run<B: RasterBackend>(mesh: &Mesh, settings: &Settings) -> anyhow::Result<PageRun> {
             let run = PoseRun::<B>::new(mesh, settings)?;
@@ -174,16 +174,16 @@ impl PageRun {
         })
     }
 
-    /// Finds out what the first step needs; `told` is called with the share that is done, 0 to 1.
+    /// Prepares the first step; calls `told` with the share that is done, 0 to 1.
     pub fn prepare(&mut self, told: &js_sys::Function) -> Result<(), String> {
         let mut tell = |share: f64| {
-            // That nobody hears it ends nothing.
+            // Errors of the callback are ignored.
             let _ = told.call1(&wasm_bindgen::JsValue::NULL, &share.into());
         };
         self.run.prepare(&mut tell).map_err(line)
     }
 
-    /// The next frame as JSON; none after the last. Its pictures are [`PageRun::soft`] and [`PageRun::hard`].
+    /// The next frame as JSON; `None` after the last. Its pictures are [`PageRun::soft`] and [`PageRun::hard`].
     pub async fn next(&mut self) -> Result<Option<String>, String> {
         self.frame = self.run.next_async().await.map_err(line)?;
         self.frame
@@ -202,12 +202,12 @@ impl PageRun {
         self.frame.as_ref().map(|frame| frame.hard.clone()).unwrap_or_default()
     }
 
-    /// What it should arrive at, `[size * size]`.
+    /// The target image, `[size * size]`.
     pub fn target(&self) -> Vec<u8> {
         bytes(&self.run.target())
     }
 
-    /// Vertices in the frame in which cameras are told, `[vertices * 3]`.
+    /// Vertices in the frame of the cameras in frames, `[vertices * 3]`.
     pub fn positions(&self) -> Vec<f32> {
         self.positions.clone()
     }
@@ -235,7 +235,7 @@ pub struct PagePlayground {
 
 #[wasm_bindgen]
 impl PagePlayground {
-    /// An empty one.
+    /// An empty playground.
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         Self::default()
@@ -249,13 +249,13 @@ impl PagePlayground {
         Ok(field.image)
     }
 
-    /// Derivatives of the picture that was just drawn, `[grid * grid, triangles, 3, 2]`.
+    /// Derivatives of the last drawn picture, `[grid * grid, triangles, 3, 2]`.
     pub fn gradient(&mut self) -> Vec<f32> {
         std::mem::take(&mut self.gradient)
     }
 }
 
-/// An error with what led to it, on one line.
+/// An error with its causes, on one line.
 fn line(error: anyhow::Error) -> String {
     format!("{error:#}").replace('\n', " ")
 }

@@ -6,10 +6,10 @@ use softrast_tensor::read_sync;
 
 use crate::CameraView;
 
-/// A frame that will come; from the CPU it comes at once.
+/// A pending frame; on the CPU it is ready at once.
 pub type Coming<'a> = Pin<Box<dyn Future<Output = anyhow::Result<Option<Frame>>> + 'a>>;
 
-/// A run that goes on when it is asked to.
+/// A run that advances one step per call.
 pub trait Run {
     /// Pixels a side of its images.
     fn size(&self) -> usize;
@@ -17,7 +17,7 @@ pub trait Run {
     /// Steps of the whole run.
     fn steps(&self) -> usize;
 
-    /// What it should arrive at, `[size * size]`, top row first, in [0, 1].
+    /// The target image, `[size * size]`, top row first, in [0, 1].
     fn target(&self) -> Vec<f64>;
 
     /// The camera of the target, if it is known.
@@ -25,7 +25,7 @@ pub trait Run {
         None
     }
 
-    /// What has to be found out before the first step, if anything; `told` hears which share of that is done, 0 to 1.
+    /// Prepares the first step, if needed; calls `told` with the share that is done, 0 to 1.
     ///
     /// # Errors
     ///
@@ -34,54 +34,54 @@ pub trait Run {
         Ok(())
     }
 
-    /// The start, then what comes of each step; none after the last.
+    /// The start, then the result of each step; `None` after the last.
     ///
     /// # Errors
     ///
-    /// Those of the problem.
+    /// The errors of the problem.
     fn next_async(&mut self) -> Coming<'_>;
 
-    /// The same where nothing has to be waited for, or this thread may wait.
+    /// [`next_async`](Run::next_async), blocking until the frame is ready; in a browser not for a GPU.
     ///
     /// # Errors
     ///
-    /// Those of the problem.
+    /// The errors of the problem.
     fn next(&mut self) -> anyhow::Result<Option<Frame>> {
         read_sync(self.next_async())
     }
 }
 
-/// What there is to see after a step.
+/// State of a run after a step, for display.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Frame {
     /// Steps taken so far.
     pub step: usize,
-    /// Where on its path the softness is, 0 to 1.
+    /// Progress along the schedule, 0 to 1.
     pub progress: f64,
-    /// Its scale, in NDC (NDC² if squared).
+    /// Scale of the softness, in NDC (NDC² if squared).
     pub scale: f64,
-    /// What is lowered.
+    /// The total loss.
     pub loss: f64,
-    /// What is wrong with the hard image.
+    /// The loss of the hard image.
     pub hard_loss: f64,
     /// Angle between the camera and that of the target in degrees, if that is known.
     pub angle_deg: Option<f64>,
     /// The camera, if there is one.
     pub camera: Option<CameraView>,
-    /// Which start this is, counted from 0, and of how many; of 0 if that is not known.
+    /// Number of the start, counted from 0, and number of starts; 0 if unknown.
     pub start: [usize; 2],
-    /// The scene, as the optimiser has it.
+    /// Parameters of the scene.
     pub theta: Vec<f64>,
     /// The soft image `[size * size]`, top row first, 0 to 255.
     #[serde(skip)]
     pub soft: Vec<u8>,
-    /// The hard image, alike.
+    /// The hard image `[size * size]`, top row first, 0 to 255.
     #[serde(skip)]
     pub hard: Vec<u8>,
 }
 
 impl Frame {
-    /// What there is to see of an iterate of one instance, with its hard image `[size * size]`, but for a camera.
+    /// The frame of an iterate of one instance with its hard image `[size * size]`, without a camera.
     pub(crate) fn new(iterate: &Iterate, hard: &[f64], theta: Vec<f64>) -> Self {
         Self {
             step: iterate.step,

@@ -1,8 +1,8 @@
-//! The Rust side of the page: what is solved and drawn there, one step at a time.
+//! The Rust side of the page: its tasks, one step at a time.
 //!
-//! Runs are [`Settings`] as JSON that become a [`Run`]: [`PoseRun`], [`MaskRun`] or [`ShapeRun`]. Each step of it is a [`Frame`].
-//! [`Playground`] draws triangles and the gradient of every pixel. All of it is plain Rust, so that the same runs on a computer; only
-//! `exports` knows of browsers.
+//! [`Settings`] as JSON become a [`Run`]: [`PoseRun`], [`MaskRun`] or [`ShapeRun`]. Each of its
+//! steps is a [`Frame`]. [`Playground`] draws triangles and the gradient of every pixel. All of it
+//! is plain Rust and also runs outside a browser; only `exports` depends on browsers.
 
 mod camera;
 mod exports;
@@ -25,11 +25,11 @@ pub use pose::PoseRun;
 pub use settings::{Settings, SoftnessChoice, curves};
 pub use shape::ShapeRun;
 
-/// What everything is computed on unless a GPU was chosen: the CPU, in one thread where there is no other.
+/// The default backend: the CPU, in a single thread if there are no others.
 pub type Backend = softrast_tensor::NdArray<f32>;
-/// What runs are computed on where a GPU was chosen, through WebGPU. On a computer it stands for the CPU.
+/// The backend for a GPU, through WebGPU. Outside a browser it is the CPU.
 #[cfg(target_family = "wasm")]
 pub type Gpu = softrast_raster::Wgpu;
-/// What runs are computed on where a GPU was chosen. On a computer it stands for the CPU.
+/// The backend for a GPU. Outside a browser it is the CPU.
 #[cfg(not(target_family = "wasm"))]
 pub type Gpu = Backend;

@@ -10,36 +10,36 @@ use softrast_views::{Lens, Picture};
 
 use crate::{Backend, CameraView, Coming, Frame, Run, Settings};
 
-/// Field of view along the shorter side of a mask, in degrees: nothing is known of the lens.
+/// Field of view along the shorter side of a mask, in degrees: the lens is unknown.
 const ASSUMED_FOV_DEG: f64 = 45.0;
-/// Starts that are gone through at most.
+/// Most starts.
 const STARTS: usize = 3;
 
-/// POSE from a mask: first all directions and rolls are looked at, on the CPU, then the most hopeful starts are improved, one after the
-/// other.
+/// POSE from a mask: a search over all directions and rolls, on the CPU, then optimisation from the
+/// best starts, one after the other.
 pub struct MaskRun<B: RasterBackend> {
     mesh: Mesh,
     mask: Picture,
     camera: Pinhole,
     square: [f64; 3],
     method: Method,
-    /// That of each start.
+    /// Settings of the run from each start.
     config: SolveConfig,
     starts: Vec<Pinhole>,
-    /// Number of the start that is improved, counted from 0.
+    /// Number of the current start, counted from 0.
     start: usize,
     run: Option<(Minimization<MaskPoses, B>, MaskPose)>,
-    /// What had the least error so far.
+    /// The frame with the smallest error so far.
     best: Option<Frame>,
     step: usize,
 }
 
 impl<B: RasterBackend> MaskRun<B> {
-    /// The run for a mask of any size, not begun.
+    /// The run for a mask of any size, before its first step.
     ///
     /// # Errors
     ///
-    /// If the mask is empty or full, the mesh has no extent, or the softness is not one.
+    /// If the mask is empty or full, the mesh has no extent, or the softness is invalid.
     pub fn new(mesh: &Mesh, mask: Picture, settings: &Settings) -> anyhow::Result<Self> {
         let camera = Lens::of_fov(ASSUMED_FOV_DEG, mask.size()).pinhole(mask.size())?;
         PoseSearch::new(mesh, camera).check(&mask)?;
@@ -60,7 +60,7 @@ impl<B: RasterBackend> MaskRun<B> {
         })
     }
 
-    /// Begins with the next start, if there is one.
+    /// Starts from the next start pose, if there is one.
     fn begin(&mut self) -> anyhow::Result<()> {
         let Some(&start) = self.starts.get(self.start) else { return Ok(()) };
         let pose = MaskPose { mask: self.mask.clone(), square: self.square, start, painted: None };
@@ -88,7 +88,7 @@ impl<B: RasterBackend> Run for MaskRun<B> {
     }
 
     fn prepare(&mut self, told: &mut dyn FnMut(f64)) -> anyhow::Result<()> {
-        // A softness with feedback solves one instance at a time; here there are many, and only coarse.
+        // A softness with feedback solves one instance at a time; here there are many, at low resolution.
         let mut method = self.method.clone();
         method.softness.feedback = None;
         told(0.0);
@@ -103,7 +103,7 @@ impl<B: RasterBackend> Run for MaskRun<B> {
         self.begin()
     }
 
-    /// The last frame is the best of all again.
+    /// The last frame repeats the best one.
     fn next_async(&mut self) -> Coming<'_> {
         Box::pin(async move {
             let Some((run, pose)) = &mut self.run else { return Ok(None) };

@@ -1,24 +1,24 @@
 use anyhow::Context;
 use softrast_mesh::Mesh;
 
-/// Faces of a mesh from a file that the page works with at most; more take too long for every step.
+/// Most faces of the mesh from a file; more make every step too slow.
 pub const MOST_FACES: usize = 10_000;
-/// The first attempt to merge vertices has so many cubes along the longest side of the mesh, each further one a fifth less.
+/// Cubes along the longest side of the mesh for merging vertices in the first attempt; each further attempt has a fifth fewer.
 const CUBES: f64 = 120.0;
 
-/// A mesh from a file, as it is looked at.
+/// A mesh from a file, normalized for the page.
 pub struct Loaded {
-    /// Centred at the origin, the longest side of its box 2, and with no more than [`MOST_FACES`] faces.
+    /// Centred at the origin, with the longest side of its box scaled to 2, and at most [`MOST_FACES`] faces.
     pub mesh: Mesh,
-    /// Faces of the file.
+    /// Number of faces of the file.
     pub faces: usize,
 }
 
-/// The mesh in the `bytes` of a file of this name: OBJ, PLY, STL, OFF, GLB or glTF.
+/// Loads a mesh from the `bytes` of a file of this name: OBJ, PLY, STL, OFF, GLB or glTF.
 ///
 /// # Errors
 ///
-/// One line that says what is wrong with the file.
+/// A message of one line with the fault of the file.
 pub fn loaded(bytes: &[u8], name: &str) -> anyhow::Result<Loaded> {
     let mesh = Mesh::parse(bytes, name)?.normalized();
     let faces = mesh.faces().len();
@@ -30,7 +30,7 @@ pub fn loaded(bytes: &[u8], name: &str) -> anyhow::Result<Loaded> {
     })
 }
 
-/// The mesh with few enough faces.
+/// The mesh reduced to at most [`MOST_FACES`] faces.
 fn reduced(mesh: Mesh) -> Option<Mesh> {
     if mesh.faces().len() <= MOST_FACES {
         return Some(mesh);

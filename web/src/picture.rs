@@ -1,7 +1,7 @@
 use softrast_views::Picture;
 
-/// The mask in a picture of `[height, width, 4]` bytes, red, green, blue and opacity: its transparency, or where all of it is opaque its
-/// luminance.
+/// The mask of a picture of `[height, width, 4]` bytes, red, green, blue and opacity: its
+/// transparency, or its luminance if it is opaque.
 ///
 /// # Panics
 ///
@@ -13,7 +13,7 @@ pub fn mask(rgba: &[u8], width: usize) -> Picture {
     Picture::new(rgba.chunks_exact(4).map(level).collect(), width)
 }
 
-/// The luminance of such a picture; what is transparent is black.
+/// The luminance of such a picture; transparent pixels are black.
 ///
 /// # Panics
 ///
@@ -23,7 +23,7 @@ pub fn luminance(rgba: &[u8], width: usize) -> Picture {
     Picture::new(rgba.chunks_exact(4).map(level).collect(), width)
 }
 
-/// Source: ITU-R BT.709, on the numbers as they are, as the library of the other programs has it.
+/// Source: ITU-R BT.709, on the encoded values, as in the image library of the other programs.
 fn luminance_of(pixel: &[u8]) -> f32 {
     let [red, green, blue] = [0, 1, 2].map(|k| f32::from(pixel[k]));
     (0.2126 * red + 0.7152 * green + 0.0722 * blue) / 255.0

@@ -11,20 +11,20 @@ use crate::{Backend, SoftnessChoice};
 /// Most pixels a side of the picture and of the gradients, and most triangles.
 const LARGEST: usize = 256;
 const MOST: usize = 8;
-/// Largest error of a pixel: a tenth of what a screen can show.
+/// Largest error of a pixel: a tenth of a screen's resolution of levels.
 const TOLERANCE: f64 = 4e-4;
 
-/// Triangles to look at.
+/// Triangles and their display.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Corners in NDC, x right and y up.
     pub triangles: Vec<[[f64; 2]; 3]>,
-    /// The softness of edges, stretched to the width; a surrogate does not count.
+    /// The softness of edges, scaled to the width; a surrogate is ignored.
     pub softness: SoftnessChoice,
     /// Its width, in NDC.
     pub width: f64,
-    /// How coverages are combined, such as `probabilistic` or `yager:2`.
+    /// T-conorm of the coverages, such as `probabilistic` or `yager:2`.
     pub t_conorm: String,
     /// Pixels a side of the picture.
     pub size: usize,
@@ -32,21 +32,22 @@ pub struct Scene {
     pub grid: usize,
 }
 
-/// A soft picture, and what every pixel of it tells the triangles.
+/// A soft picture, and the gradient of every pixel with respect to the triangles.
 pub struct Field {
     /// Coverage `[size * size]` in [0, 1], top row first.
     pub image: Vec<f32>,
-    /// Derivatives of the coverage of each pixel of a coarser picture by each corner: `[grid * grid, triangles, 3, 2]`, per NDC.
+    /// Derivatives of the coverage of each pixel of a coarser picture with respect to each corner:
+    /// `[grid * grid, triangles, 3, 2]`, per NDC.
     pub gradient: Vec<f32>,
 }
 
-/// Draws triangles one over the other, and keeps what the next picture needs again.
+/// Draws triangles over each other, and caches renderers for the next picture.
 #[derive(Default)]
 pub struct Playground {
     kept: Option<(Key, SoftRenderer<EdgeSoftness>, SoftRenderer<EdgeSoftness>)>,
 }
 
-/// What renderers were made for, but for the width.
+/// Parameters of the cached renderers, except the width.
 #[derive(PartialEq)]
 struct Key {
     name: String,
@@ -61,7 +62,7 @@ impl Playground {
     ///
     /// # Errors
     ///
-    /// If a name is not one, or a number out of range.
+    /// If a name is unknown, or a number out of range.
     pub fn draw(&mut self, scene: &Scene) -> anyhow::Result<Field> {
         let Scene { triangles, softness: choice, width, t_conorm, size, grid } = scene;
         ensure!(
@@ -110,16 +111,16 @@ impl Playground {
     }
 }
 
-/// Parameters of the softness with these, stretched to a width in NDC.
+/// The parameters scaled to a width in NDC.
 fn of_width(edge: EdgeSoftness, phi: &[f64], width: f64) -> Vec<f64> {
     let ratio = width / edge.width(phi);
     edge.with_scale_values(phi, if edge.scale_is_squared() { ratio * ratio } else { ratio })
 }
 
-/// Derivatives of the coverage at the pixels of a `grid` by each corner, `[grid * grid, corners, 2]`.
+/// Derivatives of the coverage at the pixels of a `grid` with respect to each corner, `[grid * grid, corners, 2]`.
 ///
-/// Every pixel is a view of its own, of one pixel, which sees the triangles from there: so the gradient of the sum of all images is
-/// that of each pixel by corners of its own.
+/// Every pixel is a separate view of one pixel, with the triangles moved to it: the gradient of the sum of all images
+/// then has the gradient of each pixel in that view's corners.
 fn gradients(pixel: &SoftRenderer<EdgeSoftness>, corners: &[[f64; 2]], grid: usize) -> Vec<f32> {
     let centre = |k: usize| (2 * k + 1) as f64 / grid as f64 - 1.0;
     let places: Vec<_> = (0..grid * grid).map(|k| [centre(k % grid), -centre(k / grid)]).collect();
@@ -129,7 +130,7 @@ fn gradients(pixel: &SoftRenderer<EdgeSoftness>, corners: &[[f64; 2]], grid: usi
     floats(gradient.narrow(2, 0, 2))
 }
 
-/// Corners as they are seen from each of some places, `[places, corners, 3]`: x and y in NDC, depth 1.
+/// Corners relative to each of these places, `[places, corners, 3]`: x and y in NDC, depth 1.
 fn vertices<B: RasterBackend>(corners: &[[f64; 2]], places: &[[f64; 2]]) -> Tensor<B, 3> {
     let from = |[x, y]: &[f64; 2]| {
         let (x, y) = (*x, *y);

@@ -7,7 +7,7 @@ use softrast_tensor::{numbers, vector};
 
 use crate::{CameraView, Coming, Frame, Run, Settings};
 
-/// POSE: the camera of a target that was drawn from a pose of its own.
+/// POSE: finds the camera of a seeded target.
 pub struct PoseRun<B: RasterBackend> {
     run: Minimization<PoseProblem, B>,
     instance: PoseInstance,
@@ -15,11 +15,11 @@ pub struct PoseRun<B: RasterBackend> {
 }
 
 impl<B: RasterBackend> PoseRun<B> {
-    /// The run of a seed, not begun.
+    /// The run of a seed, before its first step.
     ///
     /// # Errors
     ///
-    /// If the softness is not one.
+    /// If the softness is invalid.
     pub fn new(mesh: &Mesh, settings: &Settings) -> anyhow::Result<Self> {
         let problem = PoseProblem::new(mesh);
         let (method, config) = settings.method("pose", problem.defaults().learning_rate)?;
@@ -28,7 +28,7 @@ impl<B: RasterBackend> PoseRun<B> {
         Ok(Self { run, instance, config })
     }
 
-    /// Vertices as the target camera has its axes: a frame in which that camera stands at elevation 0 and azimuth 0, flat.
+    /// Vertices along the axes of the target camera, flat: in this frame the camera is at elevation 0 and azimuth 0.
     pub fn turned(&self, mesh: &Mesh) -> Vec<f32> {
         let target = self.instance.target;
         let of = |angle: f64| vector::<HostBackend>(&[angle]);

@@ -6,28 +6,28 @@ use softrast_tensor::{Tensor, numbers, vector};
 
 use crate::Backend;
 
-/// What stands before the name of a softness that was learned.
+/// Prefix of the name of a learned softness.
 const LEARNED: &str = "learned:";
-/// The name of the best softness that is known for a task.
+/// Name of the best known softness of a task.
 const PRESET: &str = "preset";
-/// Least and largest width of a softness, in NDC.
+/// Smallest and largest width of a softness, in NDC.
 const WIDTHS: [f64; 2] = [1e-4, 1.0];
 /// Largest image, and most steps and triangles: more would take a browser minutes.
 const LARGEST_SIZE: usize = 256;
 const MOST_STEPS: usize = 2000;
 const MOST_TRIANGLES: usize = 1000;
 
-/// What one run is asked. Two runs with the same settings, mesh and picture are the same.
+/// Settings of one run. Runs with equal settings, mesh and picture are equal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Chooses target and start; at most 2^32 - 1, so that it is a number on a page too.
+    /// Seed of target and start; at most 2^32 - 1, so that JavaScript can represent it.
     pub seed: u32,
     /// Pixels a side of the image, 16 to 256.
     pub size: usize,
     /// Steps of the optimiser, 1 to 2000.
     pub steps: usize,
-    /// Its learning rate; without one, that of the softness, or else of the problem.
+    /// Learning rate of the optimiser; by default that of the softness, or else of the problem.
     #[serde(default)]
     pub learning_rate: Option<f64>,
     /// Triangles of 2D SHAPE, 1 to 1000.
@@ -43,7 +43,7 @@ pub struct Settings {
 pub struct SoftnessChoice {
     /// `preset`, `learned:NAME` or a family.
     pub name: String,
-    /// Whether a family sees the squared distance.
+    /// Whether the input of a family is the squared distance.
     #[serde(default)]
     pub squared: bool,
     /// Width of a family at the beginning, in NDC, 1e-4 to 1.
@@ -58,7 +58,7 @@ fn usual_triangles() -> usize {
     200
 }
 
-// As those of the task POSE.
+// As in the task POSE.
 fn usual_first() -> f64 {
     0.03
 }
@@ -72,7 +72,7 @@ impl Settings {
     ///
     /// # Errors
     ///
-    /// One line that says what is wrong.
+    /// A message of one line with the mistake.
     pub fn parse(json: &str) -> anyhow::Result<Self> {
         let settings: Self =
             serde_json::from_str(json).context("these are no settings of a run")?;
@@ -94,7 +94,7 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Softness and numbers with which a problem of this task is solved, whose usual learning rate this is.
+    /// Method and numbers for a problem of this task, whose default learning rate is `usual_rate`.
     pub(crate) fn method(
         &self,
         task: &str,
@@ -108,13 +108,13 @@ impl Settings {
 }
 
 impl SoftnessChoice {
-    /// The softness for a task: `pose`, `mask` or `shape2d`. A learning rate that was learned on another task is left out.
+    /// The softness for a task: `pose`, `mask` or `shape2d`. A learning rate that was learned on another task is dropped.
     ///
     /// # Errors
     ///
-    /// If there is none of this name, or a width is out of range.
+    /// If no softness has this name, or a width is out of range.
     pub fn of_task(&self, task: &str) -> anyhow::Result<ScheduledSoftness> {
-        // What was learned on POSE with feedback expects to begin again from other starts, which a mask brings by itself.
+        // Masks use the softness learned on POSE without feedback: feedback restarts from other starts, which masks have anyway.
         let (learned_on, preset) = if task == "mask" { ("pose", "pose") } else { (task, "") };
         let softness = match self.name.strip_prefix(LEARNED) {
             Some(name) => ScheduledSoftness::learned(name)?,
@@ -122,7 +122,7 @@ impl SoftnessChoice {
             None if self.name == PRESET => ScheduledSoftness::learned(preset)?,
             None => return self.of_family(),
         };
-        // The poses of masks are in other units, so their problem has its own rate.
+        // Poses from masks have other units, so their problem has its own learning rate.
         let suits = softness.task.as_deref().is_none_or(|of| of == learned_on) && task != "mask";
         Ok(ScheduledSoftness {
             learning_rate: softness.learning_rate.filter(|_| suits),
@@ -150,7 +150,7 @@ impl SoftnessChoice {
         })
     }
 
-    /// Names of all that there are: the preset, families, then what was learned.
+    /// All names: the preset, families, then learned softnesses.
     pub fn names() -> [Vec<String>; 3] {
         let families = Family::ALL.map(|family| family.name().to_owned()).to_vec();
         let learned =
@@ -159,8 +159,8 @@ impl SoftnessChoice {
     }
 }
 
-/// Values s(d) of a softness at `progress` of its path, 0 to 1, on images of `size` pixels a side: at `count` distances, evenly spaced from
-/// `-reach` to `reach` in NDC, `[count]`. Those of its surrogate stand behind them, if it has one.
+/// Values s(d) of a softness at `progress` of a run, 0 to 1, on images of `size` pixels a side: at `count` distances,
+/// evenly spaced from `-reach` to `reach` in NDC, `[count]`. Those of its surrogate, if it has one, follow.
 pub fn curves(
     softness: &ScheduledSoftness,
     progress: f64,

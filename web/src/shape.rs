@@ -67,18 +67,18 @@ impl InverseProblem for Covering {
     }
 }
 
-/// 2D SHAPE: loose triangles move until they cover what is white in a picture.
+/// 2D SHAPE: moves loose triangles until they cover the white pixels of a picture.
 pub struct ShapeRun<B: RasterBackend> {
     run: Minimization<Covering, B>,
     config: SolveConfig,
 }
 
 impl<B: RasterBackend> ShapeRun<B> {
-    /// The run of a seed, which places the triangles; not begun.
+    /// The run of a seed, which places the triangles, before its first step.
     ///
     /// # Errors
     ///
-    /// If the softness is not one.
+    /// If the softness is invalid.
     pub fn new(picture: Picture, settings: &Settings) -> anyhow::Result<Self> {
         let problem = Covering { picture, triangles: settings.triangles };
         let (method, config) = settings.method("shape2d", problem.defaults().learning_rate)?;

@@ -1,6 +1,6 @@
-//! Makes a module for browsers of what the compiler writes: `bind FILE.wasm FOLDER`.
+//! Makes a module for browsers from the compiler's output: `bind FILE.wasm FOLDER`.
 //!
-//! It does what wasm-bindgen's own program does for a page, in the version of the lock file, and is built in a fraction of the time.
+//! It replaces wasm-bindgen's own program for a page, in the version of the lock file, and builds in a fraction of the time.
 
 use anyhow::Context;
 use wasm_bindgen_cli_support::Bindgen;
